@@ -1,0 +1,211 @@
+"""How the axes of a study are laid out as a map: along x, along y, over panels, or fixed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from cvt_hpc.analysis.figures import axis_label, display_unit
+from cvt_hpc.errors import InputError, mismatch, unknown
+
+MOST_VALUES_NAMED = 12
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """A study's dataset, reduced to what one picture shows.
+
+    Attributes
+    ----------
+    dataset : Dataset
+        Sorted along x, y and panels; the dimensions of `status` are among these.
+    x : str
+        Dimension along x.
+    y, panel : str or None
+        Dimension along y and over the panels, if the study has that many.
+    notes : tuple of str
+        What is fixed, in words.
+    """
+
+    dataset: xr.Dataset
+    x: str
+    y: str | None
+    panel: str | None
+    notes: tuple[str, ...]
+
+
+def arrange(dataset: xr.Dataset, at: Mapping[str, Any]) -> Arrangement:
+    """Choose what a map shows.
+
+    `load` runs along x, else the last numeric axis; `friction_gradient` along y, `sheave_stiffness` over
+    the panels, else the first axes that are left. Further axes are fixed at their first value.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        Results of a study.
+    at : mapping
+        Axes to fix: name -> value on the axis, as a number [SI] or a text.
+
+    Raises
+    ------
+    InputError
+        `at` names no axis, or no value on it; or no axis is left to draw.
+    """
+    axes = list(map(str, dataset["status"].dims))
+    notes = []
+    for name, value in at.items():
+        if name not in axes:
+            raise unknown("at", "axis of the results", name, axes)
+        index = _index_of(dataset[name], value)
+        notes.append(f"{name.replace('_', ' ')} = {value_text(dataset[name], index)}")
+        dataset = dataset.isel({name: index})
+    free = [name for name in axes if name not in at]
+    if not free:
+        raise InputError(
+            "map: expected results over one axis or more, found a single run, which `cvt-hpc simulate` draws"
+        )
+    numeric = [name for name in free if dataset[name].dtype.kind in "iuf"]
+    x = "load" if "load" in numeric else (numeric or free)[-1]
+    rest = [name for name in free if name != x]
+    # The panels' axis must not be taken for y where there is another one to take.
+    y = _take(rest, "friction_gradient", avoid="sheave_stiffness")
+    panel = _take(rest, "sheave_stiffness")
+    for name in rest:
+        count = dataset.sizes[name]
+        notes.append(f"{name.replace('_', ' ')} = {value_text(dataset[name], 0)} (first of {count})")
+        dataset = dataset.isel({name: 0})
+    for name in filter(None, (x, y, panel)):
+        if dataset[name].dtype.kind in "iuf":
+            dataset = dataset.sortby(name)
+    return Arrangement(dataset, x, y, panel, tuple(notes))
+
+
+def _take(names: list[str], preferred: str, avoid: str = "") -> str | None:
+    """Take the preferred name off the list, else the first, one to avoid last."""
+    if not names:
+        return None
+    others = [name for name in names if name != avoid]
+    name = preferred if preferred in names else (others or names)[0]
+    names.remove(name)
+    return name
+
+
+def _index_of(coordinate: xr.DataArray, value: Any) -> int:
+    """Index of a value on an axis."""
+    values = coordinate.values
+    if values.dtype.kind in "iuf":
+        try:
+            wanted = float(value)
+        except (TypeError, ValueError):
+            wanted = np.nan
+        hits = np.flatnonzero((values == wanted) | np.isclose(values, wanted, rtol=1e-9, atol=0))
+    else:
+        hits = np.flatnonzero(values.astype(str) == str(value))
+    if hits.size == 0:
+        raise mismatch(
+            f"at {coordinate.name}", f"a value of that axis: {_known_values(coordinate)}", repr(value)
+        )
+    return int(hits[0])
+
+
+def _known_values(coordinate: xr.DataArray) -> str:
+    """The values of an axis [SI] in words, a few of them if there are many."""
+    is_numeric = coordinate.dtype.kind in "iuf"
+    texts = [f"{value:g}" if is_numeric else str(value) for value in coordinate.values.tolist()]
+    if len(texts) > MOST_VALUES_NAMED:
+        texts = [*texts[: MOST_VALUES_NAMED - 1], "...", texts[-1]]
+    unit = coordinate.attrs.get("units", "1")
+    return ", ".join(texts) + ("" if unit in ("", "1") else f" [{unit}]")
+
+
+def value_text(coordinate: xr.DataArray, index: int) -> str:
+    """A value of an axis for people, in its display unit; infinite stiffness is "rigid"."""
+    value = coordinate.values[index]
+    if coordinate.dtype.kind not in "iuf":
+        return str(value)
+    if np.isinf(value):
+        return _infinity(str(coordinate.name))
+    factor, unit = display_unit(coordinate.attrs.get("units", ""))
+    return f"{_number(value * factor)} {unit}".strip()
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}".replace("-", "−")
+
+
+def _infinity(name: str) -> str:
+    return "rigid" if name.endswith("stiffness") else "∞"
+
+
+@dataclass(frozen=True)
+class Ruler:
+    """Where the values of an axis lie along a side of the map.
+
+    Attributes
+    ----------
+    centres : array, shape (value,)
+        Positions of the grid points, in display units.
+    edges : array, shape (value + 1,)
+        Borders of their cells, halfway between.
+    ticks : array or None
+        Where ticks have to be; None leaves it to the plotting library.
+    tick_labels : tuple of str
+        Their texts.
+    label : str
+        Name and unit.
+    """
+
+    centres: NDArray[np.float64]
+    edges: NDArray[np.float64]
+    ticks: NDArray[np.float64] | None
+    tick_labels: tuple[str, ...]
+    label: str
+
+
+def ruler(coordinate: xr.DataArray) -> Ruler:
+    """Lay out an axis: numbers at their true place, an infinite one behind them, texts side by side.
+
+    Parameters
+    ----------
+    coordinate : DataArray, shape (value,)
+        Sorted if numeric; `units` is its SI unit.
+    """
+    name = str(coordinate.name)
+    factor, unit = display_unit(coordinate.attrs.get("units", ""))
+    values = coordinate.values
+    if values.dtype.kind not in "iuf":
+        centres = np.arange(float(values.size))
+        return Ruler(centres, _edges(centres), centres, tuple(map(str, values)), axis_label(name, ""))
+    centres = values * factor
+    finite = np.isfinite(centres)
+    if np.all(finite):
+        return Ruler(centres, _edges(centres), *_exact_ticks(centres), axis_label(name, unit))
+    labels = tuple(_number(c) if np.isfinite(c) else _infinity(name) for c in centres)
+    known = centres[finite]
+    gap = np.diff(known).mean() if known.size > 1 else 1.0
+    start = known[-1] if known.size else 0.0
+    centres = np.where(finite, centres, start + gap)
+    return Ruler(centres, _edges(centres), centres, labels, axis_label(name, unit))
+
+
+def _exact_ticks(centres: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
+    """Ticks at the grid points where these are few and far enough apart to be labelled."""
+    few = centres.size <= 6
+    if few and (centres.size == 1 or np.diff(centres).min() > 0.5 * np.ptp(centres) / (centres.size - 1)):
+        return centres, tuple(map(_number, centres))
+    return None, ()
+
+
+def _edges(centres: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Borders of the cells around points, halfway between; the outer cells are symmetric."""
+    if centres.size == 1:
+        half = 0.05 * abs(centres[0]) or 0.5
+        return np.array([centres[0] - half, centres[0] + half])
+    middles = (centres[1:] + centres[:-1]) / 2
+    return np.concatenate(([2 * centres[0] - middles[0]], middles, [2 * centres[-1] - middles[-1]]))

@@ -1,0 +1,106 @@
+"""From a run's displacement history to its amplitudes, frequencies, growth rates, and whether it vibrates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cvt_hpc.analysis import signals
+from cvt_hpc.analysis.occurrence import classify
+from cvt_hpc.variables import Vibrates
+
+
+@dataclass(frozen=True)
+class Occurrence:
+    """Whether and how a run vibrates.
+
+    Attributes
+    ----------
+    vibrates : Vibrates
+        The verdict.
+    reason : str
+        One line that says why, ASCII, at most 240 characters.
+    strands : tuple of str
+        Labels of the strands, the order of the arrays below.
+    amplitude : array, shape (strand,)
+        Band-limited peak amplitude over the judged part [m], at the strongest probe.
+    frequency : array, shape (strand,)
+        Dominant frequency at that probe [Hz]; nan without a peak in the band.
+    growth_rate, growth_error : array, shape (strand,)
+        Growth rate over the judged part and its standard error [1/s]; nan where nothing moves.
+    strongest_probe : array of int, shape (strand,)
+        Column of the displacement with the largest amplitude.
+    """
+
+    vibrates: Vibrates
+    reason: str
+    strands: tuple[str, ...]
+    amplitude: NDArray[np.float64]
+    frequency: NDArray[np.float64]
+    growth_rate: NDArray[np.float64]
+    growth_error: NDArray[np.float64]
+    strongest_probe: NDArray[np.int64]
+
+
+def assess(
+    displacement: ArrayLike, rate: float, strands: Sequence[str], parameters: Mapping[str, Any]
+) -> Occurrence:
+    """Judge a run by its displacement history.
+
+    Parameters
+    ----------
+    displacement : array, shape (time, probe)
+        Displacement of the probes over the whole run [m].
+    rate : float
+        Sampling rate [Hz].
+    strands : sequence of str, length probe
+        The strand on which each probe lies.
+    parameters : mapping
+        Flat parameters with the keys of `PARAMETERS["vibration"]`.
+
+    Returns
+    -------
+    Occurrence
+        Strands in the order in which they first appear in `strands`.
+
+    Raises
+    ------
+    ValueError
+        The displacement is not finite, or too short for the band.
+    """
+    w = np.asarray(displacement, dtype=float)
+    judged = w[len(w) - round(parameters["judged_fraction"] * len(w)) :]
+    band = (parameters["band_low"], parameters["band_high"])
+    duration = len(judged) / rate
+    window = signals.fitting_window(duration, parameters["window_length"])
+    centres, windows = signals.window_amplitudes(judged, rate, band, window)
+    amplitudes = signals.band_amplitude(judged, rate, band)
+    names = tuple(dict.fromkeys(strands))
+    members = [np.flatnonzero(np.asarray(strands) == name) for name in names]
+    strongest = np.array([columns[np.argmax(amplitudes[columns])] for columns in members])
+    strand_windows = np.stack([windows[:, columns].max(axis=1) for columns in members], axis=1)
+    growth = signals.growth_fit(centres, strand_windows)
+    vibrates, reason = classify(
+        strand_windows,
+        growth.rate,
+        growth.standard_error,
+        judged_time=duration,
+        record_time=len(w) / rate,
+        parameters=parameters,
+        strands=names,
+    )
+    frequency = signals.dominant_frequency(judged[:, strongest], rate, band)
+    return Occurrence(
+        vibrates,
+        reason,
+        names,
+        amplitudes[strongest],
+        frequency,
+        growth.rate,
+        growth.standard_error,
+        strongest,
+    )

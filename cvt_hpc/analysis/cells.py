@@ -1,0 +1,187 @@
+"""The cells of a map: a run's class shows in lightness, in hatching, and in the mark on its grid point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PatchCollection
+from matplotlib.colors import Colormap, ListedColormap, Normalize, to_rgba
+from matplotlib.figure import Figure
+from matplotlib.legend_handler import HandlerTuple
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+from numpy.typing import NDArray
+
+from cvt_hpc.analysis.arrangement import Ruler
+from cvt_hpc.analysis.classes import OccurrenceClass
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ClassStyle:
+    """How a class looks: fill and hatching of its cells, mark on the grid points with its relative size."""
+
+    fill: str
+    ink: str
+    rim: str
+    hatch: str
+    mark: str
+    mark_size: float
+
+
+# Lightness falls from not run (white) over quiet to undecided; vibrating cells follow below. Failed ones are
+# white under the densest hatching, which no other class comes near in any print.
+STYLES = {
+    OccurrenceClass.QUIET: ClassStyle("#e9eef2", "#7c8a96", "#7c8a96", "", "o", 0.5),
+    OccurrenceClass.VIBRATING: ClassStyle("#e8703a", "#ffffff", "#000000", "", "o", 1.0),
+    OccurrenceClass.UNDECIDED: ClassStyle("#bccde0", "#23405f", "#23405f", "///", "$?$", 2.0),
+    OccurrenceClass.FAILED: ClassStyle("#ffffff", "#a01010", "#ffffff", "xxxx", "X", 2.2),
+    OccurrenceClass.NOT_RUN: ClassStyle("#ffffff", "#8a8a8a", "#8a8a8a", "", "_", 1.4),
+}
+
+
+def _part_of(name: str, start: float, stop: float) -> Colormap:
+    """Part of a colour map of the plotting library, in steps that an eye finds again on the colour bar."""
+    return ListedColormap(matplotlib.colormaps[name](np.linspace(start, stop, 24)), name)
+
+
+# Both fall in lightness all the way and begin darker than undecided cells.
+AMPLITUDE_COLOURS = _part_of("inferno_r", 0.27, 0.92)
+FREQUENCY_COLOURS = _part_of("viridis_r", 0.30, 1.0)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What colours the vibrating cells, and how."""
+
+    colours: Colormap
+    norm: Normalize
+    label: str
+
+
+def draw_cells(
+    axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], values: Array, scale: Scale
+) -> None:
+    """Draw the cells of one panel, and borders between the classes.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where to draw.
+    x, y : Ruler
+        Places of the columns and rows.
+    classes : array, shape (row, column)
+        `OccurrenceClass` of each run.
+    values : array, shape (row, column)
+        What colours the vibrating cells; where it is nan they keep the colour of their class.
+    scale : Scale
+        How it colours them.
+    """
+    for kind, style in STYLES.items():
+        inside = classes == kind
+        cells = [_cell(x, y, row, column) for row, column in np.argwhere(inside)]
+        fills = _fills(kind, values[inside], scale)
+        # Cells and marks are pixels even in a vector format: thousands of shapes would make megabytes of it.
+        axes.add_collection(
+            PatchCollection(cells, facecolors=fills, edgecolors="white", linewidths=0.3, rasterized=True)
+        )
+        if style.hatch:
+            lines = {"facecolors": "none", "edgecolors": style.ink, "linewidths": 0, "hatch": style.hatch}
+            axes.add_collection(PatchCollection(cells, rasterized=True, **lines))
+    axes.add_collection(LineCollection(_borders(x, y, classes), colors="#202020", linewidths=1.0))
+    axes.set(xlim=x.edges[[0, -1]], ylim=y.edges[[0, -1]])
+
+
+def draw_marks(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], size: float) -> None:
+    """Mark the grid points by class; arguments as for `draw_cells`, and the size of a dot [point]."""
+    for kind, style in STYLES.items():
+        rows, columns = np.nonzero(classes == kind)
+        axes.plot(
+            x.centres[columns],
+            y.centres[rows],
+            linestyle="",
+            marker=style.mark,
+            markersize=size * style.mark_size,
+            color=style.ink,
+            markeredgecolor=style.rim,
+            markeredgewidth=0.2 * size,
+            rasterized=True,
+        )
+
+
+def write_values(
+    axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], values: Array, fills: Array, scale: Scale
+) -> None:
+    """Write `values` as whole numbers above the grid points of vibrating cells that are filled by `fills`."""
+    vibrating = (classes == OccurrenceClass.VIBRATING) & np.isfinite(values)
+    for row, column in np.argwhere(vibrating):
+        (fill,) = _fills(OccurrenceClass.VIBRATING, fills[row : row + 1, column], scale)
+        axes.annotate(
+            f"{values[row, column]:.0f}",
+            (x.centres[column], y.centres[row]),
+            xytext=(0, 2.5),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=8.5,
+            color=_ink_on(fill, "#000000"),
+        )
+
+
+def class_legend(figure: Figure) -> None:
+    """Legend of all classes below the panels: fill, hatching and mark."""
+    handles, labels = [], []
+    for kind, style in STYLES.items():
+        outline = style.ink if style.hatch else "#606060"
+        cell = Patch(facecolor=style.fill, edgecolor=outline, hatch=style.hatch, linewidth=0.8)
+        size = 4.0 * style.mark_size
+        mark = Line2D([], [], ls="", marker=style.mark, color=style.ink, markersize=size, mec=style.rim)
+        handles.append((cell, mark))
+        labels.append(kind.label)
+    figure.legend(
+        handles,
+        labels,
+        loc="outside lower center",
+        ncols=len(handles),
+        frameon=False,
+        handler_map={tuple: HandlerTuple(ndivide=1, pad=0)},
+        handlelength=2.2,
+        handleheight=1.5,
+        columnspacing=1.3,
+    )
+
+
+def _cell(x: Ruler, y: Ruler, row: int, column: int) -> Rectangle:
+    corner = x.edges[column], y.edges[row]
+    return Rectangle(corner, x.edges[column + 1] - corner[0], y.edges[row + 1] - corner[1])
+
+
+def _fills(kind: OccurrenceClass, values: Array, scale: Scale) -> Array:
+    """Colours (cell, rgba) of cells of one class."""
+    fills = np.tile(to_rgba(STYLES[kind].fill), (len(values), 1))
+    if kind is OccurrenceClass.VIBRATING:
+        known = np.isfinite(values)
+        fills[known] = scale.colours(scale.norm(values[known]))
+    return fills
+
+
+def _ink_on(fill: Array, ink: str) -> str:
+    """The ink, or white where the fill is too dark for it."""
+    return "#ffffff" if fill[:3] @ (0.299, 0.587, 0.114) < 0.45 else ink
+
+
+def _borders(x: Ruler, y: Ruler, classes: NDArray[np.int8]) -> list[list[tuple[float, float]]]:
+    """Sides between cells of different classes."""
+    upright = [
+        [(x.edges[column + 1], y.edges[row]), (x.edges[column + 1], y.edges[row + 1])]
+        for row, column in np.argwhere(classes[:, 1:] != classes[:, :-1])
+    ]
+    level = [
+        [(x.edges[column], y.edges[row + 1]), (x.edges[column + 1], y.edges[row + 1])]
+        for row, column in np.argwhere(classes[1:] != classes[:-1])
+    ]
+    return upright + level

@@ -1,0 +1,129 @@
+"""What all pictures share: a style, units for people, and files that are whole or not there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+
+from cvt_hpc.errors import InputError, mismatch
+
+WIDTH = 6.4  # [inch]: letters of 10 points stay readable across a page and on a telephone held sideways
+RESOLUTION = 170  # dots per inch
+FORMATS = (".png", ".svg", ".pdf")
+
+# Applied around the drawing with matplotlib.rc_context: a user's settings do not change the picture, nor the
+# picture the user's settings.
+STYLE = {
+    "font.family": "DejaVu Sans",
+    "font.size": 10,
+    "axes.labelsize": 10,
+    "axes.titlesize": 10,
+    "axes.linewidth": 0.8,
+    "figure.titlesize": 11,
+    "xtick.labelsize": 9,
+    "ytick.labelsize": 9,
+    "legend.fontsize": 9,
+    "hatch.linewidth": 0.7,
+    "axes.unicode_minus": True,
+    "svg.hashsalt": "cvt_hpc",
+}
+
+_DISPLAY_UNITS = {
+    "m": (1e3, "mm"),
+    "s": (1e3, "ms"),
+    "N": (1e-3, "kN"),
+    "rad s-1": (30 / 3.141592653589793, "rpm"),
+    "rad": (180 / 3.141592653589793, "°"),
+    "1": (1.0, ""),
+}
+
+
+def display_unit(unit: str) -> tuple[float, str]:
+    """Factor and unit in which a quantity with this SI unit is shown: ("N") -> (1e-3, "kN")."""
+    known = _DISPLAY_UNITS.get(unit.replace("rad/s", "rad s-1"))
+    return known if known is not None else (1.0, unit.replace("s m-1", "s/m").replace("N m-1", "N/m"))
+
+
+def axis_label(name: str, unit: str) -> str:
+    """Name of a variable in words, with its display unit in brackets."""
+    words = name.replace("_", " ")
+    return f"{words} [{unit}]" if unit else words
+
+
+def save_figure(figure: Figure, out: Path) -> Path:
+    """Write a picture in the format that the suffix names.
+
+    Parameters
+    ----------
+    figure : Figure
+        What to write.
+    out : Path
+        The picture; its folder is made if needed.
+
+    Returns
+    -------
+    Path
+        `out`.
+
+    Raises
+    ------
+    InputError
+        The suffix is none of .png, .svg, .pdf.
+    """
+    out = Path(out)
+    check_format(out)
+    suffix = out.suffix.lower()
+    with written_aside(out) as aside:
+        if suffix == ".png":
+            _write_png(figure, aside)
+        else:  # without the date, so that the same results give the same file
+            undated = {"Date" if suffix == ".svg" else "CreationDate": None}
+            figure.savefig(aside, format=suffix[1:], metadata=undated, dpi=1.5 * RESOLUTION)
+    return out
+
+
+def _write_png(figure: Figure, path: Path) -> None:
+    """Write a picture of 256 colours: a quarter of the size of full colour, and no different to the eye."""
+    figure.set_dpi(RESOLUTION)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    reduced = picture.quantize(256, Image.Quantize.MEDIANCUT, kmeans=1, dither=Image.Dither.NONE)
+    reduced.save(path, "png", optimize=True, dpi=(RESOLUTION, RESOLUTION))
+
+
+def check_format(out: Path) -> None:
+    """Raise InputError unless the suffix names a picture format."""
+    if out.suffix.lower() not in FORMATS:
+        raise mismatch(str(out), f"a picture: {', '.join(FORMATS)}", out.suffix or "no suffix")
+
+
+@contextmanager
+def written_aside(out: Path) -> Iterator[Path]:
+    """Give a path beside `out` to write to, and rename it to `out` once it is complete and on the disk.
+
+    Raises
+    ------
+    InputError
+        The system refuses; what stood at `out` is then untouched.
+    """
+    aside = out.with_name(f".{out.stem}.{os.getpid()}.part{out.suffix}")
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        yield aside
+        with aside.open("rb") as finished:
+            os.fsync(finished.fileno())
+        os.replace(aside, out)
+    except (OSError, RuntimeError) as error:  # RuntimeError: what the netCDF library makes of a full disk
+        found = getattr(error, "strerror", None) or error
+        raise InputError(f"{out}: expected to be able to write, found: {found}") from error
+    finally:
+        with suppress(OSError):
+            aside.unlink()

@@ -1,0 +1,153 @@
+"""The history of one run: as a file, and as a picture."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from textwrap import fill
+
+import matplotlib
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from cvt_hpc.analysis import history_panels as panels
+from cvt_hpc.analysis.figures import STYLE, WIDTH, check_format, save_figure, written_aside
+from cvt_hpc.analysis.occurrence import PARAMETERS
+from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.variables import Status, Vibrates
+
+CONTENT = "cvt_hpc_content"  # global attribute by which this program knows its own files
+HISTORY = "history of one run"
+LEFT, RIGHT, WHOLE = slice(0, 2), 2, slice(0, 3)  # columns of a panel
+
+
+def write_history(dataset: xr.Dataset, path: Path) -> Path:
+    """Write the history of one run as netCDF.
+
+    The file is complete or not there: it is written aside and renamed.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        As `cvt_hpc.simulate.simulate` returns it.
+    path : Path
+        The file; its folder is made if needed.
+
+    Returns
+    -------
+    Path
+        `path`.
+
+    Raises
+    ------
+    InputError
+        `path` exists and is not a history that this program wrote, or the system refuses.
+    """
+    path = Path(path)
+    if path.exists() and not is_history(path):
+        raise mismatch(
+            str(path), "a new file, or a history written by cvt_hpc", "another file, left as it is"
+        )
+    marked = dataset.assign_attrs({CONTENT: HISTORY})
+    encoding = {
+        name: _encoding(variable, name in marked.coords) for name, variable in marked.variables.items()
+    }
+    with written_aside(path) as aside:
+        marked.to_netcdf(aside, engine="netcdf4", format="NETCDF4", encoding=encoding)
+    return path
+
+
+def is_history(path: Path) -> bool:
+    """Whether a file is a history that this program wrote."""
+    try:
+        with xr.open_dataset(path, engine="netcdf4", decode_cf=False) as dataset:
+            return dataset.attrs.get(CONTENT) == HISTORY
+    except (OSError, ValueError):
+        return False
+
+
+def _encoding(variable: xr.Variable, is_coordinate: bool) -> dict:
+    """Compress numbers, and leave coordinates without fill values."""
+    if variable.dtype.kind not in "iuf":
+        return {}
+    packing = {"zlib": True, "complevel": 4} if variable.ndim else {}
+    needs_fill = variable.dtype.kind == "f" and not is_coordinate
+    return packing if needs_fill else {**packing, "_FillValue": None}
+
+
+def draw_history(dataset: xr.Dataset, out: Path) -> Path:
+    """Draw the history of one run; what the dataset does not hold is left out.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        `displacement` (time, probe) [m], `load` (time) [N m], `ring_tension` and `push_force` (position) [N],
+        `contact_force` (position) [N/m], `region` (position), and the run's verdict.
+    out : Path
+        The picture: .png, .svg or .pdf.
+
+    Returns
+    -------
+    Path
+        `out`.
+
+    Raises
+    ------
+    InputError
+        There is nothing to draw, or the suffix is not a picture's.
+    """
+    check_format(Path(out))
+    with matplotlib.rc_context(STYLE):
+        return save_figure(history_figure(dataset), Path(out))
+
+
+def history_figure(dataset: xr.Dataset) -> Figure:
+    """Compose the picture of `draw_history`; to be called within STYLE."""
+    settings = _vibration_settings(dataset)
+    band = (settings["band_low"], settings["band_high"])
+    strands = panels.read_strands(dataset, settings["judged_fraction"], band)
+    with_spectrum = [strand for strand in strands if strand.has_spectrum]
+    rows = [
+        (1.6, [(LEFT, panels.draw_displacement, strand), (RIGHT, panels.draw_close_up, strand)])
+        for strand in strands
+    ]
+    if "load" in dataset and "time" in dataset["load"].dims and np.ptp(dataset["load"].values) > 0:
+        rows.append((1.2, [(LEFT, panels.draw_load, dataset)]))
+    if with_spectrum:
+        rows.append((2.1, [(WHOLE, panels.draw_spectra, with_spectrum)]))
+    if "ring_tension" in dataset or "push_force" in dataset:
+        rows.append((2.0, [(WHOLE, panels.draw_forces, dataset)]))
+    if "contact_force" in dataset:
+        rows.append((1.5, [(WHOLE, panels.draw_contact, dataset)]))
+    if not rows:
+        raise InputError("history: expected displacement, load or forces of a run, found none of them")
+    title = _title(dataset)
+    heights = [height for height, _ in rows]
+    figure = Figure((WIDTH, sum(heights) + 0.2 * title.count("\n") + 0.4), layout="constrained")
+    figure.suptitle(title)
+    grid = figure.add_gridspec(len(rows), 3, height_ratios=heights)
+    for i, (_, row) in enumerate(rows):
+        for columns, draw, what in row:
+            draw(figure.add_subplot(grid[i, columns]), what)
+    return figure
+
+
+def _vibration_settings(dataset: xr.Dataset) -> dict[str, float]:
+    """Table [vibration] of the run's job, defaults where the dataset does not tell."""
+    defaults = {key: parameter.default for key, parameter in PARAMETERS["vibration"].items()}
+    return defaults | json.loads(dataset.attrs.get("job", "{}")).get("vibration", {})
+
+
+def _title(dataset: xr.Dataset) -> str:
+    """What run, and what became of it."""
+    lines = ["One run: " + dataset.attrs["job_name"] if "job_name" in dataset.attrs else "One run"]
+    status = Status(int(dataset["status"])) if "status" in dataset else None
+    reason = dataset["reason"].item() if "reason" in dataset else ""
+    reason = reason.decode() if isinstance(reason, bytes) else reason
+    if status is Status.DONE and "vibrates" in dataset:
+        verdict = Vibrates(int(dataset["vibrates"]))
+        lines.append(f"vibrates: {verdict.name.lower()}" + (f" ({reason})" if reason else ""))
+    elif status is not None:
+        lines.append(f"{status.name.lower().replace('_', ' ')}" + (f": {reason}" if reason else ""))
+    return "\n".join(fill(line, 76) for line in lines)

@@ -1,0 +1,235 @@
+"""The panels in a picture of one run: displacement, spectrum, load, and the forces around the belt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+from scipy.signal import find_peaks
+
+from cvt_hpc.analysis.signals import amplitude_spectrum, band_amplitude, dominant_frequency
+from cvt_hpc.analysis.tapering import SHORTEST_SEGMENT
+
+Array = NDArray[np.float64]
+
+BIN_WIDTH = 5.0  # [Hz]
+CLOSE_UP = 0.01  # [s]: six periods at 600 Hz
+MOST_PEAKS = 3
+COLOURS = {"t1": "#b5460f", "t2": "#1f4e8c"}  # of like lightness, so line styles tell them apart in grey
+LINES = ("-", "--", ":", "-.")
+_OTHER_COLOUR = "#333333"
+
+
+@dataclass(frozen=True)
+class Strand:
+    """What the probes on one strand recorded.
+
+    Attributes
+    ----------
+    name : str
+        "t1" or "t2".
+    probes : tuple of str
+        Their labels.
+    time : array, shape (time,)
+        [s].
+    displacement : array, shape (time, probe)
+        [um], mean removed.
+    first_judged : int
+        Index of the first sample of the part that is judged.
+    band : (float, float)
+        Where vibrations are looked for [Hz].
+    """
+
+    name: str
+    probes: tuple[str, ...]
+    time: Array
+    displacement: Array
+    first_judged: int
+    band: tuple[float, float]
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate [Hz]."""
+        return (self.time.size - 1) / (self.time[-1] - self.time[0])
+
+    @property
+    def judged(self) -> Array:
+        """The judged part of the displacement [um], shape (time, probe)."""
+        return self.displacement[self.first_judged :]
+
+    @property
+    def has_spectrum(self) -> bool:
+        """Whether the judged part is long enough, and sampled fast enough for the band."""
+        return len(self.judged) >= SHORTEST_SEGMENT and self.rate > 2 * self.band[1]
+
+    @property
+    def strongest(self) -> int:
+        """Index of the probe that moves most in the band, or most at all where there is no spectrum."""
+        if self.has_spectrum:
+            return int(np.argmax(band_amplitude(self.judged, self.rate, self.band)))
+        return int(np.argmax(np.ptp(self.displacement, axis=0)))
+
+    @property
+    def colour(self) -> str:
+        """Of the strand's lines."""
+        return COLOURS.get(self.name, _OTHER_COLOUR)
+
+
+def read_strands(dataset: xr.Dataset, judged_fraction: float, band: tuple[float, float]) -> list[Strand]:
+    """Take the displacement apart by strand, up to the first value that is not finite.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        With `displacement` (time, probe) [m]; a probe's label begins with its strand, as "t1 1/2".
+    judged_fraction : float
+        Last part of the time that is judged.
+    band : (float, float)
+        Where vibrations are looked for [Hz].
+
+    Returns
+    -------
+    list of Strand
+        In the order of the probes; empty if nothing was recorded.
+    """
+    if "displacement" not in dataset:
+        return []
+    displacement = dataset["displacement"].transpose("time", "probe").values * 1e6
+    finite = np.isfinite(displacement).all(axis=1)
+    length = displacement.shape[0] if finite.all() else int(np.argmin(finite))
+    if length < 2:
+        return []
+    displacement = displacement[:length] - displacement[:length].mean(axis=0)
+    labels = [str(label) for label in dataset["probe"].values]
+    strands = []
+    for name in dict.fromkeys(label.split()[0] for label in labels):
+        columns = [i for i, label in enumerate(labels) if label.split()[0] == name]
+        strands.append(
+            Strand(
+                name,
+                tuple(labels[i] for i in columns),
+                dataset["time"].values[:length],
+                displacement[:, columns],
+                length - round(judged_fraction * length),
+                band,
+            )
+        )
+    return strands
+
+
+def draw_displacement(axes: Axes, strand: Strand) -> None:
+    """The strongest probe over the whole run; the judged part is shaded."""
+    time = 1e3 * strand.time
+    axes.axvspan(time[strand.first_judged], time[-1], color="#f1f1f1", linewidth=0)
+    axes.plot(time, strand.displacement[:, strand.strongest], color=strand.colour, linewidth=0.6)
+    axes.set(xlim=(time[0], time[-1]), xlabel="time [ms]", ylabel=f"{strand.name} [µm]")
+    axes.set_title(
+        f"displacement at {strand.probes[strand.strongest]}, judged part shaded", loc="left", pad=3
+    )
+
+
+def draw_close_up(axes: Axes, strand: Strand) -> None:
+    """All probes of a strand over the last milliseconds, without the mean of these."""
+    last = strand.time >= strand.time[-1] - CLOSE_UP
+    time = 1e3 * strand.time[last]
+    for i, label in enumerate(strand.probes):
+        values = strand.displacement[last, i] - strand.displacement[last, i].mean()
+        place = label.removeprefix(strand.name).strip() or label
+        axes.plot(time, values, LINES[i % len(LINES)], color=strand.colour, linewidth=1.2, label=place)
+    axes.set(xlim=(time[0], time[-1]), xlabel="time [ms]")
+    axes.legend(
+        loc="lower left",
+        bbox_to_anchor=(-0.05, 0.97),
+        ncols=len(strand.probes),
+        frameon=False,
+        handlelength=1.6,
+        handletextpad=0.4,
+        columnspacing=0.8,
+    )
+
+
+def draw_spectra(axes: Axes, strands: list[Strand]) -> None:
+    """Amplitude spectra of the strongest probes over the judged part, dominant peaks marked."""
+    top = 0.0
+    for i, strand in enumerate(strands):
+        bins = np.arange(0.0, strand.band[1] + BIN_WIDTH / 2, BIN_WIDTH)
+        signal = strand.judged[:, strand.strongest]
+        spectrum = amplitude_spectrum(signal, strand.rate, bins)
+        label = strand.probes[strand.strongest]
+        axes.plot(bins, spectrum, LINES[i % len(LINES)], color=strand.colour, linewidth=1.2, label=label)
+        for frequency, amplitude in _peaks(signal, strand, bins, spectrum):
+            axes.plot(frequency, amplitude, "v", color=strand.colour, markersize=5)
+            axes.annotate(
+                f"{frequency:.0f} Hz",
+                (frequency, amplitude),
+                xytext=(0, 5),
+                textcoords="offset points",
+                ha="center",
+                fontsize=8,
+                color=strand.colour,
+            )
+        top = max(top, spectrum.max())
+    axes.set(xlim=(0, strands[0].band[1]), ylim=(0, 1.25 * top or 1.0))
+    axes.set(xlabel="frequency [Hz]", ylabel="amplitude [µm]")
+    axes.set_title("spectrum of the judged part", loc="left", pad=3)
+    axes.legend(loc="upper right")
+
+
+def _peaks(signal: Array, strand: Strand, bins: Array, spectrum: Array) -> list[tuple[float, float]]:
+    """Frequency [Hz] and height of the highest peaks in the band that stand out by a fifth of the highest."""
+    inside = np.where(bins >= strand.band[0], spectrum, 0.0)
+    indices, _ = find_peaks(inside, prominence=max(0.2 * inside.max(), np.finfo(float).tiny))
+    highest = indices[np.argsort(inside[indices])[::-1][:MOST_PEAKS]]
+    peaks = []
+    for i in highest:
+        around = (max(bins[i] - 2 * BIN_WIDTH, 0.0), bins[i] + 2 * BIN_WIDTH)
+        peaks.append((float(dominant_frequency(signal, strand.rate, around)), float(spectrum[i])))
+    return peaks
+
+
+def draw_load(axes: Axes, dataset: xr.Dataset) -> None:
+    """The load over time."""
+    axes.plot(1e3 * dataset["time"].values, dataset["load"].values, color=_OTHER_COLOUR, linewidth=1.2)
+    axes.set(xlabel="time [ms]", ylabel="load [N m]", xlim=1e3 * dataset["time"].values[[0, -1]])
+
+
+def draw_forces(axes: Axes, dataset: xr.Dataset) -> None:
+    """Ring tension and push force around the belt."""
+    position = 1e3 * dataset["position"].values
+    styles = {"ring_tension": ("-", "#1f4e8c"), "push_force": ("--", "#b5460f")}
+    for name, (line, colour) in styles.items():
+        if name in dataset:
+            label = name.replace("_", " ")
+            axes.plot(position, 1e-3 * dataset[name].values, line, color=colour, linewidth=1.4, label=label)
+    axes.set(ylabel="force [kN]", ylim=(0, None))
+    axes.legend(loc="best", framealpha=0.85)
+    _lay_out_positions(axes, dataset)
+
+
+def draw_contact(axes: Axes, dataset: xr.Dataset) -> None:
+    """Contact force of the flanks around the belt."""
+    position = 1e3 * dataset["position"].values
+    axes.plot(position, 1e-3 * dataset["contact_force"].values, color=_OTHER_COLOUR, linewidth=1.2)
+    axes.set(ylabel="contact [kN/m]", ylim=(0, None))
+    _lay_out_positions(axes, dataset)
+
+
+def _lay_out_positions(axes: Axes, dataset: xr.Dataset) -> None:
+    """Axis of positions around the belt, arcs shaded and regions named along the top."""
+    position = 1e3 * dataset["position"].values
+    axes.set(xlabel="position along the belt's path [mm]", xlim=position[[0, -1]])
+    if "region" not in dataset:
+        return
+    region = dataset["region"].values.astype(str)
+    middles = (position[1:] + position[:-1]) / 2
+    borders = [position[0], *middles[region[1:] != region[:-1]], position[-1]]
+    for start, stop in pairwise(borders):
+        name = region[np.searchsorted(position, (start + stop) / 2)]
+        if "arc" in name:
+            axes.axvspan(start, stop, color="#e6e6e6", linewidth=0, zorder=0)
+        top = axes.get_xaxis_transform()
+        axes.text((start + stop) / 2, 1.03, name, transform=top, ha="center", fontsize=9)

@@ -1,0 +1,207 @@
+"""Maps of vibration occurrence over a study's grid: classes first, then amplitude and frequency.
+
+The classes differ in lightness, in hatching and in the mark on the grid point, so that a map reads the
+same in colour, in grey and in small print. Vibrating cells are coloured by amplitude, darker for larger.
+Their dominant frequency is written into the cells where there is room, and drawn as a second set of
+panels where there is none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import fill
+from typing import Any
+
+import matplotlib
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from cvt_hpc.analysis import cells
+from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, value_text
+from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, count_classes, occurrence_classes
+from cvt_hpc.analysis.figures import STYLE, WIDTH, check_format, save_figure
+
+MOST_STACKED = 5  # panels in one column; more go into two
+TITLE_HEIGHT = 0.42  # [inch], of a panel with the space around it
+ONE_ROW = Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
+
+
+def draw_map(dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None) -> Path:
+    """Draw where vibration occurs.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        Results of a study: `status` and `vibrates` over the job's axes; `amplitude` [m] and `frequency`
+        [Hz], per strand, where known. The stronger strand is shown.
+    out : Path
+        The picture: .png, .svg or .pdf.
+    at : mapping, optional
+        Axes to fix: name -> value, as a number [SI] or a text.
+
+    Returns
+    -------
+    Path
+        `out`.
+
+    Raises
+    ------
+    InputError
+        The dataset holds no results or a single run, `at` names no axis or no value on it, or the suffix
+        is not a picture's.
+    """
+    check_format(Path(out))
+    occurrence_classes(dataset)
+    with matplotlib.rc_context(STYLE):
+        return save_figure(map_figure(arrange(dataset, at or {})), Path(out))
+
+
+@dataclass(frozen=True)
+class _Sheet:
+    """What the panels show, arrays of shape (panel, row, column), and where."""
+
+    arrangement: Arrangement
+    x: Ruler
+    y: Ruler
+    classes: NDArray[np.int8]
+    amplitude: NDArray[np.float64]  # [um], nan where a run does not vibrate
+    frequency: NDArray[np.float64]  # [Hz], likewise
+
+    @property
+    def panels(self) -> int:
+        return len(self.classes)
+
+    @property
+    def columns(self) -> int:
+        return 1 if self.panels <= MOST_STACKED else 2
+
+    @property
+    def rows(self) -> int:
+        return -(-self.panels // self.columns)
+
+    @property
+    def panel_height(self) -> float:
+        """[inch]; rows of cells are high enough for a line of text as long as the page allows it."""
+        rows = self.y.centres.size
+        tall = TITLE_HEIGHT + 0.36 * rows
+        height = tall if tall * self.rows <= 6.5 else TITLE_HEIGHT + float(np.clip(0.14 * rows, 0.35, 2.0))
+        return max(height, 2.0 / self.rows)  # room for the colour bar's label
+
+    @property
+    def smallest_cell(self) -> tuple[float, float]:
+        """Width and height of the smallest cell [point]."""
+        width = (WIDTH - 1.9) / self.columns  # ticks, labels and the colour bar take the rest
+        height = self.panel_height - TITLE_HEIGHT
+        return (
+            72 * width * np.diff(self.x.edges).min() / np.ptp(self.x.edges),
+            72 * height * np.diff(self.y.edges).min() / np.ptp(self.y.edges),
+        )
+
+
+def map_figure(arrangement: Arrangement) -> Figure:
+    """Compose the picture of `draw_map`; to be called within STYLE."""
+    sheet = _sheet(arrangement)
+    has_frequency = bool(np.isfinite(sheet.frequency).any())
+    width, height = sheet.smallest_cell
+    written = has_frequency and width >= 22 and height >= 22  # [point]: three digits above a dot
+    blocks = 2 if has_frequency and not written else 1
+    figure = Figure((WIDTH, blocks * sheet.rows * sheet.panel_height + 1.9), layout="constrained")
+    axes = figure.subplots(blocks * sheet.rows, sheet.columns, sharex=True, sharey=True, squeeze=False)
+    amplitude = cells.Scale(cells.AMPLITUDE_COLOURS, _norm(sheet.amplitude, 0.0), "amplitude [µm]")
+    _draw_block(figure, axes[: sheet.rows], sheet, sheet.amplitude, amplitude)
+    if written:
+        for ax, *shown in zip(axes.flat, sheet.classes, sheet.frequency, sheet.amplitude, strict=False):
+            cells.write_values(ax, sheet.x, sheet.y, *shown, amplitude)
+    elif has_frequency:
+        frequency = cells.Scale(cells.FREQUENCY_COLOURS, _norm(sheet.frequency), "dominant frequency [Hz]")
+        _draw_block(figure, axes[sheet.rows :], sheet, sheet.frequency, frequency)
+    figure.suptitle(_title(sheet, written))
+    figure.supylabel(sheet.y.label, fontsize=10)
+    cells.class_legend(figure)
+    return figure
+
+
+def _sheet(arrangement: Arrangement) -> _Sheet:
+    """The arranged variables with all three dimensions, missing ones of length one."""
+    dataset = arrangement.dataset
+    names = [arrangement.panel, arrangement.y, arrangement.x]
+
+    def grid(variable: xr.DataArray) -> NDArray[Any]:
+        present = variable.transpose(*filter(None, names))
+        return present.values.reshape([dataset.sizes[name] if name else 1 for name in names])
+
+    classes = grid(occurrence_classes(dataset))
+    vibrating = classes == OccurrenceClass.VIBRATING
+    return _Sheet(
+        arrangement,
+        ruler(dataset[arrangement.x]),
+        ruler(dataset[arrangement.y]) if arrangement.y else ONE_ROW,
+        classes,
+        np.where(vibrating, grid(at_strongest_strand(dataset, "amplitude")) * 1e6, np.nan),
+        np.where(vibrating, grid(at_strongest_strand(dataset, "frequency")), np.nan),
+    )
+
+
+def _norm(values: NDArray[np.float64], lowest: float | None = None) -> Normalize:
+    """Scale over the finite values, from `lowest` if given."""
+    known = values[np.isfinite(values)]
+    if known.size == 0:
+        return Normalize(0.0, 1.0)
+    low, high = known.min() if lowest is None else lowest, known.max()
+    return Normalize(low, high) if high > low else Normalize(low - 0.5, high + 0.5)
+
+
+def _draw_block(
+    figure: Figure, axes: NDArray[Any], sheet: _Sheet, values: NDArray[np.float64], scale: cells.Scale
+) -> None:
+    """One set of panels, their vibrating cells coloured by `values`, and the colour bar."""
+    mark = float(np.clip(0.35 * min(sheet.smallest_cell), 1.5, 5.0))
+    for panel, ax in enumerate(axes.flat):
+        if panel >= sheet.panels:
+            ax.set_axis_off()
+            continue
+        cells.draw_cells(ax, sheet.x, sheet.y, sheet.classes[panel], values[panel], scale)
+        cells.draw_marks(ax, sheet.x, sheet.y, sheet.classes[panel], mark)
+        _label_panel(ax, sheet, panel)
+    if np.isfinite(values).any():
+        bar = figure.colorbar(
+            ScalarMappable(scale.norm, scale.colours), ax=axes, aspect=12 * len(axes), pad=0.02
+        )
+        bar.set_label(scale.label)
+
+
+def _label_panel(ax: Axes, sheet: _Sheet, panel: int) -> None:
+    """Title and ticks of a panel."""
+    name = sheet.arrangement.panel
+    if name:
+        text = value_text(sheet.arrangement.dataset[name], panel)
+        ax.set_title(f"{name.replace('_', ' ')}: {text}", loc="left", pad=3)
+    if sheet.x.ticks is not None:
+        ax.set_xticks(sheet.x.ticks, sheet.x.tick_labels)
+    if sheet.y.ticks is not None:
+        ax.set_yticks(sheet.y.ticks, sheet.y.tick_labels)
+    is_lowest = panel + sheet.columns >= sheet.panels
+    ax.tick_params(labelbottom=is_lowest)
+    if is_lowest:
+        ax.set_xlabel(sheet.x.label)
+
+
+def _title(sheet: _Sheet, written: bool) -> str:
+    """What, of which job, how many runs of each class, and what is fixed."""
+    attributes = sheet.arrangement.dataset.attrs
+    job = attributes.get("job_name", "")
+    counts = count_classes(sheet.classes)
+    runs = ", ".join(f"{count} {kind.label}" for kind, count in counts.items() if count)
+    lines = [f"Vibration occurrence: {job}" if job else "Vibration occurrence"]
+    lines.append(f"{sheet.classes.size} runs: {runs}")
+    lines.extend(sheet.arrangement.notes)
+    if written:
+        lines.append("in the cells: dominant frequency [Hz]")
+    return "\n".join(fill(line, 72) for line in lines)

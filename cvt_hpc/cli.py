@@ -1,0 +1,209 @@
+"""The command line: parse, call, print. Whatever a command needs is imported when it runs."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NoReturn
+
+from cvt_hpc import __version__
+from cvt_hpc.errors import InputError, mismatch
+
+DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+_SUBJECTS = {
+    "JOB": "job file (TOML)",
+    "DIR": "output folder of a run",
+    "RESULTS": "output folder of a run, or a dataset (.nc)",
+}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run a command line.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        Those of the process by default.
+
+    Returns
+    -------
+    int
+        Exit status: 0 done, 1 some runs failed, 2 bad input, 99 stopped early and to be gone on with.
+    """
+    logging.basicConfig(format="cvt-hpc: %(message)s")
+    try:
+        parsed = _parser().parse_args(arguments)
+        status = parsed.command(parsed)
+        sys.stdout.flush()
+        return status
+    except InputError as error:
+        _complain(str(error))
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        _complain("interrupted")
+        return INTERRUPTED
+    except BrokenPipeError:  # the reader, such as `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are ours: under MPI one rank prints them, not all."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message}; see `{self.prog} --help`")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="cvt-hpc",
+        description="Vibration-occurrence maps of metal pushbelt CVTs.",
+        epilog="Exit status: 0 done, 1 some runs failed, 2 bad input, 99 stopped early (run again to go on).",
+    )
+    parser.add_argument("--version", action="version", version=f"cvt_hpc {__version__}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    run = _add(commands, "run", _run, "do all runs of a job, or those that an earlier start has left", "JOB")
+    run.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: out/<job name>)")
+    run.add_argument("--dry-run", action="store_true", help="as `cvt-hpc check`; runs nothing")
+    run.add_argument("--fresh", action="store_true", help="throw earlier results of the folder away")
+    _add(commands, "status", _status, "how far a study is", "DIR")
+    _add(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
+    picture = _add(commands, "map", _map, "draw where vibration occurs", "RESULTS")
+    picture.add_argument("--out", type=Path, metavar="PNG", help="default: map.png beside the dataset")
+    simulate = _add(commands, "simulate", _simulate, "one run with its full history", "JOB")
+    simulate.add_argument("--out", type=Path, metavar="FILE.nc", help="dataset of the history")
+    simulate.add_argument("--plot", type=Path, metavar="PNG", help="picture of the history")
+    check = _add(commands, "check", _check, "validate a job, show its defaults and estimate its cost", "JOB")
+    for command in (run, simulate, check):
+        _add_assignments(command, "--set", "replace a value of the job, or an axis by one value")
+    _add_assignments(simulate, "--at", "where on the axes to run (default: the base scene)")
+    _add_assignments(picture, "--at", "fix an axis at a value")
+    return parser
+
+
+def _add(
+    commands: Any, name: str, call: Callable[[Any], int], text: str, subject: str
+) -> argparse.ArgumentParser:
+    command = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+    command.add_argument("path", type=Path, metavar=subject, help=_SUBJECTS[subject])
+    command.set_defaults(command=call)
+    return command
+
+
+def _add_assignments(command: argparse.ArgumentParser, flag: str, text: str) -> None:
+    text = f"{text}; may be repeated"
+    command.add_argument(flag, action="append", default=[], metavar="KEY=VALUE", help=text)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    if arguments.dry_run:
+        return _check(arguments)
+    from cvt_hpc.job import load_job
+    from cvt_hpc.printing import report_lines, trouble_lines
+    from cvt_hpc.study import run
+
+    report = run(load_job(arguments.path, arguments.set), arguments.out, fresh=arguments.fresh)
+    _complain(*trouble_lines(report))
+    if _speaks():
+        print(*report_lines(report), sep="\n")
+    return report.exit_status
+
+
+def _status(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.printing import status_lines
+    from cvt_hpc.study import read_status
+
+    status = read_status(arguments.path)
+    _complain(*status.warnings)
+    print(*status_lines(status), sep="\n")
+    return DONE
+
+
+def _gather(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.study import gather
+
+    print(f"results: {gather(arguments.path)}")
+    return DONE
+
+
+def _map(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.job.assignments import read_coordinates
+    from cvt_hpc.study import open_results
+
+    folder = arguments.path if arguments.path.is_dir() else arguments.path.parent
+    with open_results(arguments.path) as dataset:
+        units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
+        at = read_coordinates(arguments.at, units, str(arguments.path), "--at")
+        from cvt_hpc.analysis.maps import draw_map
+
+        print(f"map: {draw_map(dataset, arguments.out or folder / 'map.png', at)}")
+    return DONE
+
+
+def _simulate(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.job import load_job
+    from cvt_hpc.job.assignments import read_assignments
+
+    job = load_job(arguments.path, arguments.set)
+    at = read_assignments(arguments.at, job.schema, job.source, "--at")
+    job.point_at(at, "--at")
+    _check_output(arguments.out, (".nc",))
+    _check_output(arguments.plot, (".png", ".svg", ".pdf"))
+    from cvt_hpc.analysis.histories import draw_history, is_history, write_history
+    from cvt_hpc.printing import outcome_lines
+    from cvt_hpc.simulate import simulate
+    from cvt_hpc.variables import Status
+
+    if arguments.out is not None and arguments.out.exists() and not is_history(arguments.out):
+        raise mismatch(str(arguments.out), "a new file, or a history written by cvt_hpc", "another file")
+    dataset = simulate(job, at)
+    print(*outcome_lines(dataset), sep="\n")
+    if arguments.out is not None:
+        print(f"history: {write_history(dataset, arguments.out)}")
+    if arguments.plot is not None:
+        print(f"picture: {draw_history(dataset, arguments.plot)}")
+    status = Status(int(dataset["status"]))
+    if status != Status.DONE:
+        _complain(f"the run failed: {status.name.lower()}: {dataset['reason'].item()}")
+        return SOME_FAILED
+    return DONE
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.job import load_job
+    from cvt_hpc.job.summary import summarize
+
+    job = load_job(arguments.path, arguments.set)
+    if _speaks():
+        from cvt_hpc.simulate import estimate_cost
+
+        print(summarize(job, estimate_cost(job)))
+    return DONE
+
+
+def _check_output(path: Path | None, suffixes: tuple[str, ...]) -> None:
+    """Refuse a file that could not be written, before anything is computed for it."""
+    if path is None:
+        return
+    if path.suffix.lower() not in suffixes:
+        raise mismatch(str(path), f"a file name in {', '.join(suffixes)}", path.suffix or "no suffix")
+    nearest = path if path.is_dir() else next(parent for parent in path.absolute().parents if parent.exists())
+    if nearest == path or not nearest.is_dir() or not os.access(nearest, os.W_OK):
+        raise mismatch(str(path), "a file that can be written", f"{nearest} in its way")
+
+
+def _complain(*lines: str) -> None:
+    if _speaks():
+        for line in lines:
+            print(f"cvt-hpc: {line}", file=sys.stderr)
+
+
+def _speaks() -> bool:
+    """Return whether this process is the one of those started together that talks to the user."""
+    from cvt_hpc.study import process_rank
+
+    return process_rank() == 0

@@ -1,0 +1,159 @@
+"""The axes of a sweep: lists and ranges of a job file to the very values that runs evaluate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from typing import Any
+
+from cvt_hpc.errors import InputError, mismatch, show, unknown
+from cvt_hpc.job.values import kind_of, read_value
+from cvt_hpc.parameters import Parameter
+
+LARGEST_AXIS = 100_000
+_RANGE_KEYS = ("from", "to", "count", "step", "spacing")
+_SPACINGS = ("linear", "log")
+_STEP_TOLERANCE = Decimal("1e-9")
+_COUNT = Parameter(2, "", "values of a range", minimum=2, maximum=LARGEST_AXIS)
+_FORMS = "a list [v1, v2, ...] or a range {from=, to=, count=} or {from=, to=, step=}"
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A parameter that a study varies.
+
+    Attributes
+    ----------
+    name : str
+        Name of the parameter.
+    values : tuple
+        Its values in the job's order: numbers [unit], or texts.
+    unit : str
+        SI unit; "" for dimensionless numbers and texts.
+    description : str
+        Of the parameter.
+    """
+
+    name: str
+    values: tuple
+    unit: str
+    description: str
+
+
+def read_axis(name: str, parameter: Parameter, raw: Any, where: str) -> Axis:
+    """Check an axis as it stands in a job file, and return it with its values.
+
+    Parameters
+    ----------
+    name : str
+        Name of the parameter.
+    parameter : Parameter
+        What it declares.
+    raw : Any
+        A list of values, or a table with from, to and either count (and spacing) or step.
+    where : str
+        File and key, for the error.
+
+    Returns
+    -------
+    Axis
+        With distinct values, each one legal for the parameter.
+
+    Raises
+    ------
+    InputError
+        If the list or the range is not legal.
+    """
+    if kind_of(parameter) is tuple:
+        raise mismatch(where, "a parameter with a single value", "one that takes a list")
+    if isinstance(raw, dict):
+        values = _read_range(parameter, raw, where)
+    elif isinstance(raw, (list, tuple)):
+        values = raw
+    else:
+        raise mismatch(where, _FORMS, show(raw))
+    if not values:
+        raise mismatch(where, "at least one value", show(raw))
+    if len(values) > LARGEST_AXIS:
+        raise mismatch(where, f"at most {LARGEST_AXIS} values", f"{len(values)}")
+    read = tuple(read_value(parameter, value, f"{where}, value {i}") for i, value in enumerate(values, 1))
+    _check_distinct(read, values, where)
+    return Axis(name, read, parameter.unit, parameter.description)
+
+
+def _check_distinct(read: tuple, values: Any, where: str) -> None:
+    first: dict[Any, int] = {}
+    for i, value in enumerate(read):
+        if value in first:
+            raise mismatch(
+                where, "distinct values", f"{show(values[i])} as value {first[value] + 1} and value {i + 1}"
+            )
+        first[value] = i
+
+
+def _read_range(parameter: Parameter, raw: dict[str, Any], where: str) -> tuple[float, ...]:
+    for key in raw:
+        if key not in _RANGE_KEYS:
+            raise unknown(f"{where}.{key}", "key", key, _RANGE_KEYS)
+    if kind_of(parameter) not in (int, float):
+        raise mismatch(where, "a list of values, because the parameter is not a number", "a range")
+    for key in ("from", "to"):
+        if key not in raw:
+            raise mismatch(f"{where}.{key}", f"the {'first' if key == 'from' else 'last'} value", "nothing")
+    if ("count" in raw) == ("step" in raw):
+        raise mismatch(where, "a range with either count or step", "both" if "step" in raw else "neither")
+    start, stop = (_read_bound(parameter, raw[key], f"{where}.{key}") for key in ("from", "to"))
+    if "step" in raw:
+        return _stepped(start, stop, _read_step(parameter, raw, where), where)
+    return _counted(start, stop, raw, where)
+
+
+def _read_bound(parameter: Parameter, raw: Any, where: str) -> float:
+    return read_value(replace(parameter, allow_infinite=False), raw, where)
+
+
+def _read_step(parameter: Parameter, raw: dict[str, Any], where: str) -> float:
+    if "spacing" in raw:
+        raise InputError(f"{where}.spacing: expected to stand with count, found with step")
+    # A step has the parameter's unit, but not its bounds.
+    free = Parameter(kind_of(parameter)(0), parameter.unit, "")
+    step = read_value(free, raw["step"], f"{where}.step")
+    if step == 0:
+        raise mismatch(f"{where}.step", "a step other than 0", show(raw["step"]))
+    return step
+
+
+def _counted(start: float, stop: float, raw: dict[str, Any], where: str) -> tuple[float, ...]:
+    """Return `count` values; in decimal, so that a third step of 0.1 is 0.3 and can be asked for as that."""
+    count = read_value(_COUNT, raw["count"], f"{where}.count")
+    spacing = raw.get("spacing", "linear")
+    if spacing not in _SPACINGS:
+        raise unknown(f"{where}.spacing", f"spacing {show(spacing)}", str(spacing), _SPACINGS)
+    if start == stop:
+        raise mismatch(where, "a range with from and to apart", f"{start:g} for both")
+    first, last = _decimal(start), _decimal(stop)
+    shares = [Decimal(i) / (count - 1) for i in range(1, count - 1)]
+    if spacing == "linear":
+        return (start, *(float(first + (last - first) * share) for share in shares), stop)
+    if first <= 0 or last <= 0:
+        raise mismatch(where, "from > 0 and to > 0 for log spacing", f"{start:g} and {stop:g}")
+    return (start, *(float(first * (last / first) ** share) for share in shares), stop)
+
+
+def _stepped(start: float, stop: float, step: float, where: str) -> tuple[float, ...]:
+    first, last, stride = _decimal(start), _decimal(stop), _decimal(step)
+    steps = (last - first) / stride
+    count = round(steps)
+    if count < 1 or abs(steps - count) > _STEP_TOLERANCE:
+        raise mismatch(
+            f"{where}.step",
+            f"a step that leads from {start:g} to {stop:g} in whole steps",
+            f"{step:g}, which takes {steps:.6g} steps",
+        )
+    if count >= LARGEST_AXIS:
+        raise mismatch(where, f"at most {LARGEST_AXIS} values", f"about {steps:.0e}")
+    return (start, *(float(first + i * stride) for i in range(1, count)), stop)
+
+
+def _decimal(value: float) -> Decimal:
+    return Decimal(repr(float(value)))

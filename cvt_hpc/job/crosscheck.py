@@ -1,0 +1,84 @@
+"""What must hold between parameters, asked of the model for every run before any computing."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from cvt_hpc.errors import mismatch
+from cvt_hpc.job.axes import Axis
+from cvt_hpc.job.schema import Schema
+from cvt_hpc.job.values import in_words
+
+MOST_CHECKED_POINTS = 20_000
+
+
+def check_grid(schema: Schema, parameters: dict[str, Any], axes: tuple[Axis, ...], source: str) -> None:
+    """Check the base scene and every run; of a huge grid, the extremes of its axes.
+
+    Parameters
+    ----------
+    schema : Schema
+        With the model's checks.
+    parameters : dict
+        The base scene [SI].
+    axes : tuple of Axis
+        The grid.
+    source : str
+        The job file, for the error.
+
+    Raises
+    ------
+    InputError
+        With the first problem found, and the run that has it.
+    """
+    check_point(schema, parameters, source)
+    names = [axis.name for axis in axes]
+    for values in _points_to_check(axes):
+        varied = dict(zip(names, values, strict=True))
+        check_point(schema, {**parameters, **varied}, source, varied)
+
+
+def check_point(
+    schema: Schema, parameters: dict[str, Any], source: str, varied: Mapping[str, Any] | None = None
+) -> None:
+    """Check the parameters of one run.
+
+    Parameters
+    ----------
+    schema : Schema
+        With the model's checks.
+    parameters : dict
+        Value [SI] by key.
+    source : str
+        The job file, for the error.
+    varied : mapping, optional
+        Those of the values that set the run apart, to be named in the error.
+
+    Raises
+    ------
+    InputError
+        With the first problem found.
+    """
+    for key, expected, found in schema.check(parameters):
+        place = ", ".join(
+            f"{name} = {in_words(value, schema.parameters[name].unit)}"
+            for name, value in (varied or {}).items()
+        )
+        raise mismatch(
+            f"{source}: [{schema.section_of[key]}] {key}",
+            expected,
+            found + (f" (at {place})" if place else ""),
+        )
+
+
+def _points_to_check(axes: tuple[Axis, ...]) -> Iterable[tuple]:
+    size = math.prod(len(axis.values) for axis in axes)
+    thin = size > MOST_CHECKED_POINTS
+    return itertools.product(*(_extremes(axis.values) if thin else axis.values for axis in axes))
+
+
+def _extremes(values: tuple) -> tuple:
+    return values if isinstance(values[0], str) else (min(values), max(values))

@@ -1,0 +1,51 @@
+"""The job file as it stands on the disk: one clear error for whatever is not readable TOML."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from cvt_hpc.errors import InputError, did_you_mean, mismatch
+
+_POSITION = re.compile(r"(?P<what>.*?) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)")
+
+
+def read_document(path: Path) -> dict[str, Any]:
+    """Return the contents of a TOML file.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, a folder, not a text, or not TOML (then with line and column).
+    """
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        beside = sorted(str(file) for file in path.parent.glob("*.toml"))
+        raise InputError(
+            f"{path}: expected a job file, found nothing{did_you_mean(str(path), beside)}"
+        ) from None
+    except IsADirectoryError:
+        raise mismatch(str(path), "a job file", "a folder") from None
+    except OSError as error:
+        raise mismatch(str(path), "a job file", str(error.strerror)) from None
+    except UnicodeDecodeError:
+        raise mismatch(str(path), "a text file (TOML in UTF-8)", "binary data") from None
+    return _parse(text, str(path))
+
+
+def _parse(text: str, source: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise mismatch(source, "TOML", "lists or tables nested too deep") from None
+    except ValueError as error:  # TOMLDecodeError, and the plain ValueError of a number with too many digits
+        match = _POSITION.fullmatch(str(error))
+        if match is None:
+            raise InputError(f"{source}: expected TOML, found: {error}") from None
+        lines = text.split("\n")
+        line, column = match["line"] or len(lines), match["column"] or len(lines[-1]) + 1
+        what = match["what"][:1].lower() + match["what"][1:]
+        raise InputError(f"{source}: line {line}, column {column}: expected TOML, found: {what}") from None

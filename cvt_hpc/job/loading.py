@@ -1,0 +1,157 @@
+"""From a job file to a job: the head, the tables, the axes and the overrides, each checked in turn."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
+from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignments
+from cvt_hpc.job.axes import Axis, read_axis
+from cvt_hpc.job.crosscheck import check_grid
+from cvt_hpc.job.definition import HEADER, Job
+from cvt_hpc.job.document import read_document
+from cvt_hpc.job.schema import Schema, load_schema
+from cvt_hpc.job.values import expectation, read_value
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+
+
+def load_job(path: str | Path, overrides: Assignments = ()) -> Job:
+    """Read and validate a job file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file.
+    overrides : mapping, or sequence of "KEY=VALUE"
+        Values that replace those of the file; one for an axis replaces the axis by that one value.
+
+    Returns
+    -------
+    Job
+        With every default resolved.
+
+    Raises
+    ------
+    InputError
+        If anything is wrong with the file or an override.
+    """
+    return build_job(read_document(Path(path)), str(path), overrides)
+
+
+def build_job(document: Mapping[str, Any], source: str, overrides: Assignments = ()) -> Job:
+    """Validate the contents of a job file.
+
+    Parameters
+    ----------
+    document : mapping
+        Tables and values as TOML gives them.
+    source : str
+        Where it is from, for the errors.
+    overrides : mapping, or sequence of "KEY=VALUE"
+        See `load_job`.
+
+    Returns
+    -------
+    Job
+        With every default resolved.
+
+    Raises
+    ------
+    InputError
+        If anything is wrong with the document or an override.
+    """
+    label = "override" if isinstance(overrides, Mapping) else "--set"
+    pairs = split_assignments(overrides, source, label)
+    head = {**document, **{key: value for key, value in pairs.items() if key in HEADER}}
+    name, description = _read_name(head, source), _read_description(head, source)
+    schema = load_schema(head.get("model"), head.get("stepper"), source)
+    _check_top_level(document, schema, source)
+    tables = _read_tables(document, schema, source)
+    axes = _read_axes(document.get("axes", {}), schema, source)
+    others = {key: value for key, value in pairs.items() if key not in HEADER}
+    replaced = read_assignments(others, schema, source, label)
+    axes = tuple(axis for axis in axes if axis.name not in replaced)
+    given = {**tables, **replaced}
+    parameters = _resolve({**{axis.name: axis.values[0] for axis in axes}, **given}, schema, source)
+    check_grid(schema, parameters, axes, source)
+    return Job(name, schema.model, schema.stepper, description, source, parameters, axes, frozenset(given))
+
+
+def _read_name(head: Mapping[str, Any], source: str) -> str:
+    name = head.get("name")
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        expected = "a word of letters, digits, '.', '_' and '-' (it names the output folder)"
+        raise mismatch(f"{source}: name", expected, show(name))
+    return name
+
+
+def _read_description(head: Mapping[str, Any], source: str) -> str:
+    description = head.get("description", "")
+    if not isinstance(description, str):
+        raise mismatch(f"{source}: description", "a text", show(description))
+    return description
+
+
+def _check_top_level(document: Mapping[str, Any], schema: Schema, source: str) -> None:
+    tables = [*schema.sections, "axes"]
+    for key, value in document.items():
+        if key in HEADER:
+            continue
+        if key in tables:
+            if not isinstance(value, Mapping):
+                raise mismatch(f"{source}: {key}", f"a table [{key}]", show(value))
+        elif isinstance(value, Mapping):
+            hint = did_you_mean(key, tables) or f"; known: {', '.join(tables)}"
+            raise InputError(f"{source}: [{key}]: unknown table{hint}")
+        elif key in schema.parameters:
+            raise InputError(
+                f"{source}: {key}: belongs in [{schema.section_of[key]}], found above all tables"
+            )
+        else:
+            hint = did_you_mean(key, HEADER) or schema.nearest(key) or f"; known: {', '.join(HEADER)}"
+            raise InputError(f"{source}: {key}: unknown key{hint}")
+
+
+def _read_tables(document: Mapping[str, Any], schema: Schema, source: str) -> dict[str, Any]:
+    values = {}
+    for section in schema.sections:
+        for name, raw in document.get(section, {}).items():
+            where = f"{source}: [{section}] {name}"
+            key = schema.find(name, where, section)
+            values[key] = read_value(schema.parameters[key], raw, where)
+    return values
+
+
+def _read_axes(table: Mapping[str, Any], schema: Schema, source: str) -> tuple[Axis, ...]:
+    axes: dict[str, Axis] = {}
+    for name, raw in _flatten(table, schema):
+        where = f"{source}: [axes] {name}"
+        key = schema.find(name, where)
+        if key in axes:
+            raise mismatch(where, "one axis for a parameter", f"a second one for {key}")
+        axes[key] = read_axis(key, schema.parameters[key], raw, where)
+    return tuple(axes.values())
+
+
+def _flatten(table: Mapping[str, Any], schema: Schema) -> Iterator[tuple[str, Any]]:
+    """Yield name and value; TOML reads the line `scene.load = [...]` as a table "scene" with a key "load"."""
+    for name, raw in table.items():
+        if name in schema.sections and isinstance(raw, Mapping):
+            yield from ((f"{name}.{key}", value) for key, value in raw.items())
+        else:
+            yield name, raw
+
+
+def _resolve(values: Mapping[str, Any], schema: Schema, source: str) -> dict[str, Any]:
+    """Return the value of every key, in the order of declaration."""
+    resolved = {}
+    for key, parameter in schema.parameters.items():
+        where = f"{source}: [{schema.section_of[key]}] {key}"
+        if key not in values and parameter.default is None:
+            raise mismatch(where, expectation(parameter), "nothing")
+        resolved[key] = values[key] if key in values else read_value(parameter, parameter.default, where)
+    return resolved

@@ -1,0 +1,133 @@
+"""What a job may set: the tables that its model and its stepper declare together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from typing import Any
+
+from cvt_hpc.errors import InputError, mismatch, nearest, show, unknown
+from cvt_hpc.models import MODELS
+from cvt_hpc.parameters import Parameter
+from cvt_hpc.steppers import STEPPERS
+
+Problems = list[tuple[str, str, str]]
+
+
+@dataclass(frozen=True)
+class Schema:
+    """The parameters of a model and a stepper.
+
+    Attributes
+    ----------
+    model, stepper : str
+        Their names.
+    sections : dict
+        Section -> key -> Parameter; keys are unique over all sections.
+    check : callable
+        The model's checks that lie between parameters: flat values -> list of (key, expected, found).
+    """
+
+    model: str
+    stepper: str
+    sections: dict[str, dict[str, Parameter]]
+    check: Callable[[dict[str, Any]], Problems]
+
+    @cached_property
+    def section_of(self) -> dict[str, str]:
+        """Section by key."""
+        return {key: section for section, table in self.sections.items() for key in table}
+
+    @cached_property
+    def parameters(self) -> dict[str, Parameter]:
+        """Parameter by key."""
+        return {key: parameter for table in self.sections.values() for key, parameter in table.items()}
+
+    def find(self, name: str, where: str, section: str | None = None) -> str:
+        """Return the key that a name means: a bare key, or "section.key".
+
+        Parameters
+        ----------
+        name : str
+            As the user wrote it.
+        where : str
+            File and key, for the error.
+        section : str, optional
+            The table in which the name stands, and has to belong.
+
+        Raises
+        ------
+        InputError
+            If there is no such key, or it belongs in another table.
+        """
+        head, _, tail = name.rpartition(".")
+        if section is None and head in self.sections:
+            section, name = head, tail
+        home = self.section_of.get(name)
+        if home is not None and section in (None, home):
+            return name
+        if home is not None:
+            raise InputError(f"{where}: belongs in [{home}], found in [{section}]")
+        raise self._unknown_key(name, where, section)
+
+    def nearest(self, name: str, section: str | None = None) -> str:
+        """Return "; did you mean KEY?" for the nearest key, with its table where that is another one."""
+        near = nearest(name, self.sections.get(section, {})) or nearest(name, self.parameters)
+        if near is None:
+            return ""
+        home = self.section_of[near]
+        return f"; did you mean {near}{'' if home == section else f' in [{home}]'}?"
+
+    def _unknown_key(self, name: str, where: str, section: str | None) -> InputError:
+        hint = self.nearest(name, section)
+        if not hint:
+            known = self.sections.get(section, {}) or self.parameters
+            hint = f"; known: {', '.join(known)}"
+        return InputError(f"{where}: unknown key{hint}")
+
+
+def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
+    """Return what a job of a model and a stepper may set.
+
+    Parameters
+    ----------
+    model : str
+        A name in `cvt_hpc.models.MODELS`.
+    stepper : str or None
+        A name in `cvt_hpc.steppers.STEPPERS`; None for the model's own choice.
+    source : str
+        The file, for the error.
+
+    Returns
+    -------
+    Schema
+        Of both together.
+
+    Raises
+    ------
+    InputError
+        If there is no such model or stepper.
+    """
+    model_module = import_module(_look_up(model, MODELS, "model", source))
+    stepper = model_module.DEFAULT_STEPPER if stepper is None else stepper
+    stepper_module = import_module(_look_up(stepper, STEPPERS, "stepper", source))
+    sections: dict[str, dict[str, Parameter]] = {}
+    for module in (model_module, stepper_module):
+        for section, table in module.PARAMETERS.items():
+            sections.setdefault(section, {}).update(table)
+    return Schema(model, stepper, sections, model_module.check)
+
+
+def known_keys(model: str, stepper: str | None = None) -> tuple[str, ...]:
+    """Return every key that a job of a model and a stepper may set or vary."""
+    return tuple(load_schema(model, stepper, "known_keys").parameters)
+
+
+def _look_up(name: Any, registry: dict[str, str], what: str, source: str) -> str:
+    if not isinstance(name, str):
+        raise mismatch(f"{source}: {what}", f"one of {', '.join(registry)}", show(name))
+    if name not in registry:
+        raise unknown(f"{source}: {what}", f"{what} {show(name)}", name, registry)
+    return registry[name]

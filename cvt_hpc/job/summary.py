@@ -1,0 +1,74 @@
+"""A job in words, for `cvt-hpc check`."""
+
+from __future__ import annotations
+
+from cvt_hpc.job.axes import Axis
+from cvt_hpc.job.definition import Job
+from cvt_hpc.job.values import in_words
+
+_FEW = 8
+
+
+def summarize(job: Job, core_seconds: float) -> str:
+    """Return what a job runs: every parameter with where it is from, the axes, and the cost.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    core_seconds : float
+        Estimated cost of one run [s].
+
+    Returns
+    -------
+    str
+        Lines of at most one parameter each.
+    """
+    lines = [f"job {job.name} ({job.source}): model {job.model}, stepper {job.stepper}"]
+    lines += [job.description] if job.description else []
+    for section, rows in _tables(job).items():
+        lines += ["", f"[{section}]", *_columns(rows)]
+    if job.axes:
+        axes = [(axis.name, _values_in_words(axis), f"{len(axis.values)} values") for axis in job.axes]
+        lines += ["", "[axes]", *_columns(axes)]
+    product = f" = {' x '.join(map(str, job.shape))}" if len(job.axes) > 1 else ""
+    lines += ["", f"runs: {job.size}{product}", f"estimated cost: {_cost_in_words(core_seconds, job.size)}"]
+    return "\n".join(lines)
+
+
+def _tables(job: Job) -> dict[str, list[tuple[str, ...]]]:
+    swept = {axis.name for axis in job.axes}
+    tables: dict[str, list[tuple[str, ...]]] = {}
+    for section, table in job.schema.sections.items():
+        tables[section] = [
+            (
+                key,
+                "see [axes]" if key in swept else in_words(job.parameters[key], parameter.unit),
+                "axis" if key in swept else "given" if key in job.given else "default",
+                parameter.description,
+            )
+            for key, parameter in table.items()
+        ]
+    return tables
+
+
+def _columns(rows: list[tuple[str, ...]]) -> list[str]:
+    """Return rows as lines with aligned columns."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
+def _values_in_words(axis: Axis) -> str:
+    words = [in_words(value, "") for value in axis.values]
+    if len(words) > _FEW:
+        words = [*words[:3], "...", words[-1]]
+    return f"{', '.join(words)} {axis.unit}".rstrip()
+
+
+def _cost_in_words(core_seconds: float, runs: int) -> str:
+    total = core_seconds * runs
+    in_all = f"{total:.3g} core-seconds" if total < 3600 else f"{total / 3600:.3g} core-hours"
+    return f"{core_seconds:.3g} core-seconds per run, {in_all} in all"

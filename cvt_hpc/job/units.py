@@ -1,0 +1,141 @@
+"""Texts with units ("50 kN", "3000 rpm", "20 %") to numbers in SI; pint is loaded where a text needs it."""
+
+from __future__ import annotations
+
+import math
+import re
+from decimal import Decimal
+from functools import lru_cache
+from typing import Any
+
+_QUANTITY = re.compile(
+    r"\s*(?P<number>[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|(?:inf|nan)(?![A-Za-z])))\s*(?P<unit>.*?)\s*"
+)
+_TOKEN = re.compile(r"(?P<name>[A-Za-zµμ_]+)(?:(?:\^|\*\*)?(?P<power>[+-]?[1-9]))?(?!\d)|[*/()]|1(?!\d)|\s+")
+_TYPOGRAPHY = str.maketrans(
+    {"·": "*", "²": "2", "³": "3", "⁻": "-", "¹": "1", "%": " percent ", "°": " degree "}
+)
+_LONGEST_UNIT = 40
+
+
+class UnitError(ValueError):
+    """A text that is not a number with a unit of the expected dimension; its own text may say why."""
+
+
+def to_si(text: str, unit: str) -> float:
+    """Convert a text such as "50 kN" to a number in an SI unit.
+
+    The conversion is decimal and rounded once, so that "75 mm" is the same number as 0.075.
+
+    Parameters
+    ----------
+    text : str
+        A number, with or without a unit; without one it is taken to be in `unit`.
+    unit : str
+        The SI unit wanted, as pint or CF writes it ("N m", "rad/s", "s m-1"); "" or "1" for dimensionless.
+
+    Returns
+    -------
+    float
+        The value [unit].
+
+    Raises
+    ------
+    UnitError
+        If the text is not a number with a unit, or the unit is of another dimension.
+    """
+    match = _QUANTITY.fullmatch(text)
+    if match is None:
+        raise UnitError
+    number, given = match["number"], match["unit"]
+    if not given or given == unit:
+        return float(number)
+    factor_free = not math.isfinite(float(number))
+    magnitude = _convert(Decimal(1) if factor_free else Decimal(number), given, unit)
+    return float(number) if factor_free else float(magnitude)
+
+
+def _convert(number: Decimal, given: str, unit: str) -> Decimal:
+    registry = _registry()
+    source, target = _parse_unit(given), _parse_unit(unit)
+    if source.dimensionality != target.dimensionality:
+        raise UnitError
+    # pint counts a radian as 1, so that 50 Hz would pass for 50 rad/s.
+    if "[mass]" not in source.dimensionality and _angle_power(source) != _angle_power(target):
+        raise UnitError(f"{given} and {unit or 'a plain number'} differ by an angle")
+    try:
+        return registry.Quantity(number, source).to(target).magnitude
+    except TypeError:  # pint's and Python's: decibels, or degrees Celsius within a product
+        raise UnitError(f"{given} is no plain multiple of {unit or 1}") from None
+
+
+def _parse_unit(text: str) -> Any:
+    """Return pint's unit for a text; only names go to pint, whose own parser evaluates any expression."""
+    tokens = _tokens(text.translate(_TYPOGRAPHY))
+    unit = _product(tokens)
+    if tokens:
+        raise UnitError
+    return unit
+
+
+def _tokens(text: str) -> list[re.Match]:
+    """Take a unit's text apart; the list is in reverse, so that the next token is popped off its end."""
+    tokens, position = [], 0
+    while position < len(text):
+        token = _TOKEN.match(text, position)
+        if token is None or len(text) > _LONGEST_UNIT:
+            raise UnitError
+        tokens.append(token)
+        position = token.end()
+    return [token for token in reversed(tokens) if not token[0].isspace()]
+
+
+def _product(tokens: list[re.Match]) -> Any:
+    """Consume factors joined by "*", "/" or a space, up to the end or a closing bracket."""
+    unit = _registry().Unit("")
+    power = 1
+    while tokens and tokens[-1][0] != ")":
+        if tokens[-1][0] in "*/":
+            power = -1 if tokens.pop()[0] == "/" else 1
+        unit *= _factor(tokens) ** power
+        power = 1
+    return unit
+
+
+def _factor(tokens: list[re.Match]) -> Any:
+    token = tokens.pop() if tokens else None
+    if token is None or token[0] in "*/)":
+        raise UnitError
+    if token[0] == "1":
+        return _registry().Unit("")
+    if token[0] == "(":
+        unit = _product(tokens)
+        if not tokens:
+            raise UnitError
+        tokens.pop()
+        return unit
+    return _named_unit(token["name"]) ** int(token["power"] or 1)
+
+
+def _named_unit(name: str) -> Any:
+    import pint
+
+    try:
+        return _registry().Unit(name)
+    except (pint.PintError, ValueError):  # ValueError: "NaN" is a number to pint
+        raise UnitError(f"{name} is no known unit") from None
+
+
+def _angle_power(unit: Any) -> float:
+    roots = _registry().get_root_units(unit)[1]
+    return dict(roots._units).get("radian", 0)
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    import pint
+
+    registry = pint.UnitRegistry(non_int_type=Decimal, on_redefinition="ignore")
+    # "120 Nm" is how everyone writes a torque; to pint Nm is a measure of yarn.
+    registry.define("newton_metre = newton * metre = Nm")
+    return registry

@@ -1,0 +1,148 @@
+"""One value of a job file against the parameter that declares it: type, unit, bounds, choices."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from typing import Any
+
+from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
+from cvt_hpc.job.units import UnitError, to_si
+from cvt_hpc.parameters import Parameter
+
+
+def read_value(parameter: Parameter, raw: Any, where: str) -> Any:
+    """Check a value as it stands in a job file, and return it in SI units and in the parameter's type.
+
+    Parameters
+    ----------
+    parameter : Parameter
+        What the key declares.
+    raw : Any
+        The value found: a number, a text with or without a unit, a bool, or a (nested) list.
+    where : str
+        File and key, for the error.
+
+    Returns
+    -------
+    float, int, bool, str, or nested tuple of float
+        The value [parameter.unit].
+
+    Raises
+    ------
+    InputError
+        If the value is not what the parameter declares.
+    """
+    kind = kind_of(parameter)
+    if kind is tuple:
+        return _read_table(parameter, raw, where)
+    if kind is str:
+        return _read_text(parameter, raw, where)
+    if kind is bool:
+        return _read_flag(parameter, raw, where)
+    value = _read_number(parameter, raw, where)
+    if kind is int:
+        if not value.is_integer():
+            raise mismatch(where, "a whole number", show(raw))
+        return int(value)
+    return value
+
+
+def kind_of(parameter: Parameter) -> type:
+    """Return the type of a parameter's values: float, int, bool, str or tuple."""
+    if parameter.default is None:
+        return str if parameter.choices else float
+    # bool before int, of which it is a subclass; numpy's scalars count as the plain types they derive from
+    return next(kind for kind in (bool, int, float, str, tuple) if isinstance(parameter.default, kind))
+
+
+def expectation(parameter: Parameter) -> str:
+    """Return what a parameter takes, in words, e.g. 'a value in N (such as "1 N" or a bare number in N)'."""
+    kind = kind_of(parameter)
+    if kind is str:
+        return f"one of {', '.join(parameter.choices)}" if parameter.choices else "a text"
+    if kind is bool:
+        return "true or false"
+    if kind is tuple:
+        return _with_unit("a list of numbers", parameter, " in ")
+    return _number_in_words(parameter)
+
+
+def in_words(value: Any, unit: str) -> str:
+    """Return a value with its unit for people to read, e.g. "50000 N"."""
+    if isinstance(value, tuple):
+        text = f"[{', '.join(in_words(item, '') for item in value)}]"
+    elif isinstance(value, bool):
+        text = show(value)
+    else:
+        text = f"{value:.10g}" if isinstance(value, float) else str(value)
+    return f"{text} {unit}".rstrip()
+
+
+def _read_number(parameter: Parameter, raw: Any, where: str) -> float:
+    if isinstance(raw, bool) or not isinstance(raw, (numbers.Real, str)):
+        hint = "; what a study varies stands in [axes]" if isinstance(raw, (list, tuple)) else ""
+        raise mismatch(where, _number_in_words(parameter), show(raw) + hint)
+    try:
+        value = to_si(raw, parameter.unit) if isinstance(raw, str) else float(raw)
+    except UnitError as error:
+        reason = f" ({error})" if str(error) else ""
+        raise mismatch(where, _number_in_words(parameter), show(raw) + reason) from None
+    except OverflowError:
+        value = math.inf
+    if math.isnan(value) or (math.isinf(value) and not parameter.allow_infinite):
+        raise mismatch(where, _with_unit("a finite value", parameter, " in "), show(raw))
+    _check_bounds(parameter, value, raw, where)
+    return value + 0.0  # -0.0 and 0.0 are one value, and shall be one job
+
+
+def _check_bounds(parameter: Parameter, value: float, raw: Any, where: str) -> None:
+    low, high = parameter.minimum, parameter.maximum
+    inside = low < value < high if parameter.exclusive else low <= value <= high
+    # The bounds of an unbounded side are infinite, and an infinite value that is allowed lies on them.
+    if inside or (parameter.allow_infinite and value in (low, high) and math.isinf(value)):
+        return
+    strict = "" if parameter.exclusive else "="
+    bounds = [f">{strict} {low:g}"] if low > -math.inf else []
+    bounds += [f"<{strict} {high:g}"] if high < math.inf else []
+    raise mismatch(where, _with_unit(" and ".join(bounds), parameter), show(raw))
+
+
+def _read_text(parameter: Parameter, raw: Any, where: str) -> str:
+    if not isinstance(raw, str):
+        raise mismatch(where, expectation(parameter), show(raw))
+    if parameter.choices and raw not in parameter.choices:
+        raise InputError(
+            f"{where}: expected {expectation(parameter)}, found {show(raw)}"
+            f"{did_you_mean(raw, parameter.choices)}"
+        )
+    return raw
+
+
+def _read_flag(parameter: Parameter, raw: Any, where: str) -> bool:
+    if raw in ("true", "false"):
+        return raw == "true"
+    if not isinstance(raw, bool):
+        raise mismatch(where, expectation(parameter), show(raw))
+    return raw
+
+
+def _read_table(parameter: Parameter, raw: Any, where: str) -> tuple:
+    if not isinstance(raw, (list, tuple)):
+        raise mismatch(where, expectation(parameter), show(raw))
+    rows = []
+    for i, item in enumerate(raw, 1):
+        read = _read_table if isinstance(item, (list, tuple)) else _read_number
+        rows.append(read(parameter, item, f"{where}, item {i}"))
+    return tuple(rows)
+
+
+def _number_in_words(parameter: Parameter) -> str:
+    unit = parameter.unit
+    if kind_of(parameter) is int and not unit:
+        return "a whole number"
+    return f'a value in {unit} (such as "1 {unit}" or a bare number in {unit})' if unit else "a number"
+
+
+def _with_unit(text: str, parameter: Parameter, joint: str = " ") -> str:
+    return f"{text}{joint}{parameter.unit}" if parameter.unit else text

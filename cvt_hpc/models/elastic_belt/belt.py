@@ -1,0 +1,297 @@
+"""Constants and initial state of the elastic belt on its mesh.
+
+The reference path is cut into cells whose faces lie on the ends of the arcs. Displacement w, transverse velocity u, the layers'
+speeds v_i and the filtered sliding speed live on faces ("stations", station j at the left face of cell j); the content n_i, the
+strains and the forces in cells. Rows of the state are listed in `FIELDS`, its scalars in `SCALARS`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cvt_hpc.physics.compliance import Sheaves, flexibility, sheaves
+from cvt_hpc.physics.friction import FrictionLaw, friction_law
+from cvt_hpc.physics.geometry import Variator, variator
+
+FIELDS = ("w", "u", "v_element", "v_ring", "v_filtered", "n_element", "n_ring")
+W, U, V_ELEMENT, V_RING, V_FILTERED, N_ELEMENT, N_RING = range(len(FIELDS))
+SCALARS = ("time", "driven_speed", "driven_position")
+TIME, DRIVEN_SPEED, DRIVEN_POSITION = range(len(SCALARS))
+
+REGIONS = ("driving arc", "t1", "driven arc", "t2")
+START_DAMPING = (
+    1e4  # [N s/m^2], fades out over rise_time: lets the belt settle in the grooves without ringing
+)
+
+
+class Belt(NamedTuple):
+    """Everything the kernels need, in SI units; N stations around the belt.
+
+    Arrays of cells and stations have shape (N,); `bending` is (N, 5): force per length on station j from the
+    displacements of stations j-2 .. j+2.
+    """
+
+    cell: np.ndarray
+    dual: np.ndarray
+    curvature: np.ndarray
+    arc_curvature: np.ndarray
+    arc_share: np.ndarray
+    bending: np.ndarray
+    ring_mass: np.ndarray
+    element_mass: float
+    mass: float
+    belt_speed: float
+    element_stiffness: float
+    ring_stiffness: float
+    element_damping: float
+    ring_damping: float
+    transverse_damping: float
+    ring_offset: float
+    ring_friction: float
+    ring_friction_speed: float
+    law: FrictionLaw
+    friction_speed: float
+    friction_memory: float
+    half_wedge_angle: float
+    driving: Sheaves
+    driven: Sheaves
+    driven_start: int
+    driving_radius: float
+    driven_radius: float
+    driving_speed: float
+    driving_position: float
+    driven_inertia: float
+    axial_damping: float
+    thrust: float
+    ratio: float
+    load: float
+    load_start: float
+    rise_time: float
+    ramp_end: float
+
+
+class State(NamedTuple):
+    """The state: `fields` (7, N) in the order of FIELDS, `scalars` (3,) in the order of SCALARS."""
+
+    fields: np.ndarray
+    scalars: np.ndarray
+
+    def copy(self) -> State:
+        """Return an independent copy."""
+        return State(self.fields.copy(), self.scalars.copy())
+
+
+class Mesh(NamedTuple):
+    """Cells of the closed path: number per region, first station of each region, cell lengths (N,) [m]."""
+
+    counts: tuple[int, int, int, int]
+    starts: tuple[int, int, int, int]
+    cell: np.ndarray
+    path: Variator
+
+    @property
+    def position(self) -> np.ndarray:
+        """Path coordinate s of the stations [m], (N,); s = 0 at the inlet of the driving arc."""
+        return np.concatenate([[0.0], np.cumsum(self.cell)[:-1]])
+
+    @property
+    def region(self) -> np.ndarray:
+        """Region of each cell, 0..3 in the order of REGIONS, (N,)."""
+        return np.repeat(np.arange(4), self.counts)
+
+
+def mesh(parameters: dict[str, Any]) -> Mesh:
+    """Cut the path into `stations` cells, equal within a region and nearly equal over all.
+
+    Parameters
+    ----------
+    parameters : dict
+        Resolved parameters of one run.
+
+    Returns
+    -------
+    Mesh
+        With faces on the ends of the arcs, so that no cell is half in contact.
+    """
+    path = variator(parameters["ratio"], parameters["driven_radius"], parameters["centre_distance"])
+    total = parameters["stations"]
+    lengths = np.array(path.lengths)
+    counts = np.maximum(np.rint(total * lengths / lengths.sum()).astype(int), 4)
+    counts[1] = counts[3]
+    counts[2] = total - counts[0] - 2 * counts[1]
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    return Mesh(tuple(map(int, counts)), tuple(map(int, starts)), np.repeat(lengths / counts, counts), path)
+
+
+def belt_constants(parameters: dict[str, Any]) -> Belt:
+    """Constants of one run.
+
+    Parameters
+    ----------
+    parameters : dict
+        Resolved parameters of one run, `duration` [s] included.
+
+    Returns
+    -------
+    Belt
+        For the kernels.
+    """
+    p, grid = parameters, mesh(parameters)
+    path, cell = grid.path, grid.cell
+    dual = 0.5 * (cell + np.roll(cell, 1))
+    kappa = np.array([1.0 / path.driving_radius, 0.0, 1.0 / path.driven_radius, 0.0])[grid.region]
+    arc_share = 0.5 * (cell * (kappa > 0) + np.roll(cell * (kappa > 0), 1)) / dual
+    ring_mass = p["ring_mass"] * 0.5 * _pair(cell * (1.0 + kappa * p["ring_offset"])) / dual
+    belt_speed = p["driving_speed"] * path.driving_radius
+    wraps = [
+        sheaves(
+            cell[grid.starts[region]],
+            grid.counts[region] + 1,
+            radius,
+            p["sheave_stiffness"],
+            p["tilt_stiffness"],
+            p["local_stiffness"],
+            p["local_length"],
+            p["flank_stiffness"],
+        )
+        for region, radius in ((0, path.driving_radius), (2, path.driven_radius))
+    ]
+    law = friction_law(
+        p["friction_law"],
+        p["kinetic_friction"],
+        p["friction_gradient"],
+        p["stribeck_velocity"],
+        p["table_force"],
+        p["table_speed"],
+        p["table_mu"],
+    )
+    ramp = p["load_history"] == "ramp"
+    return Belt(
+        cell=cell,
+        dual=dual,
+        curvature=kappa,
+        arc_curvature=np.maximum(kappa, np.roll(kappa, 1)),
+        arc_share=arc_share,
+        bending=_bending_bands(cell, dual, p["bending_stiffness"]),
+        ring_mass=ring_mass,
+        element_mass=p["element_mass"],
+        mass=p["element_mass"] + p["ring_mass"],
+        belt_speed=belt_speed,
+        element_stiffness=p["element_stiffness"],
+        ring_stiffness=p["ring_stiffness"],
+        element_damping=p["element_damping"],
+        ring_damping=p["ring_damping"],
+        transverse_damping=p["transverse_damping"],
+        ring_offset=p["ring_offset"],
+        ring_friction=p["ring_friction"],
+        ring_friction_speed=p["ring_friction_speed"],
+        law=law,
+        friction_speed=p["friction_speed"],
+        friction_memory=p["friction_memory"],
+        half_wedge_angle=p["half_wedge_angle"],
+        driving=wraps[0],
+        driven=wraps[1],
+        driven_start=grid.starts[2],
+        driving_radius=path.driving_radius,
+        driven_radius=path.driven_radius,
+        driving_speed=p["driving_speed"],
+        driving_position=p["driving_position"],
+        driven_inertia=p["driven_inertia"],
+        axial_damping=p["sheave_lag"] * p["lag_stiffness"],
+        thrust=p["thrust"],
+        ratio=p["ratio"],
+        load=p["load"],
+        load_start=p["load_start"] if ramp else p["load"],
+        rise_time=p["rise_time"],
+        ramp_end=p["duration"] if ramp else p["rise_time"],
+    )
+
+
+def _pair(values: np.ndarray) -> np.ndarray:
+    """Sum of a cell quantity over the two cells of each station."""
+    return values + np.roll(values, 1)
+
+
+def _bending_bands(cell: np.ndarray, dual: np.ndarray, stiffness: float) -> np.ndarray:
+    """Bands of -D^T diag(EI dual) D / dual, D the second difference: bending as the gradient of its energy."""
+    n = cell.size
+    second = np.zeros((n, n))
+    for j in range(n):
+        left, right = 1.0 / (cell[j - 1] * dual[j]), 1.0 / (cell[j] * dual[j])
+        second[j, j - 1] += left
+        second[j, (j + 1) % n] += right
+        second[j, j] -= left + right
+    force = -stiffness * (second.T * dual) @ second / dual[:, None]
+    return np.array([[force[j, (j + k) % n] for k in range(-2, 3)] for j in range(n)])
+
+
+def initial_state(parameters: dict[str, Any], belt: Belt) -> State:
+    """Start near the steady state without load, the strands disturbed at random.
+
+    Parameters
+    ----------
+    parameters : dict
+        Resolved parameters of one run.
+    belt : Belt
+        Its constants.
+
+    Returns
+    -------
+    State
+        Belt seated in both grooves under the tension that the thrust asks for; layers at uniform strain.
+    """
+    p, grid = parameters, mesh(parameters)
+    tangent = np.tan(p["half_wedge_angle"])
+    pull = 2.0 * tangent * p["thrust"] / grid.path.driven_wrap
+    w = np.zeros(grid.cell.size)
+    arcs = []
+    for region, sheave, radius in (
+        (0, belt.driving, belt.driving_radius),
+        (2, belt.driven, belt.driven_radius),
+    ):
+        stations = slice(grid.starts[region], grid.starts[region] + sheave.weight.size)
+        force = np.full(sheave.weight.size, pull / (2.0 * tangent * radius))
+        w[stations] = -(flexibility(sheave) @ force) / (2.0 * tangent)
+        arcs.append((stations, sheave.weight, radius))
+    w[arcs[0][0]] -= p["driving_position"] / (2.0 * tangent)
+    # the belt keeps its length: what sinks at the driver comes out at the driven pulley
+    sunk = sum((weight * w[stations]).sum() / radius for stations, weight, radius in arcs)
+    lift = -sunk / grid.path.driven_wrap
+    w[arcs[1][0]] += lift
+    _fill_strands(w, grid)
+    w += _random_strands(grid, p["disturbance"], p["seed"])
+
+    mean = [(weight * w[stations]).sum() / weight.sum() for stations, weight, _ in arcs]
+    speed = belt.driving_speed * (belt.driving_radius + mean[0])
+    fields = np.zeros((len(FIELDS), grid.cell.size))
+    fields[W] = w
+    fields[V_ELEMENT] = fields[V_RING] = speed
+    length = 1.0 + belt.curvature * 0.5 * (w + np.roll(w, -1))
+    ring_length = length + belt.curvature * p["ring_offset"]
+    rings = grid.cell @ (1.0 + belt.curvature * p["ring_offset"])
+    rings /= 1.0 + p["reference_tension"] / p["ring_stiffness"]
+    fields[N_ELEMENT] = length * (grid.path.path_length - p["play"]) / (grid.cell @ length)
+    fields[N_RING] = ring_length * rings / (grid.cell @ ring_length)
+    scalars = np.array([0.0, speed / (belt.driven_radius + mean[1]), -2.0 * tangent * lift])
+    return State(fields, scalars)
+
+
+def _fill_strands(w: np.ndarray, grid: Mesh) -> None:
+    """Straight lines between the arcs' ends."""
+    for region in (1, 3):
+        first, count = grid.starts[region], grid.counts[region]
+        ends = w[first], w[(first + count) % w.size]
+        w[first : first + count] = np.linspace(*ends, count, endpoint=False)
+
+
+def _random_strands(grid: Mesh, size: float, seed: int) -> np.ndarray:
+    """Random mixture of the first six sine shapes of both strands, largest displacement `size` [m]."""
+    random = np.random.default_rng(seed)
+    shape = np.zeros(grid.cell.size)
+    for region in (1, 3):
+        x = np.arange(grid.counts[region]) / grid.counts[region]
+        stations = slice(grid.starts[region], grid.starts[region] + grid.counts[region])
+        shape[stations] = sum(random.normal() * np.sin(k * np.pi * x) for k in range(1, 7))
+    return size * shape / np.abs(shape).max()

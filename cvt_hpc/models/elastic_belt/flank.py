@@ -1,0 +1,73 @@
+"""Forces between an element's flanks and the sheaves at one station."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from cvt_hpc.physics.friction import saturation
+
+LEAST_SPEED = 1e-9  # [m/s]: below it the direction of sliding is of no effect, friction is linear there
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def sliding(v_radial: float, v_tangential: float, cosine: float) -> tuple[float, float]:
+    """Sliding speed in the plane of the flank and the part of it along the meridian.
+
+    Parameters
+    ----------
+    v_radial, v_tangential : float
+        Speed of the element against the sheave, radial and along the belt [m/s].
+    cosine : float
+        Cosine of the half wedge angle: the flank is inclined, so the meridian speed is v_radial / cosine.
+
+    Returns
+    -------
+    speed, meridian : float
+        |v| and v_meridian [m/s].
+    """
+    meridian = v_radial / cosine
+    return max(np.sqrt(meridian * meridian + v_tangential * v_tangential), LEAST_SPEED), meridian
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def flank_forces(
+    coefficient: float,
+    width: float,
+    sine: float,
+    cosine: float,
+    axial: float,
+    v_radial: float,
+    v_tangential: float,
+) -> tuple[float, float, float, float]:
+    """Line forces of both flanks on the belt (Bullinger et al. 2005, eqs 37-39).
+
+    Parameters
+    ----------
+    coefficient : float
+        Friction law's value, without regularisation [1].
+    width : float
+        Regularisation speed [m/s].
+    sine, cosine : float
+        Of the half wedge angle.
+    axial : float
+        Axial line force f_ax of one flank, >= 0 [N/m].
+    v_radial, v_tangential : float
+        Speed of the element against the sheave [m/s].
+
+    Returns
+    -------
+    radial, tangential : float
+        Forces of both flanks, outward and along the belt [N/m].
+    along, across : float
+        Minus the slope of the friction force with speed, in the direction of sliding (law's value kept) and
+        across it [N s/m^2]; both >= 0.
+    """
+    speed, meridian = sliding(v_radial, v_tangential, cosine)
+    factor, slope = saturation(speed, width)
+    mu = coefficient * factor
+    share = mu * meridian / speed
+    twice_normal = 2.0 * axial / (cosine + share * sine)
+    radial = twice_normal * (sine - share * cosine)
+    tangential = -twice_normal * mu * v_tangential / speed
+    return radial, tangential, twice_normal * coefficient * slope, twice_normal * mu / speed

@@ -1,0 +1,170 @@
+"""What a job may set of the elastic belt, with units, bounds and defaults.
+
+Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht et al. 2004, sec. 3.1); sizes are those of
+a common passenger-car belt; every other default is an assumption, plausible and not measured.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.parameters import Parameter
+from cvt_hpc.physics.geometry import variator
+
+_INF = float("inf")
+
+
+def _positive(default: float, unit: str, description: str) -> Parameter:
+    return Parameter(default, unit, description, minimum=0.0, exclusive=True)
+
+
+def _not_negative(default: float, unit: str, description: str) -> Parameter:
+    return Parameter(default, unit, description, minimum=0.0)
+
+
+def _stiffness(default: float, unit: str, description: str) -> Parameter:
+    return Parameter(default, unit, description, minimum=0.0, exclusive=True, allow_infinite=True)
+
+
+PARAMETERS: dict[str, dict[str, Parameter]] = {
+    "scene": {
+        "ratio": _positive(2.52, "", "speed ratio, driven radius / driving radius (Lebrecht 2004: LOW stop)"),
+        "driven_radius": _positive(0.075, "m", "pitch radius on the driven pulley"),
+        "centre_distance": _positive(0.155, "m", "distance of the shafts"),
+        "driving_speed": _positive(3000.0 * np.pi / 30.0, "rad/s", "speed of the driving pulley, prescribed"),
+        "thrust": _positive(50e3, "N", "axial force on the driven pulley"),
+        "load": Parameter(
+            0.0, "N m", "torque at the driving pulley; the driven one is loaded by ratio x load"
+        ),
+        "load_history": Parameter(
+            "constant",
+            "",
+            "load is reached within rise_time and kept, or rises from load_start over the whole run",
+            choices=("constant", "ramp"),
+        ),
+        "load_start": Parameter(0.0, "N m", "load at the start of a ramp"),
+        "rise_time": _positive(
+            0.03, "s", "start-up: load rises smoothly, extra damping of the belt fades out"
+        ),
+        "disturbance": _not_negative(1e-6, "m", "largest random displacement of the strands at the start"),
+        "seed": Parameter(1, "", "seed of the random disturbance", minimum=0),
+    },
+    "belt": {
+        "element_mass": _positive(1.0, "kg/m", "mass per length of the elements"),
+        "ring_mass": _positive(0.3, "kg/m", "mass per length of the rings"),
+        "element_stiffness": _positive(4e7, "N", "longitudinal stiffness EA of the pressed elements"),
+        "ring_stiffness": _positive(7.7e6, "N", "longitudinal stiffness EA of all rings"),
+        "bending_stiffness": _not_negative(
+            0.5, "N m^2", "EI of the belt against leaving its path's curvature"
+        ),
+        "play": Parameter(0.3e-3, "m", "sum of the gaps between elements on the reference path"),
+        "reference_tension": _not_negative(
+            5.3e3, "N", "ring tension at which the rings fit the reference path"
+        ),
+        "ring_offset": Parameter(1e-3, "m", "radial offset of the rings' neutral line from the pitch line"),
+        "ring_friction": _not_negative(0.08, "", "friction coefficient between rings and elements"),
+        "ring_friction_speed": _positive(0.01, "m/s", "regularisation speed of that friction"),
+        "transverse_damping": _not_negative(200.0, "N s/m^2", "viscous damping of the transverse motion"),
+        "element_damping": _not_negative(20.0, "N s", "longitudinal damping of the pressed elements"),
+        "ring_damping": _not_negative(4.0, "N s", "longitudinal damping of the rings"),
+    },
+    "sheaves": {
+        "sheave_stiffness": _stiffness(
+            1.0, "", "stiffness of the sheaves, multiple of the reference; inf: rigid"
+        ),
+        "tilt_stiffness": _stiffness(
+            4e5, "N m/rad", "reference stiffness against tilting, shaft bending included"
+        ),
+        "local_stiffness": _positive(4e9, "N/m^2", "reference stiffness against local bending, per length"),
+        "local_length": _positive(0.012, "m", "decay length of local bending"),
+        "flank_stiffness": _positive(3e10, "N/m^2", "axial stiffness of the elements, per length"),
+        "half_wedge_angle": Parameter(
+            np.deg2rad(11.0),
+            "rad",
+            "half wedge angle of the groove",
+            minimum=0.0,
+            maximum=1.0,
+            exclusive=True,
+        ),
+        "driving_position": Parameter(0.0, "m", "axial opening of the driving pulley, prescribed (LOW stop)"),
+        "sheave_lag": _positive(2e-3, "s", "time constant T1 of the driven sheave's axial motion"),
+        "lag_stiffness": _positive(2e8, "N/m", "stiffness that scales that lag"),
+        "driven_inertia": _positive(0.02, "kg m^2", "moment of inertia of the driven pulley"),
+    },
+    "friction": {
+        "friction_law": Parameter(
+            "stribeck",
+            "",
+            "friction of the flanks over sliding speed",
+            choices=("coulomb", "linear", "stribeck", "hyperbolic", "cubic", "table"),
+        ),
+        "friction_gradient": Parameter(
+            -0.8, "s/m", "slope of the friction law at zero speed, its steepest fall", maximum=0.0
+        ),
+        "kinetic_friction": _positive(0.08, "", "the level that does not change with the gradient"),
+        "stribeck_velocity": _positive(0.05, "m/s", "speed scale of the fall"),
+        "friction_speed": _positive(0.02, "m/s", "regularisation speed of the flanks' friction"),
+        "friction_memory": _not_negative(
+            0.3e-3, "s", "time constant of the filtered sliding speed; 0: no memory"
+        ),
+        "table_force": Parameter((), "N/m", "normal line forces of a friction table, ascending"),
+        "table_speed": Parameter((), "m/s", "speeds of a friction table, ascending"),
+        "table_mu": Parameter((), "", "friction table: a row of coefficients for each force"),
+    },
+    "mesh": {
+        "stations": Parameter(160, "", "cells around the belt", minimum=24, maximum=4096),
+    },
+}
+
+
+def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems that lie between parameters.
+
+    Parameters
+    ----------
+    parameters : dict
+        Values by name, in SI units.
+
+    Returns
+    -------
+    list of (key, expected, found)
+        Empty where all is well.
+    """
+    p = parameters
+    problems = []
+    try:
+        path = variator(p["ratio"], p["driven_radius"], p["centre_distance"]).path_length
+    except ValueError:
+        radius = p["driven_radius"] / p["ratio"]
+        problems.append(
+            (
+                "ratio",
+                "pulleys that do not overlap: driven_radius (1 + 1 / ratio) < centre_distance "
+                f"{p['centre_distance']:g} m",
+                f"ratio {p['ratio']:g}, radii {radius:g} m and {p['driven_radius']:g} m",
+            )
+        )
+    else:
+        if abs(p["play"]) > 0.02 * path:
+            problems.append(("play", f"within 2 % of the belt's length {path:.4g} m", f"{p['play']:g} m"))
+    if p["friction_law"] == "coulomb" and p["friction_gradient"] != 0.0:
+        problems.append(
+            ("friction_gradient", "0 with friction_law coulomb", f"{p['friction_gradient']:g} s/m")
+        )
+    if p["friction_law"] == "table":
+        problems += _check_table(p["table_force"], p["table_speed"], p["table_mu"])
+    return problems
+
+
+def _check_table(force: tuple, speed: tuple, mu: tuple) -> list[tuple[str, str, str]]:
+    for key, grid in (("table_force", force), ("table_speed", speed)):
+        if len(grid) < 2 or np.any(np.diff(grid) <= 0.0):
+            return [(key, "at least two ascending values", f"{list(grid)}")]
+    shape = (len(force), len(speed))
+    if len(mu) != shape[0] or any(not isinstance(row, tuple) or len(row) != shape[1] for row in mu):
+        return [("table_mu", f"{shape[0]} rows of {shape[1]} coefficients", f"{len(mu)} rows")]
+    if np.min(mu) <= 0.0:
+        return [("table_mu", "coefficients > 0", f"{np.min(mu):g}")]
+    return []

@@ -1,0 +1,238 @@
+"""Right-hand side of the elastic belt, written for reading: the plain form that faster steps are judged by.
+
+Derived by virtual power on the moving belt (Eulerian, path coordinate s, belt speed v, outward displacement w):
+
+    stretch        eps_i = (1 + kappa (w + d_i)) / n_i - 1,   T = EA_r eps_1,   P = -EA_e eps_0 where eps_0 < 0 else 0
+    content        n_i,t + (v_i / (1 + eps_i)),s = 0
+    elements       m_0 (v_0,t + v_0 v_0,s) = -P,s + f_t - (1 + kappa d_1) q + (p_r - d_b (w_t + v_0 w_s)) w_s
+    rings          m_1 (v_1,t + v_1 v_1,s) =  T,s + q
+    transverse     m (w_tt + 2 v w_ts) = ((T - P - m v^2) w_s),s - EI w_ssss - (T - P - m v^2) kappa - d_b (w_t + v_0 w_s) + p_r
+    memory         v_f,t + v v_f,s = (|v_slide| - v_f) / tau_f on the arcs, v_f = |v_slide| where the belt enters
+    pulleys        J omega_dn' = -sum f_t (r + w) - i M_dr,   T_1 k z_dn' = sum f_ax - F_dn
+
+with q the friction of the rings on the elements' saddle and p_r, f_t the flanks' forces. The last term of the elements' equation is the
+radial load in the direction of the belt's actual tangent: it carries the power that radial sliding dissipates, and closes the
+balance of power. Stresses of T and P enter cells, everything else stations; the content is upwinded, since centred
+fluxes leave a free checkerboard mode where P = 0.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from cvt_hpc.models.elastic_belt.belt import (
+    DRIVEN_POSITION,
+    DRIVEN_SPEED,
+    N_ELEMENT,
+    N_RING,
+    START_DAMPING,
+    TIME,
+    V_ELEMENT,
+    V_FILTERED,
+    V_RING,
+    Belt,
+    State,
+    U,
+    W,
+)
+from cvt_hpc.models.elastic_belt.flank import flank_forces, sliding
+from cvt_hpc.physics.compliance import ContactState, Sheaves, solve_contact
+from cvt_hpc.physics.friction import friction_coefficient, saturation
+
+
+@njit(cache=True, error_model="numpy")
+def load_at(belt: Belt, time: float) -> float:
+    """Torque at the driving pulley [N m]: a smooth rise to load_start, then linear to load."""
+    if time < belt.rise_time:
+        return belt.load_start * 0.5 * (1.0 - np.cos(np.pi * time / belt.rise_time))
+    if time < belt.ramp_end:
+        share = (time - belt.rise_time) / (belt.ramp_end - belt.rise_time)
+        return belt.load_start + (belt.load - belt.load_start) * share
+    return belt.load
+
+
+@njit(cache=True, error_model="numpy")
+def damping_at(belt: Belt, time: float) -> float:
+    """Transverse damping [N s/m^2]: the belt's own, and the start-up's until rise_time."""
+    left = max(1.0 - time / belt.rise_time, 0.0)
+    return belt.transverse_damping + START_DAMPING * left * left
+
+
+@njit(cache=True, error_model="numpy")
+def strains(belt: Belt, fields: np.ndarray, eps: np.ndarray) -> None:
+    """Strains of elements and rings in the cells, into `eps` (2, N) [1]."""
+    n = belt.cell.size
+    for c in range(n):
+        kappa = belt.curvature[c]
+        w = 0.5 * (fields[W, c] + fields[W, (c + 1) % n])
+        eps[0, c] = (1.0 + kappa * w) / fields[N_ELEMENT, c] - 1.0
+        eps[1, c] = (1.0 + kappa * (w + belt.ring_offset)) / fields[N_RING, c] - 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def wrap_contact(
+    belt: Belt, sheave: Sheaves, contact: ContactState, w: np.ndarray, opening: float, force: np.ndarray
+) -> int:
+    """Axial line forces of one wrap from its displacements; returns the solver's count, 0 where it failed."""
+    gap = opening + 2.0 * np.tan(belt.half_wedge_angle) * w
+    return solve_contact(sheave, contact, gap, force)
+
+
+@njit(cache=True, error_model="numpy")
+def contact_forces(
+    belt: Belt, state: State, contacts: tuple[ContactState, ContactState], force: np.ndarray
+) -> int:
+    """Axial line forces of both wraps into `force` (N,) [N/m], 0 on the strands; 0 solves: failure."""
+    force[:] = 0.0
+    w = state.fields[W]
+    last = belt.driving.weight.size
+    solves = wrap_contact(belt, belt.driving, contacts[0], w[:last], belt.driving_position, force[:last])
+    first, last = belt.driven_start, belt.driven_start + belt.driven.weight.size
+    more = wrap_contact(
+        belt, belt.driven, contacts[1], w[first:last], state.scalars[DRIVEN_POSITION], force[first:last]
+    )
+    return solves + more if solves > 0 and more > 0 else 0
+
+
+@njit(cache=True, error_model="numpy")
+def accelerations(
+    belt: Belt,
+    state: State,
+    force: np.ndarray,
+    eps: np.ndarray,
+    rate: np.ndarray,
+) -> float:
+    """Accelerations of u, v_element and v_ring.
+
+    Parameters
+    ----------
+    belt, state
+        Constants and state.
+    force : (N,) array
+        Axial line forces of the flanks [N/m].
+    eps : (2, N) array
+        Strains of the cells.
+    rate : (7, N) array
+        Rows U, V_ELEMENT and V_RING are set [m/s^2].
+
+    Returns
+    -------
+    float
+        Moment of the flanks on the driven pulley [N m].
+    """
+    n = belt.cell.size
+    w, u = state.fields[W], state.fields[U]
+    v0, v1, vf = state.fields[V_ELEMENT], state.fields[V_RING], state.fields[V_FILTERED]
+    sine, cosine = np.sin(belt.half_wedge_angle), np.cos(belt.half_wedge_angle)
+    centrifugal = belt.mass * belt.belt_speed * belt.belt_speed
+    damping = damping_at(belt, state.scalars[TIME])
+    moment = 0.0
+    for j in range(n):
+        a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
+        left, right, dual = belt.cell[a], belt.cell[j], belt.dual[j]
+        ring_left, ring_right = belt.ring_stiffness * eps[1, a], belt.ring_stiffness * eps[1, j]
+        push_left = max(-belt.element_stiffness * eps[0, a], 0.0)
+        push_right = max(-belt.element_stiffness * eps[0, j], 0.0)
+        net_left, net_right = ring_left - push_left - centrifugal, ring_right - push_right - centrifugal
+        slope = (w[b] - w[a]) / (left + right)
+
+        transverse = (net_right * (w[b] - w[j]) / right - net_left * (w[j] - w[a]) / left) / dual
+        transverse -= (
+            0.5 * (net_right * right * belt.curvature[j] + net_left * left * belt.curvature[a]) / dual
+        )
+        transverse -= 2.0 * belt.mass * belt.belt_speed * (u[b] - u[a]) / (left + right)
+        for k in range(5):
+            transverse += belt.bending[j, k] * w[(j + k - 2) % n]
+        v_radial = u[j] + v0[j] * slope
+        outward = -damping * v_radial
+
+        # stress of the layers with their dampers; elements never pull
+        stress_left = ring_left + belt.ring_damping * (v1[j] - v1[a]) / left
+        stress_right = ring_right + belt.ring_damping * (v1[b] - v1[j]) / right
+        along_ring = (stress_right - stress_left) / dual
+        if push_left > 0.0:
+            push_left = max(push_left - belt.element_damping * (v0[j] - v0[a]) / left, 0.0)
+        if push_right > 0.0:
+            push_right = max(push_right - belt.element_damping * (v0[b] - v0[j]) / right, 0.0)
+        along_element = -(push_right - push_left) / dual
+
+        share = belt.arc_share[j]
+        if share > 0.0:
+            driven = j >= belt.driven_start
+            radius = (belt.driven_radius if driven else belt.driving_radius) + w[j]
+            omega = state.scalars[DRIVEN_SPEED] if driven else belt.driving_speed
+            v_tangential = v0[j] - omega * radius
+            v_law = sliding(v_radial, v_tangential, cosine)[0] if belt.friction_memory == 0.0 else vf[j]
+            coefficient, _ = friction_coefficient(belt.law, v_law, force[j] / cosine)
+            radial, tangential, _, _ = flank_forces(
+                coefficient, belt.friction_speed, sine, cosine, force[j], v_radial, v_tangential
+            )
+            outward += share * radial
+            along_element += share * tangential
+            moment -= driven * share * dual * tangential * radius
+            # the rings press on the elements' saddles with what their own weight leaves (Bullinger, eq. 48)
+            lever = 1.0 + belt.ring_offset * belt.arc_curvature[j]
+            factor, _ = saturation(lever * v0[j] - v1[j], belt.ring_friction_speed)
+            relief = belt.ring_mass[j] * belt.belt_speed * belt.belt_speed
+            pressure = max(ring_right - relief, 0.0) * right * belt.curvature[j]
+            pressure += max(ring_left - relief, 0.0) * left * belt.curvature[a]
+            drag = 0.5 * pressure / dual * belt.ring_friction * factor
+            along_ring += drag
+            along_element -= lever * drag
+        along_element += outward * slope
+        rate[U, j] = (transverse + outward) / belt.mass
+        rate[V_ELEMENT, j] = along_element / belt.element_mass - v0[j] * (v0[j] - v0[a]) / left
+        rate[V_RING, j] = along_ring / belt.ring_mass[j] - v1[j] * (v1[j] - v1[a]) / left
+    return moment
+
+
+@njit(cache=True, error_model="numpy")
+def content_rates(belt: Belt, state: State, eps: np.ndarray, rate: np.ndarray) -> None:
+    """Rates of the layers' content [1/s] into rows N_ELEMENT and N_RING: upwind flux v / (1 + eps)."""
+    n = belt.cell.size
+    for layer in range(2):
+        v, out = state.fields[V_ELEMENT + layer], rate[N_ELEMENT + layer]
+        for c in range(n):
+            b = c + 1 if c < n - 1 else 0
+            a = c - 1 if c > 0 else n - 1
+            inflow = v[c] / (1.0 + eps[layer, a if v[c] >= 0.0 else c])
+            outflow = v[b] / (1.0 + eps[layer, c if v[b] >= 0.0 else b])
+            out[c] = (inflow - outflow) / belt.cell[c]
+
+
+@njit(cache=True, error_model="numpy")
+def memory_rates(belt: Belt, state: State, rate: np.ndarray) -> None:
+    """Rate of the filtered sliding speed [m/s^2] on the arcs, row V_FILTERED; where the belt enters it is |v| itself."""
+    n = belt.cell.size
+    vf = state.fields[V_FILTERED]
+    for j in range(n):
+        rate[V_FILTERED, j] = 0.0
+        if belt.arc_share[j] == 0.0 or belt.friction_memory == 0.0:
+            continue
+        speed = sliding_speed(belt, state, j)
+        if j == 0 or j == belt.driven_start:
+            vf[j] = speed
+        else:
+            carried = memory_transport(belt, belt.cell[j - 1])
+            rate[V_FILTERED, j] = carried * (vf[j - 1] - vf[j]) + (speed - vf[j]) / belt.friction_memory
+
+
+@njit(cache=True, error_model="numpy")
+def memory_transport(belt: Belt, spacing: float) -> float:
+    """Upwind rate of the memory's transport [1/s], fitted so that a steady memory decays as exp(-s / (v tau_f))."""
+    return 1.0 / (belt.friction_memory * np.expm1(spacing / (belt.belt_speed * belt.friction_memory)))
+
+
+@njit(cache=True, error_model="numpy")
+def sliding_speed(belt: Belt, state: State, j: int) -> float:
+    """Sliding speed |v| of the flanks at station j of an arc [m/s]."""
+    n = belt.cell.size
+    a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
+    w, v = state.fields[W], state.fields[V_ELEMENT, j]
+    v_radial = state.fields[U, j] + v * (w[b] - w[a]) / (belt.cell[a] + belt.cell[j])
+    if j >= belt.driven_start:
+        v_tangential = v - state.scalars[DRIVEN_SPEED] * (belt.driven_radius + w[j])
+    else:
+        v_tangential = v - belt.driving_speed * (belt.driving_radius + w[j])
+    return sliding(v_radial, v_tangential, np.cos(belt.half_wedge_angle))[0]

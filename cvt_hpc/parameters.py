@@ -1,0 +1,39 @@
+"""The vocabulary in which models and steppers declare what a job file may set."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One quantity that a job file may set.
+
+    Attributes
+    ----------
+    default : Any
+        Value in SI units; None where a job must give it. Its type is the parameter's type:
+        float, int, bool, str, or a (nested) tuple of floats for tables.
+    unit : str
+        SI unit as pint reads it ("N m", "rad/s"); "" for dimensionless numbers and texts.
+    description : str
+        One line, field-standard term first; shown by `cvt-hpc check`.
+    minimum, maximum : float
+        Bounds, inclusive unless `exclusive` is set.
+    exclusive : bool
+        The bounds themselves are refused (a mass must be positive, not zero).
+    allow_infinite : bool
+        `inf` is a legal value (rigid sheaves).
+    choices : tuple of str
+        The legal texts of a str parameter.
+    """
+
+    default: Any
+    unit: str
+    description: str
+    minimum: float = float("-inf")
+    maximum: float = float("inf")
+    exclusive: bool = False
+    allow_infinite: bool = False
+    choices: tuple[str, ...] = ()

@@ -1,0 +1,196 @@
+"""Friction laws between belt elements and sheaves, each with its derivative.
+
+A law gives the coefficient mu(v) >= 0 of steady sliding at speed v >= 0 [m/s]. Its regularisation about v = 0,
+tanh(v / v_reg), is a factor of its own (`saturation`), because with friction memory the two are
+taken at different speeds: the law at the filtered speed, the saturation at the present one.
+
+**The friction gradient** is defined once, here, for all laws: the slope dmu/dv [s/m] of the law at v -> 0+, without the
+regularisation. For every falling law below that is its steepest slope; negative means friction falls with speed. The speed
+scale `stribeck_velocity` and one level stay fixed when the gradient varies; the other level follows from it:
+
+============  =====================================================================  =========================
+law           mu(v), g = friction_gradient, v_s = stribeck_velocity                   level kept
+============  =====================================================================  =========================
+coulomb       mu_k                                                                     mu_k (g must be 0)
+linear        max(mu_k - g v_s + g v, mu_k): falls to the floor mu_k at v_s            mu_k
+stribeck      mu_k - g v_s exp(-v / v_s)                                               mu_k
+hyperbolic    mu_k / (1 + d v), d = -g / mu_k                                          mu_k, here at v = 0
+cubic         mu_s - 3/2 (mu_s - mu_k) (x - x^3 / 3), x = v / v_s                      mu_k, its minimum at v_s
+table         bilinear in (normal force, speed), held constant outside                 the table
+============  =====================================================================  =========================
+
+The cubic law (Thomsen and Fidlin 2003) has mu_s = mu_k - 2/3 g v_s; beyond x = sqrt(3), where the cubic is back at mu_s,
+it is held there. For a table the gradient is the slope of its first interval at the lowest force.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+
+class Law(IntEnum):
+    """The laws, as kernels know them."""
+
+    COULOMB = 0
+    LINEAR = 1
+    STRIBECK = 2
+    HYPERBOLIC = 3
+    CUBIC = 4
+    TABLE = 5
+
+
+class FrictionLaw(NamedTuple):
+    """A law with its coefficients, as kernels take it.
+
+    Attributes
+    ----------
+    kind : int
+        One of `Law`.
+    kinetic : float
+        mu_k [1].
+    gradient : float
+        dmu/dv at v -> 0+ [s/m].
+    speed : float
+        v_s [m/s].
+    table_force : (nf,) array
+        Normal line forces of the table, ascending [N/m].
+    table_speed : (nv,) array
+        Speeds of the table, ascending [m/s].
+    table_mu : (nf, nv) array
+        Coefficients [1].
+    """
+
+    kind: int
+    kinetic: float
+    gradient: float
+    speed: float
+    table_force: np.ndarray
+    table_speed: np.ndarray
+    table_mu: np.ndarray
+
+
+def friction_law(
+    kind: str,
+    kinetic: float,
+    gradient: float,
+    speed: float,
+    table_force: np.ndarray | tuple = (),
+    table_speed: np.ndarray | tuple = (),
+    table_mu: np.ndarray | tuple = (),
+) -> FrictionLaw:
+    """Build a law from its name and coefficients.
+
+    Parameters
+    ----------
+    kind : str
+        Name of a `Law`, in lower case.
+    kinetic, gradient, speed : float
+        mu_k [1], friction gradient [s/m], v_s [m/s].
+    table_force, table_speed, table_mu : array_like, shapes (nf,), (nv,), (nf, nv)
+        The table [N/m], [m/s], [1]; read by the law `table` only.
+
+    Returns
+    -------
+    FrictionLaw
+        Ready for `friction_coefficient`.
+    """
+    tables = [np.ascontiguousarray(a, dtype=np.float64) for a in (table_force, table_speed, table_mu)]
+    tables[2] = tables[2].reshape(tables[0].size, tables[1].size)
+    return FrictionLaw(int(Law[kind.upper()]), float(kinetic), float(gradient), float(speed), *tables)
+
+
+@njit(cache=True, error_model="numpy")
+def _bracket(grid: np.ndarray, value: float) -> tuple[int, float]:
+    """Interval of an ascending grid and the position in it, 0..1; held at both ends."""
+    last = grid.size - 2
+    i = min(max(np.searchsorted(grid, value) - 1, 0), last)
+    return i, min(max((value - grid[i]) / (grid[i + 1] - grid[i]), 0.0), 1.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _table_lookup(law: FrictionLaw, speed: float, force: float) -> tuple[float, float]:
+    i, a = _bracket(law.table_force, force)
+    j, b = _bracket(law.table_speed, speed)
+    low = (1.0 - a) * law.table_mu[i, j] + a * law.table_mu[i + 1, j]
+    high = (1.0 - a) * law.table_mu[i, j + 1] + a * law.table_mu[i + 1, j + 1]
+    inside = law.table_speed[0] <= speed < law.table_speed[-1]
+    slope = (high - low) / (law.table_speed[j + 1] - law.table_speed[j]) if inside else 0.0
+    return (1.0 - b) * low + b * high, slope
+
+
+@njit(cache=True, error_model="numpy")
+def formula_coefficient(
+    kind: int, kinetic: float, gradient: float, scale: float, speed: float
+) -> tuple[float, float]:
+    """Coefficient and slope of the laws that are formulas, from plain numbers (no table): `friction_coefficient`.
+
+    Kernels call this one in their inner loops: handing over a `FrictionLaw` costs more than the law itself.
+    """
+    if kind == 2:
+        fall = gradient * np.exp(-speed / scale)
+        return kinetic - scale * fall, fall
+    if kind == 0:
+        return kinetic, 0.0
+    if kind == 1:
+        if speed < scale:
+            return kinetic + gradient * (speed - scale), gradient
+        return kinetic, 0.0
+    if kind == 3:
+        denominator = 1.0 - gradient / kinetic * speed
+        return kinetic / denominator, gradient / (denominator * denominator)
+    x = speed / scale
+    span = -2.0 / 3.0 * gradient * scale
+    if x * x < 3.0:
+        return kinetic + span * (1.0 - 1.5 * (x - x * x * x / 3.0)), gradient * (1.0 - x * x)
+    return kinetic + span, 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def friction_coefficient(law: FrictionLaw, speed: float, force: float) -> tuple[float, float]:
+    """Coefficient of friction in steady sliding and its slope.
+
+    Parameters
+    ----------
+    law : FrictionLaw
+        The law.
+    speed : float
+        Sliding speed, >= 0 [m/s].
+    force : float
+        Normal line force [N/m]; only a table reads it.
+
+    Returns
+    -------
+    mu : float
+        Coefficient [1].
+    slope : float
+        dmu/dspeed [s/m].
+    """
+    if law.kind == 5:
+        return _table_lookup(law, speed, force)
+    return formula_coefficient(law.kind, law.kinetic, law.gradient, law.speed, speed)
+
+
+@njit(cache=True, error_model="numpy")
+def saturation(speed: float, width: float) -> tuple[float, float]:
+    """Regularisation of Coulomb friction about zero speed: tanh(speed / width) and its slope.
+
+    Parameters
+    ----------
+    speed : float
+        Sliding speed, any sign [m/s].
+    width : float
+        Regularisation speed v_reg, > 0 [m/s].
+
+    Returns
+    -------
+    factor, slope : float
+        tanh(speed / width) [1] and its derivative [s/m].
+    """
+    # tanh by one exponential: a third of the cost of the library's
+    decay = np.exp(-2.0 * abs(speed) / width)
+    factor = (1.0 - decay) / (1.0 + decay)
+    return np.copysign(factor, speed), (1.0 - factor * factor) / width

@@ -1,0 +1,221 @@
+"""What a study consists of, as its folder keeps it: enough to read and gather it without the model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from enum import IntEnum
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cvt_hpc.errors import InputError
+from cvt_hpc.study.simulator import Simulator
+from cvt_hpc.variables import Status, Variable
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A dimension of the dataset with its coordinate: an axis of the job, or an extra one of the record.
+
+    Attributes
+    ----------
+    name : str
+        Name of the dimension and of its coordinate.
+    values : tuple
+        Coordinate values in SI units, or texts.
+    units : str
+        CF unit; "" for texts.
+    long_name : str
+        CF long_name.
+    """
+
+    name: str
+    values: tuple
+    units: str
+    long_name: str
+
+    @property
+    def holds_texts(self) -> bool:
+        """Whether the values are texts."""
+        return isinstance(self.values[0], str)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the dimension as JSON types; infinities, which JSON lacks, as texts."""
+        values = [v if isinstance(v, str) or math.isfinite(v) else str(v) for v in self.values]
+        return {**asdict(self), "values": values, "texts": self.holds_texts}
+
+    @classmethod
+    def from_json(cls, entry: Mapping[str, Any]) -> Dimension:
+        """Return the dimension that `to_json` wrote."""
+        values = entry["values"]
+        if not entry["texts"]:
+            values = [float(v) if isinstance(v, str) else v for v in values]
+        return cls(entry["name"], tuple(values), entry["units"], entry["long_name"])
+
+
+@dataclass(frozen=True)
+class Study:
+    """A job together with the layout of its records.
+
+    Attributes
+    ----------
+    name, description, fingerprint : str
+        Of the job.
+    job : dict
+        The whole resolved job, as JSON types.
+    axes : tuple of Dimension
+        The grid; run indices count through it in C order. Empty for a single run.
+    variables : tuple of Variable
+        The quantities of a record, `status` first.
+    coordinates : tuple of Dimension
+        Dimensions of the variables beside the grid.
+    """
+
+    name: str
+    description: str
+    fingerprint: str
+    job: dict[str, Any]
+    axes: tuple[Dimension, ...]
+    variables: tuple[Variable, ...]
+    coordinates: tuple[Dimension, ...]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values on each axis."""
+        return tuple(len(axis.values) for axis in self.axes)
+
+    @property
+    def size(self) -> int:
+        """Number of runs."""
+        return math.prod(self.shape)
+
+    @cached_property
+    def record_dtype(self) -> np.dtype:
+        """Structured type of one record: packed and little-endian, so that logs move between machines."""
+        lengths = {dimension.name: len(dimension.values) for dimension in self.coordinates}
+        fields = [
+            (v.name, np.dtype(v.dtype).newbyteorder("<"), tuple(lengths[d] for d in v.dims))
+            for v in self.variables
+        ]
+        return np.dtype(fields)
+
+    def place(self, index: int) -> dict[str, Any]:
+        """Return the axes' values of run `index`, by axis name."""
+        position = np.unravel_index(index, self.shape) if self.axes else ()
+        return {axis.name: axis.values[i] for axis, i in zip(self.axes, position, strict=True)}
+
+    def blank_rows(self, shape: int | tuple[int, ...] = ()) -> np.ndarray:
+        """Return records of runs without results: NaN, zero, no text, and flags that say so."""
+        rows = np.zeros(shape, self.record_dtype)
+        for variable in self.variables:
+            if variable.flags is not None:
+                rows[variable.name] = variable.flags.__members__.get("UNDECIDED", 0)
+            elif np.dtype(variable.dtype).kind == "f":
+                rows[variable.name] = np.nan
+        return rows
+
+    def pack(self, values: Mapping[str, Any]) -> np.ndarray:
+        """Return the record, shape (), of what a run delivered.
+
+        Raises
+        ------
+        ValueError
+            If a quantity is missing, unknown, or has another shape than declared, or the run says that it was
+            not run.
+        """
+        row = self.blank_rows()
+        if values.keys() != set(row.dtype.names):
+            raise ValueError(f"a record needs {sorted(row.dtype.names)}, found {sorted(values)}")
+        for name, value in values.items():
+            field = row.dtype[name]
+            if np.shape(value) != field.shape:
+                raise ValueError(f"{name}: expected shape {field.shape}, found {np.shape(value)}")
+            row[name] = fit_text(value, field.itemsize) if field.kind == "S" else value
+        if row["status"] == Status.NOT_RUN:
+            raise ValueError("a run that ended has the status not_run")
+        return row
+
+    def pack_failure(self, reason: str) -> np.ndarray:
+        """Return the record, shape (), of a run that ended in a Python exception."""
+        row = self.blank_rows()
+        row["status"] = Status.FAILED_ERROR
+        row["reason"] = fit_text(reason, row.dtype["reason"].itemsize)
+        return row
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the study as JSON types."""
+        return {
+            "name": self.name,
+            "description": self.description,
+            "fingerprint": self.fingerprint,
+            "job": self.job,
+            "axes": [axis.to_json() for axis in self.axes],
+            "variables": [_variable_to_json(variable) for variable in self.variables],
+            "coordinates": [dimension.to_json() for dimension in self.coordinates],
+        }
+
+    @classmethod
+    def from_json(cls, entry: Mapping[str, Any]) -> Study:
+        """Return the study that `to_json` wrote."""
+        return cls(
+            entry["name"],
+            entry["description"],
+            entry["fingerprint"],
+            entry["job"],
+            tuple(Dimension.from_json(axis) for axis in entry["axes"]),
+            tuple(_variable_from_json(variable) for variable in entry["variables"]),
+            tuple(Dimension.from_json(dimension) for dimension in entry["coordinates"]),
+        )
+
+
+def describe(job: Job, simulator: Simulator) -> Study:
+    """Return the study of a job.
+
+    Raises
+    ------
+    InputError
+        If an axis has the name of a recorded quantity, so that the dataset could not hold both.
+    """
+    variables = tuple(simulator.record_variables(job))
+    coordinates = tuple(
+        Dimension(name, tuple(np.asarray(c.values).tolist()), c.units, c.long_name)
+        for name, c in simulator.record_coordinates(job).items()
+    )
+    taken = {variable.name for variable in variables} | {dimension.name for dimension in coordinates}
+    for axis in job.axes:
+        if axis.name in taken:
+            raise InputError(
+                f"{job.source}: [axes] {axis.name}: expected a parameter that is not also the name of a "
+                f"recorded quantity, found {axis.name}"
+            )
+    axes = tuple(_grid_dimension(axis) for axis in job.axes)
+    return Study(job.name, job.description, job.fingerprint(), job.resolved(), axes, variables, coordinates)
+
+
+def fit_text(text: str, size: int) -> bytes:
+    """Return a text as one line of UTF-8 of at most `size` bytes, cut between characters."""
+    return " ".join(text.split()).encode()[:size].decode(errors="ignore").encode()
+
+
+def _grid_dimension(axis: Any) -> Dimension:
+    values = tuple(np.asarray(axis.values).tolist())
+    units = "" if isinstance(values[0], str) else axis.unit or "1"
+    return Dimension(axis.name, values, units, axis.description)
+
+
+def _variable_to_json(variable: Variable) -> dict[str, Any]:
+    flags = variable.flags
+    meanings = flags and {"name": flags.__name__, "members": {m.name: int(m) for m in flags}}
+    return {**asdict(variable), "dims": list(variable.dims), "flags": meanings}
+
+
+def _variable_from_json(entry: Mapping[str, Any]) -> Variable:
+    meanings = entry["flags"]
+    flags = meanings and IntEnum(meanings["name"], meanings["members"])
+    return Variable(**{**entry, "dims": tuple(entry["dims"]), "flags": flags})

@@ -1,0 +1,188 @@
+"""From record logs to the dataset: `results.nc`, netCDF-4 with CF conventions."""
+
+from __future__ import annotations
+
+import json
+import logging
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cvt_hpc.errors import InputError
+from cvt_hpc.study.description import Dimension, Study
+from cvt_hpc.study.files import aside_of, discard, naming_refusals, put_in_place, storage_error
+from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.provenance import command, git_revision, versions
+from cvt_hpc.study.recovery import Records, read_records
+from cvt_hpc.variables import Variable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
+_logger = logging.getLogger(__name__)
+
+
+def gather(out: str | Path) -> Path:
+    """Write the dataset of all runs recorded so far; works while a run is at work.
+
+    Parameters
+    ----------
+    out : str or Path
+        The output folder of a run.
+
+    Returns
+    -------
+    Path
+        Of the dataset, `results.nc` in the folder.
+
+    Raises
+    ------
+    InputError
+        If the folder is not that of a run, or cannot be written to.
+    """
+    folder = StudyFolder(out)
+    study = folder.load()
+    records = read_records(folder.records, study)
+    for warning in records.warnings:
+        _logger.warning(warning)
+    return write_results(folder, study, records)
+
+
+def open_results(path: str | Path) -> xr.Dataset:
+    """Open the dataset of a study.
+
+    Parameters
+    ----------
+    path : str or Path
+        The output folder of a run, or a dataset.
+
+    Returns
+    -------
+    xarray.Dataset
+        Read from the file as it is used; close it, or use it in a `with`.
+
+    Raises
+    ------
+    InputError
+        If there is no dataset, or none that can be read.
+    """
+    import xarray as xr
+
+    found = Path(path)
+    with naming_refusals(found, "a netCDF dataset"):
+        if found.is_dir():
+            folder = StudyFolder(found)
+            found = folder.results
+            if not found.exists():
+                folder.load()
+                raise InputError(
+                    f"{found}: expected a dataset, found nothing; `cvt-hpc gather {path}` writes it"
+                )
+        try:
+            # Quantities in seconds are numbers, not dates.
+            return xr.open_dataset(found, engine="netcdf4", decode_times=False)
+        except ValueError as error:
+            raise InputError(f"{found}: expected a netCDF dataset, found: {error}") from error
+
+
+def write_results(folder: StudyFolder, study: Study, records: Records) -> Path:
+    """Write the dataset of records that were read: aside, to the disk, and in its place in one step.
+
+    Raises
+    ------
+    StorageError
+        If the system refuses; the dataset that was there is then untouched.
+    """
+    dataset = build_dataset(study, records)
+    encoding = {name: _encoding(array) for name, array in dataset.variables.items()}
+    for name in dataset.coords:
+        encoding[name]["_FillValue"] = None  # xarray would give them one, and CF forbids it
+    aside = aside_of(folder.results)
+    try:
+        dataset.to_netcdf(aside, engine="netcdf4", format="NETCDF4", encoding=encoding)
+        put_in_place(aside, folder.results)
+    except (OSError, RuntimeError) as error:  # RuntimeError: what the netCDF library makes of a full disk
+        discard(aside)
+        raise storage_error(folder.results, error) from error
+    return folder.results
+
+
+def build_dataset(study: Study, records: Records) -> xr.Dataset:
+    """Return the dataset of a study: one variable per quantity over the grid, `status` first."""
+    import xarray as xr
+
+    grid = tuple(axis.name for axis in study.axes)
+    variables = {}
+    for variable in study.variables:
+        values = records.rows[variable.name]
+        values = np.array(values.reshape(study.shape + values.shape[1:]), order="C")
+        if values.dtype.kind == "S":
+            values = np.char.decode(values, "utf-8", "replace")
+        variables[variable.name] = (grid + variable.dims, values, _attributes(variable, values.dtype))
+    coordinates = {dimension.name: _coordinate(dimension) for dimension in (*study.axes, *study.coordinates)}
+    return xr.Dataset(variables, coordinates, _global_attributes(study, records))
+
+
+def _attributes(variable: Variable, dtype: np.dtype) -> dict[str, Any]:
+    attributes: dict[str, Any] = {"long_name": variable.long_name}
+    if variable.flags is not None:
+        attributes["flag_values"] = np.array([int(flag) for flag in variable.flags], dtype)
+        attributes["flag_meanings"] = " ".join(flag.name.lower() for flag in variable.flags)
+    elif variable.units:
+        attributes["units"] = variable.units
+    if variable.volatile:
+        attributes["volatile"] = "yes"
+        attributes["comment"] = "depends on the machine and the hour; not reproduced bitwise"
+    return attributes
+
+
+def _coordinate(dimension: Dimension) -> tuple[str, np.ndarray, dict[str, str]]:
+    attributes = {"long_name": dimension.long_name}
+    if dimension.units:
+        attributes["units"] = dimension.units
+    values = np.array(dimension.values, dtype=object if dimension.holds_texts else None)
+    return dimension.name, values, attributes
+
+
+def _encoding(array: xr.Variable) -> dict[str, Any]:
+    """Return how a variable is stored; a fill value is for real numbers alone, flags and counts have none."""
+    if array.dtype.kind == "O":
+        return {}
+    kind = {"f": {}, "U": {"dtype": "S1"}}.get(
+        array.dtype.kind, {"_FillValue": None}
+    )  # S1: texts that compress
+    return {**kind, **(_COMPRESSION if array.ndim else {})}
+
+
+def _global_attributes(study: Study, records: Records) -> dict[str, str]:
+    sessions = records.sessions
+    lines = [
+        f"{_timestamp(s['started'])}: {s['command']} (on {s['host']}, {s['ranks']} rank(s))" for s in sessions
+    ] + [f"{_timestamp(time.time())}: {command()} (gathered)"]
+    return {
+        "Conventions": "CF-1.11",
+        "title": study.description or study.name,
+        "source": f"cvt_hpc, model {study.job.get('model', '')}".rstrip(),
+        "history": "\n".join(lines),
+        "job_name": study.name,
+        "job": json.dumps(study.job),
+        "job_fingerprint": study.fingerprint,
+        "versions": json.dumps(merge_versions([s["versions"] for s in sessions] or [versions()])),
+        "git_revision": ", ".join(dict.fromkeys(s["git_revision"] for s in sessions)) or git_revision(),
+    }
+
+
+def merge_versions(found: list[dict[str, str]]) -> dict[str, str]:
+    """Return the version of each package, several of them as "1.0, 1.1" where sessions differ."""
+    merged: dict[str, dict[str, None]] = {}
+    for versions_of_session in found:
+        for package, version in versions_of_session.items():
+            merged.setdefault(package, {})[version] = None
+    return {package: ", ".join(different) for package, different in merged.items()}
+
+
+def _timestamp(seconds: float) -> str:
+    return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(seconds))

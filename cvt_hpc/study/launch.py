@@ -1,0 +1,182 @@
+"""Who started this process, and with how many others: a serial run never touches MPI.
+
+MPI is imported only where a launcher's environment says that there are other ranks. A launcher that does
+not fit the MPI library starts ranks that cannot see each other, each of which would run the whole sweep: the
+sizes are compared and such a start is refused.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from cvt_hpc.errors import InputError
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+Result = TypeVar("Result")
+
+# Size and rank as launchers tell them, the nearest to the process first: an mpirun within a Slurm allocation
+# inherits the numbers of the allocation, which are not those of its own ranks.
+_LAUNCHERS = (
+    ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"),
+    ("PMI_SIZE", "PMI_RANK"),
+    ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
+    ("SLURM_NTASKS", "SLURM_PROCID"),
+)
+_REMEDY = (
+    "Start it with the launcher of this MPI library: its own mpirun, or under Slurm `srun --mpi=pmi2` "
+    "(MPICH) or `srun --mpi=pmix` (Open MPI); `srun --mpi=list` shows what there is. For a single process on "
+    "purpose: `srun -n 1`, or unset {variable}"
+)
+
+
+@dataclass(frozen=True)
+class Launch:
+    """What the environment says about the start of this process.
+
+    Attributes
+    ----------
+    size : int
+        Number of processes started together.
+    rank : int
+        Number of this process among them.
+    variable : str
+        The environment variable that says so; "" if there is none.
+    """
+
+    size: int = 1
+    rank: int = 0
+    variable: str = ""
+
+
+def detect_launch(environment: Mapping[str, str] = os.environ) -> Launch:
+    """Return how this process was started, by the environment alone."""
+    for size, rank in _LAUNCHERS:
+        if environment.get(size, "").isdigit():
+            number = environment.get(rank, "")
+            return Launch(int(environment[size]), int(number) if number.isdigit() else 0, size)
+    return Launch()
+
+
+def process_rank() -> int:
+    """Return the number of this process among those started together; only 0 should talk to the user."""
+    return detect_launch().rank
+
+
+class Team:
+    """The processes that work on one sweep: the ranks of a communicator, or this process alone.
+
+    Parameters
+    ----------
+    communicator : MPI.Intracomm or None
+        None for this process alone.
+    """
+
+    def __init__(self, communicator: MPI.Intracomm | None = None) -> None:
+        self.communicator = communicator
+        self.rank = communicator.rank if communicator else 0
+        self.size = communicator.size if communicator else 1
+
+    def on_root(self, work: Callable[[], Result]) -> Result:
+        """Return on all ranks what `work` returns on rank 0, or raise its `InputError` on all."""
+        if self.communicator is None:
+            return work()
+        result, error = None, None
+        if self.rank == 0:
+            try:
+                result = work()
+            except InputError as caught:
+                error = caught
+        result, text = self.communicator.bcast((result, error and str(error)))
+        if text is not None:
+            raise error or InputError(text)
+        return result
+
+    def collect(self, value: Any) -> list[Any]:
+        """Return the values of all ranks, on all ranks."""
+        return [value] if self.communicator is None else self.communicator.allgather(value)
+
+    def wait_for_all(self, meanwhile: Callable[[], None]) -> None:
+        """Return when all ranks have come here; calls `meanwhile` every few milliseconds until then."""
+        if self.communicator is None:
+            return
+        request = self.communicator.Ibarrier()
+        while not request.Test():  # asks now and then: a blocking wait would keep a core busy
+            meanwhile()
+            time.sleep(0.01)
+
+
+@contextmanager
+def assembled_team() -> Iterator[Team]:
+    """Give the team of all processes that were started together; an unexpected error of one ends them all.
+
+    Raises
+    ------
+    InputError
+        If the launcher started several processes that MPI does not connect.
+    """
+    launch = detect_launch()
+    # PMIX_RANK alone, without a size: some launcher that is not in the list. An application that has imported
+    # mpi4py itself was started for MPI as well.
+    may_have_company = launch.size > 1 or "PMIX_RANK" in os.environ or "mpi4py.MPI" in sys.modules
+    world = _connect(launch) if may_have_company else None
+    if world is None or world.size == 1:
+        yield Team()
+        return
+    _abort_on_uncaught(world)
+    communicator = world.Dup()  # our messages never mix with those of an application
+    try:
+        yield Team(communicator)
+    except InputError:  # raised by all ranks alike, so all get here
+        communicator.Free()
+        raise
+    except BaseException:
+        _abort(world, traceback.format_exc())
+        raise
+    else:
+        communicator.Free()
+
+
+def _connect(launch: Launch) -> MPI.Intracomm:
+    """Initialise MPI and return the communicator of all ranks."""
+    try:
+        from mpi4py import MPI
+    except (ImportError, RuntimeError) as error:  # RuntimeError: mpi4py is there, the MPI library is not
+        raise InputError(
+            f"{launch.variable or 'PMIX_RANK'}: expected mpi4py, to connect the tasks that were started "
+            f"together, found: {error}. Install it with an MPI, e.g. `pip install 'cvt_hpc[mpich]'`, or "
+            "start one process"
+        ) from error
+    world = MPI.COMM_WORLD
+    if world.size < launch.size:
+        library = " ".join(MPI.Get_library_version().split("\n")[0].split(",")[0].split())
+        raise InputError(
+            f"{launch.variable}: expected {launch.size} connected ranks, found {world.size}: each would run "
+            f"the whole sweep. The MPI library here is {library}. {_REMEDY.format(variable=launch.variable)}"
+        )
+    return world
+
+
+def _abort_on_uncaught(world: MPI.Intracomm) -> None:
+    """See to it that an error after or between sweeps ends all ranks, not one for which the others wait."""
+
+    def hook(kind: type[BaseException], value: BaseException, trace: Any) -> None:
+        _abort(world, "".join(traceback.format_exception(kind, value, trace)))
+
+    sys.excepthook = hook
+
+
+def _abort(world: MPI.Intracomm, text: str) -> None:
+    print(f"rank {world.rank}: {text}\nrank {world.rank}: ends all {world.size} ranks", file=sys.stderr)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    time.sleep(0.5)  # mpirun, once told to abort, drops output that it has not yet passed on
+    world.Abort(1)

@@ -1,0 +1,81 @@
+"""How far a sweep is: a bar on a terminal, plain lines where the output goes to a file."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from cvt_hpc.study.schedule import Counter
+
+_BAR_INTERVAL = 0.5  # [s]
+_FIRST_LINE = 5.0  # [s]; lines then come less and less often, so that a day's output stays readable
+_LAST_LINE = 60.0  # [s]
+
+
+class Progress:
+    """Shows on stderr how many runs all ranks have finished.
+
+    Parameters
+    ----------
+    counter : Counter
+        What the ranks report to.
+    total : int
+        Number of runs of the study.
+    recorded, failed : int
+        Number of runs that earlier sessions have recorded, and of the failed ones among them.
+    visible : bool
+        Whether anything is shown at all.
+    """
+
+    def __init__(self, counter: Counter, total: int, recorded: int, failed: int, visible: bool) -> None:
+        self._counter = counter
+        self._total = total
+        self._recorded = recorded
+        self._failed = failed
+        self._started = self._shown = time.monotonic()
+        self._visible = visible
+        self._bar = None
+        if visible and sys.stderr.isatty():
+            from tqdm import tqdm
+
+            self._bar = tqdm(total=total, initial=recorded, unit="run", dynamic_ncols=True)
+
+    def show(self) -> None:
+        """Show the state of things, if the last time is long enough ago."""
+        if not self._visible:
+            return
+        now = time.monotonic()
+        elapsed = now - self._started
+        interval = _BAR_INTERVAL if self._bar is not None else min(max(_FIRST_LINE, elapsed / 20), _LAST_LINE)
+        if now - self._shown >= interval:
+            self._shown = now
+            self._show(elapsed)
+
+    def close(self) -> None:
+        """Show the state at the end."""
+        if not self._visible:
+            return
+        self._show(time.monotonic() - self._started)
+        if self._bar is not None:
+            self._bar.close()
+
+    def _show(self, elapsed: float) -> None:
+        tally = self._counter.tally()
+        finished, failed = self._recorded + tally.finished, self._failed + tally.failed
+        if self._bar is not None:
+            self._bar.set_postfix_str(f"{failed} failed", refresh=False)
+            self._bar.update(finished - self._bar.n)
+            self._bar.refresh()
+            return
+        line = f"{finished}/{self._total} runs ({finished / self._total:.1%}), {failed} failed"
+        if tally.finished and elapsed > 0:
+            rate = tally.finished / elapsed
+            line += f", {rate:.3g} runs/s, {show_duration((self._total - finished) / rate)} to go"
+        print(line, file=sys.stderr, flush=True)
+
+
+def show_duration(seconds: float) -> str:
+    """Return a time span [s] as "h:mm:ss"."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}"

@@ -1,0 +1,72 @@
+"""Where numbers come from: the command, the host, the versions and the revision, kept in every log."""
+
+from __future__ import annotations
+
+import platform
+import shlex
+import subprocess
+import sys
+import time
+import uuid
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import cvt_hpc
+
+_PACKAGES = ("numpy", "numba", "scipy", "xarray", "netCDF4", "mpi4py")
+
+
+def new_session(ranks: int) -> dict[str, Any]:
+    """Return what is to be known of one start of a sweep, as JSON types.
+
+    Parameters
+    ----------
+    ranks : int
+        Number of MPI ranks that compute.
+    """
+    return {
+        "id": uuid.uuid4().hex,
+        "started": time.time(),
+        "command": command(),
+        "host": platform.node(),
+        "ranks": ranks,
+        "versions": versions(),
+        "git_revision": git_revision(),
+    }
+
+
+def command() -> str:
+    """Return the command line of this process, its program without the folder."""
+    return shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that numbers may depend on."""
+    found = {"cvt_hpc": cvt_hpc.__version__, "python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def git_revision() -> str:
+    """Return the revision of this source, "-dirty" appended if it was changed; "" outside a git checkout."""
+    source = Path(__file__)
+    # A package installed below somebody else's checkout must not be given that checkout's revision.
+    if _git(source, "ls-files", "--error-unmatch", source.name) is None:
+        return ""
+    return _git(source, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*") or ""
+
+
+def _git(source: Path, *arguments: str) -> str | None:
+    """Return what git says in the folder of `source`, None if it is missing or refuses."""
+    try:
+        answer = subprocess.run(
+            ["git", *arguments], cwd=source.parent, capture_output=True, text=True, timeout=10, check=True
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return answer.stdout.strip()

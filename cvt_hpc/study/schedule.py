@@ -1,0 +1,107 @@
+"""Who does which run: all ranks compute, and each claims its next run from one counter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple, Protocol, Self
+
+import numpy as np
+
+from cvt_hpc.study.launch import Team
+
+INTERRUPTED = 2**40  # claims count from here when all are interrupted: beyond every order
+
+
+class Tally(NamedTuple):
+    """How many runs of this session are finished, and how many of those failed."""
+
+    finished: int
+    failed: int
+
+
+class Counter(Protocol):
+    """The one thing that ranks share while they compute."""
+
+    def claim(self) -> int:
+        """Return a position that no other claim gets: 0, 1, 2, ... over all ranks."""
+
+    def report(self, failed: bool) -> None:
+        """Count a finished run."""
+
+    def tally(self) -> Tally:
+        """Return what all ranks have reported."""
+
+    def interrupt_all(self) -> None:
+        """Let no rank claim another run, and all break off the one that they are at."""
+
+    def is_interrupted(self) -> bool:
+        """Return whether some rank has interrupted all."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *exception: object) -> None: ...
+
+
+def open_counter(team: Team) -> Counter:
+    """Return the counter of a team, at zero."""
+    if team.communicator is None:
+        return SerialCounter()
+    from cvt_hpc.study.shared_counter import SharedCounter
+
+    return SharedCounter(team.communicator)
+
+
+def claimed_runs(order: np.ndarray, counter: Counter, may_claim: Callable[[], bool]) -> Iterator[int]:
+    """Yield the run indices that this rank is to do.
+
+    Parameters
+    ----------
+    order : numpy.ndarray of int, shape (runs,)
+        Run indices in the order in which they are to be started; the same on all ranks.
+    counter : Counter
+        Where positions in `order` are claimed.
+    may_claim : callable
+        Asked before each claim; when it answers False, there are no more.
+    """
+    while may_claim():
+        position = counter.claim()
+        if position >= len(order):
+            return
+        yield int(order[position])
+
+
+class SerialCounter:
+    """The counter of a process alone."""
+
+    def __init__(self) -> None:
+        self._next = 0
+        self._finished = 0
+        self._failed = 0
+
+    def claim(self) -> int:
+        """Return the next position."""
+        self._next += 1
+        return self._next - 1
+
+    def report(self, failed: bool) -> None:
+        """Count a finished run."""
+        self._finished += 1
+        self._failed += failed
+
+    def tally(self) -> Tally:
+        """Return what was reported."""
+        return Tally(self._finished, self._failed)
+
+    def interrupt_all(self) -> None:
+        """Let no further position be one of an order."""
+        self._next = INTERRUPTED
+
+    def is_interrupted(self) -> bool:
+        """Return whether the sweep is interrupted."""
+        return self._next >= INTERRUPTED
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        return

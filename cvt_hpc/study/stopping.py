@@ -1,0 +1,111 @@
+"""When a sweep is to end early: a signal, the time limit, or another rank that was told to stop."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable
+from types import FrameType
+from typing import Any, Self
+
+from cvt_hpc.study.schedule import Counter
+
+# What a person at the terminal, Slurm at the end of a job, and Slurm as a warning before that send.
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
+_LOOK_INTERVAL = 0.5  # [s] between looks at what the other ranks say
+_IMPATIENCE = 1.0  # [s]; a Ctrl-C later than this after the first one ends the process at once
+
+ELSEWHERE = "stopped by another rank"
+
+
+class SignalWatch:
+    """A context in which the signals to stop are noted instead of ending the process.
+
+    Attributes
+    ----------
+    noted : str or None
+        Name of the first signal that came.
+    """
+
+    def __init__(self) -> None:
+        self.noted: str | None = None
+        self._noted_at = 0.0
+        self._previous: dict[int, Any] = {}
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():  # Python has signals there alone
+            self._previous = {number: signal.signal(number, self._note) for number in _SIGNALS}
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._previous.items():
+            signal.signal(number, handler)
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        now = time.monotonic()
+        if self.noted is None:
+            self.noted, self._noted_at = signal.Signals(number).name, now
+        elif number == signal.SIGINT and now - self._noted_at > _IMPATIENCE:
+            # Not sooner: the terminal and mpirun may both pass on one Ctrl-C.
+            raise KeyboardInterrupt
+
+
+class Stop:
+    """Whether this rank goes on.
+
+    Parameters
+    ----------
+    counter : Counter
+        Through which ranks tell each other.
+    signals : SignalWatch
+        What this process was sent.
+    deadline : float
+        Time [s] of the monotonic clock after which no run is started; runs that compute then are finished.
+    meanwhile : callable
+        Called about twice a second while a run computes: shows the progress.
+    """
+
+    def __init__(
+        self, counter: Counter, signals: SignalWatch, deadline: float, meanwhile: Callable[[], None]
+    ) -> None:
+        self._counter = counter
+        self._signals = signals
+        self._deadline = deadline
+        self._meanwhile = meanwhile
+        self._looked = time.monotonic()
+        self._late = False
+        self._told = False
+        self._heard = False
+
+    @property
+    def reason(self) -> str | None:
+        """Why this rank starts no more runs, None if it goes on."""
+        if self._signals.noted:
+            return self._signals.noted
+        if self._heard:
+            return ELSEWHERE
+        return "time limit" if self._late else None
+
+    def may_claim(self) -> bool:
+        """Return whether this rank may start another run."""
+        self._late = self._late or time.monotonic() >= self._deadline
+        return self.interrupt() is None and not self._late
+
+    def interrupt(self) -> str | None:
+        """Return why the run that computes now should be broken off, None if it should go on."""
+        now = time.monotonic()
+        if now - self._looked > _LOOK_INTERVAL:
+            self._looked = now
+            self._meanwhile()
+            self._heard = self._counter.is_interrupted()
+        if self._signals.noted:
+            self.tell_all()
+        return self.reason if self._signals.noted or self._heard else None
+
+    def tell_all(self) -> None:
+        """Let all ranks stop, as this one does."""
+        # Not from the signal handler: that may strike within another call of MPI.
+        if not self._told:
+            self._told = True
+            self._counter.interrupt_all()

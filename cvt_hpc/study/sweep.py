@@ -1,0 +1,191 @@
+"""All runs of a job, on all ranks: plan, resume, compute, record, gather."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cvt_hpc.study.description import Study, describe
+from cvt_hpc.study.files import StorageError, discard
+from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.gather import write_results
+from cvt_hpc.study.launch import Team, assembled_team
+from cvt_hpc.study.lock import locked
+from cvt_hpc.study.progress import Progress
+from cvt_hpc.study.provenance import new_session
+from cvt_hpc.study.record import RecordFormat, RecordLog
+from cvt_hpc.study.recovery import Records, read_records
+from cvt_hpc.study.report import RunReport, build_report
+from cvt_hpc.study.schedule import Counter, claimed_runs, open_counter
+from cvt_hpc.study.simulator import Simulator, default_simulator
+from cvt_hpc.study.stopping import ELSEWHERE, SignalWatch, Stop
+from cvt_hpc.variables import Status
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
+
+_logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What is to be computed."""
+
+    job: Job
+    study: Study
+    simulator: Simulator
+
+    def attempt(self, index: int, interrupt: Callable[[], str | None]) -> np.ndarray | None:
+        """Return the record of run `index`, whatever becomes of it; None if it was broken off."""
+        try:
+            return self.study.pack(self.simulator.run_point(self.job, self.job.point(index), interrupt))
+        except self.simulator.Interrupted:
+            return None
+        except Exception as error:  # one run's defect must not cost the others
+            return self.study.pack_failure(f"{type(error).__name__}: {error}")
+
+
+class _Plan(NamedTuple):
+    """What rank 0 finds out and all ranks need."""
+
+    order: np.ndarray
+    recorded: int
+    failed: int
+    session: dict[str, Any]
+
+
+def run(
+    job: Job,
+    out: str | Path | None = None,
+    *,
+    fresh: bool = False,
+    simulator: Simulator | None = None,
+    progress: bool = True,
+    time_limit: float | None = None,
+) -> RunReport:
+    """Do all runs of a job that are not yet recorded, and gather the dataset.
+
+    Serial, or on all ranks when started under mpirun or srun. A run that raises is recorded as failed, and
+    the sweep goes on. SIGINT, SIGTERM and SIGUSR1 end the sweep early and orderly: the runs at work are
+    broken off, and the same call does them later.
+
+    Parameters
+    ----------
+    job : Job
+        What to run.
+    out : str or Path, optional
+        Output folder; "out/<job name>" by default.
+    fresh : bool
+        Throw away what earlier runs have left in the folder, instead of going on from there.
+    simulator : Simulator, optional
+        What does one run; `cvt_hpc.simulate` by default.
+    progress : bool
+        Whether rank 0 shows on stderr how far the sweep is.
+    time_limit : float, optional
+        Time [s] after which no more runs are started.
+
+    Returns
+    -------
+    RunReport
+        How the sweep ended.
+
+    Raises
+    ------
+    InputError
+        If the folder holds another job, is in use or cannot be written to, or if ranks are not connected.
+    """
+    deadline = float("inf") if time_limit is None else time.monotonic() + time_limit
+    simulator = simulator or default_simulator()
+    study = describe(job, simulator)
+    task = _Task(job, study, simulator)
+    folder = StudyFolder(out if out is not None else Path("out") / job.name)
+    with SignalWatch() as signals, assembled_team() as team, ExitStack() as held:
+        plan = team.on_root(lambda: _prepare(folder, study, fresh, team.size, held))
+        with open_counter(team) as counter:
+            display = Progress(counter, study.size, plan.recorded, plan.failed, progress and team.rank == 0)
+            stop = Stop(counter, signals, deadline, display.show)
+            trouble = _compute(task, folder, plan, team.rank, counter, stop)
+            team.wait_for_all(stop.interrupt)
+            display.close()
+        stopped = _settle(team, trouble, stop.reason)
+        return team.on_root(lambda: _conclude(folder, study, stopped))
+
+
+def _prepare(folder: StudyFolder, study: Study, fresh: bool, ranks: int, held: ExitStack) -> _Plan:
+    """Take the folder into possession and find what is left to do; on rank 0 alone."""
+    folder.check_free_for(study, fresh)
+    folder.create()
+    held.enter_context(locked(folder.lock_file))
+    folder.check_free_for(study, fresh)  # again: another process may have been there before the lock
+    for leftover in folder.leftovers():
+        discard(leftover)
+    if fresh:
+        folder.clear()
+    folder.save(study)
+    records = read_records(folder.records, study)
+    session = new_session(ranks)
+    for warning in records.warnings + _other_versions(records, session):
+        _logger.warning(warning)
+    recorded = records.recorded
+    done = int((records.rows["status"] == Status.DONE).sum())
+    # The order is a matter of speed alone, never of results: each run depends on its index only.
+    order = np.flatnonzero(~recorded)
+    return _Plan(order, int(recorded.sum()), int(recorded.sum()) - done, session)
+
+
+def _other_versions(records: Records, session: dict[str, Any]) -> list[str]:
+    """Return a warning if the records were made by other code than that which is going on now."""
+    keys = ("versions", "git_revision")
+    if all(earlier[key] == session[key] for earlier in records.sessions for key in keys):
+        return []
+    return [
+        "earlier runs of this folder were made with other versions than these (results.nc names them in its "
+        "attributes `versions` and `git_revision`); --fresh repeats them"
+    ]
+
+
+def _compute(
+    task: _Task, folder: StudyFolder, plan: _Plan, rank: int, counter: Counter, stop: Stop
+) -> str | None:
+    """Do and record the runs that this rank claims; return why it could not go on, if so."""
+    layout = RecordFormat(task.study.fingerprint, task.study.record_dtype)
+    try:
+        with RecordLog(folder.records, layout, plan.session, rank) as log:
+            for index in claimed_runs(plan.order, counter, stop.may_claim):
+                row = task.attempt(index, stop.interrupt)
+                if row is not None:
+                    log.append(index, row)
+                    counter.report(failed=bool(row["status"] != Status.DONE))
+    except StorageError as error:
+        stop.tell_all()
+        return str(error)
+    return None
+
+
+def _settle(team: Team, trouble: str | None, reason: str | None) -> str | None:
+    """Agree on why the sweep stopped early, None if it did not.
+
+    Raises
+    ------
+    StorageError
+        On all ranks, if one of them could not store its results.
+    """
+    ends = team.collect((trouble, reason))
+    for found, _ in ends:
+        if found:
+            raise StorageError(found)
+    return next((why for _, why in ends if why and why != ELSEWHERE), None)
+
+
+def _conclude(folder: StudyFolder, study: Study, stopped: str | None) -> RunReport:
+    """Gather the dataset and report; on rank 0 alone."""
+    records = read_records(folder.records, study)
+    write_results(folder, study, records)
+    return build_report(folder, study, records, stopped)

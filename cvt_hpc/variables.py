@@ -1,0 +1,55 @@
+"""The vocabulary in which a run's record is declared: one `Variable` per quantity, once for all rooms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """How a run ended; the CF flags of `status` in results.nc."""
+
+    NOT_RUN = 0
+    DONE = 1
+    FAILED_NUMERICS = 2
+    FAILED_ERROR = 3
+    TIMED_OUT = 4
+
+
+class Vibrates(IntEnum):
+    """Whether a run vibrates; the CF flags of `vibrates` in results.nc."""
+
+    NO = 0
+    YES = 1
+    UNDECIDED = 2
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One quantity of a run's record.
+
+    Attributes
+    ----------
+    name : str
+        Name in the dataset.
+    dims : tuple of str
+        Dimensions beside those of the sweep's grid, e.g. ("strand",).
+    dtype : str
+        numpy type: "f8", "i8", "i1", or "S240" for a text.
+    units : str
+        CF unit ("1" if dimensionless, "" for flags and texts).
+    long_name : str
+        CF long_name.
+    flags : type of IntEnum or None
+        Meaning of the values of a flag variable.
+    volatile : bool
+        Depends on the machine and the hour (timings): exempt from bitwise reproducibility.
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    dtype: str
+    units: str
+    long_name: str
+    flags: type[IntEnum] | None = None
+    volatile: bool = False

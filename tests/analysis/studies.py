@@ -1,0 +1,55 @@
+"""Made-up results of studies, in the form of results.nc."""
+
+import numpy as np
+import xarray as xr
+
+from cvt_hpc.variables import Status, Vibrates
+
+GRADIENTS = (-2.4, -1.6, -0.8)
+STIFFNESSES = (1.0, 1.2, 1.5, np.inf)
+LOADS = tuple(np.linspace(20.0, 200.0, 10))
+
+
+def flags(values, dims, kind, long_name):
+    """A flag variable with CF attributes."""
+    attributes = {
+        "long_name": long_name,
+        "flag_values": np.array(list(kind), np.int8),
+        "flag_meanings": " ".join(flag.name.lower() for flag in kind),
+    }
+    return dims, np.asarray(values, np.int8), attributes
+
+
+def study(gradients=GRADIENTS, stiffnesses=STIFFNESSES, loads=LOADS):
+    """Results that look like the papers' maps: a window of load that narrows with stiffness, and runs of every class."""
+    gradient, stiffness, load = np.meshgrid(gradients, stiffnesses, loads, indexing="ij")
+    dims = ("friction_gradient", "sheave_stiffness", "load")
+    strength = -gradient / np.max(np.abs(gradients)) / stiffness**0.5
+    size = 22e-6 * strength * np.sin(np.pi * np.clip((load - 40 * stiffness**0.5) / 150, 0, 1))
+    vibrates = np.where(size > 1e-6, Vibrates.YES, Vibrates.NO)
+    vibrates[(size > 0.5e-6) & (size < 2e-6)] = Vibrates.UNDECIDED
+    status = np.full(load.shape, Status.DONE)
+    status[0, 0, -2:] = Status.FAILED_NUMERICS
+    status[-1, 0, 1] = Status.TIMED_OUT
+    status[-1, -1, 0] = Status.FAILED_ERROR
+    status[-1, -1, -1] = Status.NOT_RUN
+    vibrates[status != Status.DONE] = Vibrates.UNDECIDED
+    amplitude = np.stack([size, 0.7 * size + 1e-9], axis=-1)
+    frequency = np.stack([640 - 0.6 * load, 520 + 0.9 * load], axis=-1)
+    unknown = (status != Status.DONE)[..., np.newaxis] & [True, True]
+    strands = (*dims, "strand")
+    return xr.Dataset(
+        {
+            "status": flags(status, dims, Status, "how the run ended"),
+            "vibrates": flags(vibrates, dims, Vibrates, "whether the run vibrates"),
+            "amplitude": (strands, np.where(unknown, np.nan, amplitude), {"units": "m"}),
+            "frequency": (strands, np.where(unknown, np.nan, frequency), {"units": "Hz"}),
+        },
+        {
+            "friction_gradient": ("friction_gradient", list(gradients), {"units": "s/m"}),
+            "sheave_stiffness": ("sheave_stiffness", list(stiffnesses), {"units": "1"}),
+            "load": ("load", list(loads), {"units": "N m"}),
+            "strand": ("strand", ["t1", "t2"]),
+        },
+        {"job_name": "occurrence", "title": "Vibration occurrence over load, friction and stiffness"},
+    )

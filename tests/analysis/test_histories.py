@@ -1,0 +1,214 @@
+"""The history of one run as a file and as a picture."""
+
+import json
+import os
+
+import matplotlib
+import numpy as np
+import pytest
+import xarray as xr
+from runs import PROBES, RATE, run
+
+from cvt_hpc.analysis.figures import STYLE
+from cvt_hpc.analysis.histories import draw_history, history_figure, is_history, write_history
+from cvt_hpc.analysis.history_panels import read_strands
+from cvt_hpc.errors import InputError
+from cvt_hpc.variables import Status
+
+BAND = (100.0, 1500.0)
+
+
+def figure_of(dataset):
+    with matplotlib.rc_context(STYLE):
+        return history_figure(dataset)
+
+
+def panel(figure, ylabel):
+    (found,) = [axes for axes in figure.axes if axes.get_ylabel() == ylabel]
+    return found
+
+
+# File
+
+
+def test_a_history_comes_back_as_it_was(tmp_path):
+    dataset = run()
+    path = write_history(dataset, tmp_path / "new" / "run.nc")
+    with xr.open_dataset(path, engine="netcdf4") as stored:
+        xr.testing.assert_equal(stored, dataset)
+        assert dataset.attrs.items() <= stored.attrs.items()
+        assert stored["displacement"].attrs == dataset["displacement"].attrs
+        assert (
+            "_FillValue" not in stored["time"].encoding
+            and "_FillValue" not in stored["probe_position"].encoding
+        )
+    assert [file.name for file in path.parent.iterdir()] == ["run.nc"]
+    assert "cvt_hpc_content" not in dataset.attrs  # the caller's dataset is not touched
+
+
+def test_an_own_history_is_replaced_and_nothing_else(tmp_path):
+    path = write_history(run(0.05), tmp_path / "run.nc")
+    write_history(run(0.06), path)
+    with xr.open_dataset(path, engine="netcdf4") as stored:
+        assert stored.sizes["time"] == round(0.06 * RATE)
+    results, text = tmp_path / "results.nc", tmp_path / "notes.nc"
+    run(0.05).to_netcdf(results, engine="netcdf4")
+    text.write_text("not a dataset")
+    for other in (results, text, tmp_path):
+        before = other.read_bytes() if other.is_file() else None
+        assert not is_history(other)
+        with pytest.raises(InputError, match="a history written by cvt_hpc, found another file"):
+            write_history(run(0.05), other)
+        assert before is None or other.read_bytes() == before
+
+
+def test_a_history_that_cannot_be_written_leaves_the_old_one(tmp_path):
+    path = write_history(run(0.05), tmp_path / "run.nc")
+    before = path.read_bytes()
+    broken = run(0.05).assign(odd=("time", np.full(round(0.05 * RATE), object())))
+    with pytest.raises(Exception, match="object"):
+        write_history(broken, path)
+    assert path.read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ["run.nc"]
+
+
+def test_a_system_that_refuses_leaves_the_old_one(tmp_path, monkeypatch):
+    path = write_history(run(0.05), tmp_path / "run.nc")
+    before = path.read_bytes()
+
+    def refuse(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", refuse)
+    with pytest.raises(
+        InputError, match="run.nc: expected to be able to write, found: No space left on device"
+    ):
+        write_history(run(0.06), path)
+    assert path.read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ["run.nc"]
+
+
+# Picture
+
+
+def test_everything_a_history_holds_is_drawn():
+    figure = figure_of(run())
+    whole, spectrum = panel(figure, "t1 [µm]"), panel(figure, "amplitude [µm]")
+    assert whole.get_title(loc="left") == "displacement at t1 1/4, judged part shaded"  # 1/2 is a node
+    values = whole.lines[0].get_ydata()
+    assert values.mean() == pytest.approx(0, abs=1e-9)
+    assert np.ptp(values[-200:]) == pytest.approx(20, rel=0.01)
+    assert whole.lines[0].get_xdata()[-1] == pytest.approx(300, abs=0.1)
+    marked = sorted(text.get_text() for text in spectrum.texts)
+    assert marked == ["560 Hz", "560 Hz", "690 Hz"]
+    heights = {
+        line.get_label(): line.get_ydata().max() for line in spectrum.lines if line.get_label()[0] == "t"
+    }
+    assert heights == pytest.approx({"t1 1/4": 10.0, "t2 1/6": 6.0}, rel=0.01)
+    load = panel(figure, "load [N m]").lines[0]
+    assert load.get_ydata()[[0, -1]] == pytest.approx([20, 140], rel=1e-3)
+
+
+def test_forces_lie_over_shaded_arcs():
+    figure = figure_of(run())
+    forces = panel(figure, "force [kN]")
+    tension, push = (line.get_ydata().max() for line in forces.lines)
+    assert (tension, push) == pytest.approx((9.1, 5.0), rel=1e-2)
+    assert panel(figure, "contact [kN/m]").lines[0].get_ydata().max() == pytest.approx(400, rel=1e-2)
+    assert [text.get_text() for text in forces.texts] == ["driving arc", "t1", "driven arc", "t2"]
+    spans = [(p.get_x(), p.get_x() + p.get_width()) for p in forces.patches]
+    # borders between stations, which are 4.1 mm apart
+    assert np.array(spans) == pytest.approx(np.array([[0, 100], [248, 504]]), abs=4.1)
+
+
+def test_the_end_shows_all_probes_of_a_strand():
+    figure = figure_of(run())
+    close = [axes for axes in figure.axes if axes.get_legend() and len(axes.lines) == 3]
+    labels = [[text.get_text() for text in axes.get_legend().get_texts()] for axes in close]
+    assert labels == [["1/4", "1/2", "3/4"], ["1/6", "1/2", "5/6"]]
+    for axes in close:
+        assert np.ptp(axes.lines[0].get_xdata()) == pytest.approx(10, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("missing", "gone"),
+    [
+        (["displacement"], {"t1 [µm]", "t2 [µm]", "amplitude [µm]"}),
+        (["load"], {"load [N m]"}),
+        (["ring_tension", "push_force"], {"force [kN]"}),
+        (["ring_tension"], set()),
+        (["contact_force"], {"contact [kN/m]"}),
+        (["region"], set()),
+        (["status", "vibrates", "reason"], set()),
+    ],
+)
+def test_what_is_absent_is_left_out(missing, gone):
+    everything, rest = (
+        {axes.get_ylabel() for axes in figure_of(dataset).axes}
+        for dataset in (run(), run().drop_vars(missing))
+    )
+    assert (everything - rest) - {""} == gone  # the close-ups have no label
+
+
+def test_a_constant_load_is_not_drawn():
+    labels = {axes.get_ylabel() for axes in figure_of(run(ramp=False)).axes}
+    assert "load [N m]" not in labels and "force [kN]" in labels
+    scalar = run().drop_vars("load").assign(load=120.0)
+    assert "load [N m]" not in {axes.get_ylabel() for axes in figure_of(scalar).axes}
+
+
+def test_a_run_without_history_is_refused(tmp_path):
+    with pytest.raises(InputError, match="found none of them"):
+        draw_history(run()[["status", "vibrates", "reason"]], tmp_path / "run.png")
+    assert not any(tmp_path.iterdir())
+
+
+def test_the_title_says_what_became_of_the_run():
+    assert figure_of(run()).get_suptitle().startswith("One run: ramp\nvibrates: yes (t1 vibrates")
+    failed = run().assign(status=np.int8(Status.FAILED_NUMERICS), reason=b"not a number at 0.02 s")
+    title = figure_of(failed).get_suptitle()
+    assert title.endswith("failed numerics: not a number at 0.02 s")
+    assert "vibrates" not in title
+
+
+def test_a_failed_run_is_drawn_up_to_where_it_failed():
+    failed = run(0.1)
+    failed["displacement"][1500:, 2] = np.nan
+    t1, t2 = read_strands(failed, 0.5, BAND)
+    assert t1.time.size == t2.time.size == 1500
+    assert np.isfinite(t1.displacement).all() and t1.first_judged == 750
+    failed["displacement"][0] = np.inf
+    assert read_strands(failed, 0.5, BAND) == []
+
+
+def test_the_judged_part_is_that_of_the_job():
+    dataset = run()
+    dataset.attrs["job"] = json.dumps({"vibration": {"judged_fraction": 0.2}})
+    shade = panel(figure_of(dataset), "t1 [µm]").patches[0]
+    assert shade.get_x() == pytest.approx(240, abs=0.1)
+
+
+def test_short_or_coarse_records_have_no_spectrum():
+    for dataset in (run(0.002), run().isel(time=slice(None, None, 10))):
+        labels = {axes.get_ylabel() for axes in figure_of(dataset).axes}
+        assert "amplitude [µm]" not in labels and "t1 [µm]" in labels
+
+
+def test_rest_is_drawn_without_peaks():
+    still = run()
+    still["displacement"][:] = 0.0
+    assert panel(figure_of(still), "amplitude [µm]").texts[:] == []
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+def test_pictures_are_small_in_every_format(suffix, tmp_path):
+    out = draw_history(run(), tmp_path / f"run{suffix}")
+    assert out.stat().st_size < 300_000
+    with pytest.raises(InputError, match="found no suffix"):
+        draw_history(run(), tmp_path / "run")
+
+
+def test_probes_are_grouped_by_strand():
+    t1, t2 = read_strands(run(), 0.5, BAND)
+    assert t1.probes + t2.probes == PROBES
+    assert (t1.rate, t1.strongest, t2.name) == (pytest.approx(RATE), 0, "t2")

@@ -1,0 +1,76 @@
+"""Runs without mechanics in the place of `cvt_hpc.simulate` and of what draws and stores histories."""
+
+import sys
+from types import ModuleType
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import cvt_hpc
+from cvt_hpc.variables import Status, Variable, Vibrates
+
+FLAGS = {
+    "status": ([0, 1, 2, 3, 4], "not_run done failed_numerics failed_error timed_out"),
+    "vibrates": ([0, 1, 2], "no yes undecided"),
+}
+
+
+class Interrupted(Exception):
+    pass
+
+
+def record_variables(job):
+    return (
+        Variable("status", (), "i1", "", "how the run ended", Status),
+        Variable("vibrates", (), "i1", "", "whether the belt vibrates", Vibrates),
+        Variable("reason", (), "S240", "", "why the run failed"),
+    )
+
+
+def run_point(job, point, interrupt):
+    """Vibrate above 40 N m; fail with rigid sheaves."""
+    fails = np.isinf(point["sheave_stiffness"])
+    return {
+        "status": Status.FAILED_NUMERICS if fails else Status.DONE,
+        "vibrates": Vibrates.YES if point["load"] > 40 else Vibrates.NO,
+        "reason": "step 3: too stiff" if fails else "",
+    }
+
+
+def simulate(job, at):
+    """Return the same as a history of three instants."""
+    point = job.point_at(at)
+    record = run_point(job, point, lambda: None)
+    data = {"load": ((), point["load"], {"units": "N m"})} | {
+        name: ((), np.int8(record[name]), {"flag_values": values, "flag_meanings": meanings})
+        for name, (values, meanings) in FLAGS.items()
+    }
+    data["reason"] = ((), record["reason"])
+    data["steps"] = ((), 3, {"units": "1"})
+    data["amplitude"] = ("strand", [1e-6, 25e-6], {"units": "m"})
+    data["displacement"] = ("time", np.zeros(9))
+    return xr.Dataset(data, {"strand": ["t1", "t2"], "time": np.arange(9.0)})
+
+
+@pytest.fixture
+def mechanics(monkeypatch):
+    """Put the double in place; return the lists of what was written and drawn."""
+    double = ModuleType("cvt_hpc.simulate")
+    double.__dict__.update(
+        Interrupted=Interrupted,
+        record_variables=record_variables,
+        record_coordinates=lambda job: {},
+        run_point=run_point,
+        simulate=simulate,
+        estimate_cost=lambda job: 30.0,
+    )
+    histories = ModuleType("cvt_hpc.analysis.histories")
+    calls = {"written": [], "drawn": []}
+    histories.write_history = lambda dataset, path: calls["written"].append((dataset, path)) or path
+    histories.is_history = lambda path: path.name == "history.nc"
+    histories.draw_history = lambda dataset, path: calls["drawn"].append((dataset, path)) or path
+    monkeypatch.setitem(sys.modules, "cvt_hpc.simulate", double)
+    monkeypatch.setattr(cvt_hpc, "simulate", double, raising=False)
+    monkeypatch.setitem(sys.modules, "cvt_hpc.analysis.histories", histories)
+    return calls

@@ -1,0 +1,296 @@
+"""The commands within this process, on the toy model and runs without mechanics."""
+
+import netCDF4
+import pytest
+
+from cvt_hpc import cli
+from cvt_hpc.cli import main
+from cvt_hpc.study import FailedRun, RunReport, StudyStatus
+
+pytestmark = pytest.mark.usefixtures("mechanics")
+
+GRID = """[scene]
+thrust = "20 kN"
+[axes]
+load = { from = 0, to = 100, step = 25 }
+sheave_stiffness = [1, 3]
+"""
+
+
+@pytest.fixture
+def call(capsys):
+    """Return a function that runs a command line: exit status, lines on stdout, lines on stderr."""
+
+    def run(*arguments):
+        status = main(list(map(str, arguments)))
+        out, err = capsys.readouterr()
+        return status, out.splitlines(), err.splitlines()
+
+    return run
+
+
+def test_run_status_gather_and_map_of_one_study(write_job, call, tmp_path):
+    write_job(GRID)
+    status, out, err = call("run", "x.toml")
+    assert (status, out) == (0, ["10 runs: 10 done, 0 failed, 0 left", "results: out/x/results.nc"])
+    assert not [line for line in err if line.startswith("cvt-hpc:")]
+    status, out, err = call("status", "out/x")
+    assert (status, err) == (0, [])
+    assert out[:5] == [
+        "job     x (not running)",
+        "runs    10",
+        "done    10 (100.0%)",
+        "failed  0",
+        "left    0",
+    ]
+    assert [line.split()[0] for line in out[5:]] == ["rate"]
+    (tmp_path / "out/x/results.nc").unlink()
+    assert call("gather", "out/x") == (0, ["results: out/x/results.nc"], [])
+    with netCDF4.Dataset("out/x/results.nc") as results:
+        assert results["vibrates"][:].tolist() == [[0, 0]] * 2 + [[1, 1]] * 3
+    assert call("map", "out/x", "--at", "sheave_stiffness=3") == (0, ["map: out/x/map.png"], [])
+    assert call("map", "out/x/results.nc", "--out", "y.png") == (0, ["map: y.png"], [])
+    for picture in ("out/x/map.png", "y.png"):
+        assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
+
+
+def test_run_goes_on_unless_fresh(write_job, call, tmp_path, monkeypatch):
+    write_job(GRID)
+    call("run", "x.toml", "--out", "here")
+    logs = set((tmp_path / "here/records").iterdir())
+    assert call("run", "x.toml", "--out", "here")[1][0] == "10 runs: 10 done, 0 failed, 0 left"
+    assert set((tmp_path / "here/records").iterdir()) == logs
+    assert call("run", "x.toml", "--out", "here", "--fresh")[0] == 0
+    assert not logs & set((tmp_path / "here/records").iterdir())
+
+
+def test_run_names_failed_runs_and_ends_with_1(write_job, call):
+    write_job(GRID)
+    status, out, err = call("run", "x.toml", "--set", "sheave_stiffness=inf", "--set", "thrust=0.03 MN")
+    assert status == 1
+    assert out == ["5 runs: 0 done, 5 failed, 0 left", "results: out/x/results.nc"]
+    named = [line for line in err if line.startswith("cvt-hpc:")]
+    assert named == [
+        f"cvt-hpc: run {i} (load = {load}): failed_numerics: step 3: too stiff"
+        for i, load in enumerate((0, 25, 50, 75, 100))
+    ]
+
+
+def test_ten_failed_runs_are_named_and_the_rest_counted(write_job, call):
+    write_job("[scene]\nthrust = 2e4\nsheave_stiffness = inf\n".replace("sheave", "[belt]\nsheave") +
+              "[axes]\nload = {from = 0, to = 11, step = 1}\n")  # fmt: skip
+    named = [line for line in call("run", "x.toml")[2] if line.startswith("cvt-hpc:")]
+    assert [line.split()[2] for line in named[:10]] == [str(i) for i in range(10)]
+    assert named[10:] == ["cvt-hpc: 2 more runs failed; `status` and `reason` in out/x/results.nc tell which"]
+
+
+def test_a_stopped_sweep_ends_with_99(write_job, call, monkeypatch, tmp_path):
+    write_job(GRID)
+    failed = (FailedRun(3, {"load": 5.0, "law": "coulomb"}, "failed_error", "ValueError: x"),)
+    report = RunReport(tmp_path, tmp_path / "results.nc", 10, 4, failed, 5, "SIGTERM")
+    monkeypatch.setattr("cvt_hpc.study.run", lambda job, out, fresh: report)
+    status, out, err = call("run", "x.toml")
+    assert status == 99
+    assert out[0] == "10 runs: 4 done, 1 failed, 5 left"
+    assert err == [
+        "cvt-hpc: run 3 (load = 5, law = coulomb): failed_error: ValueError: x",
+        "cvt-hpc: stopped early (SIGTERM); the same command goes on from here",
+    ]
+
+
+def test_status_of_a_sweep_at_work(call, monkeypatch):
+    status = StudyStatus("x", 40, 10, 2, 28, True, 0.01234, 3725.0, ("a.log: damaged",))
+    monkeypatch.setattr("cvt_hpc.study.read_status", lambda path: status)
+    assert call("status", "out/x") == (
+        0,
+        [
+            "job     x (running)",
+            "runs    40",
+            "done    10 (25.0%)",
+            "failed  2",
+            "left    28",
+            "rate    0.0123 runs/s",
+            "to go   1:02:05",
+        ],
+        ["cvt-hpc: a.log: damaged"],
+    )
+
+
+def test_another_job_in_the_folder_is_refused_and_kept(write_job, call, tmp_path):
+    write_job(GRID)
+    call("run", "x.toml")
+    before = (tmp_path / "out/x/results.nc").read_bytes()
+    status, out, err = call("run", "x.toml", "--set", "thrust=30 kN")
+    assert (status, out, len(err)) == (2, [], 1)
+    assert (tmp_path / "out/x/results.nc").read_bytes() == before
+
+
+def test_check_prints_every_parameter_with_its_origin_the_axes_and_the_cost(write_job, call, tmp_path):
+    write_job(GRID, head='name = "x"\nmodel = "toy"\ndescription = "a study"\n')
+    overrides = ("--set", "element_mass=1500 g/m", "--set", "table=[[1, 2.5], [3]]")
+    status, out, err = call("check", "x.toml", *overrides)
+    assert (status, err) == (0, [])
+    assert out[:8] == [
+        "job x (x.toml): model toy, stepper hop",
+        "a study",
+        "",
+        "[scene]",
+        "  ratio          2.5         default  speed ratio",
+        "  driving_speed  300 rad/s   default  speed of the driving pulley",
+        "  thrust         20000 N     given    axial force on the driven pulley",
+        "  load           see [axes]  axis     torque at the driving pulley",
+    ]
+    assert "  element_mass       1.5 kg/m             given    mass per length" in out
+    assert "  table              [[1, 2.5], [3]] N/m  given    rows of line forces" in out
+    assert "  refined   false  default  finer on the arcs" in out
+    assert out[-6:] == [
+        "[axes]",
+        "  load              0, 25, 50, 75, 100 N m  5 values",
+        "  sheave_stiffness  1, 3                    2 values",
+        "",
+        "runs: 10 = 5 x 2",
+        "estimated cost: 30 core-seconds per run, 300 core-seconds in all",
+    ]
+    assert call("run", "x.toml", *overrides, "--dry-run") == (0, out, [])
+    assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
+
+
+def test_check_shortens_long_axes_and_long_times(write_job, call):
+    write_job("[scene]\nthrust = 2e4\n[axes]\nload = { from = 0, to = 120, step = 0.5 }\n")
+    assert call("check", "x.toml")[1][-4:] == [
+        "  load  0, 0.5, 1, ..., 120 N m  241 values",
+        "",
+        "runs: 241",
+        "estimated cost: 30 core-seconds per run, 2.01 core-hours in all",
+    ]
+
+
+def test_simulate_prints_the_outcome_and_keeps_the_history(write_job, call, mechanics):
+    write_job(GRID)
+    arguments = ("--at", "load=0.05 kN m", "--set", "ratio=2", "--out", "new/h.nc", "--plot", "h.png")
+    status, out, err = call("simulate", "x.toml", *arguments)
+    assert (status, err) == (0, [])
+    assert out == [
+        "status     done",
+        "vibrates   yes",
+        "load       50 N m",
+        "steps      3",
+        "amplitude  t1 1e-06, t2 2.5e-05 m",
+        "history: new/h.nc",
+        "picture: h.png",
+    ]
+    ((written, where),) = mechanics["written"]
+    ((drawn, picture),) = mechanics["drawn"]
+    assert (str(where), str(picture)) == ("new/h.nc", "h.png")
+    assert written is drawn and written["load"] == 50
+
+
+def test_simulate_replaces_an_earlier_history(write_job, call, tmp_path, mechanics):
+    write_job(GRID)
+    (tmp_path / "history.nc").write_text("earlier")
+    assert call("simulate", "x.toml", "--out", "history.nc")[0] == 0
+    assert len(mechanics["written"]) == 1
+
+
+def test_simulate_of_a_run_that_fails_ends_with_1(write_job, call):
+    write_job(GRID)
+    status, out, err = call("simulate", "x.toml", "--at", "sheave_stiffness=inf")
+    assert status == 1
+    assert out[:3] == ["status     failed_numerics", "vibrates   no", "reason     step 3: too stiff"]
+    assert err == ["cvt-hpc: the run failed: failed_numerics: step 3: too stiff"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "y.toml"], "y.toml: expected a job file, found nothing; did you mean x.toml?"),
+        (
+            ["run", "x.toml", "--set", "laod=1"],
+            "x.toml: --set laod: unknown key; did you mean load in [scene]?",
+        ),
+        (["check", "x.toml", "--set", "load"], 'x.toml: --set: expected KEY=VALUE, found "load"'),
+        (
+            ["simulate", "x.toml", "--at", "load=1 kg"],
+            'x.toml: --at load: expected a value in N m (such as "1 N m" or a bare number in N m), found "1 kg"',
+        ),
+        (
+            ["simulate", "x.toml", "--at", "load=1 kN m"],
+            "x.toml: [scene] load: expected at most 200 N m at this thrust, found 1000 N m (at load = 1000 N m)",
+        ),
+        (["simulate", "x.toml", "--out", "h.txt"], "h.txt: expected a file name in .nc, found .txt"),
+        (
+            ["simulate", "x.toml", "--plot", "h"],
+            "h: expected a file name in .png, .svg, .pdf, found no suffix",
+        ),
+        (
+            ["simulate", "x.toml", "--out", "d.nc"],
+            "d.nc: expected a file that can be written, found d.nc in its way",
+        ),
+        (
+            ["simulate", "x.toml", "--plot", "x.toml/new/h.png"],
+            "x.toml/new/h.png: expected a file that can be written, found HERE/x.toml in its way",
+        ),
+        (
+            ["simulate", "x.toml", "--out", "notes.nc"],
+            "notes.nc: expected a new file, or a history written by cvt_hpc, found another file",
+        ),
+        (["status", "out/x"], "out/x: expected the output folder of a run, found nothing"),
+        (["gather", "x.toml"], "x.toml: expected the output folder of a run, found a file"),
+        (["map", "out/x"], None),
+        (["run"], "the following arguments are required: JOB; see `cvt-hpc run --help`"),
+        (["run", "x.toml", "--fast"], "unrecognized arguments: --fast; see `cvt-hpc --help`"),
+        (["chart", "x.toml"], None),
+        ([], "the following arguments are required: COMMAND; see `cvt-hpc --help`"),
+    ],
+)
+def test_bad_input_is_one_line_and_2(write_job, call, tmp_path, mechanics, arguments, message):
+    write_job(GRID)
+    (tmp_path / "d.nc").mkdir()
+    (tmp_path / "notes.nc").write_text("mine")
+    status, out, err = call(*arguments)
+    assert (status, out, len(err)) == (2, [], 1)
+    if message is not None:
+        assert [line.replace(str(tmp_path), "HERE") for line in err] == [f"cvt-hpc: {message}"]
+    assert mechanics == {"written": [], "drawn": []}
+    assert not (tmp_path / "out").exists()
+
+
+def test_map_says_what_it_cannot_fix(write_job, call):
+    write_job(GRID)
+    call("run", "x.toml")
+    assert call("map", "out/x", "--at", "laod=1") == (
+        2,
+        [],
+        ["cvt-hpc: out/x: --at laod: unknown axis; did you mean load?"],
+    )
+    status, _, err = call("map", "out/x", "--at", "load=25 kg")
+    assert status == 2
+    assert err == [
+        'cvt-hpc: out/x: --at load: expected a value in N m (such as "1 N m" or a bare number in N m), found "25 kg"'
+    ]
+    assert call("map", "out/x", "--at", "sheave_stiffness=stiff")[2] == [
+        'cvt-hpc: out/x: --at sheave_stiffness: expected a number, found "stiff"'
+    ]
+    assert call("map", "out/x", "--at", "load=0.025 kN m")[0] == 0
+    assert call("map", "out/x", "--at", "load=26 N m")[0] == 2
+
+
+@pytest.mark.parametrize(
+    "variable", [{"PMI_RANK": "1", "PMI_SIZE": "2"}, {"SLURM_PROCID": "3", "SLURM_NTASKS": "4"}]
+)
+def test_other_ranks_are_silent(write_job, call, monkeypatch, variable):
+    write_job(GRID)
+    for name, value in variable.items():
+        monkeypatch.setenv(name, value)
+    assert call("run", "y.toml") == (2, [], [])
+    assert call("run", "--fast") == (2, [], [])
+    assert call("run", "x.toml", "--dry-run") == (0, [], [])
+
+
+def test_an_interrupt_ends_with_130(write_job, call, monkeypatch):
+    def interrupt(path):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("cvt_hpc.study.read_status", interrupt)
+    assert call("status", "out/x") == (130, [], ["cvt-hpc: interrupted"])
+    assert cli.INTERRUPTED == 130

@@ -1,0 +1,93 @@
+"""The command line as a process: what it imports, how it ends, and what several ranks print."""
+
+import os
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+MPIRUN = Path(sys.executable).with_name("mpirun")
+HEAVY = {"numpy", "numba", "xarray", "pint", "matplotlib", "mpi4py"}
+
+
+RANKED = ("PMI_", "PMIX_", "OMPI_COMM_WORLD_", "SLURM_")
+
+
+def outside_mpi():
+    """Return the environment without what a launcher of this very test run has put there."""
+    return {key: value for key, value in os.environ.items() if not key.startswith(RANKED)}
+
+
+def call(*command, cwd):
+    return subprocess.run(command, cwd=cwd, env=outside_mpi(), capture_output=True, text=True, timeout=60)
+
+
+def test_help_imports_nothing_heavy(tmp_path):
+    program = f"""
+        import sys
+        from cvt_hpc.cli import main
+        try:
+            main(["--help"])
+        except SystemExit as end:
+            print(end.code, {HEAVY} & sys.modules.keys())
+    """
+    done = call(sys.executable, "-c", textwrap.dedent(program), cwd=tmp_path)
+    assert "simulate  one run with its full history" in done.stdout
+    assert done.stdout.endswith("\n0 set()\n")
+
+
+@pytest.mark.parametrize(
+    "program", [[Path(sys.executable).with_name("cvt-hpc")], [sys.executable, "-m", "cvt_hpc"]]
+)
+def test_bad_input_ends_with_2_and_one_line(tmp_path, program):
+    (tmp_path / "x.toml").write_text('name = "x"\nmodel = "elastic_belt"\n[belt]\nelement_mas = 1\n')
+    done = call(*program, "run", "x.toml", cwd=tmp_path)
+    message = "cvt-hpc: x.toml: [belt] element_mas: unknown key; did you mean element_mass?\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", message)
+    assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
+
+
+def test_an_error_in_a_job_needs_no_kernels(tmp_path):
+    (tmp_path / "x.toml").write_text('name = "x"\nmodel = "elastic_belt"\n[belt]\nelement_mas = 1\n')
+    program = f"""
+        import sys
+        from cvt_hpc.cli import main
+        print(main(["run", "x.toml"]), {HEAVY - {"numpy"}} & sys.modules.keys())
+    """
+    assert call(sys.executable, "-c", textwrap.dedent(program), cwd=tmp_path).stdout == "2 set()\n"
+
+
+@pytest.mark.skipif(not MPIRUN.exists(), reason="no mpirun beside this Python")
+def test_several_ranks_print_bad_input_once(tmp_path):
+    done = call(MPIRUN, "-n", "2", sys.executable, "-m", "cvt_hpc", "run", "missing.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.count("missing.toml: expected a job file, found nothing") == 1
+
+
+def test_a_reader_that_has_seen_enough_is_no_error(tmp_path):
+    (tmp_path / "x.toml").write_text('name = "x"\nmodel = "elastic_belt"\n')
+    shell = f"set -o pipefail; {sys.executable} -m cvt_hpc check x.toml | true"
+    done = call("bash", "-c", shell, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_exports_are_there_whatever_was_imported_before(tmp_path):
+    program = """
+        import cvt_hpc.simulate
+        from cvt_hpc import load_job, open_results, run, simulate
+        import cvt_hpc.study
+        print(callable(simulate), callable(cvt_hpc.simulate), simulate.run_point.__name__)
+        print(load_job.__module__, run.__module__, open_results.__module__, set(cvt_hpc.__all__) <= set(dir(cvt_hpc)))
+        try:
+            cvt_hpc.simulat
+        except AttributeError as error:
+            print(error)
+    """
+    done = call(sys.executable, "-c", textwrap.dedent(program), cwd=tmp_path)
+    assert done.stdout.splitlines() == [
+        "True True run_point",
+        "cvt_hpc.job.loading cvt_hpc.study.sweep cvt_hpc.study.gather True",
+        "module 'cvt_hpc' has no attribute 'simulat'",
+    ], done.stderr

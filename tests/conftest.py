@@ -1,0 +1,72 @@
+"""For all tests: a model and a stepper without physics, which say what a job file may set and run nothing."""
+
+import sys
+from types import ModuleType
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+from cvt_hpc.models import MODELS
+from cvt_hpc.parameters import Parameter
+from cvt_hpc.steppers import STEPPERS
+
+# No test depends on the clock: a busy machine, or the first loading of pint, takes longer than an example may.
+settings.register_profile(
+    "untimed", parent=settings(), deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("untimed")
+
+TOY_PARAMETERS = {
+    "scene": {
+        "ratio": Parameter(2.5, "", "speed ratio", minimum=0.0, exclusive=True),
+        "driving_speed": Parameter(300.0, "rad/s", "speed of the driving pulley"),
+        "thrust": Parameter(None, "N", "axial force on the driven pulley", minimum=0.0, exclusive=True),
+        "load": Parameter(0.0, "N m", "torque at the driving pulley"),
+        "load_history": Parameter("constant", "", "how the load is applied", choices=("constant", "ramp")),
+    },
+    "belt": {
+        "element_mass": Parameter(1.0, "kg/m", "mass per length", minimum=0.0, exclusive=True),
+        "half_wedge_angle": Parameter(0.2, "rad", "half wedge angle", minimum=0.0, maximum=1.0),
+        "sheave_stiffness": Parameter(1.0, "", "stiffness", minimum=0.0, exclusive=True, allow_infinite=True),
+        "friction_gradient": Parameter(-0.8, "s/m", "slope of the friction law", maximum=0.0),
+        "table": Parameter((), "N/m", "rows of line forces"),
+        "label": Parameter("steel", "", "what it is made of"),
+    },
+    "mesh": {
+        "stations": Parameter(160, "", "cells around the belt", minimum=24, maximum=4096),
+        "refined": Parameter(False, "", "finer on the arcs"),
+    },
+}
+TOY_NUMERICS = {"numerics": {"step": Parameter(1e-6, "s", "time step", minimum=0.0, exclusive=True)}}
+
+
+def check_toy(parameters):
+    """Refuse a load that the thrust cannot carry."""
+    load, thrust = parameters["load"], parameters["thrust"]
+    if abs(load) > thrust * 0.01:
+        return [("load", f"at most {thrust * 0.01:g} N m at this thrust", f"{load:g} N m")]
+    return []
+
+
+@pytest.fixture
+def toy(monkeypatch):
+    """Register the model "toy" and the stepper "hop"."""
+    model, stepper = ModuleType("toy_model"), ModuleType("toy_stepper")
+    model.PARAMETERS, model.DEFAULT_STEPPER, model.check = TOY_PARAMETERS, "hop", check_toy
+    stepper.PARAMETERS = TOY_NUMERICS
+    for module in (model, stepper):
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setitem(MODELS, "toy", "toy_model")
+    monkeypatch.setitem(STEPPERS, "hop", "toy_stepper")
+
+
+@pytest.fixture
+def write_job(toy, tmp_path, monkeypatch):
+    """Return a function that writes a job file of the toy model, and make it the current folder's x.toml."""
+    monkeypatch.chdir(tmp_path)
+
+    def write(text='[scene]\nthrust = "20 kN"\n', head='name = "x"\nmodel = "toy"\n'):
+        (tmp_path / "x.toml").write_text(head + text)
+        return "x.toml"
+
+    return write

@@ -1,0 +1,34 @@
+"""The fixture that starts sweeps of the double and leaves no process behind."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from study_processes import HERE, Sweep, clean_environment, find_mpirun
+
+
+@pytest.fixture
+def start() -> Iterator[Callable[..., Sweep]]:
+    """Start a program under `ranks` ranks of MPI (0: no launcher), with options as JSON."""
+    started: list[Sweep] = []
+
+    def start_program(
+        options: dict[str, Any],
+        ranks: int = 0,
+        program: str = "study_double.py",
+        environment: dict[str, str] | None = None,
+    ) -> Sweep:
+        launcher = [find_mpirun(), "-n", str(ranks)] if ranks else []
+        command = [*launcher, sys.executable, str(HERE / program), json.dumps(options, default=str)]
+        started.append(Sweep(command, {**clean_environment(), **(environment or {})}))
+        return started[-1]
+
+    yield start_program
+    for sweep in started:
+        if sweep.process.poll() is None:
+            sweep.kill()
+        sweep.process.communicate()

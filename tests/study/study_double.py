@@ -1,0 +1,194 @@
+"""A job and a simulator without mechanics, and a program that sweeps them: what the study's tests run.
+
+The numbers are those of a logistic map: they are deterministic, and the slightest difference in an input changes
+all their digits. As a program it takes a JSON text of options, see `main`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import resource
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.errors import InputError
+from cvt_hpc.variables import Status, Variable, Vibrates
+
+
+@dataclass(frozen=True)
+class Axis:
+    name: str
+    values: tuple
+    unit: str = "N m"
+    description: str = "some axis"
+
+
+@dataclass(frozen=True)
+class Job:
+    """Satisfies what the study asks of a `cvt_hpc.job.Job`.
+
+    Parameters that steer the double: `pause` [s] per run; `raise_at` and `diverge_at`, the value of the first
+    axis at which a run raises, or fails as a diverging integration does; `crash_at`, at which the process dies.
+    """
+
+    axes: tuple[Axis, ...] = (Axis("load", tuple(range(12))),)
+    parameters: dict[str, Any] = field(default_factory=dict)
+    name: str = "double"
+    description: str = "a study without mechanics"
+    model: str = "logistic"
+    stepper: str = "none"
+    source: str = "double.toml"
+
+    def point(self, index: int) -> dict[str, Any]:
+        shape = tuple(len(axis.values) for axis in self.axes)
+        place = np.unravel_index(index, shape) if shape else ()
+        return {**self.parameters, **{a.name: a.values[i] for a, i in zip(self.axes, place, strict=True)}}
+
+    def resolved(self) -> dict[str, Any]:
+        axes = {a.name: [str(v) if v == math.inf else v for v in a.values] for a in self.axes}
+        return {"model": self.model, "scene": self.parameters, "axes": axes}
+
+    def fingerprint(self) -> str:
+        # What steers only the pace is no part of the numbers.
+        numbers = {**self.resolved(), "scene": {k: v for k, v in self.parameters.items() if k != "pause"}}
+        return hashlib.sha256(json.dumps(numbers, sort_keys=True).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    values: np.ndarray
+    units: str
+    long_name: str
+
+
+class Interrupted(Exception):
+    pass
+
+
+class Simulator:
+    """Satisfies what the study asks of the module `cvt_hpc.simulate`.
+
+    `slow` makes runs take their time, and no difference to their numbers: {"from": first, "pause": seconds}.
+    `largest_file` [bytes] is what the system lets the process write from the first run on.
+    """
+
+    Interrupted = Interrupted
+
+    def __init__(self, slow: dict[str, float] | None = None, largest_file: int | None = None) -> None:
+        self.slow = slow or {}
+        self.largest_file = largest_file
+
+    def record_variables(self, job: Job) -> tuple[Variable, ...]:
+        return (
+            Variable("status", (), "i1", "", "how the run ended", Status),
+            Variable("vibrates", (), "i1", "", "whether the belt vibrates", Vibrates),
+            Variable("reason", (), "S240", "", "why the run failed"),
+            Variable("amplitude", ("strand",), "f8", "m", "amplitude of the strand's vibration"),
+            Variable("spectrum", ("strand", "frequency_bin"), "f8", "m", "amplitude spectrum"),
+            Variable("steps", (), "i8", "1", "number of time steps"),
+            Variable("core_seconds", (), "f8", "s", "computing time", volatile=True),
+        )
+
+    def record_coordinates(self, job: Job) -> dict[str, Coordinate]:
+        return {
+            "strand": Coordinate(np.array(["t1", "t2"]), "", "strand of the belt"),
+            "frequency_bin": Coordinate(np.linspace(0, 100, 11), "Hz", "frequency"),
+        }
+
+    def run_point(
+        self, job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]
+    ) -> dict[str, Any]:
+        if self.largest_file is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (self.largest_file, self.largest_file))
+        started = time.perf_counter()
+        first = point[job.axes[0].name] if job.axes else None
+        is_slow = isinstance(first, int) and first >= self.slow.get("from", math.inf)
+        wait(self.slow["pause"] if is_slow else point.get("pause", 0.0), interrupt)
+        if first is not None and first == point.get("raise_at"):
+            raise ZeroDivisionError("the driven pulley\nstands still")
+        if first is not None and first == point.get("crash_at"):
+            os._exit(7)
+        diverges = first is not None and first == point.get("diverge_at")
+        numbers = np.full(24, np.nan) if diverges else logistic_numbers(point, job)
+        return {
+            "status": Status.FAILED_NUMERICS if diverges else Status.DONE,
+            "vibrates": Vibrates.YES if numbers[0] > 0.5 else Vibrates.NO,
+            "reason": "step 17: the state is not finite" if diverges else "",
+            "amplitude": numbers[:2],
+            "spectrum": numbers[2:].reshape(2, 11),
+            "steps": 1000,
+            "core_seconds": time.perf_counter() - started,
+        }
+
+
+def wait(pause: float, interrupt: Callable[[], str | None]) -> None:
+    """Pass the time as a kernel does: in slices, asking after each whether to go on."""
+    end = time.monotonic() + pause
+    while time.monotonic() < end:
+        if reason := interrupt():
+            raise Interrupted(reason)
+        time.sleep(0.005)
+
+
+def logistic_numbers(point: dict[str, Any], job: Job) -> np.ndarray:
+    seed = json.dumps([str(point[axis.name]) for axis in job.axes])
+    x = int.from_bytes(hashlib.sha256(seed.encode()).digest()[:6]) / 2**48
+    numbers = np.empty(24)
+    for i in range(24):
+        x = 3.99 * x * (1 - x)
+        numbers[i] = x
+    return numbers
+
+
+def main(options: dict[str, Any]) -> int:
+    """Sweep the double as the command line would.
+
+    Options: `out`; `runs`, the length of the only axis; `parameters` of the job; `sweep`, further arguments of
+    `run`; `slow` and `largest_file`, see `Simulator`; `thread_level` of MPI; `break_rank`, the rank whose log
+    has a defect, and whether the program `swallows_defects`; `break_rank_after`, the rank that raises when the
+    sweep is over.
+    """
+    if "thread_level" in options:
+        import mpi4py
+
+        mpi4py.rc.thread_level = options["thread_level"]
+    from cvt_hpc.study import process_rank, run
+    from cvt_hpc.study.record import RecordLog
+
+    if process_rank() == options.get("break_rank"):
+        RecordLog.append = raise_defect
+    job = Job((Axis("load", tuple(range(options.get("runs", 12)))),), options.get("parameters", {}))
+    simulator = Simulator(options.get("slow"), options.get("largest_file"))
+    try:
+        report = run(job, Path(options["out"]), simulator=simulator, **options.get("sweep", {}))
+    except InputError as error:
+        if process_rank() == 0:
+            print(f"error: {error}", file=sys.stderr)
+        return 2
+    except RuntimeError:
+        if options.get("swallows_defects"):
+            return 0
+        raise
+    if process_rank() == options.get("break_rank_after"):
+        raise_defect()
+    if process_rank() == 0:
+        facts = {"done": report.done, "failed": len(report.failed), "remaining": report.remaining}
+        print(json.dumps({**facts, "stopped": report.stopped, "mpi": "mpi4py.MPI" in sys.modules}))
+    return report.exit_status
+
+
+def raise_defect(*_: object) -> None:
+    raise RuntimeError("a defect outside of runs")
+
+
+if __name__ == "__main__":
+    sys.exit(main(json.loads(sys.argv[1])))

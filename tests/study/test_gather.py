@@ -1,0 +1,191 @@
+"""The dataset: CF conventions, the status of every run, and all that is needed to repeat it."""
+
+import json
+import math
+import resource
+import subprocess
+import sys
+
+import netCDF4
+import numpy as np
+import pytest
+from study_double import Axis, Job, Simulator
+from study_processes import HERE, clean_environment
+
+import cvt_hpc
+from cvt_hpc.errors import InputError
+from cvt_hpc.study import gather, open_results, run
+from cvt_hpc.variables import Status, Vibrates
+
+AXES = (
+    Axis("friction_gradient", (-0.5, -0.25, 0.0), "s/m", "slope of the friction law"),
+    Axis("sheave_stiffness", (1.0, math.inf), "", "multiple of the reference stiffness"),
+    Axis("friction_law", ("stribeck", "algebraic"), "", "friction law"),
+)
+JOB = Job(AXES, {"raise_at": -0.25})
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("gathered")
+    run(JOB, folder, simulator=Simulator(), progress=False)
+    return folder
+
+
+@pytest.fixture
+def dataset(out):
+    with open_results(out) as opened:
+        yield opened
+
+
+def test_axes_are_the_dimensions(dataset):
+    assert dataset["status"].dims == ("friction_gradient", "sheave_stiffness", "friction_law")
+    assert dataset["friction_gradient"].values.tolist() == [-0.5, -0.25, 0.0]
+    assert dataset["sheave_stiffness"].values.tolist() == [1.0, math.inf]
+    assert dataset["friction_law"].values.tolist() == ["stribeck", "algebraic"]
+    assert dataset["friction_gradient"].attrs == {"units": "s/m", "long_name": "slope of the friction law"}
+    assert dataset["sheave_stiffness"].attrs["units"] == "1"
+    assert "units" not in dataset["friction_law"].attrs
+
+
+def test_each_run_stands_at_its_place(dataset):
+    for index in range(12):
+        point = JOB.point(index)
+        at = {axis.name: point[axis.name] for axis in AXES}
+        found = dataset.sel(at)
+        if at["friction_gradient"] == -0.25:
+            assert found["status"] == Status.FAILED_ERROR
+            assert found["reason"] == "ZeroDivisionError: the driven pulley stands still"
+            assert found["vibrates"] == Vibrates.UNDECIDED
+            assert np.isnan(found["spectrum"]).all()
+        else:
+            expected = Simulator().run_point(JOB, point, lambda: None)
+            assert found["status"] == Status.DONE
+            assert found["reason"] == ""
+            assert found["amplitude"].values.tobytes() == expected["amplitude"].tobytes()
+            assert found["spectrum"].values.tobytes() == expected["spectrum"].tobytes()
+
+
+def test_status_and_vibrates_are_cf_flags_and_come_first(out):
+    with netCDF4.Dataset(out / "results.nc") as file:
+        data = [name for name in file.variables if name not in file.dimensions]
+        assert data[:2] == ["status", "vibrates"]
+        status = file["status"]
+        assert status.dtype == np.int8
+        assert status.flag_values.dtype == np.int8  # CF: of the type of the variable
+        assert status.flag_values.tolist() == [0, 1, 2, 3, 4]
+        assert status.flag_meanings == "not_run done failed_numerics failed_error timed_out"
+        assert file["vibrates"].flag_meanings == "no yes undecided"
+        assert "units" not in status.ncattrs()
+
+
+def test_every_variable_is_named_and_only_real_results_have_a_fill_value(out):
+    with netCDF4.Dataset(out / "results.nc") as file:
+        for name, variable in file.variables.items():
+            assert variable.long_name, name
+            real = name in ("amplitude", "spectrum", "core_seconds")
+            assert ("_FillValue" in variable.ncattrs()) == real, name
+        assert file["spectrum"].dimensions[-2:] == ("strand", "frequency_bin")
+        assert file["spectrum"].units == "m"
+        assert file["frequency_bin"].units == "Hz"
+
+
+def test_data_are_compressed(out):
+    with netCDF4.Dataset(out / "results.nc") as file:
+        assert file["spectrum"].filters()["zlib"]
+        assert file["status"].filters()["zlib"]
+        assert file["reason"].filters()["zlib"]
+
+
+def test_what_depends_on_the_hour_says_so(dataset):
+    volatile = [name for name, variable in dataset.variables.items() if variable.attrs.get("volatile")]
+    assert volatile == ["core_seconds"]
+
+
+def test_the_file_alone_tells_how_to_repeat_it(dataset):
+    attributes = dataset.attrs
+    assert attributes["Conventions"].startswith("CF-1.")
+    assert json.loads(attributes["job"]) == JOB.resolved()
+    versions = json.loads(attributes["versions"])
+    assert versions["numpy"] == np.__version__
+    assert versions["cvt_hpc"] == cvt_hpc.__version__
+    assert "git_revision" in attributes
+    assert len(attributes["history"].splitlines()) == 2  # the run, the gathering
+    assert ", 1 rank(s))" in attributes["history"]
+
+
+def test_runs_without_a_record_are_not_run_and_no_nan_hides_it(tmp_path):
+    run(JOB, tmp_path, simulator=Simulator(), progress=False, time_limit=0.0)
+    with open_results(tmp_path) as dataset:
+        assert (dataset["status"] == Status.NOT_RUN).all()
+        assert (dataset["vibrates"] == Vibrates.UNDECIDED).all()
+        assert np.isnan(dataset["amplitude"]).all()
+
+
+def test_a_job_without_axes_gives_scalars(tmp_path):
+    report = run(Job(axes=()), tmp_path, simulator=Simulator(), progress=False)
+    assert (report.total, report.done) == (1, 1)
+    with open_results(tmp_path / "results.nc") as dataset:
+        assert dataset["status"].shape == ()
+        assert dataset["spectrum"].dims == ("strand", "frequency_bin")
+
+
+def test_long_reasons_are_cut_between_characters(tmp_path):
+    class Verbose(Simulator):
+        def run_point(self, job, point, interrupt):
+            raise ValueError("x" + "δ" * 500)  # of two bytes each; the last one that would fit in part
+
+    report = run(Job(axes=()), tmp_path, simulator=Verbose(), progress=False)
+    assert report.failed[0].reason == "ValueError: x" + "δ" * 113
+    with open_results(tmp_path) as dataset:
+        assert dataset["reason"].item() == report.failed[0].reason
+
+
+def test_an_axis_with_the_name_of_a_result_is_refused(tmp_path):
+    with pytest.raises(InputError, match="name of a recorded quantity, found amplitude"):
+        run(Job((Axis("amplitude", (1.0, 2.0)),)), tmp_path / "out", simulator=Simulator())
+    assert not (tmp_path / "out").exists()
+
+
+def test_gathering_again_gives_the_same_and_leaves_nothing_aside(out, dataset):
+    loaded = dataset.load()
+    dataset.close()
+    assert gather(out) == out / "results.nc"
+    with open_results(out) as again:
+        assert again.drop_attrs(deep=False).identical(loaded.drop_attrs(deep=False))
+    assert list(out.glob(".*")) == []
+
+
+def test_gathering_names_damaged_logs(tmp_path, caplog):
+    run(JOB, tmp_path, simulator=Simulator(), progress=False)
+    (tmp_path / "records" / "notes.txt").write_text("mine")
+    gather(tmp_path)
+    assert "notes.txt: left out: not a record log" in caplog.text
+
+
+def test_a_full_disk_leaves_the_dataset_that_was_there(tmp_path):
+    run(JOB, tmp_path, simulator=Simulator(), progress=False)
+    before = (tmp_path / "results.nc").read_bytes()
+    code = "import sys; from cvt_hpc.study import gather; gather(sys.argv[1])"
+    finished = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path)],
+        env=clean_environment(),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (8000, 8000)),
+        capture_output=True,
+        text=True,
+        cwd=HERE,
+    )
+    assert finished.returncode == 1
+    assert "StorageError" in finished.stderr.splitlines()[-1]
+    assert (tmp_path / "results.nc").read_bytes() == before
+    assert list(tmp_path.glob(".*")) == []
+
+
+def test_opening_what_is_no_dataset(tmp_path):
+    run(JOB, tmp_path, simulator=Simulator(), progress=False)
+    (tmp_path / "results.nc").write_text("mine")
+    with pytest.raises(InputError, match="expected a netCDF dataset"):
+        open_results(tmp_path)
+    (tmp_path / "results.nc").unlink()
+    with pytest.raises(InputError, match="cvt-hpc gather"):
+        open_results(tmp_path)

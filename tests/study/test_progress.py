@@ -1,0 +1,131 @@
+"""What one can see of a sweep: its bar or lines, and its status from the folder alone."""
+
+import contextlib
+import json
+import os
+import pty
+import termios
+import time
+
+import pytest
+from study_double import Job, Simulator
+from study_processes import wait_until
+
+from cvt_hpc.study import read_status, run
+from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.progress import Progress, show_duration
+from cvt_hpc.study.record import RecordFormat, RecordLog
+from cvt_hpc.study.schedule import SerialCounter
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(0.4, "0:00:00"), (59.6, "0:01:00"), (3599, "0:59:59"), (90061, "25:01:01")]
+)
+def test_durations(seconds, text):
+    assert show_duration(seconds) == text
+
+
+def test_status_of_a_finished_study(tmp_path):
+    run(Job(parameters={"raise_at": 3}), tmp_path, simulator=Simulator(), progress=False)
+    status = read_status(tmp_path)
+    assert (status.name, status.total, status.done, status.failed, status.left) == ("double", 12, 11, 1, 0)
+    assert not status.running
+    assert status.rate > 0
+    assert status.time_to_go == 0
+    assert status.warnings == ()
+
+
+def test_status_before_the_first_record(tmp_path):
+    run(Job(), tmp_path, simulator=Simulator(), progress=False, time_limit=0.0)
+    status = read_status(tmp_path)
+    assert (status.done, status.left, status.rate, status.time_to_go) == (0, 12, None, None)
+
+
+def test_status_of_a_running_sweep(start, tmp_path):
+    sweep = start({"out": tmp_path, "runs": 10_000, "parameters": {"pause": 0.02}}, ranks=2)
+    wait_until(lambda: (tmp_path / "job.json").exists() and read_status(tmp_path).done >= 20, "20 runs")
+    status = read_status(tmp_path)
+    assert status.running
+    assert status.done + status.left == 10_000
+    assert 0 < status.rate <= 100  # two ranks, at least 20 ms a run
+    assert status.time_to_go == pytest.approx(status.left / status.rate)
+    assert sweep.process.poll() is None
+
+
+def test_rate_is_that_of_the_latest_session(tmp_path):
+    run(Job(), tmp_path, simulator=Simulator(), progress=False, time_limit=0.0)
+    study = StudyFolder(tmp_path).load()
+    now = time.time()
+    for started, indices in ((now - 1e6, range(3)), (now - 1.0, range(3, 9))):
+        session = {"id": str(started), "started": started}
+        layout = RecordFormat(study.fingerprint, study.record_dtype)
+        with RecordLog(tmp_path / "records", layout, session, rank=0) as log:
+            for index in indices:
+                log.append(index, study.pack_failure("none"))
+    # All records are of now: nine of them since the latest start, a second ago.
+    status = read_status(tmp_path)
+    assert 0.01 < status.rate <= 9
+    assert status.left == 3
+
+
+def test_status_names_damage(tmp_path):
+    run(Job(), tmp_path, simulator=Simulator(), progress=False)
+    (tmp_path / "records" / "notes").write_text("mine")
+    (warning,) = read_status(tmp_path).warnings
+    assert "notes: left out" in warning
+
+
+def test_lines_where_there_is_no_terminal(start, tmp_path):
+    options = {"out": tmp_path / "out", "runs": 10, "parameters": {"raise_at": 4}}
+    output = start(options, ranks=2).finish().stderr.splitlines()
+    lines = [line for line in output if "runs" in line]  # MPI libraries have things to say as well
+    assert len(lines) == 1  # of one rank, at the end
+    assert lines[0].startswith("10/10 runs (100.0%), 1 failed, ")
+    assert "runs/s, 0:00:00 to go" in lines[0]
+
+
+def test_progress_counts_all_ranks_and_earlier_sessions(capsys):
+    counter = SerialCounter()
+    progress = Progress(counter, total=100, recorded=40, failed=2, visible=True)
+    for _ in range(10):
+        counter.report(failed=False)
+    counter.report(failed=True)
+    progress.show()
+    assert capsys.readouterr().err == ""  # too soon after the start
+    progress.close()
+    assert capsys.readouterr().err.startswith("51/100 runs (51.0%), 3 failed, ")
+
+
+def test_no_progress_if_not_wanted(start, tmp_path):
+    options = {"out": tmp_path / "out", "sweep": {"progress": False}}
+    assert start(options).finish().stderr == ""
+
+
+def test_a_bar_on_a_terminal(monkeypatch):
+    ours, theirs = pty.openpty()
+    termios.tcsetwinsize(theirs, (25, 80))
+    with os.fdopen(theirs, "w") as terminal:
+        monkeypatch.setattr("sys.stderr", terminal)
+        counter = SerialCounter()
+        progress = Progress(counter, total=10, recorded=2, failed=0, visible=True)
+        for _ in range(5):
+            counter.report(failed=True)
+        progress.close()
+    shown = read_terminal(ours)
+    assert "7/10 [" in shown
+    assert "run/s, 5 failed]" in shown
+
+
+def read_terminal(descriptor):
+    """Return all that was written to a pseudo-terminal whose other end is closed."""
+    parts = []
+    with contextlib.suppress(OSError):  # Linux's end of file
+        while part := os.read(descriptor, 100_000):
+            parts.append(part)
+    os.close(descriptor)
+    return b"".join(parts).decode()
+
+
+def test_report_is_printed_once(start, tmp_path):
+    finished = start({"out": tmp_path / "out"}, ranks=2).finish()
+    assert json.loads(finished.stdout)["done"] == 12

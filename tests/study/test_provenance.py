@@ -1,0 +1,50 @@
+"""Where numbers come from: the revision of this source, and of no other."""
+
+import shutil
+import subprocess
+
+import pytest
+
+from cvt_hpc.study import provenance
+from cvt_hpc.study.gather import merge_versions
+
+
+def git(folder, *arguments):
+    identity = ["-c", "user.name=a", "-c", "user.email=a@b"]
+    done = subprocess.run(
+        ["git", *identity, *arguments], cwd=folder, check=True, capture_output=True, text=True
+    )
+    return done.stdout.strip()
+
+
+def test_revision_is_that_of_the_source(tmp_path, monkeypatch):
+    if shutil.which("git") is None:
+        pytest.skip("git is not installed")
+    source = tmp_path / "provenance.py"
+    monkeypatch.setattr(provenance, "__file__", str(source))
+    assert provenance.git_revision() == ""
+    git(tmp_path, "init", "-q")
+    source.write_text("first")
+    git(tmp_path, "commit", "-q", "--allow-empty", "-m", "another program")
+    assert provenance.git_revision() == ""  # only installed below another program's checkout
+    git(tmp_path, "add", ".")
+    git(tmp_path, "commit", "-q", "-m", "this program")
+    git(tmp_path, "tag", "-m", "x", "v1")
+    assert provenance.git_revision() == git(tmp_path, "rev-parse", "HEAD")
+    source.write_text("second")
+    assert provenance.git_revision() == git(tmp_path, "rev-parse", "HEAD") + "-dirty"
+
+
+def test_no_revision_without_git(monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    assert provenance.git_revision() == ""
+
+
+def test_versions_of_several_sessions_stand_side_by_side():
+    found = [{"numpy": "2.0", "python": "3.11"}, {"numpy": "2.1", "python": "3.11"}, {"mpi4py": "4"}]
+    assert merge_versions(found) == {"numpy": "2.0, 2.1", "python": "3.11", "mpi4py": "4"}
+
+
+def test_command_has_no_folder_of_the_program(monkeypatch):
+    monkeypatch.setattr("sys.argv", ["/home/me/.venv/bin/cvt-hpc", "run", "a job.toml"])
+    assert provenance.command() == "cvt-hpc run 'a job.toml'"

@@ -1,0 +1,220 @@
+"""Record logs: what was written is read back bitwise, and damage costs no more than what it struck."""
+
+import os
+
+import numpy as np
+import pytest
+from study_double import Axis, Job, Simulator
+
+from cvt_hpc.study.description import describe
+from cvt_hpc.study.files import StorageError
+from cvt_hpc.study.record import FRAME, MARKER, RecordFormat, RecordLog
+from cvt_hpc.study.recovery import read_records
+from cvt_hpc.variables import Status
+
+SESSION = {"id": "a", "started": 1.0}
+RUNS = 8
+
+
+def make_study(**parameters):
+    return describe(Job((Axis("load", tuple(range(RUNS))),), parameters), Simulator())
+
+
+def make_rows(study, seed=0):
+    rows = study.blank_rows(study.size)
+    generator = np.random.default_rng(seed)
+    rows["status"] = Status.DONE
+    rows["amplitude"] = generator.standard_normal(rows["amplitude"].shape)
+    rows["spectrum"] = generator.standard_normal(rows["spectrum"].shape)
+    return rows
+
+
+def write_log(folder, study, rows, indices, session=SESSION):
+    folder.mkdir(exist_ok=True)
+    with RecordLog(folder, RecordFormat(study.fingerprint, study.record_dtype), session, rank=0) as log:
+        for index in indices:
+            log.append(index, rows[index])
+    return log.path
+
+
+@pytest.fixture
+def study():
+    return make_study()
+
+
+@pytest.fixture
+def rows(study):
+    return make_rows(study)
+
+
+@pytest.fixture
+def frame_size(study):
+    return FRAME.size + study.record_dtype.itemsize
+
+
+def assert_recorded(records, rows, indices):
+    """Assert that exactly these runs are recorded, bitwise, and the others blank."""
+    assert list(np.flatnonzero(records.recorded)) == sorted(indices)
+    for index in range(RUNS):
+        if index in indices:
+            assert records.rows[index].tobytes() == rows[index].tobytes()
+        else:
+            assert records.rows["status"][index] == Status.NOT_RUN
+            assert np.isnan(records.rows["amplitude"][index]).all()
+
+
+def test_records_come_back_bitwise(tmp_path, study, rows):
+    write_log(tmp_path / "r", study, rows, [3, 0, 7])
+    write_log(tmp_path / "r", study, rows, [1], {"id": "b", "started": 0.5})
+    records = read_records(tmp_path / "r", study)
+    assert_recorded(records, rows, [0, 1, 3, 7])
+    assert [session["id"] for session in records.sessions] == ["b", "a"]
+    assert records.warnings == []
+
+
+def test_a_log_without_records_leaves_no_file(tmp_path, study, rows):
+    write_log(tmp_path / "r", study, rows, [])
+    assert list((tmp_path / "r").iterdir()) == []
+
+
+@pytest.mark.parametrize("cut", ["one byte", "within the marker", "all but one byte"])
+def test_a_torn_tail_costs_one_record(tmp_path, study, rows, frame_size, cut):
+    path = write_log(tmp_path / "r", study, rows, [4, 5, 6])
+    lost = {"one byte": 1, "within the marker": frame_size - 2, "all but one byte": frame_size - 1}[cut]
+    os.truncate(path, path.stat().st_size - lost)
+    records = read_records(tmp_path / "r", study)
+    assert_recorded(records, rows, [4, 5])
+    assert len(records.warnings) == 1
+    assert path.name in records.warnings[0]
+    assert f"last {frame_size - lost} bytes are an unfinished record" in records.warnings[0]
+
+
+@pytest.mark.parametrize("place", range(FRAME.size + 30))
+def test_a_flipped_bit_costs_one_record(tmp_path, study, rows, frame_size, place):
+    path = write_log(tmp_path / "r", study, rows, [4, 5, 6])
+    flip(path, path.stat().st_size - 2 * frame_size + place)
+    records = read_records(tmp_path / "r", study)
+    assert_recorded(records, rows, [4, 6])
+    assert len(records.warnings) == 1
+    assert "are damaged" in records.warnings[0]
+
+
+def test_a_marker_among_the_numbers_misleads_nobody(tmp_path, study, rows, frame_size):
+    rows["spectrum"].reshape(RUNS, -1)[5].view(np.uint8)[16:20] = np.frombuffer(MARKER, np.uint8)
+    path = write_log(tmp_path / "r", study, rows, [4, 5, 6])
+    flip(path, path.stat().st_size - 2 * frame_size)
+    records = read_records(tmp_path / "r", study)
+    assert_recorded(records, rows, [4, 6])
+    assert len(records.warnings) == 1
+
+
+@pytest.mark.parametrize("place", [0, 9, 14, 18, 40])  # magic, version, length, checksum, text
+def test_records_outlive_their_header(tmp_path, study, rows, place):
+    path = write_log(tmp_path / "r", study, rows, [4, 5])
+    flip(path, place)
+    records = read_records(tmp_path / "r", study)
+    assert_recorded(records, rows, [4, 5])
+    assert any("the header is damaged" in warning for warning in records.warnings)
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        (b"\x00\x01" * 5000, "not a record log"),
+        (b"my notes", "not a record log"),
+        (MARKER * 9, "no record of this"),
+    ],
+)
+def test_a_foreign_file_is_named_and_left(tmp_path, study, rows, content, complaint):
+    write_log(tmp_path / "r", study, rows, [2])
+    foreign = tmp_path / "r" / "notes.log"
+    foreign.write_bytes(content)
+    records = read_records(tmp_path / "r", study)
+    assert_recorded(records, rows, [2])
+    assert len(records.warnings) == 1
+    assert "notes.log: left out" in records.warnings[0]
+    assert complaint in records.warnings[0]
+    assert foreign.read_bytes() == content
+
+
+def test_a_folder_among_the_logs_is_named(tmp_path, study, rows):
+    write_log(tmp_path / "r", study, rows, [2])
+    (tmp_path / "r" / "sub").mkdir()
+    records = read_records(tmp_path / "r", study)
+    assert_recorded(records, rows, [2])
+    assert "sub: left out: Is a directory" in records.warnings[0]
+
+
+def test_records_of_another_job_do_not_count(tmp_path, study, rows):
+    path = write_log(tmp_path / "r", make_study(thrust=2.0), rows, [2])
+    records = read_records(tmp_path / "r", study)
+    assert_recorded(records, rows, [])
+    assert "another job" in records.warnings[0]
+    flip(path, 0)  # nor where the header can no longer tell
+    assert_recorded(read_records(tmp_path / "r", study), rows, [])
+
+
+def test_the_earliest_of_two_records_counts_whatever_the_file_names(tmp_path, study, rows):
+    later = make_rows(study, seed=1)
+    first = write_log(tmp_path / "r", study, rows, [2])
+    second = write_log(tmp_path / "r", study, later, [2, 3])
+    for names in (("a.log", "b.log"), ("d.log", "c.log")):
+        first = first.rename(first.with_name(names[0]))
+        second = second.rename(second.with_name(names[1]))
+        records = read_records(tmp_path / "r", study)
+        assert records.rows[2].tobytes() == rows[2].tobytes()
+        assert records.rows[3].tobytes() == later[3].tobytes()
+        assert "run 2 has other numbers" in records.warnings[0]
+        assert f"{names[0]}, which counts" in records.warnings[0]
+
+
+def test_a_copied_log_changes_nothing(tmp_path, study, rows):
+    path = write_log(tmp_path / "r", study, rows, [2, 3])
+    path.with_name("copy.log").write_bytes(path.read_bytes())
+    records = read_records(tmp_path / "r", study)
+    assert_recorded(records, rows, [2, 3])
+    assert records.warnings == []
+
+
+def test_timings_may_differ_between_records_of_a_run(tmp_path, study, rows):
+    write_log(tmp_path / "r", study, rows, [2])
+    slower = rows.copy()
+    slower["core_seconds"] = 99.0
+    write_log(tmp_path / "r", study, slower, [2])
+    assert read_records(tmp_path / "r", study).warnings == []
+
+
+def test_a_refused_write_leaves_whole_records(tmp_path, study, rows, monkeypatch):
+    layout = RecordFormat(study.fingerprint, study.record_dtype)
+    log = RecordLog(tmp_path, layout, SESSION, rank=0)
+    log.append(1, rows[1])
+    system_write = os.write
+
+    def short_then_full(descriptor, data):
+        if len(data) < layout.frame_size:
+            raise OSError(28, "No space left on device")
+        return system_write(descriptor, data[:50])
+
+    monkeypatch.setattr(os, "write", short_then_full)
+    with pytest.raises(StorageError, match="No space left on device"):
+        log.append(2, rows[2])
+    monkeypatch.undo()
+    log.append(3, rows[3])
+    log.close()
+    records = read_records(tmp_path, study)
+    assert_recorded(records, rows, [1, 3])
+    assert records.warnings == []
+
+
+def test_each_record_is_one_write(tmp_path, study, rows, monkeypatch):
+    writes = []
+    system_write = os.write
+    monkeypatch.setattr(os, "write", lambda fd, data: writes.append(len(data)) or system_write(fd, data))
+    write_log(tmp_path / "r", study, rows, [0, 1, 2])
+    assert writes[1:] == [RecordFormat(study.fingerprint, study.record_dtype).frame_size] * 3
+
+
+def flip(path, place):
+    data = bytearray(path.read_bytes())
+    data[place] ^= 0x10
+    path.write_bytes(data)

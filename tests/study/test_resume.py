@@ -1,0 +1,123 @@
+"""Sweeps that are killed, interrupted or damaged go on where they stopped, to the very same numbers."""
+
+import json
+import random
+import signal
+import time
+
+import numpy as np
+import pytest
+from study_double import Axis, Job, Simulator
+from study_processes import assert_same_numbers, wait_until
+
+from cvt_hpc.study import open_results, run
+from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.recovery import read_records
+
+RUNS = 60
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    """Return the dataset of an undisturbed serial sweep."""
+    folder = tmp_path_factory.mktemp("reference")
+    run(Job((Axis("load", tuple(range(RUNS))),)), folder, simulator=Simulator(), progress=False)
+    with open_results(folder) as dataset:
+        return dataset.load()
+
+
+def recorded(out):
+    folder = StudyFolder(out)
+    return read_records(folder.records, folder.load())
+
+
+def has_records(out, count=1):
+    return (out / "job.json").exists() and recorded(out).recorded.sum() >= count
+
+
+def frames_written(out):
+    """Return the number of records in all logs, repeated ones counted each time."""
+    study = StudyFolder(out).load()
+    paths = out.glob("records/*.log")
+    size = study.record_dtype.itemsize
+    return sum(path.read_bytes().count(b"\xf5RUN" + size.to_bytes(4, "little")) for path in paths)
+
+
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_kill_9_at_any_moment_and_resume(start, tmp_path, reference, ranks):
+    options = {"out": tmp_path / "out", "runs": RUNS}
+    endless = {"from": 50, "pause": 300.0}  # so that the sweep is at work whenever the blow comes
+    sweep = start({**options, "parameters": {"pause": 0.02}, "slow": endless}, ranks)
+    wait_until(lambda: has_records(tmp_path / "out"), "the first record")
+    time.sleep(random.uniform(0.0, 0.4))
+    sweep.kill()
+    sweep.process.wait()
+    before = recorded(tmp_path / "out").recorded.sum()
+    assert 0 < before < RUNS
+    finished = start(options, ranks).finish()
+    assert finished.returncode == 0, finished.stderr
+    assert json.loads(finished.stdout)["done"] == RUNS
+    assert frames_written(tmp_path / "out") == RUNS  # none was repeated
+    with open_results(tmp_path / "out") as dataset:
+        assert_same_numbers(dataset, reference)
+
+
+def test_a_rank_that_dies_takes_the_sweep_down_and_the_rest_is_done_later(start, tmp_path, reference):
+    options = {"out": tmp_path / "out", "runs": RUNS}
+    finished = start({**options, "parameters": {"pause": 0.01, "crash_at": 20}}, ranks=2).finish()
+    assert finished.returncode != 0
+    assert 0 < recorded(tmp_path / "out").recorded.sum() < RUNS
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGUSR1"])
+def test_a_signal_breaks_off_the_run_and_is_resumed(start, tmp_path, reference, name):
+    # The run at work would take minutes: it has to be broken off, not waited for.
+    options = {"out": tmp_path / "out", "runs": RUNS, "parameters": {"pause": 0.01}}
+    sweep = start({**options, "slow": {"from": 25, "pause": 300.0}})
+    wait_until(lambda: has_records(tmp_path / "out", 25), "25 records")
+    sweep.process.send_signal(getattr(signal, name))
+    finished = sweep.finish()
+    assert finished.returncode == 99, finished.stderr
+    facts = json.loads(finished.stdout)
+    assert (facts["done"], facts["remaining"], facts["stopped"]) == (25, RUNS - 25, name)
+    with open_results(tmp_path / "out") as dataset:
+        assert int((dataset["status"] == 0).sum()) == RUNS - 25
+    finished = start(options).finish()
+    assert finished.returncode == 0, finished.stderr
+    with open_results(tmp_path / "out") as dataset:
+        assert_same_numbers(dataset, reference)
+
+
+@pytest.mark.parametrize("target", ["rank 0", "rank 1", "mpirun"])
+def test_a_signal_to_one_rank_stops_all(start, tmp_path, target):
+    options = {"out": tmp_path / "out", "runs": RUNS, "parameters": {"pause": 0.01}}
+    sweep = start({**options, "slow": {"from": 25, "pause": 300.0}}, ranks=2)
+    wait_until(lambda: has_records(tmp_path / "out", 25), "25 records")  # both are at a slow run then
+    if target == "mpirun":
+        sweep.process.send_signal(signal.SIGUSR1)
+    else:
+        sweep.ranks()[int(target[-1])].send_signal(signal.SIGUSR1)
+    finished = sweep.finish()
+    assert finished.returncode == 99, finished.stderr
+    facts = json.loads(finished.stdout)
+    assert facts["stopped"] == "SIGUSR1"
+    assert (facts["done"], facts["remaining"]) == (25, RUNS - 25)
+
+
+def test_damage_costs_only_the_runs_it_struck(start, tmp_path, reference, caplog):
+    job = Job((Axis("load", tuple(range(RUNS))),))
+    run(job, tmp_path, simulator=Simulator(), progress=False)
+    (log,) = (tmp_path / "records").iterdir()
+    data = bytearray(log.read_bytes())
+    data[len(data) // 2] ^= 1
+    log.write_bytes(data[:-5])
+    (tmp_path / "records" / "core.123").write_bytes(b"foreign")
+    left = np.flatnonzero(~recorded(tmp_path).recorded)
+    assert len(left) == 2
+    report = run(job, tmp_path, simulator=Simulator(), progress=False)
+    assert report.done == RUNS
+    assert frames_written(tmp_path) == RUNS + 2
+    for complaint in ("are damaged", "unfinished record", "core.123: left out: not a record log"):
+        assert complaint in caplog.text
+    with open_results(tmp_path) as dataset:
+        assert_same_numbers(dataset, reference)

@@ -1,0 +1,64 @@
+"""The counter: every number once, from all ranks, also while the rank that holds it computes."""
+
+import json
+
+import numpy as np
+
+from cvt_hpc.study.schedule import SerialCounter, claimed_runs
+
+
+def claim_under_mpi(start, ranks, options, environment=None):
+    finished = start(options, ranks, "claiming.py", environment).finish()
+    assert finished.returncode == 0, finished.stderr
+    return json.loads(finished.stdout)
+
+
+def test_serial_claims_follow_the_order():
+    order = np.array([5, 2, 9])
+    with SerialCounter() as counter:
+        assert list(claimed_runs(order, counter, lambda: True)) == [5, 2, 9]
+        assert list(claimed_runs(order, counter, lambda: True)) == []
+
+
+def test_no_claim_when_it_is_not_allowed():
+    counter = SerialCounter()
+    answers = iter([True, True, False])
+    assert list(claimed_runs(np.arange(9), counter, lambda: next(answers))) == [0, 1]
+    assert counter.claim() == 2  # the refusal has cost no number
+
+
+def test_serial_interruption_is_beyond_every_order():
+    counter = SerialCounter()
+    assert not counter.is_interrupted()
+    counter.interrupt_all()
+    assert counter.is_interrupted()
+    assert list(claimed_runs(np.arange(9), counter, lambda: True)) == []
+
+
+def test_three_ranks_claim_every_number_once(start):
+    found = claim_under_mpi(start, 3, {"task": "claim", "limit": 600})
+    claims = found["claims"]
+    assert sorted(sum(claims, [])) == list(range(600))
+    assert all(mine == sorted(mine) for mine in claims)
+    assert len(claims) == 3
+    assert found["tallies"] == [[600, 60]] * 3
+
+
+def test_claims_are_served_while_the_host_computes(start, tmp_path):
+    # Without shared memory, as between nodes: there a claim waits for rank 0 to enter the MPI library.
+    environment = {"MPIR_CVAR_NOLOCAL": "1", "OMPI_MCA_btl": "self,tcp", "OMPI_MCA_osc": "rdma"}
+    options = {"task": "busy host", "marker": tmp_path / "claimed"}
+    assert claim_under_mpi(start, 2, options, environment) == {"served": True}
+
+
+def test_all_ranks_learn_of_an_interruption(start):
+    found = claim_under_mpi(start, 2, {"task": "interrupt"})
+    assert found["before"] == [False, False]
+    assert found["after"] == [True, True]
+    assert min(found["claims"]) > 10**9
+
+
+def test_a_counter_that_miscounts_is_refused(start):
+    errors = claim_under_mpi(start, 2, {"task": "miscount"})["errors"]
+    assert len(errors) == 2  # on all ranks alike
+    assert all("self-test of the shared counter" in error for error in errors)
