@@ -155,7 +155,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
     _check_output(arguments.plot, (".png", ".svg", ".pdf"))
     from cvt_hpc.analysis.histories import draw_history, is_history, write_history
     from cvt_hpc.printing import outcome_lines
-    from cvt_hpc.simulate import simulate
+    from cvt_hpc.simulation import simulate
     from cvt_hpc.variables import Status
 
     if arguments.out is not None and arguments.out.exists() and not is_history(arguments.out):
@@ -179,7 +179,7 @@ def _check(arguments: argparse.Namespace) -> int:
 
     job = load_job(arguments.path, arguments.set)
     if _speaks():
-        from cvt_hpc.simulate import estimate_cost
+        from cvt_hpc.simulation import estimate_cost
 
         print(summarize(job, estimate_cost(job)))
     return DONE

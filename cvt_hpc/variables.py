@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
 
 
 class Status(IntEnum):
@@ -53,3 +56,11 @@ class Variable:
     long_name: str
     flags: type[IntEnum] | None = None
     volatile: bool = False
+
+
+class Coordinate(NamedTuple):
+    """A dimension of the record beside the grid's: values (n,), CF unit ("" for labels), CF long_name."""
+
+    values: np.ndarray
+    units: str
+    long_name: str

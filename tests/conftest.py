@@ -6,6 +6,7 @@ from types import ModuleType
 import pytest
 from hypothesis import HealthCheck, settings
 
+from cvt_hpc.job import schema
 from cvt_hpc.models import MODELS
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers import STEPPERS
@@ -38,6 +39,7 @@ TOY_PARAMETERS = {
     },
 }
 TOY_NUMERICS = {"numerics": {"step": Parameter(1e-6, "s", "time step", minimum=0.0, exclusive=True)}}
+TOY_SHARED = {"run": {"duration": Parameter(0.3, "s", "simulated time", minimum=0.0, exclusive=True)}}
 
 
 def check_toy(parameters):
@@ -48,12 +50,26 @@ def check_toy(parameters):
     return []
 
 
+def check_hop(parameters):
+    """Refuse steps that are longer than the run."""
+    step, duration = parameters["step"], parameters["duration"]
+    return [("step", f"at most duration = {duration:g} s", f"{step:g} s")] if step > duration else []
+
+
+def check_run(parameters):
+    """Refuse runs that nobody has the time for."""
+    duration = parameters["duration"]
+    return [("duration", "at most an hour", f"{duration:g} s")] if duration > 3600 else []
+
+
 @pytest.fixture
 def toy(monkeypatch):
-    """Register the model "toy" and the stepper "hop"."""
-    model, stepper = ModuleType("toy_model"), ModuleType("toy_stepper")
+    """Register the model "toy" and the stepper "hop", and put a table [run] in the place of all shared ones."""
+    model, stepper, shared = ModuleType("toy_model"), ModuleType("toy_stepper"), ModuleType("toy_shared")
     model.PARAMETERS, model.DEFAULT_STEPPER, model.check = TOY_PARAMETERS, "hop", check_toy
-    stepper.PARAMETERS = TOY_NUMERICS
+    stepper.PARAMETERS, stepper.check = TOY_NUMERICS, check_hop
+    shared.PARAMETERS, shared.check = TOY_SHARED, check_run
+    monkeypatch.setattr(schema, "SHARED", (shared,))
     for module in (model, stepper):
         monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setitem(MODELS, "toy", "toy_model")

@@ -1,1 +1,1 @@
-"""What runs say: vibrations and their spectra, whether a run vibrates, maps of a study, charts of a run."""
+"""What runs say together and one by one: maps of a study, pictures and files of a run's history."""

@@ -1,10 +1,7 @@
-"""What all pictures share: a style, units for people, and files that are whole or not there."""
+"""What all pictures share: a style, units for people, and how they are written."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +9,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.errors import mismatch
+from cvt_hpc.files import written_aside
 
 WIDTH = 6.4  # [inch]: letters of 10 points stay readable across a page and on a telephone held sideways
 RESOLUTION = 170  # dots per inch
@@ -75,12 +73,12 @@ def save_figure(figure: Figure, out: Path) -> Path:
     Raises
     ------
     InputError
-        The suffix is none of .png, .svg, .pdf.
+        The suffix is none of .png, .svg, .pdf, or the system refuses; what stood at `out` is then untouched.
     """
     out = Path(out)
     check_format(out)
     suffix = out.suffix.lower()
-    with written_aside(out) as aside:
+    with written_aside(out, parents=True) as aside:
         if suffix == ".png":
             _write_png(figure, aside)
         else:  # without the date, so that the same results give the same file
@@ -103,27 +101,3 @@ def check_format(out: Path) -> None:
     """Raise InputError unless the suffix names a picture format."""
     if out.suffix.lower() not in FORMATS:
         raise mismatch(str(out), f"a picture: {', '.join(FORMATS)}", out.suffix or "no suffix")
-
-
-@contextmanager
-def written_aside(out: Path) -> Iterator[Path]:
-    """Give a path beside `out` to write to, and rename it to `out` once it is complete and on the disk.
-
-    Raises
-    ------
-    InputError
-        The system refuses; what stood at `out` is then untouched.
-    """
-    aside = out.with_name(f".{out.stem}.{os.getpid()}.part{out.suffix}")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        yield aside
-        with aside.open("rb") as finished:
-            os.fsync(finished.fileno())
-        os.replace(aside, out)
-    except (OSError, RuntimeError) as error:  # RuntimeError: what the netCDF library makes of a full disk
-        found = getattr(error, "strerror", None) or error
-        raise InputError(f"{out}: expected to be able to write, found: {found}") from error
-    finally:
-        with suppress(OSError):
-            aside.unlink()

@@ -12,10 +12,11 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis import history_panels as panels
-from cvt_hpc.analysis.figures import STYLE, WIDTH, check_format, save_figure, written_aside
-from cvt_hpc.analysis.occurrence import PARAMETERS
+from cvt_hpc.analysis.figures import STYLE, WIDTH, check_format, save_figure
 from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.files import written_aside
 from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.vibration.criterion import PARAMETERS
 
 CONTENT = "cvt_hpc_content"  # global attribute by which this program knows its own files
 HISTORY = "history of one run"
@@ -30,7 +31,7 @@ def write_history(dataset: xr.Dataset, path: Path) -> Path:
     Parameters
     ----------
     dataset : Dataset
-        As `cvt_hpc.simulate.simulate` returns it.
+        As `cvt_hpc.simulate` returns it.
     path : Path
         The file; its folder is made if needed.
 
@@ -53,7 +54,7 @@ def write_history(dataset: xr.Dataset, path: Path) -> Path:
     encoding = {
         name: _encoding(variable, name in marked.coords) for name, variable in marked.variables.items()
     }
-    with written_aside(path) as aside:
+    with written_aside(path, parents=True) as aside:
         marked.to_netcdf(aside, engine="netcdf4", format="NETCDF4", encoding=encoding)
     return path
 

@@ -1,4 +1,4 @@
-"""What must hold between parameters, asked of the model for every run before any computing."""
+"""What must hold between parameters, asked for every run before any computing."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def check_grid(schema: Schema, parameters: dict[str, Any], axes: tuple[Axis, ...
     Parameters
     ----------
     schema : Schema
-        With the model's checks.
+        With the checks.
     parameters : dict
         The base scene [SI].
     axes : tuple of Axis
@@ -49,7 +49,7 @@ def check_point(
     Parameters
     ----------
     schema : Schema
-        With the model's checks.
+        With the checks.
     parameters : dict
         Value [SI] by key.
     source : str
@@ -62,7 +62,7 @@ def check_point(
     InputError
         With the first problem found.
     """
-    for key, expected, found in schema.check(parameters):
+    for key, expected, found in schema.problems(parameters):
         place = ", ".join(
             f"{name} = {in_words(value, schema.parameters[name].unit)}"
             for name, value in (varied or {}).items()

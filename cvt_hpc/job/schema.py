@@ -1,24 +1,29 @@
-"""What a job may set: the tables that its model and its stepper declare together."""
+"""What a job may set: the tables of its model and of its stepper, and those that all jobs share."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
 from typing import Any
 
+from cvt_hpc import recording
 from cvt_hpc.errors import InputError, mismatch, nearest, show, unknown
 from cvt_hpc.models import MODELS
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers import STEPPERS
+from cvt_hpc.vibration import criterion
 
-Problems = list[tuple[str, str, str]]
+SHARED = (recording, criterion)  # what every job may set, whatever its model and stepper
+
+Problem = tuple[str, str, str]
+Check = Callable[[dict[str, Any]], list[Problem]]
 
 
 @dataclass(frozen=True)
 class Schema:
-    """The parameters of a model and a stepper.
+    """The parameters of a job with a certain model and stepper.
 
     Attributes
     ----------
@@ -26,14 +31,14 @@ class Schema:
         Their names.
     sections : dict
         Section -> key -> Parameter; keys are unique over all sections.
-    check : callable
-        The model's checks that lie between parameters: flat values -> list of (key, expected, found).
+    checks : tuple of callable
+        The checks that lie between parameters, the model's first: flat values -> list of problems.
     """
 
     model: str
     stepper: str
     sections: dict[str, dict[str, Parameter]]
-    check: Callable[[dict[str, Any]], Problems]
+    checks: tuple[Check, ...]
 
     @cached_property
     def section_of(self) -> dict[str, str]:
@@ -44,6 +49,15 @@ class Schema:
     def parameters(self) -> dict[str, Parameter]:
         """Parameter by key."""
         return {key: parameter for table in self.sections.values() for key, parameter in table.items()}
+
+    def problems(self, parameters: dict[str, Any]) -> Iterator[Problem]:
+        """Yield what is wrong between the values [SI] of a run, as (key, expected, found).
+
+        The checks are asked in turn, so that who stops at the first problem spares a stepper's check a scene
+        that the model refuses.
+        """
+        for check in self.checks:
+            yield from check(parameters)
 
     def find(self, name: str, where: str, section: str | None = None) -> str:
         """Return the key that a name means: a bare key, or "section.key".
@@ -103,7 +117,7 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     Returns
     -------
     Schema
-        Of both together.
+        Of both, and of what all jobs share.
 
     Raises
     ------
@@ -114,10 +128,12 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     stepper = model_module.DEFAULT_STEPPER if stepper is None else stepper
     stepper_module = import_module(_look_up(stepper, STEPPERS, "stepper", source))
     sections: dict[str, dict[str, Parameter]] = {}
-    for module in (model_module, stepper_module):
+    modules = (model_module, stepper_module, *SHARED)
+    for module in modules:
         for section, table in module.PARAMETERS.items():
             sections.setdefault(section, {}).update(table)
-    return Schema(model, stepper, sections, model_module.check)
+    checks = tuple(module.check for module in modules if hasattr(module, "check"))
+    return Schema(model, stepper, sections, checks)
 
 
 def known_keys(model: str, stepper: str | None = None) -> tuple[str, ...]:

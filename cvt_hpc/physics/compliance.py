@@ -20,7 +20,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from cvt_hpc.kernels import kernel, merged_kernel
 
 ROUNDS_OF_BLOCK_FLIPS = 10
 FORCE_ROUND_OFF = 1e-6  # [N/m]: forces are 1e5, double precision leaves 1e-10
@@ -173,7 +174,7 @@ def flexibility(sheave: Sheaves) -> np.ndarray:
     return np.eye(m) / sheave.element_stiffness + sheave.compliance * elastic * sheave.weight
 
 
-@njit(cache=True, error_model="numpy")
+@merged_kernel
 def _bend(sheave: Sheaves, state: ContactState) -> None:
     """Solve the tridiagonal system in place of `state.y`."""
     y, m = state.y, state.y.size
@@ -184,7 +185,7 @@ def _bend(sheave: Sheaves, state: ContactState) -> None:
         y[j] = y[j] * state.pivot[j] - state.multiplier[j + 1] * y[j + 1]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _factorise(sheave: Sheaves, state: ContactState) -> None:
     """Factors and tilt responses for the present closed set."""
     m = sheave.weight.size
@@ -215,7 +216,7 @@ def _factorise(sheave: Sheaves, state: ContactState) -> None:
     state.fresh[0] = True
 
 
-@njit(cache=True, error_model="numpy")
+@merged_kernel
 def _forces(sheave: Sheaves, state: ContactState, gap: np.ndarray) -> int:
     """`push` for the present closed set; returns the number of stations on the wrong side."""
     m = gap.size
@@ -240,13 +241,13 @@ def _forces(sheave: Sheaves, state: ContactState, gap: np.ndarray) -> int:
     return wrong
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@merged_kernel
 def _wrong_side(state: ContactState, j: int) -> bool:
     """A closed station that pulls or an open one that overlaps, beyond round-off."""
     return state.push[j] < -FORCE_ROUND_OFF if state.closed[j] else state.push[j] > FORCE_ROUND_OFF
 
 
-@njit(cache=True, error_model="numpy")
+@merged_kernel
 def solve_contact(sheave: Sheaves, state: ContactState, gap: np.ndarray, force: np.ndarray) -> int:
     """Axial line forces of one wrap from the gaps of the rigid bodies.
 

@@ -29,7 +29,8 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from cvt_hpc.kernels import kernel
 
 
 class Law(IntEnum):
@@ -103,7 +104,7 @@ def friction_law(
     return FrictionLaw(int(Law[kind.upper()]), float(kinetic), float(gradient), float(speed), *tables)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _bracket(grid: np.ndarray, value: float) -> tuple[int, float]:
     """Interval of an ascending grid and the position in it, 0..1; held at both ends."""
     last = grid.size - 2
@@ -111,7 +112,7 @@ def _bracket(grid: np.ndarray, value: float) -> tuple[int, float]:
     return i, min(max((value - grid[i]) / (grid[i + 1] - grid[i]), 0.0), 1.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _table_lookup(law: FrictionLaw, speed: float, force: float) -> tuple[float, float]:
     i, a = _bracket(law.table_force, force)
     j, b = _bracket(law.table_speed, speed)
@@ -122,7 +123,7 @@ def _table_lookup(law: FrictionLaw, speed: float, force: float) -> tuple[float, 
     return (1.0 - b) * low + b * high, slope
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def formula_coefficient(
     kind: int, kinetic: float, gradient: float, scale: float, speed: float
 ) -> tuple[float, float]:
@@ -149,7 +150,7 @@ def formula_coefficient(
     return kinetic + span, 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def friction_coefficient(law: FrictionLaw, speed: float, force: float) -> tuple[float, float]:
     """Coefficient of friction in steady sliding and its slope.
 
@@ -174,7 +175,7 @@ def friction_coefficient(law: FrictionLaw, speed: float, force: float) -> tuple[
     return formula_coefficient(law.kind, law.kinetic, law.gradient, law.speed, speed)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def saturation(speed: float, width: float) -> tuple[float, float]:
     """Regularisation of Coulomb friction about zero speed: tanh(speed / width) and its slope.
 

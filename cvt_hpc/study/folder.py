@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from cvt_hpc.errors import InputError
+from cvt_hpc.files import naming_refusals, written_aside
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.files import naming_refusals, replace_file
 
 FORMAT = "cvt_hpc study 1"
 
@@ -30,6 +30,7 @@ class StudyFolder:
         self.records = self.path / "records"
         self.results = self.path / "results.nc"
         self.lock_file = self.path / "run.lock"
+        self.crash_log = self.path / "crash.log"
 
     def load(self) -> Study:
         """Return the study that the folder holds.
@@ -91,13 +92,14 @@ class StudyFolder:
         """Write job.json, unless it is there."""
         if not self.job_file.exists():
             text = json.dumps({"format": FORMAT, **study.to_json()}, indent=1, allow_nan=False)
-            replace_file(self.job_file, text.encode())
+            with written_aside(self.job_file) as aside:
+                aside.write_text(text)
 
     def clear(self) -> None:
         """Remove what runs have written: results, records, and last the job.json that vouches for them."""
         logs = self.records.glob("rank-*.log")
         with naming_refusals(self.path, "a folder that results can be removed from"):
-            for path in [self.results, *self.leftovers(), *logs, self.job_file]:
+            for path in [self.results, self.crash_log, *self.leftovers(), *logs, self.job_file]:
                 path.unlink(missing_ok=True)
 
     def leftovers(self) -> list[Path]:

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.errors import InputError
+from cvt_hpc.files import naming_refusals, written_aside
 from cvt_hpc.study.description import Dimension, Study
-from cvt_hpc.study.files import aside_of, discard, naming_refusals, put_in_place, storage_error
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.provenance import command, git_revision, versions
+from cvt_hpc.study.record import KEPT
 from cvt_hpc.study.recovery import Records, read_records
 from cvt_hpc.variables import Variable
 
@@ -62,7 +63,8 @@ def open_results(path: str | Path) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Read from the file as it is used; close it, or use it in a `with`.
+        Read from the file as it is used, in the chunks of the file, so that quantities larger than the
+        memory can be reduced; close it, or use it in a `with`.
 
     Raises
     ------
@@ -83,7 +85,7 @@ def open_results(path: str | Path) -> xr.Dataset:
                 )
         try:
             # Quantities in seconds are numbers, not dates.
-            return xr.open_dataset(found, engine="netcdf4", decode_times=False)
+            return xr.open_dataset(found, engine="netcdf4", decode_times=False, chunks={})
         except ValueError as error:
             raise InputError(f"{found}: expected a netCDF dataset, found: {error}") from error
 
@@ -100,13 +102,8 @@ def write_results(folder: StudyFolder, study: Study, records: Records) -> Path:
     encoding = {name: _encoding(array) for name, array in dataset.variables.items()}
     for name in dataset.coords:
         encoding[name]["_FillValue"] = None  # xarray would give them one, and CF forbids it
-    aside = aside_of(folder.results)
-    try:
+    with written_aside(folder.results, advice=KEPT) as aside:
         dataset.to_netcdf(aside, engine="netcdf4", format="NETCDF4", encoding=encoding)
-        put_in_place(aside, folder.results)
-    except (OSError, RuntimeError) as error:  # RuntimeError: what the netCDF library makes of a full disk
-        discard(aside)
-        raise storage_error(folder.results, error) from error
     return folder.results
 
 

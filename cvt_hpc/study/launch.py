@@ -12,8 +12,9 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from cvt_hpc.errors import InputError
@@ -115,8 +116,13 @@ class Team:
 
 
 @contextmanager
-def assembled_team() -> Iterator[Team]:
+def assembled_team(crash_log: Path) -> Iterator[Team]:
     """Give the team of all processes that were started together; an unexpected error of one ends them all.
+
+    Parameters
+    ----------
+    crash_log : Path
+        A file to which such an error is appended, since launchers may lose what a dying rank prints.
 
     Raises
     ------
@@ -131,7 +137,7 @@ def assembled_team() -> Iterator[Team]:
     if world is None or world.size == 1:
         yield Team()
         return
-    _abort_on_uncaught(world)
+    _abort_on_uncaught(world, crash_log)
     communicator = world.Dup()  # our messages never mix with those of an application
     try:
         yield Team(communicator)
@@ -139,7 +145,7 @@ def assembled_team() -> Iterator[Team]:
         communicator.Free()
         raise
     except BaseException:
-        _abort(world, traceback.format_exc())
+        _abort(world, traceback.format_exc(), crash_log)
         raise
     else:
         communicator.Free()
@@ -165,18 +171,22 @@ def _connect(launch: Launch) -> MPI.Intracomm:
     return world
 
 
-def _abort_on_uncaught(world: MPI.Intracomm) -> None:
+def _abort_on_uncaught(world: MPI.Intracomm, crash_log: Path) -> None:
     """See to it that an error after or between sweeps ends all ranks, not one for which the others wait."""
 
     def hook(kind: type[BaseException], value: BaseException, trace: Any) -> None:
-        _abort(world, "".join(traceback.format_exception(kind, value, trace)))
+        _abort(world, "".join(traceback.format_exception(kind, value, trace)), crash_log)
 
     sys.excepthook = hook
 
 
-def _abort(world: MPI.Intracomm, text: str) -> None:
-    print(f"rank {world.rank}: {text}\nrank {world.rank}: ends all {world.size} ranks", file=sys.stderr)
-    sys.stdout.flush()
-    sys.stderr.flush()
-    time.sleep(0.5)  # mpirun, once told to abort, drops output that it has not yet passed on
-    world.Abort(1)
+def _abort(world: MPI.Intracomm, text: str, crash_log: Path) -> None:
+    message = f"rank {world.rank}: {text}\nrank {world.rank}: ends all {world.size} ranks\n"
+    try:
+        with suppress(OSError), crash_log.open("a") as log:  # no folder, no space: stderr has to do
+            log.write(f"{time.strftime('%Y-%m-%dT%H:%M:%S%z')} {message}")
+        sys.stdout.flush()
+        print(message, end="", file=sys.stderr, flush=True)
+        time.sleep(0.5)  # mpirun, once told to abort, drops output that it has not yet passed on
+    finally:  # whatever became of the message: without this the other ranks wait for ever
+        world.Abort(1)

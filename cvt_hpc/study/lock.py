@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.study.files import naming_refusals
+from cvt_hpc.files import naming_refusals
 
 # A start waits this long [s]: `is_locked` takes the lock for an instant to see whether a run is at work.
 _PATIENCE = 1.0

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.study.files import storage_error, sync_folder
+from cvt_hpc.files import storage_error, sync_folder
 
 MAGIC = b"\x89CVTREC\n"
 FORMAT_VERSION = 1
@@ -28,6 +28,7 @@ PREAMBLE = Struct("<8sIII")  # magic, format version, header length, header chec
 FRAME = Struct("<4sIqdI")  # marker, payload length, run index, time of writing [s], checksum
 _CHECKED = Struct("<Iqd")  # the part of a frame's head that its checksum covers
 
+KEPT = "The runs recorded so far are kept, and the same command goes on from them"
 SYNC_INTERVAL = 5.0  # [s]; a dead process loses nothing, a power failure at most this much
 
 
@@ -134,7 +135,7 @@ class RecordLog:
             if time.monotonic() - self._synced > SYNC_INTERVAL:
                 self._sync()
         except OSError as error:
-            raise storage_error(self.path, error) from error
+            raise storage_error(self.path, error, KEPT) from error
 
     def close(self) -> None:
         """Bring everything to the disk and close the file."""
@@ -143,7 +144,7 @@ class RecordLog:
         try:
             self._sync()
         except OSError as error:
-            raise storage_error(self.path, error) from error
+            raise storage_error(self.path, error, KEPT) from error
         finally:
             os.close(self._descriptor)
             self._descriptor = None

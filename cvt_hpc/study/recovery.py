@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.files import naming_refusals
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.files import naming_refusals
 from cvt_hpc.study.record import FORMAT_VERSION, FRAME, MAGIC, MARKER, PREAMBLE, RecordFormat, header_check
 
 

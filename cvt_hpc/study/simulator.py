@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Simulator(Protocol):
-    """What a sweep needs to know of one run; the module `cvt_hpc.simulate` satisfies it."""
+    """What a sweep needs to know of one run; the module `cvt_hpc.simulation` satisfies it."""
 
     Interrupted: type[Exception]
 
@@ -32,4 +32,4 @@ class Simulator(Protocol):
 def default_simulator() -> Simulator:
     """Return the module that does runs of the models."""
     # Imported late: reading a status or gathering needs no kernels.
-    return import_module("cvt_hpc.simulate")
+    return import_module("cvt_hpc.simulation")

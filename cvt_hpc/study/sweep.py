@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.files import StorageError, discard
 from cvt_hpc.study.description import Study, describe
-from cvt_hpc.study.files import StorageError, discard
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.gather import write_results
 from cvt_hpc.study.launch import Team, assembled_team
@@ -85,7 +85,7 @@ def run(
     fresh : bool
         Throw away what earlier runs have left in the folder, instead of going on from there.
     simulator : Simulator, optional
-        What does one run; `cvt_hpc.simulate` by default.
+        What does one run; `cvt_hpc.simulation` by default.
     progress : bool
         Whether rank 0 shows on stderr how far the sweep is.
     time_limit : float, optional
@@ -106,7 +106,7 @@ def run(
     study = describe(job, simulator)
     task = _Task(job, study, simulator)
     folder = StudyFolder(out if out is not None else Path("out") / job.name)
-    with SignalWatch() as signals, assembled_team() as team, ExitStack() as held:
+    with SignalWatch() as signals, assembled_team(folder.crash_log) as team, ExitStack() as held:
         plan = team.on_root(lambda: _prepare(folder, study, fresh, team.size, held))
         with open_counter(team) as counter:
             display = Progress(counter, study.size, plan.recorded, plan.failed, progress and team.rank == 0)

@@ -1,4 +1,4 @@
-"""Runs without mechanics in the place of `cvt_hpc.simulate` and of what draws and stores histories."""
+"""Runs without mechanics in the place of `cvt_hpc.simulation` and of what draws and stores histories."""
 
 import sys
 from types import ModuleType
@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import cvt_hpc
 from cvt_hpc.variables import Status, Variable, Vibrates
 
 FLAGS = {
@@ -56,7 +55,7 @@ def simulate(job, at):
 @pytest.fixture
 def mechanics(monkeypatch):
     """Put the double in place; return the lists of what was written and drawn."""
-    double = ModuleType("cvt_hpc.simulate")
+    double = ModuleType("cvt_hpc.simulation")
     double.__dict__.update(
         Interrupted=Interrupted,
         record_variables=record_variables,
@@ -70,7 +69,6 @@ def mechanics(monkeypatch):
     histories.write_history = lambda dataset, path: calls["written"].append((dataset, path)) or path
     histories.is_history = lambda path: path.name == "history.nc"
     histories.draw_history = lambda dataset, path: calls["drawn"].append((dataset, path)) or path
-    monkeypatch.setitem(sys.modules, "cvt_hpc.simulate", double)
-    monkeypatch.setattr(cvt_hpc, "simulate", double, raising=False)
+    monkeypatch.setitem(sys.modules, "cvt_hpc.simulation", double)
     monkeypatch.setitem(sys.modules, "cvt_hpc.analysis.histories", histories)
     return calls

@@ -61,11 +61,11 @@ def complaint(path="x.toml"):
         ),
         ("[scene]\nload_history = 1", "[scene] load_history: expected one of constant, ramp, found 1"),
         ("[blet]", "[blet]: unknown table; did you mean belt?"),
-        ("[zzz]", "[zzz]: unknown table; known: scene, belt, mesh, numerics, axes"),
+        ("[zzz]", "[zzz]: unknown table; known: scene, belt, mesh, numerics, run, axes"),
         ("[[belt]]", "belt: expected a table [belt], found a list"),
         ("[axes]\nlaod = [1]", "[axes] laod: unknown key; did you mean load in [scene]?"),
         ("[axes]\nzzz.load = [1]", "[axes] zzz: unknown key; known: ratio, driving_speed, thrust, load, load_history, "
-         "element_mass, half_wedge_angle, sheave_stiffness, friction_gradient, table, label, stations, refined, step"),
+         "element_mass, half_wedge_angle, sheave_stiffness, friction_gradient, table, label, stations, refined, step, duration"),
         ("[axes]\nbelt.load = [1]", "[axes] belt.load: belongs in [scene], found in [belt]"),
         ("[axes]\nload = [1]\nscene.load = [2]", "[axes] scene.load: expected one axis for a parameter, found a second one for load"),
         ("[axes]\nload = []", "[axes] load: expected at least one value, found an empty list"),

@@ -190,6 +190,30 @@ def test_checks_between_parameters_name_the_run(write_job):
     assert str(caught.value) == "x.toml: [scene] load: expected at most 1 N m at this thrust, found 5 N m"
 
 
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[run]\nduration = 0.1\n[numerics]\nstep = 0.2\n", "[numerics] step: expected at most duration = 0.1 s, found 0.2 s"),
+        ("[run]\nduration = '2 h'\n", "[run] duration: expected at most an hour, found 7200 s"),
+    ],
+)  # fmt: skip
+def test_stepper_and_shared_tables_have_their_checks(write_job, text, message):
+    with pytest.raises(InputError) as caught:
+        load_job(write_job("[scene]\nthrust = 2e4\n" + text))
+    assert str(caught.value) == f"x.toml: {message}"
+
+
+def test_a_stepper_is_not_asked_about_a_scene_that_the_model_refuses(write_job, monkeypatch):
+    monkeypatch.setattr(sys.modules["toy_stepper"], "check", lambda parameters: 1 / 0)
+    with pytest.raises(InputError, match="at most 1 N m at this thrust"):
+        load_job(write_job("[scene]\nthrust = 100\nload = 5\n"))
+
+
+def test_a_stepper_may_have_no_check(write_job, monkeypatch):
+    monkeypatch.delattr(sys.modules["toy_stepper"], "check")
+    assert load_job(write_job("[scene]\nthrust = 2e4\n[numerics]\nstep = 9\n")).parameters["step"] == 9.0
+
+
 def test_a_huge_grid_is_checked_at_its_extremes(write_job, monkeypatch):
     monkeypatch.setattr(crosscheck, "MOST_CHECKED_POINTS", 5)
     loads = "[axes]\nload_history = ['ramp', 'constant']\nload = [0, {}, 10]\n"

@@ -75,7 +75,7 @@ class Interrupted(Exception):
 
 
 class Simulator:
-    """Satisfies what the study asks of the module `cvt_hpc.simulate`.
+    """Satisfies what the study asks of the module `cvt_hpc.simulation`.
 
     `slow` makes runs take their time, and no difference to their numbers: {"from": first, "pause": seconds}.
     `largest_file` [bytes] is what the system lets the process write from the first run on.

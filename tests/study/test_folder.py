@@ -63,9 +63,11 @@ def test_a_folder_with_other_quantities_is_refused(tmp_path):
 
 def test_fresh_starts_over(tmp_path):
     sweep(JOB, tmp_path)
+    (tmp_path / "crash.log").write_text("rank 1: an error")
     old_logs = set((tmp_path / "records").iterdir())
     assert sweep(OTHER, tmp_path, fresh=True).done == 12
     assert not old_logs & set((tmp_path / "records").iterdir())
+    assert not (tmp_path / "crash.log").exists()
     assert json.loads((tmp_path / "job.json").read_text())["fingerprint"] == OTHER.fingerprint()
 
 

@@ -181,6 +181,16 @@ def test_a_full_disk_leaves_the_dataset_that_was_there(tmp_path):
     assert list(tmp_path.glob(".*")) == []
 
 
+def test_results_are_opened_in_the_chunks_of_the_file(dataset, tmp_path):
+    stored = {"spectrum": {"chunksizes": (1, 2, 2, 1, 11)}}
+    dataset[["spectrum"]].to_netcdf(tmp_path / "results.nc", engine="netcdf4", encoding=stored)
+    with open_results(tmp_path / "results.nc") as chunked:
+        assert chunked["spectrum"].data.chunksize == (1, 2, 2, 1, 11)
+        assert chunked["spectrum"].data.npartitions == 6  # read one by one, as they are needed
+        largest = chunked["spectrum"].max("frequency_bin").values
+    assert np.array_equal(largest, dataset["spectrum"].values.max(axis=-1), equal_nan=True)
+
+
 def test_opening_what_is_no_dataset(tmp_path):
     run(JOB, tmp_path, simulator=Simulator(), progress=False)
     (tmp_path / "results.nc").write_text("mine")

@@ -46,11 +46,11 @@ def test_singletons_are_refused(start, tmp_path, variable):
     assert not (tmp_path / "out").exists()
 
 
-def test_ranks_without_mpi4py_are_refused(monkeypatch):
+def test_ranks_without_mpi4py_are_refused(monkeypatch, tmp_path):
     monkeypatch.setenv("PMI_SIZE", "2")
     monkeypatch.setitem(sys.modules, "mpi4py", None)
     monkeypatch.delitem(sys.modules, "mpi4py.MPI", raising=False)
-    with pytest.raises(InputError, match="expected mpi4py"), assembled_team():
+    with pytest.raises(InputError, match="expected mpi4py"), assembled_team(tmp_path / "crash.log"):
         pass
 
 
@@ -72,5 +72,7 @@ def test_a_defect_on_one_rank_ends_all(start, tmp_path, defect):
     options = {"out": tmp_path / "out", "runs": 50, "parameters": {"pause": 0.02}, **defect}
     finished = start(options, ranks=2).finish()  # fails if this hangs
     assert finished.returncode != 0
-    assert "RuntimeError: a defect outside of runs" in finished.stderr
-    assert "rank 1: ends all 2 ranks" in finished.stderr
+    # Not on stderr for certain: mpirun may lose what a dying rank prints.
+    told = (tmp_path / "out" / "crash.log").read_text()
+    assert "RuntimeError: a defect outside of runs" in told
+    assert "rank 1: ends all 2 ranks" in told

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from study_double import Axis, Job, Simulator
 
+from cvt_hpc.files import StorageError
 from cvt_hpc.study.description import describe
-from cvt_hpc.study.files import StorageError
 from cvt_hpc.study.record import FRAME, MARKER, RecordFormat, RecordLog
 from cvt_hpc.study.recovery import read_records
 from cvt_hpc.variables import Status

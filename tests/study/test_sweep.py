@@ -89,7 +89,9 @@ def test_a_full_disk_is_one_clear_error_and_loses_nothing(start, tmp_path, ranks
     assert finished.returncode == 2, finished.stderr
     errors = [line for line in finished.stderr.splitlines() if line.startswith("error:")]
     assert len(errors) == 1
-    assert "expected to be able to write, found: File too large" in errors[0]
+    assert (
+        "expected to be able to write, found: File too large. The runs recorded so far are kept" in errors[0]
+    )
     assert "Traceback" not in finished.stderr
     entry = json.loads((tmp_path / "out" / "job.json").read_text())
     records = read_records(tmp_path / "out" / "records", Study.from_json(entry))

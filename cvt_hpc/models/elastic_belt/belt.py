@@ -29,12 +29,15 @@ START_DAMPING = (
 class Belt(NamedTuple):
     """Everything the kernels need, in SI units; N stations around the belt.
 
-    Arrays of cells and stations have shape (N,); `bending` is (N, 5): force per length on station j from the
+    Arrays of cells and stations have shape (N,), `per_...` being reciprocals, the span that of two cells; `bending` is (N, 5): force per length on station j from the
     displacements of stations j-2 .. j+2.
     """
 
     cell: np.ndarray
     dual: np.ndarray
+    per_cell: np.ndarray
+    per_dual: np.ndarray
+    per_span: np.ndarray
     curvature: np.ndarray
     arc_curvature: np.ndarray
     arc_share: np.ndarray
@@ -171,6 +174,9 @@ def belt_constants(parameters: dict[str, Any]) -> Belt:
     return Belt(
         cell=cell,
         dual=dual,
+        per_cell=1.0 / cell,
+        per_dual=1.0 / dual,
+        per_span=0.5 / dual,
         curvature=kappa,
         arc_curvature=np.maximum(kappa, np.roll(kappa, 1)),
         arc_share=arc_share,
@@ -228,7 +234,7 @@ def _bending_bands(cell: np.ndarray, dual: np.ndarray, stiffness: float) -> np.n
 
 
 def initial_state(parameters: dict[str, Any], belt: Belt) -> State:
-    """Start near the steady state without load, the strands disturbed at random.
+    """Start near the steady state without load.
 
     Parameters
     ----------
@@ -261,7 +267,6 @@ def initial_state(parameters: dict[str, Any], belt: Belt) -> State:
     lift = -sunk / grid.path.driven_wrap
     w[arcs[1][0]] += lift
     _fill_strands(w, grid)
-    w += _random_strands(grid, p["disturbance"], p["seed"])
 
     mean = [(weight * w[stations]).sum() / weight.sum() for stations, weight, _ in arcs]
     speed = belt.driving_speed * (belt.driving_radius + mean[0])
@@ -286,8 +291,23 @@ def _fill_strands(w: np.ndarray, grid: Mesh) -> None:
         w[first : first + count] = np.linspace(*ends, count, endpoint=False)
 
 
-def _random_strands(grid: Mesh, size: float, seed: int) -> np.ndarray:
-    """Random mixture of the first six sine shapes of both strands, largest displacement `size` [m]."""
+def random_strands(grid: Mesh, size: float, seed: int) -> np.ndarray:
+    """Random mixture of the first six sine shapes of both strands.
+
+    Parameters
+    ----------
+    grid : Mesh
+        The belt's mesh.
+    size : float
+        Largest displacement [m].
+    seed : int
+        Of the random numbers; the mixture does not depend on the mesh.
+
+    Returns
+    -------
+    (N,) array
+        Displacement of the stations [m], 0 on the arcs.
+    """
     random = np.random.default_rng(seed)
     shape = np.zeros(grid.cell.size)
     for region in (1, 3):

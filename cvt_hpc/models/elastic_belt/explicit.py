@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
@@ -29,7 +29,7 @@ from cvt_hpc.models.elastic_belt.rhs import (
 from cvt_hpc.physics.compliance import ContactState
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def step_explicit(
     belt: Belt,
     state: State,
@@ -75,7 +75,7 @@ def step_explicit(
     return solves
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def driven_thrust(belt: Belt, force: np.ndarray) -> float:
     """Axial force of the belt on the driven sheave [N]."""
     first = belt.driven_start

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from cvt_hpc.kernels import merged_kernel
 from cvt_hpc.physics.friction import saturation
 
 LEAST_SPEED = 1e-9  # [m/s]: below it the direction of sliding is of no effect, friction is linear there
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@merged_kernel
 def sliding(v_radial: float, v_tangential: float, cosine: float) -> tuple[float, float]:
     """Sliding speed in the plane of the flank and the part of it along the meridian.
 
@@ -30,7 +30,7 @@ def sliding(v_radial: float, v_tangential: float, cosine: float) -> tuple[float,
     return max(np.sqrt(meridian * meridian + v_tangential * v_tangential), LEAST_SPEED), meridian
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@merged_kernel
 def flank_forces(
     coefficient: float,
     width: float,

@@ -15,13 +15,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
     N_ELEMENT,
-    N_RING,
     TIME,
     V_ELEMENT,
     V_FILTERED,
@@ -89,7 +88,7 @@ def imex_work(state: State) -> ImexWork:
     )
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@merged_kernel
 def implicit_share(rate: float) -> float:
     """Weight of a slope in the step, for rate = dt x slope / mass: 1/2 (time-centred) where slow, 1 where stiff.
 
@@ -98,7 +97,7 @@ def implicit_share(rate: float) -> float:
     return 0.5 + rate / (12.0 + 2.0 * rate)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def step_imex(
     belt: Belt,
     state: State,
@@ -135,7 +134,7 @@ def step_imex(
     return solves
 
 
-@njit(cache=True, error_model="numpy")
+@merged_kernel
 def _stations(belt: Belt, state: State, work: ImexWork, step: float) -> None:
     """Forces and slopes at the stations: fills `radial`, `flank`, `diagonal`, `right` but for the stresses."""
     n = belt.cell.size
@@ -147,6 +146,7 @@ def _stations(belt: Belt, state: State, work: ImexWork, step: float) -> None:
     law, width, memory = belt.law, belt.friction_speed, belt.friction_memory
     kind, kinetic, gradient, scale = law.kind, law.kinetic, law.gradient, law.speed
     cell, dual_cell, curvature, bending = belt.cell, belt.dual, belt.curvature, belt.bending
+    per_cell, per_dual, per_span = belt.per_cell, belt.per_dual, belt.per_span
     arc_share, arc_curvature, ring_masses = belt.arc_share, belt.arc_curvature, belt.ring_mass
     ring_stiffness, element_stiffness = belt.ring_stiffness, belt.element_stiffness
     element_mass, mass, ring_offset = belt.element_mass, belt.mass, belt.ring_offset
@@ -159,11 +159,12 @@ def _stations(belt: Belt, state: State, work: ImexWork, step: float) -> None:
     centrifugal = belt.mass * belt.belt_speed * belt.belt_speed
     gyroscopic = 2.0 * belt.mass * belt.belt_speed
     damping = damping_at(belt, state.scalars[TIME])
+    per_step = 1.0 / step
     for j in range(n):
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
         aa, bb = a - 1 if a > 0 else n - 1, b + 1 if b < n - 1 else 0
         left, right, dual = cell[a], cell[j], dual_cell[j]
-        span = 1.0 / (left + right)
+        per_left, per_right, span = per_cell[a], per_cell[j], per_span[j]
         ring_left, ring_right = ring_stiffness * eps[1, a], ring_stiffness * eps[1, j]
         net_left = ring_left + element_stiffness * min(eps[0, a], 0.0) - centrifugal
         net_right = ring_right + element_stiffness * min(eps[0, j], 0.0) - centrifugal
@@ -172,7 +173,8 @@ def _stations(belt: Belt, state: State, work: ImexWork, step: float) -> None:
         change = 1.5 * (u[b] - u[a]) - 0.5 * (last_u[b] - last_u[a])
         inward = net_right * right * curvature[j] + net_left * left * curvature[a]
         transverse = (
-            (net_right * (w[b] - w[j]) / right - net_left * (w[j] - w[a]) / left - 0.5 * inward) / dual
+            (net_right * (w[b] - w[j]) * per_right - net_left * (w[j] - w[a]) * per_left - 0.5 * inward)
+            * per_dual[j]
             - gyroscopic * change * span
             + bending[j, 0] * w[aa]
             + bending[j, 1] * w[a]
@@ -182,10 +184,10 @@ def _stations(belt: Belt, state: State, work: ImexWork, step: float) -> None:
         )
         v_radial = u[j] + v0[j] * slope
         outward = -damping * v_radial
-        radial_mass = mass / step + 0.5 * damping
-        element, ring, coupling = element_mass / step, ring_masses[j] / step, 0.0
-        along_element = -v0[j] * (v0[j] - v0[a]) / left * element_mass
-        along_ring = -v1[j] * (v1[j] - v1[a]) / left * ring_masses[j]
+        radial_mass = mass * per_step + 0.5 * damping
+        element, ring, coupling = element_mass * per_step, ring_masses[j] * per_step, 0.0
+        along_element = -v0[j] * (v0[j] - v0[a]) * per_left * element_mass
+        along_ring = -v1[j] * (v1[j] - v1[a]) * per_left * ring_masses[j]
         cross = 0.0
         share = arc_share[j]
         if share > 0.0:
@@ -219,7 +221,7 @@ def _stations(belt: Belt, state: State, work: ImexWork, step: float) -> None:
             relief = ring_masses[j] * speed_squared
             pressure = max(ring_right - relief, 0.0) * right * curvature[j]
             pressure += max(ring_left - relief, 0.0) * left * curvature[a]
-            grip = ring_friction * 0.5 * pressure / dual
+            grip = ring_friction * 0.5 * pressure * per_dual[j]
             along_ring += grip * factor
             along_element -= lever * grip * factor
             stiff *= grip
@@ -228,8 +230,9 @@ def _stations(belt: Belt, state: State, work: ImexWork, step: float) -> None:
             element += lever * lever * stiff
             coupling = -lever * stiff
         along_element += outward * slope
-        push = (transverse + outward) / radial_mass
-        lag = cross / radial_mass
+        mobility = 1.0 / radial_mass
+        push = (transverse + outward) * mobility
+        lag = cross * mobility
         radial_row[0, j], radial_row[1, j], radial_row[2, j] = push, lag, slope
         diagonal[0, j] = dual * (element - cross * lag)
         diagonal[1, j] = dual * coupling
@@ -238,7 +241,7 @@ def _stations(belt: Belt, state: State, work: ImexWork, step: float) -> None:
         right_hand[1, j] = dual * along_ring
 
 
-@njit(cache=True, error_model="numpy")
+@merged_kernel
 def _cells(belt: Belt, state: State, work: ImexWork, step: float) -> None:
     """Stresses at the end of the step, predicted with the old speeds, and their slopes; into the stations' rows."""
     n = belt.cell.size
@@ -270,7 +273,7 @@ def _cells(belt: Belt, state: State, work: ImexWork, step: float) -> None:
         work.right[1, j] += work.stress[1, j] - work.stress[1, a]
 
 
-@njit(cache=True, error_model="numpy")
+@merged_kernel
 def _solve_cyclic(work: ImexWork) -> None:
     """Solve the cyclic block-tridiagonal system in place of `right`, the last station as border."""
     n = work.right.shape[1]
@@ -319,7 +322,7 @@ def _solve_cyclic(work: ImexWork) -> None:
         y[0, j], y[1, j] = n0, n1
 
 
-@njit(cache=True, error_model="numpy")
+@merged_kernel
 def _advance(belt: Belt, state: State, work: ImexWork, step: float) -> float:
     """Apply the increments; returns the moment of the flanks on the driven pulley [N m]."""
     n = belt.cell.size
@@ -350,7 +353,7 @@ def _advance(belt: Belt, state: State, work: ImexWork, step: float) -> float:
     return moment
 
 
-@njit(cache=True, error_model="numpy")
+@merged_kernel
 def _advance_memory(belt: Belt, state: State, slope: np.ndarray, step: float) -> None:
     """Filtered sliding speed by the exact exponential of its own rate, towards its new sliding speed."""
     w, u, v0, vf = state.fields[W], state.fields[U], state.fields[V_ELEMENT], state.fields[V_FILTERED]

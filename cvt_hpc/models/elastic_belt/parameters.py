@@ -48,8 +48,10 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "rise_time": _positive(
             0.03, "s", "start-up: load rises smoothly, extra damping of the belt fades out"
         ),
-        "disturbance": _not_negative(1e-6, "m", "largest random displacement of the strands at the start"),
-        "seed": Parameter(1, "", "seed of the random disturbance", minimum=0),
+        "disturbance": _not_negative(
+            1e-6, "m", "largest random displacement of the strands, given to them at rise_time"
+        ),
+        "seed": Parameter(1, "", "seed of that disturbance", minimum=0),
     },
     "belt": {
         "element_mass": _positive(1.0, "kg/m", "mass per length of the elements"),
@@ -66,7 +68,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "ring_offset": Parameter(1e-3, "m", "radial offset of the rings' neutral line from the pitch line"),
         "ring_friction": _not_negative(0.08, "", "friction coefficient between rings and elements"),
         "ring_friction_speed": _positive(0.01, "m/s", "regularisation speed of that friction"),
-        "transverse_damping": _not_negative(200.0, "N s/m^2", "viscous damping of the transverse motion"),
+        "transverse_damping": _not_negative(500.0, "N s/m^2", "viscous damping of the transverse motion"),
         "element_damping": _not_negative(20.0, "N s", "longitudinal damping of the pressed elements"),
         "ring_damping": _not_negative(4.0, "N s", "longitudinal damping of the rings"),
     },
@@ -75,7 +77,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             1.0, "", "stiffness of the sheaves, multiple of the reference; inf: rigid"
         ),
         "tilt_stiffness": _stiffness(
-            4e5, "N m/rad", "reference stiffness against tilting, shaft bending included"
+            3e5, "N m/rad", "reference stiffness against tilting, shaft bending included"
         ),
         "local_stiffness": _positive(4e9, "N/m^2", "reference stiffness against local bending, per length"),
         "local_length": _positive(0.012, "m", "decay length of local bending"),
@@ -101,11 +103,14 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             choices=("coulomb", "linear", "stribeck", "hyperbolic", "cubic", "table"),
         ),
         "friction_gradient": Parameter(
-            -0.8, "s/m", "slope of the friction law at zero speed, its steepest fall", maximum=0.0
+            -0.8,
+            "s/m",
+            "friction gradient: slope dmu/dv of the law at v -> 0+, without regularisation; its steepest fall",
+            maximum=0.0,
         ),
-        "kinetic_friction": _positive(0.08, "", "the level that does not change with the gradient"),
+        "kinetic_friction": _positive(0.1, "", "the level that does not change with the gradient"),
         "stribeck_velocity": _positive(0.05, "m/s", "speed scale of the fall"),
-        "friction_speed": _positive(0.02, "m/s", "regularisation speed of the flanks' friction"),
+        "friction_speed": _positive(0.03, "m/s", "regularisation speed of the flanks' friction"),
         "friction_memory": _not_negative(
             0.3e-3, "s", "time constant of the filtered sliding speed; 0: no memory"
         ),

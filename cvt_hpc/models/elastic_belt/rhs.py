@@ -19,8 +19,8 @@ fluxes leave a free checkerboard mode where P = 0.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
@@ -41,7 +41,7 @@ from cvt_hpc.physics.compliance import ContactState, Sheaves, solve_contact
 from cvt_hpc.physics.friction import friction_coefficient, saturation
 
 
-@njit(cache=True, error_model="numpy")
+@merged_kernel
 def load_at(belt: Belt, time: float) -> float:
     """Torque at the driving pulley [N m]: a smooth rise to load_start, then linear to load."""
     if time < belt.rise_time:
@@ -52,14 +52,14 @@ def load_at(belt: Belt, time: float) -> float:
     return belt.load
 
 
-@njit(cache=True, error_model="numpy")
+@merged_kernel
 def damping_at(belt: Belt, time: float) -> float:
     """Transverse damping [N s/m^2]: the belt's own, and the start-up's until rise_time."""
     left = max(1.0 - time / belt.rise_time, 0.0)
     return belt.transverse_damping + START_DAMPING * left * left
 
 
-@njit(cache=True, error_model="numpy")
+@merged_kernel
 def strains(belt: Belt, fields: np.ndarray, eps: np.ndarray) -> None:
     """Strains of elements and rings in the cells, into `eps` (2, N) [1]."""
     n = belt.cell.size
@@ -70,7 +70,7 @@ def strains(belt: Belt, fields: np.ndarray, eps: np.ndarray) -> None:
         eps[1, c] = (1.0 + kappa * (w + belt.ring_offset)) / fields[N_RING, c] - 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@merged_kernel
 def wrap_contact(
     belt: Belt, sheave: Sheaves, contact: ContactState, w: np.ndarray, opening: float, force: np.ndarray
 ) -> int:
@@ -79,7 +79,7 @@ def wrap_contact(
     return solve_contact(sheave, contact, gap, force)
 
 
-@njit(cache=True, error_model="numpy")
+@merged_kernel
 def contact_forces(
     belt: Belt, state: State, contacts: tuple[ContactState, ContactState], force: np.ndarray
 ) -> int:
@@ -95,7 +95,28 @@ def contact_forces(
     return solves + more if solves > 0 and more > 0 else 0
 
 
-@njit(cache=True, error_model="numpy")
+@merged_kernel
+def ring_drag(
+    belt: Belt, j: int, a: int, eps: np.ndarray, v_element: float, v_ring: float
+) -> tuple[float, float]:
+    """Friction of the elements' saddles on the rings at station j of an arc, between cells a and j.
+
+    The rings press on the saddles with what their own weight leaves (Bullinger et al. 2005, eq. 48).
+
+    Returns
+    -------
+    drag, sliding_speed : float
+        Line force on the rings [N/m] and the speed of the saddles against them [m/s].
+    """
+    sliding_speed = (1.0 + belt.ring_offset * belt.arc_curvature[j]) * v_element - v_ring
+    factor, _ = saturation(sliding_speed, belt.ring_friction_speed)
+    relief = belt.ring_mass[j] * belt.belt_speed * belt.belt_speed
+    pressure = max(belt.ring_stiffness * eps[1, j] - relief, 0.0) * belt.cell[j] * belt.curvature[j]
+    pressure += max(belt.ring_stiffness * eps[1, a] - relief, 0.0) * belt.cell[a] * belt.curvature[a]
+    return 0.5 * pressure / belt.dual[j] * belt.ring_friction * factor, sliding_speed
+
+
+@kernel
 def accelerations(
     belt: Belt,
     state: State,
@@ -171,15 +192,9 @@ def accelerations(
             outward += share * radial
             along_element += share * tangential
             moment -= driven * share * dual * tangential * radius
-            # the rings press on the elements' saddles with what their own weight leaves (Bullinger, eq. 48)
-            lever = 1.0 + belt.ring_offset * belt.arc_curvature[j]
-            factor, _ = saturation(lever * v0[j] - v1[j], belt.ring_friction_speed)
-            relief = belt.ring_mass[j] * belt.belt_speed * belt.belt_speed
-            pressure = max(ring_right - relief, 0.0) * right * belt.curvature[j]
-            pressure += max(ring_left - relief, 0.0) * left * belt.curvature[a]
-            drag = 0.5 * pressure / dual * belt.ring_friction * factor
+            drag, _ = ring_drag(belt, j, a, eps, v0[j], v1[j])
             along_ring += drag
-            along_element -= lever * drag
+            along_element -= (1.0 + belt.ring_offset * belt.arc_curvature[j]) * drag
         along_element += outward * slope
         rate[U, j] = (transverse + outward) / belt.mass
         rate[V_ELEMENT, j] = along_element / belt.element_mass - v0[j] * (v0[j] - v0[a]) / left
@@ -187,7 +202,7 @@ def accelerations(
     return moment
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def content_rates(belt: Belt, state: State, eps: np.ndarray, rate: np.ndarray) -> None:
     """Rates of the layers' content [1/s] into rows N_ELEMENT and N_RING: upwind flux v / (1 + eps)."""
     n = belt.cell.size
@@ -201,7 +216,7 @@ def content_rates(belt: Belt, state: State, eps: np.ndarray, rate: np.ndarray) -
             out[c] = (inflow - outflow) / belt.cell[c]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def memory_rates(belt: Belt, state: State, rate: np.ndarray) -> None:
     """Rate of the filtered sliding speed [m/s^2] on the arcs, row V_FILTERED; where the belt enters it is |v| itself."""
     n = belt.cell.size
@@ -218,13 +233,13 @@ def memory_rates(belt: Belt, state: State, rate: np.ndarray) -> None:
             rate[V_FILTERED, j] = carried * (vf[j - 1] - vf[j]) + (speed - vf[j]) / belt.friction_memory
 
 
-@njit(cache=True, error_model="numpy")
+@merged_kernel
 def memory_transport(belt: Belt, spacing: float) -> float:
     """Upwind rate of the memory's transport [1/s], fitted so that a steady memory decays as exp(-s / (v tau_f))."""
     return 1.0 / (belt.friction_memory * np.expm1(spacing / (belt.belt_speed * belt.friction_memory)))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def sliding_speed(belt: Belt, state: State, j: int) -> float:
     """Sliding speed |v| of the flanks at station j of an arc [m/s]."""
     n = belt.cell.size

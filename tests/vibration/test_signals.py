@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cvt_hpc.analysis import signals
-from cvt_hpc.analysis.tapering import SHORTEST_SEGMENT
+from cvt_hpc.vibration import signals
+from cvt_hpc.vibration.tapering import SHORTEST_SEGMENT
 
 RATE = 20_000.0
 BAND = (100.0, 1500.0)

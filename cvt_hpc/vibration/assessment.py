@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cvt_hpc.analysis import signals
-from cvt_hpc.analysis.occurrence import classify
 from cvt_hpc.variables import Vibrates
+from cvt_hpc.vibration import signals
+from cvt_hpc.vibration.occurrence import classify
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def assess(
     strands : sequence of str, length probe
         The strand on which each probe lies.
     parameters : mapping
-        Flat parameters with the keys of `PARAMETERS["vibration"]`.
+        Flat parameters with the keys of `criterion.PARAMETERS["vibration"]`.
 
     Returns
     -------

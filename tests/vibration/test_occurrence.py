@@ -5,13 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cvt_hpc.analysis.assessment import assess
-from cvt_hpc.analysis.occurrence import PARAMETERS, check, classify
-from cvt_hpc.analysis.signals import growth_fit
 from cvt_hpc.variables import Vibrates
+from cvt_hpc.vibration.assessment import assess
+from cvt_hpc.vibration.criterion import PARAMETERS, check
+from cvt_hpc.vibration.occurrence import classify
+from cvt_hpc.vibration.signals import growth_fit
 
 RATE = 20_000.0
 DEFAULTS = {key: parameter.default for key, parameter in PARAMETERS["vibration"].items()}
+# a wide band and a round threshold, in which the cases below are told
+SETTINGS = DEFAULTS | {"band_low": 100.0, "amplitude_threshold": 1e-6}
 NO, YES, UNDECIDED = Vibrates.NO, Vibrates.YES, Vibrates.UNDECIDED
 STILL = [0.0] * 6
 
@@ -44,7 +47,7 @@ TABLE = {
 }
 
 
-def verdict(*strands, parameters=DEFAULTS):
+def verdict(*strands, parameters=SETTINGS):
     windows = 1e-6 * np.array(strands, dtype=float).T
     growth = growth_fit(0.02 * np.arange(len(windows)), windows)
     names = ("t1", "t2")[: len(strands)]
@@ -83,7 +86,7 @@ def test_reasons_fit_into_a_record():
 
 def test_each_threshold_counts():
     def changed(name, **change):
-        return verdict(TABLE[name][0], parameters=DEFAULTS | change)[0]
+        return verdict(TABLE[name][0], parameters=SETTINGS | change)[0]
 
     assert changed("settled", amplitude_threshold=20e-6) is NO
     assert changed("decaying and scattering", decay_tolerance=10.0) is YES
@@ -100,7 +103,7 @@ def test_a_failed_run_has_no_class():
     with pytest.raises(ValueError, match="finite"):
         verdict([10, 10, np.nan, 10, 10, 10])
     with pytest.raises(ValueError, match="one window"):
-        classify(np.zeros((0, 2)), [0, 0], [0, 0], judged_time=1, record_time=1, parameters=DEFAULTS)
+        classify(np.zeros((0, 2)), [0, 0], [0, 0], judged_time=1, record_time=1, parameters=SETTINGS)
 
 
 # Displacement histories: strand t1 has its node at the first probe, t2 is quiet throughout.
@@ -118,7 +121,7 @@ def history(envelope, duration, frequency=612.0, noise=1e-11, seed=0):
 
 
 def assessed(*arguments, **keywords):
-    return assess(history(*arguments, **keywords), RATE, STRANDS, DEFAULTS)
+    return assess(history(*arguments, **keywords), RATE, STRANDS, SETTINGS)
 
 
 @pytest.mark.parametrize("duration", DURATIONS)
@@ -138,7 +141,7 @@ def test_a_steady_vibration_is_found_with_its_size_and_frequency(duration):
 @settings(deadline=None, max_examples=60)
 def test_a_decaying_start_transient_never_vibrates(rate, exponent, duration, frequency):
     # A loss of 6 % over the judged part is told from scatter in a clean record; less may pass for steady.
-    rate = max(rate, 0.06 / (DEFAULTS["judged_fraction"] * duration))
+    rate = max(rate, 0.06 / (SETTINGS["judged_fraction"] * duration))
     found = assessed(lambda t: 10**exponent * np.exp(-rate * t), duration, frequency=frequency)
     assert found.vibrates is not YES
 
@@ -168,7 +171,7 @@ def test_only_the_last_part_of_a_run_is_judged():
     found = assessed(settled_late, 0.3)
     assert found.vibrates is YES
     assert found.amplitude[0] == pytest.approx(5e-6, rel=1e-3)
-    whole = assess(history(settled_late, 0.3), RATE, STRANDS, DEFAULTS | {"judged_fraction": 1.0})
+    whole = assess(history(settled_late, 0.3), RATE, STRANDS, SETTINGS | {"judged_fraction": 1.0})
     assert whole.vibrates is UNDECIDED
 
 
@@ -178,19 +181,19 @@ def test_a_vibration_that_has_died_out_is_quiet():
 
 
 def test_rest_is_quiet_and_has_no_frequency():
-    found = assess(np.zeros((2000, 3)), RATE, STRANDS, DEFAULTS)
+    found = assess(np.zeros((2000, 3)), RATE, STRANDS, SETTINGS)
     assert found.vibrates is NO
     assert not found.amplitude.any()
     assert np.isnan(found.frequency).all() and np.isnan(found.growth_rate).all()
 
 
 def test_defaults_are_consistent_and_checks_name_the_key():
-    assert check(DEFAULTS) == []
     assert check(DEFAULTS | {"duration": 0.1}) == []
-    assert check(DEFAULTS | {"duration": 0.05, "judged_fraction": 1.0}) == []
-    assert [p[0] for p in check(DEFAULTS | {"band_high": 80.0})] == ["band_high"]
-    assert [p[0] for p in check(DEFAULTS | {"window_length": 0.01})] == ["window_length"]
-    ((key, expected, found),) = check(DEFAULTS | {"duration": 0.06})
+    run = SETTINGS | {"duration": 0.1}
+    assert check(run | {"duration": 0.05, "judged_fraction": 1.0}) == []
+    assert [p[0] for p in check(run | {"band_high": 80.0})] == ["band_high"]
+    assert [p[0] for p in check(run | {"window_length": 0.01})] == ["window_length"]
+    ((key, expected, found),) = check(run | {"duration": 0.06})
     assert key == "duration" and "0.05 s" in expected and "0.03 s" in found
 
 

@@ -1,0 +1,70 @@
+"""How the kernels are compiled, and where the machine code is kept: one way for all.
+
+The compiler keeps machine code beside a file's date alone, and would go on with the old code of a kernel when one that it calls,
+in another file, has changed. So the code is kept in a folder named by the content of all kernels' sources: below
+NUMBA_CACHE_DIR if that is set, else in the package, else in the user's cache.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+
+_PACKAGE = Path(__file__).parent
+_ROOMS_WITH_KERNELS = ("physics", "models")
+
+# Division by zero gives inf as in numpy, without a test for it. Products may be contracted with sums, and divisions by
+# one number replaced by its reciprocal; sums are never reordered, and what is not a number stays visible.
+_OPTIONS = {"cache": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function when it is first called."""
+    return _compiled(function, _OPTIONS)
+
+
+def merged_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function into its callers.
+
+    A call that hands over a tuple of arrays counts references to each, which costs more than a short loop.
+    """
+    return _compiled(function, {**_OPTIONS, "inline": "always"})
+
+
+def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    users = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = _CACHE
+    try:
+        return numba.njit(**options)(function)
+    finally:
+        numba.config.CACHE_DIR = users
+
+
+def _cache_folder() -> str:
+    digest = hashlib.sha256()
+    for room in _ROOMS_WITH_KERNELS:
+        for source in sorted((_PACKAGE / room).rglob("*.py")):
+            digest.update(source.read_bytes())
+    digest.update(Path(__file__).read_bytes())
+    chosen = numba.config.CACHE_DIR
+    if chosen:
+        base = Path(chosen)
+    elif os.access(_PACKAGE, os.W_OK):
+        base = _PACKAGE / "__pycache__"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or _home_or_temporary() / ".cache") / "cvt_hpc"
+    return str(base / f"kernels-{digest.hexdigest()[:16]}")
+
+
+def _home_or_temporary() -> Path:
+    home = Path(os.path.expanduser("~"))
+    return home if os.access(home, os.W_OK) else Path(tempfile.gettempdir())
+
+
+_CACHE = _cache_folder()

@@ -1,0 +1,194 @@
+"""What the record of a run holds of the elastic belt: names, units, and how each follows from the samples."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cvt_hpc.variables import Coordinate, Variable
+from cvt_hpc.vibration.signals import amplitude_spectrum, band_amplitude
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from cvt_hpc.models.elastic_belt.transient import Transient
+
+STRANDS = ("t1", "t2")
+PULLEYS = ("driving", "driven")
+MODES = 5  # half waves along a strand that are told apart
+
+# Core-seconds per station and time step, measured on one core of an EPYC (Zen 4) at 160 stations.
+STEP_COST = {"imex": 9e-8, "explicit": 9e-8}
+
+LOSSES = (
+    "driving_flank_loss",
+    "driven_flank_loss",
+    "ring_loss",
+    "belt_loss",
+    "layer_loss",
+    "lag_loss",
+    "seating_loss",
+)
+
+VARIABLES = (
+    Variable(
+        "mode", ("strand",), "i1", "1", "half waves of the strongest mode of the strand in the band; 0: none"
+    ),
+    Variable(
+        "modal_amplitude", ("strand", "half_waves"), "f8", "m", "amplitude of each sine mode in the band"
+    ),
+    Variable("spectrum", ("strand", "frequency_bin"), "f8", "m", "amplitude spectrum at the strongest probe"),
+    Variable("mean_ring_tension", ("strand",), "f8", "N", "mean ring tension in the middle of the strand"),
+    Variable("mean_push_force", ("strand",), "f8", "N", "mean push force in the middle of the strand"),
+    Variable("axial_force", ("pulley",), "f8", "N", "mean axial force of the belt on a sheave"),
+    Variable(
+        "slip", ("pulley",), "f8", "1", "mean tangential sliding over belt speed, weighted by contact force"
+    ),
+    Variable("open_share", ("pulley",), "f8", "1", "mean share of the wrap that is out of contact"),
+    Variable("flank_loss", ("pulley",), "f8", "W", "mean friction power of the flanks"),
+    Variable("thrust_ratio", (), "f8", "1", "mean axial force of the driving over that of the driven pulley"),
+    Variable("speed_loss", (), "f8", "1", "1 - ratio x driven speed / driving speed, mean"),
+    Variable("driven_speed_ripple", (), "f8", "rad s-1", "standard deviation of the driven pulley's speed"),
+    Variable("driving_power", (), "f8", "W", "mean power of the driving pulley"),
+    Variable("load_power", (), "f8", "W", "mean power of the load"),
+    Variable("ring_loss", (), "f8", "W", "mean friction power between rings and elements"),
+    Variable("loss", (), "f8", "W", "mean of all losses"),
+    Variable(
+        "power_residual",
+        (),
+        "f8",
+        "1",
+        "what the power balance leaves open, over the larger of drive and losses",
+    ),
+    Variable("least_strand_force", (), "f8", "N", "smallest T - P - m v^2 in a strand: below 0 it is slack"),
+)
+
+
+def coordinates(parameters: dict[str, Any]) -> dict[str, Coordinate]:
+    """Coordinates of the record's dimensions.
+
+    Parameters
+    ----------
+    parameters : dict
+        Flat parameters of the job.
+    """
+    step = parameters["spectrum_step"]
+    bins = np.arange(0.0, parameters["band_high"] + step / 2, step)
+    return {
+        "strand": Coordinate(np.array(STRANDS), "", "strand: t1 leaves the driving pulley, t2 enters it"),
+        "pulley": Coordinate(np.array(PULLEYS), "", "pulley"),
+        "half_waves": Coordinate(np.arange(1, MODES + 1), "1", "half waves along the strand"),
+        "frequency_bin": Coordinate(bins, "Hz", "frequency"),
+    }
+
+
+def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
+    """Values of VARIABLES from a finished run.
+
+    Parameters
+    ----------
+    run : Transient
+        With all samples recorded.
+    strongest_probe : (2,) int array
+        Column of the displacement that vibrates most, for each strand.
+
+    Returns
+    -------
+    dict
+        Value by name.
+    """
+    p, judged = run.parameters, run.judged
+    rate, band = p["sampling_rate"], (p["band_low"], p["band_high"])
+
+    def mean(name: str) -> float:
+        return float(run.channel(name)[judged].mean())
+
+    def pair(name: str, labels: tuple[str, str]) -> np.ndarray:
+        return np.array([mean(f"{name} {label}") for label in labels])
+
+    modal = band_amplitude(run.modes[judged], rate, band)
+    bins = coordinates(p)["frequency_bin"].values
+    axial = pair("axial_force", PULLEYS)
+    driven_speed = run.channel("driven_speed")[judged]
+    loss = sum(mean(name) for name in LOSSES)
+    stored = run.channel("stored_energy")[judged]
+    storing = (stored[-1] - stored[0]) / ((stored.size - 1) * run.interval)
+    open_power = mean("driving_power") - mean("load_power") - mean("thrust_power") - loss - storing
+    return {
+        "mode": np.where(modal.max(axis=1) > 0.0, 1 + modal.argmax(axis=1), 0),
+        "modal_amplitude": modal,
+        "spectrum": amplitude_spectrum(run.displacement[judged][:, strongest_probe], rate, bins).T,
+        "mean_ring_tension": pair("ring_tension", STRANDS),
+        "mean_push_force": pair("push_force", STRANDS),
+        "axial_force": axial,
+        "slip": pair("slip", PULLEYS),
+        "open_share": pair("open_share", PULLEYS),
+        "flank_loss": np.array([mean(f"{pulley}_flank_loss") for pulley in PULLEYS]),
+        "thrust_ratio": axial[0] / axial[1],
+        "speed_loss": 1.0 - p["ratio"] * driven_speed.mean() / p["driving_speed"],
+        "driven_speed_ripple": driven_speed.std(),
+        "driving_power": mean("driving_power"),
+        "load_power": mean("load_power"),
+        "ring_loss": mean("ring_loss"),
+        "loss": loss,
+        "power_residual": open_power / max(abs(mean("driving_power")), loss),
+        "least_strand_force": run.channel("least_strand_force")[judged].min(),
+    }
+
+
+def histories(run: Transient) -> xr.Dataset:
+    """Histories over `time` and means by `position` of a run, finished or failed.
+
+    Parameters
+    ----------
+    run : Transient
+        With the samples that it has.
+
+    Returns
+    -------
+    Dataset
+        `displacement` (time, probe) [m], scalars over time, and the profiles of the judged part by `position`.
+    """
+    import xarray as xr
+
+    time = (1 + np.arange(run.done)) * run.interval
+    profiles = run.profiles
+    over_time = {
+        "load": ("N m", "torque at the driving pulley"),
+        "driven_speed": ("rad s-1", "speed of the driven pulley"),
+        "driven_position": ("m", "axial opening of the driven pulley"),
+    }
+    by_position = {
+        "ring_tension": ("N", "mean ring tension"),
+        "push_force": ("N", "mean push force between elements"),
+        "contact_force": ("N m-1", "mean axial line force of one flank"),
+        "mean_displacement": ("m", "mean displacement off the reference path, outward"),
+    }
+    variables: dict[str, Any] = {
+        "displacement": (
+            ("time", "probe"),
+            run.displacement,
+            {"units": "m", "long_name": "transverse displacement, outward"},
+        )
+    }
+    for name, (units, long_name) in over_time.items():
+        variables[name] = ("time", run.channel(name), {"units": units, "long_name": long_name})
+    for name, (units, long_name) in by_position.items():
+        variables[name] = ("position", profiles[name], {"units": units, "long_name": long_name})
+    coordinates = {
+        "time": ("time", time, {"units": "s", "long_name": "simulated time"}),
+        "probe": ("probe", np.array([probe.label for probe in run.probes], object), {"long_name": "probe"}),
+        "probe_position": (
+            "probe",
+            np.array([probe.position for probe in run.probes]),
+            {"units": "m", "long_name": "path coordinate of the probe"},
+        ),
+        "position": (
+            "position",
+            run.mesh.position,
+            {"units": "m", "long_name": "path coordinate, from the inlet of the driving arc"},
+        ),
+        "region": ("position", np.array(run.regions, object), {"long_name": "region of the path"}),
+    }
+    return xr.Dataset(variables, coordinates)

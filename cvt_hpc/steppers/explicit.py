@@ -1,0 +1,22 @@
+"""Symplectic Euler: the plain explicit step, slow and simple, by which faster ones are judged.
+
+Needs of a model: its right-hand side alone.
+
+Order 1. Stable below 2 / (largest rate of the model): on the reference belt friction near zero sliding speed, then
+longitudinal waves, limit the step to about 0.2 us.
+"""
+
+from cvt_hpc.parameters import Parameter
+
+ORDER = 1
+PARAMETERS = {
+    "numerics": {
+        "step": Parameter(
+            1e-7,
+            "s",
+            "largest time step; a whole number of steps makes a sampling interval",
+            minimum=1e-9,
+            maximum=1e-3,
+        )
+    }
+}

@@ -1,0 +1,85 @@
+"""From when on a run counts as vibrating: what a job may set of it, in [vibration].
+
+The defaults, and why:
+
+- `band_low` 300 Hz: the noise is at 500-700 Hz (Lebrecht et al. 2004, sec. 3.1). Below lie the pulleys' revolutions
+  (20-50 Hz), the judder of the driven pulley that falling friction brings (50-80 Hz) with the harmonics of its
+  jerks, and the loaded strand's first mode (200-280 Hz): motions of their own, recorded but not judged.
+  `band_high` 1500 Hz: twice the noise, so that third modes and second harmonics are in; models of this belt are
+  not meant to be dynamic much above 1 kHz.
+- `amplitude_threshold` 5 um: half of the simulated 10 um and a quarter of the measured 20 um (Lebrecht et al.
+  2004, figs. 3.3 and 3.9); judder alone moves strands by up to 3 um in the band.
+- `judged_fraction` 1/2: the first half belongs to the start transient; belt damping alone (d_b/(2 m) = 190
+  1/s in the reference belt) takes nine decades off it within 0.12 s.
+- `window_length` 40 ms: twelve periods of `band_low` keep drift and judder out, and beats
+  between neighbouring modes (50 Hz apart and more) average out. Shortened where the judged part would
+  hold fewer than four windows; for the shortest part that is accepted, to two periods.
+- `decay_tolerance` 0.25 e-folds over the judged part: settled amplitudes scatter by 2-7 % from one 50 ms
+  window to the next; three times that may pass for scatter. A smaller loss still counts as decay where
+  the fit leaves no doubt, that is where it exceeds `occurrence.STEADY_LOSS` and the fit's scatter.
+- `growth_tolerance` 1 e-fold, gained since the quietest window or, beyond doubt, within one more record of
+  the same length: noise in the band scatters by 10-15 % per window, and a factor of e is far outside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from cvt_hpc.parameters import Parameter
+
+PARAMETERS: dict[str, dict[str, Parameter]] = {
+    "vibration": {
+        "band_low": Parameter(300.0, "Hz", "lowest frequency of a vibration", minimum=0.0, exclusive=True),
+        "band_high": Parameter(1500.0, "Hz", "highest frequency of a vibration", minimum=0.0, exclusive=True),
+        "amplitude_threshold": Parameter(
+            5e-6, "m", "peak amplitude from which a strand vibrates", minimum=0.0, exclusive=True
+        ),
+        "judged_fraction": Parameter(
+            0.5,
+            "",
+            "last part of the run that is judged, the rest being start transient",
+            minimum=0.05,
+            maximum=1.0,
+        ),
+        "window_length": Parameter(
+            0.04, "s", "length of the windows in which the amplitude is taken", minimum=0.0, exclusive=True
+        ),
+        "decay_tolerance": Parameter(
+            0.25,
+            "",
+            "largest loss of amplitude over the judged part, in e-folds, of a settled vibration",
+            minimum=0.0,
+        ),
+        "growth_tolerance": Parameter(
+            1.0,
+            "",
+            "gain of amplitude, in e-folds, from which a strand is growing",
+            minimum=0.0,
+            exclusive=True,
+        ),
+    }
+}
+
+
+def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems between parameters: (key, expected, found), in the form of a model's check.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat parameters with those of [vibration] and the `duration` of a run [s].
+    """
+    low, high, window = parameters["band_low"], parameters["band_high"], parameters["window_length"]
+    problems = []
+    if high <= low:
+        problems.append(("band_high", f"a frequency above band_low = {low:g} Hz", f"{high:g} Hz"))
+    if window < 2 / low:
+        problems.append(
+            ("window_length", f"two periods of band_low ({2 / low:g} s) or more", f"{window:g} s")
+        )
+    judged = parameters["judged_fraction"] * parameters["duration"]
+    if judged < 5 / low * (1 - 1e-9):
+        expected = f"a judged part of five periods of band_low ({5 / low:g} s) or more"
+        problems.append(("duration", expected, f"judged_fraction times duration = {judged:g} s"))
+    return problems

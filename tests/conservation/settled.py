@@ -1,0 +1,95 @@
+"""A belt run until it has settled, and what a free body cut through its strands needs to know."""
+
+import numpy as np
+
+from cvt_hpc.models.elastic_belt.belt import (
+    DRIVEN_POSITION,
+    DRIVEN_SPEED,
+    Belt,
+    Mesh,
+    State,
+    W,
+    belt_constants,
+    initial_state,
+    mesh,
+)
+from cvt_hpc.models.elastic_belt.imex import imex_work, step_imex
+from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
+from cvt_hpc.models.elastic_belt.rhs import contact_forces, strains
+from cvt_hpc.physics.compliance import contact_state
+from cvt_hpc.steppers import imex
+
+DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
+DEFAULTS["duration"] = 0.1
+T1, T2 = 1, 3  # regions of the path
+STEP = imex.PARAMETERS["numerics"]["step"].default
+
+
+def fresh_contacts(belt: Belt):
+    """Contact memory of both wraps."""
+    return contact_state(belt.driving.weight.size), contact_state(belt.driven.weight.size)
+
+
+def start(**parameters):
+    """Constants, state and contact memory of a run with defaults but for `parameters`."""
+    belt = belt_constants(DEFAULTS | parameters)
+    return belt, initial_state(DEFAULTS | parameters, belt), fresh_contacts(belt)
+
+
+class Settled:
+    """Means over the last `averaged` seconds of a run of `duration` seconds.
+
+    Attributes
+    ----------
+    tension, push, w : (N,) arrays
+        T and P in the cells [N], displacement of the stations [m].
+    thrusts : (2,) array
+        Total axial forces of driving and driven wrap [N].
+    spin_up : float
+        J omega' of the driven pulley [N m]: what its moments leave.
+    closing : float
+        The sheave's damping times its speed [N]: what the thrust leaves.
+    """
+
+    def __init__(self, duration: float, averaged: float, **parameters):
+        self.belt, state, contacts = start(**parameters)
+        self.grid: Mesh = mesh(DEFAULTS | parameters)
+        work = imex_work(state)
+        samples, stride = round(averaged / STEP) // 25, 25
+        for _ in range(round(duration / STEP) - samples * stride):
+            assert step_imex(self.belt, state, contacts, work, STEP) > 0
+        before = state.scalars.copy()
+        sums = None
+        for _ in range(samples):
+            for _ in range(stride):
+                assert step_imex(self.belt, state, contacts, work, STEP) > 0
+            now = self._forces(state)
+            sums = now if sums is None else [a + b for a, b in zip(sums, now, strict=True)]
+        self.tension, self.push, self.w, self.thrusts = (total / samples for total in sums)
+        rates = (state.scalars - before) / (samples * stride * STEP)
+        self.spin_up = self.belt.driven_inertia * rates[DRIVEN_SPEED]
+        self.closing = self.belt.axial_damping * rates[DRIVEN_POSITION]
+
+    def _forces(self, state: State) -> list[np.ndarray]:
+        belt, n = self.belt, self.belt.cell.size
+        force, eps = np.empty(n), np.empty((2, n))
+        assert contact_forces(belt, state, fresh_contacts(belt), force) > 0
+        strains(belt, state.fields, eps)
+        wraps = ((belt.driving, 0), (belt.driven, belt.driven_start))
+        thrusts = [sheave.weight @ force[first : first + sheave.weight.size] for sheave, first in wraps]
+        push = np.maximum(-belt.element_stiffness * eps[0], 0.0)
+        return [belt.ring_stiffness * eps[1], push, state.fields[W].copy(), np.array(thrusts)]
+
+    @property
+    def relief(self) -> float:
+        """Centrifugal force m v^2 of the whole belt [N]."""
+        return self.belt.mass * self.belt.belt_speed**2
+
+    def in_strand(self, region: int) -> tuple[float, float, float, tuple[float, float]]:
+        """T and P [N] and slope w_s in the middle of a strand, and w where its straight line meets its two ends [m]."""
+        first, count = self.grid.starts[region], self.grid.counts[region]
+        middle = slice(first + count // 4, first + 3 * count // 4)
+        s = np.arange(count)[count // 4 : 3 * count // 4] * self.belt.cell[first]
+        slope, w = np.polyfit(s, self.w[middle], 1)
+        ends = w, w + slope * count * self.belt.cell[first]
+        return self.tension[middle].mean(), self.push[middle].mean(), slope, ends

@@ -1,0 +1,57 @@
+"""A straight periodic belt: the model with its pulleys taken out.
+
+A path of equal pulleys at a centre distance of pi r has equal cells all around; its curvature is taken out, so that the strains, and
+with them T and P, do not depend on w, and the flanks with it.
+"""
+
+import numpy as np
+
+from cvt_hpc.models.elastic_belt.belt import (
+    FIELDS,
+    N_ELEMENT,
+    N_RING,
+    SCALARS,
+    TIME,
+    V_ELEMENT,
+    V_RING,
+    Belt,
+    State,
+    belt_constants,
+)
+from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
+
+DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
+MASS = DEFAULTS["element_mass"] + DEFAULTS["ring_mass"]
+RADIUS = 0.024
+LENGTH = 2.0 * np.pi * RADIUS  # half the path [m]: 0.151, as long as a strand
+TENSION = 5000.0  # net tension F = T - P [N]
+WAVE = np.sqrt(TENSION / MASS)
+
+
+def straight_belt(cells: int, speed: float = 0.0, bending: float = 0.0, damping: float = 0.0) -> Belt:
+    """A straight belt of 2 LENGTH, `cells` cells (an even number) in each half."""
+    belt = belt_constants(
+        DEFAULTS
+        | {
+            "duration": 1.0,
+            "ratio": 1.0,
+            "driven_radius": RADIUS,
+            "centre_distance": np.pi * RADIUS,
+            "stations": 2 * cells,
+            "bending_stiffness": bending,
+            "transverse_damping": damping,
+        }
+    )
+    assert np.ptp(belt.cell) < 1e-15
+    nothing = np.zeros(2 * cells)
+    return belt._replace(curvature=nothing, arc_curvature=nothing, arc_share=nothing, belt_speed=speed)
+
+
+def moving_straight(belt: Belt, tension: float = TENSION, push: float = 0.0) -> State:
+    """The undisturbed state under uniform T and P (negative P: gaps, by that much over EA_e)."""
+    fields, scalars = np.zeros((len(FIELDS), belt.cell.size)), np.zeros(len(SCALARS))
+    fields[V_ELEMENT] = fields[V_RING] = belt.belt_speed
+    fields[N_RING] = 1.0 / (1.0 + tension / belt.ring_stiffness)
+    fields[N_ELEMENT] = 1.0 / (1.0 - push / belt.element_stiffness)
+    scalars[TIME] = belt.rise_time  # the start-up's damping is over
+    return State(fields, scalars)

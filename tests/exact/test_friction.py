@@ -1,0 +1,140 @@
+"""Friction laws against their formulas, written here once more and differentiated by a complex step."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cvt_hpc.physics.friction import formula_coefficient, friction_coefficient, friction_law, saturation
+
+# mu(v) of the module's table, for complex v too: mu_k, g, v_s, v
+FORMULAS = {
+    "coulomb": lambda mu, g, vs, v: mu + 0.0 * v,
+    "linear": lambda mu, g, vs, v: mu - g * vs + g * v if np.real(v) < vs else mu + 0.0 * v,
+    "stribeck": lambda mu, g, vs, v: mu - g * vs * np.exp(-v / vs),
+    "hyperbolic": lambda mu, g, vs, v: mu / (1.0 - g / mu * v),
+    "cubic": lambda mu, g, vs, v: (
+        thomsen_fidlin(mu, mu - 2.0 / 3.0 * g * vs, v / vs)
+        if np.real(v) < np.sqrt(3.0) * vs
+        else mu - 2.0 / 3.0 * g * vs + 0.0 * v
+    ),
+}
+FALLING = [kind for kind in FORMULAS if kind != "coulomb"]
+# A formula of five operations and one exponential on numbers of order 1 loses a few units in the last place.
+ROUND_OFF = 1e-14
+
+levels = st.floats(0.01, 0.3)
+gradients = st.floats(-5.0, -1e-3)
+scales = st.floats(1e-3, 1.0)
+shares = st.floats(0.0, 5.0)  # speed over stribeck_velocity: beyond every kink
+
+
+def thomsen_fidlin(mu_k, mu_s, x):
+    """The cubic in its authors' form: mu_s at rest, mu_k at x = 1."""
+    return mu_s - 1.5 * (mu_s - mu_k) * (x - x * x * x / 3.0)
+
+
+def coefficient(kind, mu_k, gradient, v_s, speed):
+    return friction_coefficient(friction_law(kind, mu_k, gradient, v_s), speed, 1e5)
+
+
+@pytest.mark.parametrize("kind", FORMULAS)
+@given(levels, gradients, scales, shares)
+def test_law_and_its_slope(kind, mu_k, gradient, v_s, share):
+    gradient = 0.0 if kind == "coulomb" else gradient
+    speed = share * v_s
+    tiny = 1e-30
+    expected = FORMULAS[kind](mu_k, gradient, v_s, speed + tiny * 1j)
+    found, slope = coefficient(kind, mu_k, gradient, v_s, speed)
+    # The level may be the difference of parts as large as g v_s x^3, the slope of such as g x^2; the text's cubic
+    # in mu_s - mu_k loses mu_k / v_s besides.
+    third, square = min(share, 2.0) ** 3, min(share, 2.0) ** 2
+    assert found == pytest.approx(expected.real, abs=ROUND_OFF * (mu_k - gradient * v_s * (1.0 + third)))
+    lost = mu_k / v_s - gradient * (1.0 + square)
+    assert slope == pytest.approx(expected.imag / tiny, abs=ROUND_OFF * lost)
+    assert formula_coefficient(
+        friction_law(kind, mu_k, gradient, v_s).kind, mu_k, gradient, v_s, speed
+    ) == pytest.approx((found, slope), abs=0.0)
+
+
+@pytest.mark.parametrize("kind", FALLING)
+@given(levels, gradients, scales, shares)
+def test_gradient_is_the_slope_at_rest_and_the_steepest(kind, mu_k, gradient, v_s, share):
+    assert coefficient(kind, mu_k, gradient, v_s, 0.0)[1] == pytest.approx(gradient, rel=ROUND_OFF)
+    assert coefficient(kind, mu_k, gradient, v_s, share * v_s)[1] >= gradient * (1.0 + ROUND_OFF)
+
+
+@pytest.mark.parametrize(
+    ("kind", "where"),
+    # in units of v_s: at and beyond the linear law's floor, far out, at rest, at the cubic's minimum
+    [("linear", 1.0), ("linear", 7.0), ("stribeck", 60.0), ("hyperbolic", 0.0), ("cubic", 1.0)],
+)
+@given(levels, gradients, scales)
+def test_kept_level_does_not_move_with_the_gradient(kind, where, mu_k, gradient, v_s):
+    # exp(-60) is 1e-26: nothing is left of the falling part
+    found, _ = coefficient(kind, mu_k, gradient, v_s, where * v_s)
+    assert found == pytest.approx(mu_k, rel=1e-13 * (1.0 + abs(gradient) * v_s / mu_k))
+
+
+@given(levels, gradients, scales, st.floats(0.0, 5.0))
+def test_cubic_falls_to_its_minimum_returns_and_is_held(mu_k, gradient, v_s, share):
+    at_rest, _ = coefficient("cubic", mu_k, gradient, v_s, 0.0)
+    assert at_rest == pytest.approx(mu_k - 2.0 / 3.0 * gradient * v_s, rel=1e-13)
+    lowest, slope = coefficient("cubic", mu_k, gradient, v_s, v_s)
+    assert slope == 0.0
+    found, _ = coefficient("cubic", mu_k, gradient, v_s, share * v_s)
+    assert lowest - 1e-12 <= found <= at_rest + 1e-12
+    held, slope = coefficient("cubic", mu_k, gradient, v_s, (np.sqrt(3.0) + share) * v_s * (1.0 + 1e-12))
+    # just below sqrt(3) the slope is -2 g: a relative offset of 1e-12 in speed shows as 1e-12 g v_s
+    assert held == pytest.approx(at_rest, abs=1e-11 * (mu_k + abs(gradient) * v_s))
+    assert slope == 0.0
+
+
+@st.composite
+def tables(draw):
+    forces = draw(st.lists(st.floats(0.0, 1e6), min_size=2, max_size=5, unique_by=lambda f: round(f, -3)))
+    speeds = draw(st.lists(st.floats(0.0, 2.0), min_size=2, max_size=5, unique_by=lambda v: round(v, 2)))
+    mu = [[draw(st.floats(0.01, 0.5)) for _ in speeds] for _ in forces]
+    return np.sort(forces), np.sort(speeds), np.array(mu)
+
+
+def bilinear(forces, speeds, mu, speed, force):
+    """Interpolation by numpy, row by row; np.interp holds the ends."""
+    return np.interp(force, forces, [np.interp(speed, speeds, row) for row in mu])
+
+
+@given(tables(), st.floats(0.0, 3.0), st.floats(0.0, 2e6))
+def test_table_is_bilinear_and_held_outside(table, speed, force):
+    law = friction_law("table", 0.08, 0.0, 0.05, *table)
+    found, slope = friction_coefficient(law, speed, force)
+    # positions in an interval carry the round-off of the grid's values, up to a hundred times the interval
+    assert found == pytest.approx(bilinear(*table, speed, force), abs=1e-12)
+    forces, speeds, mu = table
+    if speed < speeds[0] or speed >= speeds[-1]:
+        assert slope == 0.0
+    else:
+        j = max(np.searchsorted(speeds, speed) - 1, 0)  # at a knot: the interval below, as the slope's limit
+        ends = [bilinear(*table, v, force) for v in speeds[j : j + 2]]
+        assert slope == pytest.approx((ends[1] - ends[0]) / (speeds[j + 1] - speeds[j]), abs=1e-9)
+
+
+def test_table_by_hand():
+    law = friction_law(
+        "table", 0.08, 0.0, 0.05, (1e4, 3e4), (0.0, 0.1, 0.3), ((0.1, 0.2, 0.4), (0.5, 0.8, 0.2))
+    )
+    assert friction_coefficient(law, 0.05, 2e4) == pytest.approx((0.4, 2.0))
+    assert friction_coefficient(law, 0.2, 1.5e4) == pytest.approx((0.35, -0.25 * 3.0 + 0.75))
+    assert friction_coefficient(law, 1.0, 1e9) == pytest.approx((0.2, 0.0))
+    # the gradient that the module defines for a table: first interval, lowest force
+    assert friction_coefficient(law, 0.0, 0.0) == pytest.approx((0.1, 1.0))
+
+
+@given(st.floats(-3.0, 3.0), st.floats(1e-3, 1.0))
+def test_saturation(speed, width):
+    tiny = 1e-30
+    exact = np.tanh((speed + tiny * 1j) / width)
+    factor, slope = saturation(speed, width)
+    assert factor == pytest.approx(exact.real, abs=ROUND_OFF)
+    # 1 - tanh^2 is formed by a difference: absolute, not relative, in units of 1 / width
+    assert slope == pytest.approx(exact.imag / tiny, abs=ROUND_OFF / width)
+    assert saturation(-speed, width) == pytest.approx((-factor, slope), abs=0.0)

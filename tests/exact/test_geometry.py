@@ -1,0 +1,77 @@
+"""The variator's path against plane geometry and a published pushbelt set."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cvt_hpc.physics.geometry import variator
+
+# A public pushbelt set (github wangzhanrock/CVT_VelocityInit): centre distance, belt length at mid pack
+CENTRES = 0.155
+BELT = 0.661195
+
+ratios = st.floats(0.3, 3.0)
+radii = st.floats(
+    0.01, 0.038
+)  # driven radius; with these ratios and the centre distance below, never overlapping
+
+
+@given(ratios, radii)
+def test_path_closes_in_the_plane(ratio, driven_radius):
+    # Walk along the path: clockwise arcs about both shafts, strands straight on. What touches both circles, comes back
+    # to the start and has turned once has the right wraps and strands.
+    path = variator(ratio, driven_radius, 0.2)
+    assert path.driven_radius / path.driving_radius == pytest.approx(ratio, rel=1e-15)
+    heading = 0.5 * (np.pi + path.driving_wrap)  # of t2, symmetric to t1
+    start = point = path.driving_radius * 1j * np.exp(1j * heading)
+    for radius, wrap, centre in (
+        (path.driving_radius, path.driving_wrap, 0.0),
+        (path.driven_radius, path.driven_wrap, 0.2),
+    ):
+        # round-off of a dozen operations on lengths of 0.2 m
+        assert point - centre == pytest.approx(radius * 1j * np.exp(1j * heading), abs=1e-15)
+        point = centre + (point - centre) * np.exp(-1j * wrap)
+        heading -= wrap
+        point += path.strand_length * np.exp(1j * heading)
+    assert point == pytest.approx(start, abs=1e-15)
+    assert path.driving_wrap + path.driven_wrap == pytest.approx(2.0 * np.pi, rel=1e-15)
+
+
+@given(ratios, radii)
+def test_lengths_are_arcs_and_strands(ratio, driven_radius):
+    path = variator(ratio, driven_radius, 0.2)
+    arcs = path.driving_radius * path.driving_wrap, path.driven_radius * path.driven_wrap
+    assert path.lengths == (arcs[0], path.strand_length, arcs[1], path.strand_length)
+    assert path.path_length == pytest.approx(sum(arcs) + 2.0 * path.strand_length, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("driving", "driven"),
+    [(72.71e-3, 36.35e-3), (55.89e-3, 55.89e-3), (36.35e-3, 72.71e-3), (30.687e-3, 76.718e-3)],
+)
+def test_one_belt_fits_every_published_ratio(driving, driven):
+    # radii are printed to 5 um: each moves the length by its wrap, together 2 pi
+    assert variator(driven / driving, driven, CENTRES).path_length == pytest.approx(
+        BELT, abs=2.0 * np.pi * 5e-6
+    )
+
+
+def test_published_wrap():
+    path = variator(2.5, 76.717726657055e-3, CENTRES)
+    assert path.driving_radius == pytest.approx(30.687090662822e-3, rel=1e-12)
+    # the set's author solved for the angle by iteration, which stopped 2e-8 deg away from his radii
+    assert np.rad2deg(path.driven_wrap) == pytest.approx(2.0 * 107.2758155568609, abs=1e-7)
+
+
+def test_equal_pulleys():
+    path = variator(1.0, 0.05, CENTRES)
+    assert path.driving_wrap == path.driven_wrap == np.pi
+    assert path.strand_length == CENTRES
+    assert path.path_length == pytest.approx(2.0 * np.pi * 0.05 + 2.0 * CENTRES)
+
+
+@pytest.mark.parametrize(("ratio", "driven"), [(1.0, 0.0775), (1.0, 0.08), (0.2, 0.05)])
+def test_overlapping_pulleys_are_refused(ratio, driven):
+    with pytest.raises(ValueError, match="overlap"):
+        variator(ratio, driven, CENTRES)
