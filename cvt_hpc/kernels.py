@@ -1,8 +1,8 @@
 """How the kernels are compiled, and where the machine code is kept: one way for all.
 
-The compiler keeps machine code beside a file's date alone, and would go on with the old code of a kernel when one that it calls,
-in another file, has changed. So the code is kept in a folder named by the content of all kernels' sources: below
-NUMBA_CACHE_DIR if that is set, else in the package, else in the user's cache.
+The compiler keeps machine code beside a file's date alone, and would go on with the old code of a kernel when
+one that it calls, in another file, has changed. So the code is kept in a folder named by the content of all
+kernels' sources: below NUMBA_CACHE_DIR if that is set, else in the package, else in the user's cache.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ import numba
 _PACKAGE = Path(__file__).parent
 _ROOMS_WITH_KERNELS = ("physics", "models")
 
-# Division by zero gives inf as in numpy, without a test for it. Products may be contracted with sums, and divisions by
-# one number replaced by its reciprocal; sums are never reordered, and what is not a number stays visible.
+# Division by zero gives inf as in numpy, without a test for it. Products may be contracted with sums, and
+# divisions by one number replaced by its reciprocal; sums are never reordered, and what is not a number stays
+# visible.
 _OPTIONS = {"cache": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
 
 

@@ -71,15 +71,19 @@ def record_coordinates(job: Job) -> dict[str, Coordinate]:
 
 
 def estimate_cost(job: Job) -> float:
-    """Core-seconds of one run of the base scene: within a factor of two on processors of the last years.
+    """Core-seconds of a run, mean over the job: within a factor of two on processors of the last years.
 
     Parameters
     ----------
     job : Job
         A validated job.
     """
-    p = job.parameters
-    return _model_record(job).STEP_COST[job.stepper] * p["stations"] * p["duration"] / p["step"]
+    axes = {axis.name: np.array(axis.values) for axis in job.axes}
+
+    def mean(key: str, power: int = 1) -> float:
+        return float(np.mean(axes.get(key, np.array([job.parameters[key]])) ** power))
+
+    return _model_record(job).STEP_COST[job.stepper] * mean("stations") * mean("duration") * mean("step", -1)
 
 
 def run_point(job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]) -> dict[str, Any]:
@@ -120,8 +124,8 @@ def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
     Returns
     -------
     Dataset
-        The record's names as scalars of the run, `displacement` (time, probe), the model's histories over `time`, and
-        its means over the judged part by `position`.
+        The record's names as scalars of the run, `displacement` (time, probe), the model's histories over
+        `time`, and its means over the judged part by `position`.
 
     Raises
     ------

@@ -1,3 +1,3 @@
-"""The ladder of models; each knows physics and nothing above. A model's module declares what a job may set."""
+"""The ladder of models; each knows physics and nothing above, and declares what a job may set."""
 
 MODELS = {"elastic_belt": "cvt_hpc.models.elastic_belt"}

@@ -1,9 +1,9 @@
 """Linear complementarity: w = M z + q, w >= 0, z >= 0, w.z = 0, for any small dense M.
 
-Lemke's pivoting with the lexicographic rule of ties: it ends on every matrix, finds a solution for the copositive-plus and P-matrices that
-contacts give, and says so when its ray is secondary (no solution found). Source: Cottle, Pang and Stone, The Linear
-Complementarity Problem, sec. 4.4 and 4.9. The sheaves' contact has a solver of its own in linear time (`compliance`),
-which is tested against this one.
+Lemke's pivoting with the lexicographic rule of ties: it ends on every matrix, finds a solution for the
+copositive-plus and P-matrices that contacts give, and says so when its ray is secondary (no solution found).
+Source: Cottle, Pang and Stone, The Linear Complementarity Problem, sec. 4.4 and 4.9. The sheaves' contact has
+a solver of its own in linear time (`compliance`), which is tested against this one.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ def solve_lcp(matrix: np.ndarray, q: np.ndarray, max_pivots: int | None = None) 
     q : (n,) array
         Right-hand side; any scale.
     max_pivots : int, optional
-        Limit of pivots; default 50 n. (Lemke needs at most n on the contact problems here, 2^n on the worst matrices.)
+        Limit of pivots; default 50 n. (Lemke needs at most n on the contact problems here, 2^n on the worst
+        matrices.)
 
     Returns
     -------

@@ -1,18 +1,21 @@
 """Elastic sheaves under the belt: the unilateral contact of one wrap, solved exactly in linear time.
 
-Stations j of a wrap carry axial line forces f_j [N/m] and leave gaps g_j [m] (Bullinger et al. 2005, eqs 33-35):
+Stations j of a wrap carry axial line forces f_j [N/m] and leave gaps g_j [m] (Bullinger et al. 2005, eqs
+33-35):
 
     g_j = G_j + f_j / c_e + a (y_j + U_j . t),   f_j >= 0,  g_j >= 0,  f_j g_j = 0,
 
-G_j the gap of the rigid bodies (negative: overlap), c_e the axial stiffness of the elements per length, a the compliance of
-the sheaves (1 reference, 0 rigid), y the local bending and t the tilt about two axes,
+G_j the gap of the rigid bodies (negative: overlap), c_e the axial stiffness of the elements per length, a the
+compliance of the sheaves (1 reference, 0 rigid), y the local bending and t the tilt about two axes,
 
-    y_j = sum_k exp(-|x_j - x_k| / l) / (2 l k) h_k f_k,      t = r^2 / c_tilt sum_k U_k h_k f_k,   U = (cos phi, sin phi),
+    y_j = sum_k exp(-|x_j - x_k| / l) / (2 l k) h_k f_k,
+    t = r^2 / c_tilt sum_k U_k h_k f_k,   U = (cos phi, sin phi),
 
-h_k the length that station k stands for. The kernel's inverse is tridiagonal (Markov), the tilt is of rank two; so for a given set of
-closed stations the solution takes one tridiagonal solve and a 2x2 system. The set is found by
-flipping every station that violates its sign, warm from the last set, and, should that not settle, by flipping
-the first violator only, which ends for every P-matrix (Murty 1974); this matrix is symmetric positive definite.
+h_k the length that station k stands for. The kernel's inverse is tridiagonal (Markov), the tilt is of rank
+two; so for a given set of closed stations the solution takes one tridiagonal solve and a 2x2 system. The set
+is found by flipping every station that violates its sign, warm from the last set, and, should that not
+settle, by flipping the first violator only, which ends for every P-matrix (Murty 1974); this matrix is
+symmetric positive definite.
 """
 
 from __future__ import annotations
@@ -73,7 +76,8 @@ class ContactState(NamedTuple):
     y : (m,) array
         Work space; the local bending of the last solution.
     push : (m,) array
-        -c_e times the opening without f / c_e: the force where closed, positive where an open station overlaps [N/m].
+        -c_e times the opening without f / c_e: the force where closed, positive where an open station
+        overlaps [N/m].
     fresh : (1,) bool array
         False until the factors belong to `closed`.
     """

@@ -1,12 +1,13 @@
 """Friction laws between belt elements and sheaves, each with its derivative.
 
-A law gives the coefficient mu(v) >= 0 of steady sliding at speed v >= 0 [m/s]. Its regularisation about v = 0,
-tanh(v / v_reg), is a factor of its own (`saturation`), because with friction memory the two are
-taken at different speeds: the law at the filtered speed, the saturation at the present one.
+A law gives the coefficient mu(v) >= 0 of steady sliding at speed v >= 0 [m/s]. Its regularisation about v =
+0, tanh(v / v_reg), is a factor of its own (`saturation`), because with friction memory the two are taken at
+different speeds: the law at the filtered speed, the saturation at the present one.
 
-**The friction gradient** is defined once, here, for all laws: the slope dmu/dv [s/m] of the law at v -> 0+, without the
-regularisation. For every falling law below that is its steepest slope; negative means friction falls with speed. The speed
-scale `stribeck_velocity` and one level stay fixed when the gradient varies; the other level follows from it:
+**The friction gradient** is defined once, here, for all laws: the slope dmu/dv [s/m] of the law at v -> 0+,
+without the regularisation. For every falling law below that is its steepest slope; negative means friction
+falls with speed. The speed scale `stribeck_velocity` and one level stay fixed when the gradient varies; the
+other level follows from it:
 
 ============  =====================================================================  =========================
 law           mu(v), g = friction_gradient, v_s = stribeck_velocity                   level kept
@@ -15,12 +16,13 @@ coulomb       mu_k                                                              
 linear        max(mu_k - g v_s + g v, mu_k): falls to the floor mu_k at v_s            mu_k
 stribeck      mu_k - g v_s exp(-v / v_s)                                               mu_k
 hyperbolic    mu_k / (1 + d v), d = -g / mu_k                                          mu_k, here at v = 0
-cubic         mu_s - 3/2 (mu_s - mu_k) (x - x^3 / 3), x = v / v_s                      mu_k, its minimum at v_s
+cubic         mu_s - 3/2 (mu_s - mu_k) (x - x^3 / 3), x = v / v_s                    mu_k, its minimum at v_s
 table         bilinear in (normal force, speed), held constant outside                 the table
 ============  =====================================================================  =========================
 
-The cubic law (Thomsen and Fidlin 2003) has mu_s = mu_k - 2/3 g v_s; beyond x = sqrt(3), where the cubic is back at mu_s,
-it is held there. For a table the gradient is the slope of its first interval at the lowest force.
+The cubic law (Thomsen and Fidlin 2003) has mu_s = mu_k - 2/3 g v_s; beyond x = sqrt(3), where the cubic is
+back at mu_s, it is held there. For a table the gradient is the slope of its first interval at the lowest
+force.
 """
 
 from __future__ import annotations
@@ -127,7 +129,7 @@ def _table_lookup(law: FrictionLaw, speed: float, force: float) -> tuple[float, 
 def formula_coefficient(
     kind: int, kinetic: float, gradient: float, scale: float, speed: float
 ) -> tuple[float, float]:
-    """Coefficient and slope of the laws that are formulas, from plain numbers (no table): `friction_coefficient`.
+    """`friction_coefficient` of the laws that are formulas, from plain numbers.
 
     Kernels call this one in their inner loops: handing over a `FrictionLaw` costs more than the law itself.
     """

@@ -2,8 +2,8 @@
 
 Needs of a model: its right-hand side alone.
 
-Order 1. Stable below 2 / (largest rate of the model): on the reference belt friction near zero sliding speed, then
-longitudinal waves, limit the step to about 0.2 us.
+Order 1. Stable below 2 / (largest rate of the model): on the reference belt friction near zero sliding speed,
+then longitudinal waves, limit the step to about 0.2 us.
 """
 
 from cvt_hpc.parameters import Parameter

@@ -2,9 +2,10 @@
 
 Needs of a model: a step kernel that treats its stiff forces by their linearisation and the rest explicitly.
 
-Order 1 (longitudinal forces by backward Euler; the transverse motion is a leapfrog, without numerical damping). Stable
-where the explicit part is: on the reference belt at 160 stations up to 7.7 us. Accurate before that: c dt / h below
-about 5, c the speed of longitudinal waves in the pressed elements, h the mesh width.
+Order 1 (longitudinal forces by backward Euler; the transverse motion is a leapfrog, without numerical
+damping). Stable where the explicit part is: on the reference belt at 160 stations up to 7.7 us. Accurate
+before that: c dt / h below about 5, c the speed of longitudinal waves in the pressed elements, h the mesh
+width.
 """
 
 from cvt_hpc.parameters import Parameter

@@ -1,8 +1,9 @@
 """Constants and initial state of the elastic belt on its mesh.
 
-The reference path is cut into cells whose faces lie on the ends of the arcs. Displacement w, transverse velocity u, the layers'
-speeds v_i and the filtered sliding speed live on faces ("stations", station j at the left face of cell j); the content n_i, the
-strains and the forces in cells. Rows of the state are listed in `FIELDS`, its scalars in `SCALARS`.
+The reference path is cut into cells whose faces lie on the ends of the arcs. Displacement w, transverse
+velocity u, the layers' speeds v_i and the filtered sliding speed live on faces ("stations", station j at the
+left face of cell j); the content n_i, the strains and the forces in cells. Rows of the state are listed in
+`FIELDS`, its scalars in `SCALARS`.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ START_DAMPING = (
 class Belt(NamedTuple):
     """Everything the kernels need, in SI units; N stations around the belt.
 
-    Arrays of cells and stations have shape (N,), `per_...` being reciprocals, the span that of two cells; `bending` is (N, 5): force per length on station j from the
-    displacements of stations j-2 .. j+2.
+    Arrays of cells and stations have shape (N,), `per_...` being reciprocals, the span that of two cells;
+    `bending` is (N, 5): force per length on station j from the displacements of stations j-2 .. j+2.
     """
 
     cell: np.ndarray
@@ -221,7 +222,7 @@ def _pair(values: np.ndarray) -> np.ndarray:
 
 
 def _bending_bands(cell: np.ndarray, dual: np.ndarray, stiffness: float) -> np.ndarray:
-    """Bands of -D^T diag(EI dual) D / dual, D the second difference: bending as the gradient of its energy."""
+    """Bands of -D^T diag(EI dual) D / dual, D the second difference: the gradient of the bending energy."""
     n = cell.size
     second = np.zeros((n, n))
     for j in range(n):

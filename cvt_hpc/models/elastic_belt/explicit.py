@@ -1,4 +1,4 @@
-"""The plain explicit step of the elastic belt: symplectic Euler on the right-hand side, the judge of faster ones."""
+"""The plain explicit step of the elastic belt: symplectic Euler, the judge of faster ones."""
 
 from __future__ import annotations
 

@@ -1,13 +1,15 @@
 """The fast step of the elastic belt: explicit in the strands, implicit in friction and longitudinal waves.
 
-Staggered in time: w, n_i, v_f, z at t_k; u, v_i, omega at t_k-1/2. Transverse forces are explicit (leapfrog, no numerical damping of the
-strands). Flank and ring friction enter with their slopes, the stresses T and P by backward Euler, so neither the
-regularisation of friction nor the longitudinal waves (5-6 km/s) limit the step. Eliminating u and the content
-leaves one cyclic block-tridiagonal system, 2x2 blocks (v_element, v_ring), symmetric positive definite; the content then follows
-from the fluxes, so that each layer's total is kept to round-off.
+Staggered in time: w, n_i, v_f, z at t_k; u, v_i, omega at t_k-1/2. Transverse forces are explicit (leapfrog,
+no numerical damping of the strands). Flank and ring friction enter with their slopes, the stresses T and P by
+backward Euler, so neither the regularisation of friction nor the longitudinal waves (5-6 km/s) limit the
+step. Eliminating u and the content leaves one cyclic block-tridiagonal system, 2x2 blocks (v_element,
+v_ring), symmetric positive definite; the content then follows from the fluxes, so that each layer's total is
+kept to round-off.
 
-First order in the longitudinal part: it damps pressed elements like EA dt / 2 [N s]. The set of separated elements is
-frozen during a step. What limits the step is accuracy, c dt / h about 5, and the transverse contact and bending.
+First order in the longitudinal part: it damps pressed elements like EA dt / 2 [N s]. The set of separated
+elements is frozen during a step. What limits the step is accuracy, c dt / h about 5, and the transverse
+contact and bending.
 """
 
 from __future__ import annotations
@@ -90,9 +92,10 @@ def imex_work(state: State) -> ImexWork:
 
 @merged_kernel
 def implicit_share(rate: float) -> float:
-    """Weight of a slope in the step, for rate = dt x slope / mass: 1/2 (time-centred) where slow, 1 where stiff.
+    """Weight of a slope in the step: 1/2 (time-centred) where slow, 1 where stiff; rate = dt x slope / mass.
 
-    The linearised step then multiplies the velocity by an approximation of exp(-rate) that never changes sign.
+    The linearised step then multiplies the velocity by an approximation of exp(-rate) that never changes
+    sign.
     """
     return 0.5 + rate / (12.0 + 2.0 * rate)
 
@@ -136,7 +139,7 @@ def step_imex(
 
 @merged_kernel
 def _stations(belt: Belt, state: State, work: ImexWork, step: float) -> None:
-    """Forces and slopes at the stations: fills `radial`, `flank`, `diagonal`, `right` but for the stresses."""
+    """Forces and slopes at the stations: `radial`, `flank`, `diagonal`, `right`, but for the stresses."""
     n = belt.cell.size
     w, u = state.fields[W], state.fields[U]
     v0, v1, vf = state.fields[V_ELEMENT], state.fields[V_RING], state.fields[V_FILTERED]
@@ -243,7 +246,7 @@ def _stations(belt: Belt, state: State, work: ImexWork, step: float) -> None:
 
 @merged_kernel
 def _cells(belt: Belt, state: State, work: ImexWork, step: float) -> None:
-    """Stresses at the end of the step, predicted with the old speeds, and their slopes; into the stations' rows."""
+    """Stresses at the end of the step, predicted with the old speeds, and their slopes; into the stations."""
     n = belt.cell.size
     u, push = state.fields[U], work.radial[0]
     for layer in range(2):

@@ -1,4 +1,4 @@
-"""Many steps and samples in one call: a loop for each step kernel, since kernels are compiled for one callee."""
+"""Many steps and samples in one call: one loop per step kernel, since a kernel is compiled for its callee."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """What a job may set of the elastic belt, with units, bounds and defaults.
 
-Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht et al. 2004, sec. 3.1); sizes are those of
-a common passenger-car belt; every other default is an assumption, plausible and not measured.
+Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht et al. 2004, sec. 3.1); sizes
+are those of a common passenger-car belt; every other default is an assumption, plausible and not measured.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "friction_gradient": Parameter(
             -0.8,
             "s/m",
-            "friction gradient: slope dmu/dv of the law at v -> 0+, without regularisation; its steepest fall",
+            "slope dmu/dv of the friction law at v -> 0+, its steepest fall, without regularisation",
             maximum=0.0,
         ),
         "kinetic_friction": _positive(0.1, "", "the level that does not change with the gradient"),

@@ -4,13 +4,14 @@ In a steady state, on average over a vibration,
 
     driving = load + thrust + losses,    losses = flanks + rings + belt + layers + lag + seating,
 
-and before that the difference is what the stored energy takes up. What does not close is the work of the numerics:
-upwinded transport, backward Euler in the layers, and the linear stretch that leaves the product of changing tension and
-slope squared out.
+and before that the difference is what the stored energy takes up. What does not close is the work of the
+numerics: upwinded transport, backward Euler in the layers, and the linear stretch that leaves the product of
+changing tension and slope squared out.
 
-Seating is what the belt carries out of the sheaves' elastic contact at an outlet beyond what it brings in at the inlet. Contact
-begins and ends at the arcs' ends here, with forces that are not zero; along an arc the elastic forces do no
-work on the whole, whatever the belt's speed, since the compliance depends on the distance of two stations alone.
+Seating is what the belt carries out of the sheaves' elastic contact at an outlet beyond what it brings in at
+the inlet. Contact begins and ends at the arcs' ends here, with forces that are not zero; along an arc the
+elastic forces do no work on the whole, whatever the belt's speed, since the compliance depends on the
+distance of two stations alone.
 """
 
 from __future__ import annotations

@@ -148,7 +148,8 @@ def histories(run: Transient) -> xr.Dataset:
     Returns
     -------
     Dataset
-        `displacement` (time, probe) [m], scalars over time, and the profiles of the judged part by `position`.
+        `displacement` (time, probe) [m], scalars over time, and the profiles of the judged part by
+        `position`.
     """
     import xarray as xr
 

@@ -218,7 +218,7 @@ def sample(
 def _wrap(
     belt: Belt, sheave: Sheaves, state: State, force: np.ndarray, first: int
 ) -> tuple[float, float, float]:
-    """Axial force [N], force-weighted tangential sliding over belt speed, share of open stations of one wrap."""
+    """Axial force [N], force-weighted tangential sliding over belt speed, share of open stations."""
     axial = sliding = open_length = length = 0.0
     for k in range(sheave.weight.size):
         j = first + k

@@ -172,7 +172,8 @@ class Transient:
         """
         first = self.done
         if first == self._kick and not self._disturbed:
-            # start-up damping has gone by now: from here on a disturbance grows or decays by the belt's own nature
+            # start-up damping has gone by now: from here on a disturbance grows or decays by the belt's own
+            # nature
             p = self.parameters
             self.state.fields[W] += random_strands(self.mesh, p["disturbance"], p["seed"])
             self._disturbed = True
