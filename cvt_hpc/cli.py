@@ -161,11 +161,13 @@ def _simulate(arguments: argparse.Namespace) -> int:
     if arguments.out is not None and arguments.out.exists() and not is_history(arguments.out):
         raise mismatch(str(arguments.out), "a new file, or a history written by cvt_hpc", "another file")
     dataset = simulate(job, at)
-    print(*outcome_lines(dataset), sep="\n")
+    # files first: whoever reads the lines may close the pipe
+    written = []
     if arguments.out is not None:
-        print(f"history: {write_history(dataset, arguments.out)}")
+        written.append(f"history: {write_history(dataset, arguments.out)}")
     if arguments.plot is not None:
-        print(f"picture: {draw_history(dataset, arguments.plot)}")
+        written.append(f"picture: {draw_history(dataset, arguments.plot)}")
+    print(*outcome_lines(dataset), *written, sep="\n")
     status = Status(int(dataset["status"]))
     if status != Status.DONE:
         _complain(f"the run failed: {status.name.lower()}: {dataset['reason'].item()}")

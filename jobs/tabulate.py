@@ -14,7 +14,7 @@ COLUMNS = {
 
 
 def rows(results):
-    """Yield the table's lines, one per run: axes, status, verdict, and per strand amplitude, frequency, mode."""
+    """Yield the lines, one per run: axes, status, verdict, and per strand amplitude, frequency, mode."""
     axes = results["status"].dims
     strands = [str(strand) for strand in results["strand"].values]
     units = {name: f" [{unit}]" if unit else "" for name, (unit, *_) in COLUMNS.items()}

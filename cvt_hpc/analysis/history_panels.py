@@ -85,7 +85,8 @@ def read_strands(dataset: xr.Dataset, judged_fraction: float, band: tuple[float,
     Parameters
     ----------
     dataset : Dataset
-        With `displacement` (time, probe) [m]; a probe's label begins with its strand, as "t1 1/2".
+        With `displacement` (time, probe) [m]; a probe's label begins with its strand, as "t1 1/2". Probes on
+        arcs, "driving arc 1/2", are left out.
     judged_fraction : float
         Last part of the time that is judged.
     band : (float, float)
@@ -106,7 +107,7 @@ def read_strands(dataset: xr.Dataset, judged_fraction: float, band: tuple[float,
     displacement = displacement[:length] - displacement[:length].mean(axis=0)
     labels = [str(label) for label in dataset["probe"].values]
     strands = []
-    for name in dict.fromkeys(label.split()[0] for label in labels):
+    for name in dict.fromkeys(label.split()[0] for label in labels if " arc " not in label):
         columns = [i for i, label in enumerate(labels) if label.split()[0] == name]
         strands.append(
             Strand(
@@ -126,7 +127,11 @@ def draw_displacement(axes: Axes, strand: Strand) -> None:
     time = 1e3 * strand.time
     axes.axvspan(time[strand.first_judged], time[-1], color="#f1f1f1", linewidth=0)
     axes.plot(time, strand.displacement[:, strand.strongest], color=strand.colour, linewidth=0.6)
-    axes.set(xlim=(time[0], time[-1]), xlabel="time [ms]", ylabel=f"{strand.name} [µm]")
+    # the belt seats itself by hundreds of um at the start, which would hide everything after it
+    seated = strand.displacement[time.size // 5 :, strand.strongest]
+    margin = 0.1 * np.ptp(seated) or 1.0
+    axes.set(xlim=(time[0], time[-1]), ylim=(seated.min() - margin, seated.max() + margin))
+    axes.set(xlabel="time [ms]", ylabel=f"{strand.name} [µm]")
     axes.set_title(
         f"displacement at {strand.probes[strand.strongest]}, judged part shaded", loc="left", pad=3
     )
@@ -146,9 +151,10 @@ def draw_close_up(axes: Axes, strand: Strand) -> None:
         bbox_to_anchor=(-0.05, 0.97),
         ncols=len(strand.probes),
         frameon=False,
-        handlelength=1.6,
-        handletextpad=0.4,
-        columnspacing=0.8,
+        handlelength=1.0,
+        handletextpad=0.2,
+        columnspacing=0.4,
+        fontsize=7,
     )
 
 

@@ -42,6 +42,9 @@ def solve_lcp(matrix: np.ndarray, q: np.ndarray, max_pivots: int | None = None) 
     n = q.size
     if np.all(q >= 0.0):
         return np.zeros(n)
+    # to the order of one, so that round-off can be told from a pivot in any units
+    force, size = np.abs(matrix).max() or 1.0, np.abs(q).max()
+    matrix, q = matrix / force, q / size
     # columns: w (0..n-1), z (n..2n-1), artificial z0 (2n), right-hand side (2n+1)
     tableau = np.hstack([np.eye(n), -matrix, -np.ones((n, 1)), q[:, None]])
     basis = np.arange(n)
@@ -56,7 +59,7 @@ def solve_lcp(matrix: np.ndarray, q: np.ndarray, max_pivots: int | None = None) 
         if leaving == 2 * n:
             z = np.zeros(2 * n + 1)
             z[basis] = tableau[:, -1]
-            return np.maximum(z[n : 2 * n], 0.0)
+            return np.maximum(z[n : 2 * n], 0.0) * (size / force)
         entering = leaving + n if leaving < n else leaving - n
         column = tableau[:, entering]
         candidates = np.flatnonzero(column > 1e-12 * max(1.0, np.abs(column).max()))

@@ -2,11 +2,11 @@
 
 The defaults, and why:
 
-- `band_low` 300 Hz: the noise is at 500-700 Hz (Lebrecht et al. 2004, sec. 3.1). Below lie motions of their own,
-  recorded but not judged: the pulleys' revolutions (20-50 Hz), the judder of the driven pulley that falling
-  friction brings (50-80 Hz) with the harmonics of its jerks, the loaded strand's first mode (200-280 Hz).
-  `band_high` 1500 Hz: twice the noise, so that third modes and second harmonics are in; models of this belt
-  are not meant to be dynamic much above 1 kHz.
+- `band_low` 300 Hz: the noise is at 500-700 Hz (Lebrecht et al. 2004, sec. 3.1). Below lie motions of their
+  own, recorded but not judged: the pulleys' revolutions (20-50 Hz), the judder of the driven pulley that
+  falling friction brings (50-80 Hz) with the harmonics of its jerks, the loaded strand's first mode
+  (200-280 Hz). `band_high` 1500 Hz: twice the noise, so that third modes and second harmonics are in; models
+  of this belt are not meant to be dynamic much above 1 kHz.
 - `amplitude_threshold` 5 um: half of the simulated 10 um and a quarter of the measured 20 um (Lebrecht et al.
   2004, figs. 3.3 and 3.9); judder alone moves strands by up to 3 um in the band.
 - `judged_fraction` 1/2: the first half belongs to the start transient; belt damping alone (d_b/(2 m) = 190

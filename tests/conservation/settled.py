@@ -86,7 +86,7 @@ class Settled:
         return self.belt.mass * self.belt.belt_speed**2
 
     def in_strand(self, region: int) -> tuple[float, float, float, tuple[float, float]]:
-        """T and P [N] and slope w_s in the middle of a strand, and w where its straight line meets its two ends [m]."""
+        """T, P [N] and slope w_s in the middle of a strand; w of its straight line at both ends [m]."""
         first, count = self.grid.starts[region], self.grid.counts[region]
         middle = slice(first + count // 4, first + 3 * count // 4)
         s = np.arange(count)[count // 4 : 3 * count // 4] * self.belt.cell[first]

@@ -1,7 +1,7 @@
 """Free bodies: a pulley with its arc of belt, cut through both strands, must be in balance once settled.
 
-Only T, P, w and the axial forces of the settled state enter; all numerics are the defaults. Without friction on the flanks and
-between the layers, this fixes the tension from the thrust alone.
+Only T, P, w and the axial forces of the settled state enter; all numerics are the defaults. Without friction
+on the flanks and between the layers, this fixes the tension from the thrust alone.
 """
 
 from functools import cache
@@ -49,8 +49,9 @@ def test_thrust_is_carried(name):
 
 @pytest.mark.parametrize("name", ["at rest", "moving"])
 def test_tension_of_a_frictionless_belt(name):
-    # Radial balance of an arc: 2 tan(d0) sum f_ax = integral of (F - m v^2) dphi over the wrap that the deformed belt really has,
-    # the reference's wrap and the strands' slopes. F is uniform but for P, some 50 N, from the climb of the elements.
+    # Radial balance of an arc: 2 tan(d0) sum f_ax = integral of (F - m v^2) dphi over the wrap that the
+    # deformed belt really has, the reference's wrap and the strands' slopes. F is uniform but for P, some 50
+    # N, from the climb of the elements.
     run = settled(name)
     (net1, *_, slope1, _), (net2, *_, slope2, _) = strands(run)
     net = run.tension - run.push - run.relief
@@ -58,7 +59,8 @@ def test_tension_of_a_frictionless_belt(name):
     driving = angle @ (net * (run.grid.region == 0)) - (net1 * slope1 - net2 * slope2)
     driven = angle @ (net * (run.grid.region == 2)) - (net2 * slope2 - net1 * slope1)
     squeeze = 2.0 * np.tan(DEFAULTS["half_wedge_angle"])
-    # Strands bend a little next to the arcs, and waves of the start-up linger in the elements: 3e-5 is seen. m v^2 is 2e-2.
+    # Strands bend a little next to the arcs, and waves of the start-up linger in the elements: 3e-5 is seen.
+    # m v^2 is 2e-2.
     assert driven == pytest.approx(squeeze * DEFAULTS["thrust"], rel=2e-4)
     assert driving == pytest.approx(squeeze * run.thrusts[0], rel=2e-4)
     # nothing changes the rings' tension
@@ -75,7 +77,8 @@ def test_motion_adds_the_centrifugal_tension():
 
 @pytest.mark.parametrize(("name", "load"), [("underdrive", 0.0), ("loaded", 100.0), ("braking", -60.0)])
 def test_moment_about_the_driven_shaft(name, load):
-    # Strands pull at the arms where their lines pass the shaft, the rings by d_1 further out: this is the load i M_dr.
+    # Strands pull at the arms where their lines pass the shaft, the rings by d_1 further out: this is the
+    # load i M_dr.
     run = settled(name)
     (net1, tension1, _, _, (_, w1)), (net2, tension2, _, _, (w2, _)) = strands(run)
     radius = run.belt.driven_radius
@@ -93,14 +96,15 @@ def capstan(run, radius, wrap, taut, slack):
 
 @pytest.mark.parametrize("name", ["underdrive", "falling friction"])
 def test_no_load_underdrive(name):
-    # Bullinger et al. 2005, sec. 2: the rings slip back on the small driving pulley, T_t2 > T_t1, and only push in t2 can
-    # undo that moment.
+    # Bullinger et al. 2005, sec. 2: the rings slip back on the small driving pulley, T_t2 > T_t1, and only
+    # push in t2 can undo that moment.
     run = settled(name)
     (_, tension1, push1, *_), (_, tension2, push2, *_) = strands(run)
     assert tension2 > tension1 + 1000.0
     assert push2 > 1000.0
     assert push1 < 1e-3 * push2
-    # Euler and Eytelwein, slip over the whole wrap at 17 times the regularisation speed; the mesh's part is (mu h / r)^2 / 12
+    # Euler and Eytelwein, slip over the whole wrap at 17 times the regularisation speed; the mesh's part is
+    # (mu h / r)^2 / 12
     ratio = capstan(run, run.belt.driving_radius, run.grid.path.driving_wrap, tension2, tension1)
     assert ratio == pytest.approx(1.0, abs=2e-3)
 

@@ -1,7 +1,7 @@
 """A straight periodic belt: the model with its pulleys taken out.
 
-A path of equal pulleys at a centre distance of pi r has equal cells all around; its curvature is taken out, so that the strains, and
-with them T and P, do not depend on w, and the flanks with it.
+A path of equal pulleys at a centre distance of pi r has equal cells all around; its curvature is taken out,
+so that the strains, and with them T and P, do not depend on w, and the flanks with it.
 """
 
 import numpy as np

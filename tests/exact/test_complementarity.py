@@ -35,7 +35,7 @@ def test_published_problems(matrix, q, solution):
 
 
 def cantilever():
-    """Deflection at point i by a force at j of a clamped beam, EI 2800 N m^2, points at 0.1, 0.15 and 0.2 m."""
+    """Deflection at i by a force at j of a clamped beam, EI 2800 N m^2, points at 0.1, 0.15 and 0.2 m."""
     near, far = np.minimum.outer(*[(0.1, 0.15, 0.2)] * 2), np.maximum.outer(*[(0.1, 0.15, 0.2)] * 2)
     return near**2 * (3.0 * far - near) / (6.0 * 2800.0)
 
@@ -49,7 +49,8 @@ def cantilever():
     ],
 )
 def test_contact_on_a_cantilever_opens_in_spite_of_overlap(overlap, force, gap):
-    # Bullinger et al. 2005, fig. 14: g~ < 0 everywhere, one point carries. [N], [um]; expected to the digits given
+    # Bullinger et al. 2005, fig. 14: g~ < 0 everywhere, but not every point carries. [N], [um], to the digits
+    # given
     flexibility, rigid = cantilever(), -1e-6 * np.array(overlap)
     found = solve_lcp(flexibility, rigid)
     assert found == pytest.approx(force, rel=1e-6)
@@ -90,7 +91,8 @@ def test_random_problems_against_enumeration(problem):
 @pytest.mark.parametrize("flexibility", [1e-12, 1.0, 1e9])
 @pytest.mark.parametrize("gap", [1e-9, 1.0, 1e9])
 def test_units_do_not_matter(flexibility, gap):
-    # gaps in metres and flexibilities in m/N are small numbers; the pivots are those of the problem in other units
+    # gaps in metres and flexibilities in m/N are small numbers; the pivots are those of the problem in other
+    # units
     random = np.random.default_rng(1)
     for _ in range(200):
         half = random.normal(size=(6, 6))

@@ -1,4 +1,4 @@
-"""The sheaves' contact: the linear-time solver against Lemke on the dense matrix, and cases with a formula."""
+"""The sheaves' contact: the linear-time solver against Lemke on the dense matrix, and formulas."""
 
 import numpy as np
 import pytest
@@ -90,8 +90,8 @@ def test_forces_against_lemke(case):
     dense = flexibility(sheave)
     force, solves, state = contact(sheave, gap, closed)
     assert solves > 0
-    # Gaps times c_e are forces of up to 1e7 N/m. The solver lets stations be 1e-6 N/m wrong, the dense matrix has a
-    # condition below 1e5: 1e7 times 1e5 eps is 1e-4.
+    # Gaps times c_e are forces of up to 1e7 N/m. The solver lets stations be 1e-6 N/m wrong, the dense matrix
+    # has a condition below 1e5: 1e7 times 1e5 eps is 1e-4.
     expected = solve_lcp(ELEMENTS * dense, ELEMENTS * gap)
     assert force == pytest.approx(expected, abs=1e-3)
     opening = gap + dense @ force
@@ -147,7 +147,8 @@ def test_rigid_sheaves_leave_the_elements_alone(case):
 
 
 def test_overlapping_station_opens_behind_a_deep_one():
-    # Bullinger et al. 2005, fig. 14: g~ < 0 is not sufficient for contact. Next to a deep dent, shallow overlap opens.
+    # Bullinger et al. 2005, fig. 14: g~ < 0 is not sufficient for contact. Next to a deep dent, shallow
+    # overlap opens.
     gap = np.full(15, 1e-5)
     gap[7], gap[8] = -1e-4, -1e-6
     force, _, state = contact(wrap(15, arc=0.03), gap)
@@ -170,8 +171,8 @@ def middle_pressure(stations, stiffness):
 
 @pytest.mark.parametrize("stiffness", [1.0, 1.5])
 def test_uniform_pressure_far_from_the_ends(stiffness):
-    # The kernel integrates to 1/k, so f (1/c_e + a/k) = overlap. 11 decay lengths to either end: exp(-11) = 2e-5,
-    # less by the elements' share; the rest is the mesh's, (h/l)^2 / 12 of a/k.
+    # The kernel integrates to 1/k, so f (1/c_e + a/k) = overlap. 11 decay lengths to either end: exp(-11) =
+    # 2e-5, less by the elements' share; the rest is the mesh's, (h/l)^2 / 12 of a/k.
     exact = 1e-5 / (1.0 / ELEMENTS + 1.0 / (stiffness * LOCAL))
     errors = [middle_pressure(stations, stiffness) / exact - 1.0 for stations in (61, 121, 241)]
     assert np.divide(errors[:-1], errors[1:]) == pytest.approx([4.0, 4.0], abs=0.1)
@@ -180,8 +181,9 @@ def test_uniform_pressure_far_from_the_ends(stiffness):
 
 @pytest.mark.parametrize("arc", [0.1, 0.27])
 def test_flat_punch_carries_its_edges(arc):
-    # Stiff elements pressed in uniformly: k l (1 - l^2 d2/dx2) inverts the kernel, so inside f = k g and each end carries
-    # a line of k l g more. The sum of the mesh's forces tends to k g (L + 2 l) with the square of h.
+    # Stiff elements pressed in uniformly: k l (1 - l^2 d2/dx2) inverts the kernel, so inside f = k g and each
+    # end carries a line of k l g more. The sum of the mesh's forces tends to k g (L + 2 l) with the square of
+    # h.
     exact = LOCAL * 1e-5 * (arc + 2.0 * LENGTH)
     errors = []
     for stations in (41, 81, 161):
@@ -194,8 +196,9 @@ def test_flat_punch_carries_its_edges(arc):
 
 
 def test_tilt_under_uniform_pressure():
-    # A uniform line force f tilts the sheave by r f / c_tilt times the integral of r cos: the opening at the middle of a
-    # wrap of angle b is 2 r^3 f sin(b/2) / c_tilt, at its ends cos(b/2) of that. No local bending, trapezoidal sum.
+    # A uniform line force f tilts the sheave by r f / c_tilt times the integral of r cos: the opening at the
+    # middle of a wrap of angle b is 2 r^3 f sin(b/2) / c_tilt, at its ends cos(b/2) of that. No local
+    # bending, trapezoidal sum.
     stations, arc = 201, 0.27
     sheave = wrap(stations, arc=arc, local=1e30)
     opening = flexibility(sheave) @ np.full(stations, 1e5) - 1e5 / ELEMENTS

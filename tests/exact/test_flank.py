@@ -24,8 +24,8 @@ def forces(mu, width, angle, v_radial, v_tangential):
 
 @given(coefficients, widths, angles, speeds, speeds)
 def test_forces_are_those_of_a_sliding_body_in_a_groove(mu, width, angle, v_radial, v_tangential):
-    # One flank in (radial outward, tangential, axial away from the belt's middle). The groove opens
-    # outwards: the flank's meridian is (cos, 0, sin), its normal, from the sheave to the belt, (sin, 0, -cos).
+    # One flank in (radial outward, tangential, axial away from the belt's middle). The groove opens outwards:
+    # the flank's meridian is (cos, 0, sin), its normal, from the sheave to the belt, (sin, 0, -cos).
     meridian = np.array([np.cos(angle), 0.0, np.sin(angle)])
     normal = np.array([np.sin(angle), 0.0, -np.cos(angle)])
     velocity = v_radial / np.cos(angle) * meridian + v_tangential * np.array([0.0, 1.0, 0.0])
@@ -61,7 +61,8 @@ def test_slopes_along_and_across_the_sliding(mu, width, angle, speed, direction)
     for turn, found in ((unit, along), (np.array([unit[1], -unit[0]]), across)):
         step = 1e-5 * width
         change = friction(speed * unit + step * turn) - friction(speed * unit - step * turn)
-        # central difference: (step / width)^2 = 1e-10 of the largest slope, and round-off eps / (1e-5 width / speed)
+        # central difference: (step / width)^2 = 1e-10 of the largest slope, and round-off eps / (1e-5 width /
+        # speed)
         assert found == pytest.approx(-(change @ turn) / (2.0 * step), abs=1e-7 * twice_normal * mu / width)
     assert along >= 0.0 and across >= 0.0
 
@@ -73,8 +74,8 @@ def test_no_sliding_no_friction():
 
 
 def test_overlap_in_rigid_grooves():
-    # Bullinger et al. 2005, eq. 33: the gap is z + 2 w tan(d0), z driven by the driven sheave, prescribed at the driver;
-    # rigid sheaves leave the elements' c_e alone
+    # Bullinger et al. 2005, eq. 33: the gap is z + 2 w tan(d0), z driven by the driven sheave, prescribed at
+    # the driver; rigid sheaves leave the elements' c_e alone
     parameters = {
         key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()
     }

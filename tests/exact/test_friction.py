@@ -46,8 +46,8 @@ def test_law_and_its_slope(kind, mu_k, gradient, v_s, share):
     tiny = 1e-30
     expected = FORMULAS[kind](mu_k, gradient, v_s, speed + tiny * 1j)
     found, slope = coefficient(kind, mu_k, gradient, v_s, speed)
-    # The level may be the difference of parts as large as g v_s x^3, the slope of such as g x^2; the text's cubic
-    # in mu_s - mu_k loses mu_k / v_s besides.
+    # The level may be the difference of parts as large as g v_s x^3, the slope of such as g x^2; the text's
+    # cubic in mu_s - mu_k loses mu_k / v_s besides.
     third, square = min(share, 2.0) ** 3, min(share, 2.0) ** 2
     assert found == pytest.approx(expected.real, abs=ROUND_OFF * (mu_k - gradient * v_s * (1.0 + third)))
     lost = mu_k / v_s - gradient * (1.0 + square)

@@ -19,8 +19,8 @@ radii = st.floats(
 
 @given(ratios, radii)
 def test_path_closes_in_the_plane(ratio, driven_radius):
-    # Walk along the path: clockwise arcs about both shafts, strands straight on. What touches both circles, comes back
-    # to the start and has turned once has the right wraps and strands.
+    # Walk along the path: clockwise arcs about both shafts, strands straight on. What touches both circles,
+    # comes back to the start and has turned once has the right wraps and strands.
     path = variator(ratio, driven_radius, 0.2)
     assert path.driven_radius / path.driving_radius == pytest.approx(ratio, rel=1e-15)
     heading = 0.5 * (np.pi + path.driving_wrap)  # of t2, symmetric to t1

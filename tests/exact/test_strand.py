@@ -55,15 +55,17 @@ def test_moving_string(share, printed):
     exact = np.array([1, 2]) * np.pi * (1.0 - share**2)
     assert exact[0] == pytest.approx(printed, abs=5e-7)
     errors = np.array([pinned_frequencies(cells, share) / exact - 1.0 for cells in (32, 64, 128)])
-    # Second order in the mesh: errors fall by 4, at v = 0 within the next term, (pi n / cells)^2 / 20. Near the critical
-    # speed the gyroscopic shapes are shorter, n / (1 - v/c) waves, and the coarsest mesh is not yet asymptotic.
+    # Second order in the mesh: errors fall by 4, at v = 0 within the next term, (pi n / cells)^2 / 20. Near
+    # the critical speed the gyroscopic shapes are shorter, n / (1 - v/c) waves, and the coarsest mesh is not
+    # yet asymptotic.
     ratios = errors[:-1] / errors[1:]
     assert ratios[-1] == pytest.approx([4.0, 4.0], rel=0.02 if share < 0.8 else 0.1)
     assert np.abs(errors[-1]).max() < (1e-3 if share < 0.8 else 0.02)
 
 
 def test_string_loses_its_stiffness_at_the_critical_speed():
-    # F - m v^2 is zero at v = c, only round-off of F / (m h^2) is left; beyond, every displacement is driven outwards
+    # F - m v^2 is zero at v = c, only round-off of F / (m h^2) is left; beyond, every displacement is driven
+    # outwards
     still, _ = linearise(straight_belt(32))
     critical, _ = linearise(straight_belt(32, WAVE))
     assert np.abs(critical).max() < 1e-12 * np.abs(still).max()
@@ -110,7 +112,8 @@ def critical_speed(cells, share):
 
 
 def test_critical_speed_of_a_tensioned_beam():
-    # v^2 = (T + EI pi^2 / L^2) / m; 1.048187 is printed. The mesh puts (4 / h^2) sin^2(pi h / 2 L) for (pi / L)^2.
+    # v^2 = (T + EI pi^2 / L^2) / m; 1.048187 is printed. The mesh puts (4 / h^2) sin^2(pi h / 2 L) for (pi /
+    # L)^2.
     exact = np.sqrt(1.0 + 0.01 * np.pi**2)
     assert exact == pytest.approx(1.048187, abs=5e-7)
     errors = np.array([critical_speed(cells, 0.01) - exact for cells in (16, 32, 64)])

@@ -1,7 +1,8 @@
-"""The fast step against the plain explicit one, from a common state in motion: order, size of the error, special cases.
+"""The fast step against the plain explicit one, from a common state in motion: rates, order, size of the error.
 
-A window of 0.2 ms is short against the growth of small differences, and long enough for the strands to move by some 10 um. The
-elements' speed is not judged where they are apart: there single gaps close one or the other step earlier.
+A window of 0.2 ms is short against the growth of small differences, and long enough for the strands to move
+by some 10 um. The elements' speed is not judged where they are apart: there single gaps close one or the
+other step earlier.
 """
 
 from functools import cache
@@ -104,8 +105,9 @@ LAWS = {
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("case", CASES)
 def test_both_steps_have_the_same_rates(case, law):
-    # One tiny step from a rough state, in which gaps open and close, elements press and slip every way: both take the same
-    # forces then. A step of 0.01 ns times the stiffest rate, 10^7 / s, is 1e-4; round-off of 10 m/s in it is 1e-4 m/s^2.
+    # One tiny step from a rough state, in which gaps open and close, elements press and slip every way: both
+    # take the same forces then. A step of 0.01 ns times the stiffest rate, 10^7 / s, is 1e-4; round-off of 10
+    # m/s in it is 1e-4 m/s^2.
     belt = belt_constants(DEFAULTS | CASES[case] | LAWS[law])
     state, random, step = moving_belt("memory")[1].copy(), np.random.default_rng(3), 1e-11
     for row, size in ((W, 1e-6), (U, 0.05), (V_ELEMENT, 0.05), (V_RING, 0.05)):
@@ -140,15 +142,17 @@ def test_fast_step_tends_to_the_explicit_one_with_first_order(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_error_falls_from_the_default_step_on(case):
-    # First order gives 8. With large steps stiff parts and gaps that close add their own; half of it is asked for.
+    # First order gives 8. With large steps stiff parts and gaps that close add their own; half of it is asked
+    # for.
     coarse, fine = errors_of_the_fast_step(case, STEP), errors_of_the_fast_step(case, STEP / 8)
     for name in QUANTITIES:
         assert fine[name] < coarse[name] / 4.0, name
 
 
 def test_error_at_the_default_step():
-    # Over 1 ms, two thirds of a period of the strands: meshes of 128 and 160 stations differ by a twentieth of the motion, the
-    # step shall not cost more; twice that for u, where short and fast shapes count most. With memory: without, it is chaotic.
+    # Over 1 ms, two thirds of a period of the strands: meshes of 128 and 160 stations differ by a twentieth
+    # of the motion, the step shall not cost more; twice that for u, where short and fast shapes count most.
+    # With memory: without, it is chaotic.
     belt, state = moving_belt("memory")
     exact = march("explicit", belt, state, 50e-9, 1e-3)
     fast = march("imex", belt, state, STEP, 1e-3)

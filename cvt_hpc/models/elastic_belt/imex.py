@@ -8,7 +8,7 @@ v_ring), symmetric positive definite; the content then follows from the fluxes, 
 kept to round-off.
 
 First order in the longitudinal part: it damps pressed elements like EA dt / 2 [N s]. The set of separated
-elements is frozen during a step. What limits the step is accuracy, c dt / h about 5, and the transverse
+elements is frozen during a step: those that are apart and, with the old speeds, stay apart. What limits the step is accuracy, c dt / h about 5, and the transverse
 contact and bending.
 """
 
@@ -255,19 +255,21 @@ def _cells(belt: Belt, state: State, work: ImexWork, step: float) -> None:
         stiffness = belt.ring_stiffness if layer else belt.element_stiffness
         damper = belt.ring_damping if layer else belt.element_damping
         for c in range(n):
-            if layer == 0 and eps[c] >= 0.0:
-                work.stress[0, c] = work.link[0, c] = 0.0
-                continue
             a, b = c - 1 if c > 0 else n - 1, c + 1 if c < n - 1 else 0
             inverse = 1.0 / (content[c] * belt.cell[c])
             stretch = 1.0 + eps[c]
             widening = 0.5 * belt.curvature[c] * belt.cell[c] * (u[c] + push[c] + u[b] + push[b])
             outflow = v[b] - v[c] * stretch / (1.0 + eps[a])
-            work.stress[layer, c] = (
-                stiffness * (eps[c] + step * inverse * (widening + outflow))
-                + damper * (v[b] - v[c]) / belt.cell[c]
-            )
-            work.link[layer, c] = stiffness * step * inverse + damper / belt.cell[c]
+            ahead = eps[c] + step * inverse * (widening + outflow)
+            if layer == 0 and eps[c] >= 0.0 and ahead >= 0.0:
+                work.stress[0, c] = work.link[0, c] = 0.0
+                continue
+            viscous, grip = damper * (v[b] - v[c]) / belt.cell[c], damper / belt.cell[c]
+            if layer == 0 and viscous > -stiffness * eps[c]:
+                # elements never pull: their damper ends where it would outweigh the push force
+                viscous, grip = -stiffness * min(eps[c], 0.0), 0.0
+            work.stress[layer, c] = stiffness * ahead + viscous
+            work.link[layer, c] = stiffness * step * inverse + grip
     for j in range(n):
         a = j - 1 if j > 0 else n - 1
         work.diagonal[0, j] += work.link[0, a] + work.link[0, j]

@@ -1,0 +1,55 @@
+"""Runs of the elastic belt for the tests of this folder: each is done once, however many tests look at it."""
+
+from functools import cache
+
+import numpy as np
+
+from cvt_hpc.job import Job, build_job
+from cvt_hpc.models.elastic_belt.record import evaluate
+from cvt_hpc.models.elastic_belt.transient import Transient
+from cvt_hpc.simulation import run_point
+
+# A coarse belt that is loaded within 10 ms, judged over the shortest part that is allowed: 0.1 s of computing.
+CHEAP = {"stations": 48, "duration": 0.04, "rise_time": 0.01}
+
+
+def job(stepper: str = "imex", axes: dict | None = None, **values) -> Job:
+    """A job of the elastic belt with defaults but for `values` [SI]."""
+    document = {"name": "test", "model": "elastic_belt", "stepper": stepper, "axes": axes or {}}
+    return build_job(document, "test.toml", values)
+
+
+def never() -> None:
+    """The answer of a sweep that lets a run go on."""
+
+
+def fresh_record(**values) -> dict:
+    """The record of one run, computed anew."""
+    asked = job(**values)
+    return run_point(asked, asked.point(0), never)
+
+
+@cache
+def record(**values) -> dict:
+    """The record of one run."""
+    return fresh_record(**values)
+
+
+@cache
+def finished(**values) -> Transient:
+    """One run with all its samples."""
+    asked = job(**values)
+    run = Transient(asked.point(0), asked.stepper)
+    while run.done < run.samples:
+        assert run.advance(run.samples) is None
+    return run
+
+
+def balance(run: Transient) -> dict:
+    """The model's part of the record of a finished run."""
+    return evaluate(run, np.array([2, 7]))  # the probes in the middles of the strands
+
+
+def mean(run: Transient, name: str) -> float:
+    """Mean of a channel over the judged part."""
+    return float(run.channel(name)[run.judged].mean())
