@@ -38,7 +38,7 @@ _OCCURRENCE = (
 _COST = (
     Variable("core_seconds", (), "f8", "s", "processor time of the run", volatile=True),
     Variable("simulated_seconds", (), "f8", "s", "simulated time, less than asked where the run failed"),
-    Variable("step", (), "f8", "s", "time step"),
+    Variable("time_step", (), "f8", "s", "time step"),
     Variable("steps", (), "i8", "1", "time steps taken"),
     Variable("contact_solves", (), "i8", "1", "linear solves of the contact problem"),
 )
@@ -178,7 +178,7 @@ def _run(job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]) -
     record |= {
         "core_seconds": time.process_time() - started,
         "simulated_seconds": run.time,
-        "step": run.step,
+        "time_step": run.step,
         "steps": run.steps,
         "contact_solves": run.contact_solves,
     }

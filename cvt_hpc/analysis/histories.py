@@ -117,9 +117,9 @@ def history_figure(dataset: xr.Dataset) -> Figure:
         rows.append((1.2, [(LEFT, panels.draw_load, dataset)]))
     if with_spectrum:
         rows.append((2.1, [(WHOLE, panels.draw_spectra, with_spectrum)]))
-    if "ring_tension" in dataset or "push_force" in dataset:
+    if _is_known(dataset, "ring_tension") or _is_known(dataset, "push_force"):
         rows.append((2.0, [(WHOLE, panels.draw_forces, dataset)]))
-    if "contact_force" in dataset:
+    if _is_known(dataset, "contact_force"):
         rows.append((1.5, [(WHOLE, panels.draw_contact, dataset)]))
     if not rows:
         raise InputError("history: expected displacement, load or forces of a run, found none of them")
@@ -132,6 +132,11 @@ def history_figure(dataset: xr.Dataset) -> Figure:
         for columns, draw, what in row:
             draw(figure.add_subplot(grid[i, columns]), what)
     return figure
+
+
+def _is_known(dataset: xr.Dataset, name: str) -> bool:
+    """Whether a quantity is there and has a value: one that failed early has no judged part."""
+    return name in dataset and bool(np.isfinite(dataset[name]).any())
 
 
 def _vibration_settings(dataset: xr.Dataset) -> dict[str, float]:

@@ -20,7 +20,7 @@ BIN_WIDTH = 5.0  # [Hz]
 CLOSE_UP = 0.01  # [s]: six periods at 600 Hz
 MOST_PEAKS = 3
 COLOURS = {"t1": "#b5460f", "t2": "#1f4e8c"}  # of like lightness, so line styles tell them apart in grey
-LINES = ("-", "--", ":", "-.")
+LINES = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))  # one for each probe of a strand, by default
 _OTHER_COLOUR = "#333333"
 
 
@@ -144,14 +144,14 @@ def draw_close_up(axes: Axes, strand: Strand) -> None:
     for i, label in enumerate(strand.probes):
         values = strand.displacement[last, i] - strand.displacement[last, i].mean()
         place = label.removeprefix(strand.name).strip() or label
-        axes.plot(time, values, LINES[i % len(LINES)], color=strand.colour, linewidth=1.2, label=place)
+        axes.plot(time, values, ls=LINES[i % len(LINES)], color=strand.colour, linewidth=1.2, label=place)
     axes.set(xlim=(time[0], time[-1]), xlabel="time [ms]")
     axes.legend(
         loc="lower left",
         bbox_to_anchor=(-0.05, 0.97),
-        ncols=len(strand.probes),
+        ncols=3,
         frameon=False,
-        handlelength=1.0,
+        handlelength=2.2,
         handletextpad=0.2,
         columnspacing=0.4,
         fontsize=7,
@@ -166,7 +166,7 @@ def draw_spectra(axes: Axes, strands: list[Strand]) -> None:
         signal = strand.judged[:, strand.strongest]
         spectrum = amplitude_spectrum(signal, strand.rate, bins)
         label = strand.probes[strand.strongest]
-        axes.plot(bins, spectrum, LINES[i % len(LINES)], color=strand.colour, linewidth=1.2, label=label)
+        axes.plot(bins, spectrum, ls=LINES[i % len(LINES)], color=strand.colour, linewidth=1.2, label=label)
         for frequency, amplitude in _peaks(signal, strand, bins, spectrum):
             axes.plot(frequency, amplitude, "v", color=strand.colour, markersize=5)
             axes.annotate(

@@ -32,7 +32,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cvt_hpc.kernels import kernel
+from cvt_hpc.kernels import kernel, merged_kernel
 
 
 class Law(IntEnum):
@@ -152,7 +152,7 @@ def formula_coefficient(
     return kinetic + span, 0.0
 
 
-@kernel
+@merged_kernel
 def friction_coefficient(law: FrictionLaw, speed: float, force: float) -> tuple[float, float]:
     """Coefficient of friction in steady sliding and its slope.
 

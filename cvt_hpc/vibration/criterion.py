@@ -17,8 +17,11 @@ The defaults, and why:
 - `decay_tolerance` 0.25 e-folds over the judged part: settled amplitudes scatter by 2-7 % from one 50 ms
   window to the next; three times that may pass for scatter. A smaller loss still counts as decay where
   the fit leaves no doubt, that is where it exceeds `occurrence.STEADY_LOSS` and the fit's scatter.
-- `growth_tolerance` 1 e-fold, gained since the quietest window or, beyond doubt, within one more record of
-  the same length: noise in the band scatters by 10-15 % per window, and a factor of e is far outside.
+- `growth_tolerance` 1 e-fold, gained in a steady rise from the quietest window or, beyond doubt, within one
+  more record of the same length: noise in the band scatters by 10-15 % per window, and a factor of e is far
+  outside.
+- `negligible_amplitude` 10 nm: strands are given 1 um when the start-up is over, and what grows by itself
+  grows from there; a strand that ends a hundred times below has decayed, whatever rounding does to its trend.
 """
 
 from __future__ import annotations
@@ -34,6 +37,9 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "band_high": Parameter(1500.0, "Hz", "highest frequency of a vibration", minimum=0.0, exclusive=True),
         "amplitude_threshold": Parameter(
             5e-6, "m", "peak amplitude from which a strand vibrates", minimum=0.0, exclusive=True
+        ),
+        "negligible_amplitude": Parameter(
+            1e-8, "m", "peak amplitude below which a strand is quiet whatever its trend", minimum=0.0
         ),
         "judged_fraction": Parameter(
             0.5,

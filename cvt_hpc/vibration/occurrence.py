@@ -22,6 +22,7 @@ from cvt_hpc.variables import Vibrates
 
 CONFIDENCE = 0.975  # one-sided, by Student's t: few windows know their own scatter badly
 STEADY_LOSS = 0.05  # e-folds over the judged part that a settled vibration may lose, scatter apart
+LEAST_RISES = 3  # windows in a row, none below the one before: irregular motion does that once in 24 times
 LONGEST_REASON = 240  # bytes that a record keeps of the reason
 
 
@@ -99,10 +100,14 @@ def _judge_strand(
     if last == 0:
         return Vibrates.NO, "is at rest"
     late = windows[len(windows) // 2 :]
+    if np.all(late < parameters["negligible_amplitude"]):
+        return Vibrates.NO, f"is quiet, {size}"
     if last >= threshold or (np.any(late >= threshold) and not rate + margin < 0):
         return Vibrates.UNDECIDED, f"is above the threshold only at times, {size}"
+    since = windows[np.argmin(windows) :]
+    rising = len(since) > LEAST_RISES and bool(np.all(np.diff(since) >= 0.0))
     with np.errstate(divide="ignore"):
-        gain = max(np.log(last) - np.log(windows.min()), (rate - margin) * record_time)
+        gain = max(np.log(last / since[0]) if rising else 0.0, (rate - margin) * record_time)
     if gain >= parameters["growth_tolerance"]:
         return Vibrates.UNDECIDED, f"is below the threshold, {size}, but growing"
     if not (rate + error) * record_time < np.log(threshold / last):

@@ -1,8 +1,7 @@
 """The power balance of a run: it closes, and each of its terms is what the mechanics really take.
 
 The balance of whole runs is left open by upwinded transport, by backward Euler in the layers and by the linear stretch. At 64
-stations, judged over 40 ms, that is below 0.05 % of the power of a loaded belt. Without load the drive has 2 kW instead of
-40, and of the energy that the rise has left some 10 W are not settled after 40 ms: 0.4 %.
+stations, judged over 40 ms, these are 10 W: 0.03 % of the power of a loaded belt, and 0.4 % of the 2 kW without load.
 """
 
 import numpy as np
@@ -11,7 +10,6 @@ from marched import balance, finished, job, mean
 
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
-    DRIVEN_SPEED,
     N_ELEMENT,
     N_RING,
     V_ELEMENT,
@@ -37,16 +35,17 @@ SCENES = {
     "quiet": ({"load": 60.0}, 5e-4),
     "constant friction": ({"load": 120.0} | CONSTANT, 5e-4),
     "braking": ({"load": -60.0}, 5e-4),
-    "rigid": ({"load": 120.0, "sheave_stiffness": np.inf}, 1e-3),  # settles later: nothing but 200 W damp it
+    "rigid": ({"load": 120.0, "sheave_stiffness": np.inf}, 1e-3),  # 20 W of 38 kW
     "no load": ({"load": 0.0}, 5e-3),
     "no load, rigid": ({"load": 0.0, "sheave_stiffness": np.inf}, 5e-3),
     "no load, damped": ({"load": 0.0, "transverse_damping": 2e4}, 5e-3),
 }
-# on the default mesh short waves in the elements are sampled, too
+# The default mesh carries waves that are so short that they last a few steps only. Sampled at one step of twenty, always in
+# the same phase, one cell that closes and opens at a driven pulley's inlet counts with 70 W of 1.9 kW there.
 DEFAULT_MESH = {
     "vibrating": ({"load": 120.0}, 2.5e-3),
     "rigid": ({"load": 120.0, "sheave_stiffness": np.inf}, 0.01),
-    "no load": ({"load": 0.0}, 0.01),
+    "no load": ({"load": 0.0}, LARGEST_POWER_RESIDUAL),
 }
 
 
@@ -202,4 +201,3 @@ def test_each_term_is_what_it_takes_from_the_stored_energy(rough, name):
     assert min(abs(gained[term]) for term in terms) > 10.0
     # round-off of the stored energy, 5e-12 J, over the tiny step
     assert storing - storing_before == pytest.approx(-taken, abs=0.05)
-

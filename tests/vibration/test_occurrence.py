@@ -14,7 +14,7 @@ from cvt_hpc.vibration.signals import growth_fit
 RATE = 20_000.0
 DEFAULTS = {key: parameter.default for key, parameter in PARAMETERS["vibration"].items()}
 # a wide band and a round threshold, in which the cases below are told
-SETTINGS = DEFAULTS | {"band_low": 100.0, "amplitude_threshold": 1e-6}
+SETTINGS = DEFAULTS | {"band_low": 100.0, "amplitude_threshold": 1e-6, "negligible_amplitude": 0.0}
 NO, YES, UNDECIDED = Vibrates.NO, Vibrates.YES, Vibrates.UNDECIDED
 STILL = [0.0] * 6
 
@@ -43,6 +43,7 @@ TABLE = {
     "growing, far below": ([1e-6, 2e-6, 4e-6, 8e-6, 16e-6, 32e-6], UNDECIDED),
     "growing slowly, far below": ([1e-3, 1.1e-3, 1.21e-3, 1.33e-3, 1.46e-3, 1.61e-3], UNDECIDED),
     "growing after a decay": ([1e-1, 1e-2, 1e-3, 1e-3, 2e-3, 4e-3], UNDECIDED),
+    "irregular, low for a while by chance": ([0.1, 0.035, 0.1, 0.09, 0.035, 0.1], NO),
     "about to cross": ([0.70, 0.74, 0.78, 0.82, 0.86, 0.90], UNDECIDED),
 }
 
@@ -92,6 +93,8 @@ def test_each_threshold_counts():
     assert changed("decaying and scattering", decay_tolerance=10.0) is YES
     assert changed("creeping to its limit cycle", decay_tolerance=0.0) is UNDECIDED
     assert changed("growing after a decay", growth_tolerance=3.0) is NO
+    assert changed("growing after a decay", negligible_amplitude=3.9e-9) is UNDECIDED
+    assert changed("growing after a decay", negligible_amplitude=4.1e-9) is NO
 
 
 def test_too_few_windows_to_see_a_trend_are_undecided():

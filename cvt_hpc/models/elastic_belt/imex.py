@@ -8,8 +8,8 @@ v_ring), symmetric positive definite; the content then follows from the fluxes, 
 kept to round-off.
 
 First order in the longitudinal part: it damps pressed elements like EA dt / 2 [N s]. The set of separated
-elements is frozen during a step: those that are apart and, with the old speeds, stay apart. What limits the step is accuracy, c dt / h about 5, and the transverse
-contact and bending.
+elements is frozen during a step: those that are apart and, with the old speeds, stay apart. What limits the
+step is accuracy, c dt / h about 5, and the transverse contact and bending.
 """
 
 from __future__ import annotations
@@ -44,6 +44,8 @@ from cvt_hpc.models.elastic_belt.rhs import (
 from cvt_hpc.physics.compliance import ContactState
 from cvt_hpc.physics.friction import formula_coefficient, friction_coefficient, saturation
 
+MOST_PASSES = 3  # one, unless friction turns sliding about; a third where the second turns others
+
 
 class ImexWork(NamedTuple):
     """Work space of the step; `last_u` is u one step earlier, the rest is scratch.
@@ -68,6 +70,10 @@ class ImexWork(NamedTuple):
         Pending increment of u, its sensitivity to v_element's, slope w_s.
     flank : (3, N) array
         Tangential flank force and its slopes with v_element and u.
+    sliding : (2, N) array
+        Radial and tangential sliding speed at the old state [m/s].
+    reversing : (N,) bool array
+        Stations that the linearised friction of this step would throw back.
     """
 
     force: np.ndarray
@@ -80,14 +86,15 @@ class ImexWork(NamedTuple):
     border: np.ndarray
     radial: np.ndarray
     flank: np.ndarray
+    sliding: np.ndarray
+    reversing: np.ndarray
 
 
 def imex_work(state: State) -> ImexWork:
     """Work space for a state of N stations."""
     n = state.fields.shape[1]
-    return ImexWork(
-        np.zeros(n), state.fields[U].copy(), *(np.zeros((k, n)) for k in (2, 2, 2, 3, 2, 4, 3, 3))
-    )
+    scratch = (np.zeros((k, n)) for k in (2, 2, 2, 3, 2, 4, 3, 3, 2))
+    return ImexWork(np.zeros(n), state.fields[U].copy(), *scratch, np.zeros(n, dtype=np.bool_))
 
 
 @merged_kernel
@@ -124,9 +131,13 @@ def step_imex(
     """
     solves = contact_forces(belt, state, contacts, work.force)
     strains(belt, state.fields, work.eps)
-    _stations(belt, state, work, step)
-    _cells(belt, state, work, step)
-    _solve_cyclic(work)
+    work.reversing[:] = False
+    for _ in range(MOST_PASSES):
+        _stations(belt, state, work, step)
+        _cells(belt, state, work, step)
+        _solve_cyclic(work)
+        if not _reversals(belt, work):
+            break
     moment = _advance(belt, state, work, step)
     scalars = state.scalars
     load = belt.ratio * load_at(belt, scalars[TIME])
@@ -158,6 +169,7 @@ def _stations(belt: Belt, state: State, work: ImexWork, step: float) -> None:
     driven_speed, driving_speed = state.scalars[DRIVEN_SPEED], belt.driving_speed
     force, last_u = work.force, work.last_u
     radial_row, flank_row, diagonal, right_hand = work.radial, work.flank, work.diagonal, work.right
+    sliding_row, reversing = work.sliding, work.reversing
     speed_squared = belt.belt_speed * belt.belt_speed
     centrifugal = belt.mass * belt.belt_speed * belt.belt_speed
     gyroscopic = 2.0 * belt.mass * belt.belt_speed
@@ -210,6 +222,10 @@ def _stations(belt: Belt, state: State, work: ImexWork, step: float) -> None:
             outward += share * radial
             along_element += share * tangential
             rate = step * share / element_mass
+            sliding_row[0, j], sliding_row[1, j] = v_radial, v_tangential
+            if reversing[j]:
+                # by the secant friction stops, and never throws back
+                along = across
             along *= share * implicit_share(rate * along)
             across *= share * implicit_share(rate * across)
             c, s = meridian / speed, v_tangential / speed
@@ -325,6 +341,26 @@ def _solve_cyclic(work: ImexWork) -> None:
         n0 = y[0, j] - g[0, j] * x0 - g[1, j] * x1 + d[0, j] * e0 + d[1, j] * e1
         n1 = y[1, j] - g[2, j] * x0 - g[3, j] * x1 + d[1, j] * e0 + d[2, j] * e1
         y[0, j], y[1, j] = n0, n1
+
+
+@merged_kernel
+def _reversals(belt: Belt, work: ImexWork) -> bool:
+    """Mark stations that slid in the saturated range and would now slide back; whether there are new ones.
+
+    There the tangent of friction is flat, the step all but explicit, and a large friction force turns the
+    sliding about within a step: it chatters, and takes energy out of nothing.
+    """
+    found = False
+    for j in range(belt.cell.size):
+        if belt.arc_share[j] > 0.0 and not work.reversing[j]:
+            v_radial, v_tangential = work.sliding[0, j], work.sliding[1, j]
+            dv = work.right[0, j]
+            turn = v_radial * (work.radial[0, j] + (work.radial[2, j] - work.radial[1, j]) * dv)
+            turn += v_tangential * dv
+            speed_squared = v_radial * v_radial + v_tangential * v_tangential
+            if speed_squared > belt.friction_speed * belt.friction_speed and turn < -speed_squared:
+                work.reversing[j] = found = True
+    return found
 
 
 @merged_kernel

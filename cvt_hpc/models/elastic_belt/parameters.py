@@ -169,7 +169,8 @@ def _check_table(force: tuple, speed: tuple, mu: tuple) -> list[tuple[str, str, 
             return [(key, "at least two ascending values", f"{list(grid)}")]
     shape = (len(force), len(speed))
     if len(mu) != shape[0] or any(not isinstance(row, tuple) or len(row) != shape[1] for row in mu):
-        return [("table_mu", f"{shape[0]} rows of {shape[1]} coefficients", f"{len(mu)} rows")]
+        lengths = ", ".join(str(len(row)) if isinstance(row, tuple) else "no row" for row in mu)
+        return [("table_mu", f"{shape[0]} rows of {shape[1]} coefficients", f"rows of {lengths or 'none'}")]
     if np.min(mu) <= 0.0:
         return [("table_mu", "coefficients > 0", f"{np.min(mu):g}")]
     return []

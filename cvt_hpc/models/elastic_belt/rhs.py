@@ -242,7 +242,7 @@ def memory_transport(belt: Belt, spacing: float) -> float:
     return 1.0 / (belt.friction_memory * np.expm1(spacing / (belt.belt_speed * belt.friction_memory)))
 
 
-@kernel
+@merged_kernel
 def sliding_speed(belt: Belt, state: State, j: int) -> float:
     """Sliding speed |v| of the flanks at station j of an arc [m/s]."""
     n = belt.cell.size

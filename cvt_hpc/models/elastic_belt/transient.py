@@ -31,7 +31,7 @@ from cvt_hpc.models.elastic_belt.sampling import (
 from cvt_hpc.physics.compliance import contact_state
 from cvt_hpc.variables import Status
 
-LARGEST_POWER_RESIDUAL = 0.05
+LARGEST_POWER_RESIDUAL = 0.02
 
 FAILURES = {
     Outcome.NO_CONTACT_SOLUTION: (

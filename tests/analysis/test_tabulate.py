@@ -1,0 +1,49 @@
+"""jobs/tabulate.py: the table that is kept of a slow study."""
+
+import csv
+import runpy
+from pathlib import Path
+
+import numpy as np
+from studies import study
+
+ROWS = runpy.run_path(str(Path(__file__).parents[2] / "jobs" / "tabulate.py"))["rows"]
+
+
+def table():
+    results = study(gradients=(-2.4, -0.8))
+    shape = results["status"].shape
+    results["mode"] = (results["amplitude"].dims, np.full((*shape, 2), [2, 3], np.int8))
+    for name in ("power_residual", "core_seconds"):
+        results[name] = (results["status"].dims, np.full(shape, 0.25))
+    return results, list(csv.DictReader(ROWS(results)))
+
+
+def test_each_run_has_its_row_in_the_order_of_the_axes():
+    results, rows = table()
+    assert len(rows) == results["status"].size
+    wanted = [
+        (g, s, q) for g in (-2.4, -0.8) for s in (1.0, 1.2, 1.5, np.inf) for q in results["load"].values
+    ]
+    found = [(float(r["friction_gradient"]), float(r["sheave_stiffness"]), float(r["load"])) for r in rows]
+    assert found == wanted
+
+
+def test_values_are_those_of_the_dataset_in_the_units_of_the_head():
+    results, rows = table()
+    row, run = rows[4], results.isel(friction_gradient=0, sheave_stiffness=0, load=4)
+    assert row["status"] == "done" and row["vibrates"] == "yes"
+    # two digits after the point in um, one in Hz
+    assert abs(float(row["amplitude_t1 [um]"]) - run["amplitude"].values[0] * 1e6) <= 0.005
+    assert abs(float(row["frequency_t2 [Hz]"]) - run["frequency"].values[1]) <= 0.05
+    assert (row["mode_t1"], row["mode_t2"], row["power_residual"]) == ("2", "3", "0.2500")
+
+
+def test_a_run_that_failed_has_no_numbers():
+    _, rows = table()
+    failed = [row for row in rows if row["status"] != "done"]
+    assert {row["status"] for row in failed} >= {"failed_numerics", "failed_error", "timed_out", "not_run"}
+    for row in failed:
+        assert not any(
+            row[key] for key in row if key.startswith(("vibrates", "amplitude", "frequency", "mode"))
+        )

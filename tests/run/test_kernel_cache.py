@@ -1,0 +1,151 @@
+"""Where machine code is kept: a folder for each content of the kernels' sources, and nobody else's business changed."""
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import pytest
+
+from cvt_hpc import kernels
+
+PACKAGE = Path(kernels.__file__).parent
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A copy of what the folder's name depends on."""
+    copy = tmp_path / "site" / "cvt_hpc"
+    copy.mkdir(parents=True)
+    shutil.copy(PACKAGE / "kernels.py", copy)
+    for room in ("physics", "models", "study"):
+        shutil.copytree(PACKAGE / room, copy / room, ignore=shutil.ignore_patterns("__pycache__"))
+    return copy
+
+
+@pytest.fixture
+def no_choice(monkeypatch):
+    """No cache folder chosen by the user."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+
+
+def load(package):
+    """The module `kernels` of a copy of the package."""
+    spec = importlib.util.spec_from_file_location("copied_kernels", package / "kernels.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def folder(package):
+    return Path(load(package)._CACHE)
+
+
+def without_access_to(monkeypatch, *refused):
+    """Let the system refuse to write to some folders, whoever runs the tests."""
+    ask = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) not in refused and ask(path, mode))
+
+
+def plus_one(x):
+    return x + 1.0
+
+
+def test_the_folder_is_in_the_package_and_named_by_content(package, no_choice):
+    found = folder(package)
+    assert found.parent == package / "__pycache__"
+    assert found == folder(package)
+
+
+@pytest.mark.parametrize(
+    ("source", "is_other"),
+    [
+        ("physics/friction.py", True),
+        ("models/elastic_belt/rhs.py", True),
+        ("models/elastic_belt/new_part.py", True),
+        ("kernels.py", True),
+        ("study/sweep.py", False),
+    ],
+)
+def test_a_changed_source_gives_another_folder(package, no_choice, source, is_other):
+    before = folder(package)
+    with (package / source).open("a") as file:
+        file.write("\n")
+    assert (folder(package) != before) == is_other
+
+
+def test_the_name_does_not_depend_on_dates(package, no_choice):
+    before = folder(package)
+    for source in package.rglob("*.py"):
+        os.utime(source, (1e9, 1e9))
+    assert folder(package) == before
+
+
+def test_code_lies_in_the_users_folder_where_one_is_chosen(tmp_path):
+    # as a user does it, in a process of his own: the variable is read when numba is imported
+    program = (
+        "import numba; from cvt_hpc import kernels; from cvt_hpc.physics.friction import saturation; "
+        "saturation(0.1, 1.0); print(kernels._CACHE); print(saturation.stats.cache_path); print(numba.config.CACHE_DIR)"
+    )
+    chosen = tmp_path / "mine"
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, "NUMBA_CACHE_DIR": str(chosen)},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
+    ours, used, left = done.stdout.splitlines()
+    assert Path(ours).parent == chosen
+    assert Path(used).is_relative_to(ours)
+    assert list(Path(used).glob("friction.saturation*.nbi"))
+    assert left == str(chosen)
+
+
+def test_functions_of_other_people_are_kept_where_they_always_were(package, monkeypatch, tmp_path):
+    theirs = tmp_path / "theirs"
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(theirs))
+    module = load(package)
+    ours = module.kernel(plus_one)
+    assert numba.config.CACHE_DIR == str(theirs)
+    other = numba.njit(cache=True)(plus_one)
+    assert Path(ours.stats.cache_path).is_relative_to(module._CACHE)
+    assert not Path(other.stats.cache_path).is_relative_to(module._CACHE)
+    assert Path(other.stats.cache_path).is_relative_to(theirs)
+
+
+def test_an_error_in_a_kernel_leaves_the_users_setting(package, no_choice):
+    module = load(package)
+    with pytest.raises(TypeError):
+        module.kernel("no function")
+    assert numba.config.CACHE_DIR == ""
+
+
+def test_a_package_that_cannot_be_written_falls_back_to_the_users_cache(
+    package, no_choice, monkeypatch, tmp_path
+):
+    without_access_to(monkeypatch, package)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    module = load(package)
+    assert Path(module._CACHE).parent == tmp_path / "cache" / "cvt_hpc"
+    function = module.kernel(plus_one)
+    assert function(1.0) == 2.0
+    assert list(Path(module._CACHE).rglob("*plus_one*.nbi"))
+    assert not (package / "__pycache__").exists() or not list((package / "__pycache__").glob("kernels-*"))
+
+
+def test_without_a_cache_of_the_user_it_is_home_or_else_a_temporary_folder(
+    package, no_choice, monkeypatch, tmp_path
+):
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "home").mkdir()
+    without_access_to(monkeypatch, package)
+    assert folder(package).parent == tmp_path / "home" / ".cache" / "cvt_hpc"
+    without_access_to(monkeypatch, package, tmp_path / "home")
+    assert folder(package).parent == tmp_path / "temporary" / ".cache" / "cvt_hpc"

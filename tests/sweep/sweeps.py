@@ -1,0 +1,109 @@
+"""The real command line in processes of its own, serial or under a real mpirun."""
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.recovery import read_records
+
+PATIENCE = 120.0  # [s] until a process that should end counts as hanging; kernels may have to be compiled
+_LAUNCHERS = ("SLURM_", "PMI", "OMPI_", "MPI_")
+
+
+def environment(**changes: str) -> dict[str, str]:
+    """This environment without traces of a launcher, and with what Open MPI wants in a container."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(_LAUNCHERS)}
+    return {
+        **kept,
+        "OMPI_ALLOW_RUN_AS_ROOT": "1",
+        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
+        **changes,
+    }
+
+
+def mpirun(ranks: int) -> list[str]:
+    """The launcher for some ranks."""
+    if importlib.util.find_spec("mpi4py") is None:
+        pytest.skip("mpi4py is not installed")
+    found = shutil.which("mpirun", path=str(Path(sys.executable).parent)) or shutil.which("mpirun")
+    if found is None:
+        pytest.skip("no mpirun beside the Python interpreter nor on the path")
+    return [found, "-n", str(ranks)]
+
+
+def start(*arguments, cwd: Path, ranks: int = 0, **changes: str) -> subprocess.Popen:
+    """Start `cvt-hpc` in a process group of its own; ranks 0: without a launcher."""
+    launcher = mpirun(ranks) if ranks else []
+    return subprocess.Popen(
+        [*launcher, sys.executable, "-m", "cvt_hpc", *map(str, arguments)],
+        cwd=cwd,
+        env=environment(**changes),
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+
+
+def call(*arguments, cwd: Path, ranks: int = 0, **changes: str) -> subprocess.CompletedProcess:
+    """Run `cvt-hpc` to its end."""
+    process = start(*arguments, cwd=cwd, ranks=ranks, **changes)
+    try:
+        out, err = process.communicate(timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        kill(process)
+        pytest.fail(f"{arguments} hangs; its stderr: {process.communicate()[1]}")
+    return subprocess.CompletedProcess(process.args, process.returncode, out, err)
+
+
+def kill(process: subprocess.Popen) -> None:
+    """Kill -9 a launcher and all that it has started, wherever it has put them."""
+    root = psutil.Process(process.pid)
+    family = [*root.children(recursive=True), root]
+    for member in family:
+        try:
+            member.kill()
+        except psutil.NoSuchProcess:
+            continue
+    psutil.wait_procs(family, timeout=PATIENCE)
+
+
+def records(out: Path) -> int:
+    """How many runs an output folder has on record so far."""
+    folder = StudyFolder(out)
+    if not folder.job_file.exists():
+        return 0
+    return int(read_records(folder.records, folder.load()).recorded.sum())
+
+
+def wait_for_records(out: Path, count: int, process: subprocess.Popen) -> None:
+    """Return when so many runs are on record."""
+    deadline = time.monotonic() + PATIENCE
+    while records(out) < count:
+        if process.poll() is not None:
+            pytest.fail(f"ended with {process.returncode}: {process.communicate()[1]}")
+        if time.monotonic() > deadline:
+            pytest.fail(f"waited in vain for {count} records")
+        time.sleep(0.005)
+
+
+def assert_same_numbers(found, expected) -> None:
+    """Assert that all variables of two datasets agree bitwise, but those that depend on the hour."""
+    assert list(found.variables) == list(expected.variables)
+    for name, variable in expected.variables.items():
+        if variable.attrs.get("volatile") != "yes":
+            one, other = found[name].values, variable.values
+            assert one.dtype == other.dtype, name
+            same = (
+                one.tolist() == other.tolist() if one.dtype.kind in "OU" else one.tobytes() == other.tobytes()
+            )
+            assert same, name

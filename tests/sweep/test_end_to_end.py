@@ -1,0 +1,191 @@
+"""From a job file to its map, with the real mechanics and the real command line, on one rank and on two."""
+
+import json
+import os
+import platform
+import random
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import xarray as xr
+from PIL import Image
+from sweeps import assert_same_numbers, call, environment, kill, records, start, wait_for_records
+
+from cvt_hpc import open_results
+from cvt_hpc.analysis.cells import STYLES
+from cvt_hpc.analysis.classes import OccurrenceClass, occurrence_classes
+from cvt_hpc.study.record import MARKER
+from cvt_hpc.variables import Status, Vibrates
+
+RUNS = 8
+JOB = """
+name = "small"
+description = "A coarse belt"
+model = "elastic_belt"
+
+[axes]
+sheave_stiffness = [1.0, inf]
+load = ["0 N m", "60 N m", "120 N m", "500 N m"] # the last one is more than friction carries
+
+[scene]
+rise_time = "20 ms"
+
+[mesh]
+stations = 48
+
+[run]
+duration = "0.08 s"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with the job."""
+    (tmp_path / "small.toml").write_text(JOB)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def serial(tmp_path_factory):
+    """The folder of an undisturbed serial run."""
+    folder = tmp_path_factory.mktemp("serial")
+    (folder / "small.toml").write_text(JOB)
+    done = call("run", "small.toml", cwd=folder)
+    assert done.returncode == 1, done.stderr  # both sheaves slip through at 500 N m
+    assert done.stdout.splitlines() == [
+        "8 runs: 6 done, 2 failed, 0 left",
+        "results: out/small/results.nc",
+    ]
+    return folder / "out" / "small"
+
+
+def load_results(out):
+    with open_results(out) as dataset:
+        return dataset.load()
+
+
+def test_the_dataset_of_a_sweep(serial):
+    dataset = load_results(serial)
+    assert dataset["status"].dims == ("sheave_stiffness", "load")
+    status = [[Status(value) for value in row] for row in dataset["status"].values]
+    assert status == [[Status.DONE] * 3 + [Status.FAILED_ERROR]] * 2
+    vibrating = dataset["vibrates"].values == Vibrates.YES
+    # the coarse belt vibrates where the fine one does
+    assert np.argwhere(vibrating & (dataset["status"].values == Status.DONE)).tolist() == [[0, 2]]
+    assert np.isfinite(dataset["amplitude"].values[:, :3]).all()
+    assert np.isnan(dataset["amplitude"].values[:, 3]).all()
+    assert "slips through" in str(dataset["reason"].values[0, 3])
+    assert json.loads(dataset.attrs["job"])["axes"]["sheave_stiffness"] == [1.0, "inf"]
+
+
+def test_two_ranks_give_the_same_bits(serial, folder):
+    done = call("run", "small.toml", "--out", "two", cwd=folder, ranks=2)
+    assert done.returncode == 1, done.stderr
+    assert len(list((folder / "two" / "records").glob("rank-0001-*.log"))) == 1
+    assert_same_numbers(load_results(folder / "two"), load_results(serial))
+
+
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_kill_9_at_any_moment_and_resume(serial, folder, ranks):
+    out = folder / "out" / "small"
+    sweep = start("run", "small.toml", cwd=folder, ranks=ranks)
+    wait_for_records(out, random.randint(1, 3), sweep)
+    time.sleep(random.uniform(0.0, 0.2))
+    kill(sweep)
+    sweep.communicate()
+    before = records(out)
+    assert 0 < before < RUNS
+    assert not (out / "results.nc").exists()
+    resumed = call("run", "small.toml", cwd=folder, ranks=ranks)
+    assert resumed.returncode == 1, resumed.stderr
+    assert_same_numbers(load_results(out), load_results(serial))
+    # the dataset names both starts, and nothing was done twice
+    assert load_results(out).attrs["history"].count(f"(on {platform.node()}, {max(ranks, 1)} rank(s))") == 2
+    assert frames_written(out) == RUNS
+
+
+def frames_written(out):
+    """Number of records in all logs, repeated ones counted each time."""
+    return sum(path.read_bytes().count(MARKER) for path in (out / "records").glob("*.log"))
+
+
+def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):
+    done = call(
+        "simulate", "small.toml", "--at", "load=120 N m", "--out", "h.nc", "--plot", "h.png", cwd=folder
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "vibrates" in done.stdout
+    swept = load_results(serial).sel(sheave_stiffness=1.0, load=120.0)
+    with xr.open_dataset(folder / "h.nc", decode_times=False) as history:
+        for name in swept.data_vars:
+            if swept[name].attrs.get("volatile") != "yes" and swept[name].dtype.kind == "f":
+                assert history[name].values.tobytes() == swept[name].values.tobytes(), name
+        assert history.sizes["time"] == 1600
+    with Image.open(folder / "h.png") as picture:
+        assert min(picture.size) > 500
+        # lines, shades and letters, not an empty sheet
+        assert len(picture.convert("RGB").getcolors(1 << 20)) > 20
+
+
+def test_simulate_of_a_run_that_fails_ends_with_1_and_still_draws(folder):
+    done = call("simulate", "small.toml", "--at", "load=500", "--plot", "f.png", cwd=folder)
+    assert done.returncode == 1
+    assert done.stderr.startswith("cvt-hpc: the run failed: failed_error: at ")
+    assert (folder / "f.png").exists()
+
+
+def ink(picture, colour, tolerance=12):
+    """Number of pixels of a colour."""
+    with Image.open(picture) as image:
+        pixels = np.asarray(image.convert("RGB")).astype(int)
+    wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+    return int((np.abs(pixels - wanted).max(axis=2) <= tolerance).sum())
+
+
+def test_runs_with_a_step_too_long_are_failed_on_the_map_not_quiet(folder):
+    job = JOB.replace("sheave_stiffness = [1.0, inf]", 'step = ["2.5 us", "50 us"]').replace(
+        ', "500 N m"', ""
+    )
+    (folder / "steps.toml").write_text(job)
+    done = call("run", "steps.toml", "--out", "steps", cwd=folder)
+    assert done.returncode == 1
+    named = [line for line in done.stderr.splitlines() if "failed_numerics" in line]
+    assert len(named) == 3
+    assert named[0].startswith("cvt-hpc: run 3 (step = 5e-05, load = 0): failed_numerics: at 0.")
+    dataset = load_results(folder / "steps")
+    classes = occurrence_classes(dataset)
+    assert (classes.sel(step=50e-6) == OccurrenceClass.FAILED).all()
+    assert (classes.sel(step=2.5e-6) != OccurrenceClass.FAILED).all()
+    assert classes.sel(step=2.5e-6, load=0.0) == OccurrenceClass.QUIET
+    assert classes.sel(step=2.5e-6, load=120.0) == OccurrenceClass.VIBRATING
+    done = call("map", "steps", cwd=folder)
+    assert (done.returncode, done.stdout) == (0, "map: steps/map.png\n")
+    done = call("map", "steps", "--at", "step=2.5 us", "--out", "good.png", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    # the red of failed runs covers their half of the map, hatching between white, and is nowhere else
+    red = STYLES[OccurrenceClass.FAILED].ink
+    assert ink(folder / "steps" / "map.png", red) > 10 * max(ink(folder / "good.png", red), 100)
+
+
+def test_a_serial_run_does_without_mpi4py(serial, folder):
+    (folder / "site").mkdir()
+    (folder / "site" / "sitecustomize.py").write_text(
+        "import sys\n"
+        "class Hidden:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name.partition('.')[0] == 'mpi4py':\n"
+        "            raise ModuleNotFoundError(f'No module named {name!r}', name=name)\n"
+        "sys.meta_path.insert(0, Hidden())\n"
+    )
+    paths = [str(folder / "site"), environment().get("PYTHONPATH", "")]
+    path = {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    hidden = subprocess.run(
+        [sys.executable, "-c", "import mpi4py"], env=environment(**path), capture_output=True, text=True
+    )
+    assert "No module named 'mpi4py'" in hidden.stderr
+    done = call("run", "small.toml", cwd=folder, **path)
+    assert done.returncode == 1, done.stderr
+    assert_same_numbers(load_results(folder / "out" / "small"), load_results(serial))

@@ -1,0 +1,33 @@
+"""The jobs of this repository: each can be run as it lies there."""
+
+from pathlib import Path
+
+import pytest
+
+from cvt_hpc import simulation
+from cvt_hpc.cli import main
+from cvt_hpc.job import load_job
+from cvt_hpc.study.description import describe
+
+FOLDER = Path(__file__).parents[2] / "jobs"
+JOBS = sorted(FOLDER.glob("*.toml"))
+
+
+def test_there_are_jobs():
+    assert "quickstart" in [path.stem for path in JOBS]
+
+
+@pytest.mark.parametrize("path", JOBS, ids=lambda path: path.stem)
+def test_a_job_is_fit_to_be_run(path, capsys):
+    assert main(["check", str(path)]) == 0
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    job = load_job(path)
+    assert f"runs: {job.size}" in printed.out
+    assert "core-" in printed.out.splitlines()[-1]
+    # results go where the file's name says
+    assert job.name == path.stem
+    # the sweep takes it, too: its dataset can hold axes and recorded quantities under their names
+    study = describe(job, simulation)
+    assert study.size == job.size
+    assert study.description
