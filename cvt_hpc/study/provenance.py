@@ -38,7 +38,9 @@ def new_session(ranks: int) -> dict[str, Any]:
 
 def command() -> str:
     """Return the command line of this process, its program without the folder."""
-    return shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
+    program = Path(sys.argv[0])
+    started = ["python", "-m", program.parent.name] if program.name == "__main__.py" else [program.name]
+    return shlex.join([*started, *sys.argv[1:]])
 
 
 def versions() -> dict[str, str]:

@@ -23,12 +23,12 @@ def test_a_step_far_too_long_diverges_and_says_when(stations):
     assert found["status"] == Status.FAILED_NUMERICS
     when = f"{found['simulated_seconds'] * 1e3:.4g} ms"
     assert found["reason"] == f"at {when}: the belt is more than 10 mm off its path"
-    # within a millisecond: nothing is computed in vain
-    assert found["simulated_seconds"] < 1e-3
+    # long before the end: little is computed in vain
+    assert found["simulated_seconds"] < 0.01
     assert_no_numbers(found)
 
 
-LONG_STEPS = [(20.0, 5e-6), (60.0, 5e-6), (0.0, 6.25e-6), (60.0, 6.25e-6)]
+LONG_STEPS = [(0.0, 12.5e-6), (20.0, 12.5e-6), (60.0, 12.5e-6), (120.0, 10e-6)]
 
 
 @pytest.mark.parametrize(("load", "step"), LONG_STEPS)
@@ -36,7 +36,7 @@ def test_a_step_that_is_too_long_fails_or_does_no_harm(load, step):
     found, trusted = record(load=load, step=step, duration=0.1), record(load=load, duration=0.1)
     assert trusted["status"] == Status.DONE
     if found["status"] == Status.DONE:
-        # of first order in a step of twice the length: 0.3 % are seen
+        # of first order in the step: 0.3 % are seen
         assert found["mean_ring_tension"] == pytest.approx(trusted["mean_ring_tension"], rel=0.01)
         assert found["vibrates"] == trusted["vibrates"]
     else:
@@ -45,7 +45,7 @@ def test_a_step_that_is_too_long_fails_or_does_no_harm(load, step):
 
 
 def test_the_power_balance_catches_steps_that_do_not_diverge():
-    # at twice the default step pressed elements hum from step to step at some loads, which no amplitude in the band shows
+    # at four times the default step pressed elements hum from step to step, which no amplitude in the band shows
     found = [record(load=load, step=step, duration=0.1) for load, step in LONG_STEPS]
     caught = [f for f in found if "the power balance is open by" in f["reason"]]
     assert caught

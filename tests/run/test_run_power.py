@@ -75,7 +75,7 @@ def test_the_balance_closes_on_the_default_mesh(name):
 def test_half_the_step_does_not_open_it(name):
     # it is the mesh that leaves most of it open: one step or the other, the rest differs by 0.02 % of the power
     values, tolerance = SCENES[name]
-    half = balance(finished(**COARSE | values, step=1.25e-6))["power_residual"]
+    half = balance(finished(**COARSE | values, step=0.5 * job().parameters["step"]))["power_residual"]
     assert abs(half) < tolerance
     assert abs(half) < abs(balance(finished(**COARSE | values))["power_residual"]) + 2e-4
 

@@ -100,7 +100,8 @@ def test_costs_are_consistent(ending):
     assert found["core_seconds"] > 0
     if status == Status.DONE:
         assert found["simulated_seconds"] == pytest.approx(0.04, rel=1e-11)
-        assert found["steps"] == 0.04 * 20e3 * 20
+        default = job().parameters["step"]
+        assert found["steps"] == 0.04 * 20e3 * np.ceil(1 / 20e3 / default)
     else:
         assert found["simulated_seconds"] < 0.04
 
