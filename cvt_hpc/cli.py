@@ -80,7 +80,11 @@ def _parser() -> argparse.ArgumentParser:
     check = _add(commands, "check", _check, "validate a job, show its defaults and estimate its cost", "JOB")
     for command in (run, simulate, check):
         _add_assignments(command, "--set", "replace a value of the job, or an axis by one value")
-    _add_assignments(simulate, "--at", "where on the axes to run (default: the base scene)")
+    _add_assignments(
+        simulate,
+        "--at",
+        "where to run; an axis that is not named takes the value of its table, or else its first one",
+    )
     _add_assignments(picture, "--at", "fix an axis at a value")
     return parser
 
@@ -154,7 +158,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
     _check_output(arguments.out, (".nc",))
     _check_output(arguments.plot, (".png", ".svg", ".pdf"))
     from cvt_hpc.analysis.histories import draw_history, is_history, write_history
-    from cvt_hpc.printing import outcome_lines
+    from cvt_hpc.printing import outcome_lines, point_lines
     from cvt_hpc.simulation import simulate
     from cvt_hpc.variables import Status
 
@@ -165,9 +169,11 @@ def _simulate(arguments: argparse.Namespace) -> int:
     written = []
     if arguments.out is not None:
         written.append(f"history: {write_history(dataset, arguments.out)}")
-    if arguments.plot is not None:
+    if arguments.plot is not None and dataset.sizes["time"] > 1:
         written.append(f"picture: {draw_history(dataset, arguments.plot)}")
-    print(*outcome_lines(dataset), *written, sep="\n")
+    elif arguments.plot is not None:
+        written.append("picture: none, the run has no history")
+    print(*point_lines(job, at), *outcome_lines(dataset), *written, sep="\n")
     status = Status(int(dataset["status"]))
     if status != Status.DONE:
         _complain(f"the run failed: {status.name.lower()}: {dataset['reason'].item()}")

@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.job.values import in_words
+from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from cvt_hpc.job import Job
     from cvt_hpc.study import RunReport, StudyStatus
 
 MOST_FAILURES_NAMED = 10
+_KNOWN_OF_FAILURES = (
+    "status",
+    "reason",
+    "core_seconds",
+    "simulated_seconds",
+    "time_step",
+    "steps",
+    "contact_solves",
+)
 _FLAGS_FIRST = ("status", "vibrates", "reason")
 _LARGEST_LINE = 4  # values: one per strand or pulley, but no spectrum and no history
 
@@ -50,9 +61,27 @@ def status_lines(status: StudyStatus) -> Iterator[str]:
         yield f"to go   {show_duration(status.time_to_go)}"
 
 
+def point_lines(job: Job, at: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the line that says where on the axes of its job a run stands."""
+    point = job.point_at(at)
+    keys = dict.fromkeys([*(axis.name for axis in job.axes), *at])
+    if keys:
+        words = (f"{key} {in_words(point[key], job.schema.parameters[key].unit)}" for key in keys)
+        yield f"at      {', '.join(words)}"
+
+
 def outcome_lines(dataset: xr.Dataset) -> Iterator[str]:
-    """Yield the lines that say what one run gave: its scalars, and what is per strand or pulley."""
-    names = [str(name) for name, array in dataset.data_vars.items() if array.size <= _LARGEST_LINE]
+    """Yield the lines that say what one run gave: its scalars, and what is per strand or pulley.
+
+    Of a run that failed only what is known: no verdict, and no number that is none.
+    """
+    names = [
+        str(name)
+        for name, array in dataset.data_vars.items()
+        if array.ndim <= 1 and 0 < array.size <= _LARGEST_LINE
+    ]
+    if int(dataset["status"]) != Status.DONE:
+        names = [name for name in names if name in _KNOWN_OF_FAILURES]
     names.sort(key=lambda name: name not in _FLAGS_FIRST)
     width = max(map(len, names), default=0)
     for name in names:

@@ -41,4 +41,7 @@ def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     if parameters["sampling_rate"] < needed:
         expected = f"{LEAST_SAMPLES_PER_PERIOD} x band_high = {needed:g} Hz or more"
         problems.append(("sampling_rate", expected, f"{parameters['sampling_rate']:g} Hz"))
+    if parameters["spectrum_step"] > parameters["band_high"]:
+        expected = f"band_high = {parameters['band_high']:g} Hz or less"
+        problems.append(("spectrum_step", expected, f"{parameters['spectrum_step']:g} Hz"))
     return problems

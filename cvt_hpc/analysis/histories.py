@@ -113,7 +113,8 @@ def history_figure(dataset: xr.Dataset) -> Figure:
         (1.6, [(LEFT, panels.draw_displacement, strand), (RIGHT, panels.draw_close_up, strand)])
         for strand in strands
     ]
-    if "load" in dataset and "time" in dataset["load"].dims and np.ptp(dataset["load"].values) > 0:
+    load = dataset["load"].values if "load" in dataset and "time" in dataset["load"].dims else np.zeros(0)
+    if load.size and np.ptp(load) > 0:
         rows.append((1.2, [(LEFT, panels.draw_load, dataset)]))
     if with_spectrum:
         rows.append((2.1, [(WHOLE, panels.draw_spectra, with_spectrum)]))

@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
+from cvt_hpc.vibration.criterion import SHORTEST_SEGMENT
 from cvt_hpc.vibration.signals import amplitude_spectrum, band_amplitude, dominant_frequency
-from cvt_hpc.vibration.tapering import SHORTEST_SEGMENT
 
 Array = NDArray[np.float64]
 

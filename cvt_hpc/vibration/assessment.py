@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cvt_hpc.variables import Vibrates
 from cvt_hpc.vibration import signals
+from cvt_hpc.vibration.criterion import fitting_window
 from cvt_hpc.vibration.occurrence import classify
 
 
@@ -76,7 +77,7 @@ def assess(
     judged = w[len(w) - round(parameters["judged_fraction"] * len(w)) :]
     band = (parameters["band_low"], parameters["band_high"])
     duration = len(judged) / rate
-    window = signals.fitting_window(duration, parameters["window_length"])
+    window = fitting_window(duration, parameters["window_length"])
     centres, windows = signals.window_amplitudes(judged, rate, band, window)
     amplitudes = signals.band_amplitude(judged, rate, band)
     names = tuple(dict.fromkeys(strands))
@@ -93,6 +94,9 @@ def assess(
         parameters=parameters,
         strands=names,
     )
+    if vibrates is Vibrates.YES and amplitudes[strongest].max() < parameters["amplitude_threshold"]:
+        # a short window sees a little beyond the band: what moves there is not in it
+        vibrates, reason = Vibrates.UNDECIDED, "moves at the edge of the band only"
     frequency = signals.dominant_frequency(judged[:, strongest], rate, band)
     return Occurrence(
         vibrates,

@@ -68,13 +68,22 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 }
 
 
+SHORTEST_SEGMENT = 32  # samples of a window: its taper and the polynomial of drift must be resolved
+
+
+def fitting_window(duration: float, wanted: float) -> float:
+    """The wanted window length [s], shortened so that a record [s] holds four half-overlapping windows."""
+    # Four such windows span 2.5 lengths; a little less than 1/2.5 leaves room for rounding to samples.
+    return min(wanted, 0.39 * duration)
+
+
 def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Problems between parameters: (key, expected, found), in the form of a model's check.
 
     Parameters
     ----------
     parameters : mapping
-        Flat parameters with those of [vibration] and the `duration` of a run [s].
+        Flat parameters with those of [vibration], the `duration` of a run [s] and its `sampling_rate` [Hz].
     """
     low, high, window = parameters["band_low"], parameters["band_high"], parameters["window_length"]
     problems = []
@@ -88,4 +97,8 @@ def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     if judged < 5 / low * (1 - 1e-9):
         expected = f"a judged part of five periods of band_low ({5 / low:g} s) or more"
         problems.append(("duration", expected, f"judged_fraction times duration = {judged:g} s"))
+    length, rate = fitting_window(judged, window), parameters["sampling_rate"]
+    if round(length * rate) < SHORTEST_SEGMENT:
+        expected = f"{SHORTEST_SEGMENT} samples or more in a window of {length:g} s"
+        problems.append(("sampling_rate", expected, f"{rate:g} Hz"))
     return problems

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cvt_hpc.vibration.criterion import fitting_window
 from cvt_hpc.vibration.tapering import Array, check_band, fine_spectrum, segment_amplitude, time_last
 
 WINDOWS_FOR_GROWTH = 3  # a slope and its standard error need one more point than a line has parameters
@@ -197,12 +198,6 @@ def envelope_growth(
     if length is None:
         length = fitting_window(len(samples) / rate, 2 / band[0] if band[0] > 0 else np.inf)
     return growth_fit(*window_amplitudes(samples, rate, band, length))
-
-
-def fitting_window(duration: float, wanted: float) -> float:
-    """The wanted window length [s], shortened so that a record [s] holds four half-overlapping windows."""
-    # Four such windows span 2.5 lengths; a little less than 1/2.5 leaves room for rounding to samples.
-    return min(wanted, 0.39 * duration)
 
 
 def growth_fit(times: ArrayLike, amplitudes: ArrayLike) -> Growth:

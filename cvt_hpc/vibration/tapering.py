@@ -20,10 +20,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cvt_hpc.vibration.criterion import SHORTEST_SEGMENT
+
 Array = NDArray[np.float64]
 
 DRIFT_DEGREE = 3
-SHORTEST_SEGMENT = 32  # samples: the window and the drift polynomial must be resolved
+
 ZERO_PADDING = 8  # lines per resolved line; Hann's maximum is then met within 0.3 %
 
 

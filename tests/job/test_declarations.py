@@ -46,7 +46,10 @@ def test_defaults_are_legal(model, stepper):
             {"vibration": {"band_low": 900, "band_high": 800}},
             "[vibration] band_high: expected a frequency above",
         ),
-        ({"run": {"duration": 0.02}}, "[run] duration: expected a judged part of five periods"),
+        (
+            {"run": {"duration": 0.02}, "scene": {"rise_time": 0.005}},
+            "[run] duration: expected a judged part of five periods",
+        ),
     ],
 )
 def test_every_job_is_checked_for_what_all_runs_share(model, stepper, tables, message):

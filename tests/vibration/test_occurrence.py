@@ -191,8 +191,8 @@ def test_rest_is_quiet_and_has_no_frequency():
 
 
 def test_defaults_are_consistent_and_checks_name_the_key():
-    assert check(DEFAULTS | {"duration": 0.1}) == []
-    run = SETTINGS | {"duration": 0.1}
+    assert check(DEFAULTS | {"duration": 0.1, "sampling_rate": RATE}) == []
+    run = SETTINGS | {"duration": 0.1, "sampling_rate": RATE}
     assert check(run | {"duration": 0.05, "judged_fraction": 1.0}) == []
     assert [p[0] for p in check(run | {"band_high": 80.0})] == ["band_high"]
     assert [p[0] for p in check(run | {"window_length": 0.01})] == ["window_length"]

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cvt_hpc.vibration import signals
+from cvt_hpc.vibration.criterion import fitting_window
 from cvt_hpc.vibration.tapering import SHORTEST_SEGMENT
 
 RATE = 20_000.0
@@ -163,10 +164,10 @@ def test_windows_end_with_the_record_and_overlap_by_half():
 
 @given(st.integers(90, 4000))
 def test_fitting_window_leaves_four_windows(samples):
-    window = signals.fitting_window(samples / RATE, wanted=10.0)
+    window = fitting_window(samples / RATE, wanted=10.0)
     centres, _ = signals.window_amplitudes(np.zeros(samples), RATE, BAND, window)
     assert len(centres) >= 4
-    assert signals.fitting_window(samples / RATE, wanted=1e-4) == 1e-4
+    assert fitting_window(samples / RATE, wanted=1e-4) == 1e-4
 
 
 def test_channels_are_independent():

@@ -13,8 +13,6 @@ import numpy as np
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.physics.geometry import variator
 
-_INF = float("inf")
-
 
 def _positive(default: float, unit: str, description: str) -> Parameter:
     return Parameter(default, unit, description, minimum=0.0, exclusive=True)
@@ -154,6 +152,10 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     else:
         if abs(p["play"]) > 0.02 * path:
             problems.append(("play", f"within 2 % of the belt's length {path:.4g} m", f"{p['play']:g} m"))
+    before = (1.0 - p["judged_fraction"]) * p["duration"]
+    if p["rise_time"] > before * (1.0 + 1e-9):
+        expected = f"a load that has risen before the run is judged, within {before:g} s"
+        problems.append(("rise_time", expected, f"{p['rise_time']:g} s"))
     if p["friction_law"] == "coulomb" and p["friction_gradient"] != 0.0:
         problems.append(
             ("friction_gradient", "0 with friction_law coulomb", f"{p['friction_gradient']:g} s/m")

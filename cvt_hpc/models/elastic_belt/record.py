@@ -52,7 +52,15 @@ VARIABLES = (
     Variable("driven_speed_ripple", (), "f8", "rad s-1", "standard deviation of the driven pulley's speed"),
     Variable("driving_power", (), "f8", "W", "mean power of the driving pulley"),
     Variable("load_power", (), "f8", "W", "mean power of the load"),
+    Variable("thrust_power", (), "f8", "W", "mean power that the thrust takes up"),
+    Variable("storing_power", (), "f8", "W", "mean rate of the stored energy"),
     Variable("ring_loss", (), "f8", "W", "mean friction power between rings and elements"),
+    Variable("belt_loss", (), "f8", "W", "mean power of the belt's transverse damping"),
+    Variable("layer_loss", (), "f8", "W", "mean power of the layers' longitudinal dampers"),
+    Variable("lag_loss", (), "f8", "W", "mean power of the driven sheave's lag"),
+    Variable(
+        "seating_loss", (), "f8", "W", "mean elastic power carried out of the contact at the arcs' ends"
+    ),
     Variable("loss", (), "f8", "W", "mean of all losses"),
     Variable(
         "power_residual",
@@ -130,7 +138,9 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
         "driven_speed_ripple": driven_speed.std(),
         "driving_power": mean("driving_power"),
         "load_power": mean("load_power"),
-        "ring_loss": mean("ring_loss"),
+        "thrust_power": mean("thrust_power"),
+        "storing_power": storing,
+        **{name: mean(name) for name in LOSSES if "flank" not in name},
         "loss": loss,
         "power_residual": open_power / max(abs(mean("driving_power")), loss),
         "least_strand_force": run.channel("least_strand_force")[judged].min(),

@@ -148,9 +148,9 @@ class Transient:
 
     @property
     def profiles(self) -> dict[str, np.ndarray]:
-        """PROFILES around the belt at the stations, mean over the judged part, each (N,)."""
-        count = max(self.done - self._first_judged, 1)
-        return dict(zip(PROFILES, self._profiles[1] / count, strict=True))
+        """PROFILES around the belt, (N,) each: mean over the judged part at the stations, nan before it."""
+        count = self.done - self._first_judged
+        return dict(zip(PROFILES, self._profiles[1] / (count if count > 0 else np.nan), strict=True))
 
     @property
     def regions(self) -> np.ndarray:
