@@ -46,7 +46,7 @@ def step_explicit(
     work : (10, N) array
         Work space.
     step : float
-        Step [s]; stable below 2 / (largest rate), 0.1 us with the default belt.
+        Step [s]; stable below 2 / (largest rate), some 0.2 us with the default belt.
 
     Returns
     -------

@@ -4,19 +4,19 @@ Derived by virtual power on the moving belt (Eulerian, path coordinate s, belt s
 outward):
 
     stretch        eps_i = (1 + kappa (w + d_i)) / n_i - 1
-    forces         T = EA_r eps_1,   P = -EA_e eps_0 where eps_0 < 0 else 0,   F = T - P - m v^2
+    forces         T = EA_1 eps_1,   P = -EA_0 eps_0 where eps_0 < 0 else 0,   F = T - P - m v^2
     content        n_i,t + (v_i / (1 + eps_i)),s = 0
     elements       m_0 (v_0,t + v_0 v_0,s) = -P,s + f_t - (1 + kappa d_1) q + (p_r - d_b (w_t + v_0 w_s)) w_s
     rings          m_1 (v_1,t + v_1 v_1,s) =  T,s + q
     transverse     m (w_tt + 2 v w_ts) = (F w_s),s - EI w_ssss - F kappa - d_b (w_t + v_0 w_s) + p_r
     memory         v_f,t + v v_f,s = (|v| - v_f) / tau_f on the arcs, v_f = |v| where the belt enters
-    pulleys        J omega_dn' = -sum f_t (r + w) - i M_dr,   T_1 k z_dn' = sum f_ax - F_dn
+    pulleys        J omega_dn' = -sum f_t (r + w) - i M,   T_1 k z_dn' = sum f_ax - F_dn
 
-with q the friction of the rings on the elements' saddle, p_r, f_t the flanks' forces and |v| their sliding
-speed. The last term of the
-elements' equation is the radial load in the direction of the belt's actual tangent: it carries the power that
-radial sliding dissipates, and closes the balance of power. Stresses of T and P enter cells, everything else
-stations; the content is upwinded, since centred fluxes leave a free checkerboard mode where P = 0.
+with q the friction of the rings on the elements' saddle, p_r, f_t the flanks' forces, |v| their sliding
+speed and M the load. The last term of the elements' equation is the radial load in the direction of the
+belt's actual tangent: it carries the power that radial sliding dissipates, and closes the balance of power.
+Stresses of T and P enter cells, everything else stations; the content is upwinded, since centred fluxes
+leave a free checkerboard mode where P = 0.
 """
 
 from __future__ import annotations
