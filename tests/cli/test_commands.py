@@ -171,6 +171,7 @@ def test_simulate_prints_the_outcome_and_keeps_the_history(write_job, call, mech
     status, out, err = call("simulate", "x.toml", *arguments)
     assert (status, err) == (0, [])
     assert out == [
+        "at      load 50 N m, sheave_stiffness 1",
         "status     done",
         "vibrates   yes",
         "load       50 N m",
@@ -196,7 +197,13 @@ def test_simulate_of_a_run_that_fails_ends_with_1(write_job, call):
     write_job(GRID)
     status, out, err = call("simulate", "x.toml", "--at", "sheave_stiffness=inf")
     assert status == 1
-    assert out[:3] == ["status     failed_numerics", "vibrates   no", "reason     step 3: too stiff"]
+    # no verdict, and no number that is none
+    assert out == [
+        "at      load 0 N m, sheave_stiffness inf",
+        "status  failed_numerics",
+        "reason  step 3: too stiff",
+        "steps   3",
+    ]
     assert err == ["cvt-hpc: the run failed: failed_numerics: step 3: too stiff"]
 
 

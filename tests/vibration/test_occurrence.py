@@ -205,3 +205,13 @@ def test_each_default_lies_within_its_own_bounds():
         inside = parameter.minimum < parameter.default if parameter.exclusive else True
         assert inside and parameter.minimum <= parameter.default <= parameter.maximum, name
         assert parameter.unit in {"", "Hz", "m", "s"} and parameter.description
+
+
+def test_what_moves_below_the_band_does_not_vibrate():
+    # windows of 40 ms see 25 Hz and more beyond the band, the whole record 7 Hz
+    settings = DEFAULTS | {"band_low": 300.0, "amplitude_threshold": 5e-6}
+    time = np.arange(round(0.4 * RATE)) / RATE
+    tones = {f: np.tile(12e-6 * np.sin(2 * np.pi * f * time)[:, np.newaxis], 3) for f in (288.0, 330.0)}
+    assert assess(tones[330.0], RATE, STRANDS, settings).vibrates is YES
+    found = assess(tones[288.0], RATE, STRANDS, settings)
+    assert found.amplitude.max() < 5e-6 and found.vibrates is not YES
