@@ -28,7 +28,7 @@ def test_a_step_far_too_long_diverges_and_says_when(stations):
     assert_no_numbers(found)
 
 
-LONG_STEPS = [(0.0, 12.5e-6), (20.0, 12.5e-6), (60.0, 12.5e-6), (120.0, 10e-6)]
+LONG_STEPS = [(0.0, 12.5e-6), (60.0, 12.5e-6), (60.0, 10e-6), (120.0, 10e-6)]
 
 
 @pytest.mark.parametrize(("load", "step"), LONG_STEPS)
@@ -38,7 +38,7 @@ def test_a_step_that_is_too_long_fails_or_does_no_harm(load, step):
     if found["status"] == Status.DONE:
         # of first order in the step: 0.3 % are seen
         assert found["mean_ring_tension"] == pytest.approx(trusted["mean_ring_tension"], rel=0.01)
-        assert found["vibrates"] == trusted["vibrates"]
+        assert (found["vibrates"] == Vibrates.YES) == (trusted["vibrates"] == Vibrates.YES)
     else:
         assert found["status"] == Status.FAILED_NUMERICS
         assert_no_numbers(found)
