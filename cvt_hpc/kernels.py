@@ -3,6 +3,10 @@
 The compiler keeps machine code beside a file's date alone, and would go on with the old code of a kernel when
 one that it calls, in another file, has changed. So the code is kept in a folder named by the content of all
 kernels' sources: below NUMBA_CACHE_DIR if that is set, else in the package, else in the user's cache.
+
+A kernel may be handed to another as an argument, as a right-hand side to a stepper. The compiler tells
+kernels apart by an identity drawn at random, so that it would never find such code again: here it is the
+name.
 """
 
 from __future__ import annotations
@@ -17,7 +21,7 @@ from typing import Any
 import numba
 
 _PACKAGE = Path(__file__).parent
-_ROOMS_WITH_KERNELS = ("physics", "models")
+_ROOMS_WITH_KERNELS = ("physics", "models", "steppers")
 
 # Division by zero gives inf as in numpy, without a test for it. Products may be contracted with sums, and
 # divisions by one number replaced by its reciprocal; sums are never reordered, and what is not a number stays
@@ -42,7 +46,9 @@ def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     users = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = _CACHE
     try:
-        return numba.njit(**options)(function)
+        compiled = numba.njit(**options)(function)
+        compiled._set_uuid(f"{function.__module__}.{function.__qualname__}")
+        return compiled
     finally:
         numba.config.CACHE_DIR = users
 

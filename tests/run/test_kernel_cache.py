@@ -21,7 +21,7 @@ def package(tmp_path):
     copy = tmp_path / "site" / "cvt_hpc"
     copy.mkdir(parents=True)
     shutil.copy(PACKAGE / "kernels.py", copy)
-    for room in ("physics", "models", "study"):
+    for room in ("physics", "models", "steppers", "study"):
         shutil.copytree(PACKAGE / room, copy / room, ignore=shutil.ignore_patterns("__pycache__"))
     return copy
 
@@ -66,6 +66,7 @@ def test_the_folder_is_in_the_package_and_named_by_content(package, no_choice):
         ("physics/friction.py", True),
         ("models/elastic_belt/rhs.py", True),
         ("models/elastic_belt/new_part.py", True),
+        ("steppers/imex.py", True),
         ("kernels.py", True),
         ("study/sweep.py", False),
     ],
@@ -104,6 +105,26 @@ def test_code_lies_in_the_users_folder_where_one_is_chosen(tmp_path):
     assert Path(used).is_relative_to(ours)
     assert list(Path(used).glob("friction.saturation*.nbi"))
     assert left == str(chosen)
+
+
+def test_code_of_a_kernel_that_takes_another_is_found_again(tmp_path):
+    (tmp_path / "falling.py").write_text(
+        "from cvt_hpc.kernels import kernel\n"
+        "@kernel\ndef fall(y):\n    return -y\n"
+        "@kernel\ndef euler(rate, y):\n    return y + 0.5 * rate(y)\n"
+    )
+    program = (
+        "from falling import euler, fall; assert euler(fall, 1.0) == 0.5; "
+        "print(sum(euler.stats.cache_hits.values()))"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(tmp_path)}
+    hits = [
+        subprocess.run(
+            [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
+        ).stdout.strip()
+        for _ in range(2)
+    ]
+    assert hits == ["0", "1"]
 
 
 def test_functions_of_other_people_are_kept_where_they_always_were(package, monkeypatch, tmp_path):
