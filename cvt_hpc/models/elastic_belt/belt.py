@@ -46,6 +46,7 @@ class Belt(NamedTuple):
     ring_mass: np.ndarray
     element_mass: float
     mass: float
+    bending_stiffness: float
     belt_speed: float
     element_stiffness: float
     ring_stiffness: float
@@ -188,6 +189,7 @@ def belt_constants(parameters: dict[str, Any]) -> Belt:
         ring_mass=ring_mass,
         element_mass=p["element_mass"],
         mass=p["element_mass"] + p["ring_mass"],
+        bending_stiffness=p["bending_stiffness"],
         belt_speed=belt_speed,
         element_stiffness=p["element_stiffness"],
         ring_stiffness=p["ring_stiffness"],

@@ -79,7 +79,7 @@ def step_explicit(
 
 @kernel
 def damper_power(belt: Belt, fields: np.ndarray, eps: np.ndarray, rate: np.ndarray, step: float) -> float:
-    """Power of the layers' dampers over a step [W]: their forces at its start times the mean closing speeds."""
+    """Power of the layers' dampers in a step [W]: forces at its start times the mean closing speeds."""
     n = belt.cell.size
     power = 0.0
     for layer in range(2):

@@ -367,7 +367,7 @@ def _cell(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, k: int,
 
 @lane_kernel
 def _eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> None:
-    """Stresses into the rows, and forward elimination; the last station, which closes the cycle, is solved."""
+    """Stresses into the rows, and forward elimination; solves for the last station, which closes the cycle."""
     stations = work.stations
     n = belt.cell.size
     last = n - 1

@@ -7,7 +7,7 @@ reference path's, so that single precision does not lose strains and sliding spe
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -98,8 +98,8 @@ CONSTANTS = (
     LOAD_START,
 ) = range(len(CONSTANTS))
 
-# Scalars of the state, of each lane, double in any precision: the driven pulley's two, the work of the layers'
-# dampers until it is asked for [J], steps whose friction was found to turn sliding about.
+# Scalars of the state, of each lane, double in any precision: the driven pulley's two, the work of the
+# layers' dampers until it is asked for [J], how often friction was found to turn sliding about in a step.
 LANE_SCALARS = ("driven_speed", "driven_position", "layer_work", "repeats")
 SPEED, POSITION, LAYER_WORK, REPEATS = range(len(LANE_SCALARS))
 
@@ -167,22 +167,20 @@ class LaneState(NamedTuple):
     contacts: tuple[LaneContact, LaneContact]
 
 
-def lane_belt(belts: list[Belt], points: list[dict[str, Any]], dtype: type) -> LaneBelt:
+def lane_belt(belts: list[Belt], dtype: type) -> LaneBelt:
     """Constants of several runs on the same mesh.
 
     Parameters
     ----------
     belts : list of Belt
         One for each lane.
-    points : list of dict
-        Their resolved parameters.
     dtype : type
         np.float64 or np.float32.
     """
     first = belts[0]
     constants = LaneArray(1, len(CONSTANTS), len(belts), dtype)
-    for lane, (belt, point) in enumerate(zip(belts, points, strict=True)):
-        constants.data[0, :, lane] = _constants_of(belt, point)
+    for lane, belt in enumerate(belts):
+        constants.data[0, :, lane] = _constants_of(belt)
     cell, dual, kappa = first.cell, first.dual, first.curvature
     weighted = cell * kappa
     law = first.law
@@ -210,11 +208,10 @@ def lane_belt(belts: list[Belt], points: list[dict[str, Any]], dtype: type) -> L
     )
 
 
-def _constants_of(belt: Belt, point: dict[str, Any]) -> list[float]:
+def _constants_of(belt: Belt) -> list[float]:
     angle, memory = belt.half_wedge_angle, belt.friction_memory
     named = {
-        "ring_mass": point["ring_mass"],
-        "bending_stiffness": point["bending_stiffness"],
+        "ring_mass": belt.mass - belt.element_mass,
         "kinetic_friction": belt.law.kinetic,
         "friction_gradient": belt.law.gradient,
         "law_speed": belt.law.speed,
@@ -230,8 +227,8 @@ def _constants_of(belt: Belt, point: dict[str, Any]) -> list[float]:
 
 def _carry(belt: Belt, spacing: float) -> float:
     """Rate of the memory's transport, as `rhs.memory_transport` has it."""
-    memory = belt.friction_memory
-    return 1.0 / (memory * np.expm1(spacing / (belt.belt_speed * memory))) if memory else 0.0
+    memory, way = belt.friction_memory, belt.belt_speed * belt.friction_memory
+    return 1.0 / (memory * np.expm1(spacing / way)) if way else 0.0
 
 
 def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState:

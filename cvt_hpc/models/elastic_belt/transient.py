@@ -142,7 +142,7 @@ class Batch:
         self.dtype = PRECISIONS[p["precision"]] if stepper == "imex" else np.float64
         starts = [initial_state(point, belt) for point, belt in zip(padded, self.belts, strict=True)]
         self.state = lane_state(self.belts, starts, self.dtype)
-        self._belt = lane_belt(self.belts, padded, self.dtype)
+        self._belt = lane_belt(self.belts, self.dtype)
         self._work = imex_work(self.state)
         self.interval = 1.0 / p["sampling_rate"]
         self.steps_per_sample = max(int(np.ceil(self.interval / p["step"] - 1e-9)), 1)
