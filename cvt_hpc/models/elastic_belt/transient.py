@@ -17,7 +17,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     mesh,
     random_strands,
 )
-from cvt_hpc.models.elastic_belt.imex import imex_work
+from cvt_hpc.models.elastic_belt.imex import derive, imex_work
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
 from cvt_hpc.models.elastic_belt.march import march_explicit, march_imex
 from cvt_hpc.models.elastic_belt.sampling import (
@@ -144,6 +144,7 @@ class Batch:
         self.state = lane_state(self.belts, starts, self.dtype)
         self._belt = lane_belt(self.belts, self.dtype)
         self._work = imex_work(self.state)
+        derive(self._belt, self.state, self._work.stations)
         self.interval = 1.0 / p["sampling_rate"]
         self.steps_per_sample = max(int(np.ceil(self.interval / p["step"] - 1e-9)), 1)
         self.step = self.interval / self.steps_per_sample
@@ -185,6 +186,7 @@ class Batch:
             # nature
             for lane, point in enumerate(self.points):
                 self._displace(lane, random_strands(self.mesh, point["disturbance"], point["seed"]))
+            derive(self._belt, self.state, self._work.stations)
             self._disturbed = True
         borders = [border for border in (self._kick, self.first_judged, self.samples) if border > first]
         last = min(first + samples, *borders)
