@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -36,7 +36,14 @@ _OCCURRENCE = (
     Variable("growth_error", ("strand",), "f8", "s-1", "standard error of the growth rate"),
 )
 _COST = (
-    Variable("core_seconds", (), "f8", "s", "processor time of the run", volatile=True),
+    Variable(
+        "core_seconds",
+        (),
+        "f8",
+        "s",
+        "processor time of the run; of runs that advance together, their time divided by their number",
+        volatile=True,
+    ),
     Variable("simulated_seconds", (), "f8", "s", "simulated time, less than asked where the run failed"),
     Variable("time_step", (), "f8", "s", "time step"),
     Variable("steps", (), "i8", "1", "time steps taken"),
@@ -70,20 +77,91 @@ def record_coordinates(job: Job) -> dict[str, Coordinate]:
     return _model_record(job).coordinates(job.parameters)
 
 
+def run_costs(job: Job) -> np.ndarray:
+    """Core-seconds of each run: within a factor of two on processors of the last years.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+
+    Returns
+    -------
+    (runs,) array
+        In the order of run indices.
+    """
+    grids = np.meshgrid(*(axis.values for axis in job.axes), indexing="ij", sparse=True)
+    p = {**job.parameters, **dict(zip((axis.name for axis in job.axes), grids, strict=True))}
+    cost = _model_record(job).STEP_COST[job.stepper] * p["stations"] * p["duration"] / p["step"]
+    return np.broadcast_to(cost, job.shape).ravel()
+
+
 def estimate_cost(job: Job) -> float:
-    """Core-seconds of a run, mean over the job: within a factor of two on processors of the last years.
+    """Core-seconds of a run, mean over the job.
 
     Parameters
     ----------
     job : Job
         A validated job.
     """
-    axes = {axis.name: np.array(axis.values) for axis in job.axes}
+    return float(run_costs(job).mean())
 
-    def mean(key: str, power: int = 1) -> float:
-        return float(np.mean(axes.get(key, np.array([job.parameters[key]])) ** power))
 
-    return _model_record(job).STEP_COST[job.stepper] * mean("stations") * mean("duration") * mean("step", -1)
+def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
+    """Split runs into batches that can advance together.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job. Its model's record says by LANES how many runs a stepper takes at once, one where it
+        says nothing, and by `lane_key` of a run's parameters which ones: those with equal keys.
+    indices : sequence of int
+        Run indices.
+
+    Returns
+    -------
+    list of tuple of int
+        Each index once, in batches of at most LANES runs.
+    """
+    model = _model_record(job)
+    lanes = getattr(model, "LANES", {}).get(job.stepper, 1)
+    if lanes == 1:
+        return [(index,) for index in indices]
+    groups: dict[Any, list[int]] = {}
+    for index in indices:
+        groups.setdefault(model.lane_key(job.point(index)), []).append(index)
+    return [
+        tuple(group[first : first + lanes])
+        for group in groups.values()
+        for first in range(0, len(group), lanes)
+    ]
+
+
+def run_points(
+    job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+) -> list[dict[str, Any]]:
+    """Do the runs of a batch.
+
+    Parameters
+    ----------
+    job : Job
+        For its model and stepper.
+    points : sequence of dict
+        Flat parameters of each run [SI].
+    interrupt : callable
+        Asked every few tens of milliseconds; a text ends all runs.
+
+    Returns
+    -------
+    list of dict
+        What `run_point` returns of each point, bitwise but for its timing.
+
+    Raises
+    ------
+    Interrupted
+        With the text of `interrupt`.
+    """
+    return [run_point(job, point, interrupt) for point in points]
 
 
 def run_point(job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]) -> dict[str, Any]:
