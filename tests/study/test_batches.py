@@ -112,6 +112,15 @@ def batches_of(out, lanes, job=None, simulator=Listening):
     return report, listening.batches
 
 
+def test_a_sweep_starts_with_the_batch_that_is_predicted_to_take_longest(tmp_path):
+    class Uneven(Listening):
+        def run_costs(self, job):
+            return np.where(np.arange(12) == 6, 2.0, 1.0)
+
+    _, batches = batches_of(tmp_path, 4, Job((Axis("load", tuple(range(12))),)), Uneven)
+    assert batches == [[4, 5, 6, 7], [0, 1, 2, 3], [8, 9, 10, 11]]
+
+
 def test_a_run_that_raises_costs_its_batch_nothing(tmp_path):
     job = Job((Axis("load", tuple(range(12))),), {"raise_at": 6, "diverge_at": 5})
     report, batches = batches_of(tmp_path, 4, job)
