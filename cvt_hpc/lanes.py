@@ -31,12 +31,6 @@ from numba.extending import (
 )
 
 ALIGNMENT = 64  # bytes: the widest register, so that no access crosses a line of the cache
-WIDEST = 64  # bytes
-
-
-def lanes_of(dtype: type) -> int:
-    """Lanes that fill the widest registers: 8 in double precision, 16 in single."""
-    return WIDEST // np.dtype(dtype).itemsize
 
 
 class LaneArray:
