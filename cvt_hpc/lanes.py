@@ -399,7 +399,10 @@ def maximum(a, b):
 
 
 def exp(x):
-    """e^x of each lane, to two units in the last place; x is held within the range of the exponent."""
+    """e^x of each lane, to two units in the last place.
+
+    x is held within the range of the exponent, at its lower end where it is not a number.
+    """
     raise NotImplementedError("for kernels")
 
 
