@@ -172,23 +172,25 @@ def test_groups_hold_each_run_once_and_only_what_is_alike(stepper):
 
 
 def test_single_precision_gives_the_same_vibration():
-    # 0.5 um of ringing are left of the load's rise where it is quiet; two random starts of a vibration differ by a tenth
-    loads = (60.0, 120.0)
+    coarse = {"stations": 64, "duration": 0.16}
     found = {
         precision: run_points(
-            job(), [job(**COARSE_RUN, load=load, precision=precision).point(0) for load in loads], never
+            job(),
+            [job(**coarse, load=load, precision=precision).point(0) for load in (0.0, 60.0, 120.0)],
+            never,
         )
         for precision in WIDTHS
     }
     for one, other in zip(found["double"], found["single"], strict=True):
         assert (one["status"], other["status"]) == (Status.DONE, Status.DONE)
-        assert abs(one["power_residual"]) < 1e-3 and abs(other["power_residual"]) < 1e-3
-        assert one["vibrates"] == other["vibrates"]
-    (quiet, vibrating), (single_quiet, single_vibrating) = found["double"], found["single"]
-    assert quiet["vibrates"] == Vibrates.NO and vibrating["vibrates"] == Vibrates.YES
-    assert np.all(single_quiet["amplitude"] < quiet["amplitude"] + 0.2e-6)
-    assert single_vibrating["amplitude"] == pytest.approx(vibrating["amplitude"], rel=0.1)
-    assert single_vibrating["frequency"] == pytest.approx(vibrating["frequency"], rel=0.02)
-
-
-COARSE_RUN = {"stations": 64, "duration": 0.16}
+        assert other["vibrates"] == one["vibrates"]
+        # a hundredth of what closes the balance of a loaded belt, a tenth of the mesh's part: 2e-5 are seen
+        assert other["power_residual"] == pytest.approx(one["power_residual"], abs=1e-4)
+    # round-off rings the strands of a quiet belt by some nm, where nothing is left of the start in double precision
+    silent, quiet, vibrating = found["single"]
+    assert np.all(found["double"][0]["amplitude"] < 1e-10) and np.all(silent["amplitude"] < 1e-8)
+    assert quiet["amplitude"] == pytest.approx(found["double"][1]["amplitude"], abs=1e-8)
+    # the same limit cycle, out of phase: windows scatter by 2-7 %
+    assert vibrating["vibrates"] == Vibrates.YES
+    assert vibrating["amplitude"] == pytest.approx(found["double"][2]["amplitude"], rel=0.05)
+    assert vibrating["frequency"] == pytest.approx(found["double"][2]["frequency"], rel=0.01)
