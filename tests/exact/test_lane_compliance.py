@@ -95,8 +95,11 @@ def test_each_lane_is_lemke_on_the_dense_matrix(seed):
 
 def test_rigid_sheaves_leave_the_elements_alone():
     wraps, contact, course = batch(0, stiffness=np.inf)
-    expected = np.maximum(-course[0], 0.0) * [wrap.element_stiffness for wrap in wraps]
-    assert solve(contact, course[0]) == pytest.approx(expected, rel=1e-13, abs=1e-6)
+    stiffness = [wrap.element_stiffness for wrap in wraps]
+    # all open, all closed (nothing but open stations on the wrong side), and any
+    for gaps in (np.abs(course[0]), -np.abs(course[0]), course[1]):
+        expected = np.maximum(-gaps, 0.0) * stiffness
+        assert solve(contact, gaps) == pytest.approx(expected, rel=1e-13, abs=1e-6)
 
 
 def test_single_precision_knows_forces_to_its_round_off():
