@@ -6,7 +6,7 @@ import numpy as np
 
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.elastic_belt.belt import LAYER_WORK, Belt, State
-from cvt_hpc.models.elastic_belt.imex import imex_work
+from cvt_hpc.models.elastic_belt.imex import derive, imex_work
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state, take_lane
 from cvt_hpc.models.elastic_belt.march import march_imex
 from cvt_hpc.models.elastic_belt.power import LAYER_LOSS, POWERS
@@ -42,6 +42,8 @@ class FastRuns:
 
     def advance(self, steps: int, step: float) -> None:
         """March, and take a sample at the end: with no step at all, of the state as it is."""
+        # a test may have changed the state since
+        derive(self._constants, self.lanes, self.work.stations)
         march_imex(
             self._constants,
             self.lanes,

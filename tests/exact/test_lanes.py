@@ -15,13 +15,13 @@ from cvt_hpc.lanes import (
     LaneArray,
     absolute,
     anywhere,
-    exp,
+    decay,
     fma,
-    lanes_of,
     like,
     maximum,
     minimum,
     nearest_integer,
+    reciprocals,
     select,
     sqrt,
     with_sign_of,
@@ -31,9 +31,23 @@ from cvt_hpc.lanes import (
 NAMES = (
     *("sum", "difference", "product", "quotient", "negative", "sum with a number", "number less", "halved"),
     *("in place", "less", "at most", "more", "at least", "both", "either", "not"),
-    *("root", "size", "whole", "signed", "fused", "least", "largest", "exp", "number", "chosen number"),
+    *(
+        "root",
+        "size",
+        "whole",
+        "signed",
+        "fused",
+        "least",
+        "largest",
+        "decay",
+        "number",
+        "chosen number",
+        "reciprocal",
+        "other reciprocal",
+    ),
 )
 TYPES = [(np.float64, 1), (np.float64, 8), (np.float32, 16)]
+WIDTHS = {np.float64: 8, np.float32: 16}
 SPECIAL = (0.0, -0.0, 1.0, -1.0, 0.5, 2.5, -3.5, 1e-30, -1e30, np.inf, -np.inf, np.nan)
 NUMBER = 0.7
 
@@ -68,10 +82,11 @@ def operate(rows: int, a: LaneArray, b: LaneArray, out: LaneArray, number: float
             fma(x, y, number),
             minimum(x, y),
             maximum(x, y),
-            exp(x),
+            decay(x),
         )
         out[j, 24] = number
         out[j, 25] = select(x < y, x, number)
+        out[j, 26], out[j, 27] = reciprocals(x, y)
 
 
 @lane_kernel
@@ -159,7 +174,7 @@ def test_operations_are_numpys(dtype, lanes):
         "number": np.full_like(a, n),
         "chosen number": np.where(a < b, a, n),
     }
-    assert set(NAMES) - set(expected) == {"fused", "exp"}
+    assert set(NAMES) - set(expected) == {"fused", "decay", "reciprocal", "other reciprocal"}
     for name, values in expected.items():
         assert same_bits(found[name], values.astype(dtype)), name
 
@@ -168,7 +183,7 @@ def test_operations_are_numpys(dtype, lanes):
 def test_products_are_fused_with_sums_rounded_once(dtype):
     a, b = operands(dtype)
     finite = np.isfinite(a) & np.isfinite(b) & (np.abs(a) < 1e9) & (np.abs(b) < 1e9)
-    found = results(dtype, lanes_of(dtype))["fused"]
+    found = results(dtype, WIDTHS[dtype])["fused"]
     other = 0
     for x, y, value in zip(a[finite], b[finite], found[finite], strict=True):
         exact = Fraction(float(x)) * Fraction(float(y)) + Fraction(float(dtype(NUMBER)))
@@ -181,20 +196,33 @@ def test_products_are_fused_with_sums_rounded_once(dtype):
 
 
 @pytest.mark.parametrize(("dtype", "lanes"), TYPES)
+@np.errstate(all="ignore")
+def test_two_reciprocals_by_one_division(dtype, lanes):
+    a, b = operands(dtype)
+    found = results(dtype, lanes)
+    fit = np.isfinite(a * b) & (np.abs(a * b) > 1e-30) & (np.abs(a * b) < 1e30)
+    assert np.sum(fit) > 1000
+    # three roundings
+    for name, x in (("reciprocal", a), ("other reciprocal", b)):
+        exact = 1 / x[fit].astype(np.longdouble)
+        assert np.max(np.abs(found[name][fit] / exact - 1)) < 2 * np.finfo(dtype).eps
+
+
+@pytest.mark.parametrize(("dtype", "lanes"), TYPES)
 def test_exponential_to_two_units_in_the_last_place(dtype, lanes):
     largest = dtype(87 if dtype is np.float32 else 708)
-    x = np.concatenate([np.linspace(-largest, largest, 15000), np.linspace(-1, 1, 1000)]).astype(dtype)
+    x = np.concatenate([np.linspace(0, largest, 15000), np.linspace(0, 1, 1000)]).astype(dtype)
     out = LaneArray(x.size // lanes, len(NAMES), lanes, dtype)
     operate(x.size // lanes, in_lanes(x, lanes, dtype), in_lanes(x, lanes, dtype), out, NUMBER)
-    found = out.data[:, NAMES.index("exp")].ravel()
-    exact = np.exp(x.astype(np.longdouble))
+    found = out.data[:, NAMES.index("decay")].ravel()
+    exact = np.exp(-x.astype(np.longdouble))
     assert np.finfo(np.longdouble).nmant > 60
     assert np.max(np.abs(found - exact) / np.spacing(found)) < 2
-    # held within the range: beyond it nothing overflows, and what is not a number counts as least
-    a, outside = operands(dtype)[0], results(dtype, lanes)["exp"]
-    least, most = found[0], found[14999]
-    assert np.all(outside[a == np.inf] == most) and np.all(outside[a == -np.inf] == least)
-    assert np.all(outside[np.isnan(a)] == least) and np.isnan(a).any()
+    # held within the range: beyond it nothing overflows, and what is not a number counts as most
+    a, outside = operands(dtype)[0], results(dtype, lanes)["decay"]
+    assert found[0] == 1 and 0 < found[14999] < 1e-37
+    assert np.all(outside[a > 1e4] == found[14999]) and np.sum(a == np.inf) > 0
+    assert np.all(outside[np.isnan(a)] == found[14999]) and np.isnan(a).any()
 
 
 def test_results_do_not_depend_on_the_number_of_lanes():
@@ -232,8 +260,7 @@ def test_precisions_are_not_mixed_unawares():
         mixed(LaneArray(1, 1, 8, np.float32), LaneArray(1, 1, 8), LaneArray(1, 1, 8))
 
 
-def test_lanes_fill_a_register():
-    assert (lanes_of(np.float64), lanes_of(np.float32)) == (8, 16)
+def test_arrays_begin_where_a_register_can_be_loaded():
     for dtype, lanes in TYPES:
         for _ in range(20):  # wherever the memory begins
             array = LaneArray(3, 5, lanes, dtype)

@@ -3,8 +3,8 @@
 Importing this package is cheap: kernels are compiled when `belt` is imported.
 """
 
-from cvt_hpc.models.elastic_belt.parameters import PARAMETERS, check
+from cvt_hpc.models.elastic_belt.parameters import PARAMETERS, check, inert
 
 DEFAULT_STEPPER = "imex"
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "check"]
+__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "check", "inert"]

@@ -15,9 +15,7 @@ from cvt_hpc.models.elastic_belt.imex import (
     EPS_0,
     EPS_1,
     FORCE,
-    lane_contact_forces,
     lane_load,
-    lane_strains,
 )
 from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
@@ -167,7 +165,7 @@ def sample(
     belt, state
         Constants and state.
     stations : LaneArray
-        Of `ImexWork`; its forces and strains become those of this state.
+        Of `ImexWork`, with what `derive` finds of this state.
     sensing : Sensors
         S rows.
     rows : (samples, S + C) LaneArray of doubles
@@ -180,8 +178,6 @@ def sample(
         Where a lane's run has to be stopped for the first time, or the last one: the `Outcome`, the time [s],
         and the linear solves of the contact problem until then.
     """
-    lane_contact_forces(belt, state, stations)
-    lane_strains(belt, state, stations)
     _watch(belt, state, stations, ended)
     n, fields, c = belt.cell.size, state.fields, belt.constants
     sensed = sensing.matrix.shape[0]
