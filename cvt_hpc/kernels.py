@@ -22,6 +22,7 @@ import numba
 
 _PACKAGE = Path(__file__).parent
 _ROOMS_WITH_KERNELS = ("physics", "models", "steppers")
+_OTHER_SOURCES = ("kernels.py", "lanes.py")
 
 # Division by zero gives inf as in numpy, without a test for it. Products may be contracted with sums, and
 # divisions by one number replaced by its reciprocal; sums are never reordered, and what is not a number stays
@@ -70,7 +71,8 @@ def _cache_folder() -> str:
     for room in _ROOMS_WITH_KERNELS:
         for source in sorted((_PACKAGE / room).rglob("*.py")):
             digest.update(source.read_bytes())
-    digest.update(Path(__file__).read_bytes())
+    for name in _OTHER_SOURCES:
+        digest.update((_PACKAGE / name).read_bytes())
     chosen = numba.config.CACHE_DIR
     if chosen:
         base = Path(chosen)

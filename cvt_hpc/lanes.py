@@ -393,7 +393,10 @@ def maximum(a, b):
 
 
 def decay(x):
-    """e^-x of each lane for x >= 0, to two units in the last place; x is held within the exponent's range."""
+    """e^-x of each lane for x >= 0, to two units in the last place.
+
+    x is held within the range of the exponent, at its upper end where it is not a number.
+    """
     raise NotImplementedError("for kernels")
 
 

@@ -33,7 +33,6 @@ from cvt_hpc.models.elastic_belt.sampling import (
     sensors,
 )
 from cvt_hpc.physics.compliance import contact_state
-from cvt_hpc.physics.lane_compliance import SOLVES
 from cvt_hpc.variables import Status
 
 LARGEST_POWER_RESIDUAL = 0.02
@@ -112,7 +111,7 @@ class Batch:
         self.done = 0
         n = self.mesh.cell.size
         self.profiles = [LaneArray(n, len(PROFILES), width) for _ in range(2)]
-        self.ended = LaneArray(1, 2, width)
+        self.ended = LaneArray(1, 3, width)
         self._kick = min(int(np.ceil(p["rise_time"] * p["sampling_rate"])), self.samples)
         self.first_judged = self.samples - round(p["judged_fraction"] * self.samples)
         self._disturbed = False
@@ -166,7 +165,7 @@ class Batch:
         """Linear solves of the contact problem in a run so far."""
         if self._explicit is not None:
             return self._solves
-        return int(sum(contact.scalars.data[0, SOLVES, lane] for contact in self.state.contacts))
+        return int(self.ended.data[0, 2, lane])
 
 
 class Transient:
