@@ -23,13 +23,13 @@ def test_a_step_far_too_long_diverges_and_says_when(stations):
     found = record(load=20.0, step=50e-6, duration=0.1, stations=stations)
     assert found["status"] == Status.FAILED_NUMERICS
     when = f"{found['simulated_seconds'] * 1e3:.4g} ms"
-    assert found["reason"] == f"at {when}: the belt is more than 10 mm off its path"
+    assert found["reason"].startswith((f"at {when}: the belt is more", f"at {when}: strain is beyond 5%"))
     # long before the end: little is computed in vain
     assert found["simulated_seconds"] < 0.01
     assert_no_numbers(found)
 
 
-LONG_STEPS = [(0.0, 12.5e-6), (60.0, 12.5e-6), (60.0, 10e-6), (120.0, 10e-6)]
+LONG_STEPS = [(0.0, 10e-6), (40.0, 10e-6), (120.0, 10e-6), (120.0, 12.5e-6)]
 
 
 @pytest.mark.parametrize(("load", "step"), LONG_STEPS)
@@ -46,8 +46,9 @@ def test_a_step_that_is_too_long_fails_or_does_no_harm(load, step):
 
 
 def test_the_power_balance_catches_steps_that_do_not_diverge():
-    # at four times the default step pressed elements hum from step to step, which no amplitude in the band shows
-    found = [record(load=load, step=step, duration=0.1) for load, step in LONG_STEPS]
+    # friction regularised over 3 mm/s: what the default step makes of it stays within bounds, and is no motion of
+    # this belt
+    found = [record(load=load, friction_speed=3e-3, duration=0.1) for load in (0.0, 40.0)]
     caught = [f for f in found if "the power balance is open by" in f["reason"]]
     assert caught
     for f in caught:
