@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import lane_kernel
-from cvt_hpc.lanes import LaneArray, anywhere, fma, like, maximum, select
+from cvt_hpc.lanes import LaneArray, anywhere, fma, like, select
 from cvt_hpc.physics.compliance import ROUNDS_OF_BLOCK_FLIPS, Sheaves
 
 # fields of LaneContact.stations
@@ -130,12 +130,16 @@ def _pushes(contact: LaneContact) -> bool:
     stations, scalars, weight = contact.stations, contact.scalars, contact.weight
     m = weight.size
     ce, a, round_off = scalars[0, ELEMENT_STIFFNESS], scalars[0, COMPLIANCE], scalars[0, ROUND_OFF]
+    y = like(0.0, ce)
     for j in range(m):
-        stations[j, Y] = -weight[j] * stations[j, CLOSED] * ce * stations[j, GAP]
-    _bend(m, stations)
-    p1 = p2 = like(0.0, ce)
-    for j in range(m):
-        overlap = weight[j] * stations[j, CLOSED] * fma(a, stations[j, Y], stations[j, GAP])
+        y = fma(-stations[j, MULTIPLIER], y, -weight[j] * stations[j, CLOSED] * ce * stations[j, GAP])
+        stations[j, Y] = y
+    y = p1 = p2 = multiplier = like(0.0, ce)
+    for j in range(m - 1, -1, -1):
+        y = fma(-multiplier, y, stations[j, Y] * stations[j, PIVOT])
+        multiplier = stations[j, MULTIPLIER]
+        stations[j, Y] = y
+        overlap = weight[j] * stations[j, CLOSED] * fma(a, y, stations[j, GAP])
         p1 = fma(-contact.cosine[j], overlap, p1)
         p2 = fma(-contact.sine[j], overlap, p2)
     gain = scalars[0, TILT_COMPLIANCE] * ce
@@ -185,9 +189,3 @@ def solve_lane_contact(contact: LaneContact, most_rounds: int) -> None:
         scalars[0, SOLVES] = scalars[0, SOLVES] + select(busy, like(1.0, round_off), 0.0)
         contact.fresh[0] = False
     scalars[0, UNSOLVED] = select(busy, like(1.0, round_off), scalars[0, UNSOLVED])
-
-
-@lane_kernel
-def closed_force(stations: LaneArray, j: int):
-    """Axial line force of station j [N/m]."""
-    return select(stations[j, CLOSED] > 0.5, maximum(stations[j, PUSH], 0.0), 0.0)

@@ -85,7 +85,8 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneBelt,
     LaneState,
 )
-from cvt_hpc.physics.lane_compliance import GAP, closed_force, solve_lane_contact
+from cvt_hpc.physics.lane_compliance import CLOSED, GAP, solve_lane_contact
+from cvt_hpc.physics.lane_compliance import PUSH as PUSHED
 from cvt_hpc.physics.lane_friction import (
     lane_coefficient,
     lane_law,
@@ -222,11 +223,13 @@ def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -
         contact = state.contacts[1] if wrap else state.contacts[0]
         opening = like(state.scalars[0, POSITION], wedge) if wrap else c[0, DRIVING_POSITION]
         first = belt.driven_start if wrap else 0
+        wrap_stations = contact.stations
         for k in range(contact.weight.size):
-            contact.stations[k, GAP] = fma(wedge, fields[first + k, W], opening)
+            wrap_stations[k, GAP] = fma(wedge, fields[first + k, W], opening)
         solve_lane_contact(contact, MOST_CONTACT_ROUNDS)
         for k in range(contact.weight.size):
-            stations[first + k, FORCE] = closed_force(contact.stations, k)
+            push = maximum(wrap_stations[k, PUSHED], 0.0)
+            stations[first + k, FORCE] = select(wrap_stations[k, CLOSED] > 0.5, push, 0.0)
 
 
 @lane_kernel
