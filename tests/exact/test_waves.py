@@ -38,9 +38,9 @@ def test_waves_keep_amplitude_and_frequency(share):
         run.advance(stride, STEP)
         track.append(2.0 * np.exp(1j * phase) @ run.state().fields[W] / (belt.cell.size * SIZE))
     assert run.outcome() is Outcome.OK
-    # Leapfrog keeps amplitudes, the extrapolated gyroscopic term loses some 1e-3 in these 20 ms. Taken half a
-    # step late it would feed k v omega dt / 2, ten per second and more.
-    assert np.abs(track[-1]) == pytest.approx(np.abs(track[0]), rel=1e-2)
+    # Leapfrog keeps amplitudes, the extrapolated gyroscopic term changes them by up to 1 % in these 40 ms. Taken
+    # half a step late it would feed k v omega dt / 2, ten per second and more.
+    assert np.abs(track[-1]) == pytest.approx(np.abs(track[0]), rel=2e-2)
     turned = np.unwrap(np.angle(track))
     # leapfrog: (omega dt)^2 / 24, the extrapolation below (omega dt)^2
     found = (turned[-1] - turned[0]) / ((len(track) - 1) * stride * STEP)

@@ -299,14 +299,14 @@ def _sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
         speed = maximum(speed, least)
         saddle = fma(fma(offset, belt.arc_curvature[j], 1.0), full_speed, -(belt_speed + fields[j, V_RING]))
         rest, ring_rest = decay(speed * (2.0 * per_width)), decay(absolute(saddle) * (2.0 * per_ring_width))
-        per_flank, per_saddle = reciprocals(speed * (1.0 + rest), 1.0 + ring_rest)
+        per_flank = 1.0 / (speed * (1.0 + rest))
         stations[j, SLIDING_R], stations[j, SLIDING_T] = v_radial, v_tangential
         stations[j, COEFFICIENT] = coefficient
         stations[j, FACTOR], stations[j, PER_SPEED] = (
             (1.0 - rest) * (speed * per_flank),
             (1.0 + rest) * per_flank,
         )
-        stations[j, RING_FACTOR] = with_sign_of((1.0 - ring_rest) * per_saddle, saddle)
+        stations[j, RING_FACTOR] = with_sign_of((1.0 - ring_rest) / (1.0 + ring_rest), saddle)
 
 
 @lane_kernel
