@@ -27,6 +27,7 @@ FACTS = Facts(
     needs=frozenset({"rates"}),
     implicit=True,
     l_stable=True,
+    damping_limit=np.inf,
     stability="no limit; solvable in one way only while 0.436 step times the steepest growth rate (falling "
     "friction: N |mu'| / m) is below 1",
     damping="a vibration decays at the rate 0.0256 step^3 w^4",
