@@ -198,7 +198,7 @@ def solve_stage(
     if not _rates(system, frozen, t, z, counts):
         return NO_VALUE
     anew = frozen.memory[SIGN] == 0.0
-    begin, fresh, crossed, leaps = True, anew, False, 0
+    begin, fresh, bracketed, crossed, leaps = True, anew, False, False, 0
     left, share, near, far = 0.0, 1.0, 0.0, 1.0
     for _ in range(MOST_PASSES):
         if begin:
@@ -208,7 +208,8 @@ def solve_stage(
                     return outcome
             left = _correct(system, frozen, base, shift, z, frozen.correction, counts)
             crossed |= frozen.memory[SIGN] < 0.0
-            begin, fresh, anew, share, near, far = False, anew, True, 1.0, 0.0, 1.0
+            begin, fresh, bracketed, anew = False, anew, False, True
+            share, near, far = 1.0, 0.0, 1.0
         if not np.isfinite(left):
             return NOT_FINITE
         for i in range(z.size):
@@ -228,7 +229,9 @@ def solve_stage(
             begin = left * reduction ** (z.size + 2) > tolerance
             continue
         if fresh:
-            if far < 1.0 and not _overshot(system, frozen):
+            overshot = _overshot(system, frozen)
+            bracketed |= overshot
+            if bracketed and not overshot:
                 near = share
             else:
                 far = share

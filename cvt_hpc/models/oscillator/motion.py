@@ -71,6 +71,13 @@ def regularised_friction(o: Oscillator, sliding: float) -> float:
     return o.normal_load * (mu * saturation(sliding, o.width)[0] + at_rest)
 
 
+def largest_rate(o: Oscillator) -> float:
+    """Rate of the decay of sliding at rest under smoothed friction [1/s]."""
+    mu = friction_coefficient(o.law, 0.0, o.normal_load)[0]
+    slope = (mu + o.excess * np.exp(0.5) / HUMP) / o.width
+    return (o.normal_load * slope + o.damping) / o.mass
+
+
 @kernel
 def smoothed_rates(o: Oscillator, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     """Rates of displacement and speed with smoothed friction; see `System`."""
