@@ -11,6 +11,7 @@ from cvt_hpc.models.marched import MarchedRun, Probe
 from cvt_hpc.models.oscillator.motion import (
     V,
     X,
+    friction_at_rest,
     initial_state,
     largest_rate,
     oscillator,
@@ -48,17 +49,17 @@ class Transient(MarchedRun):
             1.0 / parameters["sampling_rate"],
         )
         super().__init__(parameters, march, (Probe("mass", 0.0),), (X,))
-        self._largest_step = march.facts.damping_limit / largest_rate(oscillator(parameters))
+        constants = oscillator(parameters)
+        self._largest_step = march.facts.damping_limit / largest_rate(constants)
+        self._jump = friction_at_rest(constants) / constants.mass
 
     def advance(self, samples: int) -> tuple[Status, str] | None:
         """March on; see `MarchedRun.advance`."""
         first = self.done
         failure = super().advance(samples)
         if failure is None and self.step > self._largest_step:
-            p = self.parameters
-            sliding = np.abs(p["belt_speed"] - self.channel("speed")[first:])
-            friction = p["normal_load"] * max(p["kinetic_friction"], p["static_friction"])
-            if np.any(sliding < self.step * friction / p["mass"]):
+            sliding = np.abs(self.parameters["belt_speed"] - self.channel("speed")[first:])
+            if np.any(sliding < self.step * self._jump):
                 return Status.FAILED_NUMERICS, (
                     f"the step is beyond {self._largest_step:.3g} s, from where friction chatters instead of "
                     "letting the mass stick"
