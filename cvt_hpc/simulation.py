@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
@@ -38,7 +38,14 @@ _OCCURRENCE = (
     Variable("growth_error", ("strand",), "f8", "s-1", "standard error of the growth rate"),
 )
 _COST = (
-    Variable("core_seconds", (), "f8", "s", "processor time of the run", volatile=True),
+    Variable(
+        "core_seconds",
+        (),
+        "f8",
+        "s",
+        "processor time of the run; of runs that advance together, their time divided by their number",
+        volatile=True,
+    ),
     Variable("simulated_seconds", (), "f8", "s", "simulated time, less than asked where the run failed"),
     Variable("time_step", (), "f8", "s", "time step"),
     Variable("steps", (), "i8", "1", "time steps taken"),
@@ -72,8 +79,29 @@ def record_coordinates(job: Job) -> dict[str, Coordinate]:
     return _model_record(job).coordinates(job.parameters)
 
 
+def run_costs(job: Job) -> np.ndarray:
+    """Core-seconds of each run: within a factor of two on processors of the last years.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+
+    Returns
+    -------
+    (runs,) array
+        In the order of run indices.
+    """
+    grids = np.meshgrid(*(axis.values for axis in job.axes), indexing="ij", sparse=True)
+    p = {**job.parameters, **dict(zip((axis.name for axis in job.axes), grids, strict=True))}
+    model = _model_record(job)
+    cost = model.STEP_COST[job.stepper] * p["stations"] * p["duration"] / p["step"]
+    cost = cost / model.lanes(job.parameters, job.stepper)
+    return np.broadcast_to(cost, job.shape).ravel()
+
+
 def estimate_cost(job: Job) -> float:
-    """Core-seconds of a run, mean over the job: within a factor of two on processors of the last years.
+    """Core-seconds of a run, mean over the job.
 
     Not known (nan) of a model that no study runs.
 
@@ -84,12 +112,7 @@ def estimate_cost(job: Job) -> float:
     """
     if not _has_record(job):
         return float("nan")
-    axes = {axis.name: np.array(axis.values) for axis in job.axes}
-
-    def mean(key: str, power: int = 1) -> float:
-        return float(np.mean(axes.get(key, np.array([job.parameters[key]])) ** power))
-
-    return _model_record(job).STEP_COST[job.stepper] * mean("stations") * mean("duration") * mean("step", -1)
+    return float(run_costs(job).mean())
 
 
 def run_point(job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]) -> dict[str, Any]:
@@ -114,7 +137,61 @@ def run_point(job: Job, point: dict[str, Any], interrupt: Callable[[], str | Non
     Interrupted
         With the text of `interrupt`.
     """
-    return _run(job, point, interrupt)[1]
+    return run_points(job, [point], interrupt)[0]
+
+
+def run_points(
+    job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+) -> list[dict[str, Any]]:
+    """Do several runs that advance together, in the lanes of the processor's registers.
+
+    Parameters
+    ----------
+    job : Job
+        For its model and stepper.
+    points : sequence of dict
+        Flat parameters of the runs [SI], as `lane_groups` puts them together.
+    interrupt : callable
+        As `run_point` takes it.
+
+    Returns
+    -------
+    list of dict
+        Records in the order of the points, each bitwise what `run_point` makes of its point alone.
+
+    Raises
+    ------
+    Interrupted
+        With the text of `interrupt`.
+    """
+    return [record for _, record in _march(job, points, interrupt)]
+
+
+def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
+    """Split runs into batches that can advance together.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job. Its model's record says by `lanes` how many runs a stepper takes at once, and by
+        `lane_key` of a run's parameters which ones: those with equal keys.
+    indices : sequence of int
+        Run indices.
+
+    Returns
+    -------
+    list of tuple of int
+        Each index once, in batches of as many as the processor's registers hold.
+    """
+    model = _model_record(job)
+    groups: dict[Any, list[int]] = {}
+    for index in indices:
+        groups.setdefault(model.lane_key(job.point(index)), []).append(index)
+    batches = []
+    for group in groups.values():
+        most = model.lanes(job.point(group[0]), job.stepper)
+        batches += [tuple(group[first : first + most]) for first in range(0, len(group), most)]
+    return batches
 
 
 def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
@@ -141,7 +218,7 @@ def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
     import xarray as xr
 
     point = job.point_at(at or {})
-    run, record = _run(job, point, lambda: None)
+    ((run, record),) = _march(job, [point], lambda: None)
     coordinates = {
         name: (name, c.values, _attributes(c.long_name, c.units))
         for name, c in record_coordinates(job).items()
@@ -163,32 +240,38 @@ def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
     return dataset.merge(histories, combine_attrs="override")
 
 
-def _run(job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]) -> tuple[Any, dict[str, Any]]:
-    """March, and make the record."""
-    model = import_module(MODELS[job.model] + ".transient")
-    run = model.Transient(point, job.stepper)
-    run.advance(0)  # compiles or loads the kernels, which is no cost of this run
+def _march(
+    job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+) -> list[tuple[Any, dict[str, Any]]]:
+    """March a batch of runs, and make their records."""
+    batch = _model(job).Batch(points, job.stepper)
+    batch.advance(0)  # compiles or loads the kernels, which is no cost of these runs
     started = time.process_time()
-    failure = None
-    while failure is None and run.done < run.samples:
+    while batch.running:
         if stop := interrupt():
             raise Interrupted(stop)
-        failure = run.advance(SAMPLES_BETWEEN_POLLS)
-    record = _blank(job)
+        batch.advance(SAMPLES_BETWEEN_POLLS)
+    marched = (time.process_time() - started) / len(points)
+    return [(run, _record(job, run, marched)) for run in batch.runs]
+
+
+def _record(job: Job, run: Any, marched: float) -> dict[str, Any]:
+    """The record of a run that has ended."""
+    started = time.process_time()
+    record, failure = _blank(job), run.failure
     if failure is None:
-        record |= _judge(job, run, point)
+        record |= _judge(job, run, run.parameters)
         failure = run.numerical_doubt(record)
     if failure is not None:
         status, why = failure
         record = _blank(job) | {"status": status, "reason": f"at {run.time * 1e3:.4g} ms: {why}"[:240]}
-    record |= {
-        "core_seconds": time.process_time() - started,
+    return record | {
+        "core_seconds": marched + time.process_time() - started,
         "simulated_seconds": run.time,
         "time_step": run.step,
         "steps": run.steps,
         "contact_solves": run.contact_solves,
     }
-    return run, record
 
 
 def _judge(job: Job, run: Any, point: dict[str, Any]) -> dict[str, Any]:
@@ -222,6 +305,10 @@ def _blank(job: Job) -> dict[str, Any]:
             shape = tuple(sizes[dim] for dim in variable.dims)
             blank[variable.name] = np.full(shape, np.nan if variable.dtype == "f8" else 0, variable.dtype)
     return blank
+
+
+def _model(job: Job) -> ModuleType:
+    return import_module(MODELS[job.model] + ".transient")
 
 
 def _model_record(job: Job) -> ModuleType:
