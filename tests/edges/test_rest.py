@@ -38,7 +38,9 @@ def test_smoothed_friction_creeps(stepper, share):
     p = HELD | {"initial_displacement": -share * 0.6 / 1e-3}
     run = finished("oscillator", stepper, p)
     creep = np.diff(run.displacement[-2:, 0])[0] / run.interval
-    assert creep == pytest.approx(1e-3 * np.arctanh(share), rel=1e-4)
+    # the spring has let go a little by the way that the mass has crept
+    pull = -1e-3 * (run.displacement[-1, 0] - 0.5 * creep * run.interval)
+    assert creep == pytest.approx(1e-3 * np.arctanh(pull / 0.6), rel=1e-5)
 
 
 def test_friction_as_it_is_does_not():

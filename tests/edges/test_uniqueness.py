@@ -83,15 +83,18 @@ def test_two_masses_at_once_are_noticed(share, expected):
     assert march.advance(np.zeros((1, 4))) == expected
 
 
-@pytest.mark.parametrize(("share", "fails"), [(0.5, False), (3.0, True)])
-def test_a_narrow_hump_of_friction_at_rest_falls_too_steeply(share, fails):
+def test_a_narrow_hump_of_friction_at_rest_falls_too_steeply():
     # stick-slip with the level at rest smoothed: the hump's other side falls by 2 / e of (mu_s - mu_k) N over
     # 6 v_reg; implicit Euler takes it up to step = 6 m v_reg e / (2 (mu_s - mu_k) N)
     width = 1e-3
     limit = 6.0 * width * np.exp(1.0) / (2.0 * 0.4)
     p = scene("oscillator", friction_speed=width, theta=1.0, duration=30.0, sampling_rate=10.0)
-    run = begin("oscillator", "theta", p | {"step": share * limit})
-    failure = run.advance(run.samples)
-    assert (failure is not None) == fails
-    if fails:
-        assert failure[1].startswith(MESSAGES[Result.NOT_UNIQUE])
+
+    def end(share):
+        run = begin("oscillator", "theta", p | {"step": share * limit})
+        return run.advance(run.samples)
+
+    assert [end(share) for share in (0.3, 0.5, 0.7, 0.9)] == [None] * 4
+    # longer steps may find the slope between sticking and slip, or leap over it
+    beyond = [failure for failure in map(end, np.linspace(1.5, 5.0, 15)) if failure]
+    assert beyond and all(reason.startswith(MESSAGES[Result.NOT_UNIQUE]) for _, reason in beyond)
