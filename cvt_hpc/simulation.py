@@ -308,16 +308,21 @@ def _blank(job: Job) -> dict[str, Any]:
 
 
 def _model(job: Job) -> ModuleType:
+    _check_recorded(job)
     return import_module(MODELS[job.model] + ".transient")
 
 
 def _model_record(job: Job) -> ModuleType:
+    _check_recorded(job)
+    return import_module(MODELS[job.model] + ".record")
+
+
+def _check_recorded(job: Job) -> None:
     if not _has_record(job):
         raise InputError(
             f"{job.source}: model: expected one whose runs are judged and recorded (elastic_belt), "
             f"found {job.model}, which is there to compare steppers: `cvt-hpc chart`"
         )
-    return import_module(MODELS[job.model] + ".record")
 
 
 def _has_record(job: Job) -> bool:

@@ -13,7 +13,7 @@ from cvt_hpc.job.summary import summarize
 from cvt_hpc.job.units import to_si
 from cvt_hpc.job.values import read_value
 from cvt_hpc.models import MODELS
-from cvt_hpc.simulation import estimate_cost
+from cvt_hpc.simulation import estimate_cost, simulate
 from cvt_hpc.steppers import STEPPERS
 from cvt_hpc.study import run
 from cvt_hpc.vibration import criterion
@@ -86,4 +86,6 @@ def test_a_model_without_records_is_no_model_of_a_study(model, tmp_path):
     with pytest.raises(InputError, match=f"x.toml: model: expected one whose runs .*found {model}"):
         run(job, tmp_path / "out", progress=False)
     assert not (tmp_path / "out").exists()
+    with pytest.raises(InputError, match=f"found {model}"):
+        simulate(job)
     assert "estimated cost: not known for this model" in summarize(job, estimate_cost(job))
