@@ -6,14 +6,15 @@ kernels' sources: below NUMBA_CACHE_DIR if that is set, else in the package, els
 
 A kernel may be handed to another as an argument, as a right-hand side to a stepper. The compiler tells
 kernels apart by an identity drawn at random, so that it would never find such code again: here it is the
-name, and for kernels from outside the package the content of their file, which the folder does not know. An
-index that names types which are gone, of a script that has been changed since, counts as empty.
+name, and for kernels from outside the package the content of their file, which the folder does not know. The
+compiler cannot read an index that names a type of a script that is not at hand: here it skips that entry.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import pickle
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -83,7 +84,7 @@ def _identity(function: Callable[..., Any]) -> str:
 
 
 class _ForgivingIndex(IndexDataCacheFile):
-    """An index of machine code, empty where it cannot be read."""
+    """An index of machine code, entry by entry: what cannot be read is kept as it is and matches nothing."""
 
     @classmethod
     def of(cls, index: IndexDataCacheFile) -> _ForgivingIndex:
@@ -91,10 +92,18 @@ class _ForgivingIndex(IndexDataCacheFile):
         return index
 
     def _load_index(self) -> dict:
-        try:
-            return super()._load_index()
-        except (AttributeError, ImportError):
-            return {}
+        return {_entry(packed): name for packed, name in super()._load_index().items()}
+
+    def _save_index(self, overloads: dict) -> None:
+        packed = {key if isinstance(key, bytes) else self._dump(key): name for key, name in overloads.items()}
+        super()._save_index(packed)
+
+
+def _entry(packed: bytes) -> Any:
+    try:
+        return pickle.loads(packed)
+    except (AttributeError, ImportError):
+        return packed
 
 
 def _cache_folder() -> str:

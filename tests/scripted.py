@@ -15,7 +15,8 @@ class Script(NamedTuple):
 
     ENDS: y' = 1 + growth y^2, without a value after `first` [s] and no number after `second` [s]; `third` is
     the growth. STOP: a unit mass pressed by `third` [N] on a stop of damping `first` [N s/m] and stiffness
-    `second` [N/m] that never pulls. TWO_MASSES: each on a unit spring, driven at the rate `first` [1/s].
+    `second` [N/m] that never pulls. TWO_MASSES: each on a unit spring, driven by its own speed at the rate `first` [1/s] and by the
+    other's at `second`.
     """
 
     kind: int
@@ -35,7 +36,7 @@ def scripted(script, t, y, out):
         return True
     for i in range(2):
         out[i] = y[2 + i]
-        out[2 + i] = script.first * y[2 + i] - y[i]
+        out[2 + i] = script.first * y[2 + i] + script.second * y[3 - i] - y[i]
     return True
 
 

@@ -74,9 +74,10 @@ def test_what_an_unnoticed_solution_would_be():
 
 
 @pytest.mark.parametrize(("share", "expected"), [(0.9, Result.OK), (1.1, Result.NOT_UNIQUE)])
-def test_two_masses_at_once_are_noticed(share, expected):
-    # the determinant turns its sign twice
-    equations = system(Script(TWO_MASSES, FALL), [1.0] * 4)
+@pytest.mark.parametrize("drive", [(FALL, 0.0), (0.0, FALL)])
+def test_two_masses_at_once_are_noticed(drive, share, expected):
+    # each driven by itself: the determinant turns its sign twice; by each other: no unknown shows it alone
+    equations = system(Script(TWO_MASSES, *drive), [1.0] * 4)
     step = share / FALL
     parameters = {"step": step, "theta": 1.0, "solver_tolerance": 1e-10}
     march = Marching("theta", parameters, equations, np.full(4, 1e-3), step)
