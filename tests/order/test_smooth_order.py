@@ -98,7 +98,9 @@ def test_order_in_the_step(model, stepper, options, stated):
 @pytest.mark.parametrize("model", SCENES)
 def test_error_goes_with_the_tolerance(model, stepper):
     tolerances = np.geomspace(1e-4, 1e-9, 11)
-    errors = [error(model, stepper, tolerance=tolerance) for tolerance in tolerances]
+    errors = np.array([error(model, stepper, tolerance=tolerance) for tolerance in tolerances])
+    # what is allowed is made use of
+    assert np.all(errors > 0.01 * tolerances)
     # SciPy's multistep methods change their order along the way: their slope is less sure
     assert order(tolerances, errors) == pytest.approx(1.0, abs=0.2)
     assert errors[-1] < 1e-6
