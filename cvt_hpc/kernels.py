@@ -6,19 +6,22 @@ kernels' sources: below NUMBA_CACHE_DIR if that is set, else in the package, els
 
 A kernel may be handed to another as an argument, as a right-hand side to a stepper. The compiler tells
 kernels apart by an identity drawn at random, so that it would never find such code again: here it is the
-name.
+name, and for kernels from outside the package the content of their file, which the folder does not know. The
+compiler cannot read an index that names a type of a script that is not at hand: here it skips that entry.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import pickle
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core.caching import IndexDataCacheFile
 
 _PACKAGE = Path(__file__).parent
 _ROOMS_WITH_KERNELS = ("physics", "models", "steppers")
@@ -60,10 +63,47 @@ def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     numba.config.CACHE_DIR = _CACHE
     try:
         compiled = numba.njit(**options)(function)
-        compiled._set_uuid(f"{function.__module__}.{function.__qualname__}")
+        compiled._set_uuid(_identity(function))
+        compiled._cache._cache_file = _ForgivingIndex.of(compiled._cache._cache_file)
         return compiled
     finally:
         numba.config.CACHE_DIR = users
+
+
+def _identity(function: Callable[..., Any]) -> str:
+    name = f"{function.__module__}.{function.__qualname__}"
+    source = Path(function.__code__.co_filename)
+    if source.is_relative_to(_PACKAGE):
+        return name
+    code = function.__code__
+    try:
+        content = source.read_bytes()
+    except OSError:  # typed into a shell
+        content = repr((code.co_code, code.co_consts, code.co_names)).encode()
+    return f"{name}-{hashlib.sha256(content).hexdigest()[:16]}"
+
+
+class _ForgivingIndex(IndexDataCacheFile):
+    """An index of machine code, entry by entry: what cannot be read is kept as it is and matches nothing."""
+
+    @classmethod
+    def of(cls, index: IndexDataCacheFile) -> _ForgivingIndex:
+        index.__class__ = cls
+        return index
+
+    def _load_index(self) -> dict:
+        return {_entry(packed): name for packed, name in super()._load_index().items()}
+
+    def _save_index(self, overloads: dict) -> None:
+        packed = {key if isinstance(key, bytes) else self._dump(key): name for key, name in overloads.items()}
+        super()._save_index(packed)
+
+
+def _entry(packed: bytes) -> Any:
+    try:
+        return pickle.loads(packed)
+    except (AttributeError, ImportError):
+        return packed
 
 
 def _cache_folder() -> str:

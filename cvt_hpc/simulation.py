@@ -6,11 +6,13 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
+from importlib.util import find_spec
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cvt_hpc.errors import InputError
 from cvt_hpc.models import MODELS
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 from cvt_hpc.vibration.assessment import Occurrence, assess
@@ -101,11 +103,15 @@ def run_costs(job: Job) -> np.ndarray:
 def estimate_cost(job: Job) -> float:
     """Core-seconds of a run, mean over the job.
 
+    Not known (nan) of a model that no study runs.
+
     Parameters
     ----------
     job : Job
         A validated job.
     """
+    if not _has_record(job):
+        return float("nan")
     return float(run_costs(job).mean())
 
 
@@ -302,11 +308,25 @@ def _blank(job: Job) -> dict[str, Any]:
 
 
 def _model(job: Job) -> ModuleType:
+    _check_recorded(job)
     return import_module(MODELS[job.model] + ".transient")
 
 
 def _model_record(job: Job) -> ModuleType:
+    _check_recorded(job)
     return import_module(MODELS[job.model] + ".record")
+
+
+def _check_recorded(job: Job) -> None:
+    if not _has_record(job):
+        raise InputError(
+            f"{job.source}: model: expected one whose runs are judged and recorded (elastic_belt), "
+            f"found {job.model}, which is there to compare steppers: `cvt-hpc chart`"
+        )
+
+
+def _has_record(job: Job) -> bool:
+    return find_spec(MODELS[job.model] + ".record") is not None
 
 
 def _attributes(long_name: str, units: str) -> dict[str, str]:

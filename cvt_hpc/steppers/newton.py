@@ -1,0 +1,153 @@
+"""The equations of an implicit stage, z = base + shift f(t, z), by Newton's method with a frozen inverse.
+
+The inverse of I - shift J is kept as long as each pass reduces the correction to half or less, and ends in
+fewer passes than a new Jacobian costs evaluations; else J is taken anew where the iteration stands. Should
+that not suffice, the way along the correction is bisected until what is left shrinks (natural monotonicity
+test, Deuflhard 2004, sec. 3.3). So the sharp bends of regularised friction are found from far off. Where
+nothing shrinks it, the iteration leaps by the whole correction: so it gets away from sticking when the pull
+has just grown too large for it, and only the slip far off is a solution.
+
+Where friction falls too steeply, the equations have several solutions, and the one found is not that to which
+the motion leads. A Newton iteration with one matrix that converges does so where the determinant of I - shift
+J has that matrix's sign, so that it is asked once for each matrix (`frozen_jacobian`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.steppers.facts import RATES, SOLVES, Result
+from cvt_hpc.steppers.frozen_jacobian import SHIFT, SIGN, Frozen, renew
+from cvt_hpc.steppers.system import System, size
+
+OK, NOT_FINITE, NO_VALUE = int(Result.OK), int(Result.NOT_FINITE), int(Result.NO_VALUE)
+NO_CONVERGENCE, NOT_UNIQUE = int(Result.NO_CONVERGENCE), int(Result.NOT_UNIQUE)
+
+ENOUGH = 0.5  # reduction of the correction in a pass with which a frozen matrix is kept
+LEAST_SHARE = 1e-9  # of the correction: the interval at which the search along it ends
+MOST_LEAPS = 5  # without descent, away from where a solution has just vanished
+MOST_PASSES = 200
+
+
+@kernel
+def _correct(
+    system: System,
+    frozen: Frozen,
+    base: np.ndarray,
+    shift: float,
+    z: np.ndarray,
+    correction: np.ndarray,
+    counts: np.ndarray,
+) -> float:
+    """Newton's correction of z, whose rates are known, by the present inverse; returns its size."""
+    for i in range(z.size):
+        frozen.changed[i] = base[i] + shift * frozen.rates[i] - z[i]
+    np.dot(frozen.inverse, frozen.changed, correction)
+    counts[SOLVES] += 1
+    return size(correction, system.scale)
+
+
+@kernel
+def _overshot(system: System, frozen: Frozen) -> bool:
+    """Whether the correction at the trial points back."""
+    along = 0.0
+    for i in range(system.scale.size):
+        along += frozen.correction[i] * frozen.next_correction[i] / system.scale[i] ** 2
+    return along < 0.0
+
+
+@kernel
+def _rates(system: System, frozen: Frozen, t: float, z: np.ndarray, counts: np.ndarray) -> bool:
+    counts[RATES] += 1
+    return system.rates(system.constants, t, z, frozen.rates)
+
+
+@kernel
+def solve_stage(
+    system: System,
+    frozen: Frozen,
+    t: float,
+    base: np.ndarray,
+    shift: float,
+    tolerance: float,
+    z: np.ndarray,
+    counts: np.ndarray,
+) -> int:
+    """Solve z = base + shift f(t, z).
+
+    Parameters
+    ----------
+    system : System
+        The equations.
+    frozen : Frozen
+        The last matrix; renewed where it does not serve.
+    t : float
+        Time of the stage [s].
+    base : (n,) array
+        Known part.
+    shift : float
+        Step times the method's coefficient [s].
+    tolerance : float
+        Largest correction that is left, against each unknown's typical size [1].
+    z : (n,) array
+        The guess; then the solution.
+    counts : (6,) int array
+        Work counters.
+
+    Returns
+    -------
+    int
+        A `Result`; NOT_UNIQUE where the solution found is one of several.
+    """
+    if not _rates(system, frozen, t, z, counts):
+        return NO_VALUE
+    anew = frozen.memory[SIGN] == 0.0
+    begin, fresh, bracketed, crossed, leaps = True, anew, False, False, 0
+    left, share, near, far = 0.0, 1.0, 0.0, 1.0
+    for _ in range(MOST_PASSES):
+        if begin:
+            if anew or frozen.memory[SHIFT] != shift:
+                outcome = renew(system, frozen, t, z, shift, anew, counts)
+                if outcome != OK:
+                    return outcome
+            left = _correct(system, frozen, base, shift, z, frozen.correction, counts)
+            crossed |= frozen.memory[SIGN] < 0.0
+            begin, fresh, bracketed, anew = False, anew, False, True
+            share, near, far = 1.0, 0.0, 1.0
+        if not np.isfinite(left):
+            return NOT_FINITE
+        for i in range(z.size):
+            frozen.trial[i] = z[i] + share * frozen.correction[i]
+        next_left = np.inf
+        if _rates(system, frozen, t, frozen.trial, counts):
+            next_left = _correct(system, frozen, base, shift, frozen.trial, frozen.next_correction, counts)
+        if share == 1.0 and next_left <= tolerance:
+            z[:] = frozen.trial + frozen.next_correction
+            return OK if frozen.memory[SIGN] > 0.0 else NOT_UNIQUE
+        reduction = next_left / left
+        if reduction <= (ENOUGH if share == 1.0 else 1.0 - 0.5 * share):
+            z[:] = frozen.trial
+            frozen.correction[:] = frozen.next_correction
+            left, share, near, far, fresh = next_left, 1.0, 0.0, 1.0, False
+            # a new Jacobian costs n evaluations: less than as many passes
+            begin = left * reduction ** (z.size + 2) > tolerance
+            continue
+        if fresh:
+            overshot = _overshot(system, frozen)
+            bracketed |= overshot
+            if bracketed and not overshot:
+                near = share
+            else:
+                far = share
+            share = 0.5 * (near + far)
+            if far - near >= LEAST_SHARE:
+                continue
+            leaps += 1
+            if leaps > MOST_LEAPS:
+                break
+            z += frozen.correction
+        begin = True
+        if not _rates(system, frozen, t, z, counts):
+            return NO_VALUE
+    return NOT_UNIQUE if crossed else NO_CONVERGENCE
