@@ -1,9 +1,11 @@
 """The elastic belt as one system of differential equations, y' = rates(t, y), for general integrators.
 
 Unknowns, in this order, for N stations: w, u, v_element, v_ring, n_element, n_ring (N each), the filtered
-speed of those stations that have a memory, the driven pulley's speed and position. Strands have no memory,
-and where the belt enters an arc the filtered speed is the sliding speed itself: neither is an unknown.
-Without friction memory none is. Forces, contact and laws are those of `rhs`, called and not written again.
+speed of those stations that have a memory, the driven pulley's speed and position. Layers' speeds are counted
+from the nominal belt speed, contents from 1 and the pulley's speed from its nominal one, so that tolerances
+relative to an unknown mean its variation. Strands have no memory, and where the belt enters an arc the
+filtered speed is the sliding speed itself: neither is an unknown; without friction memory none is. Forces,
+contact and laws are those of `rhs`, called and not written again.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     FIELDS,
     N_ELEMENT,
     N_RING,
+    SCALARS,
     TIME,
     V_ELEMENT,
     V_FILTERED,
@@ -43,9 +46,9 @@ from cvt_hpc.steppers.system import System
 ROWS = (W, U, V_ELEMENT, V_RING, N_ELEMENT, N_RING)  # of the state, as they follow in y
 VELOCITIES = (U, V_ELEMENT, V_RING)
 
-# What counts as much in each unknown: 10 um off the path, speeds against 0.1 m/s of sliding, strains of 1e-4.
-SIZES = {W: 1e-5, U: 0.1, V_ELEMENT: 0.1, V_RING: 0.1, V_FILTERED: 0.1, N_ELEMENT: 1e-4, N_RING: 1e-4}
-SIZE_OF_SPEED, SIZE_OF_POSITION = 1.0, 1e-5  # of the driven pulley [rad/s], [m]
+# What counts alike in each unknown: 0.1 mm off the path, 0.1 m/s of sliding, the strain of the rings.
+SIZES = {W: 1e-4, U: 0.1, V_ELEMENT: 0.1, V_RING: 0.1, V_FILTERED: 0.1, N_ELEMENT: 1e-3, N_RING: 1e-3}
+SIZE_OF_SPEED, SIZE_OF_POSITION = 1.0, 1e-4  # of the driven pulley [rad/s], [m]
 
 
 class FlatBelt(NamedTuple):
@@ -61,6 +64,8 @@ class FlatBelt(NamedTuple):
         Closed sets of the last call, where the next search starts. They change results by round-off alone.
     remembering : (M,) int array
         Stations whose filtered speed is an unknown.
+    origin : (n,) array
+        What the unknowns are counted from.
     force, eps, rate : (N,), (2, N), (7, N) arrays
         Work space: axial line forces, strains, rates.
     """
@@ -69,6 +74,7 @@ class FlatBelt(NamedTuple):
     state: State
     contacts: tuple[ContactState, ContactState]
     remembering: np.ndarray
+    origin: np.ndarray
     force: np.ndarray
     eps: np.ndarray
     rate: np.ndarray
@@ -81,29 +87,32 @@ def flat_belt(belt: Belt) -> FlatBelt:
     arc[[0, belt.driven_start]] = False
     remembering = np.flatnonzero(arc & (belt.friction_memory > 0.0))
     contacts = contact_state(belt.driving.weight.size), contact_state(belt.driven.weight.size)
+    origins = {V_ELEMENT: belt.belt_speed, V_RING: belt.belt_speed, N_ELEMENT: 1.0, N_RING: 1.0}
+    rows = np.repeat([origins.get(row, 0.0) for row in ROWS], n)
+    origin = np.concatenate([rows, np.zeros(remembering.size), [belt.driving_speed / belt.ratio, 0.0]])
+    state = State(np.zeros((len(FIELDS), n)), np.zeros(len(SCALARS)))
     work = np.zeros(n), np.zeros((2, n)), np.zeros((len(FIELDS), n))
-    return FlatBelt(belt, State(np.zeros((len(FIELDS), n)), np.zeros(3)), contacts, remembering, *work)
+    return FlatBelt(belt, state, contacts, remembering, origin, *work)
 
 
 def pack(flat: FlatBelt, state: State) -> np.ndarray:
     """Vector y of a state; its time is not part of it."""
+    rows, filtered = state.fields[list(ROWS)].ravel(), state.fields[V_FILTERED, flat.remembering]
     scalars = state.scalars[[DRIVEN_SPEED, DRIVEN_POSITION]]
-    return np.concatenate(
-        [state.fields[list(ROWS)].ravel(), state.fields[V_FILTERED, flat.remembering], scalars]
-    )
+    return np.concatenate([rows, filtered, scalars]) - flat.origin
 
 
 @kernel
 def unpack(flat: FlatBelt, t: float, y: np.ndarray) -> None:
     """Write y into `flat.state`; filtered speeds at the inlets are set by `rates`."""
-    n, fields, scalars = flat.belt.cell.size, flat.state.fields, flat.state.scalars
+    n, fields, scalars, origin = flat.belt.cell.size, flat.state.fields, flat.state.scalars, flat.origin
     for k, row in enumerate(ROWS):
         for j in range(n):
-            fields[row, j] = y[k * n + j]
+            fields[row, j] = origin[k * n + j] + y[k * n + j]
     first = len(ROWS) * n
     for k in range(flat.remembering.size):
         fields[V_FILTERED, flat.remembering[k]] = y[first + k]
-    scalars[TIME], scalars[DRIVEN_SPEED], scalars[DRIVEN_POSITION] = t, y[-2], y[-1]
+    scalars[TIME], scalars[DRIVEN_SPEED], scalars[DRIVEN_POSITION] = t, origin[-2] + y[-2], y[-1]
 
 
 @kernel
