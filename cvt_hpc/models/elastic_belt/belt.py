@@ -32,8 +32,8 @@ class Belt(NamedTuple):
 
     Arrays of cells and stations have shape (N,), `per_...` being reciprocals, the span that of two cells;
     `bending` is (N, 5): force per length on station j from the displacements of stations j-2 .. j+2;
-    `ring_relief` the tension at which the rings' own weight bears them. `element_mass` and `ring_mass` are the
-    inertia along the path, `mass` that across it.
+    `ring_relief` is the tension at which the rings' own weight bears them. `element_mass` and `ring_mass` are
+    the inertia along the path, `mass` that across it.
     """
 
     cell: np.ndarray

@@ -38,6 +38,7 @@ from cvt_hpc.models.elastic_belt.rhs import (
     content_rates,
     load_at,
     memory_rates,
+    sliding_speed,
     strains,
 )
 from cvt_hpc.physics.compliance import ContactState, contact_state
@@ -104,7 +105,7 @@ def pack(flat: FlatBelt, state: State) -> np.ndarray:
 
 @kernel
 def unpack(flat: FlatBelt, t: float, y: np.ndarray) -> None:
-    """Write y into `flat.state`; filtered speeds at the inlets are set by `rates`."""
+    """Write y into `flat.state`, and the sliding speeds at the inlets into the filtered ones."""
     n, fields, scalars, origin = flat.belt.cell.size, flat.state.fields, flat.state.scalars, flat.origin
     for k, row in enumerate(ROWS):
         for j in range(n):
@@ -113,6 +114,15 @@ def unpack(flat: FlatBelt, t: float, y: np.ndarray) -> None:
     for k in range(flat.remembering.size):
         fields[V_FILTERED, flat.remembering[k]] = y[first + k]
     scalars[TIME], scalars[DRIVEN_SPEED], scalars[DRIVEN_POSITION] = t, origin[-2] + y[-2], y[-1]
+    set_inlets(flat)
+
+
+@kernel
+def set_inlets(flat: FlatBelt) -> None:
+    """Where the belt enters an arc the filtered speed is that of sliding, in `flat.state`."""
+    if flat.belt.friction_memory > 0.0:
+        for j in (0, flat.belt.driven_start):
+            flat.state.fields[V_FILTERED, j] = sliding_speed(flat.belt, flat.state, j)
 
 
 @kernel

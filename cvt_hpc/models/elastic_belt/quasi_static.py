@@ -44,6 +44,7 @@ from cvt_hpc.models.elastic_belt.flat import (
     SIZES,
     FlatBelt,
     flat_belt,
+    set_inlets,
 )
 from cvt_hpc.models.elastic_belt.rhs import (
     accelerations,
@@ -209,6 +210,7 @@ def unpack(model: QuasiStatic, t: float, y: np.ndarray) -> None:
     for k in range(flat.remembering.size):
         fields[V_FILTERED, flat.remembering[k]] = y[first + k]
     scalars[TIME], scalars[DRIVEN_SPEED], scalars[DRIVEN_POSITION] = t, model.origin[-2] + y[-2], y[-1]
+    set_inlets(flat)
 
 
 @kernel
