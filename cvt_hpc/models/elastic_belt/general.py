@@ -24,6 +24,7 @@ from cvt_hpc.models.elastic_belt.transient import FAILURES
 from cvt_hpc.physics.compliance import contact_state
 from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.marching import Marching
+from cvt_hpc.steppers.stiffness import STABLE, fastest_rate
 from cvt_hpc.variables import Status
 
 SAMPLES_TOGETHER = 20  # between two looks at what was sampled: a run that has left its path goes not far
@@ -111,6 +112,8 @@ class GeneralTransient:
         self._form = self.form(self.belt, self.mesh, p)
         start = self._form.pack(initial_state(p, self.belt))
         self._marching = Marching(stepper, p, self._form.system, start, self.interval)
+        self._stable = STABLE.get(stepper, np.inf)
+        self._fastest = np.random.default_rng(0).normal(size=start.size)
         if stepper.startswith("scipy_"):
             self._marching.tell(**self._form.hints(stepper))
         self.done = 0
@@ -213,7 +216,19 @@ class GeneralTransient:
                 return FAILURES[Outcome(seen)]
         if outcome != Result.OK:
             return Status.FAILED_NUMERICS, self._marching.explain(outcome)
-        return None
+        return self._too_long() if np.isfinite(self._stable) else None
+
+    def _too_long(self) -> tuple[Status, str] | None:
+        """Whether the step of an explicit method is beyond its limit: friction then hums, and nothing fails."""
+        rate = fastest_rate(self._form.system, self.time, self._marching.y, self._fastest)
+        if self._marching.step * rate <= self._stable:
+            return None
+        limit = self._stable / rate
+        return (
+            Status.FAILED_NUMERICS,
+            f"the step {self._marching.step:.3g} s is beyond what is stable, {limit:.3g} s: friction, waves or "
+            f"contact decay or swing at {rate:.3g} per second",
+        )
 
     def _sample(self, y: np.ndarray) -> int:
         """Record one state."""

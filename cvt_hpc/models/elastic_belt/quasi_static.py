@@ -58,7 +58,6 @@ from cvt_hpc.physics.splines import Splines, hierarchical_splines
 from cvt_hpc.steppers.system import System
 
 COARSE_SPACING = 0.02  # [m]: seven splines along a strand, three for the shortest half wave that is looked at
-LEVELS = 2  # finer ones: 10 mm on the arcs, 5 mm at their ends, which is the mesh's 4 mm
 
 
 class QuasiStatic(NamedTuple):
@@ -70,6 +69,8 @@ class QuasiStatic(NamedTuple):
         The belt, its layers' dampers taken out, and work space.
     shapes : (N, D + L) array
         The splines at the stations, dynamic ones first.
+    moving : (N, D) array
+        The dynamic ones of them.
     slow_pull : (D, N) array
         Accelerations of the dynamic splines from accelerations of the stations.
     fast_pull : (L, N) array
@@ -84,6 +85,7 @@ class QuasiStatic(NamedTuple):
 
     flat: FlatBelt
     shapes: np.ndarray
+    moving: np.ndarray
     slow_pull: np.ndarray
     fast_pull: np.ndarray
     drag: np.ndarray
@@ -92,14 +94,18 @@ class QuasiStatic(NamedTuple):
 
 
 def splines_of_belt(grid: Mesh) -> Splines:
-    """Splines of a belt: the coarse ones all around, finer ones on the arcs and finest at the arcs' ends."""
+    """Splines of a belt: the coarse ones all around, finer ones on the arcs and finest at the arcs' ends.
+
+    None finer than the mesh: with 160 stations 10 mm on the arcs and 5 mm at their ends.
+    """
     length = grid.path.path_length
-    coarse = max(round(length / COARSE_SPACING), 8)
+    coarse = round(length / COARSE_SPACING)
     spacing = length / coarse
+    levels = int(np.floor(np.log2(spacing / grid.cell.max()))) if spacing > grid.cell.max() else 0
     ends = [grid.position[start] for start in grid.starts]
     arcs = [(ends[0] - spacing, ends[1] + spacing), (ends[2] - spacing, ends[3] + spacing)]
     corners = [(end - 0.75 * spacing, end + 0.75 * spacing) for end in ends]
-    return hierarchical_splines(grid.position, length, coarse, [arcs, corners][:LEVELS])
+    return hierarchical_splines(grid.position, length, coarse, [arcs, corners][:levels])
 
 
 def transverse_stiffness(belt: Belt) -> np.ndarray:
@@ -153,6 +159,7 @@ def quasi_static_belt(belt: Belt, grid: Mesh, limit: float) -> QuasiStatic:
     return QuasiStatic(
         flat,
         np.ascontiguousarray(np.hstack([moving, lagging])),
+        np.ascontiguousarray(moving),
         np.linalg.solve(moved, moving.T * mass),
         np.linalg.solve(lag * held, lagging.T * mass),
         np.array([belt.element_stiffness, belt.ring_stiffness]) * longest**2 * lag,
@@ -190,13 +197,8 @@ def unpack(model: QuasiStatic, t: float, y: np.ndarray) -> None:
     flat = model.flat
     fields, scalars, belt, eps = flat.state.fields, flat.state.scalars, flat.belt, flat.eps
     n, count, slow = belt.cell.size, model.shapes.shape[1], model.slow_pull.shape[0]
-    for j in range(n):
-        w = u = 0.0
-        for i in range(count):
-            w += model.shapes[j, i] * y[i]
-        for i in range(slow):
-            u += model.shapes[j, i] * y[count + i]
-        fields[W, j], fields[U, j] = w, u
+    np.dot(model.shapes, y[:count], fields[W])
+    np.dot(model.moving, y[count : count + slow], fields[U])
     first = count + slow
     for layer in range(2):
         for c in range(n):
@@ -224,20 +226,11 @@ def rates(model: QuasiStatic, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     memory_rates(belt, state, rate)
     moment = accelerations(belt, state, flat.force, flat.eps, rate)
     n, count, slow = belt.cell.size, model.shapes.shape[1], model.slow_pull.shape[0]
-    for i in range(slow):
-        pull = 0.0
-        for j in range(n):
-            pull += model.slow_pull[i, j] * rate[U, j]
-        out[i], out[count + i] = y[count + i], pull
-    for j in range(n):
-        for i in range(slow):
-            rate[U, j] -= model.shapes[j, i] * out[count + i]
-    for i in range(count - slow):
-        pull = 0.0
-        for j in range(n):
-            pull += model.fast_pull[i, j] * rate[U, j]
-        out[slow + i] = pull
     first = count + slow
+    out[:slow] = y[count:first]
+    np.dot(model.slow_pull, rate[U], out[count:first])
+    rate[U] -= np.dot(model.moving, out[count:first])
+    np.dot(model.fast_pull, rate[U], out[slow:count])
     for layer in range(2):
         out[first + layer] = _shift(model, layer, rate[V_ELEMENT + layer], out, first + 2 + layer * n)
     first += 2 + 2 * n
