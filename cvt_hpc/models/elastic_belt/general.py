@@ -219,16 +219,13 @@ class GeneralTransient:
         return self._too_long() if np.isfinite(self._stable) else None
 
     def _too_long(self) -> tuple[Status, str] | None:
-        """Whether the step of an explicit method is beyond its limit: friction then hums, and nothing fails."""
+        """Whether an explicit step is beyond its limit, where friction only hums and nothing diverges."""
         rate = fastest_rate(self._form.system, self.time, self._marching.y, self._fastest)
         if self._marching.step * rate <= self._stable:
             return None
-        limit = self._stable / rate
-        return (
-            Status.FAILED_NUMERICS,
-            f"the step {self._marching.step:.3g} s is beyond what is stable, {limit:.3g} s: friction, waves or "
-            f"contact decay or swing at {rate:.3g} per second",
-        )
+        step, limit = self._marching.step, self._stable / rate
+        found = f"the step {step:.3g} s is beyond what is stable, {limit:.3g} s"
+        return Status.FAILED_NUMERICS, f"{found}: some motion has a rate of {rate:.3g}/s"
 
     def _sample(self, y: np.ndarray) -> int:
         """Record one state."""
