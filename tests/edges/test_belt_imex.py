@@ -30,3 +30,17 @@ def outcome(step, values):
     p = point("imex", **values, step=step, sampling_rate=1.0 / (step * max(round(50e-6 / step), 1)))
     run = Transient(p, "imex")
     return run.advance(round(0.02 / run.interval)), run
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_limit_is_that_of_the_shortest_wave(case):
+    values = RIGID | CASES[case]
+    step = limit(values)
+    found, run = outcome(0.95 * step, values)
+    assert found is None
+    quiet = np.abs(run.displacement).max()
+    # Bending has no damper worth the name at the shortest wave: measured between 1.00 and 1.05 of the formula.
+    # Contact has friction, and opens instead of swinging on: 1.1 to 1.2.
+    status, reason = outcome(1.3 * step, values)[0]
+    assert status == Status.FAILED_NUMERICS and reason
+    assert quiet < 1e-4

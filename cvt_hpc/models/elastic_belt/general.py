@@ -18,9 +18,10 @@ from cvt_hpc.models.elastic_belt.belt import (
     mesh,
     random_strands,
 )
+from cvt_hpc.models.elastic_belt.doubts import slack_doubt
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, PROFILES, Outcome, probes, sample, sensors
 from cvt_hpc.models.elastic_belt.structure import SparseJacobian
-from cvt_hpc.models.elastic_belt.transient import FAILURES
+from cvt_hpc.models.elastic_belt.transient import FAILURES, LARGEST_POWER_RESIDUAL
 from cvt_hpc.physics.compliance import contact_state
 from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.marching import Marching
@@ -236,3 +237,25 @@ class GeneralTransient:
         )
         self.done += int(outcome == Outcome.OK)
         return outcome
+
+    def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
+        """Whether a run that reached its end is not to be trusted.
+
+        Parameters
+        ----------
+        record : dict
+            With `power_residual` and `least_strand_force`.
+
+        Returns
+        -------
+        (Status, str) or None
+            As `advance`.
+        """
+        residual = abs(record["power_residual"])
+        if not residual <= LARGEST_POWER_RESIDUAL:
+            return (
+                Status.FAILED_NUMERICS,
+                f"the power balance is open by {residual:.3g} of the power that flows",
+            )
+        cell = float(self.mesh.cell[self.mesh.starts[1]])
+        return slack_doubt(self.parameters["bending_stiffness"], cell, record["least_strand_force"])
