@@ -1,3 +1,6 @@
 """The ladder of models; each knows physics and nothing above, and declares what a job may set."""
 
-MODELS = {"elastic_belt": "cvt_hpc.models.elastic_belt"}
+MODELS = {
+    "elastic_belt": "cvt_hpc.models.elastic_belt",
+    "quasi_static_belt": "cvt_hpc.models.quasi_static_belt",
+}

@@ -1,10 +1,12 @@
 """The fast step on the belt: what it treats explicitly limits it, by formula; beyond, the run fails and says so."""
 
 import numpy as np
+import pytest
 from belts import point
 
 from cvt_hpc.models.elastic_belt.belt import belt_constants
 from cvt_hpc.models.elastic_belt.transient import Transient
+from cvt_hpc.variables import Status
 
 CASES = {
     "bending": {"bending_stiffness": 200.0, "stations": 64},

@@ -7,4 +7,24 @@ from cvt_hpc.models.elastic_belt.parameters import PARAMETERS, check
 
 DEFAULT_STEPPER = "imex"
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "check"]
+# Steppers that the belt takes: two of its own, and general ones by `general`
+OWN_STEPPERS = ("imex", "explicit")
+STEPPER_NAMES = (
+    *OWN_STEPPERS,
+    "symplectic_euler",
+    "runge_kutta_4",
+    "dormand_prince",
+    "theta",
+    "generalised_alpha",
+    "sdirk",
+    "rosenbrock_w",
+    "scipy_lsoda",
+    "scipy_bdf",
+    "scipy_radau",
+)
+REFUSED = {
+    "moreau": "friction of the belt is regularised and has two directions, its contact is elastic: the belt "
+    "has no set-valued forces",
+}
+
+__all__ = ["DEFAULT_STEPPER", "OWN_STEPPERS", "PARAMETERS", "REFUSED", "STEPPER_NAMES", "check"]

@@ -67,6 +67,8 @@ class FlatBelt(NamedTuple):
         Stations whose filtered speed is an unknown.
     origin : (n,) array
         What the unknowns are counted from.
+    start : float
+        Simulated time at t = 0 [s].
     force, eps, rate : (N,), (2, N), (7, N) arrays
         Work space: axial line forces, strains, rates.
     """
@@ -76,13 +78,22 @@ class FlatBelt(NamedTuple):
     contacts: tuple[ContactState, ContactState]
     remembering: np.ndarray
     origin: np.ndarray
+    start: float
     force: np.ndarray
     eps: np.ndarray
     rate: np.ndarray
 
 
-def flat_belt(belt: Belt) -> FlatBelt:
-    """Constants and work space of a belt's `rates`."""
+def flat_belt(belt: Belt, start: float = 0.0) -> FlatBelt:
+    """Constants and work space of a belt's `rates`.
+
+    Parameters
+    ----------
+    belt : Belt
+        Constants of the run.
+    start : float
+        Simulated time at t = 0 [s].
+    """
     n = belt.cell.size
     arc = belt.arc_share > 0.0
     arc[[0, belt.driven_start]] = False
@@ -93,7 +104,7 @@ def flat_belt(belt: Belt) -> FlatBelt:
     origin = np.concatenate([rows, np.zeros(remembering.size), [belt.driving_speed / belt.ratio, 0.0]])
     state = State(np.zeros((len(FIELDS), n)), np.zeros(len(SCALARS)))
     work = np.zeros(n), np.zeros((2, n)), np.zeros((len(FIELDS), n))
-    return FlatBelt(belt, state, contacts, remembering, origin, *work)
+    return FlatBelt(belt, state, contacts, remembering, origin, start, *work)
 
 
 def pack(flat: FlatBelt, state: State) -> np.ndarray:
@@ -113,7 +124,7 @@ def unpack(flat: FlatBelt, t: float, y: np.ndarray) -> None:
     first = len(ROWS) * n
     for k in range(flat.remembering.size):
         fields[V_FILTERED, flat.remembering[k]] = y[first + k]
-    scalars[TIME], scalars[DRIVEN_SPEED], scalars[DRIVEN_POSITION] = t, origin[-2] + y[-2], y[-1]
+    scalars[TIME], scalars[DRIVEN_SPEED], scalars[DRIVEN_POSITION] = flat.start + t, origin[-2] + y[-2], y[-1]
     set_inlets(flat)
 
 
@@ -162,7 +173,7 @@ def rates(flat: FlatBelt, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     first = len(ROWS) * n
     for k in range(flat.remembering.size):
         out[first + k] = rate[V_FILTERED, flat.remembering[k]]
-    out[-2] = (moment - belt.ratio * load_at(belt, t)) / belt.driven_inertia
+    out[-2] = (moment - belt.ratio * load_at(belt, state.scalars[TIME])) / belt.driven_inertia
     out[-1] = (driven_thrust(belt, flat.force) - belt.thrust) / belt.axial_damping
     return True
 

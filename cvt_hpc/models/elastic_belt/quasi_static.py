@@ -6,7 +6,8 @@ al. 2004). Forces, contact and laws are the same; inertia is not:
 - Transverse: w is a sum of hierarchical cubic B-splines. Splines whose own frequency (stiffness over mass of
   the shape, in the groove if it lies there) is below the limit move by their equations of motion. The others
   follow with the time constant T = 1 / (2 pi limit): T K q' = the force on them that the slow splines'
-  inertia leaves. They are no part of the radial sliding speed's w_t, only of its v w_s.
+  inertia leaves, K that of sheaves, tension and bending. They are no part of the radial sliding speed's w_t,
+  only of its v w_s.
 - Longitudinal: each layer has one speed C as a rigid ring has; local acceleration is dropped, and the speed
   along the path is that of a steady flow, v = C (1 + eps) (eqs 29, 30). The force that is left at a station,
   beyond its share in the acceleration of the whole, shifts material against a drag, d xi' = N,s + f - mean

@@ -20,5 +20,9 @@ PARAMETERS = elastic_belt.PARAMETERS | {
     },
 }
 DEFAULT_STEPPER = "scipy_bdf"
+STEPPER_NAMES = tuple(name for name in elastic_belt.STEPPER_NAMES if name not in elastic_belt.OWN_STEPPERS)
+REFUSED = elastic_belt.REFUSED | {
+    name: "it is a step for the belt with all its inertia" for name in elastic_belt.OWN_STEPPERS
+}
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "check"]
+__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPER_NAMES", "check"]
