@@ -55,7 +55,7 @@ def test_runs_are_those_of_the_explicit_step(stepper, values):
 
 
 def test_the_strands_are_disturbed_once_the_start_up_is_over():
-    run, same = (general("symplectic_euler", step=4e-7, disturbance=size) for size in (1e-6, 0.0))
+    run, same = (general("symplectic_euler", step=2e-7, disturbance=size) for size in (1e-6, 0.0))
     kick = round(CHEAP["rise_time"] / run.interval)
     assert run.advance(kick) is None and same.advance(kick) is None
     assert np.array_equal(run.displacement, same.displacement)
@@ -65,7 +65,7 @@ def test_the_strands_are_disturbed_once_the_start_up_is_over():
 
 
 def test_a_state_that_is_no_number_ends_the_run():
-    run = general("symplectic_euler", step=4e-7)
+    run = general("symplectic_euler", step=2e-7)
     assert run.advance(2) is None
     run._marching.y[7] = np.nan
     status, reason = run.advance(2)
@@ -74,7 +74,7 @@ def test_a_state_that_is_no_number_ends_the_run():
 
 
 def test_the_sparse_jacobian_is_the_full_one():
-    run = general("symplectic_euler", step=4e-7)
+    run = general("symplectic_euler", step=2e-7)
     assert run.advance(SAMPLES) is None
     flat = flat_belt(run.belt, run.time)
     whole, y = system(flat), pack(flat, run.state)
@@ -90,7 +90,7 @@ def test_the_sparse_jacobian_is_the_full_one():
 
 
 def test_no_two_columns_of_a_group_share_a_rate():
-    flat = flat_belt(general("symplectic_euler", step=4e-7).belt)
+    flat = flat_belt(general("symplectic_euler", step=2e-7).belt)
     where = pattern(flat)
     together = groups(where)
     for group in range(together.max() + 1):

@@ -130,7 +130,7 @@ def test_the_lag_is_that_of_the_limit():
     # Without friction: held splines return to balance as exp(-2 pi limit t), and so does the longest wave of a
     # layer, shorter ones with the square of their number. Layers are soft here: else each shape in a groove
     # stretches them as well, and is back sooner by what that adds to the sheaves' stiffness.
-    slack = {"ring_stiffness": 1e3, "element_stiffness": 1e3}
+    slack = {"ring_stiffness": 1e3, "element_stiffness": 1e3, "reference_tension": 0.0}
     belt, state, model = belt_and_model(
         kinetic_friction=1e-9, friction_gradient=0.0, ring_friction=0.0, transverse_damping=0.0, **slack
     )
@@ -148,7 +148,10 @@ def test_the_lag_is_that_of_the_limit():
         return np.linalg.eigvals(np.array(columns).T)
 
     rate = 2.0 * np.pi * LIMIT
-    assert -block(where[1]).real == pytest.approx(np.full(where[1].stop - where[1].start, rate), rel=0.05)
+    held = -block(where[1]).real
+    assert np.median(held) == pytest.approx(rate, rel=0.01)
+    # soft layers carry no tension either, of which K knows: a fifth of it where a spline reaches into a strand
+    assert held == pytest.approx(np.full(held.size, rate), rel=0.25)
     rings = np.sort(-block(where[5]).real)
     assert rings[0] == pytest.approx(0.0, abs=1e-3 * rate)  # the whole content
     assert rings[1:5] == pytest.approx(rate * np.array([1.0, 1.0, 4.0, 4.0]), rel=0.03)
