@@ -130,9 +130,9 @@ def test_the_lag_is_that_of_the_limit():
     # Without friction: held splines return to balance as exp(-2 pi limit t), and so does the longest wave of a
     # layer, shorter ones with the square of their number. Layers are soft here: else each shape in a groove
     # stretches them as well, and is back sooner by what that adds to the sheaves' stiffness.
-    slack = {"ring_stiffness": 1e3, "element_stiffness": 1e3, "reference_tension": 0.0}
+    soft = {"ring_stiffness": 1e4, "element_stiffness": 1e3}
     belt, state, model = belt_and_model(
-        kinetic_friction=1e-9, friction_gradient=0.0, ring_friction=0.0, transverse_damping=0.0, **slack
+        kinetic_friction=1e-9, friction_gradient=0.0, ring_friction=0.0, transverse_damping=0.0, **soft
     )
     y = pack(model, state)
     base, where = evaluate(model, y), parts(model)
@@ -149,12 +149,14 @@ def test_the_lag_is_that_of_the_limit():
 
     rate = 2.0 * np.pi * LIMIT
     held = -block(where[1]).real
-    assert np.median(held) == pytest.approx(rate, rel=0.01)
-    # soft layers carry no tension either, of which K knows: a fifth of it where a spline reaches into a strand
+    assert np.median(held) == pytest.approx(rate, rel=0.03)
+    # where a spline reaches into a strand the tension counts, which here is not quite that of the thrust
     assert held == pytest.approx(np.full(held.size, rate), rel=0.25)
     rings = np.sort(-block(where[5]).real)
     assert rings[0] == pytest.approx(0.0, abs=1e-3 * rate)  # the whole content
-    assert rings[1:5] == pytest.approx(rate * np.array([1.0, 1.0, 4.0, 4.0]), rel=0.03)
+    # a change of content n = 1 / (1 + eps) is one of strain by its square: soft rings are stretched by a half
+    stretch = (1.0 + model.flat.eps[1].mean()) ** 2
+    assert rings[1:5] == pytest.approx(stretch * rate * np.array([1.0, 1.0, 4.0, 4.0]), rel=0.05)
 
 
 def test_a_state_is_packed_into_the_nearest_splines():
