@@ -1,9 +1,10 @@
-"""Cost and error of every stepper on a short scene: python jobs/yardstick.py TABLE.csv [STEPPER ...].
+"""Cost and error of steppers on a short scene: python jobs/yardstick.py TABLE.csv [STEPPER | KEY=VALUE ...].
 
-The belt at 100 N m, 40 ms after its start (160 stations, memory 0.3 ms), is marched for 1 ms from one state
-by every method. Error: root mean square over the stations of w [um] at the end, and of the rings' speed
-[mm/s], against the explicit step extrapolated from 25 and 12.5 ns. Cost: processor time over simulated time,
-kernels compiled before. SciPy's integrators are given the Jacobian by coloured differences.
+The belt at 120 N m, vibrating, 120 ms after its start (160 stations, memory 0.3 ms), is marched for 1 ms from
+one state by every method. Error: root mean square over the stations of w [um] at the end, and of the rings'
+speed [mm/s], against the explicit step extrapolated from 25 and 12.5 ns. Cost: processor time over simulated
+time, kernels compiled before. SciPy's integrators are given the Jacobian by coloured differences. Where
+element_damping=0 no force jumps, which is what implicit methods need.
 """
 
 import sys
@@ -23,8 +24,9 @@ from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.marching import Marching
 
 WINDOW = 1e-3  # [s]
-SCENE = {"load": 100.0, "duration": 0.1}
-MOST_STEPS = {"most_steps": 5000}  # in the window: an integrator that takes more has lost its way
+BEFORE = 2400  # samples
+SCENE = {"load": 120.0, "duration": 0.2}
+MOST_STEPS = {"most_steps": 1500}  # in the window: an integrator that takes more has lost its way
 EULER, CRANK_NICOLSON = {"theta": 1.0}, {"theta": 0.5}
 METHODS = [
     *(("imex", {"step": step}) for step in (3e-6, 1.5e-6, 0.75e-6)),
@@ -34,7 +36,7 @@ METHODS = [
     *(("dormand_prince", {"tolerance": tolerance}) for tolerance in (1e-3, 1e-5)),
     *(("scipy_bdf", {"tolerance": tolerance} | MOST_STEPS) for tolerance in (1e-2, 1e-3, 1e-4)),
     *(("scipy_radau", {"tolerance": tolerance} | MOST_STEPS) for tolerance in (1e-2, 1e-3)),
-    *(("scipy_lsoda", {"tolerance": tolerance} | MOST_STEPS) for tolerance in (1e-2, 1e-3, 1e-4)),
+    *(("scipy_lsoda", {"tolerance": tolerance} | MOST_STEPS) for tolerance in (1e-2, 1e-3)),
     *(("rosenbrock_w", {"step": step}) for step in (2e-6, 1e-6)),
     ("theta", {"step": 2e-6} | EULER),
     ("theta", {"step": 2e-6} | CRANK_NICOLSON),
@@ -67,7 +69,7 @@ def march_own(belt, state, stepper, step):
 
 
 def march_general(belt, state, stepper, options):
-    """By a general stepper; as `march_own`."""
+    """By a general stepper; as `march_own`, core-seconds of a failed march scaled to the window."""
     flat = flat_belt(belt, state.scalars[TIME])
     march = Marching(stepper, parameters(stepper, options), system(flat), pack(flat, state), WINDOW)
     if stepper.startswith("scipy_"):
@@ -81,13 +83,16 @@ def march_general(belt, state, stepper, options):
     unpack(flat, WINDOW, march.y)
     counters = march.counters()
     found = "ok" if outcome == Result.OK else march.explain(outcome)
-    return found, flat.state, spent, counters
+    return found, flat.state, spent * WINDOW / max(march.time, 1e-12), counters
 
 
 def main(table, chosen):
     """Write the table."""
+    SCENE.update((key, float(value)) for key, value in (text.split("=") for text in chosen if "=" in text))
+    chosen = [text for text in chosen if "=" not in text]
     run = Transient(parameters("imex", {}), "imex")
-    assert run.advance(800) is None
+    while run.done < BEFORE:
+        assert run.advance(BEFORE - run.done) is None
     belt, state = run.belt, run.state
     fine, finer = (march_own(belt, state, "explicit", step)[1] for step in (25e-9, 12.5e-9))
     exact = 2.0 * finer.fields - fine.fields
