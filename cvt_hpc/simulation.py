@@ -95,7 +95,8 @@ def run_costs(job: Job) -> np.ndarray:
     grids = np.meshgrid(*(axis.values for axis in job.axes), indexing="ij", sparse=True)
     p = {**job.parameters, **dict(zip((axis.name for axis in job.axes), grids, strict=True))}
     model = _model_record(job)
-    cost = model.STEP_COST[job.stepper] * p["stations"] * p["duration"] / p["step"]
+    # of general steppers, some of which choose their step, little is known beforehand
+    cost = model.STEP_COST.get(job.stepper, 1e-5) * p["stations"] * p["duration"] / p.get("step", 1e-6)
     cost = cost / model.lanes(job.parameters, job.stepper)
     return np.broadcast_to(cost, job.shape).ravel()
 
@@ -244,7 +245,7 @@ def _march(
     job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
 ) -> list[tuple[Any, dict[str, Any]]]:
     """March a batch of runs, and make their records."""
-    batch = _model(job).Batch(points, job.stepper)
+    batch = _model(job).batch(points, job.stepper)
     batch.advance(0)  # compiles or loads the kernels, which is no cost of these runs
     started = time.process_time()
     while batch.running:

@@ -4,4 +4,5 @@ MODELS = {
     "elastic_belt": "cvt_hpc.models.elastic_belt",
     "oscillator": "cvt_hpc.models.oscillator",
     "moving_string": "cvt_hpc.models.moving_string",
+    "quasi_static_belt": "cvt_hpc.models.quasi_static_belt",
 }

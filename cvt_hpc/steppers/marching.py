@@ -55,6 +55,10 @@ class Marching:
         self._clock = np.zeros(1)
         self._counts = np.zeros(len(COUNTERS), dtype=np.int64)
 
+    def tell(self, **options: Any) -> None:
+        """Tell an integrator of SciPy more of the system, such as its Jacobian by `jac`."""
+        self._work.options |= options
+
     def advance(self, rows: np.ndarray) -> Result:
         """March on.
 

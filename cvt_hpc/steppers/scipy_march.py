@@ -23,6 +23,8 @@ class Work:
 
     Attributes
     ----------
+    options : dict
+        What else the integrator is told of the system, such as `jac`; may be set before the first march.
     solver : OdeSolver or None
         None until it is started.
     time, state
@@ -36,6 +38,7 @@ class Work:
     """
 
     def __init__(self) -> None:
+        self.options: dict[str, Any] = {}
         self.solver: OdeSolver | None = None
         self.time, self.state = 0.0, np.zeros(0)
         self.counted = np.zeros(3, dtype=np.int64)
@@ -55,9 +58,8 @@ class Work:
 
         self.evaluations, self.known = 0, True
         self.counted[:] = 0
-        self.solver = method(
-            rates, time, y.copy(), np.inf, rtol=control.tolerance, atol=control.tolerance * system.scale
-        )
+        allowed = {"rtol": control.tolerance, "atol": control.tolerance * system.scale}
+        self.solver = method(rates, time, y.copy(), np.inf, **allowed, **self.options)
 
     def count(self, counts: np.ndarray) -> None:
         """Add to the work counters what has been done since the last call."""

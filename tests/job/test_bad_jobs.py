@@ -85,11 +85,14 @@ def test_tables(write_job, text, message):
         ('name = "a/b"\nmodel = "toy"', f'name: {A_WORD} "a/b"'),
         ('name = "..\\n"\nmodel = "toy"', f'name: {A_WORD} "..\\n"'),
         ('name = 5\nmodel = "toy"', f"name: {A_WORD} 5"),
-        ('name = "x"', "model: expected one of elastic_belt, oscillator, moving_string, toy, found nothing"),
+        (
+            'name = "x"',
+            "model: expected one of elastic_belt, oscillator, moving_string, quasi_static_belt, toy, found nothing",
+        ),
         ('name = "x"\nmodel = "toi"', 'model: unknown model "toi"; did you mean toy?'),
         (
             'name = "x"\nmodel = 5',
-            "model: expected one of elastic_belt, oscillator, moving_string, toy, found 5",
+            "model: expected one of elastic_belt, oscillator, moving_string, quasi_static_belt, toy, found 5",
         ),
         (f'{HEAD}stepper = "hopp"', 'stepper: unknown stepper "hopp"; did you mean hop?'),
         (f"{HEAD}description = 5", "description: expected a text, found 5"),

@@ -152,7 +152,7 @@ AXES = {
 @pytest.mark.parametrize("stepper", ["imex", "explicit"])
 def test_groups_hold_each_run_once_and_only_what_is_alike(stepper):
     axes = {k: v for k, v in AXES.items() if k != "precision" or stepper == "imex"}
-    asked = job(stepper=stepper, axes=axes, friction_gradient=0.0, **NO_PRECISION)
+    asked = job(stepper=stepper, axes=axes, friction_gradient=0.0)
     indices = np.random.default_rng(0).permutation(asked.size).tolist()
     groups = lane_groups(asked, indices)
     assert sorted(index for group in groups for index in group) == sorted(indices)

@@ -6,7 +6,24 @@ Importing this package is cheap: kernels are compiled when `belt` is imported.
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS, check, inert
 
 DEFAULT_STEPPER = "imex"
-STEPPER_NAMES = ("imex", "explicit")
-REFUSED: dict[str, str] = {}
+# Steppers that the belt takes: two of its own, and general ones by `general`
+OWN_STEPPERS = ("imex", "explicit")
+STEPPER_NAMES = (
+    *OWN_STEPPERS,
+    "symplectic_euler",
+    "runge_kutta_4",
+    "dormand_prince",
+    "theta",
+    "generalised_alpha",
+    "sdirk",
+    "rosenbrock_w",
+    "scipy_lsoda",
+    "scipy_bdf",
+    "scipy_radau",
+)
+REFUSED = {
+    "moreau": "friction of the belt is regularised and has two directions, its contact is elastic: the belt "
+    "has no set-valued forces",
+}
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPER_NAMES", "check", "inert"]
+__all__ = ["DEFAULT_STEPPER", "OWN_STEPPERS", "PARAMETERS", "REFUSED", "STEPPER_NAMES", "check", "inert"]

@@ -31,7 +31,9 @@ class Belt(NamedTuple):
     """Everything the kernels need, in SI units; N stations around the belt.
 
     Arrays of cells and stations have shape (N,), `per_...` being reciprocals, the span that of two cells;
-    `bending` is (N, 5): force per length on station j from the displacements of stations j-2 .. j+2.
+    `bending` is (N, 5): force per length on station j from the displacements of stations j-2 .. j+2;
+    `ring_relief` is the tension at which the rings' own weight bears them. `element_mass` and `ring_mass` are
+    the inertia along the path, `mass` that across it.
     """
 
     cell: np.ndarray
@@ -44,6 +46,7 @@ class Belt(NamedTuple):
     arc_share: np.ndarray
     bending: np.ndarray
     ring_mass: np.ndarray
+    ring_relief: np.ndarray
     element_mass: float
     mass: float
     bending_stiffness: float
@@ -186,8 +189,9 @@ def belt_constants(parameters: dict[str, Any]) -> Belt:
         arc_curvature=np.maximum(kappa, np.roll(kappa, 1)),
         arc_share=arc_share,
         bending=bending_bands(cell, dual, p["bending_stiffness"]),
-        ring_mass=ring_mass,
-        element_mass=p["element_mass"],
+        ring_mass=p["longitudinal_mass"] * ring_mass,
+        ring_relief=ring_mass * belt_speed * belt_speed,
+        element_mass=p["longitudinal_mass"] * p["element_mass"],
         mass=p["element_mass"] + p["ring_mass"],
         bending_stiffness=p["bending_stiffness"],
         belt_speed=belt_speed,

@@ -76,6 +76,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     RING_FRICTION_SPEED,
     RING_MASS,
     RING_OFFSET,
+    RING_RELIEF,
     RING_STIFFNESS,
     SINE,
     SPEED,
@@ -323,8 +324,8 @@ def _stations(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
     element_mass, ring_mass, mass, offset = c[0, ELEMENT_MASS], c[0, RING_MASS], c[0, MASS], c[0, RING_OFFSET]
     belt_speed, bending = c[0, BELT_SPEED], c[0, BENDING_STIFFNESS]
     ring_friction, per_ring_width = c[0, RING_FRICTION], 1.0 / c[0, RING_FRICTION_SPEED]
-    speed_squared = belt_speed * belt_speed
-    centrifugal, gyroscopic = mass * speed_squared, 2.0 * mass * belt_speed
+    ring_relief = c[0, RING_RELIEF]
+    centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
     damping = c[0, TRANSVERSE_DAMPING] + start_damping(belt, state.time[0])
     base_mass = fma(mass, per_step, 0.5 * damping)
     element_rate = element_mass * per_step
@@ -358,7 +359,8 @@ def _stations(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
         full_speed = belt_speed + v0
         v_radial = fma(full_speed, slope, u)
         outward = -damping * v_radial
-        ring_here = ring_mass * fma(offset, belt.ring_curvature[j], 1.0)
+        longer = fma(offset, belt.ring_curvature[j], 1.0)
+        ring_here = ring_mass * longer
         element, ring, coupling = element_rate, ring_here * per_step, zero
         along_element = -full_speed * ((v0 - fields[a, V_ELEMENT]) * per_left) * element_mass
         along_ring = -(belt_speed + v1) * ((v1 - fields[a, V_RING]) * per_left) * ring_here
@@ -369,7 +371,7 @@ def _stations(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
             per_speed, factor = stations[j, PER_SPEED], stations[j, FACTOR]
             ring_factor, meridian, force = stations[j, RING_FACTOR], v_radial * per_cosine, stations[j, FORCE]
 
-            relief = ring_here * speed_squared
+            relief = ring_relief * longer
             pressure = maximum(ring_right - relief, 0.0) * (right * belt.curvature[j])
             pressure += maximum(ring_left - relief, 0.0) * (left * belt.curvature[a])
             grip = ring_friction * (0.5 * belt.per_dual[j]) * pressure

@@ -34,6 +34,7 @@ CONSTANTS = (
     "ring_damping",
     "element_mass",
     "ring_mass",
+    "ring_relief",
     "mass",
     "belt_speed",
     "transverse_damping",
@@ -69,6 +70,7 @@ CONSTANTS = (
     RING_DAMPING,
     ELEMENT_MASS,
     RING_MASS,
+    RING_RELIEF,
     MASS,
     BELT_SPEED,
     TRANSVERSE_DAMPING,
@@ -113,10 +115,10 @@ class LaneBelt(NamedTuple):
         As in `Belt`.
     ring_curvature : (N,) array
         Curvature of both neighbouring cells, weighted by length [1/m]: a station's ring mass is
-        ring_mass (1 + ring_offset ring_curvature).
+        ring_mass (1 + ring_offset ring_curvature), and so with its centrifugal relief.
     bending : (N, 5) array
         As in `Belt`, for a bending stiffness of 1 N m^2.
-    constants : (1, 33) LaneArray
+    constants : (1, 34) LaneArray
         CONSTANTS.
     driven_start : int
         First station of the driven arc.
@@ -182,7 +184,6 @@ def lane_belt(belts: list[Belt], dtype: type) -> LaneBelt:
     for lane, belt in enumerate(belts):
         constants.data[0, :, lane] = _constants_of(belt)
     cell, dual, kappa = first.cell, first.dual, first.curvature
-    weighted = cell * kappa
     law = first.law
     tables = (law.table_force.astype(dtype), law.table_speed.astype(dtype), law.table_mu.astype(dtype))
     shared = (
@@ -194,7 +195,7 @@ def lane_belt(belts: list[Belt], dtype: type) -> LaneBelt:
         kappa,
         first.arc_curvature,
         first.arc_share,
-        0.5 * (weighted + np.roll(weighted, 1)) / dual,
+        _ring_curvature(first),
         bending_bands(cell, dual, 1.0),
     )
     return LaneBelt(
@@ -208,10 +209,17 @@ def lane_belt(belts: list[Belt], dtype: type) -> LaneBelt:
     )
 
 
+def _ring_curvature(belt: Belt) -> np.ndarray:
+    weighted = belt.cell * belt.curvature
+    return 0.5 * (weighted + np.roll(weighted, 1)) / belt.dual
+
+
 def _constants_of(belt: Belt) -> list[float]:
     angle, memory = belt.half_wedge_angle, belt.friction_memory
+    longer = 1.0 + belt.ring_offset * _ring_curvature(belt)[0]
     named = {
-        "ring_mass": belt.mass - belt.element_mass,
+        "ring_mass": belt.ring_mass[0] / longer,
+        "ring_relief": belt.ring_relief[0] / longer,
         "kinetic_friction": belt.law.kinetic,
         "friction_gradient": belt.law.gradient,
         "law_speed": belt.law.speed,

@@ -95,10 +95,27 @@ def march_explicit(
     for k in range(first, last):
         for _ in range(steps):
             solves += step_explicit(belt, state, contacts, work, step)
-        hand_over(belt, state, lane)
-        derive(lane_belt, lane, lane_work.stations)
-        sample(lane_belt, lane, lane_work.stations, sensing, rows, k, profiles, ended)
+        record_state(belt, state, lane_belt, lane, lane_work, sensing, rows, k, profiles, ended)
     return solves
+
+
+@kernel
+def record_state(
+    belt: Belt,
+    state: State,
+    lane_belt: LaneBelt,
+    lane: LaneState,
+    lane_work: ImexWork,
+    sensing: Sensors,
+    rows: LaneArray,
+    k: int,
+    profiles: LaneArray,
+    ended: LaneArray,
+) -> None:
+    """Sample the state of one run; arguments as of `march_explicit`, `k` the row."""
+    hand_over(belt, state, lane)
+    derive(lane_belt, lane, lane_work.stations)
+    sample(lane_belt, lane, lane_work.stations, sensing, rows, k, profiles, ended)
 
 
 @kernel

@@ -70,6 +70,9 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "transverse_damping": _not_negative(500.0, "N s/m^2", "viscous damping of the transverse motion"),
         "element_damping": _not_negative(20.0, "N s", "longitudinal damping of the pressed elements"),
         "ring_damping": _not_negative(4.0, "N s", "longitudinal damping of the rings"),
+        "longitudinal_mass": _positive(
+            1.0, "", "factor on the layers' inertia along the path; other than 1 it is another belt"
+        ),
     },
     "sheaves": {
         "sheave_stiffness": _stiffness(

@@ -53,6 +53,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     RING_FRICTION_SPEED,
     RING_MASS,
     RING_OFFSET,
+    RING_RELIEF,
     RING_STIFFNESS,
     SINE,
     SPEED,
@@ -155,7 +156,8 @@ def audit(
         bent += (
             belt.bending[j, 2] * w + belt.bending[j, 3] * fields[b, W] + belt.bending[j, 4] * fields[bb, W]
         )
-        ring_here = ring_mass * fma(offset, belt.ring_curvature[j], 1.0)
+        longer = fma(offset, belt.ring_curvature[j], 1.0)
+        ring_here = ring_mass * longer
         moving = element_mass * v0 * v0 + ring_here * v1 * v1 + mass * u * u
         stored += (0.5 * dual) * (moving - c[0, BENDING_STIFFNESS] * w * bent)
         pressed, stretched = minimum(stations[j, EPS_0], 0.0), stations[j, EPS_1]
@@ -186,7 +188,7 @@ def audit(
             driving += length * tangential * (radius + w) * omega
         lever = fma(offset, belt.arc_curvature[j], 1.0)
         saddle = fma(lever, v0, -v1)
-        relief = ring_here * belt_speed * belt_speed
+        relief = c[0, RING_RELIEF] * longer
         pressure = maximum(ring_stiffness * stretched - relief, 0.0) * (right * belt.curvature[j])
         pressure += maximum(ring_stiffness * stations[a, EPS_1] - relief, 0.0) * (
             belt.cell[a] * belt.curvature[a]

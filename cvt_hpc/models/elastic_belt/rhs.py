@@ -113,7 +113,7 @@ def ring_drag(
     """
     sliding_speed = (1.0 + belt.ring_offset * belt.arc_curvature[j]) * v_element - v_ring
     factor, _ = saturation(sliding_speed, belt.ring_friction_speed)
-    relief = belt.ring_mass[j] * belt.belt_speed * belt.belt_speed
+    relief = belt.ring_relief[j]
     pressure = max(belt.ring_stiffness * eps[1, j] - relief, 0.0) * belt.cell[j] * belt.curvature[j]
     pressure += max(belt.ring_stiffness * eps[1, a] - relief, 0.0) * belt.cell[a] * belt.curvature[a]
     return 0.5 * pressure / belt.dual[j] * belt.ring_friction * factor, sliding_speed

@@ -8,15 +8,19 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.alone import Alone
+from cvt_hpc.models.elastic_belt import OWN_STEPPERS
 from cvt_hpc.models.elastic_belt.belt import (
     FIELDS,
     REGIONS,
+    Mesh,
     W,
     belt_constants,
     initial_state,
     mesh,
     random_strands,
 )
+from cvt_hpc.models.elastic_belt.doubts import slack_doubt
 from cvt_hpc.models.elastic_belt.imex import derive, imex_work
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
 from cvt_hpc.models.elastic_belt.march import march_explicit, march_imex
@@ -60,6 +64,53 @@ FAILURES = {
 
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
+
+
+def batch(points: Sequence[dict[str, Any]], stepper: str) -> Any:
+    """Runs that advance together by any stepper that the belt takes.
+
+    Parameters
+    ----------
+    points : sequence of dict
+        Resolved parameters of the runs [SI], all of one `lane_key`; one for steppers without lanes.
+    stepper : str
+        One of STEPPER_NAMES.
+
+    Returns
+    -------
+    Batch or Alone
+        They have `runs`, `samples`, `done`, `running`, `interval` and `advance` in common.
+    """
+    if stepper in OWN_STEPPERS:
+        return Batch(points, stepper)
+    from cvt_hpc.models.elastic_belt.general import GeneralTransient
+
+    (parameters,) = points
+    return Alone(GeneralTransient(parameters, stepper))
+
+
+def doubt(record: dict[str, Any], bending_stiffness: float, grid: Mesh) -> tuple[Status, str] | None:
+    """Whether a run that reached its end is not to be trusted.
+
+    Parameters
+    ----------
+    record : dict
+        With `power_residual` and `least_strand_force`.
+    bending_stiffness : float
+        EI [N m^2].
+    grid : Mesh
+        The belt's mesh.
+
+    Returns
+    -------
+    (Status, str) or None
+        What is wrong.
+    """
+    residual = abs(record["power_residual"])
+    if not residual <= LARGEST_POWER_RESIDUAL:
+        why = f"the power balance is open by {residual:.3g} of the power that flows"
+        return Status.FAILED_NUMERICS, why
+    return slack_doubt(bending_stiffness, float(grid.cell[grid.starts[1]]), record["least_strand_force"])
 
 
 class Batch:
@@ -108,6 +159,7 @@ class Batch:
         self.probes = probes(self.mesh, p["strand_probes"], p["arc_probes"])
         self.sensing = sensors(self.mesh, self.probes, self.interval, self.dtype)
         self.rows = LaneArray(self.samples, self.sensing.matrix.shape[0] + len(CHANNELS), width)
+        self._ordered: np.ndarray | None = None
         self.done = 0
         n = self.mesh.cell.size
         self.profiles = [LaneArray(n, len(PROFILES), width) for _ in range(2)]
@@ -160,6 +212,17 @@ class Batch:
             self.state.fields.data[:, W, lane] += shape
         else:
             self._explicit[1].fields[W] += shape
+
+    def history(self, lane: int) -> np.ndarray:
+        """Rows of a run, (samples, S + C); put in order of lanes and channels once all are there.
+
+        As they are written, values of a channel lie far apart: reading them costs more than the copy.
+        """
+        if self.done < self.samples:
+            return self.rows.data[:, :, lane]
+        if self._ordered is None:
+            self._ordered = np.ascontiguousarray(self.rows.data.transpose(2, 1, 0))
+        return self._ordered[lane].T
 
     def solves(self, lane: int) -> int:
         """Linear solves of the contact problem in a run so far."""
@@ -232,7 +295,7 @@ class Transient:
     @property
     def rows(self) -> np.ndarray:
         """The sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C)."""
-        return self.batch.rows.data[: self.done, :, self._lane]
+        return self.batch.history(self._lane)[: self.done]
 
     @property
     def displacement(self) -> np.ndarray:
@@ -290,14 +353,11 @@ class Transient:
         Parameters
         ----------
         record : dict
-            With `power_residual`.
+            With `power_residual` and `least_strand_force`.
 
         Returns
         -------
         (Status, str) or None
             As `advance`.
         """
-        residual = abs(record["power_residual"])
-        if residual <= LARGEST_POWER_RESIDUAL:
-            return None
-        return Status.FAILED_NUMERICS, f"the power balance is open by {residual:.3g} of the power that flows"
+        return doubt(record, self.parameters["bending_stiffness"], self.mesh)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from cvt_hpc.models.alone import Alone
 from cvt_hpc.models.marched import MarchedRun, Probe
 from cvt_hpc.models.moving_string.exact import probe_positions
 from cvt_hpc.models.moving_string.motion import energy, initial_state, system
@@ -42,3 +43,17 @@ class Transient(MarchedRun):
     def channel(self, name: str) -> np.ndarray:
         """History of one of CHANNELS, (done,): energy that the string's motion keeps [J]."""
         return {"energy": energy}[name](self.parameters, self.rows[: self.done])
+
+
+def batch(points: Sequence[Mapping[str, Any]], stepper: str) -> Alone:
+    """One run in the form of a batch.
+
+    Parameters
+    ----------
+    points : sequence of mapping
+        Resolved parameters of the one run [SI].
+    stepper : str
+        One of the model's STEPPER_NAMES.
+    """
+    (parameters,) = points
+    return Alone(Transient(parameters, stepper))

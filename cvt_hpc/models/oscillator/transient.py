@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from cvt_hpc.models.alone import Alone
 from cvt_hpc.models.marched import MarchedRun, Probe
 from cvt_hpc.models.oscillator.motion import (
     V,
@@ -69,3 +70,17 @@ class Transient(MarchedRun):
     def channel(self, name: str) -> np.ndarray:
         """History of one of CHANNELS, (done,): speed of the mass [m/s]."""
         return self.rows[: self.done, {"speed": V}[name]]
+
+
+def batch(points: Sequence[Mapping[str, Any]], stepper: str) -> Alone:
+    """One run in the form of a batch.
+
+    Parameters
+    ----------
+    points : sequence of mapping
+        Resolved parameters of the one run [SI].
+    stepper : str
+        One of the model's STEPPER_NAMES.
+    """
+    (parameters,) = points
+    return Alone(Transient(parameters, stepper))

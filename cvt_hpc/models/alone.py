@@ -1,0 +1,54 @@
+"""A run of a stepper or model without lanes, in the form of a batch of one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cvt_hpc.variables import Status
+
+
+class Alone:
+    """A batch of one run.
+
+    Parameters
+    ----------
+    run : Transient
+        Of any model; what is not said here is asked of it.
+
+    Attributes
+    ----------
+    samples : int
+        Samples of the whole run.
+    interval : float
+        Sampling interval [s].
+    failure : (Status, str) or None
+        What has gone wrong, where the run cannot go on.
+    """
+
+    def __init__(self, run: Any) -> None:
+        self.run = run
+        self.samples, self.interval = run.samples, run.interval
+        self.failure: tuple[Status, str] | None = None
+
+    @property
+    def runs(self) -> tuple[Alone]:
+        """The run, which has a failure as those of batches do."""
+        return (self,)
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended."""
+        return self.failure is None and self.run.done < self.samples
+
+    def advance(self, samples: int) -> None:
+        """March on.
+
+        Parameters
+        ----------
+        samples : int
+            How many samples at most.
+        """
+        self.failure = self.run.advance(samples)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.run, name)

@@ -1,0 +1,198 @@
+"""The elastic belt as one system of differential equations, y' = rates(t, y), for general integrators.
+
+Unknowns, in this order, for N stations: w, u, v_element, v_ring, n_element, n_ring (N each), the filtered
+speed of those stations that have a memory, the driven pulley's speed and position. Layers' speeds are counted
+from the nominal belt speed, contents from 1 and the pulley's speed from its nominal one, so that tolerances
+relative to an unknown mean its variation. Strands have no memory, and where the belt enters an arc the
+filtered speed is the sliding speed itself: neither is an unknown; without friction memory none is. Forces,
+contact and laws are those of `rhs`, called and not written again.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.models.elastic_belt.belt import (
+    DRIVEN_POSITION,
+    DRIVEN_SPEED,
+    FIELDS,
+    N_ELEMENT,
+    N_RING,
+    SCALARS,
+    TIME,
+    V_ELEMENT,
+    V_FILTERED,
+    V_RING,
+    Belt,
+    State,
+    U,
+    W,
+)
+from cvt_hpc.models.elastic_belt.explicit import driven_thrust
+from cvt_hpc.models.elastic_belt.rhs import (
+    accelerations,
+    contact_forces,
+    content_rates,
+    load_at,
+    memory_rates,
+    sliding_speed,
+    strains,
+)
+from cvt_hpc.physics.compliance import ContactState, contact_state
+from cvt_hpc.steppers.system import System
+
+ROWS = (W, U, V_ELEMENT, V_RING, N_ELEMENT, N_RING)  # of the state, as they follow in y
+VELOCITIES = (U, V_ELEMENT, V_RING)
+
+# What counts alike in each unknown: 0.1 mm off the path, 0.1 m/s of sliding, the strain of the rings.
+SIZES = {W: 1e-4, U: 0.1, V_ELEMENT: 0.1, V_RING: 0.1, V_FILTERED: 0.1, N_ELEMENT: 1e-3, N_RING: 1e-3}
+SIZE_OF_SPEED, SIZE_OF_POSITION = 1.0, 1e-4  # of the driven pulley [rad/s], [m]
+
+
+class FlatBelt(NamedTuple):
+    """What `rates` needs beside t and y.
+
+    Attributes
+    ----------
+    belt : Belt
+        Constants.
+    state : State
+        Work space: y as fields and scalars, of the last call.
+    contacts : tuple of two ContactState
+        Closed sets of the last call, where the next search starts. They change results by round-off alone.
+    remembering : (M,) int array
+        Stations whose filtered speed is an unknown.
+    origin : (n,) array
+        What the unknowns are counted from.
+    start : float
+        Simulated time at t = 0 [s].
+    force, eps, rate : (N,), (2, N), (7, N) arrays
+        Work space: axial line forces, strains, rates.
+    """
+
+    belt: Belt
+    state: State
+    contacts: tuple[ContactState, ContactState]
+    remembering: np.ndarray
+    origin: np.ndarray
+    start: float
+    force: np.ndarray
+    eps: np.ndarray
+    rate: np.ndarray
+
+
+def flat_belt(belt: Belt, start: float = 0.0) -> FlatBelt:
+    """Constants and work space of a belt's `rates`.
+
+    Parameters
+    ----------
+    belt : Belt
+        Constants of the run.
+    start : float
+        Simulated time at t = 0 [s].
+    """
+    n = belt.cell.size
+    arc = belt.arc_share > 0.0
+    arc[[0, belt.driven_start]] = False
+    remembering = np.flatnonzero(arc & (belt.friction_memory > 0.0))
+    contacts = contact_state(belt.driving.weight.size), contact_state(belt.driven.weight.size)
+    origins = {V_ELEMENT: belt.belt_speed, V_RING: belt.belt_speed, N_ELEMENT: 1.0, N_RING: 1.0}
+    rows = np.repeat([origins.get(row, 0.0) for row in ROWS], n)
+    origin = np.concatenate([rows, np.zeros(remembering.size), [belt.driving_speed / belt.ratio, 0.0]])
+    state = State(np.zeros((len(FIELDS), n)), np.zeros(len(SCALARS)))
+    work = np.zeros(n), np.zeros((2, n)), np.zeros((len(FIELDS), n))
+    return FlatBelt(belt, state, contacts, remembering, origin, start, *work)
+
+
+def pack(flat: FlatBelt, state: State) -> np.ndarray:
+    """Vector y of a state; its time is not part of it."""
+    rows, filtered = state.fields[list(ROWS)].ravel(), state.fields[V_FILTERED, flat.remembering]
+    scalars = state.scalars[[DRIVEN_SPEED, DRIVEN_POSITION]]
+    return np.concatenate([rows, filtered, scalars]) - flat.origin
+
+
+@kernel
+def unpack(flat: FlatBelt, t: float, y: np.ndarray) -> None:
+    """Write y into `flat.state`, and the sliding speeds at the inlets into the filtered ones."""
+    n, fields, scalars, origin = flat.belt.cell.size, flat.state.fields, flat.state.scalars, flat.origin
+    for k, row in enumerate(ROWS):
+        for j in range(n):
+            fields[row, j] = origin[k * n + j] + y[k * n + j]
+    first = len(ROWS) * n
+    for k in range(flat.remembering.size):
+        fields[V_FILTERED, flat.remembering[k]] = y[first + k]
+    scalars[TIME], scalars[DRIVEN_SPEED], scalars[DRIVEN_POSITION] = flat.start + t, origin[-2] + y[-2], y[-1]
+    set_inlets(flat)
+
+
+@kernel
+def set_inlets(flat: FlatBelt) -> None:
+    """Where the belt enters an arc the filtered speed is that of sliding, in `flat.state`."""
+    if flat.belt.friction_memory > 0.0:
+        for j in (0, flat.belt.driven_start):
+            flat.state.fields[V_FILTERED, j] = sliding_speed(flat.belt, flat.state, j)
+
+
+@kernel
+def rates(flat: FlatBelt, t: float, y: np.ndarray, out: np.ndarray) -> bool:
+    """Right-hand side.
+
+    Parameters
+    ----------
+    flat : FlatBelt
+        Constants and work space.
+    t : float
+        Time [s].
+    y : (n,) array
+        Unknowns.
+    out : (n,) array
+        Result: their rates.
+
+    Returns
+    -------
+    bool
+        Whether the contact has a solution; it has one unless y is not a number.
+    """
+    belt, state, rate = flat.belt, flat.state, flat.rate
+    unpack(flat, t, y)
+    if contact_forces(belt, state, flat.contacts, flat.force) == 0:
+        return False
+    strains(belt, state.fields, flat.eps)
+    memory_rates(belt, state, rate)
+    content_rates(belt, state, flat.eps, rate)
+    moment = accelerations(belt, state, flat.force, flat.eps, rate)
+    n = belt.cell.size
+    for j in range(n):
+        out[j] = state.fields[U, j]
+    for k in range(1, len(ROWS)):
+        for j in range(n):
+            out[k * n + j] = rate[ROWS[k], j]
+    first = len(ROWS) * n
+    for k in range(flat.remembering.size):
+        out[first + k] = rate[V_FILTERED, flat.remembering[k]]
+    out[-2] = (moment - belt.ratio * load_at(belt, state.scalars[TIME])) / belt.driven_inertia
+    out[-1] = (driven_thrust(belt, flat.force) - belt.thrust) / belt.axial_damping
+    return True
+
+
+def system(flat: FlatBelt) -> System:
+    """The belt as general steppers take it.
+
+    Velocities are those unknowns whose rates are forces over masses: u, the layers' speeds and the pulley's.
+    Of these u alone is the rate of an unknown.
+    """
+    moving = _by_row(flat, {row: row in VELOCITIES for row in (*ROWS, V_FILTERED)}, True, False)
+    n = flat.belt.cell.size
+    position_of = np.full(moving.size, -1)
+    position_of[n : 2 * n] = np.arange(n)
+    scale = _by_row(flat, SIZES, SIZE_OF_SPEED, SIZE_OF_POSITION)
+    return System(rates, flat, moving, position_of, scale)
+
+
+def _by_row(flat: FlatBelt, values: dict[int, float], *scalars: float) -> np.ndarray:
+    """One value for each unknown, by its row of the state."""
+    rows = np.repeat([values[row] for row in ROWS], flat.belt.cell.size)
+    return np.concatenate([rows, np.full(flat.remembering.size, values[V_FILTERED]), scalars])

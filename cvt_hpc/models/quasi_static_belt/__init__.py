@@ -1,0 +1,28 @@
+"""The elastic belt with all that is faster than a limit frequency lagging behind its forces.
+
+Another model than `elastic_belt`, made of its parts: `cvt_hpc/models/elastic_belt/quasi_static.py` says what
+it keeps and what it drops. Importing this package is cheap.
+"""
+
+from cvt_hpc.models import elastic_belt
+from cvt_hpc.models.elastic_belt import check
+from cvt_hpc.parameters import Parameter
+
+PARAMETERS = elastic_belt.PARAMETERS | {
+    "limit": {
+        "limit_frequency": Parameter(
+            1000.0,
+            "Hz",
+            "splines of a higher own frequency, and all longitudinal motion, follow their forces with a lag",
+            minimum=0.0,
+            exclusive=True,
+        ),
+    },
+}
+DEFAULT_STEPPER = "scipy_bdf"
+STEPPER_NAMES = tuple(name for name in elastic_belt.STEPPER_NAMES if name not in elastic_belt.OWN_STEPPERS)
+REFUSED = elastic_belt.REFUSED | {
+    name: "it is a step for the belt with all its inertia" for name in elastic_belt.OWN_STEPPERS
+}
+
+__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPER_NAMES", "check"]

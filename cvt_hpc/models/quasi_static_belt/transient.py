@@ -1,0 +1,46 @@
+"""A transient run of the quasi-static belt by any general stepper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.models.alone import Alone
+from cvt_hpc.models.elastic_belt import quasi_static
+from cvt_hpc.models.elastic_belt.belt import Belt, Mesh, State
+from cvt_hpc.models.elastic_belt.general import GeneralTransient
+
+
+class QuasiStaticForm:
+    """As `cvt_hpc.models.elastic_belt.general.Form`, of the split model."""
+
+    def __init__(self, belt: Belt, grid: Mesh, parameters: dict[str, Any]) -> None:
+        self._model = quasi_static.quasi_static_belt(belt, grid, parameters["limit_frequency"])
+        self.system = quasi_static.system(self._model)
+
+    def pack(self, state: State) -> np.ndarray:
+        """Unknowns nearest to a state."""
+        return quasi_static.pack(self._model, state)
+
+    def state(self, time: float, y: np.ndarray) -> State:
+        """State of unknowns; overwritten by the next call, and by the next evaluation of rates."""
+        quasi_static.unpack(self._model, time, y)
+        return self._model.flat.state
+
+    def hints(self, stepper: str) -> dict[str, Any]:
+        """What SciPy's integrators can use: nothing, since splines fill the Jacobian."""
+        return {}
+
+
+class Transient(GeneralTransient):
+    """One run; see `GeneralTransient`."""
+
+    form = QuasiStaticForm
+
+
+def batch(points: Sequence[dict[str, Any]], stepper: str) -> Alone:
+    """One run in the form of a batch; arguments as of `elastic_belt.transient.batch`."""
+    (parameters,) = points
+    return Alone(Transient(parameters, stepper))

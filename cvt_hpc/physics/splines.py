@@ -1,0 +1,75 @@
+"""Hierarchical cubic B-splines on a closed path: a coarse basis everywhere, finer splines where asked.
+
+Finer splines are added and change none of the coarser ones (Bullinger et al. 2005, sec. 5.1, fig. 12): each
+level halves the spacing and takes the splines that sit between those of the level before, which with them
+span the finer space.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Splines(NamedTuple):
+    """A basis.
+
+    Attributes
+    ----------
+    values : (N, n) array
+        Of each spline at the stations [1].
+    centres, spacings : (n,) arrays
+        Where it sits, and a quarter of its width [m].
+    levels : (n,) int array
+        0 the coarse ones.
+    """
+
+    values: np.ndarray
+    centres: np.ndarray
+    spacings: np.ndarray
+    levels: np.ndarray
+
+
+def cubic_spline(x: np.ndarray) -> np.ndarray:
+    """Cardinal cubic B-spline, of support |x| < 2 and value 2/3 at 0."""
+    x = np.abs(x)
+    inner = (4.0 - 6.0 * x**2 + 3.0 * x**3) / 6.0
+    outer = (2.0 - x) ** 3 / 6.0
+    return np.where(x < 1.0, inner, np.where(x < 2.0, outer, 0.0))
+
+
+def hierarchical_splines(
+    position: np.ndarray, length: float, coarse: int, zones: list[list[tuple[float, float]]]
+) -> Splines:
+    """Basis at the stations of a closed path.
+
+    Parameters
+    ----------
+    position : (N,) array
+        Path coordinates of the stations [m].
+    length : float
+        Of the closed path [m].
+    coarse : int
+        Number of splines of level 0, at least 4.
+    zones : list of lists of (start, end)
+        For each finer level the intervals of the path that it refines [m]: it takes the splines whose centres
+        lie there. An interval may reach beyond the path's seam.
+
+    Returns
+    -------
+    Splines
+        Level by level.
+    """
+    centres, spacings, levels = [], [], []
+    for level, intervals in enumerate([[(0.0, length)], *zones]):
+        spacing = length / coarse / 2**level
+        offered = np.arange(coarse * 2**level)
+        offered = spacing * (offered if level == 0 else offered[1::2])
+        kept = [c for c in offered if any((c - start) % length <= end - start for start, end in intervals)]
+        centres += kept
+        spacings += [spacing] * len(kept)
+        levels += [level] * len(kept)
+    centres, spacings = np.array(centres), np.array(spacings)
+    apart = (position[:, None] - centres + 0.5 * length) % length - 0.5 * length
+    return Splines(cubic_spline(apart / spacings), centres, spacings, np.array(levels))

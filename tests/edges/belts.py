@@ -1,0 +1,74 @@
+"""Belts for the tests of where methods end: short runs by general steppers, and growth of tiny differences."""
+
+from functools import cache
+
+import numpy as np
+
+from cvt_hpc.job import build_job
+from cvt_hpc.models.elastic_belt.flat import flat_belt, pack, system
+from cvt_hpc.models.elastic_belt.general import GeneralTransient
+from cvt_hpc.steppers.facts import Result
+from cvt_hpc.steppers.marching import Marching
+from cvt_hpc.steppers.system import RELATIVE_INCREMENT, System, jacobian
+
+COARSE = {"stations": 48, "duration": 0.04, "rise_time": 0.01, "load": 60.0}
+
+
+def point(stepper: str, **values) -> dict:
+    """Parameters of a run of a coarse belt with defaults but for `values` [SI]."""
+    document = {"name": "test", "model": "elastic_belt", "stepper": stepper}
+    return build_job(document, "test.toml", COARSE | values).point(0)
+
+
+def general(stepper: str, **values) -> GeneralTransient:
+    """A run by a general stepper."""
+    return GeneralTransient(point(stepper, **values), stepper)
+
+
+@cache
+def settled(**values) -> tuple[System, np.ndarray]:
+    """A belt under its load, and its unknowns 1 ms after the start-up."""
+    run = general("dormand_prince", tolerance=1e-4, **values)
+    assert run.advance(220) is None
+    flat = flat_belt(run.belt, run.time)
+    return system(flat), pack(flat, run.state)
+
+
+def eigenvalues(**values) -> np.ndarray:
+    """Of the settled belt's Jacobian [1/s]."""
+    whole, y = settled(**values)
+    n = y.size
+    rates, matrix = np.empty(n), np.empty((n, n))
+    assert whole.rates(whole.constants, 1.0, y, rates)
+    assert jacobian(whole, 1.0, y, rates, np.empty(n), matrix)
+    return np.linalg.eigvals(matrix)
+
+
+def growth(stepper: str, step: float, **values) -> float:
+    """Largest factor by which one step from the settled belt makes a tiny difference grow."""
+    whole, y = settled(**values)
+    march = Marching(stepper, point(stepper, step=step, **values), whole, y, step)
+    n = y.size
+
+    def after(start: np.ndarray) -> np.ndarray:
+        march.y[:] = start
+        row = np.empty((1, n))
+        assert march.advance(row) == Result.OK
+        return row[0]
+
+    base, change = after(y), np.empty((n, n))
+    for j in range(n):
+        moved = y.copy()
+        moved[j] += RELATIVE_INCREMENT * max(abs(y[j]), whole.scale[j])
+        change[:, j] = (after(moved) - base) / (moved[j] - y[j])
+    return np.abs(np.linalg.eigvals(change)).max()
+
+
+def longest_stable_step(stepper: str, guess: float, **values) -> float:
+    """Step between half and twice a guess beyond which differences grow, by bisection to 1 %."""
+    low, high = 0.5 * guess, 2.0 * guess
+    for _ in range(7):
+        step = np.sqrt(low * high)
+        # 1 % in a step is far more than what the belt itself lets grow, 10^3 per second
+        low, high = (low, step) if growth(stepper, step, **values) > 1.01 else (step, high)
+    return np.sqrt(low * high)

@@ -1,0 +1,29 @@
+"""Implicit steps on the belt: where their equations have no solution, because a force jumps."""
+
+import pytest
+from belts import general
+
+from cvt_hpc.variables import Status
+
+# Pressed elements have a damper, which is there from the moment their gap closes: P jumps from 0 to the damping
+# times their speed of closing over a cell. A step that would end at the jump ends nowhere.
+JUMP, NO_JUMP = {"element_damping": 20.0}, {"element_damping": 0.0}
+
+
+@pytest.mark.parametrize("step", [1e-6, 3e-6])
+def test_a_damper_that_sets_in_with_contact_leaves_implicit_euler_without_a_solution(step):
+    run = general("theta", theta=1.0, solver_tolerance=1e-6, step=step, **JUMP)
+    status, reason = run.advance(40)
+    assert status == Status.FAILED_NUMERICS
+    assert "the equations of an implicit step were not solved" in reason
+    # within the first milliseconds, in which gaps close; a shorter step is no way around
+    assert run.time < 2e-3
+
+
+@pytest.mark.parametrize("step", [3e-6, 10e-6])
+def test_without_that_damper_it_has_one_at_any_step(step):
+    run = general("theta", theta=1.0, solver_tolerance=1e-6, step=step, **NO_JUMP)
+    assert run.advance(40) is None
+    assert run.done == 40
+    # kinks are found by a matrix of their own: every other step or more takes one
+    assert run.counters()["jacobians"] > 0.3 * run.steps

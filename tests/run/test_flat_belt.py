@@ -1,0 +1,139 @@
+"""The belt as one system of equations: the readable right-hand side, number for number, in another order."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from cvt_hpc.models.elastic_belt.belt import (
+    DRIVEN_POSITION,
+    DRIVEN_SPEED,
+    N_RING,
+    TIME,
+    V_ELEMENT,
+    V_FILTERED,
+    V_RING,
+    State,
+    U,
+    W,
+    belt_constants,
+    initial_state,
+)
+from cvt_hpc.models.elastic_belt.explicit import step_explicit
+from cvt_hpc.models.elastic_belt.flat import flat_belt, pack, rates, system, unpack
+from cvt_hpc.models.elastic_belt.imex import imex_work, step_imex
+from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
+from cvt_hpc.physics.compliance import contact_state
+
+DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
+DEFAULTS |= {"duration": 0.1, "load": 100.0, "load_history": "ramp", "stations": 96}
+CASES = {"memory": {}, "no memory": {"friction_memory": 0.0}, "rigid": {"sheave_stiffness": np.inf}}
+
+
+def contacts(belt):
+    return contact_state(belt.driving.weight.size), contact_state(belt.driven.weight.size)
+
+
+@cache
+def rough_belt(case):
+    """A belt in motion, roughened so that gaps open, elements press and flanks slip every way."""
+    parameters = DEFAULTS | CASES[case]
+    belt = belt_constants(parameters)
+    state, memory = initial_state(parameters, belt), contacts(belt)
+    work, random = imex_work(state), np.random.default_rng(5)
+    for _ in range(5000):
+        assert step_imex(belt, state, memory, work, 4e-6) > 0
+    for row, size in ((W, 1e-6), (U, 0.05), (V_ELEMENT, 0.05), (V_RING, 0.05)):
+        state.fields[row] += size * random.normal(size=belt.cell.size)
+    return belt, state
+
+
+def flat_rates(belt, state):
+    flat = flat_belt(belt)
+    y = pack(flat, state)
+    out = np.full_like(y, np.nan)
+    assert rates(flat, state.scalars[TIME], y, out)
+    return flat, y, out
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_state_survives_the_vector(case):
+    belt, state = rough_belt(case)
+    flat = flat_belt(belt)
+    unpack(flat, 0.125, pack(flat, state))
+    filtered = flat.remembering
+    for row in range(N_RING + 1):
+        here = filtered if row == V_FILTERED else slice(None)
+        assert np.array_equal(flat.state.fields[row, here], state.fields[row, here])
+    assert flat.state.scalars.tolist() == [0.125, *state.scalars[[DRIVEN_SPEED, DRIVEN_POSITION]]]
+    # every station of both arcs remembers but the inlets; no other does
+    expected = 0 if case == "no memory" else np.count_nonzero(belt.arc_share) - 2
+    assert filtered.size == expected and not {0, belt.driven_start} & set(filtered)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_rates_are_those_of_the_explicit_step(case):
+    # The explicit step advances velocities by the rates of the old state, and by nothing else: its first
+    # increment is step x rate, of which round-off of 10 m/s, 1e-15, leaves 1e-6 m/s^2 at a step of 1 ns.
+    belt, state = rough_belt(case)
+    flat, _, out = flat_rates(belt, state)
+    after, n, step = State(state.fields.copy(), state.scalars.copy()), belt.cell.size, 1e-9
+    # the inlets' filtered speed is the present sliding speed in `rates`, that of the last step in the stepper
+    after.fields[V_FILTERED] = flat.state.fields[V_FILTERED]
+    assert step_explicit(belt, after, contacts(belt), np.zeros((10, n)), step) > 0
+    for place, row in ((1, U), (2, V_ELEMENT), (3, V_RING)):
+        change = (after.fields[row] - state.fields[row]) / step
+        assert out[place * n : (place + 1) * n] == pytest.approx(change, abs=1e-5 + 1e-12 * abs(change).max())
+    speed = (after.scalars[DRIVEN_SPEED] - state.scalars[DRIVEN_SPEED]) / step
+    assert out[-2] == pytest.approx(speed, abs=1e-4)  # round-off of 125 rad/s
+    position = (after.scalars[DRIVEN_POSITION] - state.scalars[DRIVEN_POSITION]) / step
+    assert out[-1] == pytest.approx(position, rel=1e-6)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_velocities_advance_is_by_their_new_values_in_the_explicit_step(case):
+    # at the explicit step's new velocities and old positions the rates of all else are its increments
+    belt, state = rough_belt(case)
+    after, n, step = State(state.fields.copy(), state.scalars.copy()), belt.cell.size, 1e-9
+    assert step_explicit(belt, after, contacts(belt), np.zeros((10, n)), step) > 0
+    mixed = State(state.fields.copy(), state.scalars.copy())
+    for row in (U, V_ELEMENT, V_RING):
+        mixed.fields[row] = after.fields[row]
+    mixed.scalars[DRIVEN_SPEED] = after.scalars[DRIVEN_SPEED]
+    flat, y, out = flat_rates(belt, mixed)
+    advanced = y + step * out
+    advanced[system(flat).velocities] = y[system(flat).velocities]
+    expected = pack(flat, after)
+    # the sums are taken from other origins, 10 m/s, 1 and 125 rad/s: an ulp of each
+    assert advanced == pytest.approx(expected, rel=1e-15, abs=2e-14)
+
+
+def test_velocities_know_their_positions():
+    belt, state = rough_belt("memory")
+    flat, y, out = flat_rates(belt, state)
+    whole = system(flat)
+    moving = np.flatnonzero(whole.position_of >= 0)
+    assert whole.velocities[moving].all() and moving.size == belt.cell.size
+    assert np.array_equal(out[whole.position_of[moving]], y[moving])
+    assert (flat.origin[moving] == 0.0).all()
+    assert whole.velocities.sum() == 3 * belt.cell.size + 1
+    assert whole.scale.shape == y.shape and (whole.scale > 0.0).all()
+
+
+def test_the_history_of_contact_leaves_no_trace():
+    belt, state = rough_belt("memory")
+    flat, y, out = flat_rates(belt, state)
+    lifted = y.copy()
+    lifted[: belt.cell.size] += 1e-3  # every station leaves the grooves
+    again = np.empty_like(out)
+    assert rates(flat, 0.02, lifted, again)
+    assert rates(flat, state.scalars[TIME], y, again)
+    # forces within 1e-5 N/m over masses of 1 kg/m
+    assert again == pytest.approx(out, abs=1e-4)
+
+
+def test_no_number_has_no_rates():
+    belt, state = rough_belt("memory")
+    flat, y, out = flat_rates(belt, state)
+    y[3] = np.nan
+    assert not rates(flat, 0.0, y, out)

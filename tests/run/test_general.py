@@ -1,0 +1,97 @@
+"""The belt under general steppers: the same run as by its own explicit step, and the Jacobian that helps."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from marched import CHEAP, job
+
+from cvt_hpc.models.elastic_belt.flat import flat_belt, pack, rates, system
+from cvt_hpc.models.elastic_belt.general import GeneralTransient
+from cvt_hpc.models.elastic_belt.structure import SparseJacobian, groups, pattern
+from cvt_hpc.models.elastic_belt.transient import Transient
+from cvt_hpc.steppers.system import jacobian
+from cvt_hpc.variables import Status
+
+SAMPLES = 30
+
+
+@cache
+def plain(step):
+    """By the belt's own explicit step."""
+    asked = job("explicit", **CHEAP, load=60.0, step=step)
+    run = Transient(asked.point(0), "explicit")
+    assert run.advance(SAMPLES) is None
+    return run
+
+
+def general(stepper, **values):
+    asked = job(stepper, **CHEAP, load=60.0, **values)
+    return GeneralTransient(asked.point(0), stepper)
+
+
+@pytest.mark.parametrize(
+    ("stepper", "values"),
+    [
+        ("symplectic_euler", {"step": 1e-7}),
+        ("dormand_prince", {"tolerance": 1e-5}),
+        ("scipy_bdf", {"tolerance": 1e-4}),
+    ],
+)
+def test_runs_are_those_of_the_explicit_step(stepper, values):
+    run = general(stepper, **values)
+    assert run.advance(SAMPLES) is None
+    assert run.done == SAMPLES and run.time == pytest.approx(SAMPLES * run.interval)
+    # the explicit run's own error is what halving its step changes, twice over at the longer one
+    coarse, fine = plain(2e-7), plain(1e-7)
+    error = 2.0 * np.abs(coarse.displacement - fine.displacement).max()
+    assert np.abs(run.displacement - fine.displacement).max() < 2.0 * error
+    for name in ("ring_tension t1", "push_force t2", "axial_force driven", "driven_speed"):
+        error = 2.0 * np.abs(coarse.channel(name) - fine.channel(name)).max()
+        size = np.abs(fine.channel(name)).max()
+        assert np.abs(run.channel(name) - fine.channel(name)).max() < 3.0 * error + 1e-4 * size, name
+    assert run.counters()["rates"] > run.steps > 0
+    assert run.step == pytest.approx(run.time / run.steps)
+
+
+def test_the_strands_are_disturbed_once_the_start_up_is_over():
+    run, same = (general("symplectic_euler", step=2e-7, disturbance=size) for size in (1e-6, 0.0))
+    kick = round(CHEAP["rise_time"] / run.interval)
+    assert run.advance(kick) is None and same.advance(kick) is None
+    assert np.array_equal(run.displacement, same.displacement)
+    assert run.advance(1) is None and same.advance(1) is None
+    change = np.abs(run.displacement - same.displacement)[-1].max()
+    assert 1e-7 < change < 2e-6
+
+
+def test_a_state_that_is_no_number_ends_the_run():
+    run = general("symplectic_euler", step=2e-7)
+    assert run.advance(2) is None
+    run._marching.y[7] = np.nan
+    status, reason = run.advance(2)
+    assert status == Status.FAILED_NUMERICS and reason
+    assert run.done == 2
+
+
+def test_the_sparse_jacobian_is_the_full_one():
+    run = general("symplectic_euler", step=2e-7)
+    assert run.advance(SAMPLES) is None
+    flat = flat_belt(run.belt, run.time)
+    whole, y = system(flat), pack(flat, run.state)
+    base, full = np.empty_like(y), np.empty((y.size, y.size))
+    assert rates(flat, 0.0, y, base)
+    assert jacobian(whole, 0.0, y, base, np.empty_like(y), full)
+    sparse = SparseJacobian(flat)
+    found = sparse(0.0, y).toarray()
+    # nothing lies outside the pattern, and each column is the same quotient as alone
+    assert not np.any(full[~pattern(flat).toarray()])
+    assert found == pytest.approx(full, abs=1e-6 * np.abs(full).max())
+    assert sparse.evaluations < y.size / 2
+
+
+def test_no_two_columns_of_a_group_share_a_rate():
+    flat = flat_belt(general("symplectic_euler", step=2e-7).belt)
+    where = pattern(flat)
+    together = groups(where)
+    for group in range(together.max() + 1):
+        assert where.toarray()[:, together == group].sum(axis=1).max() == 1
