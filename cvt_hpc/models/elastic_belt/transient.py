@@ -121,6 +121,10 @@ class Transient:
         """Linear solves of the contact problem so far."""
         return int(self._counts[2])
 
+    def counters(self) -> dict[str, int]:
+        """Work done so far, by its name."""
+        return {"steps": self.steps, "contact_solves": self.contact_solves}
+
     @property
     def time(self) -> float:
         """Simulated time [s]."""
