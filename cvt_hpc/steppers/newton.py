@@ -1,0 +1,230 @@
+"""The equations of an implicit stage, z = base + shift f(t, z), by Newton's method with a frozen inverse.
+
+The inverse of I - shift J is kept as long as each pass reduces the correction to half or less; else J is
+taken anew where the iteration stands, and should that not suffice, the correction is halved until it shrinks
+(natural monotonicity test, Deuflhard 2004, sec. 3.3). So the sharp bends of regularised friction are found
+from far off.
+
+Where friction falls more steeply than 1 / shift, I - shift J has lost the sign that its determinant has for
+short steps: the equations then have several solutions, and the one found is not that to which the motion
+leads. A Newton iteration with one matrix that converges does so where the determinant has that matrix's sign,
+so that the sign is asked once for each matrix. An even number of such directions at once goes unnoticed.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.steppers.facts import FACTORISATIONS, JACOBIANS, RATES, SOLVES, Result
+from cvt_hpc.steppers.system import System, all_finite, jacobian, size
+
+OK, NOT_FINITE, NO_VALUE = int(Result.OK), int(Result.NOT_FINITE), int(Result.NO_VALUE)
+NO_CONVERGENCE, SINGULAR, NOT_UNIQUE = (
+    int(Result.NO_CONVERGENCE),
+    int(Result.SINGULAR),
+    int(Result.NOT_UNIQUE),
+)
+ENOUGH = 0.5  # reduction of the correction in a pass with which a frozen matrix is kept
+LEAST_SHARE = 1e-4  # of the correction, below which no descent is found
+MOST_PASSES = 200
+
+SHIFT, SIGN = range(2)
+
+
+class Frozen(NamedTuple):
+    """A Jacobian, the inverse that was made of it, and work space.
+
+    Attributes
+    ----------
+    jacobian, inverse : (n, n) arrays
+        J, and (I - shift J)^-1.
+    memory : (2,) array
+        Shift of that inverse [s], 0 where there is none yet; sign of det(I - shift J).
+    rates, changed, trial, correction, next_correction : (n,) arrays
+        Work space.
+    """
+
+    jacobian: np.ndarray
+    inverse: np.ndarray
+    memory: np.ndarray
+    rates: np.ndarray
+    changed: np.ndarray
+    trial: np.ndarray
+    correction: np.ndarray
+    next_correction: np.ndarray
+
+
+def frozen(system: System) -> Frozen:
+    """Work space for a system; holds no matrix yet."""
+    n = system.scale.size
+    return Frozen(np.zeros((n, n)), np.zeros((n, n)), np.zeros(2), *(np.zeros(n) for _ in range(5)))
+
+
+@kernel
+def invert(frozen: Frozen, shift: float, counts: np.ndarray) -> int:
+    """Make the inverse of I - shift J.
+
+    Parameters
+    ----------
+    frozen : Frozen
+        With J.
+    shift : float
+        Step times the method's coefficient [s].
+    counts : (6,) int array
+        Work counters.
+
+    Returns
+    -------
+    int
+        A `Result`.
+    """
+    n = frozen.rates.size
+    frozen.memory[SHIFT] = 0.0
+    for i in range(n):
+        if not all_finite(frozen.jacobian[i]):
+            return NOT_FINITE
+        for j in range(n):
+            frozen.inverse[i, j] = (1.0 if i == j else 0.0) - shift * frozen.jacobian[i, j]
+    counts[FACTORISATIONS] += 1
+    sign, logarithm = np.linalg.slogdet(frozen.inverse)
+    if sign == 0.0 or not np.isfinite(logarithm):
+        return SINGULAR
+    frozen.inverse[:] = np.linalg.inv(frozen.inverse)
+    frozen.memory[SHIFT], frozen.memory[SIGN] = shift, sign
+    return OK
+
+
+@kernel
+def renew(system: System, frozen: Frozen, t: float, y: np.ndarray, shift: float, counts: np.ndarray) -> int:
+    """Take the Jacobian at a state whose rates are in `frozen.rates`, and invert.
+
+    Parameters
+    ----------
+    system : System
+        The equations.
+    frozen : Frozen
+        Result.
+    t, y
+        Time [s] and state (n,).
+    shift, counts
+        As in `invert`.
+
+    Returns
+    -------
+    int
+        A `Result`.
+    """
+    counts[JACOBIANS] += 1
+    counts[RATES] += y.size
+    if not jacobian(system, t, y, frozen.rates, frozen.changed, frozen.jacobian):
+        return NO_VALUE
+    return invert(frozen, shift, counts)
+
+
+@kernel
+def _correct(
+    system: System,
+    frozen: Frozen,
+    base: np.ndarray,
+    shift: float,
+    z: np.ndarray,
+    correction: np.ndarray,
+    counts: np.ndarray,
+) -> float:
+    """Newton's correction of z, whose rates are known, by the present inverse; returns its size."""
+    for i in range(z.size):
+        frozen.changed[i] = base[i] + shift * frozen.rates[i] - z[i]
+    np.dot(frozen.inverse, frozen.changed, correction)
+    counts[SOLVES] += 1
+    return size(correction, system.scale)
+
+
+@kernel
+def _rates(system: System, frozen: Frozen, t: float, z: np.ndarray, counts: np.ndarray) -> bool:
+    counts[RATES] += 1
+    return system.rates(system.constants, t, z, frozen.rates)
+
+
+@kernel
+def solve_stage(
+    system: System,
+    frozen: Frozen,
+    t: float,
+    base: np.ndarray,
+    shift: float,
+    tolerance: float,
+    z: np.ndarray,
+    counts: np.ndarray,
+) -> int:
+    """Solve z = base + shift f(t, z).
+
+    Parameters
+    ----------
+    system : System
+        The equations.
+    frozen : Frozen
+        The last matrix; renewed where it does not serve.
+    t : float
+        Time of the stage [s].
+    base : (n,) array
+        Known part.
+    shift : float
+        Step times the method's coefficient [s].
+    tolerance : float
+        Largest correction that is left, against each unknown's typical size [1].
+    z : (n,) array
+        The guess; then the solution.
+    counts : (6,) int array
+        Work counters.
+
+    Returns
+    -------
+    int
+        A `Result`; NOT_UNIQUE where the solution found is one of several.
+    """
+    if not _rates(system, frozen, t, z, counts):
+        return NO_VALUE
+    outcome, fresh = OK, frozen.memory[SIGN] == 0.0
+    if fresh:
+        outcome = renew(system, frozen, t, z, shift, counts)
+    elif frozen.memory[SHIFT] != shift:
+        outcome = invert(frozen, shift, counts)
+    if outcome != OK:
+        return outcome
+    left = _correct(system, frozen, base, shift, z, frozen.correction, counts)
+    share, crossed = 1.0, False
+    for _ in range(MOST_PASSES):
+        if not np.isfinite(left):
+            return NOT_FINITE
+        crossed |= frozen.memory[SIGN] < 0.0
+        for i in range(z.size):
+            frozen.trial[i] = z[i] + share * frozen.correction[i]
+        next_left = np.inf
+        if _rates(system, frozen, t, frozen.trial, counts):
+            next_left = _correct(system, frozen, base, shift, frozen.trial, frozen.next_correction, counts)
+        if share == 1.0 and next_left <= tolerance:
+            z[:] = frozen.trial + frozen.next_correction
+            return OK if frozen.memory[SIGN] > 0.0 else NOT_UNIQUE
+        if next_left <= (ENOUGH if share == 1.0 else 1.0 - 0.5 * share) * left:
+            z[:] = frozen.trial
+            frozen.correction[:] = frozen.next_correction
+            left, share, fresh = next_left, 1.0, False
+        elif fresh:
+            share *= 0.5
+            if share < LEAST_SHARE:
+                break
+        else:
+            if not _rates(system, frozen, t, z, counts):
+                return NO_VALUE
+            outcome = renew(system, frozen, t, z, shift, counts)
+            if outcome != OK:
+                return outcome
+            left, share, fresh = (
+                _correct(system, frozen, base, shift, z, frozen.correction, counts),
+                1.0,
+                True,
+            )
+    return NOT_UNIQUE if crossed else NO_CONVERGENCE

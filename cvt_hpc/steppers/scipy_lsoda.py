@@ -1,0 +1,48 @@
+"""LSODA by SciPy: Adams methods, and backward differences where the motion is stiff (Petzold 1983).
+
+Orders 1 to 12 (Adams) and 1 to 5 (backward differences), chosen as it goes; multistep, adaptive. A yardstick
+that people know, not one of the family: called from Python, with a full matrix by difference quotients (which
+count as evaluations of the rates; it does not tell how many matrices it made).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.integrate import LSODA
+
+from cvt_hpc.steppers.facts import Facts
+from cvt_hpc.steppers.numerics import MOST_STEPS, TOLERANCE, Tolerance, tolerance
+from cvt_hpc.steppers.scipy_march import Work, march_by
+from cvt_hpc.steppers.system import System
+
+FACTS = Facts(
+    order=5,
+    order_at_events=1.0,
+    adaptive=True,
+    needs=frozenset({"rates"}),
+    implicit=True,
+    l_stable=False,
+    stability="backward differences up to order 2 are A-stable, higher ones not near the imaginary axis",
+    damping="below the tolerance",
+)
+PARAMETERS = {"numerics": {"tolerance": TOLERANCE, "most_steps": MOST_STEPS}}
+control = tolerance
+
+
+def work(system: System) -> Work:
+    """Where the integrator is kept."""
+    return Work()
+
+
+def march(
+    system: System,
+    control: Tolerance,
+    interval: float,
+    rows: np.ndarray,
+    clock: np.ndarray,
+    y: np.ndarray,
+    work: Work,
+    counts: np.ndarray,
+) -> int:
+    """March; see `cvt_hpc.steppers`."""
+    return march_by(LSODA, system, control, interval, rows, clock, y, work, counts)
