@@ -201,10 +201,11 @@ def _chart(arguments: argparse.Namespace) -> int:
 def _check(arguments: argparse.Namespace) -> int:
     from cvt_hpc.job import load_job
     from cvt_hpc.job.summary import summarize
-    from cvt_hpc.study import check_study
+    from cvt_hpc.study.description import describe
+    from cvt_hpc.study.simulator import default_simulator
 
     job = load_job(arguments.path, arguments.set)
-    check_study(job)
+    describe(job, default_simulator())  # refuses axes that the dataset of a run could not hold
     if _speaks():
         from cvt_hpc.simulation import estimate_cost
 

@@ -1,11 +1,14 @@
 """The commands within this process, on the toy model and runs without mechanics."""
 
+import sys
+
 import netCDF4
 import pytest
 
 from cvt_hpc import cli
 from cvt_hpc.cli import main
 from cvt_hpc.study import FailedRun, RunReport, StudyStatus
+from cvt_hpc.variables import Status, Variable
 
 pytestmark = pytest.mark.usefixtures("mechanics")
 
@@ -152,6 +155,22 @@ def test_check_prints_every_parameter_with_its_origin_the_axes_and_the_cost(writ
         "estimated cost: 30 core-seconds per run, 300 core-seconds in all",
     ]
     assert call("run", "x.toml", *overrides, "--dry-run") == (0, out, [])
+    assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
+
+
+@pytest.mark.parametrize("command", [["check"], ["run", "--dry-run"], ["run"]])
+def test_an_axis_that_the_dataset_could_not_hold_is_refused_by_all(
+    write_job, call, tmp_path, monkeypatch, command
+):
+    write_job(GRID)
+    recorded = (Variable("status", (), "i1", "", "how the run ended", Status),
+                Variable("load", (), "f8", "N m", "mean torque"))  # fmt: skip
+    monkeypatch.setattr(sys.modules["cvt_hpc.simulation"], "record_variables", lambda job: recorded)
+    status, out, err = call(command[0], "x.toml", *command[1:])
+    assert (status, out) == (2, [])
+    assert err == [
+        "cvt-hpc: x.toml: [axes] load: expected a parameter that is not also the name of a recorded quantity, found load"
+    ]
     assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
 
 
