@@ -27,6 +27,8 @@ _ROOMS_WITH_KERNELS = ("physics", "models", "steppers")
 # divisions by one number replaced by its reciprocal; sums are never reordered, and what is not a number stays
 # visible.
 _OPTIONS = {"cache": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
+# Every operation rounded once as written: the same bits however many lanes a number has.
+_LANE_OPTIONS = {"cache": True, "error_model": "numpy"}
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -40,6 +42,16 @@ def merged_kernel(function: Callable[..., Any]) -> Any:
     A call that hands over a tuple of arrays counts references to each, which costs more than a short loop.
     """
     return _compiled(function, {**_OPTIONS, "inline": "always"})
+
+
+def lane_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function of lanes: what it computes in one does not depend on how many there are."""
+    return _compiled(function, _LANE_OPTIONS)
+
+
+def merged_lane_kernel(function: Callable[..., Any]) -> Any:
+    """As `lane_kernel`, into its callers."""
+    return _compiled(function, {**_LANE_OPTIONS, "inline": "always"})
 
 
 def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:

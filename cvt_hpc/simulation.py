@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -36,7 +36,14 @@ _OCCURRENCE = (
     Variable("growth_error", ("strand",), "f8", "s-1", "standard error of the growth rate"),
 )
 _COST = (
-    Variable("core_seconds", (), "f8", "s", "processor time of the run", volatile=True),
+    Variable(
+        "core_seconds",
+        (),
+        "f8",
+        "s",
+        "processor time of the run, its share where several advance together",
+        volatile=True,
+    ),
     Variable("simulated_seconds", (), "f8", "s", "simulated time, less than asked where the run failed"),
     Variable("time_step", (), "f8", "s", "time step"),
     Variable("steps", (), "i8", "1", "time steps taken"),
@@ -108,7 +115,61 @@ def run_point(job: Job, point: dict[str, Any], interrupt: Callable[[], str | Non
     Interrupted
         With the text of `interrupt`.
     """
-    return _run(job, point, interrupt)[1]
+    return run_points(job, [point], interrupt)[0]
+
+
+def run_points(
+    job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+) -> list[dict[str, Any]]:
+    """Do several runs that advance together, in the lanes of the processor's registers.
+
+    Parameters
+    ----------
+    job : Job
+        For its model and stepper.
+    points : sequence of dict
+        Flat parameters of the runs [SI], as `lane_groups` puts them together.
+    interrupt : callable
+        As `run_point` takes it.
+
+    Returns
+    -------
+    list of dict
+        Records in the order of the points, each bitwise what `run_point` makes of its point alone.
+
+    Raises
+    ------
+    Interrupted
+        With the text of `interrupt`.
+    """
+    return [record for _, record in _march(job, points, interrupt)]
+
+
+def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
+    """Split runs into groups that can advance together.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    indices : sequence of int
+        Runs of the job.
+
+    Returns
+    -------
+    list of tuple of int
+        Each index once, in groups of as many as the processor's registers hold; in each group in the order
+        given.
+    """
+    model = _model(job)
+    kinds: dict[tuple, list[int]] = {}
+    for index in indices:
+        kinds.setdefault(model.lane_key(job.point(index)), []).append(index)
+    groups = []
+    for alike in kinds.values():
+        most = model.lanes(job.point(alike[0]), job.stepper)
+        groups += [tuple(alike[k : k + most]) for k in range(0, len(alike), most)]
+    return groups
 
 
 def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
@@ -135,7 +196,7 @@ def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
     import xarray as xr
 
     point = job.point_at(at or {})
-    run, record = _run(job, point, lambda: None)
+    ((run, record),) = _march(job, [point], lambda: None)
     coordinates = {
         name: (name, c.values, _attributes(c.long_name, c.units))
         for name, c in record_coordinates(job).items()
@@ -157,32 +218,38 @@ def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
     return dataset.merge(histories, combine_attrs="override")
 
 
-def _run(job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]) -> tuple[Any, dict[str, Any]]:
-    """March, and make the record."""
-    model = import_module(MODELS[job.model] + ".transient")
-    run = model.Transient(point, job.stepper)
-    run.advance(0)  # compiles or loads the kernels, which is no cost of this run
+def _march(
+    job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+) -> list[tuple[Any, dict[str, Any]]]:
+    """March a batch of runs, and make their records."""
+    batch = _model(job).Batch(points, job.stepper)
+    batch.advance(0)  # compiles or loads the kernels, which is no cost of these runs
     started = time.process_time()
-    failure = None
-    while failure is None and run.done < run.samples:
+    while batch.running:
         if stop := interrupt():
             raise Interrupted(stop)
-        failure = run.advance(SAMPLES_BETWEEN_POLLS)
-    record = _blank(job)
+        batch.advance(SAMPLES_BETWEEN_POLLS)
+    marched = (time.process_time() - started) / len(points)
+    return [(run, _record(job, run, marched)) for run in batch.runs]
+
+
+def _record(job: Job, run: Any, marched: float) -> dict[str, Any]:
+    """The record of a run that has ended."""
+    started = time.process_time()
+    record, failure = _blank(job), run.failure
     if failure is None:
-        record |= _judge(job, run, point)
+        record |= _judge(job, run, run.parameters)
         failure = run.numerical_doubt(record)
     if failure is not None:
         status, why = failure
         record = _blank(job) | {"status": status, "reason": f"at {run.time * 1e3:.4g} ms: {why}"[:240]}
-    record |= {
-        "core_seconds": time.process_time() - started,
+    return record | {
+        "core_seconds": marched + time.process_time() - started,
         "simulated_seconds": run.time,
         "time_step": run.step,
         "steps": run.steps,
         "contact_solves": run.contact_solves,
     }
-    return run, record
 
 
 def _judge(job: Job, run: Any, point: dict[str, Any]) -> dict[str, Any]:
@@ -216,6 +283,10 @@ def _blank(job: Job) -> dict[str, Any]:
             shape = tuple(sizes[dim] for dim in variable.dims)
             blank[variable.name] = np.full(shape, np.nan if variable.dtype == "f8" else 0, variable.dtype)
     return blank
+
+
+def _model(job: Job) -> ModuleType:
+    return import_module(MODELS[job.model] + ".transient")
 
 
 def _model_record(job: Job) -> ModuleType:

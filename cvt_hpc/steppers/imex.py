@@ -19,6 +19,12 @@ PARAMETERS = {
             "largest time step; a whole number of steps makes a sampling interval",
             minimum=1e-9,
             maximum=1e-3,
-        )
+        ),
+        "precision": Parameter(
+            "double",
+            "",
+            "of the numbers in a step: 8 runs advance together in double, 16 in single",
+            choices=("double", "single"),
+        ),
     }
 }

@@ -18,8 +18,8 @@ from cvt_hpc.physics.geometry import Variator, variator
 
 FIELDS = ("w", "u", "v_element", "v_ring", "v_filtered", "n_element", "n_ring")
 W, U, V_ELEMENT, V_RING, V_FILTERED, N_ELEMENT, N_RING = range(len(FIELDS))
-SCALARS = ("time", "driven_speed", "driven_position")
-TIME, DRIVEN_SPEED, DRIVEN_POSITION = range(len(SCALARS))
+SCALARS = ("time", "driven_speed", "driven_position", "layer_work")
+TIME, DRIVEN_SPEED, DRIVEN_POSITION, LAYER_WORK = range(len(SCALARS))
 
 REGIONS = ("driving arc", "t1", "driven arc", "t2")
 START_DAMPING = (
@@ -46,6 +46,7 @@ class Belt(NamedTuple):
     ring_mass: np.ndarray
     element_mass: float
     mass: float
+    bending_stiffness: float
     belt_speed: float
     element_stiffness: float
     ring_stiffness: float
@@ -77,7 +78,10 @@ class Belt(NamedTuple):
 
 
 class State(NamedTuple):
-    """The state: `fields` (7, N) in the order of FIELDS, `scalars` (3,) in the order of SCALARS."""
+    """The state: `fields` (7, N) in the order of FIELDS, `scalars` (4,) in the order of SCALARS.
+
+    The last scalar is no state of the belt: the work of the layers' dampers [J] until it is asked for.
+    """
 
     fields: np.ndarray
     scalars: np.ndarray
@@ -181,10 +185,11 @@ def belt_constants(parameters: dict[str, Any]) -> Belt:
         curvature=kappa,
         arc_curvature=np.maximum(kappa, np.roll(kappa, 1)),
         arc_share=arc_share,
-        bending=_bending_bands(cell, dual, p["bending_stiffness"]),
+        bending=bending_bands(cell, dual, p["bending_stiffness"]),
         ring_mass=ring_mass,
         element_mass=p["element_mass"],
         mass=p["element_mass"] + p["ring_mass"],
+        bending_stiffness=p["bending_stiffness"],
         belt_speed=belt_speed,
         element_stiffness=p["element_stiffness"],
         ring_stiffness=p["ring_stiffness"],
@@ -221,7 +226,7 @@ def _pair(values: np.ndarray) -> np.ndarray:
     return values + np.roll(values, 1)
 
 
-def _bending_bands(cell: np.ndarray, dual: np.ndarray, stiffness: float) -> np.ndarray:
+def bending_bands(cell: np.ndarray, dual: np.ndarray, stiffness: float) -> np.ndarray:
     """Bands of -D^T diag(EI dual) D / dual, D the second difference: the gradient of the bending energy."""
     n = cell.size
     second = np.zeros((n, n))
@@ -280,7 +285,7 @@ def initial_state(parameters: dict[str, Any], belt: Belt) -> State:
     rings /= 1.0 + p["reference_tension"] / p["ring_stiffness"]
     fields[N_ELEMENT] = length * (grid.path.path_length - p["play"]) / (grid.cell @ length)
     fields[N_RING] = ring_length * rings / (grid.cell @ ring_length)
-    scalars = np.array([0.0, speed / (belt.driven_radius + mean[1]), -2.0 * tangent * lift])
+    scalars = np.array([0.0, speed / (belt.driven_radius + mean[1]), -2.0 * tangent * lift, 0.0])
     return State(fields, scalars)
 
 

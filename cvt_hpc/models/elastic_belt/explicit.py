@@ -8,6 +8,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
+    LAYER_WORK,
     N_ELEMENT,
     TIME,
     V_ELEMENT,
@@ -60,6 +61,7 @@ def step_explicit(
     moment = accelerations(belt, state, force, eps, rate)
     axial = driven_thrust(belt, force)
 
+    scalars[LAYER_WORK] += step * damper_power(belt, fields, eps, rate, step)
     for row in (U, V_ELEMENT, V_RING):
         fields[row] += step * rate[row]
     load = belt.ratio * load_at(belt, scalars[TIME])
@@ -73,6 +75,26 @@ def step_explicit(
     scalars[DRIVEN_POSITION] += step * (axial - belt.thrust) / belt.axial_damping
     scalars[TIME] += step
     return solves
+
+
+@kernel
+def damper_power(belt: Belt, fields: np.ndarray, eps: np.ndarray, rate: np.ndarray, step: float) -> float:
+    """Power of the layers' dampers in a step [W]: forces at its start times the mean closing speeds."""
+    n = belt.cell.size
+    power = 0.0
+    for layer in range(2):
+        v, change = fields[V_ELEMENT + layer], rate[V_ELEMENT + layer]
+        damper = belt.ring_damping if layer else belt.element_damping
+        for c in range(n):
+            b = c + 1 if c < n - 1 else 0
+            damped = damper * (v[b] - v[c]) / belt.cell[c]
+            if layer == 0:
+                # as in `accelerations`: elements that are apart have none, and it never makes them pull
+                damped = (
+                    min(damped, max(-belt.element_stiffness * eps[0, c], 0.0)) if eps[0, c] < 0.0 else 0.0
+                )
+            power += damped * (v[b] - v[c] + 0.5 * step * (change[b] - change[c]))
+    return power
 
 
 @kernel

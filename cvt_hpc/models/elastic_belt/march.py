@@ -4,60 +4,59 @@ from __future__ import annotations
 
 import numpy as np
 
-from cvt_hpc.kernels import kernel
-from cvt_hpc.models.elastic_belt.belt import Belt, State
+from cvt_hpc.kernels import kernel, lane_kernel
+from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.elastic_belt.belt import (
+    DRIVEN_POSITION,
+    DRIVEN_SPEED,
+    LAYER_WORK,
+    N_ELEMENT,
+    N_RING,
+    TIME,
+    V_ELEMENT,
+    V_RING,
+    Belt,
+    State,
+)
 from cvt_hpc.models.elastic_belt.explicit import step_explicit
 from cvt_hpc.models.elastic_belt.imex import ImexWork, step_imex
+from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK as LANE_LAYER_WORK
+from cvt_hpc.models.elastic_belt.lane_belt import POSITION, SPEED, LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.sampling import Sensors, sample
 from cvt_hpc.physics.compliance import ContactState
 
 
-@kernel
+@lane_kernel
 def march_imex(
-    belt: Belt,
-    state: State,
-    contacts: tuple[ContactState, ContactState],
+    belt: LaneBelt,
+    state: LaneState,
     work: ImexWork,
     step: float,
     steps: int,
     sensing: Sensors,
-    rows: np.ndarray,
-    profiles: np.ndarray,
-    scratch: np.ndarray,
-    counts: np.ndarray,
-) -> int:
-    """Fill `rows` with samples, `steps` steps before each.
+    rows: LaneArray,
+    first: int,
+    last: int,
+    profiles: LaneArray,
+    ended: LaneArray,
+) -> None:
+    """Fill rows first .. last - 1 with samples, `steps` steps before each.
 
     Parameters
     ----------
-    belt, state, contacts, work
+    belt, state, work
         As the step kernel takes them.
     step, steps : float, int
         Step [s] and their number between samples.
-    sensing, profiles, scratch
+    sensing, rows, profiles, ended
         As `sample` takes them.
-    rows : (samples, S + C) array
-        One row for each sample.
-    counts : (3,) int array
-        Samples, steps and solves of the contact problem are added to it.
-
-    Returns
-    -------
-    int
-        An `Outcome`; unless it is OK, the march ended before the sample that is not counted.
+    first, last : int
+        Which rows.
     """
-    for k in range(rows.shape[0]):
+    for k in range(first, last):
         for _ in range(steps):
-            solves = step_imex(belt, state, contacts, work, step)
-            if solves == 0:
-                return 1
-            counts[1] += 1
-            counts[2] += solves
-        outcome = sample(belt, state, contacts, sensing, rows[k], profiles, scratch)
-        if outcome != 0:
-            return outcome
-        counts[0] += 1
-    return 0
+            step_imex(belt, state, work, step)
+        sample(belt, state, work.stations, sensing, rows, k, profiles, ended)
 
 
 @kernel
@@ -66,24 +65,55 @@ def march_explicit(
     state: State,
     contacts: tuple[ContactState, ContactState],
     work: np.ndarray,
+    lane_belt: LaneBelt,
+    lane: LaneState,
+    lane_work: ImexWork,
     step: float,
     steps: int,
     sensing: Sensors,
-    rows: np.ndarray,
-    profiles: np.ndarray,
-    scratch: np.ndarray,
-    counts: np.ndarray,
+    rows: LaneArray,
+    first: int,
+    last: int,
+    profiles: LaneArray,
+    ended: LaneArray,
 ) -> int:
-    """As `march_imex`, with the explicit step and its work space (10, N)."""
-    for k in range(rows.shape[0]):
+    """As `march_imex`, with the explicit step of one run, whose state is handed over to be sampled.
+
+    Parameters
+    ----------
+    belt, state, contacts, work
+        As `step_explicit` takes them.
+    lane_belt, lane, lane_work
+        The same run as a single lane.
+
+    Returns
+    -------
+    int
+        Linear solves of the contact problem.
+    """
+    solves = 0
+    for k in range(first, last):
         for _ in range(steps):
-            solves = step_explicit(belt, state, contacts, work, step)
-            if solves == 0:
-                return 1
-            counts[1] += 1
-            counts[2] += solves
-        outcome = sample(belt, state, contacts, sensing, rows[k], profiles, scratch)
-        if outcome != 0:
-            return outcome
-        counts[0] += 1
-    return 0
+            solves += step_explicit(belt, state, contacts, work, step)
+        hand_over(belt, state, lane)
+        sample(lane_belt, lane, lane_work.stations, sensing, rows, k, profiles, ended)
+    return solves
+
+
+@kernel
+def hand_over(belt: Belt, state: State, lane: LaneState) -> None:
+    """Copy a run's state into a LaneState of one lane."""
+    fields, scalars = state.fields, state.scalars
+    for j in range(belt.cell.size):
+        for field in range(fields.shape[0]):
+            base = 0.0
+            if field == V_ELEMENT or field == V_RING:
+                base = belt.belt_speed
+            elif field == N_ELEMENT:
+                base = 1.0
+            elif field == N_RING:
+                base = 1.0 + belt.curvature[j] * belt.ring_offset
+            lane.fields[j, field] = fields[field, j] - base
+    lane.scalars[0, SPEED], lane.scalars[0, POSITION] = scalars[DRIVEN_SPEED], scalars[DRIVEN_POSITION]
+    lane.scalars[0, LANE_LAYER_WORK], scalars[LAYER_WORK] = scalars[LAYER_WORK], 0.0
+    lane.time[0] = scalars[TIME]

@@ -6,7 +6,9 @@ In a steady state, on average over a vibration,
 
 and before that the difference is what the stored energy takes up. What does not close is the work of the
 numerics: upwinded transport, backward Euler in the layers, and the linear stretch that leaves the product of
-changing tension and slope squared out.
+changing tension and slope squared out. The layers' loss is not taken from a state, as all else is, but from
+the work of their dampers in the steps since the last one: a damper acts in a cell that is just closing, for a
+step or two, and instants now and then would not meet it as often as it acts.
 
 Seating is what the belt carries out of the sheaves' elastic contact at an outlet beyond what it brings in at
 the inlet. Contact begins and ends at the arcs' ends here, with forces that are not zero; along an arc the
@@ -16,25 +18,49 @@ distance of two stations alone.
 
 from __future__ import annotations
 
-import numpy as np
-
-from cvt_hpc.kernels import kernel
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_POSITION,
-    DRIVEN_SPEED,
-    N_ELEMENT,
-    TIME,
-    V_ELEMENT,
-    V_FILTERED,
-    V_RING,
-    Belt,
-    State,
-    U,
-    W,
+from cvt_hpc.kernels import lane_kernel
+from cvt_hpc.lanes import LaneArray, fma, like, maximum, minimum, sqrt
+from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_FILTERED, V_RING, U, W
+from cvt_hpc.models.elastic_belt.imex import (
+    EPS_0,
+    EPS_1,
+    FORCE,
+    LEAST_SHARE_OF_WIDTH,
+    coefficient_of_law,
+    lane_load,
+    start_damping,
 )
-from cvt_hpc.models.elastic_belt.flank import flank_forces, sliding
-from cvt_hpc.models.elastic_belt.rhs import damping_at, load_at, ring_drag
-from cvt_hpc.physics.friction import friction_coefficient
+from cvt_hpc.models.elastic_belt.lane_belt import (
+    AXIAL_DAMPING,
+    BELT_SPEED,
+    BENDING_STIFFNESS,
+    COSINE,
+    DRIVEN_INERTIA,
+    DRIVEN_RADIUS,
+    DRIVING_POSITION,
+    DRIVING_RADIUS,
+    DRIVING_SPEED,
+    ELEMENT_MASS,
+    ELEMENT_STIFFNESS,
+    FRICTION_SPEED,
+    LAYER_WORK,
+    MASS,
+    POSITION,
+    RATIO,
+    RING_FRICTION,
+    RING_FRICTION_SPEED,
+    RING_MASS,
+    RING_OFFSET,
+    RING_STIFFNESS,
+    SINE,
+    SPEED,
+    THRUST,
+    TRANSVERSE_DAMPING,
+    WEDGE,
+    LaneBelt,
+    LaneState,
+)
+from cvt_hpc.physics.lane_friction import lane_saturation
 
 POWERS = (
     "driving_power",
@@ -64,84 +90,109 @@ POWERS = (
 ) = range(len(POWERS))
 
 
-@kernel
+@lane_kernel
 def audit(
-    belt: Belt, state: State, force: np.ndarray, eps: np.ndarray, axial: float, out: np.ndarray
+    belt: LaneBelt,
+    state: LaneState,
+    stations: LaneArray,
+    axial,
+    interval: float,
+    rows: LaneArray,
+    k: int,
+    first: int,
 ) -> None:
     """Powers [W] and stored energy [J] of a state.
 
     Parameters
     ----------
     belt, state
-        Constants and state.
-    force : (N,) array
-        Axial line forces of the flanks [N/m].
-    eps : (2, N) array
-        Strains of the cells.
-    axial : float
-        Axial force of the belt on the driven sheave [N].
-    out : (11,) array
-        Result, in the order of POWERS.
+        Constants and state; the work of the dampers since the last audit is used up.
+    stations : LaneArray
+        Of `ImexWork`, with the forces and strains of this state.
+    axial
+        Axial force of the belt on the driven sheave [N], in lanes.
+    interval : float
+        Time since the last audit [s].
+    rows, k, first
+        Results go into row k from field `first` on, in the order of POWERS.
     """
-    n = belt.cell.size
-    w, u = state.fields[W], state.fields[U]
-    v0, v1, vf = state.fields[V_ELEMENT], state.fields[V_RING], state.fields[V_FILTERED]
-    driven_speed = state.scalars[DRIVEN_SPEED]
-    sine, cosine = np.sin(belt.half_wedge_angle), np.cos(belt.half_wedge_angle)
-    wedge = 2.0 * sine / cosine
-    damping = damping_at(belt, state.scalars[TIME])
-    axial_speed = (axial - belt.thrust) / belt.axial_damping
-    out[:] = 0.0
-    out[LOAD_POWER] = belt.ratio * load_at(belt, state.scalars[TIME]) * driven_speed
-    out[THRUST_POWER] = belt.thrust * axial_speed
-    out[LAG_LOSS] = belt.axial_damping * axial_speed * axial_speed
-    stored = 0.5 * belt.driven_inertia * driven_speed * driven_speed
+    n, fields, c, scalars = belt.cell.size, state.fields, belt.constants, state.scalars
+    speed = scalars[0, SPEED]
+    zero = like(0.0, axial)
+    omega_driven = like(speed, zero)
+    belt_speed, sine, cosine, wedge = c[0, BELT_SPEED], c[0, SINE], c[0, COSINE], c[0, WEDGE]
+    per_cosine, width = 1.0 / cosine, c[0, FRICTION_SPEED]
+    least = LEAST_SHARE_OF_WIDTH * width
+    damping = c[0, TRANSVERSE_DAMPING] + start_damping(belt, state.time[0])
+    element_mass, ring_mass, mass, offset = c[0, ELEMENT_MASS], c[0, RING_MASS], c[0, MASS], c[0, RING_OFFSET]
+    ring_stiffness, element_stiffness = c[0, RING_STIFFNESS], c[0, ELEMENT_STIFFNESS]
+    driven_base = like(speed * like(c[0, DRIVEN_RADIUS], speed) - like(belt_speed, speed), zero)
+    omega, radius, opening_0 = c[0, DRIVING_SPEED], c[0, DRIVING_RADIUS], c[0, DRIVING_POSITION]
+    surface = omega * radius - belt_speed
+    driving = driving_rub = rub = ring_loss = belt_loss = seating = zero
+    stored = 0.5 * c[0, DRIVEN_INERTIA] * omega_driven * omega_driven
     for j in range(n):
+        if j == belt.driven_start:
+            surface, omega, radius = driven_base, omega_driven, c[0, DRIVEN_RADIUS]
+            opening_0 = like(scalars[0, POSITION], zero)
+            driving_rub, rub = rub, zero
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
-        left, right, dual = belt.cell[a], belt.cell[j], belt.dual[j]
-        v_radial = u[j] + v0[j] * (w[b] - w[a]) / (left + right)
-        out[BELT_LOSS] += dual * damping * v_radial * v_radial
-        bending = 0.0
-        for k in range(5):
-            bending += belt.bending[j, k] * w[(j + k - 2) % n]
-        stored += (
-            0.5
-            * dual
-            * (
-                belt.element_mass * v0[j] * v0[j]
-                + belt.ring_mass[j] * v1[j] * v1[j]
-                + belt.mass * u[j] * u[j]
-                - w[j] * bending
-            )
+        aa, bb = a - 1 if a > 0 else n - 1, b + 1 if b < n - 1 else 0
+        right, dual = belt.cell[j], belt.dual[j]
+        w, u = fields[j, W], fields[j, U]
+        v0, v1 = belt_speed + fields[j, V_ELEMENT], belt_speed + fields[j, V_RING]
+        v_radial = fma(v0, (fields[b, W] - fields[a, W]) * belt.per_span[j], u)
+        belt_loss += dual * damping * v_radial * v_radial
+        bent = belt.bending[j, 0] * fields[aa, W] + belt.bending[j, 1] * fields[a, W]
+        bent += (
+            belt.bending[j, 2] * w + belt.bending[j, 3] * fields[b, W] + belt.bending[j, 4] * fields[bb, W]
         )
-        for layer in range(2):
-            stiffness = belt.ring_stiffness if layer else belt.element_stiffness
-            if layer == 0 and eps[0, j] >= 0.0:
-                continue
-            content = state.fields[N_ELEMENT + layer, j]
-            stored += 0.5 * right * content * stiffness * eps[layer, j] * eps[layer, j]
-            v = state.fields[V_ELEMENT + layer]
-            damper = belt.ring_damping if layer else belt.element_damping
-            out[LAYER_LOSS] += damper * (v[b] - v[j]) * (v[b] - v[j]) / right
+        ring_here = ring_mass * fma(offset, belt.ring_curvature[j], 1.0)
+        moving = element_mass * v0 * v0 + ring_here * v1 * v1 + mass * u * u
+        stored += (0.5 * dual) * (moving - c[0, BENDING_STIFFNESS] * w * bent)
+        pressed, stretched = minimum(stations[j, EPS_0], 0.0), stations[j, EPS_1]
+        rings = fields[j, N_ELEMENT + 1] + 1.0 + belt.curvature[j] * offset
+        elastic = (fields[j, N_ELEMENT] + 1.0) * element_stiffness * pressed * pressed
+        stored += (0.5 * right) * (elastic + rings * ring_stiffness * stretched * stretched)
         share = belt.arc_share[j]
         if share == 0.0:
             continue
-        driven = j >= belt.driven_start
-        radius = (belt.driven_radius if driven else belt.driving_radius) + w[j]
-        omega = driven_speed if driven else belt.driving_speed
-        v_tangential = v0[j] - omega * radius
-        v_law = sliding(v_radial, v_tangential, cosine)[0] if belt.friction_memory == 0.0 else vf[j]
-        coefficient, _ = friction_coefficient(belt.law, v_law, force[j] / cosine)
-        radial, tangential, _, _ = flank_forces(
-            coefficient, belt.friction_speed, sine, cosine, force[j], v_radial, v_tangential
+        force = stations[j, FORCE]
+        v_tangential = fields[j, V_ELEMENT] - fma(omega, w, surface)
+        meridian = v_radial * per_cosine
+        sliding = maximum(sqrt(fma(meridian, meridian, v_tangential * v_tangential)), least)
+        v_law = fields[j, V_FILTERED] if belt.memory else sliding
+        mu = coefficient_of_law(belt, v_law, force * per_cosine) * lane_saturation(sliding, width)[0]
+        upward = mu * meridian / sliding
+        twice_normal = 2.0 * force / fma(upward, sine, cosine)
+        radial = twice_normal * (sine - upward * cosine)
+        tangential = -twice_normal * mu * v_tangential / sliding
+        length = share * dual
+        seating -= length * wedge * force * (v_radial - u)
+        rub -= length * (tangential * v_tangential + (radial - wedge * force) * v_radial)
+        if j < belt.driven_start:
+            driving += length * tangential * (radius + w) * omega
+        lever = fma(offset, belt.arc_curvature[j], 1.0)
+        saddle = fma(lever, v0, -v1)
+        relief = ring_here * belt_speed * belt_speed
+        pressure = maximum(ring_stiffness * stretched - relief, 0.0) * (right * belt.curvature[j])
+        pressure += maximum(ring_stiffness * stations[a, EPS_1] - relief, 0.0) * (
+            belt.cell[a] * belt.curvature[a]
         )
-        rubbing = tangential * v_tangential + (radial - wedge * force[j]) * v_radial
-        out[SEATING_LOSS] -= share * dual * wedge * force[j] * (v_radial - u[j])
-        out[DRIVEN_FLANK_LOSS if driven else DRIVING_FLANK_LOSS] -= share * dual * rubbing
-        if not driven:
-            out[DRIVING_POWER] += share * dual * tangential * radius * omega
-        drag, sliding_speed = ring_drag(belt, j, a, eps, v0[j], v1[j])
-        out[RING_LOSS] += dual * drag * sliding_speed
-        opening = (state.scalars[DRIVEN_POSITION] if driven else belt.driving_position) + wedge * w[j]
-        stored -= 0.5 * share * dual * force[j] * opening
-    out[STORED_ENERGY] = stored
+        grip = c[0, RING_FRICTION] * 0.5 * pressure
+        ring_loss += grip * lane_saturation(saddle, c[0, RING_FRICTION_SPEED])[0] * saddle
+        stored -= 0.5 * length * force * fma(wedge, w, opening_0)
+    thrust = c[0, THRUST]
+    axial_speed = (axial - thrust) / c[0, AXIAL_DAMPING]
+    rows[k, first + DRIVING_POWER] = driving
+    rows[k, first + LOAD_POWER] = like(c[0, RATIO], speed) * lane_load(belt, state.time[0], speed) * speed
+    rows[k, first + THRUST_POWER] = thrust * axial_speed
+    rows[k, first + DRIVING_FLANK_LOSS] = driving_rub
+    rows[k, first + DRIVEN_FLANK_LOSS] = rub
+    rows[k, first + RING_LOSS] = ring_loss
+    rows[k, first + BELT_LOSS] = belt_loss
+    rows[k, first + LAYER_LOSS] = scalars[0, LAYER_WORK] / interval
+    rows[k, first + LAG_LOSS] = c[0, AXIAL_DAMPING] * axial_speed * axial_speed
+    rows[k, first + SEATING_LOSS] = seating
+    rows[k, first + STORED_ENERGY] = stored
+    scalars[0, LAYER_WORK] = 0.0

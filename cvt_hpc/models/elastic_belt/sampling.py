@@ -8,22 +8,34 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cvt_hpc.kernels import kernel
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_POSITION,
-    DRIVEN_SPEED,
-    REGIONS,
-    TIME,
-    V_ELEMENT,
-    Belt,
-    Mesh,
-    State,
-    W,
+from cvt_hpc.kernels import lane_kernel
+from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, select
+from cvt_hpc.models.elastic_belt.belt import REGIONS, V_ELEMENT, Mesh, W
+from cvt_hpc.models.elastic_belt.imex import (
+    EPS_0,
+    EPS_1,
+    FORCE,
+    lane_contact_forces,
+    lane_load,
+    lane_strains,
+)
+from cvt_hpc.models.elastic_belt.lane_belt import (
+    BELT_SPEED,
+    DRIVEN_RADIUS,
+    DRIVING_RADIUS,
+    DRIVING_SPEED,
+    ELEMENT_STIFFNESS,
+    MASS,
+    POSITION,
+    RATIO,
+    RING_STIFFNESS,
+    SPEED,
+    LaneBelt,
+    LaneState,
 )
 from cvt_hpc.models.elastic_belt.power import POWERS, audit
 from cvt_hpc.models.elastic_belt.record import MODES
-from cvt_hpc.models.elastic_belt.rhs import contact_forces, load_at, strains
-from cvt_hpc.physics.compliance import ContactState, Sheaves
+from cvt_hpc.physics.lane_compliance import UNSOLVED
 
 SCALARS = (
     "load",
@@ -66,19 +78,22 @@ class Sensors(NamedTuple):
 
     Attributes
     ----------
-    matrix : (S, N) array
+    matrix : (S, N) array, of the lanes' precision
         Weights of the stations' displacement: first the probes, then MODES sine amplitudes of each strand,
         measured from the chord between its ends.
     middles : (2,) int array
         Cell in the middle of each strand.
     starts, stops : (2,) int arrays
         First cell of each strand and the one behind its last.
+    interval : float
+        Sampling interval [s].
     """
 
     matrix: np.ndarray
     middles: np.ndarray
     starts: np.ndarray
     stops: np.ndarray
+    interval: float
 
 
 class Probe(NamedTuple):
@@ -108,7 +123,7 @@ def probes(grid: Mesh, per_strand: int, per_arc: int) -> tuple[Probe, ...]:
     return tuple(places)
 
 
-def sensors(grid: Mesh, places: tuple[Probe, ...]) -> Sensors:
+def sensors(grid: Mesh, places: tuple[Probe, ...], interval: float, dtype: type) -> Sensors:
     """Weights that turn the stations' displacement into that of probes and of the strands' modes."""
     n = grid.cell.size
     ends = np.append(grid.position, grid.path.path_length)
@@ -131,104 +146,122 @@ def sensors(grid: Mesh, places: tuple[Probe, ...]) -> Sensors:
             rows.append(row)
     starts = np.array([grid.starts[1], grid.starts[3]])
     stops = starts + np.array([grid.counts[1], grid.counts[3]])
-    return Sensors(np.array(rows), (starts + stops) // 2, starts, stops)
+    return Sensors(np.array(rows, dtype=dtype), (starts + stops) // 2, starts, stops, interval)
 
 
-@kernel
+@lane_kernel
 def sample(
-    belt: Belt,
-    state: State,
-    contacts: tuple[ContactState, ContactState],
+    belt: LaneBelt,
+    state: LaneState,
+    stations: LaneArray,
     sensing: Sensors,
-    row: np.ndarray,
-    profiles: np.ndarray,
-    scratch: np.ndarray,
-) -> int:
+    rows: LaneArray,
+    k: int,
+    profiles: LaneArray,
+    ended: LaneArray,
+) -> None:
     """Record a state.
 
     Parameters
     ----------
-    belt, state, contacts
-        Constants, state and the contact solver's memory.
+    belt, state
+        Constants and state.
+    stations : LaneArray
+        Of `ImexWork`; its forces and strains become those of this state.
     sensing : Sensors
         S rows.
-    row : (S + C,) array
-        Result: the sensors, then CHANNELS.
-    profiles : (4, N) array
+    rows : (samples, S + C) LaneArray of doubles
+        Row k is set: the sensors, then CHANNELS.
+    k : int
+        Which row.
+    profiles : (N, 4) LaneArray of doubles
         PROFILES of this state are added to it; those of cells are averaged onto stations.
-    scratch : (3, N) array
-        Work space.
-
-    Returns
-    -------
-    int
-        An `Outcome`.
+    ended : (1, 2) LaneArray of doubles
+        Where a lane's run has to be stopped for the first time: the `Outcome`, and the time [s].
     """
-    n, count = belt.cell.size, sensing.matrix.shape[0]
-    w = state.fields[W]
-    for j in range(n):
-        for field in range(state.fields.shape[0]):
-            if not np.isfinite(state.fields[field, j]):
-                return 2
-        if abs(w[j]) > LARGEST_DISPLACEMENT:
-            return 3
-    driven_speed = state.scalars[DRIVEN_SPEED]
-    if not (np.isfinite(driven_speed) and np.isfinite(state.scalars[DRIVEN_POSITION])):
-        return 2
-    if driven_speed < LEAST_SPEED * belt.driving_speed / belt.ratio:
-        return 5
-    force, eps = scratch[0], scratch[1:3]
-    if contact_forces(belt, state, contacts, force) == 0:
-        return 1
-    strains(belt, state.fields, eps)
-    for j in range(n):
-        if abs(eps[1, j]) > LARGEST_STRAIN or abs(eps[0, j]) > LARGEST_ELEMENT_STRAIN:
-            return 4
-    for k in range(count):
-        total = 0.0
+    lane_contact_forces(belt, state, stations)
+    lane_strains(belt, state, stations)
+    _watch(belt, state, stations, ended)
+    n, fields, c = belt.cell.size, state.fields, belt.constants
+    sensed = sensing.matrix.shape[0]
+    zero = like(0.0, fields[0, W])
+    for s in range(sensed):
+        total = zero
         for j in range(n):
-            total += sensing.matrix[k, j] * w[j]
-        row[k] = total
-    out = row[count:]
-    out[0] = load_at(belt, state.scalars[TIME])
-    out[1], out[2] = driven_speed, state.scalars[DRIVEN_POSITION]
-    centrifugal = belt.mass * belt.belt_speed * belt.belt_speed
-    least = np.inf
+            total = fma(sensing.matrix[s, j], fields[j, W], total)
+        rows[k, s] = total
+    speed = state.scalars[0, SPEED]
+    rows[k, sensed] = lane_load(belt, state.time[0], speed)
+    rows[k, sensed + 1], rows[k, sensed + 2] = speed, state.scalars[0, POSITION]
+    element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
+    centrifugal = c[0, MASS] * c[0, BELT_SPEED] * c[0, BELT_SPEED]
+    least = like(np.inf, zero)
     for strand in range(2):
         middle = sensing.middles[strand]
-        out[3 + strand] = belt.ring_stiffness * eps[1, middle]
-        out[5 + strand] = max(-belt.element_stiffness * eps[0, middle], 0.0)
-        for c in range(sensing.starts[strand], sensing.stops[strand]):
-            net = belt.ring_stiffness * eps[1, c] + belt.element_stiffness * min(eps[0, c], 0.0)
-            least = min(least, net - centrifugal)
-    out[13] = least
-    out[7], out[9], out[11] = _wrap(belt, belt.driving, state, force, 0)
-    out[8], out[10], out[12] = _wrap(belt, belt.driven, state, force, belt.driven_start)
-    audit(belt, state, force, eps, out[8], out[14:])
+        rows[k, sensed + 3 + strand] = ring_stiffness * stations[middle, EPS_1]
+        rows[k, sensed + 5 + strand] = maximum(-element_stiffness * stations[middle, EPS_0], 0.0)
+        for j in range(sensing.starts[strand], sensing.stops[strand]):
+            net = ring_stiffness * stations[j, EPS_1]
+            net = fma(element_stiffness, minimum(stations[j, EPS_0], 0.0), net)
+            least = minimum(net, least)
+    rows[k, sensed + 13] = least - centrifugal
+    driven_speed = like(speed, zero)
+    driven_surface = like(speed * like(c[0, DRIVEN_RADIUS], speed) - like(c[0, BELT_SPEED], speed), zero)
+    driving_surface = c[0, DRIVING_SPEED] * c[0, DRIVING_RADIUS] - c[0, BELT_SPEED]
+    axial = zero
+    for wrap in range(2):
+        weight = state.contacts[1].weight if wrap else state.contacts[0].weight
+        first = belt.driven_start if wrap else 0
+        surface, turning = driving_surface, c[0, DRIVING_SPEED]
+        if wrap:
+            surface, turning = driven_surface, driven_speed
+        axial = sliding = open_length = zero
+        length = 0.0
+        for i in range(weight.size):
+            force = stations[first + i, FORCE]
+            slides = fields[first + i, V_ELEMENT] - fma(turning, fields[first + i, W], surface)
+            axial += weight[i] * force
+            sliding += weight[i] * force * slides
+            open_length += select(force > 0.0, zero, weight[i])
+            length += weight[i]
+        rows[k, sensed + 7 + wrap] = axial
+        rows[k, sensed + 9 + wrap] = sliding / (maximum(axial, 1e-9) * c[0, BELT_SPEED])
+        rows[k, sensed + 11 + wrap] = open_length / length
+    audit(belt, state, stations, axial, sensing.interval, rows, k, sensed + 14)
     for j in range(n):
         a = j - 1 if j > 0 else n - 1
-        profiles[0, j] += 0.5 * belt.ring_stiffness * (eps[1, a] + eps[1, j])
-        profiles[1, j] -= 0.5 * belt.element_stiffness * (min(eps[0, a], 0.0) + min(eps[0, j], 0.0))
-        profiles[2, j] += force[j]
-        profiles[3, j] += w[j]
-    return 0
+        tension = 0.5 * ring_stiffness * (stations[a, EPS_1] + stations[j, EPS_1])
+        pressed = minimum(stations[a, EPS_0], 0.0) + minimum(stations[j, EPS_0], 0.0)
+        profiles[j, 0] = profiles[j, 0] + like(tension, speed)
+        profiles[j, 1] = profiles[j, 1] - like(0.5 * element_stiffness * pressed, speed)
+        profiles[j, 2] = profiles[j, 2] + like(stations[j, FORCE], speed)
+        profiles[j, 3] = profiles[j, 3] + like(fields[j, W], speed)
 
 
-@kernel
-def _wrap(
-    belt: Belt, sheave: Sheaves, state: State, force: np.ndarray, first: int
-) -> tuple[float, float, float]:
-    """Axial force [N], force-weighted tangential sliding over belt speed, share of open stations."""
-    axial = sliding = open_length = length = 0.0
-    for k in range(sheave.weight.size):
-        j = first + k
-        weight = sheave.weight[k]
-        if first > 0:
-            surface = state.scalars[DRIVEN_SPEED] * (belt.driven_radius + state.fields[W, j])
-        else:
-            surface = belt.driving_speed * (belt.driving_radius + state.fields[W, j])
-        axial += weight * force[j]
-        sliding += weight * force[j] * (state.fields[V_ELEMENT, j] - surface)
-        open_length += weight * (force[j] == 0.0)
-        length += weight
-    return axial, sliding / (max(axial, 1e-9) * belt.belt_speed), open_length / length
+@lane_kernel
+def _watch(belt: LaneBelt, state: LaneState, stations: LaneArray, ended: LaneArray) -> None:
+    """Find the lanes whose state is out of bounds."""
+    n, fields = belt.cell.size, state.fields
+    content = largest = strain = element_strain = like(0.0, fields[0, W])
+    for j in range(n):
+        for field in range(7):
+            # 0 times what is not a number or infinite is not a number
+            content = fma(fields[j, field], 0.0, content)
+        largest = maximum(absolute(fields[j, W]), largest)
+        strain = maximum(absolute(stations[j, EPS_1]), strain)
+        element_strain = maximum(absolute(stations[j, EPS_0]), element_strain)
+    speed, c = state.scalars[0, SPEED], belt.constants
+    total = fma(speed, 0.0, fma(state.scalars[0, POSITION], 0.0, like(content, speed)))
+    least = like(LEAST_SPEED * c[0, DRIVING_SPEED] / c[0, RATIO], speed)
+    code = like(0.0, speed)
+    beyond = maximum(like(element_strain, speed) - LARGEST_ELEMENT_STRAIN, 0.0)
+    beyond = maximum(like(strain, speed) - LARGEST_STRAIN, beyond)
+    code = select(beyond > 0.0, 4.0, code)
+    unsolved = state.contacts[0].scalars[0, UNSOLVED] + state.contacts[1].scalars[0, UNSOLVED]
+    code = select(like(unsolved, speed) > 0.0, 1.0, code)
+    code = select(speed < least, 5.0, code)
+    code = select(like(largest, speed) > LARGEST_DISPLACEMENT, 3.0, code)
+    code = select(total <= 0.0, code, 2.0)
+    running = ended[0, 0] < 0.5
+    ended[0, 1] = select(running, like(state.time[0], speed), ended[0, 1])
+    ended[0, 0] = select(running, code, ended[0, 0])

@@ -1,11 +1,13 @@
-"""A transient run of the elastic belt: state, stepper and recording in one object."""
+"""Transient runs of the elastic belt: state, stepper and recording in one object, for one run or a batch."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from cvt_hpc.lanes import LaneArray, lanes_of
 from cvt_hpc.models.elastic_belt.belt import (
     FIELDS,
     REGIONS,
@@ -16,6 +18,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     random_strands,
 )
 from cvt_hpc.models.elastic_belt.imex import imex_work
+from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
 from cvt_hpc.models.elastic_belt.march import march_explicit, march_imex
 from cvt_hpc.models.elastic_belt.sampling import (
     CHANNELS,
@@ -29,6 +32,7 @@ from cvt_hpc.models.elastic_belt.sampling import (
     sensors,
 )
 from cvt_hpc.physics.compliance import contact_state
+from cvt_hpc.physics.lane_compliance import SOLVES
 from cvt_hpc.variables import Status
 
 LARGEST_POWER_RESIDUAL = 0.02
@@ -36,7 +40,7 @@ LARGEST_POWER_RESIDUAL = 0.02
 FAILURES = {
     Outcome.NO_CONTACT_SOLUTION: (
         Status.FAILED_NUMERICS,
-        "the contact of belt and sheaves has no solution, since the state is not a number",
+        "the search for the closed stations of belt and sheaves did not end",
     ),
     Outcome.NOT_FINITE: (Status.FAILED_NUMERICS, "the state is not a number"),
     Outcome.LEFT_THE_GROOVES: (
@@ -55,8 +59,159 @@ FAILURES = {
 }
 
 
+PRECISIONS = {"double": np.float64, "single": np.float32}
+# What the runs of a batch have in common: the mesh, the law's kind, and the course of time.
+SHARED = (
+    "ratio",
+    "driven_radius",
+    "centre_distance",
+    "stations",
+    "friction_law",
+    "table_force",
+    "table_speed",
+    "table_mu",
+    "rise_time",
+    "load_history",
+    "duration",
+    "judged_fraction",
+    "sampling_rate",
+    "strand_probes",
+    "arc_probes",
+    "step",
+    "precision",
+)
+
+
+def lanes(parameters: dict[str, Any], stepper: str) -> int:
+    """Most runs that a batch can take.
+
+    Parameters
+    ----------
+    parameters : dict
+        Resolved parameters of a run.
+    stepper : str
+        "imex" or "explicit".
+    """
+    return lanes_of(PRECISIONS[parameters["precision"]]) if stepper == "imex" else 1
+
+
+def lane_key(parameters: dict[str, Any]) -> tuple:
+    """What two runs must have in common to be in one batch.
+
+    Parameters
+    ----------
+    parameters : dict
+        Resolved parameters of a run.
+    """
+    return (*(parameters[key] for key in SHARED if key in parameters), parameters["friction_memory"] > 0.0)
+
+
+class Batch:
+    """Runs that advance together, sample by sample, each in a lane of its own.
+
+    Parameters
+    ----------
+    points : sequence of dict
+        Resolved parameters of the runs [SI], all of one `lane_key`.
+    stepper : str
+        "imex" or "explicit"; the latter takes one run.
+
+    Attributes
+    ----------
+    runs : tuple of Transient
+        The runs.
+    samples : int
+        Samples of a whole run.
+    done : int
+        Samples taken so far.
+    interval, step : float
+        Sampling interval and time step [s].
+    """
+
+    def __init__(self, points: Sequence[dict[str, Any]], stepper: str) -> None:
+        p = points[0]
+        most = lanes(p, stepper)
+        if not 0 < len(points) <= most:
+            raise ValueError(f"a batch of {stepper} takes 1 to {most} runs, not {len(points)}")
+        self.points = tuple(points)
+        self.mesh = mesh(p)
+        # one lane, or all of them: a register costs the same however many of its lanes are of use
+        width = 1 if len(points) == 1 else most
+        padded = [*points, *[points[-1]] * (width - len(points))]
+        self.belts = [belt_constants(point) for point in padded]
+        self.dtype = PRECISIONS[p["precision"]] if stepper == "imex" else np.float64
+        starts = [initial_state(point, belt) for point, belt in zip(padded, self.belts, strict=True)]
+        self.state = lane_state(self.belts, starts, self.dtype)
+        self._belt = lane_belt(self.belts, self.dtype)
+        self._work = imex_work(self.state)
+        self.interval = 1.0 / p["sampling_rate"]
+        self.steps_per_sample = max(int(np.ceil(self.interval / p["step"] - 1e-9)), 1)
+        self.step = self.interval / self.steps_per_sample
+        self.samples = max(int(round(p["duration"] * p["sampling_rate"])), 1)
+        self.probes = probes(self.mesh, p["strand_probes"], p["arc_probes"])
+        self.sensing = sensors(self.mesh, self.probes, self.interval, self.dtype)
+        self.rows = LaneArray(self.samples, self.sensing.matrix.shape[0] + len(CHANNELS), width)
+        self.done = 0
+        n = self.mesh.cell.size
+        self.profiles = [LaneArray(n, len(PROFILES), width) for _ in range(2)]
+        self.ended = LaneArray(1, 2, width)
+        self._kick = min(int(np.ceil(p["rise_time"] * p["sampling_rate"])), self.samples)
+        self.first_judged = self.samples - round(p["judged_fraction"] * self.samples)
+        self._disturbed = False
+        self._explicit = None
+        if stepper == "explicit":
+            wraps = (self.belts[0].driving, self.belts[0].driven)
+            contacts = tuple(contact_state(wrap.weight.size) for wrap in wraps)
+            self._explicit = (self.belts[0], starts[0], contacts, np.zeros((3 + len(FIELDS), n)))
+            self._solves = 0
+        self.runs = tuple(Transient(point, stepper, self, k) for k, point in enumerate(points))
+
+    @property
+    def running(self) -> bool:
+        """Whether any run has not ended."""
+        return self.done < self.samples and any(run.failure is None for run in self.runs)
+
+    def advance(self, samples: int) -> None:
+        """March on, at most to the next border of the judged part.
+
+        Parameters
+        ----------
+        samples : int
+            How many samples at most.
+        """
+        first = self.done
+        if first == self._kick and not self._disturbed:
+            # start-up damping has gone by now: from here on a disturbance grows or decays by the belt's own
+            # nature
+            for lane, point in enumerate(self.points):
+                self._displace(lane, random_strands(self.mesh, point["disturbance"], point["seed"]))
+            self._disturbed = True
+        borders = [border for border in (self._kick, self.first_judged, self.samples) if border > first]
+        last = min(first + samples, *borders)
+        profiles = self.profiles[int(first >= self.first_judged)]
+        pace = (self.step, self.steps_per_sample, self.sensing, self.rows, first, last, profiles, self.ended)
+        if self._explicit is None:
+            march_imex(self._belt, self.state, self._work, *pace)
+        else:
+            lane = (self._belt, self.state, self._work)
+            self._solves += march_explicit(*self._explicit, *lane, *pace)
+        self.done = last
+
+    def _displace(self, lane: int, shape: np.ndarray) -> None:
+        if self._explicit is None:
+            self.state.fields.data[:, W, lane] += shape
+        else:
+            self._explicit[1].fields[W] += shape
+
+    def solves(self, lane: int) -> int:
+        """Linear solves of the contact problem in a run so far."""
+        if self._explicit is not None:
+            return self._solves
+        return int(sum(contact.scalars.data[0, SOLVES, lane] for contact in self.state.contacts))
+
+
 class Transient:
-    """One run, advanced sample by sample.
+    """One run, alone or of a batch.
 
     Parameters
     ----------
@@ -64,6 +219,10 @@ class Transient:
         Resolved parameters of the run [SI].
     stepper : str
         "imex" or "explicit".
+    batch : Batch, optional
+        Which it belongs to; by default one of its own.
+    lane : int
+        Its lane there.
 
     Attributes
     ----------
@@ -73,53 +232,23 @@ class Transient:
         Samples of the whole run.
     interval, step : float
         Sampling interval and time step [s].
-    rows : (samples, S + C) array
-        The sensors' displacement [m], the strands' modes [m], and CHANNELS; filled up to `done`.
     """
 
-    def __init__(self, parameters: dict[str, Any], stepper: str) -> None:
-        p = parameters
-        self.parameters = p
-        self.mesh = mesh(p)
-        self.belt = belt_constants(p)
-        self.state = initial_state(p, self.belt)
-        self.contacts = (
-            contact_state(self.belt.driving.weight.size),
-            contact_state(self.belt.driven.weight.size),
-        )
-        self.interval = 1.0 / p["sampling_rate"]
-        self.steps_per_sample = max(int(np.ceil(self.interval / p["step"] - 1e-9)), 1)
-        self.step = self.interval / self.steps_per_sample
-        self.samples = max(int(round(p["duration"] * p["sampling_rate"])), 1)
-        self.probes = probes(self.mesh, p["strand_probes"], p["arc_probes"])
-        self._sensing = sensors(self.mesh, self.probes)
-        self.rows = np.full((self.samples, self._sensing.matrix.shape[0] + len(CHANNELS)), np.nan)
-        self._kick = min(int(np.ceil(p["rise_time"] * p["sampling_rate"])), self.samples)
-        self._first_judged = self.samples - round(p["judged_fraction"] * self.samples)
-        self._disturbed = False
-        n = self.mesh.cell.size
-        self._profiles = np.zeros((2, len(PROFILES), n))
-        self._scratch = np.zeros((3, n))
-        self._counts = np.zeros(3, dtype=np.int64)
-        if stepper == "explicit":
-            self._march, self._work = march_explicit, np.zeros((3 + len(FIELDS), n))
-        else:
-            self._march, self._work = march_imex, imex_work(self.state)
+    def __init__(
+        self, parameters: dict[str, Any], stepper: str, batch: Batch | None = None, lane: int = 0
+    ) -> None:
+        self.parameters = parameters
+        self.batch = batch or Batch([parameters], stepper)
+        self._lane = lane
+        self.mesh, self.probes = self.batch.mesh, self.batch.probes
+        self.samples, self.interval, self.step = self.batch.samples, self.batch.interval, self.batch.step
+        self._sensors = self.batch.sensing.matrix.shape[0]
 
     @property
-    def done(self) -> int:
-        """Samples recorded so far."""
-        return int(self._counts[0])
-
-    @property
-    def steps(self) -> int:
-        """Steps taken so far."""
-        return int(self._counts[1])
-
-    @property
-    def contact_solves(self) -> int:
-        """Linear solves of the contact problem so far."""
-        return int(self._counts[2])
+    def failure(self) -> tuple[Status, str] | None:
+        """What has gone wrong, where the run cannot go on."""
+        outcome = int(self.batch.ended.data[0, 0, self._lane])
+        return FAILURES[Outcome(outcome)] if outcome else None
 
     def counters(self) -> dict[str, int]:
         """Work done so far, by its name."""
@@ -128,33 +257,57 @@ class Transient:
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return float(self.state.scalars[0])
+        return float(self.batch.ended.data[0, 1, self._lane])
+
+    @property
+    def done(self) -> int:
+        """Samples recorded so far, up to the one at which the run failed."""
+        taken = round(self.time / self.interval)
+        return taken if self.failure is None else taken - 1
+
+    @property
+    def steps(self) -> int:
+        """Steps taken so far."""
+        return round(self.time / self.step)
+
+    @property
+    def contact_solves(self) -> int:
+        """Linear solves of the contact problem so far."""
+        return self.batch.solves(self._lane)
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C)."""
+        return self.batch.rows.data[: self.done, :, self._lane]
 
     @property
     def displacement(self) -> np.ndarray:
         """Displacement at the probes, (done, probe) [m]."""
-        return self.rows[: self.done, : len(self.probes)]
+        return self.rows[:, : len(self.probes)]
 
     @property
     def modes(self) -> np.ndarray:
         """Sine amplitudes of both strands, (done, 2, MODES) [m]."""
-        first, last = len(self.probes), self._sensing.matrix.shape[0]
-        return self.rows[: self.done, first:last].reshape(self.done, 2, -1)
+        return self.rows[:, len(self.probes) : self._sensors].reshape(self.done, 2, -1)
 
     def channel(self, name: str) -> np.ndarray:
         """History of one of CHANNELS, (done,)."""
-        return self.rows[: self.done, self._sensing.matrix.shape[0] + CHANNELS.index(name)]
+        return self.rows[:, self._sensors + CHANNELS.index(name)]
 
     @property
     def judged(self) -> slice:
         """Samples of the judged part."""
-        return slice(self._first_judged, self.samples)
+        return slice(self.batch.first_judged, self.samples)
 
     @property
     def profiles(self) -> dict[str, np.ndarray]:
-        """PROFILES around the belt, (N,) each: mean over the judged part at the stations, nan before it."""
-        count = self.done - self._first_judged
-        return dict(zip(PROFILES, self._profiles[1] / (count if count > 0 else np.nan), strict=True))
+        """PROFILES around the belt, (N,) each: mean over the judged part at the stations.
+
+        Not a number before that part, and where the run has failed.
+        """
+        count = self.done - self.batch.first_judged if self.failure is None else 0
+        sums = self.batch.profiles[1].data[:, :, self._lane].T
+        return dict(zip(PROFILES, sums / (count if count > 0 else np.nan), strict=True))
 
     @property
     def regions(self) -> np.ndarray:
@@ -162,7 +315,7 @@ class Transient:
         return np.array(REGIONS)[self.mesh.region]
 
     def advance(self, samples: int) -> tuple[Status, str] | None:
-        """March on.
+        """March on, and the rest of the batch with it.
 
         Parameters
         ----------
@@ -174,29 +327,8 @@ class Transient:
         (Status, str) or None
             What has gone wrong, where the run cannot go on.
         """
-        first = self.done
-        if first == self._kick and not self._disturbed:
-            # start-up damping has gone by now: from here on a disturbance grows or decays by the belt's own
-            # nature
-            p = self.parameters
-            self.state.fields[W] += random_strands(self.mesh, p["disturbance"], p["seed"])
-            self._disturbed = True
-        borders = [border for border in (self._kick, self._first_judged, self.samples) if border > first]
-        last = min(first + samples, *borders)
-        outcome = self._march(
-            self.belt,
-            self.state,
-            self.contacts,
-            self._work,
-            self.step,
-            self.steps_per_sample,
-            self._sensing,
-            self.rows[first:last],
-            self._profiles[int(first >= self._first_judged)],
-            self._scratch,
-            self._counts,
-        )
-        return None if outcome == Outcome.OK else FAILURES[Outcome(outcome)]
+        self.batch.advance(samples)
+        return self.failure
 
     def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
         """Whether a run that reached its end is not to be trusted.

@@ -1,0 +1,274 @@
+"""The elastic belt for several runs at once: constants and state of all lanes, in the order that steps read.
+
+Runs of one batch share the mesh, the friction law's kind and the course of time; all else is each lane's own.
+Velocities of the layers are kept as deviations from the belt's nominal speed, contents as deviations from the
+reference path's, so that single precision does not lose strains and sliding speeds in them.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.elastic_belt.belt import (
+    DRIVEN_POSITION,
+    DRIVEN_SPEED,
+    N_ELEMENT,
+    N_RING,
+    V_ELEMENT,
+    V_RING,
+    Belt,
+    State,
+    bending_bands,
+)
+from cvt_hpc.physics.friction import FrictionLaw
+from cvt_hpc.physics.lane_compliance import LaneContact, lane_contact
+
+# Constants of each lane, in SI units; what is not named in `Belt` is explained where it is computed below.
+CONSTANTS = (
+    "element_stiffness",
+    "ring_stiffness",
+    "element_damping",
+    "ring_damping",
+    "element_mass",
+    "ring_mass",
+    "mass",
+    "belt_speed",
+    "transverse_damping",
+    "bending_stiffness",
+    "ring_offset",
+    "ring_friction",
+    "ring_friction_speed",
+    "friction_speed",
+    "kinetic_friction",
+    "friction_gradient",
+    "law_speed",
+    "sine",
+    "cosine",
+    "wedge",
+    "forget",
+    "driving_carry",
+    "driven_carry",
+    "driving_radius",
+    "driven_radius",
+    "driving_speed",
+    "driving_position",
+    "driven_inertia",
+    "axial_damping",
+    "thrust",
+    "ratio",
+    "load",
+    "load_start",
+)
+(
+    ELEMENT_STIFFNESS,
+    RING_STIFFNESS,
+    ELEMENT_DAMPING,
+    RING_DAMPING,
+    ELEMENT_MASS,
+    RING_MASS,
+    MASS,
+    BELT_SPEED,
+    TRANSVERSE_DAMPING,
+    BENDING_STIFFNESS,
+    RING_OFFSET,
+    RING_FRICTION,
+    RING_FRICTION_SPEED,
+    FRICTION_SPEED,
+    KINETIC_FRICTION,
+    FRICTION_GRADIENT,
+    LAW_SPEED,
+    SINE,
+    COSINE,
+    WEDGE,
+    FORGET,
+    DRIVING_CARRY,
+    DRIVEN_CARRY,
+    DRIVING_RADIUS,
+    DRIVEN_RADIUS,
+    DRIVING_SPEED,
+    DRIVING_POSITION,
+    DRIVEN_INERTIA,
+    AXIAL_DAMPING,
+    THRUST,
+    RATIO,
+    LOAD,
+    LOAD_START,
+) = range(len(CONSTANTS))
+
+# Scalars of the state, of each lane, double in any precision: the driven pulley's two, the work of the
+# layers' dampers until it is asked for [J], how often friction was found to turn sliding about in a step.
+LANE_SCALARS = ("driven_speed", "driven_position", "layer_work", "repeats")
+SPEED, POSITION, LAYER_WORK, REPEATS = range(len(LANE_SCALARS))
+
+
+class LaneBelt(NamedTuple):
+    """Constants of W runs on one mesh of N stations; arrays of one number a station are shared.
+
+    Attributes
+    ----------
+    cell, dual, per_cell, per_dual, per_span, curvature, arc_curvature, arc_share : (N,) arrays
+        As in `Belt`.
+    ring_curvature : (N,) array
+        Curvature of both neighbouring cells, weighted by length [1/m]: a station's ring mass is
+        ring_mass (1 + ring_offset ring_curvature).
+    bending : (N, 5) array
+        As in `Belt`, for a bending stiffness of 1 N m^2.
+    constants : (1, 33) LaneArray
+        CONSTANTS.
+    driven_start : int
+        First station of the driven arc.
+    memory : bool
+        Whether friction has a memory.
+    law : FrictionLaw
+        Its kind, and the table where it is one; coefficients are in `constants`.
+    rise_time, ramp_end : float
+        Course of the load [s].
+    """
+
+    cell: np.ndarray
+    dual: np.ndarray
+    per_cell: np.ndarray
+    per_dual: np.ndarray
+    per_span: np.ndarray
+    curvature: np.ndarray
+    arc_curvature: np.ndarray
+    arc_share: np.ndarray
+    ring_curvature: np.ndarray
+    bending: np.ndarray
+    constants: LaneArray
+    driven_start: int
+    memory: bool
+    law: FrictionLaw
+    rise_time: float
+    ramp_end: float
+
+
+class LaneState(NamedTuple):
+    """State of W runs.
+
+    Attributes
+    ----------
+    fields : (N, 7) LaneArray
+        FIELDS at each station: layers' speeds less the belt speed; contents less 1 + kappa d_i.
+    scalars : (1, 4) LaneArray of doubles
+        LANE_SCALARS.
+    time : (1,) array
+        [s]
+    contacts : pair of LaneContact
+        Driving and driven wrap.
+    """
+
+    fields: LaneArray
+    scalars: LaneArray
+    time: np.ndarray
+    contacts: tuple[LaneContact, LaneContact]
+
+
+def lane_belt(belts: list[Belt], dtype: type) -> LaneBelt:
+    """Constants of several runs on the same mesh.
+
+    Parameters
+    ----------
+    belts : list of Belt
+        One for each lane.
+    dtype : type
+        np.float64 or np.float32.
+    """
+    first = belts[0]
+    constants = LaneArray(1, len(CONSTANTS), len(belts), dtype)
+    for lane, belt in enumerate(belts):
+        constants.data[0, :, lane] = _constants_of(belt)
+    cell, dual, kappa = first.cell, first.dual, first.curvature
+    weighted = cell * kappa
+    law = first.law
+    tables = (law.table_force.astype(dtype), law.table_speed.astype(dtype), law.table_mu.astype(dtype))
+    shared = (
+        cell,
+        dual,
+        first.per_cell,
+        first.per_dual,
+        first.per_span,
+        kappa,
+        first.arc_curvature,
+        first.arc_share,
+        0.5 * (weighted + np.roll(weighted, 1)) / dual,
+        bending_bands(cell, dual, 1.0),
+    )
+    return LaneBelt(
+        *(array.astype(dtype) for array in shared),
+        constants,
+        first.driven_start,
+        first.friction_memory > 0.0,
+        FrictionLaw(law.kind, 0.0, 0.0, 0.0, *tables),
+        first.rise_time,
+        first.ramp_end,
+    )
+
+
+def _constants_of(belt: Belt) -> list[float]:
+    angle, memory = belt.half_wedge_angle, belt.friction_memory
+    named = {
+        "ring_mass": belt.mass - belt.element_mass,
+        "kinetic_friction": belt.law.kinetic,
+        "friction_gradient": belt.law.gradient,
+        "law_speed": belt.law.speed,
+        "sine": np.sin(angle),
+        "cosine": np.cos(angle),
+        "wedge": 2.0 * np.tan(angle),
+        "forget": 1.0 / memory if memory else 0.0,
+        "driving_carry": _carry(belt, belt.cell[0]),
+        "driven_carry": _carry(belt, belt.cell[belt.driven_start]),
+    }
+    return [named[key] if key in named else getattr(belt, key) for key in CONSTANTS]
+
+
+def _carry(belt: Belt, spacing: float) -> float:
+    """Rate of the memory's transport, as `rhs.memory_transport` has it."""
+    memory, way = belt.friction_memory, belt.belt_speed * belt.friction_memory
+    return 1.0 / (memory * np.expm1(spacing / way)) if way else 0.0
+
+
+def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState:
+    """State of several runs on the same mesh, with fresh contacts.
+
+    Parameters
+    ----------
+    belts, states : lists of Belt and State
+        One for each lane, all at the same time.
+    dtype : type
+        np.float64 or np.float32.
+    """
+    n, lanes = belts[0].cell.size, len(belts)
+    fields = LaneArray(n, states[0].fields.shape[0], lanes, dtype)
+    scalars = LaneArray(1, len(LANE_SCALARS), lanes)
+    for lane, (belt, state) in enumerate(zip(belts, states, strict=True)):
+        put_lane(fields.data, scalars.data, lane, belt, state)
+    wraps = [[belt.driving for belt in belts], [belt.driven for belt in belts]]
+    contacts = (lane_contact(wraps[0], dtype), lane_contact(wraps[1], dtype))
+    return LaneState(fields, scalars, np.array([states[0].scalars[0]]), contacts)
+
+
+def put_lane(fields: np.ndarray, scalars: np.ndarray, lane: int, belt: Belt, state: State) -> None:
+    """Write a run's state into its lane of a LaneState's data."""
+    values = state.fields.copy()
+    values[V_ELEMENT] -= belt.belt_speed
+    values[V_RING] -= belt.belt_speed
+    values[N_ELEMENT] -= 1.0
+    values[N_RING] -= 1.0 + belt.curvature * belt.ring_offset
+    fields[:, :, lane] = values.T
+    scalars[0, SPEED, lane] = state.scalars[DRIVEN_SPEED]
+    scalars[0, POSITION, lane] = state.scalars[DRIVEN_POSITION]
+
+
+def take_lane(state: LaneState, lane: int, belt: Belt) -> State:
+    """One run's state out of its lane."""
+    values = state.fields.data[:, :, lane].T.astype(float)
+    values[V_ELEMENT] += belt.belt_speed
+    values[V_RING] += belt.belt_speed
+    values[N_ELEMENT] += 1.0
+    values[N_RING] += 1.0 + belt.curvature * belt.ring_offset
+    scalars = state.scalars.data[0, :, lane]
+    return State(values, np.array([state.time[0], *scalars[: LAYER_WORK + 1]]))

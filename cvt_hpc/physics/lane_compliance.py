@@ -1,0 +1,193 @@
+"""The contact of `compliance` for several runs at once, each lane with stiffnesses and gaps of its own.
+
+The same solution by the same steps: tridiagonal factors for the closed set, a correction of rank two for the
+tilt, flips of the stations on the wrong side. Lanes that have found their set repeat their last solve, with
+the same numbers, until the slowest has found its own.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cvt_hpc.kernels import lane_kernel
+from cvt_hpc.lanes import LaneArray, anywhere, fma, like, maximum, select
+from cvt_hpc.physics.compliance import ROUNDS_OF_BLOCK_FLIPS, Sheaves
+
+# fields of LaneContact.stations
+GAP, PUSH, DIAGONAL, PIVOT, MULTIPLIER, RESPONSE_1, RESPONSE_2, Y, CLOSED = range(9)
+# fields of LaneContact.scalars
+ELEMENT_STIFFNESS, COMPLIANCE, OFF_DIAGONAL, TILT_COMPLIANCE, INVERSE_11, INVERSE_12, INVERSE_22 = range(7)
+ROUND_OFF, SOLVES, UNSOLVED = range(7, 10)
+
+# Forces are 1e5 N/m and come from openings that are 1 % of their parts: what each precision leaves of them.
+_ROUND_OFF = {np.dtype(np.float64): 1e-6, np.dtype(np.float32): 2.0}
+
+
+class LaneContact(NamedTuple):
+    """The contact of one wrap of m stations in W runs.
+
+    Attributes
+    ----------
+    weight, cosine, sine : (m,) arrays
+        Length that a station stands for [m]; directions of the tilt.
+    stations : (m, 9) LaneArray
+        Gap of the rigid bodies [m] (set by the caller), -c_e times the opening without f / c_e [N/m]; the
+        local kernel's diagonal, factors, the tilt's response, work space, closed set (1 or 0).
+    scalars : (1, 10) LaneArray
+        Constants of the wrap, the inverse of the tilt's 2x2 system, the round-off of forces [N/m]; linear
+        solves so far, and whether (1) a search for the closed set did not end.
+    fresh : (1,) bool array
+        False until the factors belong to the closed set.
+    """
+
+    weight: np.ndarray
+    cosine: np.ndarray
+    sine: np.ndarray
+    stations: LaneArray
+    scalars: LaneArray
+    fresh: np.ndarray
+
+
+def lane_contact(wraps: list[Sheaves], dtype: type) -> LaneContact:
+    """All stations closed, for wraps of the same stations, one for each lane.
+
+    Parameters
+    ----------
+    wraps : list of Sheaves
+        One for each lane.
+    dtype : type
+        np.float64 or np.float32.
+    """
+    weight = wraps[0].weight
+    stations = LaneArray(weight.size, 9, len(wraps), dtype)
+    scalars = LaneArray(1, 10, len(wraps), dtype)
+    stations.data[:, CLOSED] = 1.0
+    scalars.data[:, ROUND_OFF] = _ROUND_OFF[np.dtype(dtype)]
+    for lane, wrap in enumerate(wraps):
+        stations.data[:, DIAGONAL, lane] = wrap.diagonal
+        scalars.data[0, :INVERSE_11, lane] = (
+            wrap.element_stiffness,
+            wrap.compliance,
+            wrap.off_diagonal,
+            wrap.tilt_compliance,
+        )
+    shared = (weight.astype(dtype), wraps[0].tilt[0].astype(dtype), wraps[0].tilt[1].astype(dtype))
+    return LaneContact(*shared, stations, scalars, np.zeros(1, dtype=np.bool_))
+
+
+@lane_kernel
+def _bend(m: int, stations: LaneArray) -> None:
+    """Solve the tridiagonal system in place of Y."""
+    y = stations[0, Y]
+    for j in range(1, m):
+        y = fma(-stations[j, MULTIPLIER], y, stations[j, Y])
+        stations[j, Y] = y
+    y = y * stations[m - 1, PIVOT]
+    stations[m - 1, Y] = y
+    for j in range(m - 2, -1, -1):
+        y = fma(-stations[j + 1, MULTIPLIER], y, stations[j, Y] * stations[j, PIVOT])
+        stations[j, Y] = y
+
+
+@lane_kernel
+def _factorise(contact: LaneContact) -> None:
+    """Factors and tilt responses for the present closed set."""
+    stations, scalars, weight = contact.stations, contact.scalars, contact.weight
+    m = weight.size
+    ce, a, off = scalars[0, ELEMENT_STIFFNESS], scalars[0, COMPLIANCE], scalars[0, OFF_DIAGONAL]
+    grip = ce * a
+    pivot = like(0.0, ce)
+    for j in range(m):
+        multiplier = off * pivot
+        d = stations[j, DIAGONAL] + weight[j] * grip * stations[j, CLOSED] - off * multiplier
+        pivot = 1.0 / d
+        stations[j, MULTIPLIER], stations[j, PIVOT] = multiplier, pivot
+    for b in range(2):
+        tilt = contact.sine if b else contact.cosine
+        for j in range(m):
+            stations[j, Y] = weight[j] * tilt[j] * grip * stations[j, CLOSED]
+        _bend(m, stations)
+        for j in range(m):
+            stations[j, RESPONSE_1 + b] = tilt[j] - stations[j, Y]
+    gain = scalars[0, TILT_COMPLIANCE] * grip
+    s11, s12, s22 = like(1.0, ce), like(0.0, ce), like(1.0, ce)
+    for j in range(m):
+        h = gain * stations[j, CLOSED] * weight[j]
+        s11 += h * contact.cosine[j] * stations[j, RESPONSE_1]
+        s12 += h * contact.cosine[j] * stations[j, RESPONSE_2]
+        s22 += h * contact.sine[j] * stations[j, RESPONSE_2]
+    per_determinant = 1.0 / (s11 * s22 - s12 * s12)
+    scalars[0, INVERSE_11], scalars[0, INVERSE_22] = s22 * per_determinant, s11 * per_determinant
+    scalars[0, INVERSE_12] = -s12 * per_determinant
+    contact.fresh[0] = True
+
+
+@lane_kernel
+def _pushes(contact: LaneContact) -> bool:
+    """PUSH for the present closed set; whether a station of any lane is on the wrong side."""
+    stations, scalars, weight = contact.stations, contact.scalars, contact.weight
+    m = weight.size
+    ce, a, round_off = scalars[0, ELEMENT_STIFFNESS], scalars[0, COMPLIANCE], scalars[0, ROUND_OFF]
+    for j in range(m):
+        stations[j, Y] = -weight[j] * stations[j, CLOSED] * ce * stations[j, GAP]
+    _bend(m, stations)
+    p1 = p2 = like(0.0, ce)
+    for j in range(m):
+        overlap = weight[j] * stations[j, CLOSED] * fma(a, stations[j, Y], stations[j, GAP])
+        p1 = fma(-contact.cosine[j], overlap, p1)
+        p2 = fma(-contact.sine[j], overlap, p2)
+    gain = scalars[0, TILT_COMPLIANCE] * ce
+    t1 = gain * (scalars[0, INVERSE_11] * p1 + scalars[0, INVERSE_12] * p2)
+    t2 = gain * (scalars[0, INVERSE_12] * p1 + scalars[0, INVERSE_22] * p2)
+    wrong = ce < 0.0
+    for j in range(m):
+        elastic = fma(t2, stations[j, RESPONSE_2], fma(t1, stations[j, RESPONSE_1], stations[j, Y]))
+        push = -ce * fma(a, elastic, stations[j, GAP])
+        stations[j, PUSH] = push
+        # closed stations that pull, open ones that overlap
+        outward = select(stations[j, CLOSED] > 0.5, -push, push)
+        wrong |= outward > round_off
+    return anywhere(wrong)
+
+
+@lane_kernel
+def solve_lane_contact(contact: LaneContact, most_rounds: int) -> None:
+    """Closed sets and pushes from the gaps; forces are the pushes of closed stations, where positive.
+
+    Parameters
+    ----------
+    contact : LaneContact
+        With GAP set; the last closed set is where the search starts.
+    most_rounds : int
+        After that many the lanes whose search has not ended are marked UNSOLVED.
+    """
+    stations, scalars = contact.stations, contact.scalars
+    m = contact.weight.size
+    round_off = scalars[0, ROUND_OFF]
+    scalars[0, SOLVES] = scalars[0, SOLVES] + 1.0
+    busy = round_off < 0.0
+    for round_ in range(most_rounds):
+        if not contact.fresh[0]:
+            _factorise(contact)
+        if not _pushes(contact):
+            return
+        busy = round_off < 0.0
+        for j in range(m):
+            push, closed = stations[j, PUSH], stations[j, CLOSED]
+            wrong = select(closed > 0.5, -push, push) > round_off
+            if round_ >= ROUNDS_OF_BLOCK_FLIPS:
+                # one at a time: ends for every P-matrix
+                wrong &= ~busy
+            busy |= wrong
+            stations[j, CLOSED] = select(wrong, 1.0 - closed, closed)
+        scalars[0, SOLVES] = scalars[0, SOLVES] + select(busy, like(1.0, round_off), 0.0)
+        contact.fresh[0] = False
+    scalars[0, UNSOLVED] = select(busy, like(1.0, round_off), scalars[0, UNSOLVED])
+
+
+@lane_kernel
+def closed_force(stations: LaneArray, j: int):
+    """Axial line force of station j [N/m]."""
+    return select(stations[j, CLOSED] > 0.5, maximum(stations[j, PUSH], 0.0), 0.0)
