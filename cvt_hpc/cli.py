@@ -188,7 +188,10 @@ def _simulate(arguments: argparse.Namespace) -> int:
 def _chart(arguments: argparse.Namespace) -> int:
     from cvt_hpc.chart import load_chart, make_chart
     from cvt_hpc.chart.table import table_lines
+    from cvt_hpc.study.launch import detect_launch
 
+    if detect_launch().size > 1:
+        raise mismatch("chart", "one process, because it measures times", f"{detect_launch().size} started")
     chart = load_chart(arguments.path, arguments.set)
     report = make_chart(chart, arguments.out, fresh=arguments.fresh, tell=_complain)
     for comparison in report.comparisons:

@@ -95,6 +95,10 @@ def _compare_scene(chart: Chart, scene: Scene, measurements: Mapping[str, Measur
         for point in chart.points_of(scene.name, Role.METHOD)
     ]
     methods, verdict = choose(scene, own, methods)
+    for known in chart.points_of(scene.name, Role.REFERENCE, Role.COARSER):
+        if reason := measurements[known.name].reason:
+            setting = known.setting_in_words
+            verdict = f"none can be chosen: the reference failed at {setting}: {reason}"
     choices: tuple[Result, ...] = ()
     for base in chart.points_of(scene.name, Role.BASE):
         against = measurements[base.name]
@@ -118,15 +122,19 @@ def _own_errors(
 ) -> dict[str, float]:
     """Error of the reference: its distance from the coarser one, and the scatter of that over the starts.
 
-    The scatter is the standard error of the difference of the two, start by start: nothing where they stay
-    together, and in a chaotic scene what so few starts leave open.
+    For an error in proportion to the step the distance is that of the steps, so many times the error; no
+    higher order is assumed, and none for a tolerance. The scatter is the standard error of the difference,
+    start by start: nothing where the two stay together, and in a chaotic scene what so few starts leave open.
     """
     if scene.exact:
         return {quantity.name: 0.0 for quantity in scene.quantities}
+    (point,) = chart.points_of(scene.name, Role.REFERENCE)
     (coarser,) = chart.points_of(scene.name, Role.COARSER)
     other = measurements[coarser.name]
+    share = 1.0 if point.key == "tolerance" else 1.0 / (coarser.setting / point.setting - 1.0)
     return {
-        q.name: math.hypot(error(q, other, reference), scatter(q, other, reference)) for q in scene.quantities
+        q.name: math.hypot(share * error(q, other, reference), scatter(q, other, reference))
+        for q in scene.quantities
     }
 
 
@@ -194,7 +202,7 @@ def choose(scene: Scene, own: Mapping[str, float], results: list[Result]) -> tup
     """
     asked = {q.name: q.tolerance for q in scene.quantities if math.isfinite(q.tolerance)}
     if not asked:
-        return results, "no tolerance is asked"
+        return results, "none, because no tolerance is asked"
     blunt = [name for name, tolerance in asked.items() if not own[name] <= tolerance]
     if blunt:
         words = ", ".join(f"{name} ({own[name]:.2g} > {asked[name]:.2g})" for name in blunt)

@@ -29,6 +29,7 @@ SCENE = {
 METHOD = {
     "label": Parameter("", "", "name in tables and pictures"),
     "stepper": Parameter(None, "", "stepper"),
+    "lanes": Parameter(1, "", "runs that advance together; costs are those of one", minimum=1, maximum=64),
     "until": Parameter(
         math.inf,
         "s",

@@ -12,8 +12,9 @@ from pathlib import Path
 from cvt_hpc.chart.comparing import Comparison, compare
 from cvt_hpc.chart.dataset import write_dataset
 from cvt_hpc.chart.drawing import draw_budget, draw_scene
-from cvt_hpc.chart.measuring import Measurement, check_channels, measure
+from cvt_hpc.chart.measuring import Measurement, measure
 from cvt_hpc.chart.plan import Chart, Point
+from cvt_hpc.chart.prospects import check_prospects
 from cvt_hpc.chart.store import ChartFolder
 from cvt_hpc.chart.table import write_table
 
@@ -68,7 +69,7 @@ def make_chart(
         If the folder holds another job, the models do not record what is asked, or the system refuses.
     """
     folder = ChartFolder(Path(out) if out is not None else Path("out") / chart.name)
-    check_channels(chart)
+    check_prospects(chart)
     folder.prepare(chart, fresh)
     measurements = {}
     missing = []

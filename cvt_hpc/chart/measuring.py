@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
@@ -11,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.chart.marching import Marched, march, warm_up
-from cvt_hpc.chart.plan import Chart, Point, Scene
-from cvt_hpc.chart.quantities import History, channels_needed, observe, strand_of
-from cvt_hpc.errors import mismatch
+from cvt_hpc.chart.marching import Marched, march, most_lanes, warm_up
+from cvt_hpc.chart.plan import Point, Scene
+from cvt_hpc.chart.quantities import History, observe, strand_of
 from cvt_hpc.models import MODELS
 from cvt_hpc.vibration.assessment import assess
 
@@ -64,66 +62,71 @@ def measure(point: Point, scene: Scene, repeats: int, time_limit: float) -> Meas
     time_limit : float
         Core-seconds after which a run is given up [s].
     """
-    starts = [point.parameters(k) for k in range(point.starts)]
     if scene.exact and point.series == "exact":
-        return _exact(point, scene, starts)
+        return _exact(point, scene)
     model, stepper = point.job.model, point.job.stepper
-    warm_up(model, stepper, starts[0])
-    marched = march(model, stepper, starts, point.until, time_limit)
-    reason, values = _outcome(point, scene, marched, starts)
+    lanes = point.lanes or min(most_lanes(model, stepper, point.parameters(0)), point.starts)
+    # costs are those of full lanes: further starts, if need be, count for the time alone
+    runs = math.ceil(point.starts / lanes) * lanes if point.timed else point.starts
+    points = [point.parameters(k) for k in range(runs)]
+    warm_up(model, stepper, points[:lanes])
+    marched = march(model, stepper, points, lanes, point.until, time_limit)
+    reason, values = _outcome(point, scene, marched)
     cost = math.nan
     if point.timed and not reason:
-        again = repeats if marched.core_seconds < _LONG * len(starts) else 0
-        costs = [march(model, stepper, starts, point.until).cost for _ in range(again)]
+        again = repeats if marched.core_seconds < _LONG * runs / lanes else 0
+        costs = [march(model, stepper, points, lanes, point.until).cost for _ in range(again)]
         cost = min([marched.cost, *costs])
-    return Measurement(reason, values, cost, marched.core_seconds, marched.simulated, _mean_counters(marched))
+    counters = _mean_counters(marched)
+    return Measurement(reason, values, cost, marched.core_seconds, marched.simulated, counters)
 
 
-def check_channels(chart: Chart) -> None:
-    """Make sure that each scene's model records what is to be judged, before anything is computed.
+def exact_displacement(point: Point, start: int) -> tuple[Any, NDArray[np.float64]]:
+    """Return a run of a point that was not marched, and its exact displacement, (time, probe) [m].
 
     Raises
     ------
     InputError
-        If a channel is missing, or a model has no exact solution where one is asked for.
+        If the model has no closed form for these parameters.
+    ModuleNotFoundError
+        If it has none at all.
     """
-    for scene in chart.scenes:
-        point = next(point for point in chart.points if point.scene == scene.name)
-        where = f"{chart.source}: [chart.scenes.{scene.name}]"
-        run = import_module(MODELS[point.job.model] + ".transient").Transient(
-            point.parameters(0), point.job.stepper
-        )
-        if scene.exact and not _has_exact(point.job.model):
-            raise mismatch(
-                f"{where} reference", f"a model with an exact solution for {scene.name}", point.job.model
-            )
-        for channel in channels_needed(scene.quantities):
-            if scene.exact or not _has_channel(run, channel):
-                found = "an exact solution, which has none" if scene.exact else point.job.model
-                raise mismatch(f"{where} quantities", f"a model that records the channel {channel}", found)
+    parameters = point.parameters(start)
+    solution = import_module(MODELS[point.job.model] + ".exact").exact
+    run = import_module(MODELS[point.job.model] + ".transient").Transient(parameters, point.job.stepper)
+    return run, solution(parameters, (1 + np.arange(run.samples)) * run.interval)
 
 
-def _outcome(
-    point: Point, scene: Scene, marched: Marched, starts: list[dict[str, Any]]
-) -> tuple[str, dict[str, NDArray[np.float64]]]:
+def _exact(point: Point, scene: Scene) -> Measurement:
+    """The model's exact solution in the place of a run."""
+    observed = []
+    for start in range(point.starts):
+        run, displacement = exact_displacement(point, start)
+        columns, strands = _columns(run)
+        history = History(displacement[:, columns], strands, run.channel, run.parameters)
+        observed.append(observe(history, scene.quantities, whole=True))
+    return Measurement("", _stacked(observed))
+
+
+def _outcome(point: Point, scene: Scene, marched: Marched) -> tuple[str, dict[str, NDArray[np.float64]]]:
     """Why a point failed, or else its values."""
     whole = math.isinf(point.until)
     observed = []
-    for k, run in enumerate(marched.runs):
+    for k, run in enumerate(marched.runs[: point.starts]):
         failure = marched.failures[k]
         if failure is None and whole:
-            failure = _doubt(point.job.model, run, starts[k])
+            failure = _doubt(point.job.model, run)
         if failure is not None:
             status, why = failure
-            count = f" (start {k + 1} of {len(starts)})" if len(starts) > 1 else ""
+            count = f" (start {k + 1} of {point.starts})" if point.starts > 1 else ""
             return f"{status.name.lower()}{count} at {run.time * 1e3:.4g} ms: {why}", {}
-        observed.append(observe(_history(run, starts[k]), scene.quantities, whole))
-    return "", {name: np.array([values[name] for values in observed]) for name in observed[0]}
+        observed.append(observe(_history(run), scene.quantities, whole))
+    return "", _stacked(observed)
 
 
-def _history(run: Any, parameters: Mapping[str, Any]) -> History:
+def _history(run: Any) -> History:
     columns, strands = _columns(run)
-    return History(np.array(run.displacement)[:, columns], strands, run.channel, parameters)
+    return History(np.array(run.displacement)[:, columns], strands, run.channel, run.parameters)
 
 
 def _columns(run: Any) -> tuple[list[int], tuple[str, ...]]:
@@ -132,40 +135,18 @@ def _columns(run: Any) -> tuple[list[int], tuple[str, ...]]:
     return columns, tuple(strands[k] for k in columns)
 
 
-def _doubt(model: str, run: Any, parameters: dict[str, Any]) -> Any:
-    """Whether the model itself does not trust a run that has reached its end."""
-    history = _history(run, parameters)
-    found = assess(history.displacement, history.rate, history.strands, parameters)
+def _doubt(model: str, run: Any) -> Any:
+    """Whether a model that audits its runs does not trust one that has reached its end."""
+    if not hasattr(run, "numerical_doubt"):
+        return None
+    history = _history(run)
+    found = assess(history.displacement, history.rate, history.strands, history.parameters)
     strongest = np.array(_columns(run)[0])[found.strongest_probe]
     return run.numerical_doubt(import_module(MODELS[model] + ".record").evaluate(run, strongest))
 
 
-def _exact(point: Point, scene: Scene, starts: list[dict[str, Any]]) -> Measurement:
-    """The model's exact solution in the place of a run."""
-    solution = import_module(MODELS[point.job.model] + ".exact").exact
-    observed = []
-    for parameters in starts:
-        run = import_module(MODELS[point.job.model] + ".transient").Transient(parameters, point.job.stepper)
-        columns, strands = _columns(run)
-        displacement = solution(parameters, (1 + np.arange(run.samples)) * run.interval)[:, columns]
-        history = History(displacement, strands, run.channel, parameters)
-        observed.append(observe(history, scene.quantities, whole=True))
-    return Measurement("", {name: np.array([values[name] for values in observed]) for name in observed[0]})
-
-
-def _has_exact(model: str) -> bool:
-    try:
-        return hasattr(import_module(MODELS[model] + ".exact"), "exact")
-    except ModuleNotFoundError:
-        return False
-
-
-def _has_channel(run: Any, name: str) -> bool:
-    try:
-        run.channel(name)
-    except (KeyError, ValueError):
-        return False
-    return True
+def _stacked(observed: list[dict[str, NDArray[np.float64]]]) -> dict[str, NDArray[np.float64]]:
+    return {name: np.array([values[name] for values in observed]) for name in observed[0]}
 
 
 def _mean_counters(marched: Marched) -> dict[str, float]:

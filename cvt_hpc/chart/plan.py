@@ -94,6 +94,9 @@ class Point:
         What is run; with its own seed for the first start, the next ones for the others.
     starts : int
         Number of runs.
+    lanes : int
+        How many of them advance together; timed ones fill all lanes, if need be with further starts that
+        count for the time alone. 0: as many as the model can, where only results count.
     until : float
         How far a run is marched [s]; inf: to its end.
     refines : bool
@@ -109,6 +112,7 @@ class Point:
     key: str
     job: Job
     starts: int
+    lanes: int = 0
     until: float = math.inf
     refines: bool = False
 
@@ -191,6 +195,7 @@ class Chart:
                     "role": point.role.value,
                     "label": point.label,
                     "starts": point.starts,
+                    "lanes": point.lanes,
                     "until": _to_json(point.until),
                     "refines": point.refines,
                     "job": {**point.job.resolved(), "name": "", "description": ""},

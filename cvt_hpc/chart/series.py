@@ -24,7 +24,8 @@ def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
     stage : Stage
         The scene.
     raw : Any
-        "exact", or a table with a stepper, its step or tolerance, and what else is to be set.
+        "exact", or a table with a stepper, its step or tolerance, that of the coarser one (by default twice
+        the step or ten times the tolerance), and what else is to be set.
 
     Raises
     ------
@@ -40,7 +41,7 @@ def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
         return
     if not isinstance(raw, Mapping):
         raise mismatch(where, '"exact", or a table with a stepper and its step or tolerance', show(raw))
-    read_table({"stepper": METHOD["stepper"]}, raw, where, ("set", *SETTINGS))
+    read_table({"stepper": METHOD["stepper"]}, raw, where, ("set", "coarser", *SETTINGS))
     key = _setting_key(raw, where)
     fine = stage.job(where, stepper=raw["stepper"], **read_set(raw, where), **{key: raw[key]})
     _check_starts(stage, fine)
@@ -50,8 +51,10 @@ def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
             raise mismatch(
                 f"{stage.where} quantities.{quantity.name}.until", expected, f"{quantity.until:g} s"
             )
-    coarse = {key: fine.parameters[key] * _COARSER[key]}
-    coarser = stage.job(where, stepper=raw["stepper"], **read_set(raw, where), **coarse)
+    coarse = raw.get("coarser", fine.parameters[key] * _COARSER[key])
+    coarser = stage.job(where, stepper=raw["stepper"], **read_set(raw, where), **{key: coarse})
+    if coarser.parameters[key] <= fine.parameters[key]:
+        raise mismatch(f"{where} coarser", f"more than {key} = {fine.parameters[key]:g}", f"{coarse}")
     label = in_words(raw["stepper"])
     yield Point(f"{name}-reference", name, Role.REFERENCE, raw["stepper"], label, key, fine, starts)
     yield Point(f"{name}-coarser", name, Role.COARSER, raw["stepper"], label, key, coarser, starts)
@@ -94,6 +97,7 @@ def method_points(name: str, raw: Any, stages: list[Stage], where: str) -> Itera
                 key,
                 job,
                 stage.scene.starts,
+                own["lanes"],
                 until,
             )
 

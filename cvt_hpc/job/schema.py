@@ -122,11 +122,16 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     Raises
     ------
     InputError
-        If there is no such model or stepper.
+        If there is no such model or stepper, or the model refuses the stepper (its REFUSED says why).
     """
     model_module = import_module(_look_up(model, MODELS, "model", source))
     stepper = model_module.DEFAULT_STEPPER if stepper is None else stepper
     stepper_module = import_module(_look_up(stepper, STEPPERS, "stepper", source))
+    if stepper in (refused := getattr(model_module, "REFUSED", {})):
+        takes = ", ".join(name for name in STEPPERS if name not in refused)
+        raise mismatch(
+            f"{source}: stepper", f"one that {model} takes ({takes})", f"{stepper}: {refused[stepper]}"
+        )
     sections: dict[str, dict[str, Parameter]] = {}
     modules = (model_module, stepper_module, *SHARED)
     for module in modules:
