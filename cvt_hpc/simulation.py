@@ -6,11 +6,13 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
+from importlib.util import find_spec
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cvt_hpc.errors import InputError
 from cvt_hpc.models import MODELS
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 from cvt_hpc.vibration.assessment import Occurrence, assess
@@ -80,11 +82,15 @@ def record_coordinates(job: Job) -> dict[str, Coordinate]:
 def estimate_cost(job: Job) -> float:
     """Core-seconds of a run, mean over the job: within a factor of two on processors of the last years.
 
+    Not known (nan) of a model that no study runs.
+
     Parameters
     ----------
     job : Job
         A validated job.
     """
+    if not _has_record(job):
+        return float("nan")
     axes = {axis.name: np.array(axis.values) for axis in job.axes}
 
     def mean(key: str, power: int = 1) -> float:
@@ -290,7 +296,16 @@ def _model(job: Job) -> ModuleType:
 
 
 def _model_record(job: Job) -> ModuleType:
+    if not _has_record(job):
+        raise InputError(
+            f"{job.source}: model: expected one whose runs are judged and recorded (elastic_belt), "
+            f"found {job.model}, which is there to compare steppers: `cvt-hpc chart`"
+        )
     return import_module(MODELS[job.model] + ".record")
+
+
+def _has_record(job: Job) -> bool:
+    return find_spec(MODELS[job.model] + ".record") is not None
 
 
 def _attributes(long_name: str, units: str) -> dict[str, str]:

@@ -67,6 +67,7 @@ def toy(monkeypatch):
     """Register the model "toy" and the stepper "hop", and put a table [run] in the place of all shared ones."""
     model, stepper, shared = ModuleType("toy_model"), ModuleType("toy_stepper"), ModuleType("toy_shared")
     model.PARAMETERS, model.DEFAULT_STEPPER, model.check = TOY_PARAMETERS, "hop", check_toy
+    model.STEPPER_NAMES, model.REFUSED = ("hop",), {"imex": "the toy has no step of its own"}
     stepper.PARAMETERS, stepper.check = TOY_NUMERICS, check_hop
     shared.PARAMETERS, shared.check = TOY_SHARED, check_run
     monkeypatch.setattr(schema, "SHARED", (shared,))

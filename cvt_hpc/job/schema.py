@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
+from types import ModuleType
 from typing import Any
 
 from cvt_hpc import recording
@@ -122,16 +123,12 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     Raises
     ------
     InputError
-        If there is no such model or stepper, or the model refuses the stepper (its REFUSED says why).
+        If there is no such model or stepper, or the model does not take it.
     """
     model_module = import_module(_look_up(model, MODELS, "model", source))
     stepper = model_module.DEFAULT_STEPPER if stepper is None else stepper
     stepper_module = import_module(_look_up(stepper, STEPPERS, "stepper", source))
-    if stepper in (refused := getattr(model_module, "REFUSED", {})):
-        takes = ", ".join(name for name in STEPPERS if name not in refused)
-        raise mismatch(
-            f"{source}: stepper", f"one that {model} takes ({takes})", f"{stepper}: {refused[stepper]}"
-        )
+    _check_accepted(model, model_module, stepper, source)
     sections: dict[str, dict[str, Parameter]] = {}
     modules = (model_module, stepper_module, *SHARED)
     for module in modules:
@@ -144,6 +141,13 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
 def known_keys(model: str, stepper: str | None = None) -> tuple[str, ...]:
     """Return every key that a job of a model and a stepper may set or vary."""
     return tuple(load_schema(model, stepper, "known_keys").parameters)
+
+
+def _check_accepted(model: str, module: ModuleType, stepper: str, source: str) -> None:
+    if stepper not in module.STEPPER_NAMES:
+        reason = module.REFUSED.get(stepper, "the model does not take it")
+        expected = f"one that {model} takes ({', '.join(module.STEPPER_NAMES)})"
+        raise mismatch(f"{source}: stepper", expected, f"{show(stepper)}: {reason}")
 
 
 def _look_up(name: Any, registry: dict[str, str], what: str, source: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.definition import Job
 from cvt_hpc.job.values import in_words
@@ -69,6 +71,8 @@ def _values_in_words(axis: Axis) -> str:
 
 
 def _cost_in_words(core_seconds: float, runs: int) -> str:
+    if math.isnan(core_seconds):
+        return "not known for this model"
     total = core_seconds * runs
     in_all = f"{total:.3g} core-seconds" if total < 3600 else f"{total / 3600:.3g} core-hours"
     return f"{core_seconds:.3g} core-seconds per run, {in_all} in all"

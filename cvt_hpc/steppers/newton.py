@@ -1,9 +1,11 @@
 """The equations of an implicit stage, z = base + shift f(t, z), by Newton's method with a frozen inverse.
 
-The inverse of I - shift J is kept as long as each pass reduces the correction to half or less; else J is
-taken anew where the iteration stands, and should that not suffice, the correction is halved until it shrinks
-(natural monotonicity test, Deuflhard 2004, sec. 3.3). So the sharp bends of regularised friction are found
-from far off.
+The inverse of I - shift J is kept as long as each pass reduces the correction to half or less, and ends in
+fewer passes than a new Jacobian costs evaluations; else J is taken anew where the iteration stands. Should
+that not suffice, the way along the correction is bisected until what is left shrinks (natural monotonicity
+test, Deuflhard 2004, sec. 3.3). So the sharp bends of regularised friction are found
+from far off. Where nothing shrinks it, the iteration leaps by the whole correction: so it gets away from
+sticking when the pull has just grown too large for it, and only the slip far off is a solution.
 
 Where friction falls more steeply than 1 / shift, I - shift J has lost the sign that its determinant has for
 short steps: the equations then have several solutions, and the one found is not that to which the motion
@@ -28,7 +30,8 @@ NO_CONVERGENCE, SINGULAR, NOT_UNIQUE = (
     int(Result.NOT_UNIQUE),
 )
 ENOUGH = 0.5  # reduction of the correction in a pass with which a frozen matrix is kept
-LEAST_SHARE = 1e-4  # of the correction, below which no descent is found
+LEAST_SHARE = 1e-9  # of the correction: the interval at which the search along it ends
+MOST_LEAPS = 5  # without descent, away from where a solution has just vanished
 MOST_PASSES = 200
 
 SHIFT, SIGN = range(2)
@@ -143,6 +146,15 @@ def _correct(
 
 
 @kernel
+def _overshot(system: System, frozen: Frozen) -> bool:
+    """Whether the correction at the trial points back."""
+    along = 0.0
+    for i in range(system.scale.size):
+        along += frozen.correction[i] * frozen.next_correction[i] / system.scale[i] ** 2
+    return along < 0.0
+
+
+@kernel
 def _rates(system: System, frozen: Frozen, t: float, z: np.ndarray, counts: np.ndarray) -> bool:
     counts[RATES] += 1
     return system.rates(system.constants, t, z, frozen.rates)
@@ -195,7 +207,7 @@ def solve_stage(
     if outcome != OK:
         return outcome
     left = _correct(system, frozen, base, shift, z, frozen.correction, counts)
-    share, crossed = 1.0, False
+    share, near, far, leaps, crossed = 1.0, 0.0, 1.0, 0, False
     for _ in range(MOST_PASSES):
         if not np.isfinite(left):
             return NOT_FINITE
@@ -208,23 +220,32 @@ def solve_stage(
         if share == 1.0 and next_left <= tolerance:
             z[:] = frozen.trial + frozen.next_correction
             return OK if frozen.memory[SIGN] > 0.0 else NOT_UNIQUE
-        if next_left <= (ENOUGH if share == 1.0 else 1.0 - 0.5 * share) * left:
+        reduction = next_left / left
+        if reduction <= (ENOUGH if share == 1.0 else 1.0 - 0.5 * share):
             z[:] = frozen.trial
             frozen.correction[:] = frozen.next_correction
-            left, share, fresh = next_left, 1.0, False
-        elif fresh:
-            share *= 0.5
-            if share < LEAST_SHARE:
-                break
+            left, share, near, far, fresh = next_left, 1.0, 0.0, 1.0, False
+            # a new Jacobian costs n evaluations: less than as many passes
+            if left * reduction ** (z.size + 2) <= tolerance:
+                continue
         else:
+            if fresh:
+                if far < 1.0 and not _overshot(system, frozen):
+                    near = share
+                else:
+                    far = share
+                share = 0.5 * (near + far)
+                if far - near >= LEAST_SHARE:
+                    continue
+                leaps += 1
+                if leaps > MOST_LEAPS:
+                    break
+                z += frozen.correction
             if not _rates(system, frozen, t, z, counts):
                 return NO_VALUE
-            outcome = renew(system, frozen, t, z, shift, counts)
-            if outcome != OK:
-                return outcome
-            left, share, fresh = (
-                _correct(system, frozen, base, shift, z, frozen.correction, counts),
-                1.0,
-                True,
-            )
+        outcome = renew(system, frozen, t, z, shift, counts)
+        if outcome != OK:
+            return outcome
+        left = _correct(system, frozen, base, shift, z, frozen.correction, counts)
+        share, near, far, fresh = 1.0, 0.0, 1.0, True
     return NOT_UNIQUE if crossed else NO_CONVERGENCE

@@ -9,15 +9,20 @@ from cvt_hpc import recording
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.job.schema import load_schema
+from cvt_hpc.job.summary import summarize
 from cvt_hpc.job.units import to_si
 from cvt_hpc.job.values import read_value
 from cvt_hpc.models import MODELS
+from cvt_hpc.simulation import estimate_cost
 from cvt_hpc.steppers import STEPPERS
+from cvt_hpc.study import run
 from cvt_hpc.vibration import criterion
 
-pytestmark = [pytest.mark.parametrize("model", MODELS), pytest.mark.parametrize("stepper", STEPPERS)]
+PAIRS = [(model, stepper) for model in MODELS for stepper in import_module(MODELS[model]).STEPPER_NAMES]
+both = pytest.mark.parametrize(("model", "stepper"), PAIRS)
 
 
+@both
 def test_keys_are_unique_over_all_tables(model, stepper):
     modules = [import_module(MODELS[model]), import_module(STEPPERS[stepper]), recording, criterion]
     keys = [key for module in modules for table in module.PARAMETERS.values() for key in table]
@@ -25,6 +30,7 @@ def test_keys_are_unique_over_all_tables(model, stepper):
     assert set(keys) == set(load_schema(model, stepper, "x").parameters)
 
 
+@both
 def test_units_are_si_and_what_a_job_file_may_write(model, stepper):
     registry = pint.UnitRegistry()
     for unit in {parameter.unit for parameter in load_schema(model, stepper, "x").parameters.values()} - {""}:
@@ -32,6 +38,7 @@ def test_units_are_si_and_what_a_job_file_may_write(model, stepper):
         assert to_si(f"3 ({unit})", unit) == 3.0
 
 
+@both
 def test_defaults_are_legal(model, stepper):
     for key, parameter in load_schema(model, stepper, "x").parameters.items():
         if parameter.default is not None:
@@ -39,6 +46,7 @@ def test_defaults_are_legal(model, stepper):
         assert parameter.description
 
 
+@both
 @pytest.mark.parametrize(
     ("tables", "message"),
     [
@@ -47,7 +55,7 @@ def test_defaults_are_legal(model, stepper):
             "[vibration] band_high: expected a frequency above",
         ),
         (
-            {"run": {"duration": 0.02}, "scene": {"rise_time": 0.005}},
+            {"run": {"duration": 0.08}, "vibration": {"judged_fraction": 0.1}},
             "[run] duration: expected a judged part of five periods",
         ),
     ],
@@ -56,3 +64,26 @@ def test_every_job_is_checked_for_what_all_runs_share(model, stepper, tables, me
     with pytest.raises(InputError) as caught:
         build_job({"name": "x", "model": model, "stepper": stepper} | tables, "x.toml")
     assert str(caught.value).startswith(f"x.toml: {message}")
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_every_stepper_is_taken_or_refused_with_a_reason(model):
+    module = import_module(MODELS[model])
+    for stepper in STEPPERS:
+        if stepper not in module.STEPPER_NAMES:
+            with pytest.raises(InputError) as caught:
+                build_job({"name": "x", "model": model, "stepper": stepper}, "x.toml")
+            reason = module.REFUSED.get(stepper, "the model does not take it")
+            assert str(caught.value).startswith(f"x.toml: stepper: expected one that {model} takes (")
+            assert str(caught.value).endswith(f'found "{stepper}": {reason}')
+    assert module.DEFAULT_STEPPER in module.STEPPER_NAMES
+    assert set(module.STEPPER_NAMES) | set(module.REFUSED) <= set(STEPPERS)
+
+
+@pytest.mark.parametrize("model", ["oscillator", "moving_string"])
+def test_a_model_without_records_is_no_model_of_a_study(model, tmp_path):
+    job = build_job({"name": "x", "model": model}, "x.toml")
+    with pytest.raises(InputError, match=f"x.toml: model: expected one whose runs .*found {model}"):
+        run(job, tmp_path / "out", progress=False)
+    assert not (tmp_path / "out").exists()
+    assert "estimated cost: not known for this model" in summarize(job, estimate_cost(job))

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.parameters import Parameter
+from cvt_hpc.physics.friction_table import table_problems
 from cvt_hpc.physics.geometry import variator
 
 
@@ -161,18 +162,5 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
             ("friction_gradient", "0 with friction_law coulomb", f"{p['friction_gradient']:g} s/m")
         )
     if p["friction_law"] == "table":
-        problems += _check_table(p["table_force"], p["table_speed"], p["table_mu"])
+        problems += table_problems(p["table_force"], p["table_speed"], p["table_mu"])
     return problems
-
-
-def _check_table(force: tuple, speed: tuple, mu: tuple) -> list[tuple[str, str, str]]:
-    for key, grid in (("table_force", force), ("table_speed", speed)):
-        if len(grid) < 2 or np.any(np.diff(grid) <= 0.0):
-            return [(key, "at least two ascending values", f"{list(grid)}")]
-    shape = (len(force), len(speed))
-    if len(mu) != shape[0] or any(not isinstance(row, tuple) or len(row) != shape[1] for row in mu):
-        lengths = ", ".join(str(len(row)) if isinstance(row, tuple) else "no row" for row in mu)
-        return [("table_mu", f"{shape[0]} rows of {shape[1]} coefficients", f"rows of {lengths or 'none'}")]
-    if np.min(mu) <= 0.0:
-        return [("table_mu", "coefficients > 0", f"{np.min(mu):g}")]
-    return []

@@ -1,0 +1,20 @@
+"""A string that runs between two eyes: the strand of a belt without bending, push force and neighbours.
+
+    m (w_tt + 2 v w_xt + v^2 w_xx) = T w_xx,   w = 0 at x = 0 and x = L,
+
+m its mass per length, T its tension, v its speed, c = sqrt(T / m). Eigenfrequencies n (c^2 - v^2) / (2 c L);
+from v = c on it holds no shape (critical speed).
+"""
+
+from cvt_hpc.models.moving_string.parameters import PARAMETERS, check
+from cvt_hpc.steppers import STEPPERS
+
+DEFAULT_STEPPER = "runge_kutta_4"
+REFUSED = {
+    "imex": "it is the elastic belt's own step",
+    "explicit": "it is the elastic belt's own step; symplectic_euler is the same method",
+    "moreau": "nothing rubs here: it is for set-valued friction and rigid contact",
+}
+STEPPER_NAMES = tuple(name for name in STEPPERS if name not in REFUSED)
+
+__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPER_NAMES", "check"]

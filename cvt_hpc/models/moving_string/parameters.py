@@ -1,0 +1,62 @@
+"""What a job may set of the moving string; the defaults are near those of a belt's strand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.parameters import Parameter
+
+
+def _positive(default: float, unit: str, description: str) -> Parameter:
+    return Parameter(default, unit, description, minimum=0.0, exclusive=True)
+
+
+PARAMETERS: dict[str, dict[str, Parameter]] = {
+    "scene": {
+        "belt_speed": Parameter(9.4, "m/s", "speed of the string", minimum=0.0),
+        "shape": Parameter(
+            "mode",
+            "",
+            "what travels along the string: an eigenmode, or a single pulse",
+            choices=("mode", "pulse"),
+        ),
+        "mode": Parameter(1, "", "number of the eigenmode", minimum=1, maximum=1000),
+        "pulse_width": _positive(0.1, "", "width of the pulse, relative to the length of its way and back"),
+        "largest_displacement": _positive(1e-5, "m", "largest displacement at the start, nearly"),
+    },
+    "string": {
+        "length": _positive(0.15, "m", "length between the eyes"),
+        "tension": _positive(5000.0, "N", "tension T"),
+        "line_mass": _positive(1.3, "kg/m", "mass per length"),
+    },
+    "mesh": {
+        "cells": Parameter(64, "", "cells between the eyes", minimum=4, maximum=4096),
+    },
+}
+
+
+def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems that lie between parameters.
+
+    Parameters
+    ----------
+    parameters : dict
+        Values by name, in SI units.
+
+    Returns
+    -------
+    list of (key, expected, found)
+        Empty where all is well.
+    """
+    p = parameters
+    problems = []
+    wave = np.sqrt(p["tension"] / p["line_mass"])
+    if p["belt_speed"] >= wave:
+        expected = f"less than the wave speed sqrt(tension / line_mass) = {wave:g} m/s"
+        problems.append(("belt_speed", expected, f"{p['belt_speed']:g} m/s"))
+    if p["cells"] < p["strand_probes"] + 1:
+        expected = f"strand_probes + 1 = {p['strand_probes'] + 1} or more"
+        problems.append(("cells", expected, f"{p['cells']}"))
+    return problems

@@ -1,0 +1,27 @@
+"""What is wrong with a friction table, in the form of a model's check."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def table_problems(force: tuple, speed: tuple, mu: tuple) -> list[tuple[str, str, str]]:
+    """Problems of a friction table: (key, expected, found); the first one only.
+
+    Parameters
+    ----------
+    force, speed : tuples
+        Its knots [N/m, or N for a single contact], [m/s].
+    mu : tuple of tuples
+        A row of coefficients for each force [1].
+    """
+    for key, grid in (("table_force", force), ("table_speed", speed)):
+        if len(grid) < 2 or np.any(np.diff(grid) <= 0.0):
+            return [(key, "at least two ascending values", f"{list(grid)}")]
+    shape = (len(force), len(speed))
+    if len(mu) != shape[0] or any(not isinstance(row, tuple) or len(row) != shape[1] for row in mu):
+        lengths = ", ".join(str(len(row)) if isinstance(row, tuple) else "no row" for row in mu)
+        return [("table_mu", f"{shape[0]} rows of {shape[1]} coefficients", f"rows of {lengths or 'none'}")]
+    if np.min(mu) <= 0.0:
+        return [("table_mu", "coefficients > 0", f"{np.min(mu):g}")]
+    return []
