@@ -45,7 +45,9 @@ BUDGET = {
 }
 CHOICE = {
     "label": Parameter("", "", "name in tables and pictures"),
-    "stepper": Parameter("", "", "stepper, where it is not that of the base"),
+    "stepper": Parameter(
+        "", "", "stepper, where it is not the base's; what the base sets then does not count"
+    ),
     "refines": Parameter(
         False, "", "nearer to the truth than the base: the difference is an error of the base"
     ),

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -20,8 +22,9 @@ from cvt_hpc.chart.comparing import Comparison, Result
 from cvt_hpc.chart.plan import Quantity
 from cvt_hpc.chart.quantities import KINDS
 
-# Okabe and Ito's colours, told apart by those who do not see all; with the markers enough for 28 methods.
+# Okabe and Ito's colours, told apart by those who do not see all; with the lines enough for 21 methods.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#333333")
+LINES = ("-", "--", ":")
 MARKERS = ("o", "s", "^", "D", "v", "P", "<", ">")
 GREY = "#a8a8a8"
 _COLUMNS = 2
@@ -30,6 +33,8 @@ _LINE_HEIGHT = 0.16  # [inch], of the text under the panels
 _LINE_LENGTH = 104  # [letters]
 _ROW_HEIGHT = 0.24  # [inch], of the budget
 _MARGIN = 1.6  # factor by which axes reach beyond the points
+LARGEST_ERROR = 10.0  # relative: what is beyond is named, and not drawn
+_DETAILS = re.compile(r" \([^()]*\)$")
 _LEAST_SPAN = 100.0  # of an error's axis, so that two powers of ten stand at it
 
 
@@ -121,7 +126,7 @@ def _draw_panel(
         drawn = [r for r in results if _is_drawn(r, quantity.name)]
         x = [max(r.errors[quantity.name], floor) for r in drawn]
         y = [r.measurement.cost for r in drawn]
-        axes.plot(x, y, color=_colour(k), marker=_marker(k), lw=1.3, ms=4.5, label=results[0].point.label)
+        axes.plot(x, y, **_style(k), label=results[0].point.label)
         for result, error, cost in zip(drawn, x, y, strict=True):
             _mark_point(axes, result, quantity.name, error, cost, k)
     _limit(axes, quantity, own, floor)
@@ -133,7 +138,8 @@ def _draw_panel(
 
 def _mark_point(axes: Axes, result: Result, name: str, error: float, cost: float, k: int) -> None:
     if name in result.below:
-        axes.plot(error, cost, marker=_marker(k), ms=4.5, mfc="white", mec=GREY, ls="", gid="below")
+        hollow = {**_style(k), "ls": "", "mfc": "white", "mec": GREY}
+        axes.plot(error, cost, **hollow, gid="below")
     if result.errors.get("occurrence", 0.0) > 0.0:
         axes.plot(error, cost, marker="x", ms=7, color="black", ls="", gid="occurrence")
     if result.chosen:
@@ -196,33 +202,40 @@ def _series(results: Sequence[Result]) -> dict[str, list[Result]]:
 
 def _notes(comparison: Comparison) -> list[str]:
     """What stands under the panels: what was chosen, and what is not drawn and why."""
-    failed: dict[tuple[str, str], list[str]] = {}
-    for result in comparison.methods:
-        if result.measurement.reason:
-            why = result.measurement.reason.partition(": ")[2]
-            failed.setdefault((result.point.label, why), []).append(result.point.setting_in_words)
-        else:
-            lost = [name.replace("_", " ") for name, e in result.errors.items() if math.isinf(e)]
-            if lost:
-                key = (result.point.label, f"has no {' and no '.join(lost)}")
-                failed.setdefault(key, []).append(result.point.setting_in_words)
-    reference = comparison.reference.point
-    known = (
-        "the model's exact solution"
-        if comparison.scene.exact
-        else (f"{reference.label} at {reference.setting_in_words}, its own error from a coarser one")
-    )
-    lines = wrap(f"reference: {known}", _LINE_LENGTH)
+    point = comparison.reference.point
+    known = f"{point.label} at {point.setting_in_words}; its own error from a coarser one"
+    lines = wrap(f"reference: {'exact solution' if comparison.scene.exact else known}", _LINE_LENGTH)
     lines += wrap(f"cheapest within all tolerances: {comparison.verdict}", _LINE_LENGTH)
-    for (label, why), settings in failed.items():
-        text = f"omitted: failed: {label} at {', '.join(settings)}: {why}"
-        lines += wrap(text, _LINE_LENGTH, subsequent_indent="    ")
+    for why, methods in _omitted(comparison).items():
+        each = "; ".join(f"{label} ({', '.join(settings)})" for label, settings in methods.items())
+        lines += wrap(f"omitted: {why}: {each}", _LINE_LENGTH, subsequent_indent="    ")
     return lines
+
+
+def _omitted(comparison: Comparison) -> dict[str, dict[str, list[str]]]:
+    """Points that are not drawn in all panels: reason -> method -> settings."""
+    omitted: dict[str, dict[str, list[str]]] = {}
+    for result in comparison.methods:
+        for why in _reasons(result):
+            methods = omitted.setdefault(why, {})
+            methods.setdefault(result.point.label, []).append(result.point.setting_in_words)
+    return omitted
+
+
+def _reasons(result: Result) -> list[str]:
+    """Why a point is not drawn, in general words: where and after how many steps is in the table."""
+    if reason := result.measurement.reason:
+        return [f"failed, {_DETAILS.sub('', reason.partition(': ')[2])}"]
+    errors = {name.replace("_", " "): error for name, error in result.errors.items()}
+    reasons = [f"no {name}" for name, error in errors.items() if math.isinf(error)]
+    if any(LARGEST_ERROR < error < math.inf for error in errors.values()):
+        reasons.append(f"error of more than {LARGEST_ERROR:.0%}")
+    return reasons
 
 
 def _legend(comparison: Comparison, series: dict[str, list[Result]]) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [
-        Line2D([], [], color=_colour(k), marker=_marker(k), lw=1.3, ms=4.5, label=results[0].point.label)
+        Line2D([], [], **_style(k), label=results[0].point.label)
         for k, results in enumerate(series.values())
         if any(not result.measurement.reason for result in results)
     ]
@@ -241,7 +254,7 @@ def _legend(comparison: Comparison, series: dict[str, list[Result]]) -> list[Lin
 
 
 def _is_drawn(result: Result, name: str) -> bool:
-    return not result.measurement.reason and math.isfinite(result.errors[name])
+    return not result.measurement.reason and result.errors[name] <= LARGEST_ERROR
 
 
 def _in_order(choices: Sequence[Result], quantities: Sequence[Quantity]) -> list[Result]:
@@ -277,9 +290,12 @@ def _error_label(quantity: Quantity) -> str:
     return f"error / {factor * quantity.scale:g} {unit}"
 
 
-def _colour(k: int) -> str:
-    return COLOURS[k % len(COLOURS)]
-
-
-def _marker(k: int) -> str:
-    return MARKERS[k % len(MARKERS)]
+def _style(k: int) -> dict[str, Any]:
+    """Line and marker of the k-th method."""
+    return {
+        "color": COLOURS[k % len(COLOURS)],
+        "ls": LINES[k // len(COLOURS) % len(LINES)],
+        "marker": MARKERS[k % len(MARKERS)],
+        "lw": 1.3,
+        "ms": 4.5,
+    }

@@ -165,7 +165,13 @@ def read_quantity(name: str, raw: Any, where: str) -> Quantity:
         raise unknown(where, "quantity", name, KINDS)
     kind = KINDS[name]
     declared = {
-        "tolerance": Parameter(math.inf, "", "largest error allowed", minimum=0.0, allow_infinite=True),
+        "tolerance": Parameter(
+            0.0 if name == "occurrence" else math.inf,
+            "",
+            "largest error allowed; of the occurrence the share of starts that are judged differently",
+            minimum=0.0,
+            allow_infinite=True,
+        ),
         "scale": Parameter(
             0.0, kind.unit, "what errors are divided by; 0: the reference's size", minimum=0.0
         ),

@@ -115,7 +115,8 @@ def budget_points(raw: Any, stages: list[Stage], where: str) -> tuple[list[Point
         place = where.replace("budget]", f"budget.choices.{name}]")
         check_word(name, place)
         choice = read_table(CHOICE, table, place, ("set",))
-        changed = {**base, **read_set(table, place)}
+        # what is set for the base's stepper may be unknown to another
+        changed = {**({} if choice["stepper"] else base), **read_set(table, place)}
         job = stage.job(place, stepper=choice["stepper"] or stepper, **changed)
         points.append(
             Point(

@@ -6,6 +6,7 @@ import csv
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from textwrap import shorten
 
 from cvt_hpc.chart.comparing import Comparison, Result
 from cvt_hpc.chart.plan import Role
@@ -24,6 +25,8 @@ _HEAD = (
     "core_s_per_s",
     "starts",
 )
+
+_LONGEST_NOTE = 90  # letters; the whole reason is in the file
 
 
 def write_table(comparisons: Sequence[Comparison], path: Path) -> Path:
@@ -123,7 +126,7 @@ def _errors(result: Result, names: Sequence[str]) -> list[str]:
 def _note(result: Result) -> str:
     """What else is to be said of a point."""
     if result.measurement.reason:
-        return f"failed: {result.measurement.reason}"
+        return shorten(f"failed: {result.measurement.reason}", _LONGEST_NOTE, placeholder=" ...")
     if result.point.role is Role.CHOICE:
         return "error of the base" if result.point.refines else ""
     return "<- chosen" if result.chosen else ""
