@@ -58,6 +58,8 @@ class Comparison:
         Its errors are its own.
     methods, choices : tuple of Result
         Against the reference, and against the base of the error budget.
+    base : str
+        What choices are compared with; "" where there are none.
     shown : tuple of str
         Quantities by which choices are judged.
     verdict : str
@@ -68,6 +70,7 @@ class Comparison:
     reference: Result
     methods: tuple[Result, ...]
     choices: tuple[Result, ...]
+    base: str
     shown: tuple[str, ...]
     verdict: str
 
@@ -100,13 +103,14 @@ def _compare_scene(chart: Chart, scene: Scene, measurements: Mapping[str, Measur
             setting = known.setting_in_words
             verdict = f"none can be chosen: the reference failed at {setting}: {reason}"
     choices: tuple[Result, ...] = ()
+    label = ""
     for base in chart.points_of(scene.name, Role.BASE):
-        against = measurements[base.name]
+        label, against = base.label, measurements[base.name]
         choices = tuple(
             _judge(point, measurements[point.name], against, scene, {})
             for point in chart.points_of(scene.name, Role.CHOICE)
         )
-    return Comparison(scene, judged, tuple(methods), choices, chart.budgeted, verdict)
+    return Comparison(scene, judged, tuple(methods), choices, label, chart.budgeted, verdict)
 
 
 def _judge(

@@ -40,6 +40,7 @@ METHOD = {
     ),
 }
 BUDGET = {
+    "label": Parameter("the base", "", "what the choices are compared with, for people"),
     "scene": Parameter("", "", "scene whose errors are taken apart"),
     "stepper": Parameter("", "", "stepper of the base and, unless they say otherwise, of all choices"),
 }

@@ -31,6 +31,7 @@ _COLUMNS = 2
 _PANEL_HEIGHT = 2.55  # [inch]
 _LINE_HEIGHT = 0.16  # [inch], of the text under the panels
 _LINE_LENGTH = 104  # [letters]
+_LEGEND = {"loc": "outside lower center", "frameon": False, "fontsize": 8, "columnspacing": 1.0}
 _ROW_HEIGHT = 0.24  # [inch], of the budget
 _MARGIN = 1.6  # factor by which axes reach beyond the points
 LARGEST_ERROR = 10.0  # relative: what is beyond is named, and not drawn
@@ -83,7 +84,7 @@ def scene_figure(comparison: Comparison) -> Figure:
     below = figure.add_subplot(grid[rows, :])
     below.set_axis_off()
     below.text(0.0, 1.0, "\n".join(notes), va="top", fontsize=7.5, transform=below.transAxes)
-    figure.legend(handles=_legend(comparison, series), loc="outside lower center", ncols=3, frameon=False)
+    figure.legend(handles=_legend(comparison, series), ncols=3, **_LEGEND)
     return figure
 
 
@@ -100,19 +101,19 @@ def budget_figure(comparison: Comparison) -> Figure:
     ]
     choices = _in_order(comparison.choices, quantities)
     figure = Figure((WIDTH, 1.3 + _ROW_HEIGHT * len(choices)), layout="constrained")
-    figure.suptitle(f"{comparison.scene.title}: error budget")
+    figure.suptitle(f"{comparison.scene.title}: error budget, against {comparison.base}")
     panels = np.atleast_1d(figure.subplots(1, len(quantities), sharey=True))
     for axes, quantity in zip(panels, quantities, strict=True):
         _draw_budget_panel(axes, quantity, choices)
     panels[0].set_yticks(range(len(choices)), [choice.point.label for choice in choices])
     panels[0].set_ylim(len(choices) - 0.5, -0.5)
     handles = [
-        Line2D([], [], ls="", marker="o", color=COLOURS[1], label="error of the base"),
+        Line2D([], [], ls="", marker="o", color=COLOURS[1], label=f"error of {comparison.base}"),
         Line2D([], [], ls="", marker="o", color=COLOURS[0], mfc="white", label="what another choice changes"),
         Line2D([], [], ls="--", color="black", lw=0.9, label="tolerance"),
         Line2D([], [], ls="", marker="x", color="black", label="occurrence differs"),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
+    figure.legend(handles=handles, ncols=2, **_LEGEND)
     return figure
 
 
@@ -239,9 +240,9 @@ def _legend(comparison: Comparison, series: dict[str, list[Result]]) -> list[Lin
         for k, results in enumerate(series.values())
         if any(not result.measurement.reason for result in results)
     ]
-    handles.append(
-        Patch(facecolor="#f3f3f3", edgecolor="#d0d0d0", hatch="////", label="below the reference's error")
-    )
+    if not comparison.scene.exact:
+        grey = {"facecolor": "#f3f3f3", "edgecolor": "#d0d0d0", "hatch": "////"}
+        handles.append(Patch(**grey, label="below the reference's error"))
     handles.append(Line2D([], [], color="black", ls="--", lw=0.9, label="tolerance"))
     handles.append(
         Line2D(

@@ -135,7 +135,7 @@ class Point:
         if unit != "s":
             return in_words(self.setting, unit)
         factor, prefix = next((pair for pair in _PREFIXES if abs(self.setting) >= pair[0]), _PREFIXES[-1])
-        return f"{self.setting / factor:.4g} {prefix}s"
+        return f"{self.setting / factor:.4g}\u00a0{prefix}s"  # no line break between the two
 
     def parameters(self, start: int) -> dict[str, Any]:
         """Return the flat parameters [SI] of one of the runs."""

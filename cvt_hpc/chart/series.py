@@ -37,6 +37,7 @@ def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
     if stage.scene.exact:
         job = stage.job(where)
         _check_starts(stage, job)
+        _check_quantities(stage, job)
         yield Point(f"{name}-exact", name, Role.REFERENCE, "exact", "exact", "", job, starts)
         return
     if not isinstance(raw, Mapping):
@@ -45,12 +46,7 @@ def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
     key = _setting_key(raw, where)
     fine = stage.job(where, stepper=raw["stepper"], **read_set(raw, where), **{key: raw[key]})
     _check_starts(stage, fine)
-    for quantity in stage.scene.quantities:
-        if quantity.until < math.inf and quantity.until > fine.parameters["duration"]:
-            expected = f"a time within the run of {fine.parameters['duration']:g} s"
-            raise mismatch(
-                f"{stage.where} quantities.{quantity.name}.until", expected, f"{quantity.until:g} s"
-            )
+    _check_quantities(stage, fine)
     coarse = raw.get("coarser", fine.parameters[key] * _COARSER[key])
     coarser = stage.job(where, stepper=raw["stepper"], **read_set(raw, where), **{key: coarse})
     if coarser.parameters[key] <= fine.parameters[key]:
@@ -110,7 +106,7 @@ def budget_points(raw: Any, stages: list[Stage], where: str) -> tuple[list[Point
     stepper = own["stepper"] or None
     scene, starts = stage.scene.name, stage.scene.starts
     job = stage.job(where, stepper=stepper, **base)
-    points = [Point(f"{scene}-base", scene, Role.BASE, "base", "base", "", job, starts)]
+    points = [Point(f"{scene}-base", scene, Role.BASE, "base", own["label"], "", job, starts)]
     for name, table in read_tables(raw.get("choices"), f"{where} choices", "choices").items():
         place = where.replace("budget]", f"budget.choices.{name}]")
         check_word(name, place)
@@ -171,6 +167,14 @@ def _check_starts(stage: Stage, job: Job) -> None:
         raise mismatch(
             f"{stage.where} starts", f"1, because {job.model} has no seed", f"{stage.scene.starts}"
         )
+
+
+def _check_quantities(stage: Stage, job: Job) -> None:
+    duration = job.parameters["duration"]
+    for quantity in stage.scene.quantities:
+        if duration < quantity.until < math.inf:
+            where = f"{stage.where} quantities.{quantity.name}.until"
+            raise mismatch(where, f"a time within the run of {duration:g} s", f"{quantity.until:g} s")
 
 
 def _check_until(until: float, quantities: tuple[Quantity, ...], where: str) -> None:

@@ -68,7 +68,9 @@ def table_lines(comparison: Comparison) -> Iterator[str]:
     yield f"  chosen: {comparison.verdict}"
     if comparison.choices:
         shown = comparison.shown
-        rows = [["error budget, against the base", *(f"{name.replace('_', ' ')}" for name in shown), ""]]
+        rows = [
+            [f"error budget, against {comparison.base}", *(f"{name.replace('_', ' ')}" for name in shown), ""]
+        ]
         yield from _columns(
             [*rows, *([r.point.label, *_errors(r, shown), _note(r)] for r in comparison.choices)]
         )
@@ -128,7 +130,7 @@ def _note(result: Result) -> str:
     if result.measurement.reason:
         return shorten(f"failed: {result.measurement.reason}", _LONGEST_NOTE, placeholder=" ...")
     if result.point.role is Role.CHOICE:
-        return "error of the base" if result.point.refines else ""
+        return "is an error of it" if result.point.refines else ""
     return "<- chosen" if result.chosen else ""
 
 
