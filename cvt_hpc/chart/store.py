@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
 
@@ -60,7 +61,7 @@ class ChartFolder:
                     "choose another --out, or --fresh to throw its results away"
                 )
             if found is not None and fresh:
-                self._clear()
+                self._clear(found["job"]["scenes"])
             self.points.mkdir(parents=True, exist_ok=True)
         entry = {"format": FORMAT, "fingerprint": chart.fingerprint(), "job": chart.resolved()}
         with written_aside(self.job_file) as aside:
@@ -99,8 +100,8 @@ class ChartFolder:
             raise InputError(f'{self.job_file}: expected format "{FORMAT}", found another')
         return entry
 
-    def _clear(self) -> None:
-        """Remove what charts have written, and last the file that vouches for them."""
-        pictures = self.path.glob("*.png")
+    def _clear(self, scenes: Iterable[str]) -> None:
+        """Remove what a chart of these scenes has written, and last the file that vouches for it."""
+        pictures = [self.picture(name) for name in (*scenes, "budget")]
         for path in [*self.points.glob("*.npz"), self.table, self.dataset, *pictures, self.job_file]:
             path.unlink(missing_ok=True)

@@ -265,7 +265,10 @@ def test_simulate_of_a_run_that_fails_ends_with_1(write_job, call):
         (["map", "out/x"], None),
         (["run"], "the following arguments are required: JOB; see `cvt-hpc run --help`"),
         (["run", "x.toml", "--fast"], "unrecognized arguments: --fast; see `cvt-hpc --help`"),
-        (["chart", "x.toml"], None),
+        (
+            ["chart", "x.toml"],
+            "x.toml: chart: expected a table [chart]; see `jobs/chart_oscillator.toml`, found nothing",
+        ),
         ([], "the following arguments are required: COMMAND; see `cvt-hpc --help`"),
     ],
 )
