@@ -6,7 +6,8 @@ kernels' sources: below NUMBA_CACHE_DIR if that is set, else in the package, els
 
 A kernel may be handed to another as an argument, as a right-hand side to a stepper. The compiler tells
 kernels apart by an identity drawn at random, so that it would never find such code again: here it is the
-name.
+name, and for kernels from outside the package the content of their file, which the folder does not know. An
+index that names types which are gone, of a script that has been changed since, counts as empty.
 """
 
 from __future__ import annotations
@@ -19,9 +20,11 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core.caching import IndexDataCacheFile
 
 _PACKAGE = Path(__file__).parent
 _ROOMS_WITH_KERNELS = ("physics", "models", "steppers")
+_OTHER_SOURCES = ("kernels.py", "lanes.py")
 
 # Division by zero gives inf as in numpy, without a test for it. Products may be contracted with sums, and
 # divisions by one number replaced by its reciprocal; sums are never reordered, and what is not a number stays
@@ -59,10 +62,39 @@ def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     numba.config.CACHE_DIR = _CACHE
     try:
         compiled = numba.njit(**options)(function)
-        compiled._set_uuid(f"{function.__module__}.{function.__qualname__}")
+        compiled._set_uuid(_identity(function))
+        compiled._cache._cache_file = _ForgivingIndex.of(compiled._cache._cache_file)
         return compiled
     finally:
         numba.config.CACHE_DIR = users
+
+
+def _identity(function: Callable[..., Any]) -> str:
+    name = f"{function.__module__}.{function.__qualname__}"
+    source = Path(function.__code__.co_filename)
+    if source.is_relative_to(_PACKAGE):
+        return name
+    code = function.__code__
+    try:
+        content = source.read_bytes()
+    except OSError:  # typed into a shell
+        content = repr((code.co_code, code.co_consts, code.co_names)).encode()
+    return f"{name}-{hashlib.sha256(content).hexdigest()[:16]}"
+
+
+class _ForgivingIndex(IndexDataCacheFile):
+    """An index of machine code, empty where it cannot be read."""
+
+    @classmethod
+    def of(cls, index: IndexDataCacheFile) -> _ForgivingIndex:
+        index.__class__ = cls
+        return index
+
+    def _load_index(self) -> dict:
+        try:
+            return super()._load_index()
+        except (AttributeError, ImportError):
+            return {}
 
 
 def _cache_folder() -> str:
@@ -70,7 +102,8 @@ def _cache_folder() -> str:
     for room in _ROOMS_WITH_KERNELS:
         for source in sorted((_PACKAGE / room).rglob("*.py")):
             digest.update(source.read_bytes())
-    digest.update(Path(__file__).read_bytes())
+    for name in _OTHER_SOURCES:
+        digest.update((_PACKAGE / name).read_bytes())
     chosen = numba.config.CACHE_DIR
     if chosen:
         base = Path(chosen)

@@ -31,12 +31,6 @@ from numba.extending import (
 )
 
 ALIGNMENT = 64  # bytes: the widest register, so that no access crosses a line of the cache
-WIDEST = 64  # bytes
-
-
-def lanes_of(dtype: type) -> int:
-    """Lanes that fill the widest registers: 8 in double precision, 16 in single."""
-    return WIDEST // np.dtype(dtype).itemsize
 
 
 class LaneArray:
@@ -398,8 +392,16 @@ def maximum(a, b):
     raise NotImplementedError("for kernels")
 
 
-def exp(x):
-    """e^x of each lane, to two units in the last place; x is held within the range of the exponent."""
+def decay(x):
+    """e^-x of each lane for x >= 0, to two units in the last place.
+
+    x is held within the range of the exponent, at its upper end where it is not a number.
+    """
+    raise NotImplementedError("for kernels")
+
+
+def reciprocals(a, b):
+    """1 / a and 1 / b by one division, the dearest of operations; a b must be within the exponent's range."""
     raise NotImplementedError("for kernels")
 
 
@@ -413,14 +415,23 @@ def _maximum(a, b):
     return lambda a, b: select(a > b, a, b)
 
 
-# ln 2 in two parts, the first with bits to spare, so that n times it is exact
+@overload(reciprocals, inline="always")
+def _reciprocals(a, b):
+    def both(a, b):
+        per_both = 1.0 / (a * b)
+        return b * per_both, a * per_both
+
+    return both
+
+
+# ln 2 in two parts, the first with bits to spare, so that n times it is exact; largest argument
 _SINGLE = (0.693359375, -2.12194440e-4, 87.0)
 _DOUBLE = (0.693145751953125, 1.42860682030941723212e-6, 708.0)
 _PER_LN_2 = 1.4426950408889634
 
 
-@overload(exp)
-def _exp(x):
+@overload(decay)
+def _decay(x):
     if not isinstance(x, _Lanes):
         return None
     high, low, largest = _SINGLE if x.dtype == types.float32 else _DOUBLE
@@ -430,9 +441,9 @@ def _exp(x):
     first, others = factors[0], factors[1:]
 
     def compute(x):
-        x = minimum(maximum(x, -largest), largest)
-        n = nearest_integer(x * _PER_LN_2)
-        r = fma(n, -low, fma(n, -high, x))
+        x = minimum(x, largest)
+        n = nearest_integer(x * -_PER_LN_2)
+        r = fma(n, -low, fma(n, -high, -x))
         total = like(first, x)
         for factor in others:
             total = fma(total, r, factor)

@@ -43,7 +43,7 @@ _COST = (
         (),
         "f8",
         "s",
-        "processor time of the run, its share where several advance together",
+        "processor time of the run; of runs that advance together, their time divided by their number",
         volatile=True,
     ),
     Variable("simulated_seconds", (), "f8", "s", "simulated time, less than asked where the run failed"),
@@ -79,8 +79,29 @@ def record_coordinates(job: Job) -> dict[str, Coordinate]:
     return _model_record(job).coordinates(job.parameters)
 
 
+def run_costs(job: Job) -> np.ndarray:
+    """Core-seconds of each run: within a factor of two on processors of the last years.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+
+    Returns
+    -------
+    (runs,) array
+        In the order of run indices.
+    """
+    grids = np.meshgrid(*(axis.values for axis in job.axes), indexing="ij", sparse=True)
+    p = {**job.parameters, **dict(zip((axis.name for axis in job.axes), grids, strict=True))}
+    model = _model_record(job)
+    cost = model.STEP_COST[job.stepper] * p["stations"] * p["duration"] / p["step"]
+    cost = cost / model.lanes(job.parameters, job.stepper)
+    return np.broadcast_to(cost, job.shape).ravel()
+
+
 def estimate_cost(job: Job) -> float:
-    """Core-seconds of a run, mean over the job: within a factor of two on processors of the last years.
+    """Core-seconds of a run, mean over the job.
 
     Not known (nan) of a model that no study runs.
 
@@ -91,12 +112,7 @@ def estimate_cost(job: Job) -> float:
     """
     if not _has_record(job):
         return float("nan")
-    axes = {axis.name: np.array(axis.values) for axis in job.axes}
-
-    def mean(key: str, power: int = 1) -> float:
-        return float(np.mean(axes.get(key, np.array([job.parameters[key]])) ** power))
-
-    return _model_record(job).STEP_COST[job.stepper] * mean("stations") * mean("duration") * mean("step", -1)
+    return float(run_costs(job).mean())
 
 
 def run_point(job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]) -> dict[str, Any]:
@@ -152,30 +168,30 @@ def run_points(
 
 
 def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
-    """Split runs into groups that can advance together.
+    """Split runs into batches that can advance together.
 
     Parameters
     ----------
     job : Job
-        A validated job.
+        A validated job. Its model's record says by `lanes` how many runs a stepper takes at once, and by
+        `lane_key` of a run's parameters which ones: those with equal keys.
     indices : sequence of int
-        Runs of the job.
+        Run indices.
 
     Returns
     -------
     list of tuple of int
-        Each index once, in groups of as many as the processor's registers hold; in each group in the order
-        given.
+        Each index once, in batches of as many as the processor's registers hold.
     """
-    model = _model(job)
-    kinds: dict[tuple, list[int]] = {}
+    model = _model_record(job)
+    groups: dict[Any, list[int]] = {}
     for index in indices:
-        kinds.setdefault(model.lane_key(job.point(index)), []).append(index)
-    groups = []
-    for alike in kinds.values():
-        most = model.lanes(job.point(alike[0]), job.stepper)
-        groups += [tuple(alike[k : k + most]) for k in range(0, len(alike), most)]
-    return groups
+        groups.setdefault(model.lane_key(job.point(index)), []).append(index)
+    batches = []
+    for group in groups.values():
+        most = model.lanes(job.point(group[0]), job.stepper)
+        batches += [tuple(group[first : first + most]) for first in range(0, len(group), most)]
+    return batches
 
 
 def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:

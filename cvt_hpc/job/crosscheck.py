@@ -16,7 +16,7 @@ MOST_CHECKED_POINTS = 20_000
 
 
 def check_grid(schema: Schema, parameters: dict[str, Any], axes: tuple[Axis, ...], source: str) -> None:
-    """Check the base scene and every run; of a huge grid, the extremes of its axes.
+    """Check the base scene and every run, and that axes are of effect; of a huge grid, the axes' extremes.
 
     Parameters
     ----------
@@ -32,13 +32,20 @@ def check_grid(schema: Schema, parameters: dict[str, Any], axes: tuple[Axis, ...
     Raises
     ------
     InputError
-        With the first problem found, and the run that has it.
+        With the first problem found, and the run that has it; or with an axis that changes no run.
     """
     check_point(schema, parameters, source)
-    names = [axis.name for axis in axes]
+    sizes = {axis.name: len(axis.values) for axis in axes}
+    idle = {name: "" for name, size in sizes.items() if size > 1}
     for values in _points_to_check(axes):
-        varied = dict(zip(names, values, strict=True))
-        check_point(schema, {**parameters, **varied}, source, varied)
+        varied = dict(zip(sizes, values, strict=True))
+        point = {**parameters, **varied}
+        check_point(schema, point, source, varied)
+        inert = schema.inert(point) if idle else {}
+        idle = {name: inert[name] for name in idle if name in inert}
+    for name, setting in idle.items():
+        expected = f"one value, since it has no effect with {setting}"
+        raise mismatch(f"{source}: [axes] {name}", expected, f"{sizes[name]} values")
 
 
 def check_point(

@@ -20,6 +20,7 @@ SHARED = (recording, criterion)  # what every job may set, whatever its model an
 
 Problem = tuple[str, str, str]
 Check = Callable[[dict[str, Any]], list[Problem]]
+Inert = Callable[[dict[str, Any]], dict[str, str]]
 
 
 @dataclass(frozen=True)
@@ -34,12 +35,15 @@ class Schema:
         Section -> key -> Parameter; keys are unique over all sections.
     checks : tuple of callable
         The checks that lie between parameters, the model's first: flat values -> list of problems.
+    inert : callable
+        Flat values -> the keys without effect on such a run, each with the setting that makes it so.
     """
 
     model: str
     stepper: str
     sections: dict[str, dict[str, Parameter]]
     checks: tuple[Check, ...]
+    inert: Inert
 
     @cached_property
     def section_of(self) -> dict[str, str]:
@@ -135,7 +139,8 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
         for section, table in module.PARAMETERS.items():
             sections.setdefault(section, {}).update(table)
     checks = tuple(module.check for module in modules if hasattr(module, "check"))
-    return Schema(model, stepper, sections, checks)
+    inert = getattr(model_module, "inert", lambda parameters: {})
+    return Schema(model, stepper, sections, checks, inert)
 
 
 def known_keys(model: str, stepper: str | None = None) -> tuple[str, ...]:

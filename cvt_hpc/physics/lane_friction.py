@@ -5,48 +5,68 @@ from __future__ import annotations
 import numpy as np
 
 from cvt_hpc.kernels import lane_kernel, merged_lane_kernel
-from cvt_hpc.lanes import absolute, exp, like, maximum, minimum, select, with_sign_of
+from cvt_hpc.lanes import decay, fma, like, maximum, minimum
 
 
 @merged_lane_kernel
-def lane_saturation(speed, width):
-    """tanh(speed / width) and its slope [s/m]."""
-    decay = exp(absolute(speed) * (-2.0 / width))
-    factor = (1.0 - decay) / (1.0 + decay)
-    return with_sign_of(factor, speed), (1.0 - factor * factor) / width
+def lane_saturation(speed, per_width):
+    """tanh(speed / width) of speeds >= 0 [m/s], from 1 / width [s/m]."""
+    left = decay(speed * (2.0 * per_width))
+    return (1.0 - left) / (1.0 + left)
 
 
 @merged_lane_kernel
-def lane_coefficient(kind: int, kinetic, gradient, scale, speed):
-    """Coefficient of steady sliding by a law that is a formula; `kind` is one of `friction.Law`.
+def lane_law(kind: int, kinetic, gradient, scale):
+    """Three coefficients by which `lane_coefficient` computes a law of formula without a division by them.
 
     Parameters
     ----------
     kind : int
-        The law, the same in all lanes.
-    kinetic, gradient, scale, speed
-        mu_k [1], slope at rest [s/m], v_s [m/s], sliding speed >= 0 [m/s], of each lane.
+        One of `friction.Law`, the same in all lanes.
+    kinetic, gradient, scale
+        mu_k [1], slope at rest [s/m] and v_s [m/s] of each lane.
+    """
+    if kind == 3:
+        # mu_k / (1 + d v): mu_k and d
+        return kinetic, -gradient / kinetic, scale
+    return kinetic, gradient * scale, 1.0 / scale
+
+
+@merged_lane_kernel
+def lane_coefficient(kind: int, kinetic, fall, per_scale, speed):
+    """Coefficient of steady sliding by a law that is a formula.
+
+    Parameters
+    ----------
+    kind : int
+        One of `friction.Law`, the same in all lanes.
+    kinetic, fall, per_scale
+        What `lane_law` made of its numbers.
+    speed
+        Sliding speed, >= 0 [m/s].
     """
     if kind == 2:
-        return kinetic - scale * gradient * exp(speed * (-1.0 / scale))
-    if kind == 0:
-        return kinetic
-    if kind == 1:
-        return kinetic + gradient * minimum(speed - scale, 0.0)
-    if kind == 3:
-        return kinetic / (1.0 - gradient / kinetic * speed)
-    x = speed / scale
-    span = gradient * scale * (-2.0 / 3.0)
-    inside = kinetic + span * (1.0 - 1.5 * (x - x * x * x * (1.0 / 3.0)))
-    return select(x * x < 3.0, inside, kinetic + span)
+        mu = fma(-fall, decay(speed * per_scale), kinetic)
+    elif kind == 0:
+        mu = kinetic
+    elif kind == 1:
+        mu = fma(fall, minimum(speed * per_scale - 1.0, 0.0), kinetic)
+    elif kind == 3:
+        mu = kinetic / fma(fall, speed, 1.0)
+    else:
+        x = minimum(speed * per_scale, 1.7320508075688772)
+        mu = kinetic - fall * (2.0 / 3.0) * (1.0 - 1.5 * (x - x * x * x * (1.0 / 3.0)))
+    return mu
 
 
 @lane_kernel
-def lane_table(table_force: np.ndarray, table_speed: np.ndarray, table_mu: np.ndarray, speed, force):
+def lane_table(table: tuple[np.ndarray, np.ndarray, np.ndarray], speed, force):
     """Coefficient by a table that all lanes share: bilinear, held constant outside.
 
-    Written as a sum over the table's intervals, of which each lane fills those below its place.
+    `table` holds forces (nf,) [N/m], speeds (nv,) [m/s] and coefficients (nf, nv). Written as a sum over its
+    intervals, of which each lane fills those below its place.
     """
+    table_force, table_speed, table_mu = table
     mu = mu_below = like(0.0, speed)
     for i in range(table_force.size):
         row = like(table_mu[i, 0], speed)

@@ -20,11 +20,12 @@ from cvt_hpc.steppers.system import System, all_finite, size
 
 FACTS = Facts(
     order=5,
-    order_at_events=1.0,
+    order_at_events=None,
     adaptive=True,
     needs=frozenset({"rates"}),
     implicit=False,
     l_stable=False,
+    damping_limit=np.inf,
     stability="the control keeps the step below 3.3 / d for a damping rate d (friction: "
     "d = N mu / (m v_reg)) and 1.0 / w for a vibration of frequency w",
     damping="below the tolerance",

@@ -44,9 +44,9 @@ class Facts:
     ----------
     order : int
         Order of the error in the step, or of the error per step's control, where the motion is smooth.
-    order_at_events : float
-        Order that is left where friction turns from slip to stick and back, as measured on stick-slip motion
-        (tests/order/test_events.py).
+    order_at_events : float or None
+        Order that is left where friction turns from slip to stick and back, as measured
+        (tests/order/test_events.py); None for an adaptive method, whose step follows the event.
     adaptive : bool
         Takes a tolerance instead of a step.
     needs : frozenset of str
@@ -56,6 +56,8 @@ class Facts:
         Solves linear systems with the Jacobian.
     l_stable : bool
         Motions much faster than the step are gone after it.
+    damping_limit : float
+        Largest step times the rate of a decay (friction: N mu / (m v_reg)) that stays a decay [1].
     stability : str
         The limit of the step, in a sentence.
     damping : str
@@ -63,10 +65,11 @@ class Facts:
     """
 
     order: int
-    order_at_events: float
+    order_at_events: float | None
     adaptive: bool
     needs: frozenset[str]
     implicit: bool
     l_stable: bool
+    damping_limit: float
     stability: str
     damping: str

@@ -4,8 +4,8 @@ Positions half a step on; smooth forces there; then the impulses of the step, fo
 velocities (half-explicit: positions explicit, set-valued forces implicit); positions the second half on
 (Moreau 1988; Acary and Brogliato 2008, sec. 10.1). The impulses solve the inclusion exactly, contact by
 contact until nothing changes (Gauss-Seidel of proximal points): a contact that sticks is at rest, without
-regularisation and without creep, and a rigid body that closes a gap does so in finitely many steps, however
-many bounces there were.
+regularisation and without creep, and a rigid body that closes a gap in infinitely many bounces is at rest
+when they are over, those too short for the step being skipped.
 
 Order 2 between events where smooth forces depend on positions only, 1 else: damping and falling friction are
 taken at the velocity of the step's start. Events fall on steps: order 1. A gap is closed only once it is
@@ -36,6 +36,7 @@ FACTS = Facts(
     needs=frozenset({"rates", "partition", "friction"}),
     implicit=False,
     l_stable=False,
+    damping_limit=np.inf,
     stability="step < 2 / w for a vibration of frequency w, step < 2 / d for a damping rate d (rising "
     "friction: N |mu'| / m); dry friction and rigid contact set no limit",
     damping="none where smooth forces depend on positions only",

@@ -7,10 +7,11 @@ test, Deuflhard 2004, sec. 3.3). So the sharp bends of regularised friction are 
 from far off. Where nothing shrinks it, the iteration leaps by the whole correction: so it gets away from
 sticking when the pull has just grown too large for it, and only the slip far off is a solution.
 
-Where friction falls more steeply than 1 / shift, I - shift J has lost the sign that its determinant has for
-short steps: the equations then have several solutions, and the one found is not that to which the motion
-leads. A Newton iteration with one matrix that converges does so where the determinant has that matrix's sign,
-so that the sign is asked once for each matrix. An even number of such directions at once goes unnoticed.
+Where friction falls more steeply than 1 / shift, I - shift J is no longer positive in its direction: the
+equations then have several solutions, and the one found is not that to which the motion leads. It shows in
+the sign of the determinant; or, should that have turned twice, in that of 1 - shift J_vv - shift^2 J_vx of a
+velocity v and its position x. A Newton iteration with one matrix that converges does so where the determinant
+has that matrix's sign, so that the signs are asked once for each matrix.
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ class Frozen(NamedTuple):
     jacobian, inverse : (n, n) arrays
         J, and (I - shift J)^-1.
     memory : (2,) array
-        Shift of that inverse [s], 0 where there is none yet; sign of det(I - shift J).
+        Shift of that inverse [s], 0 where there is none yet; 1 where friction leaves one solution, -1 where
+        several.
     rates, changed, trial, correction, next_correction : (n,) arrays
         Work space.
     """
@@ -67,23 +69,7 @@ def frozen(system: System) -> Frozen:
 
 
 @kernel
-def invert(frozen: Frozen, shift: float, counts: np.ndarray) -> int:
-    """Make the inverse of I - shift J.
-
-    Parameters
-    ----------
-    frozen : Frozen
-        With J.
-    shift : float
-        Step times the method's coefficient [s].
-    counts : (6,) int array
-        Work counters.
-
-    Returns
-    -------
-    int
-        A `Result`.
-    """
+def _invert(frozen: Frozen, position_of: np.ndarray, shift: float, counts: np.ndarray) -> int:
     n = frozen.rates.size
     frozen.memory[SHIFT] = 0.0
     for i in range(n):
@@ -97,34 +83,46 @@ def invert(frozen: Frozen, shift: float, counts: np.ndarray) -> int:
         return SINGULAR
     frozen.inverse[:] = np.linalg.inv(frozen.inverse)
     frozen.memory[SHIFT], frozen.memory[SIGN] = shift, sign
+    for i in range(n):
+        if position_of[i] >= 0:
+            stiffness = -frozen.jacobian[i, position_of[i]]
+            if 1.0 - shift * frozen.jacobian[i, i] + shift * shift * stiffness < 0.0:
+                frozen.memory[SIGN] = -1.0
     return OK
 
 
 @kernel
-def renew(system: System, frozen: Frozen, t: float, y: np.ndarray, shift: float, counts: np.ndarray) -> int:
-    """Take the Jacobian at a state whose rates are in `frozen.rates`, and invert.
+def renew(
+    system: System, frozen: Frozen, t: float, y: np.ndarray, shift: float, anew: bool, counts: np.ndarray
+) -> int:
+    """Make the inverse of I - shift J, of the Jacobian at hand or of a new one.
 
     Parameters
     ----------
     system : System
         The equations.
     frozen : Frozen
-        Result.
+        Result; its `rates` are those of y.
     t, y
         Time [s] and state (n,).
-    shift, counts
-        As in `invert`.
+    shift : float
+        Step times the method's coefficient [s].
+    anew : bool
+        Take the Jacobian at y.
+    counts : (6,) int array
+        Work counters.
 
     Returns
     -------
     int
         A `Result`.
     """
-    counts[JACOBIANS] += 1
-    counts[RATES] += y.size
-    if not jacobian(system, t, y, frozen.rates, frozen.changed, frozen.jacobian):
-        return NO_VALUE
-    return invert(frozen, shift, counts)
+    if anew:
+        counts[JACOBIANS] += 1
+        counts[RATES] += y.size
+        if not jacobian(system, t, y, frozen.rates, frozen.changed, frozen.jacobian):
+            return NO_VALUE
+    return _invert(frozen, system.position_of, shift, counts)
 
 
 @kernel
@@ -199,19 +197,21 @@ def solve_stage(
     """
     if not _rates(system, frozen, t, z, counts):
         return NO_VALUE
-    outcome, fresh = OK, frozen.memory[SIGN] == 0.0
-    if fresh:
-        outcome = renew(system, frozen, t, z, shift, counts)
-    elif frozen.memory[SHIFT] != shift:
-        outcome = invert(frozen, shift, counts)
-    if outcome != OK:
-        return outcome
-    left = _correct(system, frozen, base, shift, z, frozen.correction, counts)
-    share, near, far, leaps, crossed = 1.0, 0.0, 1.0, 0, False
+    anew = frozen.memory[SIGN] == 0.0
+    begin, fresh, bracketed, crossed, leaps = True, anew, False, False, 0
+    left, share, near, far = 0.0, 1.0, 0.0, 1.0
     for _ in range(MOST_PASSES):
+        if begin:
+            if anew or frozen.memory[SHIFT] != shift:
+                outcome = renew(system, frozen, t, z, shift, anew, counts)
+                if outcome != OK:
+                    return outcome
+            left = _correct(system, frozen, base, shift, z, frozen.correction, counts)
+            crossed |= frozen.memory[SIGN] < 0.0
+            begin, fresh, bracketed, anew = False, anew, False, True
+            share, near, far = 1.0, 0.0, 1.0
         if not np.isfinite(left):
             return NOT_FINITE
-        crossed |= frozen.memory[SIGN] < 0.0
         for i in range(z.size):
             frozen.trial[i] = z[i] + share * frozen.correction[i]
         next_left = np.inf
@@ -226,26 +226,23 @@ def solve_stage(
             frozen.correction[:] = frozen.next_correction
             left, share, near, far, fresh = next_left, 1.0, 0.0, 1.0, False
             # a new Jacobian costs n evaluations: less than as many passes
-            if left * reduction ** (z.size + 2) <= tolerance:
+            begin = left * reduction ** (z.size + 2) > tolerance
+            continue
+        if fresh:
+            overshot = _overshot(system, frozen)
+            bracketed |= overshot
+            if bracketed and not overshot:
+                near = share
+            else:
+                far = share
+            share = 0.5 * (near + far)
+            if far - near >= LEAST_SHARE:
                 continue
-        else:
-            if fresh:
-                if far < 1.0 and not _overshot(system, frozen):
-                    near = share
-                else:
-                    far = share
-                share = 0.5 * (near + far)
-                if far - near >= LEAST_SHARE:
-                    continue
-                leaps += 1
-                if leaps > MOST_LEAPS:
-                    break
-                z += frozen.correction
-            if not _rates(system, frozen, t, z, counts):
-                return NO_VALUE
-        outcome = renew(system, frozen, t, z, shift, counts)
-        if outcome != OK:
-            return outcome
-        left = _correct(system, frozen, base, shift, z, frozen.correction, counts)
-        share, near, far, fresh = 1.0, 0.0, 1.0, True
+            leaps += 1
+            if leaps > MOST_LEAPS:
+                break
+            z += frozen.correction
+        begin = True
+        if not _rates(system, frozen, t, z, counts):
+            return NO_VALUE
     return NOT_UNIQUE if crossed else NO_CONVERGENCE

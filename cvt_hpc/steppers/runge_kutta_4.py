@@ -25,6 +25,7 @@ FACTS = Facts(
     needs=frozenset({"rates"}),
     implicit=False,
     l_stable=False,
+    damping_limit=2.785,
     stability="step < 2.828 / w for a vibration of frequency w, step < 2.785 / d for a damping rate d "
     "(friction: d = N mu / (m v_reg))",
     damping="a vibration decays at the rate (step w)^6 / (144 step)",

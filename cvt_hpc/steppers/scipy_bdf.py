@@ -17,11 +17,12 @@ from cvt_hpc.steppers.system import System
 
 FACTS = Facts(
     order=5,
-    order_at_events=1.0,
+    order_at_events=None,
     adaptive=True,
     needs=frozenset({"rates"}),
     implicit=True,
     l_stable=False,
+    damping_limit=np.inf,
     stability="orders up to 2 are A-stable, higher ones not near the imaginary axis",
     damping="below the tolerance",
 )

@@ -32,7 +32,7 @@ class Work:
     evaluations : int
         Of the rates, by this solver.
     known : bool
-        Whether every rate had a value.
+        Whether every rate of the present step had a value.
     """
 
     def __init__(self) -> None:
@@ -122,10 +122,11 @@ def _sample(work: Work, control: Tolerance, end: float, y: np.ndarray, counts: n
             return Result.OK
         solver.step()
         counts[STEPS] += 1
-        if not work.known or not np.all(np.isfinite(solver.y)):
+        finite = np.all(np.isfinite(solver.y))
+        if solver.status == "failed" or not finite:
             y[:] = solver.y
-            return Result.NOT_FINITE if work.known else Result.NO_VALUE
-        if solver.status == "failed":
-            y[:] = solver.y
-            return Result.STEP_TOO_SMALL
+            if not work.known:
+                return Result.NO_VALUE
+            return Result.STEP_TOO_SMALL if finite else Result.NOT_FINITE
+        work.known = True  # it has found a way round where there was no value
     return Result.TOO_MANY_STEPS

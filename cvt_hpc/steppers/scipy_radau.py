@@ -17,11 +17,12 @@ from cvt_hpc.steppers.system import System
 
 FACTS = Facts(
     order=5,
-    order_at_events=1.0,
+    order_at_events=None,
     adaptive=True,
     needs=frozenset({"rates"}),
     implicit=True,
     l_stable=True,
+    damping_limit=np.inf,
     stability="no limit",
     damping="below the tolerance; what is too fast for the step is gone after it",
 )

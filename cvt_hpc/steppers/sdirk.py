@@ -2,7 +2,7 @@
 
 Order 3, three stages of one matrix, L-stable and stiffly accurate: the last stage is the new state, so that
 what is much faster than the step is in balance after it. A vibration of frequency w is damped in third order,
-at the rate 0.0256 step^3 w^4. It is of stage order 1: where a stiff force moves the motion along, as friction
+at the rate 0.0259 step^3 w^4. It is of stage order 1: where a stiff force moves the motion along, as friction
 that nearly sticks does, expect order 1 to 2.
 """
 
@@ -27,9 +27,10 @@ FACTS = Facts(
     needs=frozenset({"rates"}),
     implicit=True,
     l_stable=True,
+    damping_limit=np.inf,
     stability="no limit; solvable in one way only while 0.436 step times the steepest growth rate (falling "
     "friction: N |mu'| / m) is below 1",
-    damping="a vibration decays at the rate 0.0256 step^3 w^4",
+    damping="a vibration decays at the rate 0.0259 step^3 w^4",
 )
 PARAMETERS = {"numerics": {"step": STEP, "solver_tolerance": SOLVER_TOLERANCE}}
 OK = int(Result.OK)

@@ -29,6 +29,7 @@ FACTS = Facts(
     needs=frozenset({"rates", "partition"}),
     implicit=False,
     l_stable=False,
+    damping_limit=2.0,
     stability="step < 2 / w for a vibration of frequency w, step < 2 / d for a damping rate d (friction: "
     "d = N mu / (m v_reg))",
     damping="none where forces depend on positions only",

@@ -1,4 +1,4 @@
-"""The durable record: one append-only log per rank and session, one unbuffered write per run.
+"""The durable record: one append-only log per rank and session, one unbuffered write per batch of runs.
 
 A log is a preamble (magic, format version, a JSON header and its checksum) and then frames of one length:
 marker, payload length, run index, time of writing, checksum, payload. A frame's checksum starts from the
@@ -13,6 +13,7 @@ import os
 import platform
 import time
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 from struct import Struct
 from typing import Any
@@ -30,6 +31,8 @@ _CHECKED = Struct("<Iqd")  # the part of a frame's head that its checksum covers
 
 KEPT = "The runs recorded so far are kept, and the same command goes on from them"
 SYNC_INTERVAL = 5.0  # [s]; a dead process loses nothing, a power failure at most this much
+
+Record = tuple[int, np.ndarray]  # run index, and the record of that run, shape ()
 
 
 class RecordFormat:
@@ -120,18 +123,19 @@ class RecordLog:
         self._descriptor: int | None = None
         self._synced = 0.0
 
-    def append(self, index: int, row: np.ndarray) -> None:
-        """Write the record of run `index`; when this returns, the death of the process cannot lose it.
+    def append(self, records: Sequence[Record]) -> None:
+        """Write the records of some runs; when this returns, the death of the process cannot lose them.
 
         Raises
         ------
         StorageError
-            If the system refuses the write. The log then ends with the record before.
+            If the system refuses the write. The log then ends with the record before, and none of these.
         """
+        now = time.time()
         try:
             if self._descriptor is None:
                 self._open()
-            self._write(self._layout.frame(index, time.time(), row.tobytes()))
+            self._write(b"".join(self._layout.frame(index, now, row.tobytes()) for index, row in records))
             if time.monotonic() - self._synced > SYNC_INTERVAL:
                 self._sync()
         except OSError as error:

@@ -1,15 +1,14 @@
-"""Who does which run: all ranks compute, and each claims its next run from one counter."""
+"""Who does which runs: all ranks compute, and each claims its next batch from one counter."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, Protocol, Self
 
-import numpy as np
-
+from cvt_hpc.study.batches import Batch
 from cvt_hpc.study.launch import Team
 
-INTERRUPTED = 2**40  # claims count from here when all are interrupted: beyond every order
+INTERRUPTED = 2**40  # claims count from here when all are interrupted: beyond every plan
 
 
 class Tally(NamedTuple):
@@ -25,14 +24,14 @@ class Counter(Protocol):
     def claim(self) -> int:
         """Return a position that no other claim gets: 0, 1, 2, ... over all ranks."""
 
-    def report(self, failed: bool) -> None:
-        """Count a finished run."""
+    def report(self, finished: int, failed: int) -> None:
+        """Count runs that are finished, and those of them that failed."""
 
     def tally(self) -> Tally:
         """Return what all ranks have reported."""
 
     def interrupt_all(self) -> None:
-        """Let no rank claim another run, and all break off the one that they are at."""
+        """Let no rank claim another batch, and all break off the one that they are at."""
 
     def is_interrupted(self) -> bool:
         """Return whether some rank has interrupted all."""
@@ -51,23 +50,25 @@ def open_counter(team: Team) -> Counter:
     return SharedCounter(team.communicator)
 
 
-def claimed_runs(order: np.ndarray, counter: Counter, may_claim: Callable[[], bool]) -> Iterator[int]:
-    """Yield the run indices that this rank is to do.
+def claimed_batches(
+    plan: Sequence[Batch], counter: Counter, may_claim: Callable[[], bool]
+) -> Iterator[Batch]:
+    """Yield the batches that this rank is to do.
 
     Parameters
     ----------
-    order : numpy.ndarray of int, shape (runs,)
-        Run indices in the order in which they are to be started; the same on all ranks.
+    plan : sequence of tuple of int
+        Run indices of each batch, in the order in which they are to be started; the same on all ranks.
     counter : Counter
-        Where positions in `order` are claimed.
+        Where positions in `plan` are claimed.
     may_claim : callable
         Asked before each claim; when it answers False, there are no more.
     """
     while may_claim():
         position = counter.claim()
-        if position >= len(order):
+        if position >= len(plan):
             return
-        yield int(order[position])
+        yield plan[position]
 
 
 class SerialCounter:
@@ -83,9 +84,9 @@ class SerialCounter:
         self._next += 1
         return self._next - 1
 
-    def report(self, failed: bool) -> None:
-        """Count a finished run."""
-        self._finished += 1
+    def report(self, finished: int, failed: int) -> None:
+        """Count runs that are finished, and those of them that failed."""
+        self._finished += finished
         self._failed += failed
 
     def tally(self) -> Tally:
@@ -93,7 +94,7 @@ class SerialCounter:
         return Tally(self._finished, self._failed)
 
     def interrupt_all(self) -> None:
-        """Let no further position be one of an order."""
+        """Let no further position be one of a plan."""
         self._next = INTERRUPTED
 
     def is_interrupted(self) -> bool:

@@ -57,18 +57,18 @@ class SharedCounter:
         """Return a position that no other claim gets."""
         return self._fetch(self._NEXT, 1, MPI.SUM)
 
-    def report(self, failed: bool) -> None:
-        """Count a finished run."""
-        self._fetch(self._FINISHED, 1, MPI.SUM)
+    def report(self, finished: int, failed: int) -> None:
+        """Count runs that are finished, and those of them that failed."""
+        self._fetch(self._FINISHED, finished, MPI.SUM)
         if failed:
-            self._fetch(self._FAILED, 1, MPI.SUM)
+            self._fetch(self._FAILED, failed, MPI.SUM)
 
     def tally(self) -> Tally:
         """Return what all ranks have reported."""
         return Tally(self._fetch(self._FINISHED, 0, MPI.NO_OP), self._fetch(self._FAILED, 0, MPI.NO_OP))
 
     def interrupt_all(self) -> None:
-        """Let no rank claim another run, and all break off the one that they are at."""
+        """Let no rank claim another batch, and all break off the one that they are at."""
         # By the same operation as a claim: MPI promises nothing for two kinds that meet at one place.
         self._fetch(self._NEXT, INTERRUPTED, MPI.SUM)
 

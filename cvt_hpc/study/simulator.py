@@ -1,10 +1,12 @@
-"""What a sweep asks of one run, so that tests can put something small in the place of the mechanics."""
+"""What a sweep asks of its runs, so that tests can put something small in the place of the mechanics."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
 
 from cvt_hpc.variables import Variable
 
@@ -13,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Simulator(Protocol):
-    """What a sweep needs to know of one run; the module `cvt_hpc.simulation` satisfies it."""
+    """What a sweep needs to know of its runs; the module `cvt_hpc.simulation` satisfies it."""
 
     Interrupted: type[Exception]
 
@@ -23,10 +25,20 @@ class Simulator(Protocol):
     def record_coordinates(self, job: Job) -> Mapping[str, Any]:
         """Return the dimensions of the record beside the grid's: name -> (values, units, long_name)."""
 
-    def run_point(
-        self, job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]
-    ) -> Mapping[str, Any]:
-        """Do one run; raise `Interrupted` when `interrupt()` returns a text."""
+    def run_costs(self, job: Job) -> np.ndarray:
+        """Return the predicted duration of each run, in any unit."""
+
+    def lane_groups(self, job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
+        """Split run indices into batches of runs that can advance together, as large as there are lanes."""
+
+    def run_points(
+        self, job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+    ) -> Sequence[Mapping[str, Any]]:
+        """Do the runs of a batch, and return their records in the order of the points.
+
+        No number of a record depends on the other runs of its batch. When `interrupt()` returns a text, all
+        runs end by `Interrupted`.
+        """
 
 
 def default_simulator() -> Simulator:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.files import StorageError, discard
+from cvt_hpc.study.batches import Batch
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.gather import write_results
@@ -23,9 +22,10 @@ from cvt_hpc.study.provenance import new_session
 from cvt_hpc.study.record import RecordFormat, RecordLog
 from cvt_hpc.study.recovery import Records, read_records
 from cvt_hpc.study.report import RunReport, build_report
-from cvt_hpc.study.schedule import Counter, claimed_runs, open_counter
+from cvt_hpc.study.schedule import Counter, claimed_batches, open_counter
 from cvt_hpc.study.simulator import Simulator, default_simulator
 from cvt_hpc.study.stopping import ELSEWHERE, SignalWatch, Stop
+from cvt_hpc.study.task import Task
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
@@ -34,28 +34,10 @@ if TYPE_CHECKING:
 _logger = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class _Task:
-    """What is to be computed."""
-
-    job: Job
-    study: Study
-    simulator: Simulator
-
-    def attempt(self, index: int, interrupt: Callable[[], str | None]) -> np.ndarray | None:
-        """Return the record of run `index`, whatever becomes of it; None if it was broken off."""
-        try:
-            return self.study.pack(self.simulator.run_point(self.job, self.job.point(index), interrupt))
-        except self.simulator.Interrupted:
-            return None
-        except Exception as error:  # one run's defect must not cost the others
-            return self.study.pack_failure(f"{type(error).__name__}: {error}")
-
-
 class _Plan(NamedTuple):
     """What rank 0 finds out and all ranks need."""
 
-    order: np.ndarray
+    batches: list[Batch]
     recorded: int
     failed: int
     session: dict[str, Any]
@@ -85,7 +67,7 @@ def run(
     fresh : bool
         Throw away what earlier runs have left in the folder, instead of going on from there.
     simulator : Simulator, optional
-        What does one run; `cvt_hpc.simulation` by default.
+        What does the runs; `cvt_hpc.simulation` by default.
     progress : bool
         Whether rank 0 shows on stderr how far the sweep is.
     time_limit : float, optional
@@ -104,10 +86,10 @@ def run(
     deadline = float("inf") if time_limit is None else time.monotonic() + time_limit
     simulator = simulator or default_simulator()
     study = describe(job, simulator)
-    task = _Task(job, study, simulator)
+    task = Task(job, study, simulator)
     folder = StudyFolder(out if out is not None else Path("out") / job.name)
     with SignalWatch() as signals, assembled_team(folder.crash_log) as team, ExitStack() as held:
-        plan = team.on_root(lambda: _prepare(folder, study, fresh, team.size, held))
+        plan = team.on_root(lambda: _prepare(folder, task, fresh, team.size, held))
         with open_counter(team) as counter:
             display = Progress(counter, study.size, plan.recorded, plan.failed, progress and team.rank == 0)
             stop = Stop(counter, signals, deadline, display.show)
@@ -118,8 +100,9 @@ def run(
         return team.on_root(lambda: _conclude(folder, study, stopped))
 
 
-def _prepare(folder: StudyFolder, study: Study, fresh: bool, ranks: int, held: ExitStack) -> _Plan:
+def _prepare(folder: StudyFolder, task: Task, fresh: bool, ranks: int, held: ExitStack) -> _Plan:
     """Take the folder into possession and find what is left to do; on rank 0 alone."""
+    study = task.study
     folder.check_free_for(study, fresh)
     folder.create()
     held.enter_context(locked(folder.lock_file))
@@ -135,9 +118,8 @@ def _prepare(folder: StudyFolder, study: Study, fresh: bool, ranks: int, held: E
         _logger.warning(warning)
     recorded = records.recorded
     done = int((records.rows["status"] == Status.DONE).sum())
-    # The order is a matter of speed alone, never of results: each run depends on its index only.
-    order = np.flatnonzero(~recorded)
-    return _Plan(order, int(recorded.sum()), int(recorded.sum()) - done, session)
+    batches = task.plan(np.flatnonzero(~recorded), ranks)
+    return _Plan(batches, int(recorded.sum()), int(recorded.sum()) - done, session)
 
 
 def _other_versions(records: Records, session: dict[str, Any]) -> list[str]:
@@ -152,17 +134,17 @@ def _other_versions(records: Records, session: dict[str, Any]) -> list[str]:
 
 
 def _compute(
-    task: _Task, folder: StudyFolder, plan: _Plan, rank: int, counter: Counter, stop: Stop
+    task: Task, folder: StudyFolder, plan: _Plan, rank: int, counter: Counter, stop: Stop
 ) -> str | None:
     """Do and record the runs that this rank claims; return why it could not go on, if so."""
     layout = RecordFormat(task.study.fingerprint, task.study.record_dtype)
     try:
         with RecordLog(folder.records, layout, plan.session, rank) as log:
-            for index in claimed_runs(plan.order, counter, stop.may_claim):
-                row = task.attempt(index, stop.interrupt)
-                if row is not None:
-                    log.append(index, row)
-                    counter.report(failed=bool(row["status"] != Status.DONE))
+            for batch in claimed_batches(plan.batches, counter, stop.may_claim):
+                for records in task.do(batch, stop.interrupt):
+                    log.append(records)
+                    failed = sum(bool(row["status"] != Status.DONE) for _, row in records)
+                    counter.report(len(records), failed)
     except StorageError as error:
         stop.tell_all()
         return str(error)

@@ -37,6 +37,10 @@ def run_point(job, point, interrupt):
     }
 
 
+def run_points(job, points, interrupt):
+    return [run_point(job, point, interrupt) for point in points]
+
+
 def simulate(job, at):
     """Return the same as a history of three instants."""
     point = job.point_at(at)
@@ -60,7 +64,9 @@ def mechanics(monkeypatch):
         Interrupted=Interrupted,
         record_variables=record_variables,
         record_coordinates=lambda job: {},
-        run_point=run_point,
+        run_costs=lambda job: np.ones(job.size),
+        lane_groups=lambda job, indices: [(index,) for index in indices],
+        run_points=run_points,
         simulate=simulate,
         estimate_cost=lambda job: 30.0,
     )

@@ -1,6 +1,7 @@
 """A belt run until it has settled, and what a free body cut through its strands needs to know."""
 
 import numpy as np
+from fast_runs import FastRuns
 
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
@@ -13,9 +14,9 @@ from cvt_hpc.models.elastic_belt.belt import (
     initial_state,
     mesh,
 )
-from cvt_hpc.models.elastic_belt.imex import imex_work, step_imex
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, strains
+from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.physics.compliance import contact_state
 from cvt_hpc.steppers import imex
 
@@ -30,10 +31,10 @@ def fresh_contacts(belt: Belt):
     return contact_state(belt.driving.weight.size), contact_state(belt.driven.weight.size)
 
 
-def start(**parameters):
-    """Constants, state and contact memory of a run with defaults but for `parameters`."""
+def start(**parameters) -> tuple[Belt, State]:
+    """Constants and state of a run with defaults but for `parameters`."""
     belt = belt_constants(DEFAULTS | parameters)
-    return belt, initial_state(DEFAULTS | parameters, belt), fresh_contacts(belt)
+    return belt, initial_state(DEFAULTS | parameters, belt)
 
 
 class Settled:
@@ -52,21 +53,20 @@ class Settled:
     """
 
     def __init__(self, duration: float, averaged: float, **parameters):
-        self.belt, state, contacts = start(**parameters)
+        self.belt, state = start(**parameters)
         self.grid: Mesh = mesh(DEFAULTS | parameters)
-        work = imex_work(state)
+        run = FastRuns([self.belt], [state])
         samples, stride = round(averaged / STEP) // 25, 25
-        for _ in range(round(duration / STEP) - samples * stride):
-            assert step_imex(self.belt, state, contacts, work, STEP) > 0
-        before = state.scalars.copy()
+        run.advance(round(duration / STEP) - samples * stride, STEP)
+        before = run.state().scalars
         sums = None
         for _ in range(samples):
-            for _ in range(stride):
-                assert step_imex(self.belt, state, contacts, work, STEP) > 0
-            now = self._forces(state)
+            run.advance(stride, STEP)
+            now = self._forces(run.state())
             sums = now if sums is None else [a + b for a, b in zip(sums, now, strict=True)]
+        assert run.outcome() is Outcome.OK
         self.tension, self.push, self.w, self.thrusts = (total / samples for total in sums)
-        rates = (state.scalars - before) / (samples * stride * STEP)
+        rates = (run.state().scalars - before) / (samples * stride * STEP)
         self.spin_up = self.belt.driven_inertia * rates[DRIVEN_SPEED]
         self.closing = self.belt.axial_damping * rates[DRIVEN_POSITION]
 

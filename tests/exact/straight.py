@@ -7,6 +7,7 @@ so that the strains, and with them T and P, do not depend on w, and the flanks w
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import (
+    DRIVEN_SPEED,
     FIELDS,
     N_ELEMENT,
     N_RING,
@@ -54,4 +55,7 @@ def moving_straight(belt: Belt, tension: float = TENSION, push: float = 0.0) -> 
     fields[N_RING] = 1.0 / (1.0 + tension / belt.ring_stiffness)
     fields[N_ELEMENT] = 1.0 / (1.0 - push / belt.element_stiffness)
     scalars[TIME] = belt.rise_time  # the start-up's damping is over
+    scalars[DRIVEN_SPEED] = (
+        belt.driving_speed / belt.ratio
+    )  # and the pulley, of which the belt is free, turns
     return State(fields, scalars)

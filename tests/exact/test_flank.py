@@ -5,7 +5,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from cvt_hpc.models.elastic_belt.belt import DRIVEN_POSITION, State, W, belt_constants
+from cvt_hpc.models.elastic_belt.belt import DRIVEN_POSITION, SCALARS, State, W, belt_constants
 from cvt_hpc.models.elastic_belt.flank import flank_forces, sliding
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.rhs import contact_forces
@@ -82,7 +82,7 @@ def test_overlap_in_rigid_grooves():
     parameters |= {"duration": 1.0, "sheave_stiffness": np.inf, "driving_position": 3e-5}
     belt = belt_constants(parameters)
     n, first, count = belt.cell.size, belt.driven_start, belt.driven.weight.size
-    fields, scalars, force = np.zeros((7, n)), np.zeros(3), np.empty(n)
+    fields, scalars, force = np.zeros((7, n)), np.zeros(len(SCALARS)), np.empty(n)
     fields[W] = 1e-4 * np.sin(np.arange(n))
     scalars[DRIVEN_POSITION] = -2e-5
     contacts = contact_state(belt.driving.weight.size), contact_state(count)

@@ -214,6 +214,29 @@ def test_a_stepper_may_have_no_check(write_job, monkeypatch):
     assert load_job(write_job("[scene]\nthrust = 2e4\n[numerics]\nstep = 9\n")).parameters["step"] == 9.0
 
 
+IDLE = '[scene]\nthrust = "20 kN"\n[axes]\nlabel = ["steel", "brass"]\n'
+
+
+def test_an_axis_that_changes_no_run_is_refused(write_job, monkeypatch):
+    def inert(parameters):
+        return {"label": "refined false", "ratio": "always"} if not parameters["refined"] else {}
+
+    assert load_job(write_job(IDLE)).size == 2  # the model says nothing of what is inert
+    monkeypatch.setattr(sys.modules["toy_model"], "inert", inert, raising=False)
+    with pytest.raises(InputError) as caught:
+        load_job("x.toml")
+    assert (
+        str(caught.value)
+        == "x.toml: [axes] label: expected one value, since it has no effect with refined false, found 2 values"
+    )
+    assert load_job("x.toml", {"refined": True}).size == 2
+    assert load_job("x.toml", {"label": "brass"}).size == 1
+    # of effect in half of the runs is of effect, and one value costs nothing
+    for order in ("true, false", "false, true"):
+        assert load_job(write_job(f"{IDLE}refined = [{order}]\n")).size == 4
+    assert load_job(write_job(changed(IDLE, '"steel", ', ""))).size == 1
+
+
 def test_a_huge_grid_is_checked_at_its_extremes(write_job, monkeypatch):
     monkeypatch.setattr(crosscheck, "MOST_CHECKED_POINTS", 5)
     loads = "[axes]\nload_history = ['ramp', 'constant']\nload = [0, {}, 10]\n"

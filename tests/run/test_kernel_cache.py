@@ -20,7 +20,8 @@ def package(tmp_path):
     """A copy of what the folder's name depends on."""
     copy = tmp_path / "site" / "cvt_hpc"
     copy.mkdir(parents=True)
-    shutil.copy(PACKAGE / "kernels.py", copy)
+    for name in ("kernels.py", "lanes.py"):
+        shutil.copy(PACKAGE / name, copy)
     for room in ("physics", "models", "steppers", "study"):
         shutil.copytree(PACKAGE / room, copy / room, ignore=shutil.ignore_patterns("__pycache__"))
     return copy
@@ -68,6 +69,7 @@ def test_the_folder_is_in_the_package_and_named_by_content(package, no_choice):
         ("models/elastic_belt/new_part.py", True),
         ("steppers/imex.py", True),
         ("kernels.py", True),
+        ("lanes.py", True),
         ("study/sweep.py", False),
     ],
 )
@@ -125,6 +127,49 @@ def test_code_of_a_kernel_that_takes_another_is_found_again(tmp_path):
         for _ in range(2)
     ]
     assert hits == ["0", "1"]
+
+
+def cache_hits(folder, tmp_path, program):
+    """What a program prints, in a process of its own with a cache of its own."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(folder)}
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    return done.stdout.split()
+
+
+MARCH = (
+    "from cvt_hpc.kernels import kernel\n"
+    "@kernel\ndef euler(rate, constants, y):\n    return y + 0.5 * rate(constants, y)\n"
+)
+FALL = (
+    "from typing import NamedTuple\nfrom cvt_hpc.kernels import kernel\n"
+    "class NAME(NamedTuple):\n    rate: float\n"
+    "@kernel\ndef fall(constants, y):\n    return -SLOPE * constants.rate * y\n"
+    "ONE = NAME(1.0)\n"
+)
+RUN = (
+    "from falling import ONE, fall; from marching import euler; "
+    "print(euler(fall, ONE, 1.0), sum(euler.stats.cache_hits.values()))"
+)
+
+
+def test_a_changed_kernel_from_outside_the_package_is_another(tmp_path):
+    # the marching kernel, as of the package, stays; what it was handed has changed under the same name
+    (tmp_path / "marching.py").write_text(MARCH)
+    found = []
+    for slope in ("1.0", "1.0", "0.5", "1.0"):
+        (tmp_path / "falling.py").write_text(FALL.replace("SLOPE", slope).replace("NAME", "Rate"))
+        found.append(cache_hits(tmp_path, tmp_path, RUN))
+    assert found == [["0.5", "0"], ["0.5", "1"], ["0.75", "0"], ["0.5", "1"]]
+
+
+def test_an_index_with_a_type_that_is_gone_counts_as_empty(tmp_path):
+    (tmp_path / "marching.py").write_text(MARCH)
+    found = []
+    for name in ("Rate", "Speed", "Speed"):
+        (tmp_path / "falling.py").write_text(FALL.replace("SLOPE", "1.0").replace("NAME", name))
+        found.append(cache_hits(tmp_path, tmp_path, RUN))
+    assert found == [["0.5", "0"], ["0.5", "0"], ["0.5", "1"]]
 
 
 def test_functions_of_other_people_are_kept_where_they_always_were(package, monkeypatch, tmp_path):

@@ -16,6 +16,11 @@ def grid(request):
     return mesh(job(stations=request.param).parameters)
 
 
+def weights(grid, places):
+    """The sensors' matrix, in double precision."""
+    return sensors(grid, places, 50e-6, np.float64).matrix
+
+
 def strand(grid, region):
     """First station, number of cells, and x / length at the stations of a strand."""
     count = grid.counts[region]
@@ -37,7 +42,7 @@ def test_probes_divide_every_region_in_equal_parts(grid):
 def test_probes_are_exact_for_linear_displacement(grid):
     # 7 probes lie within cells, at stations, wherever; the last cell, where a line is torn, is behind all of them
     places = probes(grid, 7, 4)
-    matrix = sensors(grid, places).matrix[: len(places)]
+    matrix = weights(grid, places)[: len(places)]
     w = 3e-4 - 2e-3 * grid.position
     expected = [3e-4 - 2e-3 * place.position for place in places]
     # sums of two products: a few round-offs of 1 mm
@@ -48,7 +53,7 @@ def test_a_probe_behind_the_last_station_looks_round_the_corner(grid):
     # a hundred probes on t2: the last ones lie in the cell that leads back to station 0
     places = probes(grid, 99, 1)
     last = max(places, key=lambda place: place.position)
-    row = sensors(grid, places).matrix[places.index(last)]
+    row = weights(grid, places)[places.index(last)]
     start, cell = grid.position[-1], grid.cell[-1]
     assert last.position > start
     share = (last.position - start) / cell
@@ -65,13 +70,13 @@ def test_modal_sensors_are_exact_for_sines_on_a_chord(grid, region):
     w[(first + count) % w.size] = 4e-4 - 9e-4
     for k, size in enumerate(sizes, start=1):
         w[first : first + count] += size * np.sin(k * np.pi * x)
-    found = (sensors(grid, ()).matrix @ w).reshape(2, MODES)[STRANDS.index(region)]
+    found = (weights(grid, ()) @ w).reshape(2, MODES)[STRANDS.index(region)]
     # discrete sines are orthogonal; the chord, a thousand um, is taken out up to its round-off
     assert found == pytest.approx(sizes, rel=1e-9, abs=1e-17)
 
 
 def test_modal_sensors_are_blind_for_arcs_the_other_strand_and_higher_modes(grid):
-    matrix = sensors(grid, ()).matrix.reshape(2, MODES, -1)
+    matrix = weights(grid, ()).reshape(2, MODES, -1)
     for number, region in enumerate(STRANDS):
         first, count, x = strand(grid, region)
         seen = np.flatnonzero(np.abs(matrix[number]).max(axis=0))

@@ -19,11 +19,11 @@ PATIENCE = 20.0  # [s] that rank 0 computes at most while it waits for the other
 def claim_all(team: Team, counter: Counter, options: dict[str, Any]) -> dict[str, Any]:
     """Claim below a limit from all ranks; return the claims by rank, and the tally as all ranks see it."""
     mine = [counter.claim()]
-    counter.report(failed=mine[0] % 10 == 0)
+    counter.report(1, failed=mine[0] % 10 == 0)
     team.wait_for_all(lambda: None)  # each has one
     while (position := counter.claim()) < options["limit"]:
         mine.append(position)
-        counter.report(failed=position % 10 == 0)
+        counter.report(1, failed=position % 10 == 0)
     team.wait_for_all(lambda: None)
     return {"claims": team.collect(mine), "tallies": team.collect(tuple(counter.tally()))}
 

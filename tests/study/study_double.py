@@ -13,7 +13,7 @@ import os
 import resource
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -78,14 +78,18 @@ class Simulator:
     """Satisfies what the study asks of the module `cvt_hpc.simulation`.
 
     `slow` makes runs take their time, and no difference to their numbers: {"from": first, "pause": seconds}.
-    `largest_file` [bytes] is what the system lets the process write from the first run on.
+    `largest_file` [bytes] is what the system lets the process write from the first run on. Up to `lanes` runs are
+    done as one batch.
     """
 
     Interrupted = Interrupted
 
-    def __init__(self, slow: dict[str, float] | None = None, largest_file: int | None = None) -> None:
+    def __init__(
+        self, slow: dict[str, float] | None = None, largest_file: int | None = None, lanes: int = 1
+    ) -> None:
         self.slow = slow or {}
         self.largest_file = largest_file
+        self.lanes = lanes
 
     def record_variables(self, job: Job) -> tuple[Variable, ...]:
         return (
@@ -103,6 +107,17 @@ class Simulator:
             "strand": Coordinate(np.array(["t1", "t2"]), "", "strand of the belt"),
             "frequency_bin": Coordinate(np.linspace(0, 100, 11), "Hz", "frequency"),
         }
+
+    def run_costs(self, job: Job) -> np.ndarray:
+        return np.ones(math.prod(len(axis.values) for axis in job.axes))
+
+    def lane_groups(self, job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
+        return [tuple(indices[i : i + self.lanes]) for i in range(0, len(indices), self.lanes)]
+
+    def run_points(
+        self, job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+    ) -> list[dict[str, Any]]:
+        return [self.run_point(job, point, interrupt) for point in points]
 
     def run_point(
         self, job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]
@@ -153,7 +168,7 @@ def main(options: dict[str, Any]) -> int:
     """Sweep the double as the command line would.
 
     Options: `out`; `runs`, the length of the only axis; `parameters` of the job; `sweep`, further arguments of
-    `run`; `slow` and `largest_file`, see `Simulator`; `thread_level` of MPI; `break_rank`, the rank whose log
+    `run`; `slow`, `largest_file` and `lanes`, see `Simulator`; `thread_level` of MPI; `break_rank`, the rank whose log
     has a defect, and whether the program `swallows_defects`; `break_rank_after`, the rank that raises when the
     sweep is over.
     """
@@ -167,7 +182,7 @@ def main(options: dict[str, Any]) -> int:
     if process_rank() == options.get("break_rank"):
         RecordLog.append = raise_defect
     job = Job((Axis("load", tuple(range(options.get("runs", 12)))),), options.get("parameters", {}))
-    simulator = Simulator(options.get("slow"), options.get("largest_file"))
+    simulator = Simulator(options.get("slow"), options.get("largest_file"), options.get("lanes", 1))
     try:
         report = run(job, Path(options["out"]), simulator=simulator, **options.get("sweep", {}))
     except InputError as error:

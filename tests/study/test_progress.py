@@ -61,7 +61,7 @@ def test_rate_is_that_of_the_latest_session(tmp_path):
         layout = RecordFormat(study.fingerprint, study.record_dtype)
         with RecordLog(tmp_path / "records", layout, session, rank=0) as log:
             for index in indices:
-                log.append(index, study.pack_failure("none"))
+                log.append([(index, study.pack_failure("none"))])
     # All records are of now: nine of them since the latest start, a second ago.
     status = read_status(tmp_path)
     assert 0.01 < status.rate <= 9
@@ -87,9 +87,8 @@ def test_lines_where_there_is_no_terminal(start, tmp_path):
 def test_progress_counts_all_ranks_and_earlier_sessions(capsys):
     counter = SerialCounter()
     progress = Progress(counter, total=100, recorded=40, failed=2, visible=True)
-    for _ in range(10):
-        counter.report(failed=False)
-    counter.report(failed=True)
+    counter.report(8, failed=0)
+    counter.report(3, failed=1)
     progress.show()
     assert capsys.readouterr().err == ""  # too soon after the start
     progress.close()
@@ -108,8 +107,7 @@ def test_a_bar_on_a_terminal(monkeypatch):
         monkeypatch.setattr("sys.stderr", terminal)
         counter = SerialCounter()
         progress = Progress(counter, total=10, recorded=2, failed=0, visible=True)
-        for _ in range(5):
-            counter.report(failed=True)
+        counter.report(5, failed=5)
         progress.close()
     shown = read_terminal(ours)
     assert "7/10 [" in shown

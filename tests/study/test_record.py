@@ -33,7 +33,7 @@ def write_log(folder, study, rows, indices, session=SESSION):
     folder.mkdir(exist_ok=True)
     with RecordLog(folder, RecordFormat(study.fingerprint, study.record_dtype), session, rank=0) as log:
         for index in indices:
-            log.append(index, rows[index])
+            log.append([(index, rows[index])])
     return log.path
 
 
@@ -187,7 +187,7 @@ def test_timings_may_differ_between_records_of_a_run(tmp_path, study, rows):
 def test_a_refused_write_leaves_whole_records(tmp_path, study, rows, monkeypatch):
     layout = RecordFormat(study.fingerprint, study.record_dtype)
     log = RecordLog(tmp_path, layout, SESSION, rank=0)
-    log.append(1, rows[1])
+    log.append([(1, rows[1])])
     system_write = os.write
 
     def short_then_full(descriptor, data):
@@ -197,21 +197,31 @@ def test_a_refused_write_leaves_whole_records(tmp_path, study, rows, monkeypatch
 
     monkeypatch.setattr(os, "write", short_then_full)
     with pytest.raises(StorageError, match="No space left on device"):
-        log.append(2, rows[2])
+        log.append([(2, rows[2]), (4, rows[4])])
     monkeypatch.undo()
-    log.append(3, rows[3])
+    log.append([(3, rows[3])])
     log.close()
     records = read_records(tmp_path, study)
     assert_recorded(records, rows, [1, 3])
     assert records.warnings == []
 
 
-def test_each_record_is_one_write(tmp_path, study, rows, monkeypatch):
+def test_the_records_of_a_batch_are_one_write(tmp_path, study, rows, frame_size, monkeypatch):
     writes = []
     system_write = os.write
     monkeypatch.setattr(os, "write", lambda fd, data: writes.append(len(data)) or system_write(fd, data))
-    write_log(tmp_path / "r", study, rows, [0, 1, 2])
-    assert writes[1:] == [RecordFormat(study.fingerprint, study.record_dtype).frame_size] * 3
+    with RecordLog(tmp_path, RecordFormat(study.fingerprint, study.record_dtype), SESSION, rank=0) as log:
+        for batch in ([6], [5, 0, 2], [7]):
+            log.append([(index, rows[index]) for index in batch])
+    assert writes[1:] == [frame_size, 3 * frame_size, frame_size]
+    assert_recorded(read_records(tmp_path, study), rows, [0, 2, 5, 6, 7])
+
+
+def test_a_torn_batch_keeps_its_whole_records(tmp_path, study, rows, frame_size):
+    with RecordLog(tmp_path, RecordFormat(study.fingerprint, study.record_dtype), SESSION, rank=0) as log:
+        log.append([(index, rows[index]) for index in (3, 4, 5, 6)])
+    os.truncate(log.path, log.path.stat().st_size - frame_size - 1)
+    assert_recorded(read_records(tmp_path, study), rows, [3, 4])
 
 
 def flip(path, place):

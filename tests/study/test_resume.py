@@ -43,9 +43,9 @@ def frames_written(out):
     return sum(path.read_bytes().count(b"\xf5RUN" + size.to_bytes(4, "little")) for path in paths)
 
 
-@pytest.mark.parametrize("ranks", [0, 2])
-def test_kill_9_at_any_moment_and_resume(start, tmp_path, reference, ranks):
-    options = {"out": tmp_path / "out", "runs": RUNS}
+@pytest.mark.parametrize(("ranks", "lanes"), [(0, 1), (2, 1), (0, 4), (2, 4)])
+def test_kill_9_at_any_moment_and_resume(start, tmp_path, reference, ranks, lanes):
+    options = {"out": tmp_path / "out", "runs": RUNS, "lanes": lanes}
     endless = {"from": 50, "pause": 300.0}  # so that the sweep is at work whenever the blow comes
     sweep = start({**options, "parameters": {"pause": 0.02}, "slow": endless}, ranks)
     wait_until(lambda: has_records(tmp_path / "out"), "the first record")
@@ -84,6 +84,22 @@ def test_a_signal_breaks_off_the_run_and_is_resumed(start, tmp_path, reference, 
         assert int((dataset["status"] == 0).sum()) == RUNS - 25
     finished = start(options).finish()
     assert finished.returncode == 0, finished.stderr
+    with open_results(tmp_path / "out") as dataset:
+        assert_same_numbers(dataset, reference)
+
+
+def test_a_batch_that_is_broken_off_leaves_no_record(start, tmp_path, reference):
+    # Batches of seven: of the fourth, runs 21 to 24 are fast, and are at their end when the signal comes.
+    options = {"out": tmp_path / "out", "runs": RUNS, "lanes": 7}
+    sweep = start({**options, "slow": {"from": 25, "pause": 300.0}})
+    wait_until(lambda: has_records(tmp_path / "out", 21), "three batches")
+    time.sleep(0.1)
+    sweep.process.send_signal(signal.SIGUSR1)
+    finished = sweep.finish()
+    assert finished.returncode == 99, finished.stderr
+    assert json.loads(finished.stdout)["done"] == 21
+    assert start({**options, "lanes": 5}).finish().returncode == 0  # in other batches
+    assert frames_written(tmp_path / "out") == RUNS
     with open_results(tmp_path / "out") as dataset:
         assert_same_numbers(dataset, reference)
 

@@ -2,9 +2,9 @@
 
 import json
 
-import numpy as np
+from cvt_hpc.study.schedule import SerialCounter, claimed_batches
 
-from cvt_hpc.study.schedule import SerialCounter, claimed_runs
+PLAN = [(5, 2), (9,), (0, 1, 3)]
 
 
 def claim_under_mpi(start, ranks, options, environment=None):
@@ -13,26 +13,25 @@ def claim_under_mpi(start, ranks, options, environment=None):
     return json.loads(finished.stdout)
 
 
-def test_serial_claims_follow_the_order():
-    order = np.array([5, 2, 9])
+def test_serial_claims_follow_the_plan():
     with SerialCounter() as counter:
-        assert list(claimed_runs(order, counter, lambda: True)) == [5, 2, 9]
-        assert list(claimed_runs(order, counter, lambda: True)) == []
+        assert list(claimed_batches(PLAN, counter, lambda: True)) == PLAN
+        assert list(claimed_batches(PLAN, counter, lambda: True)) == []
 
 
 def test_no_claim_when_it_is_not_allowed():
     counter = SerialCounter()
     answers = iter([True, True, False])
-    assert list(claimed_runs(np.arange(9), counter, lambda: next(answers))) == [0, 1]
+    assert list(claimed_batches(PLAN, counter, lambda: next(answers))) == PLAN[:2]
     assert counter.claim() == 2  # the refusal has cost no number
 
 
-def test_serial_interruption_is_beyond_every_order():
+def test_serial_interruption_is_beyond_every_plan():
     counter = SerialCounter()
     assert not counter.is_interrupted()
     counter.interrupt_all()
     assert counter.is_interrupted()
-    assert list(claimed_runs(np.arange(9), counter, lambda: True)) == []
+    assert list(claimed_batches(PLAN, counter, lambda: True)) == []
 
 
 def test_three_ranks_claim_every_number_once(start):

@@ -69,10 +69,11 @@ def test_a_defective_record_is_a_failed_run(tmp_path, defect, complaint):
     assert report.failed[0].reason.startswith(complaint)
 
 
-def test_two_ranks_give_the_numbers_of_a_serial_run(start, tmp_path):
+@pytest.mark.parametrize("lanes", [1, 64])  # one batch would hold all runs, and leave a rank without any
+def test_two_ranks_give_the_numbers_of_a_serial_run(start, tmp_path, lanes):
     options = {"runs": 60, "parameters": {"pause": 0.004, "raise_at": 7, "diverge_at": 30}}
     serial = start({"out": tmp_path / "serial", **options})
-    shared = start({"out": tmp_path / "shared", **options}, ranks=2)
+    shared = start({"out": tmp_path / "shared", "lanes": lanes, **options}, ranks=2)
     for finished in (serial.finish(), shared.finish()):
         assert finished.returncode == 1, finished.stderr
         assert json.loads(finished.stdout)["done"] == 58

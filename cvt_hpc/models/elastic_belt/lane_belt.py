@@ -228,7 +228,10 @@ def _constants_of(belt: Belt) -> list[float]:
 def _carry(belt: Belt, spacing: float) -> float:
     """Rate of the memory's transport, as `rhs.memory_transport` has it."""
     memory, way = belt.friction_memory, belt.belt_speed * belt.friction_memory
-    return 1.0 / (memory * np.expm1(spacing / way)) if way else 0.0
+    if way == 0.0:
+        return 0.0
+    # exp(-x) / (1 - exp(-x)): a belt that hardly moves makes exp(x) too large for a number
+    return np.exp(-spacing / way) / (-np.expm1(-spacing / way) * memory)
 
 
 def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState:

@@ -19,7 +19,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     State,
 )
 from cvt_hpc.models.elastic_belt.explicit import step_explicit
-from cvt_hpc.models.elastic_belt.imex import ImexWork, step_imex
+from cvt_hpc.models.elastic_belt.imex import ImexWork, derive, step_imex
 from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK as LANE_LAYER_WORK
 from cvt_hpc.models.elastic_belt.lane_belt import POSITION, SPEED, LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.sampling import Sensors, sample
@@ -96,6 +96,7 @@ def march_explicit(
         for _ in range(steps):
             solves += step_explicit(belt, state, contacts, work, step)
         hand_over(belt, state, lane)
+        derive(lane_belt, lane, lane_work.stations)
         sample(lane_belt, lane, lane_work.stations, sensing, rows, k, profiles, ended)
     return solves
 

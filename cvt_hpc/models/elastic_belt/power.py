@@ -19,14 +19,13 @@ distance of two stations alone.
 from __future__ import annotations
 
 from cvt_hpc.kernels import lane_kernel
-from cvt_hpc.lanes import LaneArray, fma, like, maximum, minimum, sqrt
+from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, sqrt
 from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_FILTERED, V_RING, U, W
 from cvt_hpc.models.elastic_belt.imex import (
     EPS_0,
     EPS_1,
     FORCE,
     LEAST_SHARE_OF_WIDTH,
-    coefficient_of_law,
     lane_load,
     start_damping,
 )
@@ -42,7 +41,10 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     DRIVING_SPEED,
     ELEMENT_MASS,
     ELEMENT_STIFFNESS,
+    FRICTION_GRADIENT,
     FRICTION_SPEED,
+    KINETIC_FRICTION,
+    LAW_SPEED,
     LAYER_WORK,
     MASS,
     POSITION,
@@ -60,7 +62,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneBelt,
     LaneState,
 )
-from cvt_hpc.physics.lane_friction import lane_saturation
+from cvt_hpc.physics.lane_friction import lane_coefficient, lane_law, lane_saturation, lane_table
 
 POWERS = (
     "driving_power",
@@ -122,6 +124,12 @@ def audit(
     omega_driven = like(speed, zero)
     belt_speed, sine, cosine, wedge = c[0, BELT_SPEED], c[0, SINE], c[0, COSINE], c[0, WEDGE]
     per_cosine, width = 1.0 / cosine, c[0, FRICTION_SPEED]
+    per_width, per_ring_width = 1.0 / width, 1.0 / c[0, RING_FRICTION_SPEED]
+    kind = belt.law.kind
+    table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
+    kinetic, fall, per_scale = lane_law(
+        kind, c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED]
+    )
     least = LEAST_SHARE_OF_WIDTH * width
     damping = c[0, TRANSVERSE_DAMPING] + start_damping(belt, state.time[0])
     element_mass, ring_mass, mass, offset = c[0, ELEMENT_MASS], c[0, RING_MASS], c[0, MASS], c[0, RING_OFFSET]
@@ -162,7 +170,11 @@ def audit(
         meridian = v_radial * per_cosine
         sliding = maximum(sqrt(fma(meridian, meridian, v_tangential * v_tangential)), least)
         v_law = fields[j, V_FILTERED] if belt.memory else sliding
-        mu = coefficient_of_law(belt, v_law, force * per_cosine) * lane_saturation(sliding, width)[0]
+        if kind == 5:
+            mu = lane_table(table, v_law, force * per_cosine)
+        else:
+            mu = lane_coefficient(kind, kinetic, fall, per_scale, v_law)
+        mu *= lane_saturation(sliding, per_width)
         upward = mu * meridian / sliding
         twice_normal = 2.0 * force / fma(upward, sine, cosine)
         radial = twice_normal * (sine - upward * cosine)
@@ -180,7 +192,7 @@ def audit(
             belt.cell[a] * belt.curvature[a]
         )
         grip = c[0, RING_FRICTION] * 0.5 * pressure
-        ring_loss += grip * lane_saturation(saddle, c[0, RING_FRICTION_SPEED])[0] * saddle
+        ring_loss += grip * lane_saturation(absolute(saddle), per_ring_width) * absolute(saddle)
         stored -= 0.5 * length * force * fma(wedge, w, opening_0)
     thrust = c[0, THRUST]
     axial_speed = (axial - thrust) / c[0, AXIAL_DAMPING]

@@ -18,8 +18,55 @@ STRANDS = ("t1", "t2")
 PULLEYS = ("driving", "driven")
 MODES = 5  # half waves along a strand that are told apart
 
-# Core-seconds per station and time step, measured on one core of an EPYC (Zen 4) at 160 stations.
-STEP_COST = {"imex": 8e-8, "explicit": 1.2e-7}
+# Core-seconds per station and time step of a batch, measured on one core of an EPYC (Zen 5) at 160 stations.
+STEP_COST = {"imex": 1.3e-7, "explicit": 1.2e-7}
+
+LANES = {"double": 8, "single": 16}  # what registers of 64 bytes hold
+# What the runs of a batch have in common: the mesh, the law's kind, and the course of time.
+SHARED = (
+    "ratio",
+    "driven_radius",
+    "centre_distance",
+    "stations",
+    "friction_law",
+    "table_force",
+    "table_speed",
+    "table_mu",
+    "rise_time",
+    "load_history",
+    "duration",
+    "judged_fraction",
+    "sampling_rate",
+    "strand_probes",
+    "arc_probes",
+    "step",
+    "precision",
+)
+
+
+def lanes(parameters: dict[str, Any], stepper: str) -> int:
+    """Most runs that a batch can take.
+
+    Parameters
+    ----------
+    parameters : dict
+        Resolved parameters of a run.
+    stepper : str
+        "imex" or "explicit".
+    """
+    return LANES[parameters["precision"]] if stepper == "imex" else 1
+
+
+def lane_key(parameters: dict[str, Any]) -> tuple:
+    """What two runs must have in common to be in one batch.
+
+    Parameters
+    ----------
+    parameters : dict
+        Resolved parameters of a run.
+    """
+    return (*(parameters[key] for key in SHARED if key in parameters), parameters["friction_memory"] > 0.0)
+
 
 LOSSES = (
     "driving_flank_loss",

@@ -15,9 +15,7 @@ from cvt_hpc.models.elastic_belt.imex import (
     EPS_0,
     EPS_1,
     FORCE,
-    lane_contact_forces,
     lane_load,
-    lane_strains,
 )
 from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
@@ -35,7 +33,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
 )
 from cvt_hpc.models.elastic_belt.power import POWERS, audit
 from cvt_hpc.models.elastic_belt.record import MODES
-from cvt_hpc.physics.lane_compliance import UNSOLVED
+from cvt_hpc.physics.lane_compliance import SOLVES, UNSOLVED
 
 SCALARS = (
     "load",
@@ -167,7 +165,7 @@ def sample(
     belt, state
         Constants and state.
     stations : LaneArray
-        Of `ImexWork`; its forces and strains become those of this state.
+        Of `ImexWork`, with what `derive` finds of this state.
     sensing : Sensors
         S rows.
     rows : (samples, S + C) LaneArray of doubles
@@ -176,11 +174,10 @@ def sample(
         Which row.
     profiles : (N, 4) LaneArray of doubles
         PROFILES of this state are added to it; those of cells are averaged onto stations.
-    ended : (1, 2) LaneArray of doubles
-        Where a lane's run has to be stopped for the first time: the `Outcome`, and the time [s].
+    ended : (1, 3) LaneArray of doubles
+        Where a lane's run has to be stopped for the first time, or the last one: the `Outcome`, the time [s],
+        and the linear solves of the contact problem until then.
     """
-    lane_contact_forces(belt, state, stations)
-    lane_strains(belt, state, stations)
     _watch(belt, state, stations, ended)
     n, fields, c = belt.cell.size, state.fields, belt.constants
     sensed = sensing.matrix.shape[0]
@@ -264,4 +261,6 @@ def _watch(belt: LaneBelt, state: LaneState, stations: LaneArray, ended: LaneArr
     code = select(total <= 0.0, code, 2.0)
     running = ended[0, 0] < 0.5
     ended[0, 1] = select(running, like(state.time[0], speed), ended[0, 1])
+    solves = state.contacts[0].scalars[0, SOLVES] + state.contacts[1].scalars[0, SOLVES]
+    ended[0, 2] = select(running, like(solves, speed), ended[0, 2])
     ended[0, 0] = select(running, code, ended[0, 0])

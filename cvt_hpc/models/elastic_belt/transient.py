@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.lanes import LaneArray, lanes_of
+from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.elastic_belt.belt import (
     FIELDS,
     REGIONS,
@@ -17,9 +17,10 @@ from cvt_hpc.models.elastic_belt.belt import (
     mesh,
     random_strands,
 )
-from cvt_hpc.models.elastic_belt.imex import imex_work
+from cvt_hpc.models.elastic_belt.imex import derive, imex_work
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
 from cvt_hpc.models.elastic_belt.march import march_explicit, march_imex
+from cvt_hpc.models.elastic_belt.record import lanes
 from cvt_hpc.models.elastic_belt.sampling import (
     CHANNELS,
     LARGEST_DISPLACEMENT,
@@ -32,7 +33,6 @@ from cvt_hpc.models.elastic_belt.sampling import (
     sensors,
 )
 from cvt_hpc.physics.compliance import contact_state
-from cvt_hpc.physics.lane_compliance import SOLVES
 from cvt_hpc.variables import Status
 
 LARGEST_POWER_RESIDUAL = 0.02
@@ -60,50 +60,6 @@ FAILURES = {
 
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
-# What the runs of a batch have in common: the mesh, the law's kind, and the course of time.
-SHARED = (
-    "ratio",
-    "driven_radius",
-    "centre_distance",
-    "stations",
-    "friction_law",
-    "table_force",
-    "table_speed",
-    "table_mu",
-    "rise_time",
-    "load_history",
-    "duration",
-    "judged_fraction",
-    "sampling_rate",
-    "strand_probes",
-    "arc_probes",
-    "step",
-    "precision",
-)
-
-
-def lanes(parameters: dict[str, Any], stepper: str) -> int:
-    """Most runs that a batch can take.
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of a run.
-    stepper : str
-        "imex" or "explicit".
-    """
-    return lanes_of(PRECISIONS[parameters["precision"]]) if stepper == "imex" else 1
-
-
-def lane_key(parameters: dict[str, Any]) -> tuple:
-    """What two runs must have in common to be in one batch.
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of a run.
-    """
-    return (*(parameters[key] for key in SHARED if key in parameters), parameters["friction_memory"] > 0.0)
 
 
 class Batch:
@@ -144,6 +100,7 @@ class Batch:
         self.state = lane_state(self.belts, starts, self.dtype)
         self._belt = lane_belt(self.belts, self.dtype)
         self._work = imex_work(self.state)
+        derive(self._belt, self.state, self._work.stations)
         self.interval = 1.0 / p["sampling_rate"]
         self.steps_per_sample = max(int(np.ceil(self.interval / p["step"] - 1e-9)), 1)
         self.step = self.interval / self.steps_per_sample
@@ -154,7 +111,7 @@ class Batch:
         self.done = 0
         n = self.mesh.cell.size
         self.profiles = [LaneArray(n, len(PROFILES), width) for _ in range(2)]
-        self.ended = LaneArray(1, 2, width)
+        self.ended = LaneArray(1, 3, width)
         self._kick = min(int(np.ceil(p["rise_time"] * p["sampling_rate"])), self.samples)
         self.first_judged = self.samples - round(p["judged_fraction"] * self.samples)
         self._disturbed = False
@@ -185,6 +142,7 @@ class Batch:
             # nature
             for lane, point in enumerate(self.points):
                 self._displace(lane, random_strands(self.mesh, point["disturbance"], point["seed"]))
+            derive(self._belt, self.state, self._work.stations)
             self._disturbed = True
         borders = [border for border in (self._kick, self.first_judged, self.samples) if border > first]
         last = min(first + samples, *borders)
@@ -207,7 +165,7 @@ class Batch:
         """Linear solves of the contact problem in a run so far."""
         if self._explicit is not None:
             return self._solves
-        return int(sum(contact.scalars.data[0, SOLVES, lane] for contact in self.state.contacts))
+        return int(self.ended.data[0, 2, lane])
 
 
 class Transient:

@@ -71,6 +71,18 @@ def regularised_friction(o: Oscillator, sliding: float) -> float:
     return o.normal_load * (mu * saturation(sliding, o.width)[0] + at_rest)
 
 
+def friction_at_rest(o: Oscillator) -> float:
+    """Largest friction force at rest [N]."""
+    return o.normal_load * (friction_coefficient(o.law, 0.0, o.normal_load)[0] + o.excess)
+
+
+def largest_rate(o: Oscillator) -> float:
+    """Rate of the decay of sliding at rest under smoothed friction [1/s]."""
+    mu = friction_coefficient(o.law, 0.0, o.normal_load)[0]
+    slope = (mu + o.excess * np.exp(0.5) / HUMP) / o.width
+    return (o.normal_load * slope + o.damping) / o.mass
+
+
 @kernel
 def smoothed_rates(o: Oscillator, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     """Rates of displacement and speed with smoothed friction; see `System`."""
@@ -110,7 +122,7 @@ def friction_bounds(
 def _unknowns(o: Oscillator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which unknowns are velocities, their positions, and typical sizes."""
     frequency = np.sqrt(o.stiffness / o.mass)
-    pull = o.normal_load * (friction_coefficient(o.law, 0.0, o.normal_load)[0] + o.excess) / o.stiffness
+    pull = friction_at_rest(o) / o.stiffness
     speed = o.belt_speed if o.belt_speed > 0.0 else frequency * pull
     return np.array([False, True]), np.array([-1, X]), np.array([pull + speed / frequency, speed])
 

@@ -1,0 +1,100 @@
+"""Falling friction so steep that an implicit step has more than one solution, and what the program says.
+
+The mass slides steadily on friction that falls at the rate s = N |g| / m, as an unstable state, w the
+frequency of its spring. The equations of a stage of length a = (coefficient) step have one solution while 1 -
+s a + w^2 a^2 > 0: with a soft spring up to step s = 1 / coefficient.
+"""
+
+import numpy as np
+import pytest
+from scripted import TWO_MASSES, Script, system
+from small_systems import IMPLICIT, begin, bisect, scene
+
+from cvt_hpc.steppers.facts import MESSAGES, Result
+from cvt_hpc.steppers.marching import Marching
+from cvt_hpc.variables import Status
+
+FALL, FREQUENCY = 200.0, 5.0
+STEEP = scene(
+    "oscillator",
+    friction_law="linear",
+    friction_gradient=-FALL,
+    stribeck_velocity=1.0,
+    kinetic_friction=10.0,
+    belt_speed=0.5,
+    stiffness=FREQUENCY**2,
+)
+PULL = (10.0 + FALL * 0.5) / FREQUENCY**2
+STEEP |= {"initial_displacement": PULL, "initial_speed": 1e-9}
+COEFFICIENTS = {
+    "theta": lambda p: p["theta"],
+    "generalised_alpha": lambda p: 2.0 / ((1 + p["spectral_radius"]) * (3 - p["spectral_radius"])),
+    "sdirk": lambda p: 0.43586652150845899942,
+    "rosenbrock_w": lambda p: 1.0 - np.sqrt(0.5),
+}
+CASES = [
+    ("theta", {"theta": 1.0}),
+    ("theta", {"theta": 0.5}),
+    ("generalised_alpha", {"spectral_radius": 0.0}),
+    ("generalised_alpha", {"spectral_radius": 1.0}),
+    ("sdirk", {}),
+    ("rosenbrock_w", {}),
+]
+
+
+def first_step(stepper, step, **options):
+    """What the first step gives."""
+    run = begin("oscillator", stepper, STEEP | options | {"step": step, "sampling_rate": 1.0 / step})
+    return run.advance(1)
+
+
+@pytest.mark.parametrize(("stepper", "options"), CASES)
+def test_the_step_from_which_there_are_several_solutions(stepper, options):
+    measured = bisect(
+        lambda step: first_step(stepper, step, **options) is not None, 0.3 / FALL, 6.0 / FALL, times=20
+    )
+    coefficient = COEFFICIENTS[stepper](STEEP | options)
+    roots = np.roots([FREQUENCY**2, -FALL, 1.0])
+    assert measured == pytest.approx(roots.min() / coefficient, rel=1e-3)
+    assert measured == pytest.approx(1.0 / (coefficient * FALL), rel=1e-2)
+    status, reason = first_step(stepper, 1.05 * measured, **options)
+    assert status == Status.FAILED_NUMERICS
+    assert reason.startswith(MESSAGES[Result.NOT_UNIQUE])
+
+
+def test_all_implicit_methods_are_asked():
+    assert set(IMPLICIT) == {stepper for stepper, _ in CASES}
+
+
+def test_what_an_unnoticed_solution_would_be():
+    # implicit Euler in its own formula: beyond the limit the mass is thrown to the other side of its start
+    away = 1e-9
+    for step, sign in ((0.8 / FALL, 1.0), (1.2 / FALL, -1.0)):
+        assert np.sign(away / (1 - FALL * step + (FREQUENCY * step) ** 2)) == sign
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.9, Result.OK), (1.1, Result.NOT_UNIQUE)])
+def test_two_masses_at_once_are_noticed(share, expected):
+    # the determinant turns its sign twice
+    equations = system(Script(TWO_MASSES, FALL), [1.0] * 4)
+    step = share / FALL
+    parameters = {"step": step, "theta": 1.0, "solver_tolerance": 1e-10}
+    march = Marching("theta", parameters, equations, np.full(4, 1e-3), step)
+    assert march.advance(np.zeros((1, 4))) == expected
+
+
+def test_a_narrow_hump_of_friction_at_rest_falls_too_steeply():
+    # stick-slip with the level at rest smoothed: the hump's other side falls by 2 / e of (mu_s - mu_k) N over
+    # 6 v_reg; implicit Euler takes it up to step = 6 m v_reg e / (2 (mu_s - mu_k) N)
+    width = 1e-3
+    limit = 6.0 * width * np.exp(1.0) / (2.0 * 0.4)
+    p = scene("oscillator", friction_speed=width, theta=1.0, duration=30.0, sampling_rate=10.0)
+
+    def end(share):
+        run = begin("oscillator", "theta", p | {"step": share * limit})
+        return run.advance(run.samples)
+
+    assert [end(share) for share in (0.3, 0.5, 0.7, 0.9)] == [None] * 4
+    # longer steps may find the slope between sticking and slip, or leap over it
+    beyond = [failure for failure in map(end, np.linspace(1.5, 5.0, 15)) if failure]
+    assert beyond and all(reason.startswith(MESSAGES[Result.NOT_UNIQUE]) for _, reason in beyond)

@@ -1,0 +1,151 @@
+"""The contact of several runs at once against the plain solver of each, and Lemke on the dense matrix."""
+
+import numpy as np
+import pytest
+
+from cvt_hpc.physics.complementarity import solve_lcp
+from cvt_hpc.physics.compliance import contact_state, flexibility, sheaves, solve_contact
+from cvt_hpc.physics.lane_compliance import (
+    CLOSED,
+    GAP,
+    PUSH,
+    SOLVES,
+    UNSOLVED,
+    lane_contact,
+    solve_lane_contact,
+)
+
+STATIONS, ARC, RADIUS = 20, 0.27, 0.075
+ELEMENTS = 3e10  # c_e [N/m^2] in the middle of what is tried
+MOST_ROUNDS = 400
+WIDTHS = {np.float64: 8, np.float32: 16}
+
+
+def random_wrap(random, stiffness=None):
+    """A wrap on the common stations, all else its own."""
+    if stiffness is None:
+        stiffness = random.choice([0.3, 1.0, 3.0, np.inf])
+    return sheaves(
+        ARC / (STATIONS - 1),
+        STATIONS,
+        RADIUS,
+        stiffness,
+        random.choice([4e4, 4e5, np.inf]),
+        random.uniform(2e9, 8e9),
+        random.uniform(0.004, 0.04),
+        ELEMENTS * random.uniform(0.5, 2.0),
+    )
+
+
+def courses(random, lanes, calls=8):
+    """Gaps (calls, stations, lanes) [m] that change from call to call, so that stations open and close."""
+    x = np.linspace(0.0, 1.0, STATIONS)[:, None]
+    slow, fast = random.uniform(1.0, 9.0, lanes), random.uniform(0.0, 2.0, lanes)
+    shapes = [
+        np.cos(slow * x + fast * call) + 0.5 * random.normal(size=(STATIONS, lanes)) for call in range(calls)
+    ]
+    return 2e-5 * (np.array(shapes) + random.choice([-2.0, -0.5, 0.0], lanes))
+
+
+def solve(contact, gaps, most_rounds=MOST_ROUNDS):
+    """Forces (stations, lanes) [N/m]."""
+    contact.stations.data[:, GAP] = gaps
+    solve_lane_contact(contact, most_rounds)
+    closed = contact.stations.data[:, CLOSED] > 0.5
+    return np.where(closed, np.maximum(contact.stations.data[:, PUSH], 0.0), 0.0)
+
+
+def batch(seed, dtype=np.float64, **values):
+    """Wraps, their contact in lanes, and courses of gaps."""
+    random = np.random.default_rng(seed)
+    wraps = [random_wrap(random, **values) for _ in range(WIDTHS[dtype])]
+    return wraps, lane_contact(wraps, dtype), courses(random, len(wraps))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_each_lane_is_the_plain_solver(seed):
+    wraps, contact, course = batch(seed)
+    plain = [contact_state(STATIONS) for _ in wraps]
+    sets, counts = set(), np.zeros(len(wraps))
+    for gaps in course:
+        found = solve(contact, gaps)
+        for lane, (wrap, state) in enumerate(zip(wraps, plain, strict=True)):
+            force = np.empty(STATIONS)
+            counts[lane] += solve_contact(wrap, state, np.ascontiguousarray(gaps[:, lane]), force)
+            # the same operations but for contraction: round-off of forces of up to 1e7 N/m times a condition of 1e2
+            assert found[:, lane] == pytest.approx(force, abs=1e-5)
+            assert np.array_equal(contact.stations.data[:, CLOSED, lane] > 0.5, state.closed)
+            sets.add(tuple(state.closed))
+        assert np.array_equal(contact.scalars.data[0, SOLVES], counts)
+        assert not contact.scalars.data[0, UNSOLVED].any()
+    assert len(sets) > len(wraps)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_each_lane_is_lemke_on_the_dense_matrix(seed):
+    wraps, contact, course = batch(seed)
+    for gaps in course[:3]:
+        found = solve(contact, gaps)
+        for lane, wrap in enumerate(wraps):
+            ce = wrap.element_stiffness
+            expected = solve_lcp(ce * flexibility(wrap), ce * gaps[:, lane])
+            # as for the plain solver: 1e7 N/m times a condition of 1e5 times eps is 1e-4
+            assert found[:, lane] == pytest.approx(expected, abs=1e-3)
+
+
+def test_rigid_sheaves_leave_the_elements_alone():
+    wraps, contact, course = batch(0, stiffness=np.inf)
+    stiffness = [wrap.element_stiffness for wrap in wraps]
+    # all open, all closed (nothing but open stations on the wrong side), and any
+    for gaps in (np.abs(course[0]), -np.abs(course[0]), course[1]):
+        expected = np.maximum(-gaps, 0.0) * stiffness
+        assert solve(contact, gaps) == pytest.approx(expected, rel=1e-13, abs=1e-6)
+
+
+def test_single_precision_knows_forces_to_its_round_off():
+    wraps, contact, course = batch(4, np.float32)
+    for gaps in course:
+        found = solve(contact, gaps)
+        for lane, wrap in enumerate(wraps):
+            force = np.empty(STATIONS)
+            given = gaps[:, lane].astype(np.float32).astype(float)
+            assert solve_contact(wrap, contact_state(STATIONS), given, force) > 0
+            # stations may be on the wrong side by 2 N/m; eps = 6e-8 times a condition of 1e2 of forces of 1e6 N/m
+            assert found[:, lane] == pytest.approx(force, abs=2.0 + 3e-5 * force.max())
+        assert not contact.scalars.data[0, UNSOLVED].any()
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_lane_without_numbers_does_not_disturb_the_others(bad):
+    (_, contact, course), (_, other, _) = batch(5), batch(5)
+    spoiled = course.copy()
+    spoiled[3:, 7, 2] = bad
+    rest = np.delete(np.arange(8), 2)
+    for gaps, bad_gaps in zip(course, spoiled, strict=True):
+        expected, found = solve(contact, gaps), solve(other, bad_gaps)
+        assert np.array_equal(found[:, rest], expected[:, rest])
+        for row in (SOLVES, UNSOLVED):
+            assert np.array_equal(other.scalars.data[0, row, rest], contact.scalars.data[0, row, rest])
+
+
+def test_a_search_that_does_not_end_is_marked_in_its_lane_alone():
+    # without the sheaves' part all stations that overlap stay closed: one solve; lane 3 has a station that is far off
+    _, contact, _ = batch(6, stiffness=np.inf)
+    gaps = np.full((STATIONS, 8), -1e-4)
+    gaps[9, 3] = 1e-3
+    solve(contact, gaps, most_rounds=1)
+    assert contact.scalars.data[0, UNSOLVED].tolist() == [0, 0, 0, 1, 0, 0, 0, 0]
+    assert contact.scalars.data[0, SOLVES].tolist() == [1, 1, 1, 2, 1, 1, 1, 1]
+    # what is marked stays so
+    solve(contact, gaps)
+    assert contact.scalars.data[0, UNSOLVED].tolist() == [0, 0, 0, 1, 0, 0, 0, 0]
+
+
+def test_neighbours_do_not_change_a_bit():
+    # one wrap alone, and in each lane of a batch whose other searches take longer or shorter
+    wraps, contact, course = batch(7)
+    alone = [lane_contact([wrap], np.float64) for wrap in wraps]
+    for gaps in course:
+        found = solve(contact, gaps)
+        for lane, single in enumerate(alone):
+            assert np.array_equal(solve(single, gaps[:, [lane]])[:, 0], found[:, lane])

@@ -1,0 +1,76 @@
+"""What the model calls inert changes no bit of a run, and beside it stands what does."""
+
+import numpy as np
+import pytest
+from marched import fresh_record, job
+
+from cvt_hpc.errors import InputError
+from cvt_hpc.models.elastic_belt import inert
+from cvt_hpc.simulation import record_variables
+
+COARSE = {"stations": 32, "duration": 0.04, "rise_time": 0.01, "load": 60.0}
+TABLE = {
+    "friction_law": "table",
+    "table_force": [1e3, 1e6],
+    "table_speed": [0.0, 1.0],
+    "table_mu": [[0.12, 0.1], [0.12, 0.1]],
+}
+OTHER = {
+    "friction_gradient": -0.7,
+    "kinetic_friction": 0.12,
+    "stribeck_velocity": 0.06,
+    "load_start": 10.0,
+    "seed": 2,
+    "ring_friction_speed": 0.02,
+    "tilt_stiffness": 4e5,
+    "local_stiffness": 5e9,
+    "local_length": 0.02,
+}
+CASES = [
+    (TABLE, ["friction_gradient", "kinetic_friction", "stribeck_velocity"], "friction_law table"),
+    ({"friction_law": "coulomb", "friction_gradient": 0.0}, ["stribeck_velocity"], "friction_gradient 0"),
+    ({"friction_law": "linear", "friction_gradient": 0.0}, ["stribeck_velocity"], "friction_gradient 0"),
+    ({"friction_law": "cubic", "friction_gradient": 0.0}, ["stribeck_velocity"], "friction_gradient 0"),
+    ({"friction_law": "hyperbolic"}, ["stribeck_velocity"], "friction_law hyperbolic"),
+    ({"friction_gradient": 0.0}, ["stribeck_velocity"], "friction_gradient 0"),
+    ({"load_history": "constant"}, ["load_start"], "load_history constant"),
+    ({"disturbance": 0.0}, ["seed"], "disturbance 0"),
+    ({"ring_friction": 0.0}, ["ring_friction_speed"], "ring_friction 0"),
+    (
+        {"sheave_stiffness": np.inf},
+        ["tilt_stiffness", "local_stiffness", "local_length"],
+        "sheave_stiffness inf",
+    ),
+]
+
+
+def bits(**values):
+    """All bytes of the record of a run, timings excepted."""
+    found = fresh_record(**COARSE, **values)
+    return {
+        variable.name: np.asarray(found[variable.name]).tobytes()
+        for variable in record_variables(job())
+        if not variable.volatile
+    }
+
+
+@pytest.mark.parametrize(("scene", "keys", "setting"), CASES)
+def test_what_is_inert_changes_nothing_and_is_no_axis(scene, keys, setting):
+    scene = {"load_history": "ramp"} | scene
+    asked = job(**COARSE, **scene)
+    assert inert(asked.parameters) == dict.fromkeys(keys, setting)
+    alone = bits(**scene)
+    for key in keys:
+        assert bits(**scene, **{key: OTHER[key]}) == alone, key
+        with pytest.raises(
+            InputError, match=rf"\[axes\] {key}: expected one value, .* with {setting}, found 2"
+        ):
+            job(axes={key: [asked.parameters[key], OTHER[key]]}, **COARSE, **scene)
+
+
+def test_the_reference_has_no_inert_parameter_once_its_load_ramps():
+    scene = {"load_history": "ramp"}
+    assert inert(job(**COARSE, **scene).parameters) == {}
+    alone = bits(**scene)
+    for key, value in OTHER.items():
+        assert bits(**scene, **{key: value}) != alone, key

@@ -1,0 +1,197 @@
+"""Runs that advance together: each is bit by bit what it is alone, and what becomes of one is no other's business."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from fast_runs import FastRuns
+from marched import CHEAP, job, never
+
+from cvt_hpc.models.elastic_belt.belt import DRIVEN_SPEED, N_RING, W, belt_constants, initial_state
+from cvt_hpc.models.elastic_belt.record import lane_key
+from cvt_hpc.models.elastic_belt.sampling import Outcome
+from cvt_hpc.models.elastic_belt.transient import Batch
+from cvt_hpc.physics.lane_compliance import UNSOLVED
+from cvt_hpc.simulation import lane_groups, record_variables, run_point, run_points
+from cvt_hpc.variables import Status, Vibrates
+
+WIDTHS = {"double": 8, "single": 16}
+SHORT = CHEAP | {"stations": 40}
+# Of all that may differ between the lanes of a batch, and of all endings.
+DIFFERENT = [
+    {"load": 120.0},
+    {"load": 60.0, "seed": 3},
+    {"load": 500.0},  # slips through
+    {"load": 100.0, "sheave_stiffness": np.inf},
+    {"load": 100.0, "friction_gradient": -1.2, "friction_speed": 0.02},
+    {"load": 80.0, "half_wedge_angle": 0.21, "thrust": 40e3, "element_damping": 30.0},
+    {"load": -60.0, "driving_speed": 250.0, "ring_friction": 0.05},
+    {"load": 40.0, "bending_stiffness": 0.5, "element_mass": 1.2, "friction_memory": 1e-4},
+]
+
+
+def points(precision):
+    """As many as a batch takes."""
+    rounds = WIDTHS[precision] // len(DIFFERENT)
+    return [
+        job(**SHORT | values | {"precision": precision, "disturbance": 1e-6 * (1 + k)}).point(0)
+        for k in range(rounds)
+        for values in DIFFERENT
+    ]
+
+
+@cache
+def together(precision):
+    """Records of the batch."""
+    return run_points(job(**SHORT), points(precision), never)
+
+
+def assert_same_bits(record, other):
+    for variable in record_variables(job()):
+        if not variable.volatile:
+            one, two = np.asarray(record[variable.name]), np.asarray(other[variable.name])
+            assert one.tobytes() == two.tobytes(), variable.name
+
+
+@pytest.mark.parametrize("precision", WIDTHS)
+def test_records_are_those_of_the_runs_alone(precision):
+    records = together(precision)
+    for point, record in zip(points(precision), records, strict=True):
+        assert_same_bits(record, run_point(job(**SHORT), point, never))
+    ends = [record["status"] for record in records]
+    assert ends.count(Status.FAILED_ERROR) == WIDTHS[precision] // 8 and ends.count(Status.DONE) >= 6
+    assert len({float(record["driving_power"]) for record in records if record["status"] == Status.DONE}) >= 6
+
+
+def test_a_batch_that_is_not_full_gives_the_same_in_the_order_of_its_points():
+    chosen = [6, 2, 0]
+    for k, record in zip(
+        chosen, run_points(job(**SHORT), [points("double")[k] for k in chosen], never), strict=True
+    ):
+        assert_same_bits(record, together("double")[k])
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_run_that_is_not_a_number_fails_alone(monkeypatch, value):
+    advance, spoiled = Batch.advance, 4
+
+    def spoiling(batch, samples):
+        if batch.done >= 300:
+            batch.state.fields.data[5, W, spoiled] = value
+        return advance(batch, samples)
+
+    monkeypatch.setattr(Batch, "advance", spoiling)
+    for k, record in enumerate(run_points(job(**SHORT), points("double"), never)):
+        if k == spoiled:
+            assert record["status"] == Status.FAILED_NUMERICS
+            assert "off its path" in record["reason"] or "not a number" in record["reason"]
+            assert 0.015 < record["simulated_seconds"] < 0.021
+            assert np.isnan(record["amplitude"]).all()
+        else:
+            assert_same_bits(record, together("double")[k])
+
+
+def spoiled_lanes(lanes):
+    """Eight runs of which five are given a state out of bounds, each in its own way."""
+    parameters = job(**SHORT, load=60.0).point(0)
+    belt = belt_constants(parameters)
+    states = [initial_state(parameters, belt) for _ in range(lanes)]
+    states[1].fields[W, 30] = np.nan
+    states[2].fields[W, 30] = 0.011
+    states[3].fields[N_RING, 7] *= 0.9
+    states[4].scalars[DRIVEN_SPEED] *= 0.4
+    runs = FastRuns([belt] * lanes, states)
+    runs.lanes.contacts[1].scalars.data[0, UNSOLVED, 5] = 1.0
+    return runs
+
+
+def test_an_outcome_is_that_of_the_lane_concerned():
+    runs = spoiled_lanes(8)
+    runs.advance(0, 1e-6)
+    assert [runs.outcome(lane) for lane in range(8)] == [
+        Outcome.OK,
+        Outcome.NOT_FINITE,
+        Outcome.LEFT_THE_GROOVES,
+        Outcome.OVERSTRAINED,
+        Outcome.SLIPPED_THROUGH,
+        Outcome.NO_CONTACT_SOLUTION,
+        Outcome.OK,
+        Outcome.OK,
+    ]
+
+
+def test_the_first_outcome_counts():
+    runs = spoiled_lanes(8)
+    runs.advance(0, 1e-6)
+    before = [runs.outcome(lane) for lane in range(8)]
+    runs.lanes.fields.data[3, W] = np.nan
+    runs.advance(0, 1e-6)
+    after = [runs.outcome(lane) for lane in range(8)]
+    assert after[1:6] == before[1:6]
+    assert {after[k] for k in (0, 6, 7)} == {Outcome.NOT_FINITE}
+
+
+def test_a_batch_takes_no_more_than_a_register():
+    point = points("double")[0]
+    for count in (0, 9):
+        with pytest.raises(ValueError, match="1 to 8 runs"):
+            Batch([point] * count, "imex") if count else run_points(job(), [point] * 9, never)
+    with pytest.raises(ValueError, match="1 to 1 runs"):
+        Batch([point] * 2, "explicit")
+
+
+AXES = {
+    "friction_law": ["stribeck", "coulomb"],
+    "friction_memory": [0.0, 0.3e-3, 1e-3],
+    "load": [0.0, 40.0, 80.0, 120.0, 160.0],
+    "precision": ["double", "single"],
+    "stations": [48, 64],
+}
+
+
+@pytest.mark.parametrize("stepper", ["imex", "explicit"])
+def test_groups_hold_each_run_once_and_only_what_is_alike(stepper):
+    axes = {k: v for k, v in AXES.items() if k != "precision" or stepper == "imex"}
+    asked = job(stepper=stepper, axes=axes, friction_gradient=0.0)
+    indices = np.random.default_rng(0).permutation(asked.size).tolist()
+    groups = lane_groups(asked, indices)
+    assert sorted(index for group in groups for index in group) == sorted(indices)
+    for group in groups:
+        all_points = [asked.point(index) for index in group]
+        assert len({lane_key(point) for point in all_points}) == 1
+        for key in ("friction_law", "stations", *(["precision"] if stepper == "imex" else [])):
+            assert len({point[key] for point in all_points}) == 1, key
+        assert len({point["friction_memory"] > 0 for point in all_points}) == 1
+        assert len(group) <= (WIDTHS[all_points[0]["precision"]] if stepper == "imex" else 1)
+        # in the order in which they were given
+        places = [indices.index(index) for index in group]
+        assert places == sorted(places)
+    if stepper == "imex":
+        # as few as can be: 5 loads without memory, 10 with, of each law, mesh and precision
+        assert len(groups) == 2 * 2 * ((1 + 2) + (1 + 1))
+    assert lane_groups(asked, indices) == groups
+
+
+def test_single_precision_gives_the_same_vibration():
+    coarse = {"stations": 64, "duration": 0.16}
+    found = {
+        precision: run_points(
+            job(),
+            [job(**coarse, load=load, precision=precision).point(0) for load in (0.0, 60.0, 120.0)],
+            never,
+        )
+        for precision in WIDTHS
+    }
+    for one, other in zip(found["double"], found["single"], strict=True):
+        assert (one["status"], other["status"]) == (Status.DONE, Status.DONE)
+        assert other["vibrates"] == one["vibrates"]
+        # a hundredth of what closes the balance of a loaded belt, a tenth of the mesh's part: 2e-5 are seen
+        assert other["power_residual"] == pytest.approx(one["power_residual"], abs=1e-4)
+    # round-off rings the strands of a quiet belt by some nm, where nothing is left of the start in double precision
+    silent, quiet, vibrating = found["single"]
+    assert np.all(found["double"][0]["amplitude"] < 1e-10) and np.all(silent["amplitude"] < 1e-8)
+    assert quiet["amplitude"] == pytest.approx(found["double"][1]["amplitude"], abs=1e-8)
+    # the same limit cycle, out of phase: windows scatter by 2-7 %
+    assert vibrating["vibrates"] == Vibrates.YES
+    assert vibrating["amplitude"] == pytest.approx(found["double"][2]["amplitude"], rel=0.05)
+    assert vibrating["frequency"] == pytest.approx(found["double"][2]["frequency"], rel=0.01)
