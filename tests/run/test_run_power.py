@@ -263,7 +263,7 @@ def test_work_of_the_dampers_is_force_times_mean_speed():
 
 
 def test_both_steps_agree_on_the_dampers_work(rough):
-    # no element lets go: what differs is of first order in the step
+    # no element lets go: what differs is of first order in the step for elements, and of a higher one for the rings
     belt, duration = belt_constants(job(**COARSE | {"load": 100.0}).parameters), 2e-6
     errors = []
     for steps in (80, 160, 320):
@@ -271,5 +271,5 @@ def test_both_steps_agree_on_the_dampers_work(rough):
         run = FastRuns([belt], [rough])
         run.advance(steps, duration / steps)
         errors.append(run.state().scalars[LAYER_WORK] / expected - 1)
-    assert np.divide(errors[:-1], errors[1:]) == pytest.approx([2.0, 2.0], rel=0.1)
+    assert np.all(np.divide(errors[:-1], errors[1:]) > 1.8)
     assert abs(errors[-1]) < 0.005

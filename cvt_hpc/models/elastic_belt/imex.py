@@ -105,7 +105,8 @@ FORCE, LAST_U, EPS_0, EPS_1, SHORT_0, SHORT_1, PER_CONTENT_0, PER_CONTENT_1 = ra
 PUSH, LAG, SLOPE, FLANK, FLANK_SLOPE, FLANK_CROSS, SLIDING_R, SLIDING_T, REVERSING = range(8, 17)
 D_00, D_01, D_11, Y_0, Y_1 = range(17, 22)
 I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(22, 33)
-FIELDS_OF_WORK = 33
+COEFFICIENT, FACTOR, PER_SPEED, RING_FACTOR = range(33, 37)
+FIELDS_OF_WORK = 37
 
 
 class ImexWork(NamedTuple):
@@ -113,12 +114,13 @@ class ImexWork(NamedTuple):
 
     Attributes
     ----------
-    stations : (N, 33) LaneArray
+    stations : (N, 37) LaneArray
         Of the present state: axial line force, u one step earlier, the cells' strains, 1 / (1 + strain) and 1
         / content. Of the step: pending increment of u, its sensitivity to v_element's, slope w_s, the flanks'
         tangential force and its slopes, sliding speeds, whether (1) the linearised friction would throw the
         station back; the blocks of the system and its right side; the eliminated system: inverse pivots, the
-        increments of v_element and v_ring, the border, the stresses' slopes with the speeds' differences.
+        increments of v_element and v_ring, the border, the stresses' slopes with the speeds' differences; the
+        law's coefficient, tanh of sliding speed over regularisation, 1 / that speed, the same of rings.
     """
 
     stations: LaneArray
@@ -155,6 +157,7 @@ def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
         Step [s].
     """
     stations, scalars = work.stations, state.scalars
+    _sliding(belt, state, stations)
     for attempt in range(MOST_PASSES):
         _stations(belt, state, work, step, attempt > 0)
         _eliminate(belt, state, work, step)
@@ -252,20 +255,66 @@ def lane_strains(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
 
 
 @lane_kernel
+def _sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
+    """Sliding speeds on the arcs, and what friction does of them alone.
+
+    A loop of its own: the chain of operations from a speed to the system's rows is longer than what a
+    processor looks ahead, so that it would not begin a station before the last one is nearly done.
+    """
+    n, fields, c = belt.cell.size, state.fields, belt.constants
+    kind, memory = belt.law.kind, belt.memory
+    table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
+    kinetic, fall, per_scale = lane_law(
+        kind, c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED]
+    )
+    per_cosine, belt_speed, offset = 1.0 / c[0, COSINE], c[0, BELT_SPEED], c[0, RING_OFFSET]
+    least = LEAST_SHARE_OF_WIDTH * c[0, FRICTION_SPEED]
+    per_width, per_ring_width = 1.0 / c[0, FRICTION_SPEED], 1.0 / c[0, RING_FRICTION_SPEED]
+    driven_speed = state.scalars[0, SPEED]
+    driven_base = driven_speed * like(c[0, DRIVEN_RADIUS], driven_speed) - like(belt_speed, driven_speed)
+    turning = c[0, DRIVING_SPEED]
+    surface = turning * c[0, DRIVING_RADIUS] - belt_speed
+    for j in range(n):
+        if j == belt.driven_start:
+            surface, turning = like(driven_base, least), like(driven_speed, least)
+        if belt.arc_share[j] == 0.0:
+            continue
+        a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
+        full_speed = belt_speed + fields[j, V_ELEMENT]
+        slope = (fields[b, W] - fields[a, W]) * belt.per_span[j]
+        v_radial = fma(full_speed, slope, fields[j, U])
+        v_tangential = fields[j, V_ELEMENT] - fma(turning, fields[j, W], surface)
+        meridian = v_radial * per_cosine
+        speed = sqrt(fma(meridian, meridian, v_tangential * v_tangential))
+        v_law = fields[j, V_FILTERED] if memory else speed
+        if kind == 5:
+            coefficient = lane_table(table, v_law, stations[j, FORCE] * per_cosine)
+        else:
+            coefficient = lane_coefficient(kind, kinetic, fall, per_scale, v_law)
+        # tanh(x) = (1 - e^-2x) / (1 + e^-2x) for flanks and rings
+        speed = maximum(speed, least)
+        saddle = fma(fma(offset, belt.arc_curvature[j], 1.0), full_speed, -(belt_speed + fields[j, V_RING]))
+        rest, ring_rest = decay(speed * (2.0 * per_width)), decay(absolute(saddle) * (2.0 * per_ring_width))
+        per_flank, per_saddle = reciprocals(speed * (1.0 + rest), 1.0 + ring_rest)
+        stations[j, SLIDING_R], stations[j, SLIDING_T] = v_radial, v_tangential
+        stations[j, COEFFICIENT] = coefficient
+        stations[j, FACTOR], stations[j, PER_SPEED] = (
+            (1.0 - rest) * (speed * per_flank),
+            (1.0 + rest) * per_flank,
+        )
+        stations[j, RING_FACTOR] = with_sign_of((1.0 - ring_rest) * per_saddle, saddle)
+
+
+@lane_kernel
 def _stations(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, again: bool) -> None:
     """Forces and slopes at the stations, but for the stresses T and P: the system's blocks and right side.
 
     `again` looks at stations alone that some lane's friction would throw back.
     """
     n, fields, stations, c = belt.cell.size, state.fields, work.stations, belt.constants
-    memory, per_step = belt.memory, 1.0 / step
+    per_step = 1.0 / step
     sine, cosine, width = c[0, SINE], c[0, COSINE], c[0, FRICTION_SPEED]
     per_cosine, per_width = 1.0 / cosine, 1.0 / width
-    kind = belt.law.kind
-    table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
-    kinetic, fall, per_scale = lane_law(
-        kind, c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED]
-    )
     element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
     element_mass, ring_mass, mass, offset = c[0, ELEMENT_MASS], c[0, RING_MASS], c[0, MASS], c[0, RING_OFFSET]
     belt_speed, bending = c[0, BELT_SPEED], c[0, BENDING_STIFFNESS]
@@ -275,15 +324,8 @@ def _stations(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
     damping = c[0, TRANSVERSE_DAMPING] + start_damping(belt, state.time[0])
     base_mass = fma(mass, per_step, 0.5 * damping)
     element_rate = element_mass * per_step
-    driven_speed = state.scalars[0, SPEED]
-    driven_base = driven_speed * like(c[0, DRIVEN_RADIUS], driven_speed) - like(belt_speed, driven_speed)
-    driving_base = c[0, DRIVING_SPEED] * c[0, DRIVING_RADIUS] - belt_speed
-    surface, turning = driving_base, c[0, DRIVING_SPEED]
-    least = LEAST_SHARE_OF_WIDTH * width
     zero = like(0.0, sine)
     for j in range(n):
-        if j == belt.driven_start:
-            surface, turning = like(driven_base, zero), like(driven_speed, zero)
         share = belt.arc_share[j]
         if again and (share == 0.0 or not anywhere(stations[j, REVERSING] > 0.5)):
             continue
@@ -319,25 +361,9 @@ def _stations(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
         radial_mass, cross = base_mass, zero
         if share > 0.0:
             lever = fma(offset, belt.arc_curvature[j], 1.0)
-            saddle = fma(lever, full_speed, -(belt_speed + v1))
-            v_tangential = v0 - fma(turning, w, surface)
-            meridian = v_radial * per_cosine
-            speed = sqrt(fma(meridian, meridian, v_tangential * v_tangential))
-            force = stations[j, FORCE]
-            v_law = fields[j, V_FILTERED] if memory else speed
-            if kind == 5:
-                coefficient = lane_table(table, v_law, force * per_cosine)
-            else:
-                coefficient = lane_coefficient(kind, kinetic, fall, per_scale, v_law)
-            # tanh(x) = (1 - e^-2x) / (1 + e^-2x) for flanks and rings, its slope 1 - tanh^2
-            speed = maximum(speed, least)
-            rest, ring_rest = (
-                decay(speed * (2.0 * per_width)),
-                decay(absolute(saddle) * (2.0 * per_ring_width)),
-            )
-            per_flank, per_saddle = reciprocals(speed * (1.0 + rest), 1.0 + ring_rest)
-            factor, per_speed = (1.0 - rest) * (speed * per_flank), (1.0 + rest) * per_flank
-            ring_factor = with_sign_of((1.0 - ring_rest) * per_saddle, saddle)
+            v_tangential, coefficient = stations[j, SLIDING_T], stations[j, COEFFICIENT]
+            per_speed, factor = stations[j, PER_SPEED], stations[j, FACTOR]
+            ring_factor, meridian, force = stations[j, RING_FACTOR], v_radial * per_cosine, stations[j, FORCE]
 
             relief = ring_here * speed_squared
             pressure = maximum(ring_right - relief, 0.0) * (right * belt.curvature[j])
@@ -370,7 +396,6 @@ def _stations(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
             element += fma(lever * lever, stiff, flank_slope)
             ring += stiff
             coupling = -lever * stiff
-            stations[j, SLIDING_R], stations[j, SLIDING_T] = v_radial, v_tangential
             stations[j, FLANK], stations[j, FLANK_SLOPE] = tangential, flank_slope
             stations[j, FLANK_CROSS] = cross
             if not again:
