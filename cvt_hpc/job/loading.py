@@ -108,6 +108,8 @@ def _check_top_level(document: Mapping[str, Any], schema: Schema, source: str) -
         if key in tables:
             if not isinstance(value, Mapping):
                 raise mismatch(f"{source}: {key}", f"a table [{key}]", show(value))
+        elif key == "chart":
+            raise InputError(f"{source}: [chart]: expected a job of runs, found one for `cvt-hpc chart`")
         elif isinstance(value, Mapping):
             hint = did_you_mean(key, tables) or f"; known: {', '.join(tables)}"
             raise InputError(f"{source}: [{key}]: unknown table{hint}")
