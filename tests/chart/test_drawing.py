@@ -151,6 +151,12 @@ def test_the_budget_shows_errors_of_the_default_first(write_chart):
     assert "error of the default" in [text.get_text() for text in figure.legends[0].texts]
 
 
+def test_the_largest_error_of_the_default_is_on_top(write_chart):
+    job = write_chart(('set = { loudness = "22 um" }', 'set = { loudness = "22 um" }\nrefines = true'))
+    axes = drawn(budget_figure, comparison_of(job)).axes[0]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["louder", "step 1 us", "cracked"]
+
+
 def test_pictures_are_small_and_named_after_their_scenes(write_chart):
     report = make_chart(load_chart(write_chart()), processes=1)
     assert [str(path) for path in report.pictures] == ["out/bells/ringing.png", "out/bells/budget.png"]
