@@ -180,7 +180,7 @@ def _draw_budget_panel(axes: Axes, quantity: Quantity, choices: Sequence[Result]
     if quantity.tolerance < math.inf:
         axes.axvline(quantity.tolerance, color="black", ls="--", lw=0.9)
     axes.tick_params(axis="y", length=0)
-    axes.set_title(KINDS[quantity.name].title, loc="left", pad=3)
+    axes.set_title(quantity.name.replace("_", " "), loc="left", pad=3)  # short: panels are narrow
     axes.set_xlabel(_error_label(quantity))
 
 

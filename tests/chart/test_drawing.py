@@ -138,7 +138,7 @@ def test_an_error_over_a_scale_says_so(write_chart):
 
 def test_the_budget_shows_errors_of_the_default_first(write_chart):
     figure = drawn(budget_figure, comparison_of(write_chart()))
-    assert [axes.get_title(loc="left") for axes in figure.axes] == ["amplitude", "dominant frequency"]
+    assert [axes.get_title(loc="left") for axes in figure.axes] == ["amplitude", "frequency"]
     axes = figure.axes[0]
     assert axes.get_xscale() == "log" and axes.get_xlabel() == "relative error"
     assert [label.get_text() for label in axes.get_yticklabels()] == ["step 1 us", "louder", "cracked"]
