@@ -58,6 +58,8 @@ class Comparison:
         Its errors are its own.
     methods, choices : tuple of Result
         Against the reference, and against the base of the error budget.
+    series : tuple of str
+        All methods of the chart by name, so that each has the same colour in all pictures.
     base : str
         What choices are compared with; "" where there are none.
     shown : tuple of str
@@ -70,6 +72,7 @@ class Comparison:
     reference: Result
     methods: tuple[Result, ...]
     choices: tuple[Result, ...]
+    series: tuple[str, ...]
     base: str
     shown: tuple[str, ...]
     verdict: str
@@ -103,6 +106,7 @@ def _compare_scene(chart: Chart, scene: Scene, measurements: Mapping[str, Measur
             setting = known.setting_in_words
             verdict = f"none can be chosen: the reference failed at {setting}: {reason}"
     choices: tuple[Result, ...] = ()
+    series = tuple(dict.fromkeys(p.series for p in chart.points if p.role is Role.METHOD))
     label = ""
     for base in chart.points_of(scene.name, Role.BASE):
         label, against = base.label, measurements[base.name]
@@ -110,7 +114,7 @@ def _compare_scene(chart: Chart, scene: Scene, measurements: Mapping[str, Measur
             _judge(point, measurements[point.name], against, scene, {})
             for point in chart.points_of(scene.name, Role.CHOICE)
         )
-    return Comparison(scene, judged, tuple(methods), choices, label, chart.budgeted, verdict)
+    return Comparison(scene, judged, tuple(methods), choices, series, label, chart.budgeted, verdict)
 
 
 def _judge(

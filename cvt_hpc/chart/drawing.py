@@ -123,7 +123,8 @@ def _draw_panel(
     own = comparison.reference.errors[quantity.name]
     axes.set(xscale="log", yscale="log")
     floor = _floor(quantity, comparison)
-    for k, results in enumerate(series.values()):
+    for name, results in series.items():
+        k = comparison.series.index(name)
         drawn = [r for r in results if _is_drawn(r, quantity.name)]
         x = [max(r.errors[quantity.name], floor) for r in drawn]
         y = [r.measurement.cost for r in drawn]
@@ -236,8 +237,8 @@ def _reasons(result: Result) -> list[str]:
 
 def _legend(comparison: Comparison, series: dict[str, list[Result]]) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [
-        Line2D([], [], **_style(k), label=results[0].point.label)
-        for k, results in enumerate(series.values())
+        Line2D([], [], **_style(comparison.series.index(name)), label=results[0].point.label)
+        for name, results in series.items()
         if any(not result.measurement.reason for result in results)
     ]
     if not comparison.scene.exact:

@@ -71,6 +71,26 @@ def test_each_method_is_a_line_over_its_settings(figure):
     )
 
 
+def test_a_method_looks_alike_in_all_scenes(write_chart):
+    other = """
+[chart.scenes.other]
+reference = "exact"
+quantities = { amplitude = {} }
+
+[chart.methods.soft]
+scenes = ["ringing"]"""
+    chart = load_chart(
+        write_chart(("[chart.methods.soft]", other), ('"20 ms"', '"20 ms"\nscenes = ["ringing"]'))
+    )
+    found = {p.name: measure(p, chart.scene(p.scene), 1, 3600.0) for p in chart.points}
+    looks = []
+    for comparison in compare(chart, found):
+        figure = drawn(scene_figure, comparison)
+        line = next(line for line in panel(figure, "amplitude").lines if line.get_label() == "clever")
+        looks.append((line.get_color(), line.get_marker()))
+    assert looks[0] == looks[1]
+
+
 def test_what_is_below_the_references_error_is_hatched_and_grey(figure):
     axes = panel(figure, "amplitude")
     (hatched,) = [patch for patch in axes.patches if patch.get_gid() == "reference"]
