@@ -77,9 +77,13 @@ def _parser() -> argparse.ArgumentParser:
     simulate = _add(commands, "simulate", _simulate, "one run with its full history", "JOB")
     simulate.add_argument("--out", type=Path, metavar="FILE.nc", help="dataset of the history")
     simulate.add_argument("--plot", type=Path, metavar="PNG", help="picture of the history")
+    chart = _add(commands, "chart", _chart, "measure speed against accuracy, and draw it", "JOB")
+    chart.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: out/<job name>)")
+    chart.add_argument("--fresh", action="store_true", help="throw earlier results of the folder away")
     check = _add(commands, "check", _check, "validate a job, show its defaults and estimate its cost", "JOB")
     for command in (run, simulate, check):
         _add_assignments(command, "--set", "replace a value of the job, or an axis by one value")
+    _add_assignments(chart, "--set", "replace a value of the job and of all its scenes")
     _add_assignments(
         simulate,
         "--at",
@@ -181,11 +185,30 @@ def _simulate(arguments: argparse.Namespace) -> int:
     return DONE
 
 
+def _chart(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.chart import load_chart, make_chart
+    from cvt_hpc.chart.table import table_lines
+    from cvt_hpc.study.launch import detect_launch
+
+    if detect_launch().size > 1:
+        raise mismatch("chart", "one process, because it measures times", f"{detect_launch().size} started")
+    chart = load_chart(arguments.path, arguments.set)
+    report = make_chart(chart, arguments.out, fresh=arguments.fresh, tell=_complain)
+    for comparison in report.comparisons:
+        print(*table_lines(comparison), "", sep="\n")
+    print(f"table: {report.table}", f"dataset: {report.dataset}", sep="\n")
+    print(*(f"picture: {picture}" for picture in report.pictures), sep="\n")
+    return DONE
+
+
 def _check(arguments: argparse.Namespace) -> int:
     from cvt_hpc.job import load_job
     from cvt_hpc.job.summary import summarize
+    from cvt_hpc.study.description import describe
+    from cvt_hpc.study.simulator import default_simulator
 
     job = load_job(arguments.path, arguments.set)
+    describe(job, default_simulator())  # refuses axes that the dataset of a run could not hold
     if _speaks():
         from cvt_hpc.simulation import estimate_cost
 

@@ -107,7 +107,8 @@ def history_figure(dataset: xr.Dataset) -> Figure:
     """Compose the picture of `draw_history`; to be called within STYLE."""
     settings = _vibration_settings(dataset)
     band = (settings["band_low"], settings["band_high"])
-    strands = panels.read_strands(dataset, settings["judged_fraction"], band)
+    judged = settings["judged_fraction"] if _is_judged(dataset) else 0.0
+    strands = panels.read_strands(dataset, judged, band)
     with_spectrum = [strand for strand in strands if strand.has_spectrum]
     rows = [
         (1.6, [(LEFT, panels.draw_displacement, strand), (RIGHT, panels.draw_close_up, strand)])
@@ -133,6 +134,11 @@ def history_figure(dataset: xr.Dataset) -> Figure:
         for columns, draw, what in row:
             draw(figure.add_subplot(grid[i, columns]), what)
     return figure
+
+
+def _is_judged(dataset: xr.Dataset) -> bool:
+    """Whether the run reached its end: one that failed has no verdict, and no part that was judged."""
+    return "status" not in dataset or int(dataset["status"]) == Status.DONE
 
 
 def _is_known(dataset: xr.Dataset, name: str) -> bool:

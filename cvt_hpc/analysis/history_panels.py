@@ -39,7 +39,7 @@ class Strand:
     displacement : array, shape (time, probe)
         [um], mean removed.
     first_judged : int
-        Index of the first sample of the part that is judged.
+        Index of the first sample of the part that is judged; the number of samples where nothing is.
     band : (float, float)
         Where vibrations are looked for [Hz].
     """
@@ -88,7 +88,7 @@ def read_strands(dataset: xr.Dataset, judged_fraction: float, band: tuple[float,
         With `displacement` (time, probe) [m]; a probe's label begins with its strand, as "t1 1/2". Probes on
         arcs, "driving arc 1/2", are left out.
     judged_fraction : float
-        Last part of the time that is judged.
+        Last part of the time that is judged; 0 of a run that was not judged.
     band : (float, float)
         Where vibrations are looked for [Hz].
 
@@ -123,18 +123,19 @@ def read_strands(dataset: xr.Dataset, judged_fraction: float, band: tuple[float,
 
 
 def draw_displacement(axes: Axes, strand: Strand) -> None:
-    """The strongest probe over the whole run; the judged part is shaded."""
+    """The strongest probe over the whole run; the judged part is shaded, where there is one."""
     time = 1e3 * strand.time
-    axes.axvspan(time[strand.first_judged], time[-1], color="#f1f1f1", linewidth=0)
+    title = f"displacement at {strand.probes[strand.strongest]}"
+    if len(strand.judged):
+        axes.axvspan(time[strand.first_judged], time[-1], color="#f1f1f1", linewidth=0)
+        title += ", judged part shaded"
     axes.plot(time, strand.displacement[:, strand.strongest], color=strand.colour, linewidth=0.6)
     # the belt seats itself by hundreds of um at the start, which would hide everything after it
     seated = strand.displacement[time.size // 5 :, strand.strongest]
     margin = 0.1 * np.ptp(seated) or 1.0
     axes.set(xlim=(time[0], time[-1]), ylim=(seated.min() - margin, seated.max() + margin))
     axes.set(xlabel="time [ms]", ylabel=f"{strand.name} [µm]")
-    axes.set_title(
-        f"displacement at {strand.probes[strand.strongest]}, judged part shaded", loc="left", pad=3
-    )
+    axes.set_title(title, loc="left", pad=3)
 
 
 def draw_close_up(axes: Axes, strand: Strand) -> None:

@@ -42,7 +42,9 @@ def load_job(path: str | Path, overrides: Assignments = ()) -> Job:
     return build_job(read_document(Path(path)), str(path), overrides)
 
 
-def build_job(document: Mapping[str, Any], source: str, overrides: Assignments = ()) -> Job:
+def build_job(
+    document: Mapping[str, Any], source: str, overrides: Assignments = (), label: str | None = None
+) -> Job:
     """Validate the contents of a job file.
 
     Parameters
@@ -53,6 +55,8 @@ def build_job(document: Mapping[str, Any], source: str, overrides: Assignments =
         Where it is from, for the errors.
     overrides : mapping, or sequence of "KEY=VALUE"
         See `load_job`.
+    label : str, optional
+        What to call the overrides in an error; by default after where they come from.
 
     Returns
     -------
@@ -64,7 +68,7 @@ def build_job(document: Mapping[str, Any], source: str, overrides: Assignments =
     InputError
         If anything is wrong with the document or an override.
     """
-    label = "override" if isinstance(overrides, Mapping) else "--set"
+    label = label or ("override" if isinstance(overrides, Mapping) else "--set")
     pairs = split_assignments(overrides, source, label)
     head = {**document, **{key: value for key, value in pairs.items() if key in HEADER}}
     name, description = _read_name(head, source), _read_description(head, source)
@@ -104,6 +108,8 @@ def _check_top_level(document: Mapping[str, Any], schema: Schema, source: str) -
         if key in tables:
             if not isinstance(value, Mapping):
                 raise mismatch(f"{source}: {key}", f"a table [{key}]", show(value))
+        elif key == "chart":
+            raise InputError(f"{source}: [chart]: expected a job of runs, found one for `cvt-hpc chart`")
         elif isinstance(value, Mapping):
             hint = did_you_mean(key, tables) or f"; known: {', '.join(tables)}"
             raise InputError(f"{source}: [{key}]: unknown table{hint}")

@@ -181,6 +181,15 @@ def test_a_failed_run_is_drawn_up_to_where_it_failed():
     assert read_strands(failed, 0.5, BAND) == []
 
 
+def test_nothing_of_a_failed_run_is_shown_as_judged():
+    failed = run().assign(status=np.int8(Status.FAILED_NUMERICS), reason=b"not a number at 0.3 s")
+    figure = figure_of(failed)
+    axes = panel(figure, "t1 [µm]")
+    assert axes.get_title(loc="left") == "displacement at t1 1/4"
+    assert len(axes.patches) == 0 and axes.lines
+    assert "amplitude [µm]" not in {axes.get_ylabel() for axes in figure.axes}  # the judged part's spectrum
+
+
 def test_the_judged_part_is_that_of_the_job():
     dataset = run()
     dataset.attrs["job"] = json.dumps({"vibration": {"judged_fraction": 0.2}})

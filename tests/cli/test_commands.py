@@ -1,11 +1,14 @@
 """The commands within this process, on the toy model and runs without mechanics."""
 
+import sys
+
 import netCDF4
 import pytest
 
 from cvt_hpc import cli
 from cvt_hpc.cli import main
 from cvt_hpc.study import FailedRun, RunReport, StudyStatus
+from cvt_hpc.variables import Status, Variable
 
 pytestmark = pytest.mark.usefixtures("mechanics")
 
@@ -155,6 +158,22 @@ def test_check_prints_every_parameter_with_its_origin_the_axes_and_the_cost(writ
     assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
 
 
+@pytest.mark.parametrize("command", [["check"], ["run", "--dry-run"], ["run"]])
+def test_an_axis_that_the_dataset_could_not_hold_is_refused_by_all(
+    write_job, call, tmp_path, monkeypatch, command
+):
+    write_job(GRID)
+    recorded = (Variable("status", (), "i1", "", "how the run ended", Status),
+                Variable("load", (), "f8", "N m", "mean torque"))  # fmt: skip
+    monkeypatch.setattr(sys.modules["cvt_hpc.simulation"], "record_variables", lambda job: recorded)
+    status, out, err = call(command[0], "x.toml", *command[1:])
+    assert (status, out) == (2, [])
+    assert err == [
+        "cvt-hpc: x.toml: [axes] load: expected a parameter that is not also the name of a recorded quantity, found load"
+    ]
+    assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
+
+
 def test_check_shortens_long_axes_and_long_times(write_job, call):
     write_job("[scene]\nthrust = 2e4\n[axes]\nload = { from = 0, to = 120, step = 0.5 }\n")
     assert call("check", "x.toml")[1][-4:] == [
@@ -246,7 +265,10 @@ def test_simulate_of_a_run_that_fails_ends_with_1(write_job, call):
         (["map", "out/x"], None),
         (["run"], "the following arguments are required: JOB; see `cvt-hpc run --help`"),
         (["run", "x.toml", "--fast"], "unrecognized arguments: --fast; see `cvt-hpc --help`"),
-        (["chart", "x.toml"], None),
+        (
+            ["chart", "x.toml"],
+            "x.toml: chart: expected a table [chart]; see `jobs/chart_oscillator.toml`, found nothing",
+        ),
         ([], "the following arguments are required: COMMAND; see `cvt-hpc --help`"),
     ],
 )

@@ -271,6 +271,10 @@ class Transient:
         outcome = int(self.batch.ended.data[0, 0, self._lane])
         return FAILURES[Outcome(outcome)] if outcome else None
 
+    def counters(self) -> dict[str, int]:
+        """Work done so far, by its name."""
+        return {"steps": self.steps, "contact_solves": self.contact_solves}
+
     @property
     def time(self) -> float:
         """Simulated time [s]."""

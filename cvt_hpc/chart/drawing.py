@@ -1,0 +1,303 @@
+"""Pictures of a chart: error against cost for each scene, and the error budget."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from textwrap import wrap
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import NullFormatter
+
+from cvt_hpc.analysis.figures import STYLE, WIDTH, display_unit, save_figure
+from cvt_hpc.chart.comparing import Comparison, Result
+from cvt_hpc.chart.plan import Quantity
+from cvt_hpc.chart.quantities import KINDS
+
+# Okabe and Ito's colours, told apart by those who do not see all; with the lines enough for 21 methods.
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#333333")
+LINES = ("-", "--", ":")
+MARKERS = ("o", "s", "^", "D", "v", "P", "<", ">")
+GREY = "#a8a8a8"
+_COLUMNS = 2
+_PANEL_HEIGHT = 2.55  # [inch]
+_LINE_HEIGHT = 0.16  # [inch], of the text under the panels
+_LINE_LENGTH = 104  # [letters]
+_LEGEND = {"loc": "outside lower center", "frameon": False, "fontsize": 8, "columnspacing": 1.0}
+_ROW_HEIGHT = 0.24  # [inch], of the budget
+_MARGIN = 1.6  # factor by which axes reach beyond the points
+LARGEST_ERROR = 10.0  # relative: what is beyond is named, and not drawn
+_DETAILS = re.compile(r" \([^()]*\)$")
+_LEAST_SPAN = 100.0  # of an error's axis, so that two powers of ten stand at it
+
+
+def draw_scene(comparison: Comparison, out: Path) -> Path:
+    """Draw error against cost, a panel for each quantity.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Results of a scene.
+    out : Path
+        The picture: .png, .svg or .pdf.
+
+    Returns
+    -------
+    Path
+        `out`.
+    """
+    with matplotlib.rc_context(STYLE):
+        return save_figure(scene_figure(comparison), out)
+
+
+def scene_figure(comparison: Comparison) -> Figure:
+    """Compose the picture of `draw_scene`; to be called within STYLE."""
+    quantities = [q for q in comparison.scene.quantities if q.name != "occurrence"]
+    columns = min(_COLUMNS, len(quantities))
+    rows = math.ceil(len(quantities) / columns)
+    series = _series(comparison.methods)
+    notes = _notes(comparison)
+    legend_rows = math.ceil((len(series) + 4) / 3)
+    text_height = _LINE_HEIGHT * (len(notes) + 0.5)
+    height = 0.5 + _PANEL_HEIGHT * rows + 0.19 * legend_rows + text_height
+    figure = Figure((WIDTH, height), layout="constrained")
+    figure.suptitle(f"{comparison.scene.title}: error against cost, lower left is better")
+    ratios = [_PANEL_HEIGHT] * rows + [text_height]
+    grid = figure.add_gridspec(rows + 1, columns, height_ratios=ratios)
+    first: Axes | None = None
+    for k, quantity in enumerate(quantities):
+        axes = figure.add_subplot(grid[divmod(k, columns)], sharey=first)
+        first = first or axes
+        _draw_panel(axes, quantity, comparison, series)
+        if k % columns == 0:
+            axes.set_ylabel("core-seconds per\nsimulated second")
+        else:
+            axes.tick_params(labelleft=False)
+    below = figure.add_subplot(grid[rows, :])
+    below.set_axis_off()
+    below.text(0.0, 1.0, "\n".join(notes), va="top", fontsize=7.5, transform=below.transAxes)
+    figure.legend(handles=_legend(comparison, series), ncols=3, **_LEGEND)
+    return figure
+
+
+def draw_budget(comparison: Comparison, out: Path) -> Path:
+    """Draw the error of each choice against the base; otherwise as `draw_scene`."""
+    with matplotlib.rc_context(STYLE):
+        return save_figure(budget_figure(comparison), out)
+
+
+def budget_figure(comparison: Comparison) -> Figure:
+    """Compose the picture of `draw_budget`; to be called within STYLE."""
+    quantities = [
+        q for q in comparison.scene.quantities if q.name in comparison.shown and q.name != "occurrence"
+    ]
+    choices = _in_order(comparison.choices, quantities)
+    figure = Figure((WIDTH, 1.3 + _ROW_HEIGHT * len(choices)), layout="constrained")
+    figure.suptitle(f"{comparison.scene.title}: error budget, against {comparison.base}")
+    panels = np.atleast_1d(figure.subplots(1, len(quantities), sharey=True))
+    for axes, quantity in zip(panels, quantities, strict=True):
+        _draw_budget_panel(axes, quantity, choices)
+    panels[0].set_yticks(range(len(choices)), [choice.point.label for choice in choices])
+    panels[0].set_ylim(len(choices) - 0.5, -0.5)
+    handles = [
+        Line2D([], [], ls="", marker="o", color=COLOURS[1], label=f"error of {comparison.base}"),
+        Line2D([], [], ls="", marker="o", color=COLOURS[0], mfc="white", label="what another choice changes"),
+        Line2D([], [], ls="--", color="black", lw=0.9, label="tolerance"),
+        Line2D([], [], ls="", marker="x", color="black", label="occurrence differs"),
+    ]
+    figure.legend(handles=handles, ncols=2, **_LEGEND)
+    return figure
+
+
+def _draw_panel(
+    axes: Axes, quantity: Quantity, comparison: Comparison, series: dict[str, list[Result]]
+) -> None:
+    own = comparison.reference.errors[quantity.name]
+    axes.set(xscale="log", yscale="log")
+    floor = _floor(quantity, comparison)
+    for name, results in series.items():
+        k = comparison.series.index(name)
+        drawn = [r for r in results if _is_drawn(r, quantity.name)]
+        x = [max(r.errors[quantity.name], floor) for r in drawn]
+        y = [r.measurement.cost for r in drawn]
+        axes.plot(x, y, **_style(k), label=results[0].point.label)
+        for result, error, cost in zip(drawn, x, y, strict=True):
+            _mark_point(axes, result, quantity.name, error, cost, k)
+    _limit(axes, quantity, own, floor)
+    axes.set_title(_heading(quantity), loc="left", pad=3)
+    axes.set_xlabel(_error_label(quantity))
+    axes.grid(which="major", color="#e4e4e4", lw=0.6)
+    axes.set_axisbelow(True)
+
+
+def _mark_point(axes: Axes, result: Result, name: str, error: float, cost: float, k: int) -> None:
+    if name in result.below:
+        hollow = {**_style(k), "ls": "", "mfc": "white", "mec": GREY}
+        axes.plot(error, cost, **hollow, gid="below")
+    if result.errors.get("occurrence", 0.0) > 0.0:
+        axes.plot(error, cost, marker="x", ms=7, color="black", ls="", gid="occurrence")
+    if result.chosen:
+        axes.plot(error, cost, marker="o", ms=11, mfc="none", mec="black", ls="", gid="chosen")
+
+
+def _limit(axes: Axes, quantity: Quantity, own: float, floor: float) -> None:
+    """Limits of the error's axis, the tolerance, and the part where the reference itself is not known."""
+    drawn = [x for line in axes.lines for x in np.atleast_1d(line.get_xdata())]
+    marks = [x for x in (own, quantity.tolerance) if 0.0 < x < math.inf]
+    low = _set_error_axis(axes, [*drawn, *marks])
+    if 0.0 < own < math.inf:
+        axes.axvspan(
+            low, own, facecolor="#f3f3f3", edgecolor="#d0d0d0", hatch="////", lw=0, zorder=0, gid="reference"
+        )
+    if quantity.tolerance < math.inf:
+        axes.axvline(quantity.tolerance, color="black", ls="--", lw=0.9, gid="tolerance")
+
+
+def _draw_budget_panel(axes: Axes, quantity: Quantity, choices: Sequence[Result]) -> None:
+    axes.set_xscale("log")
+    errors = [c.errors[quantity.name] for c in choices]
+    positive = [e for e in errors if 0.0 < e < math.inf]
+    floor = min(positive, default=1e-3) / _MARGIN
+    for row, (choice, error) in enumerate(zip(choices, errors, strict=True)):
+        axes.axhline(row, color="#ececec", lw=0.6, zorder=0)
+        if choice.measurement.reason or not math.isfinite(error):
+            words = "failed" if choice.measurement.reason else "none"
+            axes.text(0.04, row, words, va="center", fontsize=8, transform=axes.get_yaxis_transform())
+            continue
+        colour, fill = (COLOURS[1], COLOURS[1]) if choice.point.refines else (COLOURS[0], "white")
+        axes.plot(max(error, floor), row, "o", color=colour, mfc=fill, ms=5.5)
+        if choice.errors.get("occurrence", 0.0) > 0.0:
+            axes.plot(max(error, floor), row, "x", color="black", ms=8)
+    marks = [quantity.tolerance] if 0.0 < quantity.tolerance < math.inf else []
+    _set_error_axis(axes, [floor, *positive, *marks])
+    if quantity.tolerance < math.inf:
+        axes.axvline(quantity.tolerance, color="black", ls="--", lw=0.9)
+    axes.tick_params(axis="y", length=0)
+    axes.set_title(quantity.name.replace("_", " "), loc="left", pad=3)  # short: panels are narrow
+    axes.set_xlabel(_error_label(quantity))
+
+
+def _set_error_axis(axes: Axes, values: Sequence[float]) -> float:
+    """Make room for the values, and return the lower limit."""
+    low, high = min(values, default=1e-3) / _MARGIN, max(values, default=1.0) * _MARGIN
+    wanting = max(_LEAST_SPAN * low / high, 1.0) ** 0.5
+    axes.set_xlim(low / wanting, high * wanting)
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    return low / wanting
+
+
+def _series(results: Sequence[Result]) -> dict[str, list[Result]]:
+    """The methods by their name, in the job's order, each along its setting."""
+    series: dict[str, list[Result]] = {}
+    for result in results:
+        series.setdefault(result.point.series, []).append(result)
+    return {name: sorted(found, key=lambda r: r.point.setting) for name, found in series.items()}
+
+
+def _notes(comparison: Comparison) -> list[str]:
+    """What stands under the panels: what was chosen, and what is not drawn and why."""
+    point = comparison.reference.point
+    known = f"{point.label} at {point.setting_in_words}; its own error from a coarser one"
+    lines = wrap(f"reference: {'exact solution' if comparison.scene.exact else known}", _LINE_LENGTH)
+    lines += wrap(f"cheapest within all tolerances: {comparison.verdict}", _LINE_LENGTH)
+    for why, methods in _omitted(comparison).items():
+        each = "; ".join(f"{label} ({', '.join(settings)})" for label, settings in methods.items())
+        lines += wrap(f"omitted: {why}: {each}", _LINE_LENGTH, subsequent_indent="    ")
+    return lines
+
+
+def _omitted(comparison: Comparison) -> dict[str, dict[str, list[str]]]:
+    """Points that are not drawn in all panels: reason -> method -> settings."""
+    omitted: dict[str, dict[str, list[str]]] = {}
+    for result in comparison.methods:
+        for why in _reasons(result):
+            methods = omitted.setdefault(why, {})
+            methods.setdefault(result.point.label, []).append(result.point.setting_in_words)
+    return omitted
+
+
+def _reasons(result: Result) -> list[str]:
+    """Why a point is not drawn, in general words: where and after how many steps is in the table."""
+    if reason := result.measurement.reason:
+        return [f"failed, {_DETAILS.sub('', reason.partition(': ')[2])}"]
+    errors = {name.replace("_", " "): error for name, error in result.errors.items()}
+    reasons = [f"no {name}" for name, error in errors.items() if math.isinf(error)]
+    if any(LARGEST_ERROR < error < math.inf for error in errors.values()):
+        reasons.append(f"error of more than {LARGEST_ERROR:.0%}")
+    return reasons
+
+
+def _legend(comparison: Comparison, series: dict[str, list[Result]]) -> list[Line2D | Patch]:
+    handles: list[Line2D | Patch] = [
+        Line2D([], [], **_style(comparison.series.index(name)), label=results[0].point.label)
+        for name, results in series.items()
+        if any(not result.measurement.reason for result in results)
+    ]
+    if not comparison.scene.exact:
+        grey = {"facecolor": "#f3f3f3", "edgecolor": "#d0d0d0", "hatch": "////"}
+        handles.append(Patch(**grey, label="below the reference's error"))
+    handles.append(Line2D([], [], color="black", ls="--", lw=0.9, label="tolerance"))
+    handles.append(
+        Line2D(
+            [], [], ls="", marker="o", ms=9, mfc="none", mec="black", label="cheapest within all tolerances"
+        )
+    )
+    if any(result.errors.get("occurrence", 0.0) > 0.0 for result in comparison.methods):
+        handles.append(Line2D([], [], ls="", marker="x", color="black", label="occurrence differs"))
+    return handles
+
+
+def _is_drawn(result: Result, name: str) -> bool:
+    return not result.measurement.reason and result.errors[name] <= LARGEST_ERROR
+
+
+def _in_order(choices: Sequence[Result], quantities: Sequence[Quantity]) -> list[Result]:
+    """Errors of the base first, the largest on top, then all other choices as the job lists them."""
+
+    def size(choice: Result) -> float:
+        worst = [choice.errors[q.name] / min(q.tolerance, 1.0) for q in quantities]
+        return max((value for value in worst if not math.isnan(value)), default=math.inf)
+
+    errors = sorted((c for c in choices if c.point.refines), key=size, reverse=True)
+    return [*errors, *(c for c in choices if not c.point.refines)]
+
+
+def _floor(quantity: Quantity, comparison: Comparison) -> float:
+    """Where an error of 0 is drawn: a little left of the smallest one."""
+    errors = [r.errors[quantity.name] for r in comparison.methods if _is_drawn(r, quantity.name)]
+    return min((e for e in errors if e > 0.0), default=1e-3) / _MARGIN
+
+
+def _heading(quantity: Quantity) -> str:
+    title = KINDS[quantity.name].title
+    if quantity.name == "trajectory":
+        return f"{title}, {1e3 * quantity.since:g}-{1e3 * quantity.until:g} ms"
+    return title
+
+
+def _error_label(quantity: Quantity) -> str:
+    if quantity.scale == 0.0:
+        return "relative error"
+    factor, unit = (
+        (1e6, "µm") if KINDS[quantity.name].unit == "m" else display_unit(KINDS[quantity.name].unit)
+    )
+    return f"error / {factor * quantity.scale:g} {unit}"
+
+
+def _style(k: int) -> dict[str, Any]:
+    """Line and marker of the k-th method."""
+    return {
+        "color": COLOURS[k % len(COLOURS)],
+        "ls": LINES[k // len(COLOURS) % len(LINES)],
+        "marker": MARKERS[k % len(MARKERS)],
+        "lw": 1.3,
+        "ms": 4.5,
+    }

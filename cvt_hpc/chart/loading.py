@@ -1,0 +1,78 @@
+"""From a chart job to what is measured: every run of it is built and checked before any computing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from cvt_hpc.chart.declarations import CHART, read_table, read_tables
+from cvt_hpc.chart.plan import Chart, Point
+from cvt_hpc.chart.series import budget_points, method_points, reference_points
+from cvt_hpc.chart.stage import Stage, read_stage
+from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.job.assignments import Assignments, split_assignments
+from cvt_hpc.job.definition import HEADER
+from cvt_hpc.job.document import read_document
+
+
+def load_chart(path: str | Path, overrides: Assignments = ()) -> Chart:
+    """Read and validate a chart job.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file: a job with a table [chart].
+    overrides : mapping, or sequence of "KEY=VALUE"
+        Values that replace those of the job and of all its scenes.
+
+    Returns
+    -------
+    Chart
+        With every run built and checked.
+
+    Raises
+    ------
+    InputError
+        If anything is wrong with the file or an override.
+    """
+    source = str(path)
+    document = read_document(Path(path))
+    if "chart" not in document:
+        raise mismatch(f"{source}: chart", "a table [chart]; see `jobs/chart_oscillator.toml`", "nothing")
+    table = document.pop("chart")
+    if "axes" in document:
+        raise InputError(f"{source}: [axes]: expected no axes in a chart job, found some")
+    replaced = split_assignments(overrides, source, "--set")
+    for key in replaced:
+        if key in HEADER:
+            raise mismatch(f"{source}: --set {key}", "a parameter of the scenes", f"the job's {key}")
+    where = f"{source}: [chart]"
+    settings = read_table(CHART, table, where, ("scenes", "methods", "budget"))
+    scenes = read_tables(table.get("scenes"), f"{where} scenes", "scenes")
+    stages = [read_stage(name, raw, document, replaced, source) for name, raw in scenes.items()]
+    points = [*_references(scenes, stages), *_methods(table.get("methods"), stages, source)]
+    budgeted: tuple[str, ...] = ()
+    if "budget" in table:
+        choices, budgeted = budget_points(table["budget"], stages, f"{source}: [chart.budget]")
+        points += choices
+    job = points[0].job
+    return Chart(
+        job.name,
+        job.description,
+        source,
+        tuple(stage.scene for stage in stages),
+        tuple(points),
+        **settings,
+        budgeted=budgeted,
+    )
+
+
+def _references(scenes: Mapping[str, Any], stages: list[Stage]) -> Iterator[Point]:
+    for stage, raw in zip(stages, scenes.values(), strict=True):
+        yield from reference_points(stage, raw.get("reference"))
+
+
+def _methods(raw: Any, stages: list[Stage], source: str) -> Iterator[Point]:
+    for name, table in read_tables(raw, f"{source}: [chart] methods", "methods").items():
+        yield from method_points(name, table, stages, f"{source}: [chart.methods.{name}]")

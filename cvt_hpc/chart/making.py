@@ -1,0 +1,125 @@
+"""A chart made: all points measured, compared, written and drawn."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+
+from cvt_hpc.chart.comparing import Comparison, compare
+from cvt_hpc.chart.dataset import write_dataset
+from cvt_hpc.chart.drawing import draw_budget, draw_scene
+from cvt_hpc.chart.measuring import Measurement, measure
+from cvt_hpc.chart.plan import Chart, Point
+from cvt_hpc.chart.prospects import check_prospects
+from cvt_hpc.chart.store import ChartFolder
+from cvt_hpc.chart.table import write_table
+
+
+@dataclass(frozen=True)
+class ChartReport:
+    """What a chart left.
+
+    Attributes
+    ----------
+    comparisons : tuple of Comparison
+        The results, scene by scene.
+    table, dataset : Path
+        The files that hold them.
+    pictures : tuple of Path
+        One for each scene, and that of the error budget.
+    """
+
+    comparisons: tuple[Comparison, ...]
+    table: Path
+    dataset: Path
+    pictures: tuple[Path, ...]
+
+
+def make_chart(
+    chart: Chart,
+    out: Path | None = None,
+    *,
+    fresh: bool = False,
+    processes: int | None = None,
+    tell: Callable[[str], None] = lambda line: None,
+) -> ChartReport:
+    """Measure what has not been measured, and write table, dataset and pictures.
+
+    Parameters
+    ----------
+    chart : Chart
+        What to measure.
+    out : Path, optional
+        Output folder; out/<job name> by default.
+    fresh : bool
+        Throw earlier results of the folder away.
+    processes : int, optional
+        How many runs that are not timed may go on together; as many as there are cores by default. Timed
+        runs are always alone.
+    tell : callable
+        Given a line for each point that was measured.
+
+    Raises
+    ------
+    InputError
+        If the folder holds another job, the models do not record what is asked, or the system refuses.
+    """
+    folder = ChartFolder(Path(out) if out is not None else Path("out") / chart.name)
+    check_prospects(chart)
+    folder.prepare(chart, fresh)
+    measurements = {}
+    missing = []
+    for point in chart.points:
+        found = folder.load(point.name)
+        if found is None:
+            missing.append(point)
+        else:
+            measurements[point.name] = found
+    processes = processes or len(os.sched_getaffinity(0))
+    for point, measurement in _measure_all(chart, missing, processes):
+        folder.save(point.name, measurement)
+        measurements[point.name] = measurement
+        ended = (
+            f"failed: {measurement.reason}"
+            if measurement.reason
+            else f"{measurement.core_seconds:.3g} core-s"
+        )
+        tell(f"{len(measurements)}/{len(chart.points)} {point.name}: {ended}")
+    comparisons = compare(chart, measurements)
+    write_table(comparisons, folder.table)
+    write_dataset(chart, comparisons, folder.dataset)
+    pictures = [draw_scene(comparison, folder.picture(comparison.scene.name)) for comparison in comparisons]
+    pictures += [draw_budget(c, folder.picture("budget")) for c in comparisons if c.choices]
+    return ChartReport(comparisons, folder.table, folder.dataset, tuple(pictures))
+
+
+def _measure_all(chart: Chart, points: list[Point], processes: int) -> Iterator[tuple[Point, Measurement]]:
+    """Yield each point as it is done: those without timing first, several together, then the others alone."""
+    untimed = [point for point in points if not point.timed]
+    if processes > 1 and len(untimed) > 1:
+        yield from _measure_together(chart, untimed, processes)
+    else:
+        yield from ((point, _measure(chart, point)) for point in untimed)
+    yield from ((point, _measure(chart, point)) for point in points if point.timed)
+
+
+def _measure_together(
+    chart: Chart, points: list[Point], processes: int
+) -> Iterator[tuple[Point, Measurement]]:
+    # spawned, not forked: a forked child inherits locks of the compiler's and the drawing library's threads
+    pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"))
+    try:
+        pending = {pool.submit(_measure, chart, point): point for point in points}
+        for future in as_completed(pending):
+            yield pending[future], future.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _measure(chart: Chart, point: Point) -> Measurement:
+    limit = chart.time_limit if point.timed else float("inf")
+    return measure(point, chart.scene(point.scene), chart.repeats, limit)

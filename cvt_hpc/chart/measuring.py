@@ -1,0 +1,159 @@
+"""One point measured: runs from all its starts, what they give, and what they cost."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cvt_hpc.chart.marching import Marched, march, most_lanes, warm_up
+from cvt_hpc.chart.plan import Point, Scene
+from cvt_hpc.chart.quantities import History, observe, strand_of
+from cvt_hpc.models import MODELS
+from cvt_hpc.variables import Status
+from cvt_hpc.vibration.assessment import assess
+
+_BOUND = 1e3  # [m]: linear models know no limits, and an unstable step does not stop at one
+_UNBOUNDED = (Status.FAILED_NUMERICS, "the motion grows without bounds")
+_LONG = 2.0  # [s] of processor time: beyond, a run is timed once, because noise averages out within it
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What a point gave.
+
+    Attributes
+    ----------
+    reason : str
+        Why it failed; "" where it did not.
+    values : dict
+        By quantity an array with the starts along the first axis; empty where it failed.
+    cost : float
+        Core-seconds for each simulated second of a run, the shortest of all repeats; nan where it is of no
+        interest.
+    core_seconds : float
+        Processor time that the first pass took [s].
+    simulated : float
+        Simulated time of all starts [s].
+    counters : dict
+        Work by its name, mean over the starts.
+    """
+
+    reason: str
+    values: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    cost: float = math.nan
+    core_seconds: float = 0.0
+    simulated: float = 0.0
+    counters: dict[str, float] = field(default_factory=dict)
+
+
+def measure(point: Point, scene: Scene, repeats: int, time_limit: float) -> Measurement:
+    """Measure a point.
+
+    Parameters
+    ----------
+    point : Point
+        What to run.
+    scene : Scene
+        What is judged.
+    repeats : int
+        How often a quick run is timed.
+    time_limit : float
+        Core-seconds after which a run is given up [s].
+    """
+    if scene.exact and point.series == "exact":
+        return _exact(point, scene)
+    model, stepper = point.job.model, point.job.stepper
+    lanes = point.lanes or min(most_lanes(model, stepper, point.parameters(0)), point.starts)
+    # costs are those of full lanes: further starts, if need be, count for the time alone
+    runs = math.ceil(point.starts / lanes) * lanes if point.timed else point.starts
+    points = [point.parameters(k) for k in range(runs)]
+    warm_up(model, stepper, points[:lanes])
+    marched = march(model, stepper, points, lanes, point.until, time_limit)
+    reason, values = _outcome(point, scene, marched)
+    cost = math.nan
+    if point.timed and not reason:
+        again = repeats if marched.core_seconds < _LONG * runs / lanes else 0
+        costs = [march(model, stepper, points, lanes, point.until).cost for _ in range(again)]
+        cost = min([marched.cost, *costs])
+    counters = _mean_counters(marched)
+    return Measurement(reason, values, cost, marched.core_seconds, marched.simulated, counters)
+
+
+def exact_displacement(point: Point, start: int) -> tuple[Any, NDArray[np.float64]]:
+    """Return a run of a point that was not marched, and its exact displacement, (time, probe) [m].
+
+    Raises
+    ------
+    InputError
+        If the model has no closed form for these parameters.
+    ModuleNotFoundError
+        If it has none at all.
+    """
+    parameters = point.parameters(start)
+    solution = import_module(MODELS[point.job.model] + ".exact").exact
+    run = import_module(MODELS[point.job.model] + ".transient").Transient(parameters, point.job.stepper)
+    return run, solution(parameters, (1 + np.arange(run.samples)) * run.interval)
+
+
+def _exact(point: Point, scene: Scene) -> Measurement:
+    """The model's exact solution in the place of a run."""
+    observed = []
+    for start in range(point.starts):
+        run, displacement = exact_displacement(point, start)
+        columns, strands = _columns(run)
+        history = History(displacement[:, columns], strands, run.channel, run.parameters)
+        observed.append(observe(history, scene.quantities, whole=True))
+    return Measurement("", _stacked(observed))
+
+
+def _outcome(point: Point, scene: Scene, marched: Marched) -> tuple[str, dict[str, NDArray[np.float64]]]:
+    """Why a point failed, or else its values."""
+    whole = math.isinf(point.until)
+    observed = []
+    for k, run in enumerate(marched.runs[: point.starts]):
+        failure = marched.failures[k]
+        if failure is None and np.abs(run.displacement).max() > _BOUND:
+            failure = _UNBOUNDED
+        if failure is None and whole:
+            failure = _doubt(point.job.model, run)
+        if failure is not None:
+            status, why = failure
+            count = f" (start {k + 1} of {point.starts})" if point.starts > 1 else ""
+            return f"{status.name.lower()}{count} at {run.time * 1e3:.4g} ms: {why}", {}
+        observed.append(observe(_history(run), scene.quantities, whole))
+    return "", _stacked(observed)
+
+
+def _history(run: Any) -> History:
+    columns, strands = _columns(run)
+    return History(np.array(run.displacement)[:, columns], strands, run.channel, run.parameters)
+
+
+def _columns(run: Any) -> tuple[list[int], tuple[str, ...]]:
+    strands = [strand_of(probe.label) for probe in run.probes]
+    columns = [k for k, strand in enumerate(strands) if strand is not None]
+    return columns, tuple(strands[k] for k in columns)
+
+
+def _doubt(model: str, run: Any) -> Any:
+    """Whether a model that audits its runs does not trust one that has reached its end."""
+    if not hasattr(run, "numerical_doubt"):
+        return None
+    history = _history(run)
+    found = assess(history.displacement, history.rate, history.strands, history.parameters)
+    strongest = np.array(_columns(run)[0])[found.strongest_probe]
+    return run.numerical_doubt(import_module(MODELS[model] + ".record").evaluate(run, strongest))
+
+
+def _stacked(observed: list[dict[str, NDArray[np.float64]]]) -> dict[str, NDArray[np.float64]]:
+    return {name: np.array([values[name] for values in observed]) for name in observed[0]}
+
+
+def _mean_counters(marched: Marched) -> dict[str, float]:
+    each = [run.counters() for run in marched.runs]
+    return {name: float(np.mean([counters[name] for counters in each])) for name in each[0]}

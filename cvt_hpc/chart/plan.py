@@ -1,0 +1,219 @@
+"""What a chart consists of: scenes, what is judged of them, and the points to be measured."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from dataclasses import asdict, dataclass
+from enum import Enum
+from typing import Any
+
+from cvt_hpc.job import Job
+from cvt_hpc.job.values import in_words
+
+_PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+
+
+class Role(Enum):
+    """What a point is measured for."""
+
+    REFERENCE = "reference"  # what errors are measured against
+    COARSER = "coarser"  # the same method at a longer step, by which the reference's own error is known
+    METHOD = "method"
+    BASE = "base"  # what the choices of the error budget are compared with
+    CHOICE = "choice"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A result by which methods are judged.
+
+    Attributes
+    ----------
+    name : str
+        One of `cvt_hpc.chart.quantities.KINDS`.
+    tolerance : float
+        Largest error that is allowed; inf where none is asked.
+    scale : float
+        What errors are divided by [unit of the quantity]; 0: the size of the reference.
+    since, until : float
+        Part of the run [s] that is looked at, where the quantity has one; inf: to the end.
+    channel : str
+        Recorded channel by which an onset is told; "" for other quantities.
+    """
+
+    name: str
+    tolerance: float
+    scale: float
+    since: float = 0.0
+    until: float = math.inf
+    channel: str = ""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One problem on which methods compete.
+
+    Attributes
+    ----------
+    name, title : str
+        For files and for people.
+    quantities : tuple of Quantity
+        What is judged, in the order of the panels.
+    starts : int
+        Number of runs, from as many random starts.
+    exact : bool
+        Whether the reference is the model's exact solution.
+    """
+
+    name: str
+    title: str
+    quantities: tuple[Quantity, ...]
+    starts: int
+    exact: bool
+
+
+@dataclass(frozen=True)
+class Point:
+    """One thing to measure: a scene by a method at a step or a tolerance.
+
+    Attributes
+    ----------
+    name : str
+        Unique in the chart; a file-safe word.
+    scene : str
+        Name of its scene.
+    role : Role
+        What it is measured for.
+    series, label : str
+        The method or the choice: its name in the job, and for people.
+    key : str
+        Which parameter of the stepper the points of a series differ in; "" where there is none.
+    job : Job
+        What is run; with its own seed for the first start, the next ones for the others.
+    starts : int
+        Number of runs.
+    lanes : int
+        How many of them advance together; timed ones fill all lanes, if need be with further starts that
+        count for the time alone. 0: as many as the model can, where only results count.
+    until : float
+        How far a run is marched [s]; inf: to its end.
+    refines : bool
+        Of a choice: whether it comes nearer to the truth than the base, so that the difference is an error
+        of the base.
+    """
+
+    name: str
+    scene: str
+    role: Role
+    series: str
+    label: str
+    key: str
+    job: Job
+    starts: int
+    lanes: int = 0
+    until: float = math.inf
+    refines: bool = False
+
+    @property
+    def timed(self) -> bool:
+        """Whether what it costs is of interest."""
+        return self.role is Role.METHOD
+
+    @property
+    def setting(self) -> float:
+        """Value of the parameter `key` [SI]; nan where there is none."""
+        return float(self.job.parameters[self.key]) if self.key else math.nan
+
+    @property
+    def setting_in_words(self) -> str:
+        """The same for people, such as "3 µs"; "" where there is none."""
+        if not self.key:
+            return ""
+        unit = self.job.schema.parameters[self.key].unit
+        if unit != "s":
+            return in_words(self.setting, unit)
+        factor, prefix = next((pair for pair in _PREFIXES if abs(self.setting) >= pair[0]), _PREFIXES[-1])
+        return f"{self.setting / factor:.4g}\u00a0{prefix}s"  # no line break between the two
+
+    def parameters(self, start: int) -> dict[str, Any]:
+        """Return the flat parameters [SI] of one of the runs."""
+        if start == 0:
+            return dict(self.job.parameters)
+        return {**self.job.parameters, "seed": self.job.parameters["seed"] + start}
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A validated chart job.
+
+    Attributes
+    ----------
+    name, description, source : str
+        As of a job.
+    scenes : tuple of Scene
+        The problems.
+    points : tuple of Point
+        All that is measured, references first.
+    repeats : int
+        How often a quick run is timed.
+    time_limit : float
+        Core-seconds [s] after which a run is given up.
+    budgeted : tuple of str
+        Quantities that the error budget shows.
+    """
+
+    name: str
+    description: str
+    source: str
+    scenes: tuple[Scene, ...]
+    points: tuple[Point, ...]
+    repeats: int
+    time_limit: float
+    budgeted: tuple[str, ...] = ()
+
+    def scene(self, name: str) -> Scene:
+        """Return the scene of a name."""
+        return next(scene for scene in self.scenes if scene.name == name)
+
+    def points_of(self, scene: str, *roles: Role) -> tuple[Point, ...]:
+        """Return the points of a scene in certain roles."""
+        return tuple(point for point in self.points if point.scene == scene and point.role in roles)
+
+    def resolved(self) -> dict[str, Any]:
+        """Return all that determines what is measured, as JSON types."""
+        return {
+            "name": self.name,
+            "description": self.description,
+            "repeats": self.repeats,
+            "time_limit": self.time_limit,
+            "budgeted": list(self.budgeted),
+            "scenes": {scene.name: _to_json(asdict(scene)) for scene in self.scenes},
+            "points": {
+                point.name: {
+                    "role": point.role.value,
+                    "label": point.label,
+                    "starts": point.starts,
+                    "lanes": point.lanes,
+                    "until": _to_json(point.until),
+                    "refines": point.refines,
+                    "job": {**point.job.resolved(), "name": "", "description": ""},
+                }
+                for point in self.points
+            },
+        }
+
+    def fingerprint(self) -> str:
+        """Return the SHA-256 [hex] of `resolved`; name and description do not count."""
+        document = {**self.resolved(), "name": "", "description": ""}
+        return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
+
+
+def _to_json(value: Any) -> Any:
+    """Return a value without the infinities that JSON lacks, and without tuples."""
+    if isinstance(value, dict):
+        return {key: _to_json(item) for key, item in value.items()}
+    if isinstance(value, (tuple, list)):
+        return [_to_json(item) for item in value]
+    return str(value) if isinstance(value, float) and math.isinf(value) else value

@@ -1,0 +1,64 @@
+"""What a chart needs of the models, asked for before anything is computed."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from cvt_hpc.chart.marching import most_lanes
+from cvt_hpc.chart.measuring import exact_displacement
+from cvt_hpc.chart.plan import Chart, Point, Role, Scene
+from cvt_hpc.chart.quantities import channels_needed
+from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.models import MODELS
+
+
+def check_prospects(chart: Chart) -> None:
+    """Make sure that the models record what is to be judged, know what is called exact, and have the lanes.
+
+    Raises
+    ------
+    InputError
+        If one does not.
+    """
+    for scene in chart.scenes:
+        where = f"{chart.source}: [chart.scenes.{scene.name}]"
+        (point,) = chart.points_of(scene.name, Role.REFERENCE)
+        if scene.exact:
+            _check_exact(point, where)
+        _check_channels(point, scene, where)
+    for point in chart.points:
+        most = most_lanes(point.job.model, point.job.stepper, point.parameters(0))
+        if point.lanes > most:
+            where = f"{chart.source}: [chart.methods.{point.series}] lanes"
+            raise mismatch(where, f"at most {most} with stepper {point.job.stepper}", f"{point.lanes}")
+
+
+def _check_exact(point: Point, where: str) -> None:
+    try:
+        exact_displacement(point, 0)
+    except ModuleNotFoundError:
+        found = f"{point.job.model}, which has none"
+        raise mismatch(f"{where} reference", "a model with an exact solution", found) from None
+    except InputError as error:
+        raise InputError(f"{where} reference: {error}") from error
+
+
+def _check_channels(point: Point, scene: Scene, where: str) -> None:
+    needed = channels_needed(scene.quantities)
+    if scene.exact and needed:
+        raise mismatch(f"{where} quantities", "those that an exact solution has", f"channel {needed[0]}")
+    transient = import_module(MODELS[point.job.model] + ".transient").Transient
+    run = transient(point.parameters(0), point.job.stepper)
+    for channel in needed:
+        if not _has_channel(run, channel):
+            expected = f"a model that records {channel}"
+            raise mismatch(f"{where} quantities", expected, point.job.model)
+
+
+def _has_channel(run: Any, name: str) -> bool:
+    try:
+        run.channel(name)
+    except (KeyError, ValueError):
+        return False
+    return True

@@ -1,0 +1,230 @@
+"""The results by which methods are judged: what a job may say of each, and how runs give them.
+
+A quantity of one run is an array of one row; runs from several starts are pooled before they are compared,
+so that a chaotic scene is judged by what can be repeated: the rms over the starts of an amplitude, the mean
+of everything else. Errors are relative: the norm of the difference over the norm of the reference, or over a
+stated scale.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cvt_hpc.chart.declarations import read_table
+from cvt_hpc.chart.plan import Quantity
+from cvt_hpc.errors import mismatch, unknown
+from cvt_hpc.parameters import Parameter
+from cvt_hpc.vibration import signals
+from cvt_hpc.vibration.assessment import assess
+from cvt_hpc.vibration.criterion import fitting_window
+
+Array = NDArray[np.float64]
+
+PUSH_FORCE_CHANNELS = ("push_force t1", "push_force t2")
+
+
+@dataclass(frozen=True)
+class History:
+    """What a run recorded.
+
+    Attributes
+    ----------
+    displacement : array, shape (time, probe)
+        Of the probes on strands or masses [m]; the first sample is one interval after the start.
+    strands : tuple of str, length probe
+        The strand, or the mass, to which each probe belongs.
+    channel : callable
+        History of a recorded channel by its name, shape (time,).
+    parameters : mapping
+        Flat parameters of the run [SI].
+    """
+
+    displacement: Array
+    strands: tuple[str, ...]
+    channel: Callable[[str], Array]
+    parameters: Mapping[str, Any]
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate [Hz]."""
+        return float(self.parameters["sampling_rate"])
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Where vibrations are looked for [Hz]."""
+        return self.parameters["band_low"], self.parameters["band_high"]
+
+    @property
+    def judged(self) -> slice:
+        """Samples of the part of the run that is judged."""
+        samples = len(self.displacement)
+        return slice(samples - round(self.parameters["judged_fraction"] * samples), samples)
+
+    def part(self, since: float, until: float) -> slice:
+        """Return the samples after `since` and up to `until` [s]."""
+        last = len(self.displacement) if math.isinf(until) else round(until * self.rate)
+        return slice(round(since * self.rate), last)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A sort of quantity.
+
+    Attributes
+    ----------
+    unit : str
+        Of its values.
+    title : str
+        What is compared, for people; the heading of a panel.
+    takes_part : bool
+        Whether a job may limit it to a part of the run.
+    needs_part : bool
+        Whether it must.
+    values : callable
+        (History, Quantity) -> the run's values, shape (n,) or, for a trajectory, (time, probe).
+    """
+
+    unit: str
+    title: str
+    values: Callable[[History, Quantity], Array]
+    takes_part: bool = False
+    needs_part: bool = False
+
+
+def _trajectory(history: History, quantity: Quantity) -> Array:
+    return history.displacement[history.part(quantity.since, quantity.until)]
+
+
+def _amplitude(history: History, quantity: Quantity) -> Array:
+    return _assessed(history).amplitude
+
+
+def _frequency(history: History, quantity: Quantity) -> Array:
+    return _assessed(history).frequency
+
+
+def _occurrence(history: History, quantity: Quantity) -> Array:
+    return np.array([float(_assessed(history).vibrates)])
+
+
+def _growth_rate(history: History, quantity: Quantity) -> Array:
+    part = history.displacement[history.part(quantity.since, quantity.until)]
+    return _at_strongest(history, signals.envelope_growth(part, history.rate, history.band).rate)
+
+
+def _onset(history: History, quantity: Quantity) -> Array:
+    """Load at which the amplitude of a window first exceeds the threshold, between the windows' middles."""
+    p = history.parameters
+    w = history.displacement
+    length = fitting_window(len(w) / history.rate, p["window_length"])
+    times, windows = signals.window_amplitudes(w, history.rate, history.band, length)
+    first = round(quantity.since * history.rate) / history.rate
+    strongest, times = windows.max(axis=1)[times >= first], times[times >= first]
+    above = np.flatnonzero(strongest > p["amplitude_threshold"])
+    if above.size == 0 or above[0] == 0:
+        return np.array([np.nan])
+    k = above[0]
+    # amplitudes grow exponentially, so it is their logarithm that is interpolated
+    levels = np.log(np.maximum(strongest[k - 1 : k + 1], np.finfo(float).tiny))
+    crossing = np.interp(np.log(p["amplitude_threshold"]), levels, times[k - 1 : k + 1])
+    sampled = (1 + np.arange(len(w))) / history.rate
+    # the first sample is one interval after the start, and `times` counts from the first sample
+    return np.array([np.interp(crossing + 1 / history.rate, sampled, history.channel(quantity.channel))])
+
+
+def _push_force(history: History, quantity: Quantity) -> Array:
+    return np.array([history.channel(name)[history.judged].mean() for name in PUSH_FORCE_CHANNELS])
+
+
+KINDS: dict[str, Kind] = {
+    "trajectory": Kind("m", "trajectory", _trajectory, takes_part=True, needs_part=True),
+    "amplitude": Kind("m", "amplitude", _amplitude),
+    "frequency": Kind("Hz", "dominant frequency", _frequency),
+    "growth_rate": Kind("s-1", "growth rate", _growth_rate, takes_part=True),
+    "occurrence": Kind("1", "occurrence", _occurrence),
+    "onset": Kind("N m", "onset load", _onset, takes_part=True),
+    "push_force": Kind("N", "push force", _push_force),
+}
+
+
+def read_quantity(name: str, raw: Any, where: str) -> Quantity:
+    """Return a quantity as a chart job asks for it.
+
+    Raises
+    ------
+    InputError
+        If there is no such quantity, or its table is not legal.
+    """
+    if name not in KINDS:
+        raise unknown(where, "quantity", name, KINDS)
+    kind = KINDS[name]
+    declared = {
+        "tolerance": Parameter(
+            0.0 if name == "occurrence" else math.inf,
+            "",
+            "largest error allowed; of the occurrence the share of starts that are judged differently",
+            minimum=0.0,
+            allow_infinite=True,
+        ),
+        "scale": Parameter(
+            0.0, kind.unit, "what errors are divided by; 0: the reference's size", minimum=0.0
+        ),
+    }
+    if kind.takes_part:
+        end = None if kind.needs_part else math.inf
+        declared["since"] = Parameter(0.0, "s", "start of the part that is looked at", minimum=0.0)
+        declared["until"] = Parameter(
+            end, "s", "end of it", minimum=0.0, exclusive=True, allow_infinite=end is not None
+        )
+    if name == "onset":
+        declared["channel"] = Parameter("load", "", "recorded channel whose value is the onset")
+    values = read_table(declared, raw, where)
+    if kind.takes_part and values["since"] >= values["until"]:
+        raise mismatch(
+            f"{where} until", f"a time after since = {values['since']:g} s", f"{values['until']:g} s"
+        )
+    return Quantity(name, **values)
+
+
+def channels_needed(quantities: Sequence[Quantity]) -> tuple[str, ...]:
+    """Return the recorded channels that quantities are made of."""
+    pushing = PUSH_FORCE_CHANNELS if any(q.name == "push_force" for q in quantities) else ()
+    return (*pushing, *(q.channel for q in quantities if q.channel))
+
+
+def strand_of(label: str) -> str | None:
+    """Return the strand, or the mass, on which a probe lies; None for one on an arc, as "driving arc 1/2"."""
+    return None if " arc " in label else label.split()[0]
+
+
+def observe(history: History, quantities: Sequence[Quantity], whole: bool) -> dict[str, Array]:
+    """Return the values of a run by quantity.
+
+    Parameters
+    ----------
+    history : History
+        What it recorded.
+    quantities : sequence of Quantity
+        What is asked.
+    whole : bool
+        Whether the run went to its end; of a shorter one only the trajectory counts.
+    """
+    asked = [quantity for quantity in quantities if whole or quantity.name == "trajectory"]
+    values = {quantity.name: KINDS[quantity.name].values(history, quantity) for quantity in asked}
+    # amplitudes tell which strand is judged, whether they are asked for or not
+    return {"amplitude": _assessed(history).amplitude, **values} if whole else values
+
+
+def _assessed(history: History) -> Any:
+    return assess(history.displacement, history.rate, history.strands, history.parameters)
+
+
+def _at_strongest(history: History, values: Array) -> Array:
+    """Values (probe,) at the probe of each strand that moves most."""
+    return values[_assessed(history).strongest_probe]

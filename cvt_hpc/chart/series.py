@@ -1,0 +1,188 @@
+"""The points of a chart from its tables: references, methods over their settings, and the error budget."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from cvt_hpc.chart.declarations import BUDGET, CHOICE, METHOD, SETTINGS, read_set, read_table, read_tables
+from cvt_hpc.chart.plan import Point, Quantity, Role, Scene
+from cvt_hpc.chart.stage import Stage, check_word, in_words
+from cvt_hpc.errors import mismatch, show, unknown
+from cvt_hpc.job import Job
+from cvt_hpc.job.schema import load_schema
+
+_COARSER = {"step": 2.0, "tolerance": 10.0}  # by which the coarser reference is coarser
+
+
+def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
+    """Yield the reference of a scene and, unless it is exact, the coarser one that tells its error.
+
+    Parameters
+    ----------
+    stage : Stage
+        The scene.
+    raw : Any
+        "exact", or a table with a stepper, its step or tolerance, that of the coarser one (by default twice
+        the step or ten times the tolerance), and what else is to be set.
+
+    Raises
+    ------
+    InputError
+        If it is neither, or a quantity of the scene looks beyond the end of the runs.
+    """
+    where = f"{stage.where} reference"
+    name, starts = stage.scene.name, stage.scene.starts
+    if stage.scene.exact:
+        job = stage.job(where)
+        _check_starts(stage, job)
+        _check_quantities(stage, job)
+        yield Point(f"{name}-exact", name, Role.REFERENCE, "exact", "exact", "", job, starts)
+        return
+    if not isinstance(raw, Mapping):
+        raise mismatch(where, '"exact", or a table with a stepper and its step or tolerance', show(raw))
+    read_table({"stepper": METHOD["stepper"]}, raw, where, ("set", "coarser", *SETTINGS))
+    key = _setting_key(raw, where)
+    fine = stage.job(where, stepper=raw["stepper"], **read_set(raw, where), **{key: raw[key]})
+    _check_starts(stage, fine)
+    _check_quantities(stage, fine)
+    coarse = raw.get("coarser", fine.parameters[key] * _COARSER[key])
+    coarser = stage.job(where, stepper=raw["stepper"], **read_set(raw, where), **{key: coarse})
+    if coarser.parameters[key] <= fine.parameters[key]:
+        raise mismatch(f"{where} coarser", f"more than {key} = {fine.parameters[key]:g}", f"{coarse}")
+    label = in_words(raw["stepper"])
+    yield Point(f"{name}-reference", name, Role.REFERENCE, raw["stepper"], label, key, fine, starts)
+    yield Point(f"{name}-coarser", name, Role.COARSER, raw["stepper"], label, key, coarser, starts)
+
+
+def method_points(name: str, raw: Any, stages: list[Stage], where: str) -> Iterator[Point]:
+    """Yield the points of a method: its settings on each of its scenes.
+
+    Parameters
+    ----------
+    name, raw
+        Of the method: its name and its table.
+    stages : list of Stage
+        All scenes.
+    where : str
+        File and table, for the errors.
+
+    Raises
+    ------
+    InputError
+        If the table is not legal, or a scene's model does not take the stepper.
+    """
+    check_word(name, where)
+    own = read_table(METHOD, raw, where, ("set", "scenes", *SETTINGS))
+    label = own["label"] or in_words(name)
+    key = _setting_key(raw, where)
+    if not isinstance(raw[key], list) or not raw[key]:
+        raise mismatch(f"{where} {key}", "a list of values", show(raw[key]))
+    for stage in _chosen_stages(raw.get("scenes"), stages, where):
+        for i, value in enumerate(raw[key], 1):
+            job = stage.job(where, stepper=own["stepper"], **read_set(raw, where), **{key: value})
+            until = own["until"] if own["until"] < job.parameters["duration"] else math.inf
+            _check_until(until, stage.scene.quantities, where)
+            yield Point(
+                f"{stage.scene.name}-{name}-{i}",
+                stage.scene.name,
+                Role.METHOD,
+                name,
+                label,
+                key,
+                job,
+                stage.scene.starts,
+                own["lanes"],
+                until,
+            )
+
+
+def budget_points(raw: Any, stages: list[Stage], where: str) -> tuple[list[Point], tuple[str, ...]]:
+    """The base and the choices of the error budget, and the quantities that it shows."""
+    own = read_table(BUDGET, raw, where, ("set", "quantities", "choices"))
+    (stage,) = _chosen_stages([own["scene"]], stages, where)
+    base = read_set(raw, where)
+    stepper = own["stepper"] or None
+    scene, starts = stage.scene.name, stage.scene.starts
+    job = stage.job(where, stepper=stepper, **base)
+    points = [Point(f"{scene}-base", scene, Role.BASE, "base", own["label"], "", job, starts)]
+    for name, table in read_tables(raw.get("choices"), f"{where} choices", "choices").items():
+        place = where.replace("budget]", f"budget.choices.{name}]")
+        check_word(name, place)
+        choice = read_table(CHOICE, table, place, ("set",))
+        # what is set for the base's stepper may be unknown to another
+        changed = {**({} if choice["stepper"] else base), **read_set(table, place)}
+        job = stage.job(place, stepper=choice["stepper"] or stepper, **changed)
+        points.append(
+            Point(
+                f"{scene}-choice-{name}",
+                scene,
+                Role.CHOICE,
+                name,
+                choice["label"] or in_words(name),
+                "",
+                job,
+                starts,
+                refines=choice["refines"],
+            )
+        )
+    return points, _budgeted(raw.get("quantities"), stage.scene, f"{where} quantities")
+
+
+def _budgeted(names: Any, scene: Scene, where: str) -> tuple[str, ...]:
+    """The quantities that were named, or else all of the scene but the trajectory, which no choice keeps."""
+    known = [quantity.name for quantity in scene.quantities]
+    if names is None:
+        return tuple(name for name in known if name != "trajectory")
+    if not isinstance(names, list) or not names:
+        raise mismatch(where, "a list of quantities", show(names))
+    for name in names:
+        if name not in known:
+            raise unknown(where, f"quantity {show(name)} of scene {scene.name}", str(name), known)
+    return tuple(names)
+
+
+def _chosen_stages(names: Any, stages: list[Stage], where: str) -> list[Stage]:
+    if names is None:
+        return stages
+    if not isinstance(names, list):
+        raise mismatch(f"{where} scenes", "a list of scenes", show(names))
+    known = {stage.scene.name: stage for stage in stages}
+    for name in names:
+        if name not in known:
+            raise unknown(f"{where} scenes", f"scene {show(name)}", str(name), known)
+    return [known[name] for name in names]
+
+
+def _setting_key(raw: Mapping[str, Any], where: str) -> str:
+    keys = [key for key in SETTINGS if key in raw]
+    if len(keys) != 1:
+        raise mismatch(where, f"one of {' and '.join(SETTINGS)}", "both" if keys else "neither")
+    return keys[0]
+
+
+def _check_starts(stage: Stage, job: Job) -> None:
+    if stage.scene.starts > 1 and "seed" not in load_schema(job.model, job.stepper, stage.where).parameters:
+        raise mismatch(
+            f"{stage.where} starts", f"1, because {job.model} has no seed", f"{stage.scene.starts}"
+        )
+
+
+def _check_quantities(stage: Stage, job: Job) -> None:
+    duration = job.parameters["duration"]
+    for quantity in stage.scene.quantities:
+        if duration < quantity.until < math.inf:
+            where = f"{stage.where} quantities.{quantity.name}.until"
+            raise mismatch(where, f"a time within the run of {duration:g} s", f"{quantity.until:g} s")
+
+
+def _check_until(until: float, quantities: tuple[Quantity, ...], where: str) -> None:
+    if math.isinf(until):
+        return
+    needed = [quantity.until for quantity in quantities if quantity.name == "trajectory"]
+    if not needed:
+        raise mismatch(f"{where} until", "runs to their end, because no trajectory is judged", f"{until:g} s")
+    if until < needed[0]:
+        expected = f"{needed[0]:g} s or more, the trajectory that is judged"
+        raise mismatch(f"{where} until", expected, f"{until:g} s")

@@ -1,0 +1,92 @@
+"""A scene of a chart job, with what its runs are built from."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from cvt_hpc.chart.declarations import SCENE, read_set, read_table, read_tables
+from cvt_hpc.chart.plan import Scene
+from cvt_hpc.chart.quantities import read_quantity
+from cvt_hpc.errors import mismatch, show
+from cvt_hpc.job import Job, build_job
+
+_WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9_]{0,59}")
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A scene with what its runs are built from.
+
+    Attributes
+    ----------
+    scene : Scene
+        As the chart knows it.
+    document : dict
+        Job file without the chart.
+    values : dict
+        What the scene, or the command line, sets beside it.
+    where : str
+        File and table, for the errors.
+    """
+
+    scene: Scene
+    document: dict[str, Any]
+    values: dict[str, Any]
+    where: str
+
+    def job(self, where: str, **values: Any) -> Job:
+        """Return the job of a run of this scene with further values set."""
+        # None: the model's own choice of a stepper
+        values = {key: value for key, value in values.items() if value is not None}
+        return build_job(self.document, where, {**self.values, **values}, "set")
+
+
+def read_stage(name: str, raw: Any, document: dict[str, Any], replaced: dict[str, Any], source: str) -> Stage:
+    """Return a scene as its table in a chart job describes it.
+
+    Parameters
+    ----------
+    name : str
+        Of the scene.
+    raw : Any
+        Its table.
+    document : dict
+        The job file without the chart.
+    replaced : dict
+        Values from the command line, which count more than those of the scene.
+    source : str
+        The job file, for the errors.
+
+    Raises
+    ------
+    InputError
+        If the table is not legal.
+    """
+    where = f"{source}: [chart.scenes.{name}]"
+    check_word(name, where)
+    own = read_table(SCENE, raw, where, ("set", "quantities", "reference"))
+    base = document
+    if own["model"]:
+        head = {key: document[key] for key in ("name", "description") if key in document}
+        base = {**head, "model": own["model"]}
+    asked = read_tables(raw.get("quantities"), f"{where} quantities", "quantities")
+    quantities = tuple(
+        read_quantity(key, table, f"{source}: [chart.scenes.{name}.quantities] {key}")
+        for key, table in asked.items()
+    )
+    exact = raw.get("reference") == "exact"
+    scene = Scene(name, own["title"] or in_words(name), quantities, own["starts"], exact)
+    return Stage(scene, base, {**read_set(raw, where), **replaced}, where)
+
+
+def check_word(name: str, where: str) -> None:
+    """Raise InputError unless a name may be part of a file's name."""
+    if not _WORD.fullmatch(name):
+        raise mismatch(where, "a name of letters, digits and '_' (it names files)", show(name))
+
+
+def in_words(name: str) -> str:
+    """Return a name as people write it."""
+    return name.replace("_", " ")

@@ -1,0 +1,38 @@
+"""The charts of this repository: each can be made as it lies there."""
+
+from pathlib import Path
+
+import pytest
+
+from cvt_hpc.chart import load_chart
+from cvt_hpc.chart.plan import Role
+from cvt_hpc.chart.prospects import check_prospects
+from cvt_hpc.cli import main
+
+FOLDER = Path(__file__).parents[2] / "jobs"
+CHARTS = sorted(FOLDER.glob("chart_*.toml"))
+
+
+def test_there_are_charts():
+    assert [path.stem for path in CHARTS] == ["chart_belt", "chart_oscillator"]
+
+
+@pytest.mark.parametrize("path", CHARTS, ids=lambda path: path.stem)
+def test_a_chart_is_fit_to_be_made(path):
+    chart = load_chart(path)
+    assert chart.name == path.stem and chart.description
+    check_prospects(chart)
+    for scene in chart.scenes:
+        assert any(quantity.tolerance < 1.0 for quantity in scene.quantities)
+        # a method that is also the reference would be judged by itself
+        reference = chart.points_of(scene.name, Role.REFERENCE)[0]
+        finest = [p.setting for p in chart.points_of(scene.name, Role.METHOD)
+                  if not scene.exact and p.job.stepper == reference.job.stepper]  # fmt: skip
+        assert all(setting > reference.setting for setting in finest)
+
+
+@pytest.mark.parametrize("command", ["check", "run", "simulate"])
+def test_a_chart_is_no_job_of_runs(command, capsys):
+    assert main([command, str(CHARTS[0])]) == 2
+    error = capsys.readouterr().err
+    assert error == f"cvt-hpc: {CHARTS[0]}: [chart]: expected a job of runs, found one for `cvt-hpc chart`\n"

@@ -1,0 +1,183 @@
+"""What a chart job says, and what is wrong with a bad one."""
+
+import math
+
+import pytest
+
+from cvt_hpc.chart import load_chart
+from cvt_hpc.chart.plan import Role
+from cvt_hpc.errors import InputError
+
+
+def test_a_chart_holds_every_run_that_it_needs(write_chart):
+    chart = load_chart(write_chart())
+    assert (chart.name, chart.description, chart.repeats, chart.time_limit) == (
+        "bells",
+        "Two ways to ring",
+        2,
+        3600,
+    )
+    assert [point.name for point in chart.points] == [
+        "ringing-exact",
+        *(f"ringing-soft-{k}" for k in (1, 2, 3, 4)),
+        *(f"ringing-clever-{k}" for k in (1, 2, 3)),
+        "ringing-brief-1",
+        "ringing-base",
+        "ringing-choice-louder",
+        "ringing-choice-fine",
+        "ringing-choice-cracked",
+    ]
+    by_name = {point.name: point for point in chart.points}
+    soft = by_name["ringing-soft-2"]
+    assert soft.role is Role.METHOD and soft.timed
+    assert (soft.label, soft.key, soft.setting) == ("soft hammer", "step", 1e-6)
+    assert soft.setting_in_words == "1\u00a0µs"
+    assert soft.job.parameters["loudness"] == 20e-6 and soft.job.stepper == "soft"
+    assert by_name["ringing-clever-1"].setting_in_words == "0.01"
+    assert by_name["ringing-brief-1"].until == 0.02 and math.isinf(soft.until)
+    assert by_name["ringing-choice-louder"].job.parameters["step"] == 1e-5  # what the base sets
+    assert [p.refines for p in chart.points_of("ringing", Role.CHOICE)] == [False, True, False]
+    assert chart.budgeted == ("amplitude", "frequency", "occurrence")
+    scene = chart.scene("ringing")
+    assert [q.name for q in scene.quantities] == ["trajectory", "amplitude", "frequency", "occurrence"]
+    assert [q.tolerance for q in scene.quantities] == [0.05, 0.01, 0.01, 0.0]
+
+
+REFERENCE = ('reference = "exact"', 'reference = { stepper = "hard", step = "2 us" }')
+
+
+@pytest.mark.parametrize(
+    ("reference", "settings"),
+    [
+        ('{ stepper = "hard", step = "2 us" }', (2e-6, 4e-6)),
+        ('{ stepper = "hard", step = "2 us", coarser = "3 us" }', (2e-6, 3e-6)),
+        ('{ stepper = "clever", tolerance = 1e-6 }', (1e-6, 1e-5)),
+    ],
+)
+def test_a_computed_reference_has_a_coarser_one_beside_it(write_chart, reference, settings):
+    chart = load_chart(write_chart((REFERENCE[0], f"reference = {reference}")))
+    found = chart.points_of("ringing", Role.REFERENCE, Role.COARSER)
+    assert [point.role for point in found] == [Role.REFERENCE, Role.COARSER]
+    assert tuple(point.setting for point in found) == pytest.approx(settings, rel=1e-12)
+    assert not any(point.timed for point in found)
+
+
+def test_starts_differ_in_their_seeds(write_chart):
+    chart = load_chart(write_chart(('title = "Ringing"', "starts = 3")))
+    point = chart.points[1]
+    assert [point.parameters(k)["seed"] for k in range(3)] == [1, 2, 3]
+
+
+def test_values_from_the_command_line_count_more_than_those_of_scenes(write_chart):
+    chart = load_chart(write_chart(), ["loudness=30 um", "duration=0.2 s"])
+    by_name = {point.name: point.job.parameters for point in chart.points}
+    assert by_name["ringing-soft-1"]["loudness"] == 30e-6 and by_name["ringing-exact"]["duration"] == 0.2
+    assert by_name["ringing-choice-louder"]["loudness"] == 22e-6  # what is varied stays varied
+    assert by_name["ringing-soft-1"]["step"] == 2e-3
+    assert chart.fingerprint() != load_chart(write_chart()).fingerprint()
+
+
+def test_names_do_not_make_another_chart(write_chart):
+    plain = load_chart(write_chart()).fingerprint()
+    assert load_chart(write_chart(("bells", "chimes"), ("Two ways", "Ways"))).fingerprint() == plain
+    assert load_chart(write_chart(("repeats = 2", "repeats = 3"))).fingerprint() != plain
+    assert load_chart(write_chart(('tolerance = "5 %"', 'tolerance = "6 %"'))).fingerprint() != plain
+
+
+A_SCENE_OF_ITS_OWN = """
+[chart.scenes.other]
+model = "oscillator"
+reference = "exact"
+set = { stiffness = 1e7, normal_load = 3162.278 }
+quantities = { frequency = {} }
+"""
+
+
+def test_a_scene_may_be_of_another_model(write_chart):
+    job = write_chart(
+        ("[chart.methods.soft]", f'{A_SCENE_OF_ITS_OWN}\n[chart.methods.soft]\nscenes = ["ringing"]'),
+        ("[chart.methods.clever]", '[chart.methods.clever]\nscenes = ["ringing"]'),
+        ("[chart.methods.brief]", '[chart.methods.brief]\nscenes = ["ringing"]'),
+    )
+    other = next(point for point in load_chart(job).points if point.scene == "other")
+    assert (other.job.model, other.job.name) == ("oscillator", "bells")
+    assert (
+        other.job.parameters["duration"] == 0.3
+    )  # its own default: the job's tables are for the job's model
+
+
+WHERE = "c.toml: [chart.scenes.ringing"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[chart]\nrepeats", "[chart]\nrepeat", "c.toml: [chart] repeat: unknown key; did you mean repeats?"),
+        ("repeats = 2", "repeats = 0", "c.toml: [chart] repeats: expected >= 1, found 0"),
+        ("repeats = 2", 'repeats = "2 s"', 'c.toml: [chart] repeats: expected a whole number, found "2 s"'),
+        ('time_limit = "1 h"', 'time_limit = "1 m"',
+         'c.toml: [chart] time_limit: expected a value in s (such as "1 s" or a bare number in s), found "1 m"'),
+        ("[chart.scenes.ringing]\ntitle", "[chart.scenes.ringing]\ntitel",
+         f"{WHERE}] titel: unknown key; did you mean title?"),
+        ("chart.scenes.ringing", 'chart.scenes."ring/ing"',
+         "c.toml: [chart.scenes.ring/ing]: expected a name of letters, digits and '_' (it names files), "
+         'found "ring/ing"'),
+        ('loudness = "20 um"', 'loudnes = "20 um"',
+         f"{WHERE}] reference: set loudnes: unknown key; did you mean loudness in [scene]?"),
+        ('loudness = "20 um"', 'model = "bell"', f"{WHERE}] set model: expected a parameter, found the job's model"),
+        ('reference = "exact"', 'reference = "exakt"',
+         f'{WHERE}] reference: expected "exact", or a table with a stepper and its step or tolerance, found "exakt"'),
+        ('reference = "exact"', 'reference = { stepper = "hard" }',
+         f"{WHERE}] reference: expected one of step and tolerance, found neither"),
+        ('reference = "exact"', 'reference = { stepper = "hard", step = "2 us", coarser = "1 us" }',
+         f"{WHERE}] reference coarser: expected more than step = 2e-06, found 1 us"),
+        ('reference = "exact"', 'reference = { stepper = "hart", step = "2 us" }',
+         f'{WHERE}] reference: stepper: unknown stepper "hart"; did you mean hard?'),
+        ("amplitude =", "amplitde =", f"{WHERE}.quantities] amplitde: unknown quantity; did you mean amplitude?"),
+        ('until = "10 ms", tol', "tol",
+         f'{WHERE}.quantities] trajectory until: expected a value in s (such as "1 s" or a bare number in s), '
+         "found nothing"),
+        ('until = "10 ms"', 'since = "10 ms", until = "10 ms"',
+         f"{WHERE}.quantities] trajectory until: expected a time after since = 0.01 s, found 0.01 s"),
+        ('until = "10 ms"', 'until = "0.2 s"',
+         f"{WHERE}] quantities.trajectory.until: expected a time within the run of 0.1 s, found 0.2 s"),
+        ('step = ["2 ms", "1 us", "10 us", "0.2 ms"]', "",
+         "c.toml: [chart.methods.soft]: expected one of step and tolerance, found neither"),
+        ('step = ["2 ms", "1 us", "10 us", "0.2 ms"]', 'step = "1 us"',
+         'c.toml: [chart.methods.soft] step: expected a list of values, found "1 us"'),
+        ('"1 us", "10 us"', '"1 kg", "10 us"',
+         'c.toml: [chart.methods.soft]: set step: expected a value in s (such as "1 s" or a bare number in s), '
+         'found "1 kg"'),
+        ('stepper = "clever"', 'stepper = "clever"\nscenes = ["rining"]',
+         'c.toml: [chart.methods.clever] scenes: unknown scene "rining"; did you mean ringing?'),
+        ('until = "20 ms"', 'until = "5 ms"',
+         "c.toml: [chart.methods.brief] until: expected 0.01 s or more, the trajectory that is judged, "
+         "found 0.005 s"),
+        ('stepper = "soft"', 'stepper = "explicit"', None),
+        ('scene = "ringing"', 'scene = "rining"',
+         'c.toml: [chart.budget] scenes: unknown scene "rining"; did you mean ringing?'),
+        ("refines = true", "refine = true",
+         "c.toml: [chart.budget.choices.fine] refine: unknown key; did you mean refines?"),
+        ('set = { loudness = "22 um" }', "set = { loudness = inf }",
+         "c.toml: [chart.budget.choices.louder]: set loudness: expected a finite value in m, found inf"),
+        ('label = "the default"', 'quantities = ["onset"]',
+         'c.toml: [chart.budget] quantities: unknown quantity "onset" of scene ringing; '
+         "known: trajectory, amplitude, frequency, occurrence"),
+        ("[run]", "[axes]\nseed = [1, 2]\n[run]", "c.toml: [axes]: expected no axes in a chart job, found some"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_clear_error(write_chart, old, new, message):
+    with pytest.raises(InputError) as caught:
+        load_chart(write_chart((old, new)))
+    if message is not None:
+        assert str(caught.value) == message
+    assert "\n" not in str(caught.value)
+
+
+def test_a_job_without_a_chart_is_refused(write_chart):
+    with pytest.raises(InputError, match=r"c.toml: chart: expected a table \[chart\]"):
+        load_chart(write_chart(text='name = "x"\nmodel = "bell"\n'))
+    with pytest.raises(
+        InputError, match="--set stepper: expected a parameter of the scenes, found the job's"
+    ):
+        load_chart(write_chart(), ["stepper=hard"])

@@ -1,0 +1,153 @@
+"""Charts from the job to the files, broken off, gone on with, and refused."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from bells import Transient
+
+from cvt_hpc.chart import load_chart, make_chart
+from cvt_hpc.chart.table import table_lines
+from cvt_hpc.errors import InputError
+
+
+def made(job, **options):
+    return make_chart(load_chart(job), processes=1, **options)
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Pictures take most of the time, and are tested elsewhere."""
+    for name in ("draw_scene", "draw_budget"):
+        monkeypatch.setattr(f"cvt_hpc.chart.making.{name}", lambda comparison, out: out)
+
+
+@pytest.fixture
+def report(write_chart, undrawn):
+    return made(write_chart())
+
+
+def test_the_table_holds_every_point_with_its_outcome(report):
+    with report.table.open() as file:
+        rows = list(csv.DictReader(file))
+    assert str(report.table) == "out/bells/chart.csv"
+    assert [row["method"] for row in rows] == [
+        "exact", *["soft hammer"] * 4, *["clever"] * 3, "brief", "louder", "step 1 us", "cracked",
+    ]  # fmt: skip
+    assert [row["role"] for row in rows[-3:]] == ["choice", "refinement", "choice"]
+    failed = rows[1]
+    assert failed["outcome"] == "failed_numerics at 50 ms: the bell has cracked (by 3 mm)"
+    assert (failed["setting"], failed["value"]) == ("step", "0.002")
+    assert failed["amplitude_error"] == failed["core_s_per_s"] == ""
+    good = rows[3]
+    assert good["outcome"] == "done" and good["stepper"] == "soft"
+    assert float(good["core_s_per_s"]) == pytest.approx(20e3 * 1.1e-9 / 1e-5, rel=1e-3)
+    assert float(good["amplitude [m]"]) == pytest.approx(20.02e-6, rel=1e-3)
+    assert float(good["amplitude_error"]) == 0.001
+    assert (good["steps"], good["rates"]) == ("6000", "14000")
+    assert [row["method"] for row in rows if row["chosen"] == "yes"] == ["clever"]
+
+
+def test_people_read_the_same(report):
+    lines = list(table_lines(report.comparisons[0]))
+    assert lines[0] == "Ringing"
+    assert "".join(line for line in lines if line.endswith("<- chosen")).split()[0] == "clever"
+    assert sum("failed: failed_numerics at 50 ms: the bell has cracked" in line for line in lines) == 2
+    assert next(line for line in lines if line.startswith("  step 1 us")).endswith("is an error of it")
+
+
+def test_the_dataset_repeats_the_study(report):
+    with xr.open_dataset(report.dataset) as dataset:
+        assert dataset.attrs["Conventions"] == "CF-1.11"
+        job = json.loads(dataset.attrs["job"])
+        assert job["points"]["ringing-soft-3"]["job"]["numerics"]["step"] == 1e-5
+        assert {"python", "numpy"} <= set(json.loads(dataset.attrs["versions"]))
+        assert json.loads(dataset.attrs["machine"])["cores"] >= 1
+        point = dataset.sel(point="ringing-soft-3")
+        assert float(point["amplitude_error"]) == pytest.approx(1e-3, rel=1e-6)
+        assert dataset["amplitude"].attrs["units"] == "m" and dataset["step"].attrs["units"] == "s"
+        assert float(point["step"]) == 1e-5 and np.isnan(float(point["tolerance"]))
+        assert int(point["failed"]) == 0 and int(dataset["failed"].sum()) == 2
+        assert int(dataset["chosen"].sum()) == 1
+        for variable in dataset.data_vars.values():
+            assert "long_name" in variable.attrs
+
+
+def test_a_chart_goes_on_where_it_was_broken_off(write_chart, undrawn, monkeypatch):
+    job = write_chart()
+    measure = Transient.advance
+
+    def broken(run, samples):
+        if run.stepper == "clever":
+            raise KeyboardInterrupt
+        return measure(run, samples)
+
+    monkeypatch.setattr(Transient, "advance", broken)
+    with pytest.raises(KeyboardInterrupt):
+        made(job)
+    monkeypatch.setattr(Transient, "advance", measure)
+    told = []
+    report = made(job, tell=told.append)
+    # the exact solution, the budget and the soft hammer had been measured
+    assert [line.split()[1] for line in told] == [
+        "ringing-clever-1:", "ringing-clever-2:", "ringing-clever-3:", "ringing-brief-1:",
+    ]  # fmt: skip
+    assert told[-1].startswith("13/13 ")
+    before = report.table.read_bytes()
+    told.clear()
+    assert made(job, tell=told.append).table.read_bytes() == before
+    assert told == []
+
+
+def test_failures_are_kept_too(write_chart, undrawn):
+    told = []
+    job = write_chart()
+    made(job, tell=told.append)
+    assert "failed: failed_numerics at 50 ms" in next(line for line in told if "ringing-soft-1" in line)
+    told.clear()
+    report = made(job, tell=told.append)
+    assert told == []
+    assert report.comparisons[0].methods[0].measurement.reason.startswith("failed_numerics at 50 ms")
+
+
+def test_another_job_in_the_folder_is_refused_unless_fresh(write_chart, undrawn, tmp_path):
+    report = made(write_chart())
+    before = report.table.read_bytes()
+    changed = write_chart(("20 um", "21 um"))
+    with pytest.raises(InputError) as caught:
+        made(changed)
+    assert str(caught.value).startswith(
+        "out/bells: expected the folder of this job, found that of another (points."
+    )
+    assert "loudness is 2e-05 there, 2.1e-05 here" in str(caught.value)
+    assert str(caught.value).endswith("choose another --out, or --fresh to throw its results away")
+    assert report.table.read_bytes() == before
+    (tmp_path / "out/bells/notes.txt").write_text("mine")
+    (tmp_path / "out/bells/mine.png").write_text("mine")
+    told = []
+    assert made(changed, fresh=True, tell=told.append).table.read_bytes() != before
+    assert len(told) == 13
+    assert (tmp_path / "out/bells/notes.txt").read_text() == "mine"
+    assert (tmp_path / "out/bells/mine.png").read_text() == "mine"
+
+
+@pytest.mark.parametrize("fresh", [False, True])
+def test_a_folder_of_something_else_is_left_alone(write_chart, undrawn, tmp_path, fresh):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/chart.csv").write_text("mine")
+    with pytest.raises(InputError, match="expected an empty folder or that of an earlier chart"):
+        made(write_chart(), out=tmp_path / "mine", fresh=fresh)
+    assert (tmp_path / "mine/chart.csv").read_text() == "mine"
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(InputError, match="expected a folder for the results, found a file"):
+        made(write_chart(), out=tmp_path / "file", fresh=fresh)
+
+
+def test_a_damaged_point_is_named(write_chart, undrawn, tmp_path):
+    job = write_chart()
+    made(job)
+    (tmp_path / "out/bells/points/ringing-soft-3.npz").write_bytes(b"PK")
+    with pytest.raises(InputError, match="ringing-soft-3.npz: expected a point as charts write it"):
+        made(job)

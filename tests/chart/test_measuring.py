@@ -1,0 +1,218 @@
+"""Runs marched, timed and observed."""
+
+import math
+
+import numpy as np
+import pytest
+from bells import Transient
+
+from cvt_hpc.chart import load_chart
+from cvt_hpc.chart.measuring import measure
+from cvt_hpc.chart.prospects import check_prospects
+from cvt_hpc.chart.quantities import History, Quantity, observe
+from cvt_hpc.errors import InputError
+
+
+def measured(chart, name, repeats=2, time_limit=math.inf):
+    point = next(point for point in chart.points if point.name == name)
+    return measure(point, chart.scene(point.scene), repeats, time_limit)
+
+
+def cost(setting, rate=20e3):
+    """What a simulated second of the bell takes: 1.1 ns over the setting for each sample."""
+    return rate * 1.1e-9 / setting
+
+
+def test_a_point_has_its_values_its_cost_and_its_work(write_chart):
+    found = measured(load_chart(write_chart()), "ringing-soft-3")
+    assert found.reason == ""
+    assert found.cost == pytest.approx(cost(1e-5), rel=1e-9)
+    assert found.values["trajectory"].shape == (1, 200, 2)  # starts, 10 ms at 20 kHz, rim and foot
+    assert found.values["amplitude"][0] == pytest.approx([20.02e-6, 4.004e-6], rel=1e-3)
+    assert found.values["frequency"][0] == pytest.approx([500.0, 500.0], abs=0.01)
+    assert found.counters == {"steps": 6000.0, "rates": 14000.0}
+    assert found.simulated == pytest.approx(0.1)
+
+
+def test_compiling_costs_nothing_and_the_quickest_repeat_counts(write_chart, bell, monkeypatch):
+    chart = load_chart(write_chart())
+    slowness = iter([1000.0, 5.0, 3.0, 4.0])  # warming up, the first pass, two repeats
+    factors = {}
+    advance = Transient.advance
+
+    def uneven(run, samples):
+        before = bell.now
+        failure = advance(run, samples)
+        factor = factors.setdefault(id(run), None) or next(slowness)
+        factors[id(run)] = factor
+        bell.now = before + factor * (bell.now - before)
+        return failure
+
+    monkeypatch.setattr(Transient, "advance", uneven)
+    kept = []
+    init = Transient.__init__
+    monkeypatch.setattr(Transient, "__init__", lambda run, *given: (kept.append(run), init(run, *given))[1])
+    assert measured(chart, "ringing-soft-3").cost == pytest.approx(3 * cost(1e-5), rel=1e-9)
+
+
+def test_long_runs_are_timed_once(write_chart):
+    chart = load_chart(write_chart())
+    Transient.made = 0
+    measured(chart, "ringing-soft-3", repeats=5)  # 0.22 s
+    assert Transient.made == 2 + 5  # warmed up, observed, repeated
+    Transient.made = 0
+    measured(chart, "ringing-soft-2", repeats=5)  # 2.2 s
+    assert Transient.made == 2
+    Transient.made = 0
+    measured(chart, "ringing-base", repeats=5)  # not timed at all
+    assert Transient.made == 2
+
+
+def test_costs_are_those_of_one_run_whatever_the_number_of_starts(write_chart):
+    chart = load_chart(write_chart(('title = "Ringing"', "starts = 4")))
+    found = measured(chart, "ringing-soft-3")
+    assert found.cost == pytest.approx(cost(1e-5), rel=1e-9)
+    assert found.values["amplitude"].shape == (4, 2)
+    assert found.simulated == pytest.approx(0.4)
+
+
+def test_a_failed_run_is_named_with_its_instant(write_chart):
+    found = measured(load_chart(write_chart()), "ringing-soft-1")
+    assert found.reason == "failed_numerics at 50 ms: the bell has cracked (by 3 mm)"
+    assert found.values == {} and math.isnan(found.cost)
+    several = measured(load_chart(write_chart(('title = "Ringing"', "starts = 4"))), "ringing-soft-1")
+    assert several.reason.startswith("failed_numerics (start 1 of 4) at 50 ms")
+
+
+def test_a_run_that_takes_too_long_is_given_up(write_chart):
+    found = measured(load_chart(write_chart()), "ringing-soft-2", time_limit=0.5)
+    assert found.reason.startswith("timed_out at ")
+    assert found.reason.endswith("ms: takes longer than the chart's time_limit")
+    assert found.core_seconds < 2.0  # of 2.2 s for the whole run
+
+
+def test_a_motion_without_bounds_is_a_failure(write_chart):
+    chart = load_chart(write_chart(('loudness = "20 um"', 'loudness = "20 um", swell = 300')))
+    found = measured(chart, "ringing-soft-3")
+    assert found.reason == "failed_numerics at 100 ms: the motion grows without bounds"
+
+
+def test_a_short_run_is_judged_by_its_trajectory_alone(write_chart):
+    found = measured(load_chart(write_chart()), "ringing-brief-1")
+    assert set(found.values) == {"trajectory"}
+    assert found.simulated == pytest.approx(0.02)
+    assert found.cost == pytest.approx(cost(1e-6), rel=1e-9)
+
+
+class Batch:
+    """Bells that ring together: two cost as much as one."""
+
+    def __init__(self, points, stepper):
+        self.runs = tuple(Transient(point, stepper) for point in points)
+        for run in self.runs:
+            run.failure = None
+        self.samples, self.interval = self.runs[0].samples, self.runs[0].interval
+
+    @property
+    def done(self):
+        return self.runs[0].done
+
+    @property
+    def running(self):
+        return self.done < self.samples
+
+    def advance(self, samples):
+        before = Transient.clock.now
+        for run in self.runs:
+            Transient.clock.now = before
+            run.advance(samples)
+
+
+def test_lanes_are_filled_and_share_their_time(write_chart, monkeypatch):
+    import bell.transient as module
+
+    monkeypatch.setattr(module, "Batch", Batch, raising=False)
+    monkeypatch.setattr(module, "lanes", lambda parameters, stepper: 2, raising=False)
+    chart = load_chart(
+        write_chart(('stepper = "soft"', 'stepper = "soft"\nlanes = 2'), ('title = "Ringing"', "starts = 3"))
+    )
+    check_prospects(chart)
+    found = measured(chart, "ringing-soft-3")
+    assert found.cost == pytest.approx(cost(1e-5) / 2, rel=1e-9)
+    assert found.values["amplitude"].shape == (3, 2)  # the fourth run fills a lane, and is not judged
+    alone = load_chart(write_chart(('title = "Ringing"', "starts = 3")))
+    assert np.array_equal(found.values["amplitude"], measured(alone, "ringing-soft-3").values["amplitude"])
+    assert measured(alone, "ringing-soft-3").cost == pytest.approx(cost(1e-5), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('stepper = "soft"', 'stepper = "soft"\nlanes = 2',
+         "c.toml: [chart.methods.soft] lanes: expected at most 1 with stepper soft, found 2"),
+        ("occurrence = {}", "push_force = {}",
+         "c.toml: [chart.scenes.ringing] quantities: expected those that an exact solution has, "
+         "found channel push_force t1"),
+        ("occurrence = {}\n", 'occurrence = {}\n[chart.scenes.s]\nmodel = "oscillator"\nreference = "exact"\n'
+         'set = { friction_law = "stribeck", friction_gradient = -2 }\nquantities = { amplitude = {} }\n', None),
+    ],
+)  # fmt: skip
+def test_models_are_asked_before_anything_is_computed(write_chart, old, new, message):
+    job = write_chart((old, new), ("[chart.methods.clever]", '[chart.methods.clever]\nscenes = ["ringing"]'))
+    if message is None:
+        job = write_chart((old, new), *((f'[chart.methods.{name}]', f'[chart.methods.{name}]\nscenes = ["ringing"]')
+                                        for name in ("soft", "clever", "brief")))  # fmt: skip
+        message = "c.toml: [chart.scenes.s] reference: exact motion: expected friction_law coulomb"
+    with pytest.raises(InputError) as caught:
+        check_prospects(load_chart(job))
+    assert str(caught.value).startswith(message)
+
+
+def test_a_channel_that_is_not_recorded_is_refused(write_chart):
+    job = write_chart(('reference = "exact"', 'reference = { stepper = "hard", step = "2 us" }'),
+                      ("occurrence = {}", "push_force = {}"))  # fmt: skip
+    with pytest.raises(
+        InputError, match="quantities: expected a model that records push_force t1, found bell"
+    ):
+        check_prospects(load_chart(job))
+    check_prospects(load_chart(write_chart(
+        ('reference = "exact"', 'reference = { stepper = "hard", step = "2 us" }'),
+        ("occurrence = {}", "onset = {}"))))  # fmt: skip
+
+
+PARAMETERS = {
+    "sampling_rate": 20e3,
+    "band_low": 300.0,
+    "band_high": 1500.0,
+    "amplitude_threshold": 5e-6,
+    "window_length": 0.01,
+    "judged_fraction": 0.5,
+    "negligible_amplitude": 1e-8,
+    "decay_tolerance": 0.25,
+    "growth_tolerance": 1.0,
+}
+
+
+def growing(rate=20.0, duration=0.3, start=1e-7):
+    times = (1 + np.arange(round(duration * 20e3))) / 20e3
+    wave = start * np.exp(rate * times) * np.sin(2 * np.pi * 500 * times)
+    return History(np.column_stack([wave, 0.1 * wave]), ("t1", "t2"), lambda name: 300.0 * times, PARAMETERS)
+
+
+def test_onset_is_the_load_at_which_the_amplitude_meets_the_threshold():
+    history = growing()
+    (load,) = observe(history, [Quantity("onset", math.inf, 0.0, channel="load")], True)["onset"]
+    crossing = np.log(5e-6 / 1e-7) / 20.0
+    assert load == pytest.approx(300.0 * crossing, rel=2e-3)
+    # a window's amplitude leads its middle by the curvature of an exponential: rate^2 x length^2 / 60
+    later = Quantity("onset", math.inf, 0.0, since=0.25, channel="load")
+    assert np.isnan(
+        observe(history, [later], True)["onset"][0]
+    )  # above from the first window on: no onset seen
+
+
+def test_growth_is_that_of_the_part_asked_for():
+    quantity = Quantity("growth_rate", math.inf, 0.0, since=0.05, until=0.2)
+    found = observe(growing(-35.0, start=1e-3), [quantity], True)
+    assert found["growth_rate"] == pytest.approx([-35.0, -35.0], rel=1e-3)
+    assert found["amplitude"].shape == (2,)  # tells which strand counts
