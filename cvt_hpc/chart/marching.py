@@ -47,7 +47,7 @@ class Marched:
 
 def warm_up(model: str, stepper: str, points: Sequence[dict[str, Any]]) -> None:
     """Compile or load all that a group of runs needs, which is no cost of theirs."""
-    _batch(model, stepper, points).advance(1)
+    _module(model).batch(points, stepper).advance(1)
 
 
 def most_lanes(model: str, stepper: str, parameters: dict[str, Any]) -> int:
@@ -84,7 +84,7 @@ def march(
     failures: list[tuple[Status, str] | None] = []
     seconds = 0.0
     for first in range(0, len(points), lanes):
-        batch = _batch(model, stepper, points[first : first + lanes])
+        batch = _module(model).batch(points[first : first + lanes], stepper)
         samples = batch.samples if math.isinf(until) else min(batch.samples, round(until / batch.interval))
         piece = samples if math.isinf(time_limit) else _FIRST_SLICE
         started = time.process_time()
@@ -93,32 +93,6 @@ def march(
         runs += batch.runs
         failures += [run.failure or (None if in_time else _TOO_LONG) for run in batch.runs]
     return Marched(tuple(runs), tuple(failures), seconds, sum(run.time for run in runs))
-
-
-class _Single:
-    """A run of a model without batches, in the form of a batch of one."""
-
-    def __init__(self, run: Any) -> None:
-        self.run = run
-        self.samples, self.interval = run.samples, run.interval
-        self.failure: tuple[Status, str] | None = None
-
-    @property
-    def runs(self) -> tuple[_Single]:
-        """The run, which has a failure as those of batches do."""
-        return (self,)
-
-    @property
-    def running(self) -> bool:
-        """Whether it has not ended."""
-        return self.failure is None and self.run.done < self.samples
-
-    def advance(self, samples: int) -> None:
-        """March on."""
-        self.failure = self.run.advance(samples)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.run, name)
 
 
 def _advance(batch: Any, samples: int, piece: int, deadline: float) -> bool:
@@ -131,14 +105,6 @@ def _advance(batch: Any, samples: int, piece: int, deadline: float) -> bool:
         before, now = now, time.process_time()
         piece = 2 * piece if now - before < _SLICE else piece
     return True
-
-
-def _batch(model: str, stepper: str, points: Sequence[dict[str, Any]]) -> Any:
-    module = _module(model)
-    if hasattr(module, "Batch"):
-        return module.Batch(points, stepper)
-    (parameters,) = points
-    return _Single(module.Transient(parameters, stepper))
 
 
 def _module(model: str) -> ModuleType:

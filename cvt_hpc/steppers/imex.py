@@ -14,7 +14,7 @@ ORDER = 1
 PARAMETERS = {
     "numerics": {
         "step": Parameter(
-            5e-6,
+            4.6e-6,
             "s",
             "largest time step; a whole number of steps makes a sampling interval",
             minimum=1e-9,

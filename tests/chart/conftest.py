@@ -7,6 +7,7 @@ import pytest
 from bells import JOB, PARAMETERS, STEP, TOLERANCE, Clock, Transient, exact
 
 from cvt_hpc.models import MODELS
+from cvt_hpc.models.alone import Alone
 from cvt_hpc.steppers import STEPPERS
 
 
@@ -18,6 +19,7 @@ def bell(monkeypatch):
     model.STEPPER_NAMES, model.REFUSED = ("soft", "hard", "clever"), {}
     model.check = lambda parameters: []
     transient.Transient, solution.exact = Transient, exact
+    transient.batch = lambda points, stepper: Alone(Transient(points[0], stepper))
     clock = Clock()
     monkeypatch.setattr(Transient, "clock", clock)
     monkeypatch.setattr(Transient, "made", 0)

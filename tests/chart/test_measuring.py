@@ -131,7 +131,7 @@ class Batch:
 def test_lanes_are_filled_and_share_their_time(write_chart, monkeypatch):
     import bell.transient as module
 
-    monkeypatch.setattr(module, "Batch", Batch, raising=False)
+    monkeypatch.setattr(module, "batch", Batch)
     monkeypatch.setattr(module, "lanes", lambda parameters, stepper: 2, raising=False)
     chart = load_chart(
         write_chart(('stepper = "soft"', 'stepper = "soft"\nlanes = 2'), ('title = "Ringing"', "starts = 3"))

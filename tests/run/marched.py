@@ -18,7 +18,7 @@ def job(stepper: str = "imex", axes: dict | None = None, **values) -> Job:
 
     So that tolerances tell what the method leaves, not what rounding does.
     """
-    if stepper == "imex":
+    if stepper == "imex" and "precision" not in (axes or {}):
         values = {"precision": "double"} | values
     document = {"name": "test", "model": "elastic_belt", "stepper": stepper, "axes": axes or {}}
     return build_job(document, "test.toml", values)

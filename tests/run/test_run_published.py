@@ -27,8 +27,8 @@ def test_falling_friction_lets_the_loaded_strand_vibrate():
     assert 350 < found["frequency"][T1] < 800
     # the papers' 10-20 um, within a factor of two: ours follows the assumed damping and friction
     assert 5e-6 < found["amplitude"][T1] < 40e-6
-    # settled: over the judged 0.1 s it neither grows nor falls by more than its own scatter, 7 % per window
-    assert abs(found["growth_rate"][T1]) * 0.1 < 0.15
+    # settled: over the judged 0.1 s it neither grows nor falls by more than its own scatter, 10 % per window
+    assert abs(found["growth_rate"][T1]) * 0.1 < 0.25
 
 
 @pytest.mark.parametrize(
