@@ -82,10 +82,15 @@ def test_groups_are_of_one_kind_and_no_larger_than_the_lanes(monkeypatch):
     monkeypatch.setattr(record, "LANES", {"double": 3, "single": 3})
     asked = job(MIXED)
     groups = simulation.lane_groups(asked, range(asked.size))
-    assert sorted(map(len, groups)) == [1] * 6 + [3] * 6
-    for group in groups:
-        kinds = {(asked.point(i)["stations"], asked.point(i)["step"]) for i in group}
-        assert len(kinds) == 1
+    kinds = [
+        {tuple(asked.point(i)[key] for key in ("stations", "step", "duration")) for i in group}
+        for group in groups
+    ]
+    assert [len(kind) for kind in kinds] == [1] * 12
+    assert sorted(map(len, groups)) == [2] * 12
+    # more of a kind than lanes
+    many = job({"load": [0.0, 20.0, 40.0, 60.0, 80.0]})
+    assert sorted(map(len, simulation.lane_groups(many, range(5)))) == [2, 3]
     explicit = job({"load": [0.0, 60.0]}, "explicit")  # takes one run at a time
     assert simulation.lane_groups(explicit, [0, 1]) == [(0,), (1,)]
 
