@@ -84,7 +84,7 @@ def scene_figure(comparison: Comparison) -> Figure:
     below = figure.add_subplot(grid[rows, :])
     below.set_axis_off()
     below.text(0.0, 1.0, "\n".join(notes), va="top", fontsize=7.5, transform=below.transAxes)
-    figure.legend(handles=_legend(comparison, series), ncols=3, **_LEGEND)
+    figure.legend(handles=_legend(comparison, series), ncols=2, **_LEGEND)
     return figure
 
 
