@@ -27,12 +27,10 @@ _PACKAGE = Path(__file__).parent
 _ROOMS_WITH_KERNELS = ("physics", "models", "steppers")
 _OTHER_SOURCES = ("kernels.py", "lanes.py")
 
-# Division by zero gives inf as in numpy, without a test for it. Products may be contracted with sums, and
-# divisions by one number replaced by its reciprocal; sums are never reordered, and what is not a number stays
-# visible.
-_OPTIONS = {"cache": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
-# Every operation rounded once as written: the same bits however many lanes a number has.
-_LANE_OPTIONS = {"cache": True, "error_model": "numpy"}
+# Division by zero gives inf as in numpy, without a test for it. Every operation is rounded once, as written:
+# were products contracted with sums, the bits would depend on which kernels the compiler merges, and so on
+# whether their code is compiled or found in the folder.
+_OPTIONS = {"cache": True, "error_model": "numpy"}
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -46,16 +44,6 @@ def merged_kernel(function: Callable[..., Any]) -> Any:
     A call that hands over a tuple of arrays counts references to each, which costs more than a short loop.
     """
     return _compiled(function, {**_OPTIONS, "inline": "always"})
-
-
-def lane_kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function of lanes: what it computes in one does not depend on how many there are."""
-    return _compiled(function, _LANE_OPTIONS)
-
-
-def merged_lane_kernel(function: Callable[..., Any]) -> Any:
-    """As `lane_kernel`, into its callers."""
-    return _compiled(function, {**_LANE_OPTIONS, "inline": "always"})
 
 
 def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:

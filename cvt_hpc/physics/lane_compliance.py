@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cvt_hpc.kernels import lane_kernel
+from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, anywhere, fma, like, select
 from cvt_hpc.physics.compliance import ROUNDS_OF_BLOCK_FLIPS, Sheaves
 
@@ -77,7 +77,7 @@ def lane_contact(wraps: list[Sheaves], dtype: type) -> LaneContact:
     return LaneContact(*shared, stations, scalars, np.zeros(1, dtype=np.bool_))
 
 
-@lane_kernel
+@kernel
 def _bend(m: int, stations: LaneArray) -> None:
     """Solve the tridiagonal system in place of Y."""
     y = stations[0, Y]
@@ -91,7 +91,7 @@ def _bend(m: int, stations: LaneArray) -> None:
         stations[j, Y] = y
 
 
-@lane_kernel
+@kernel
 def _factorise(contact: LaneContact) -> None:
     """Factors and tilt responses for the present closed set."""
     stations, scalars, weight = contact.stations, contact.scalars, contact.weight
@@ -124,7 +124,7 @@ def _factorise(contact: LaneContact) -> None:
     contact.fresh[0] = True
 
 
-@lane_kernel
+@kernel
 def _pushes(contact: LaneContact) -> bool:
     """PUSH for the present closed set; whether a station of any lane is on the wrong side."""
     stations, scalars, weight = contact.stations, contact.scalars, contact.weight
@@ -156,7 +156,7 @@ def _pushes(contact: LaneContact) -> bool:
     return anywhere(wrong)
 
 
-@lane_kernel
+@kernel
 def solve_lane_contact(contact: LaneContact, most_rounds: int) -> None:
     """Closed sets and pushes from the gaps; forces are the pushes of closed stations, where positive.
 

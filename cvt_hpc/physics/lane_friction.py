@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from cvt_hpc.kernels import lane_kernel, merged_lane_kernel
+from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import decay, fma, like, maximum, minimum
 
 
-@merged_lane_kernel
+@merged_kernel
 def lane_saturation(speed, per_width):
     """tanh(speed / width) of speeds >= 0 [m/s], from 1 / width [s/m]."""
     left = decay(speed * (2.0 * per_width))
     return (1.0 - left) / (1.0 + left)
 
 
-@merged_lane_kernel
+@merged_kernel
 def lane_law(kind: int, kinetic, gradient, scale):
     """Three coefficients by which `lane_coefficient` computes a law of formula without a division by them.
 
@@ -32,7 +32,7 @@ def lane_law(kind: int, kinetic, gradient, scale):
     return kinetic, gradient * scale, 1.0 / scale
 
 
-@merged_lane_kernel
+@merged_kernel
 def lane_coefficient(kind: int, kinetic, fall, per_scale, speed):
     """Coefficient of steady sliding by a law that is a formula.
 
@@ -59,7 +59,7 @@ def lane_coefficient(kind: int, kinetic, fall, per_scale, speed):
     return mu
 
 
-@lane_kernel
+@kernel
 def lane_table(table: tuple[np.ndarray, np.ndarray, np.ndarray], speed, force):
     """Coefficient by a table that all lanes share: bilinear, held constant outside.
 

@@ -7,8 +7,19 @@ then longitudinal waves, limit the step to about 0.2 us.
 """
 
 from cvt_hpc.parameters import Parameter
+from cvt_hpc.steppers.facts import Facts
 
-ORDER = 1
+FACTS = Facts(
+    order=1,
+    order_at_events=1.0,  # with gaps that close and friction that turns: tests/order/test_steps.py
+    adaptive=False,
+    needs=frozenset(),  # of a general system: it is a step of the belt's own
+    implicit=False,
+    l_stable=False,
+    damping_limit=2.0,
+    stability="step < 2 / the fastest rate: friction near zero sliding speed, then longitudinal waves",
+    damping="none",
+)
 PARAMETERS = {
     "numerics": {
         "step": Parameter(

@@ -12,9 +12,8 @@ Dettmer and Peric 2017). The rates are carried from step to step; a state change
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from cvt_hpc.steppers.facts import RATES, Facts, Result
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.frozen_jacobian import Frozen, frozen
 from cvt_hpc.steppers.newton import solve_stage
-from cvt_hpc.steppers.numerics import SOLVER_TOLERANCE, STEP
+from cvt_hpc.steppers.numerics import SOLVER_TOLERANCE, STEP, from_parameters
 from cvt_hpc.steppers.system import System
 
 FACTS = Facts(
@@ -64,9 +63,7 @@ class Control(NamedTuple):
     solver_tolerance: float
 
 
-def control(parameters: Mapping[str, Any]) -> Control:
-    """Control from flat parameters [SI]."""
-    return Control(*(float(parameters[key]) for key in Control._fields))
+control = partial(from_parameters, Control)
 
 
 class Work(NamedTuple):

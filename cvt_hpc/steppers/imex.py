@@ -4,13 +4,26 @@ Needs of a model: a step kernel that treats its stiff forces by their linearisat
 
 Order 1 (the push force by backward Euler; the transverse motion is a leapfrog, without numerical damping).
 Stable where the explicit part is: the reference belt at 160 stations is computed up to 8 us, and fails
-visibly, at some loads from 10 us, at all from 12.5 us. At 5 us amplitudes of a vibrating strand are within
-2 %, its frequency within 0.5 %, means over starts.
+visibly, at some loads from 10 us, at all from 12.5 us. At 4.6 us amplitudes of a vibrating strand are within
+2.5 %, its frequency within 0.5 %, means over eight starts.
 """
 
-from cvt_hpc.parameters import Parameter
+from math import inf
 
-ORDER = 1
+from cvt_hpc.parameters import Parameter
+from cvt_hpc.steppers.facts import Facts
+
+FACTS = Facts(
+    order=1,
+    order_at_events=1.0,  # with gaps that close and friction that turns: tests/order/test_steps.py
+    adaptive=False,
+    needs=frozenset(),  # of a general system: it is a step of the belt's own
+    implicit=True,
+    l_stable=False,
+    damping_limit=inf,
+    stability="bending, tension and contact of the strands: step < 2 / their fastest frequency",
+    damping="none in strands and rings; pressed elements like a damper EA step [N s]",
+)
 PARAMETERS = {
     "numerics": {
         "step": Parameter(

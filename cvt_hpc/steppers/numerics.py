@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Any, NamedTuple, TypeVar
 
 from cvt_hpc.parameters import Parameter
 
@@ -33,6 +34,14 @@ SOLVER_TOLERANCE = Parameter(
 )
 
 
+Kind = TypeVar("Kind", bound=NamedTuple)
+
+
+def from_parameters(kind: type[Kind], parameters: Mapping[str, Any]) -> Kind:
+    """Control whose fields are numbers named as the flat parameters [SI]."""
+    return kind(*(float(parameters[key]) for key in kind._fields))
+
+
 class FixedStep(NamedTuple):
     """Control of a method with a fixed step."""
 
@@ -53,14 +62,8 @@ class Tolerance(NamedTuple):
     most_steps: int
 
 
-def fixed_step(parameters: Mapping[str, Any]) -> FixedStep:
-    """Control of a method with a fixed step, from flat parameters [SI]."""
-    return FixedStep(float(parameters["step"]))
-
-
-def implicit_step(parameters: Mapping[str, Any]) -> ImplicitStep:
-    """Control of an implicit method, from flat parameters [SI]."""
-    return ImplicitStep(float(parameters["step"]), float(parameters["solver_tolerance"]))
+fixed_step = partial(from_parameters, FixedStep)
+implicit_step = partial(from_parameters, ImplicitStep)
 
 
 def tolerance(parameters: Mapping[str, Any]) -> Tolerance:

@@ -13,9 +13,24 @@ from typing import Any
 import numpy as np
 from scipy.integrate import OdeSolver
 
-from cvt_hpc.steppers.facts import FACTORISATIONS, JACOBIANS, RATES, STEPS, Result
-from cvt_hpc.steppers.numerics import Tolerance
+from cvt_hpc.steppers.facts import FACTORISATIONS, JACOBIANS, RATES, STEPS, Facts, Result
+from cvt_hpc.steppers.numerics import MOST_STEPS, TOLERANCE, Tolerance, tolerance
 from cvt_hpc.steppers.system import System
+
+# What the three have in common; each says what is its own.
+FACTS = Facts(
+    order=5,
+    order_at_events=None,
+    adaptive=True,
+    needs=frozenset({"rates"}),
+    implicit=True,
+    l_stable=False,
+    damping_limit=np.inf,
+    stability="",
+    damping="below the tolerance",
+)
+PARAMETERS = {"numerics": {"tolerance": TOLERANCE, "most_steps": MOST_STEPS}}
+control = tolerance
 
 
 class Work:
@@ -66,6 +81,11 @@ class Work:
         now = np.array([self.evaluations, self.solver.njev, self.solver.nlu])
         counts[[RATES, JACOBIANS, FACTORISATIONS]] += now - self.counted
         self.counted = now
+
+
+def work(system: System) -> Work:
+    """Where the integrator is kept."""
+    return Work()
 
 
 def march_by(

@@ -7,43 +7,20 @@ quotients.
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
+from functools import partial
+
 from scipy.integrate import Radau
 
-from cvt_hpc.steppers.facts import Facts
-from cvt_hpc.steppers.numerics import MOST_STEPS, TOLERANCE, Tolerance, tolerance
-from cvt_hpc.steppers.scipy_march import Work, march_by
-from cvt_hpc.steppers.system import System
+from cvt_hpc.steppers.scipy_march import FACTS as COMMON
+from cvt_hpc.steppers.scipy_march import PARAMETERS, control, march_by, work
 
-FACTS = Facts(
-    order=5,
-    order_at_events=None,
-    adaptive=True,
-    needs=frozenset({"rates"}),
-    implicit=True,
+__all__ = ["FACTS", "PARAMETERS", "control", "march", "work"]
+
+FACTS = replace(
+    COMMON,
     l_stable=True,
-    damping_limit=np.inf,
     stability="no limit",
     damping="below the tolerance; what is too fast for the step is gone after it",
 )
-PARAMETERS = {"numerics": {"tolerance": TOLERANCE, "most_steps": MOST_STEPS}}
-control = tolerance
-
-
-def work(system: System) -> Work:
-    """Where the integrator is kept."""
-    return Work()
-
-
-def march(
-    system: System,
-    control: Tolerance,
-    interval: float,
-    rows: np.ndarray,
-    clock: np.ndarray,
-    y: np.ndarray,
-    work: Work,
-    counts: np.ndarray,
-) -> int:
-    """March; see `cvt_hpc.steppers`."""
-    return march_by(Radau, system, control, interval, rows, clock, y, work, counts)
+march = partial(march_by, Radau)

@@ -17,7 +17,7 @@ import numpy as np
 
 from cvt_hpc import lanes
 from cvt_hpc.job import build_job
-from cvt_hpc.kernels import lane_kernel
+from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, fma, like
 from cvt_hpc.models.elastic_belt import imex
 from cvt_hpc.models.elastic_belt.lane_belt import REPEATS
@@ -179,7 +179,7 @@ def _batch(runs: int, step: float, precision: str) -> Batch:
     return Batch([job.point(0) | {"seed": k} for k in range(runs)], "imex")
 
 
-@lane_kernel
+@kernel
 def _fused(array, turns):
     """Twelve independent chains of fused operations: enough to hide their latency."""
     a, b = array[0, 0], array[0, 1]
@@ -193,7 +193,7 @@ def _fused(array, turns):
     array[0, 2] = c0 + c1 + c2 + c3 + c4 + c5 + c6 + c7 + c8 + c9 + ca + cb
 
 
-@lane_kernel
+@kernel
 def _quotients(array, turns):
     """Four independent chains of quotients."""
     a = array[0, 0]
@@ -203,7 +203,7 @@ def _quotients(array, turns):
     array[0, 2] = c0 + c1 + c2 + c3
 
 
-@lane_kernel
+@kernel
 def _traffic(array, turns):
     """Three places read and one written at each row."""
     for _ in range(turns):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.kernels import lane_kernel
+from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.physics.friction import Law, friction_coefficient, friction_law, saturation
 from cvt_hpc.physics.lane_friction import lane_coefficient, lane_law, lane_saturation, lane_table
@@ -20,20 +20,20 @@ TABLE = (
 ONE_SPEED = ((1e4, 3e4), (0.1, 0.3), ((0.1, 0.2), (0.3, 0.2)))
 
 
-@lane_kernel
+@kernel
 def formulas(kind: int, rows: int, a: LaneArray) -> None:
     for j in range(rows):
         kinetic, fall, per_scale = lane_law(kind, a[j, MU], a[j, GRADIENT], a[j, SCALE])
         a[j, FOUND] = lane_coefficient(kind, kinetic, fall, per_scale, a[j, SPEED])
 
 
-@lane_kernel
+@kernel
 def saturations(rows: int, a: LaneArray) -> None:
     for j in range(rows):
         a[j, FOUND] = lane_saturation(a[j, SPEED], 1.0 / a[j, SCALE])
 
 
-@lane_kernel
+@kernel
 def tables(table: tuple[np.ndarray, np.ndarray, np.ndarray], rows: int, a: LaneArray) -> None:
     for j in range(rows):
         a[j, FOUND] = lane_table(table, a[j, SPEED], a[j, FORCE])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from cvt_hpc.kernels import lane_kernel
+from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import (
     ALIGNMENT,
     LaneArray,
@@ -52,7 +52,7 @@ SPECIAL = (0.0, -0.0, 1.0, -1.0, 0.5, 2.5, -3.5, 1e-30, -1e30, np.inf, -np.inf, 
 NUMBER = 0.7
 
 
-@lane_kernel
+@kernel
 def operate(rows: int, a: LaneArray, b: LaneArray, out: LaneArray, number: float) -> None:
     """Every operation on a[j, 0] and b[j, 0], into row j, in the order of NAMES."""
     for j in range(rows):
@@ -89,7 +89,7 @@ def operate(rows: int, a: LaneArray, b: LaneArray, out: LaneArray, number: float
         out[j, 26], out[j, 27] = reciprocals(x, y)
 
 
-@lane_kernel
+@kernel
 def converse(rows: int, single: LaneArray, double: LaneArray) -> None:
     """Between precisions: by a store, and by `like`."""
     for j in range(rows):
@@ -98,13 +98,13 @@ def converse(rows: int, single: LaneArray, double: LaneArray) -> None:
         double[j, 2] = like(single[j, 0], double[j, 0]) + double[j, 0]
 
 
-@lane_kernel
+@kernel
 def found_anywhere(rows: int, a: LaneArray, threshold: float, found: np.ndarray) -> None:
     for j in range(rows):
         found[j] = anywhere(a[j, 0] > threshold)
 
 
-@lane_kernel
+@kernel
 def mixed(a: LaneArray, b: LaneArray, out: LaneArray) -> None:
     out[0, 0] = a[0, 0] + b[0, 0]
 

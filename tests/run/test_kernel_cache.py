@@ -1,7 +1,9 @@
 """Where machine code is kept: a folder for each content of the kernels' sources, and nobody else's business changed."""
 
+import importlib
 import importlib.util
 import os
+import pkgutil
 import shutil
 import subprocess
 import sys
@@ -9,7 +11,9 @@ from pathlib import Path
 
 import numba
 import pytest
+from numba.core.dispatcher import Dispatcher
 
+import cvt_hpc
 from cvt_hpc import kernels
 
 PACKAGE = Path(kernels.__file__).parent
@@ -215,3 +219,17 @@ def test_without_a_cache_of_the_user_it_is_home_or_else_a_temporary_folder(
     assert folder(package).parent == tmp_path / "home" / ".cache" / "cvt_hpc"
     without_access_to(monkeypatch, package, tmp_path / "home")
     assert folder(package).parent == tmp_path / "temporary" / ".cache" / "cvt_hpc"
+
+
+def test_no_kernel_may_be_rounded_otherwise_than_written():
+    # with contraction allowed the same run gave other bits when its kernels were compiled than when they were found
+    modules = [
+        importlib.import_module(info.name)
+        for info in pkgutil.walk_packages(cvt_hpc.__path__, "cvt_hpc.")
+        if info.name != "cvt_hpc.__main__"  # it runs the command
+    ]
+    found = {id(x): x for module in modules for x in vars(module).values() if isinstance(x, Dispatcher)}
+    assert len(found) > 30
+    for dispatcher in found.values():
+        assert not dispatcher.targetoptions.get("fastmath"), dispatcher
+        assert not dispatcher.targetoptions.get("parallel"), dispatcher

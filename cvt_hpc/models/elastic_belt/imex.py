@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cvt_hpc.kernels import lane_kernel, merged_lane_kernel
+from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import (
     LaneArray,
     absolute,
@@ -137,7 +137,7 @@ def imex_work(state: LaneState) -> ImexWork:
     return ImexWork(stations)
 
 
-@merged_lane_kernel
+@merged_kernel
 def implicit_shares(one, other, inertia):
     """Two slopes, weighted by 1/2 (time-centred) where slow, 1 where stiff; inertia = mass / dt.
 
@@ -148,7 +148,7 @@ def implicit_shares(one, other, inertia):
     return one * fma(one, per_one, 0.5), other * fma(other, per_other, 0.5)
 
 
-@lane_kernel
+@kernel
 def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> None:
     """One step.
 
@@ -179,14 +179,14 @@ def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
     derive(belt, state, stations)
 
 
-@lane_kernel
+@kernel
 def derive(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Contact forces and strains of the present state."""
     lane_contact_forces(belt, state, stations)
     lane_strains(belt, state, stations)
 
 
-@merged_lane_kernel
+@merged_kernel
 def lane_load(belt: LaneBelt, time: float, pattern):
     """Torque at the driving pulley [N m], as `rhs.load_at` has it, in lanes like `pattern`."""
     c = belt.constants
@@ -198,14 +198,14 @@ def lane_load(belt: LaneBelt, time: float, pattern):
     return load
 
 
-@merged_lane_kernel
+@merged_kernel
 def start_damping(belt: LaneBelt, time: float) -> float:
     """What the start-up adds to the transverse damping [N s/m^2]."""
     left = max(1.0 - time / belt.rise_time, 0.0)
     return START_DAMPING * left * left
 
 
-@lane_kernel
+@kernel
 def lane_thrust(belt: LaneBelt, state: LaneState, stations: LaneArray):
     """Axial force of the belt on the driven sheave [N]."""
     weight = state.contacts[1].weight
@@ -215,7 +215,7 @@ def lane_thrust(belt: LaneBelt, state: LaneState, stations: LaneArray):
     return total
 
 
-@lane_kernel
+@kernel
 def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Axial line forces of both wraps into FORCE [N/m]; on the strands it stays 0."""
     fields, c = state.fields, belt.constants
@@ -233,7 +233,7 @@ def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -
             stations[first + k, FORCE] = select(wrap_stations[k, CLOSED] > 0.5, push, 0.0)
 
 
-@lane_kernel
+@kernel
 def lane_strains(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Strains of elements and rings in the cells, with 1 / (1 + strain) and 1 / content."""
     n, fields = belt.cell.size, state.fields
@@ -259,7 +259,7 @@ def lane_strains(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
         w_b = w
 
 
-@lane_kernel
+@kernel
 def _sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Sliding speeds on the arcs, and what friction does of them alone.
 
@@ -310,7 +310,7 @@ def _sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
         stations[j, RING_FACTOR] = with_sign_of((1.0 - ring_rest) / (1.0 + ring_rest), saddle)
 
 
-@lane_kernel
+@kernel
 def _stations(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, again: bool) -> None:
     """Forces and slopes at the stations, but for the stresses T and P: the system's blocks and right side.
 
@@ -417,7 +417,7 @@ def _stations(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
         stations[j, Y_1] = dual * along_ring
 
 
-@merged_lane_kernel
+@merged_kernel
 def _element_stress(stiffness, grip, eps, closing, ahead, per_length):
     """-P in a cell [N] with the speeds that the step begins with, and its slope with their change.
 
@@ -439,7 +439,7 @@ def _element_stress(stiffness, grip, eps, closing, ahead, per_length):
     return stress, select(apart, 0.0, fma(stiffness, per_length, grip))
 
 
-@lane_kernel
+@kernel
 def _eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> None:
     """Stresses into the rows, and forward elimination; the last station, that closes the cycle, is solved."""
     fields, stations, c = state.fields, work.stations, belt.constants
@@ -519,7 +519,7 @@ def _eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) ->
     stations[last, DV_1] = fma(p, f1, -q * f0) * per_determinant
 
 
-@lane_kernel
+@kernel
 def _substitute(belt: LaneBelt, work: ImexWork, scalars: LaneArray) -> bool:
     """Back substitution: DV become the increments of v_element and v_ring. Whether friction has to be redone.
 
@@ -559,7 +559,7 @@ def _substitute(belt: LaneBelt, work: ImexWork, scalars: LaneArray) -> bool:
     return anywhere(found)
 
 
-@lane_kernel
+@kernel
 def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
     """Apply the increments; returns the moment of the flanks on the driven pulley [N m], in doubles."""
     n, fields, stations, c = belt.cell.size, state.fields, work.stations, belt.constants

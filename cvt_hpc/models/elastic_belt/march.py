@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cvt_hpc.kernels import kernel, lane_kernel
+from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
@@ -26,7 +26,7 @@ from cvt_hpc.models.elastic_belt.sampling import Sensors, sample
 from cvt_hpc.physics.compliance import ContactState
 
 
-@lane_kernel
+@kernel
 def march_imex(
     belt: LaneBelt,
     state: LaneState,

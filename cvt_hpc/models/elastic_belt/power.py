@@ -18,7 +18,7 @@ distance of two stations alone.
 
 from __future__ import annotations
 
-from cvt_hpc.kernels import lane_kernel
+from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, sqrt
 from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_FILTERED, V_RING, U, W
 from cvt_hpc.models.elastic_belt.imex import (
@@ -93,7 +93,7 @@ POWERS = (
 ) = range(len(POWERS))
 
 
-@lane_kernel
+@kernel
 def audit(
     belt: LaneBelt,
     state: LaneState,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cvt_hpc.kernels import lane_kernel
+from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, select
 from cvt_hpc.models.elastic_belt.belt import REGIONS, V_ELEMENT, Mesh, W
 from cvt_hpc.models.elastic_belt.imex import (
@@ -147,7 +147,7 @@ def sensors(grid: Mesh, places: tuple[Probe, ...], interval: float, dtype: type)
     return Sensors(np.array(rows, dtype=dtype), (starts + stops) // 2, starts, stops, interval)
 
 
-@lane_kernel
+@kernel
 def sample(
     belt: LaneBelt,
     state: LaneState,
@@ -235,7 +235,7 @@ def sample(
         profiles[j, 3] = profiles[j, 3] + like(fields[j, W], speed)
 
 
-@lane_kernel
+@kernel
 def _watch(belt: LaneBelt, state: LaneState, stations: LaneArray, ended: LaneArray) -> None:
     """Find the lanes whose state is out of bounds."""
     n, fields = belt.cell.size, state.fields
