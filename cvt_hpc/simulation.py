@@ -92,7 +92,8 @@ def run_costs(job: Job) -> np.ndarray:
     (runs,) array
         In the order of run indices.
     """
-    grids = np.meshgrid(*(axis.values for axis in job.axes), indexing="ij", sparse=True)
+    values = [np.asarray(axis.values) for axis in job.axes]
+    grids = values if job.is_sampled else np.meshgrid(*values, indexing="ij", sparse=True)
     p = {**job.parameters, **dict(zip((axis.name for axis in job.axes), grids, strict=True))}
     model = _model_record(job)
     # of general steppers, some of which choose their step, little is known beforehand

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.definition import Job
@@ -33,8 +34,16 @@ def summarize(job: Job, core_seconds: float) -> str:
     if job.axes:
         axes = [(axis.name, _values_in_words(axis), f"{len(axis.values)} values") for axis in job.axes]
         lines += ["", "[axes]", *_columns(axes)]
-    product = f" = {' x '.join(map(str, job.shape))}" if len(job.axes) > 1 else ""
-    lines += ["", f"runs: {job.size}{product}", f"estimated cost: {_cost_in_words(core_seconds, job.size)}"]
+    if job.design:
+        lines += [
+            "",
+            "[design]",
+            *_columns([(key, _setting_in_words(value)) for key, value in job.design.items()]),
+        ]
+    product = f" = {' x '.join(map(str, job.shape))}" if len(job.shape) > 1 else ""
+    at_most = "at most " if "first_spacing" in job.design else ""
+    lines += ["", f"runs: {at_most}{job.size}{product}"]
+    lines += [f"estimated cost: {at_most}{_cost_in_words(core_seconds, job.size)}"]
     return "\n".join(lines)
 
 
@@ -68,6 +77,12 @@ def _values_in_words(axis: Axis) -> str:
     if len(words) > _FEW:
         words = [*words[:3], "...", words[-1]]
     return f"{', '.join(words)} {axis.unit}".rstrip()
+
+
+def _setting_in_words(value: Any) -> str:
+    if not isinstance(value, dict):
+        return in_words(value, "")
+    return ", ".join(f"{count} along {name}" for name, count in value.items())
 
 
 def _cost_in_words(core_seconds: float, runs: int) -> str:

@@ -25,11 +25,16 @@ class Progress:
         Number of runs that earlier sessions have recorded, and of the failed ones among them.
     visible : bool
         Whether anything is shown at all.
+
+    Attributes
+    ----------
+    total : int
+        Number of runs of the study, as far as is known.
     """
 
     def __init__(self, counter: Counter, total: int, recorded: int, failed: int, visible: bool) -> None:
         self._counter = counter
-        self._total = total
+        self.total = total
         self._recorded = recorded
         self._failed = failed
         self._started = self._shown = time.monotonic()
@@ -63,14 +68,15 @@ class Progress:
         tally = self._counter.tally()
         finished, failed = self._recorded + tally.finished, self._failed + tally.failed
         if self._bar is not None:
+            self._bar.total = self.total
             self._bar.set_postfix_str(f"{failed} failed", refresh=False)
             self._bar.update(finished - self._bar.n)
             self._bar.refresh()
             return
-        line = f"{finished}/{self._total} runs ({finished / self._total:.1%}), {failed} failed"
+        line = f"{finished}/{self.total} runs ({finished / self.total:.1%}), {failed} failed"
         if tally.finished and elapsed > 0:
             rate = tally.finished / elapsed
-            line += f", {rate:.3g} runs/s, {show_duration((self._total - finished) / rate)} to go"
+            line += f", {rate:.3g} runs/s, {show_duration((self.total - finished) / rate)} to go"
         print(line, file=sys.stderr, flush=True)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.recovery import Records
+from cvt_hpc.study.tracing import needed_runs
 from cvt_hpc.variables import Status
 
 DONE, SOME_FAILED, STOPPED = 0, 1, 99  # exit statuses; 2 is bad input, raised as InputError
@@ -23,7 +24,7 @@ class FailedRun:
     Attributes
     ----------
     index : int
-        Its place in the grid, in C order.
+        Its place in the grid, in C order, or among the samples.
     at : dict
         Values of the axes there, by name [SI].
     status : str
@@ -47,7 +48,10 @@ class RunReport:
     out, results : Path
         The output folder, and the dataset in it.
     total, done, remaining : int
-        Number of runs: all, with results, not yet run.
+        Number of runs: all that are needed, with results, not yet run. While runs of a trace remain, they may
+        ask for more.
+    unneeded : int
+        Number of cells of the grid that a trace does not run.
     failed : tuple of FailedRun
         The runs that ended without results.
     stopped : str or None
@@ -61,6 +65,7 @@ class RunReport:
     failed: tuple[FailedRun, ...]
     remaining: int
     stopped: str | None
+    unneeded: int = 0
 
     @property
     def exit_status(self) -> int:
@@ -82,12 +87,14 @@ def build_report(folder: StudyFolder, study: Study, records: Records, stopped: s
         )
         for index in np.flatnonzero(records.recorded & (status != Status.DONE))
     )
+    needed = needed_runs(study, records)
     return RunReport(
         out=folder.path,
         results=folder.results,
-        total=study.size,
+        total=int(needed.sum()),
         done=int((status == Status.DONE).sum()),
         failed=failed,
-        remaining=int((~records.recorded).sum()),
+        remaining=int((needed & ~records.recorded).sum()),
         stopped=stopped,
+        unneeded=int((~needed).sum()),
     )

@@ -11,6 +11,7 @@ import numpy as np
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.lock import is_locked
 from cvt_hpc.study.recovery import Records, read_records
+from cvt_hpc.study.tracing import needed_runs
 from cvt_hpc.variables import Status
 
 
@@ -23,7 +24,8 @@ class StudyStatus:
     name : str
         Of the job.
     total, done, failed, left : int
-        Number of runs: all, with results, ended without results, not yet recorded.
+        Number of runs: all that are needed, with results, ended without results, not yet recorded. While runs
+        of a trace are left, they may ask for more.
     running : bool
         Whether a sweep is at work in the folder now.
     rate : float or None
@@ -32,6 +34,8 @@ class StudyStatus:
         Time [s] that the runs left take at this rate; None where there is no rate.
     warnings : tuple of str
         One line for each record file that is not sound.
+    unneeded : int
+        Number of cells of the grid that a trace does not run, as far as is known.
     """
 
     name: str
@@ -43,6 +47,7 @@ class StudyStatus:
     rate: float | None
     time_to_go: float | None
     warnings: tuple[str, ...]
+    unneeded: int = 0
 
 
 def read_status(out: str | Path) -> StudyStatus:
@@ -64,11 +69,12 @@ def read_status(out: str | Path) -> StudyStatus:
     records = read_records(folder.records, study)
     recorded = int(records.recorded.sum())
     done = int((records.rows["status"] == Status.DONE).sum())
-    left = study.size - recorded
+    needed = needed_runs(study, records)
+    left = int((needed & ~records.recorded).sum())
     rate = _session_rate(records, running)
     return StudyStatus(
         name=study.name,
-        total=study.size,
+        total=int(needed.sum()),
         done=done,
         failed=recorded - done,
         left=left,
@@ -76,6 +82,7 @@ def read_status(out: str | Path) -> StudyStatus:
         rate=rate,
         time_to_go=left / rate if rate else None,
         warnings=tuple(records.warnings),
+        unneeded=int((~needed).sum()),
     )
 
 

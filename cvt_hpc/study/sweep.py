@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import logging
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
-
-import numpy as np
 
 from cvt_hpc.files import StorageError, discard
 from cvt_hpc.study.batches import Batch
@@ -26,6 +24,7 @@ from cvt_hpc.study.schedule import Counter, claimed_batches, open_counter
 from cvt_hpc.study.simulator import Simulator, default_simulator
 from cvt_hpc.study.stopping import ELSEWHERE, SignalWatch, Stop
 from cvt_hpc.study.task import Task
+from cvt_hpc.study.tracing import pending_runs
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
@@ -38,6 +37,7 @@ class _Plan(NamedTuple):
     """What rank 0 finds out and all ranks need."""
 
     batches: list[Batch]
+    total: int
     recorded: int
     failed: int
     session: dict[str, Any]
@@ -91,12 +91,20 @@ def run(
     with SignalWatch() as signals, assembled_team(folder.crash_log) as team, ExitStack() as held:
         plan = team.on_root(lambda: _prepare(folder, task, fresh, team.size, held))
         with open_counter(team) as counter:
-            display = Progress(counter, study.size, plan.recorded, plan.failed, progress and team.rank == 0)
+            display = Progress(counter, plan.total, plan.recorded, plan.failed, progress and team.rank == 0)
             stop = Stop(counter, signals, deadline, display.show)
-            trouble = _compute(task, folder, plan, team.rank, counter, stop)
-            team.wait_for_all(stop.interrupt)
-            display.close()
-        stopped = _settle(team, trouble, stop.reason)
+            stopped = None
+            with closing(display):
+                while plan.batches:
+                    trouble = _compute(task, folder, plan, team.rank, counter, stop)
+                    team.wait_for_all(stop.interrupt)
+                    stopped = _settle(team, trouble, stop.reason)
+                    batches = (
+                        []
+                        if stopped
+                        else team.on_root(lambda: _next_round(folder, task, team.size, counter, display))
+                    )
+                    plan = plan._replace(batches=batches)
         return team.on_root(lambda: _conclude(folder, study, stopped))
 
 
@@ -116,10 +124,23 @@ def _prepare(folder: StudyFolder, task: Task, fresh: bool, ranks: int, held: Exi
     session = new_session(ranks)
     for warning in records.warnings + _other_versions(records, session):
         _logger.warning(warning)
-    recorded = records.recorded
+    recorded = int(records.recorded.sum())
     done = int((records.rows["status"] == Status.DONE).sum())
-    batches = task.plan(np.flatnonzero(~recorded), ranks)
-    return _Plan(batches, int(recorded.sum()), int(recorded.sum()) - done, session)
+    pending = pending_runs(study, records)
+    return _Plan(task.plan(pending, ranks), recorded + pending.size, recorded, recorded - done, session)
+
+
+def _next_round(
+    folder: StudyFolder, task: Task, ranks: int, counter: Counter, display: Progress
+) -> list[Batch]:
+    """Return what a trace asks for after the runs of a round; nothing for other designs; on rank 0 alone."""
+    if not task.study.is_traced:
+        return []
+    records = read_records(folder.records, task.study)
+    pending = pending_runs(task.study, records)
+    counter.rewind()
+    display.total = int(records.recorded.sum()) + pending.size
+    return task.plan(pending, ranks)
 
 
 def _other_versions(records: Records, session: dict[str, Any]) -> list[str]:
