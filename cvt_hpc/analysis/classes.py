@@ -42,9 +42,24 @@ def occurrence_classes(dataset: xr.Dataset) -> xr.DataArray:
     return xr.DataArray(classes, status.coords, status.dims, "occurrence_class", attributes)
 
 
-def count_classes(classes: NDArray[np.int8]) -> dict[OccurrenceClass, int]:
-    """Number of runs of each class."""
-    return {c: int(np.count_nonzero(classes == c)) for c in OccurrenceClass}
+def map_classes(dataset: xr.Dataset) -> xr.DataArray:
+    """Class of each cell of a map: that of its run, or in a trace what was inferred where there was none.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        As `occurrence_classes` takes it, with `inferred_class` if it is of a trace.
+    """
+    classes = occurrence_classes(dataset)
+    if "inferred_class" not in dataset:
+        return classes
+    return classes.where(classes != OccurrenceClass.NOT_RUN, dataset["inferred_class"])
+
+
+def count_classes(classes: NDArray[np.int8]) -> str:
+    """Number of runs of each class that occurs, in words."""
+    counts = {c: int(np.count_nonzero(classes == c)) for c in OccurrenceClass}
+    return ", ".join(f"{count} {kind.label}" for kind, count in counts.items() if count)
 
 
 def at_strongest_strand(dataset: xr.Dataset, name: str) -> xr.DataArray:

@@ -1,9 +1,9 @@
 """Maps of vibration occurrence over a study's grid: classes first, then amplitude and frequency.
 
 The classes differ in lightness, in hatching and in the mark on the grid point, so that a map reads the
-same in colour, in grey and in small print. Vibrating cells are coloured by amplitude, darker for larger.
-Their dominant frequency is written into the cells where there is room, and drawn as a second set of
-panels where there is none.
+same in colour, in grey and in small print. Cells whose class is inferred have level lines and no mark.
+Vibrating cells are coloured by amplitude, darker for larger. Their dominant frequency is written into the
+cells where there is room, and drawn as a second set of panels where there is none.
 """
 
 from __future__ import annotations
@@ -25,7 +25,13 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, value_text
-from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, count_classes, occurrence_classes
+from cvt_hpc.analysis.classes import (
+    OccurrenceClass,
+    at_strongest_strand,
+    count_classes,
+    map_classes,
+    occurrence_classes,
+)
 from cvt_hpc.analysis.figures import STYLE, WIDTH, check_format, save_figure
 
 MOST_STACKED = 5  # panels in one column; more go into two
@@ -40,7 +46,7 @@ def draw_map(dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None
     ----------
     dataset : Dataset
         Results of a study: `status` and `vibrates` over the job's axes; `amplitude` [m] and `frequency`
-        [Hz], per strand, where known. The stronger strand is shown.
+        [Hz], per strand, where known; `inferred_class` of a trace. The stronger strand is shown.
     out : Path
         The picture: .png, .svg or .pdf.
     at : mapping, optional
@@ -71,6 +77,7 @@ class _Sheet:
     x: Ruler
     y: Ruler
     classes: NDArray[np.int8]
+    inferred: NDArray[np.bool_]  # whether the class of a cell is not that of a run
     amplitude: NDArray[np.float64]  # [um], nan where a run does not vibrate
     frequency: NDArray[np.float64]  # [Hz], likewise
 
@@ -124,7 +131,7 @@ def map_figure(arrangement: Arrangement) -> Figure:
         _draw_block(figure, axes[sheet.rows :], sheet, sheet.frequency, frequency)
     figure.suptitle(_title(sheet, written))
     figure.supylabel(sheet.y.label, fontsize=10)
-    cells.class_legend(figure)
+    cells.class_legend(figure, with_inferred=bool(sheet.inferred.any()))
     return figure
 
 
@@ -137,13 +144,14 @@ def _sheet(arrangement: Arrangement) -> _Sheet:
         present = variable.transpose(*filter(None, names))
         return present.values.reshape([dataset.sizes[name] if name else 1 for name in names])
 
-    classes = grid(occurrence_classes(dataset))
-    vibrating = classes == OccurrenceClass.VIBRATING
+    runs, classes = grid(occurrence_classes(dataset)), grid(map_classes(dataset))
+    vibrating = runs == OccurrenceClass.VIBRATING
     return _Sheet(
         arrangement,
         ruler(dataset[arrangement.x]),
         ruler(dataset[arrangement.y]) if arrangement.y else ONE_ROW,
         classes,
+        classes != runs,
         np.where(vibrating, grid(at_strongest_strand(dataset, "amplitude")) * 1e6, np.nan),
         np.where(vibrating, grid(at_strongest_strand(dataset, "frequency")), np.nan),
     )
@@ -167,8 +175,9 @@ def _draw_block(
         if panel >= sheet.panels:
             ax.set_axis_off()
             continue
-        cells.draw_cells(ax, sheet.x, sheet.y, sheet.classes[panel], values[panel], scale)
-        cells.draw_marks(ax, sheet.x, sheet.y, sheet.classes[panel], mark)
+        classes, inferred = sheet.classes[panel], sheet.inferred[panel]
+        cells.draw_cells(ax, sheet.x, sheet.y, classes, inferred, values[panel], scale)
+        cells.draw_marks(ax, sheet.x, sheet.y, classes, ~inferred, mark)
         _label_panel(ax, sheet, panel)
     if np.isfinite(values).any():
         bar = figure.colorbar(
@@ -197,10 +206,11 @@ def _title(sheet: _Sheet, written: bool) -> str:
     """What, of which job, how many runs of each class, and what is fixed."""
     attributes = sheet.arrangement.dataset.attrs
     job = attributes.get("job_name", "")
-    counts = count_classes(sheet.classes)
-    runs = ", ".join(f"{count} {kind.label}" for kind, count in counts.items() if count)
+    runs, inferred = sheet.classes[~sheet.inferred], sheet.classes[sheet.inferred]
     lines = [f"Vibration occurrence: {job}" if job else "Vibration occurrence"]
-    lines.append(f"{sheet.classes.size} runs: {runs}")
+    lines.append(f"{runs.size} runs: {count_classes(runs)}")
+    if inferred.size:
+        lines.append(f"{inferred.size} cells inferred: {count_classes(inferred)}")
     lines.extend(sheet.arrangement.notes)
     if written:
         lines.append("in the cells: dominant frequency [Hz]")
