@@ -69,6 +69,15 @@ class Scale:
     label: str
 
 
+def norm_over(values: Array, lowest: float | None = None) -> Normalize:
+    """Scale over the finite values, from `lowest` if given."""
+    known = values[np.isfinite(values)]
+    if known.size == 0:
+        return Normalize(0.0, 1.0)
+    low, high = known.min() if lowest is None else lowest, known.max()
+    return Normalize(low, high) if high > low else Normalize(low - 0.5, high + 0.5)
+
+
 def draw_cells(
     axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], inferred: Mask, values: Array, scale: Scale
 ) -> None:
@@ -92,7 +101,7 @@ def draw_cells(
     for kind, style in STYLES.items():
         inside = classes == kind
         cells = [_cell(x, y, row, column) for row, column in np.argwhere(inside)]
-        fills = _fills(kind, values[inside], scale)
+        fills = fills_of(kind, values[inside], scale)
         if kind is OccurrenceClass.VIBRATING:
             fills[inferred[inside]] = to_rgba(INFERRED_VIBRATION)
         # Cells and marks are pixels even in a vector format: thousands of shapes would make megabytes of it.
@@ -131,7 +140,7 @@ def write_values(
     """Write `values` as whole numbers above the grid points of vibrating cells that are filled by `fills`."""
     vibrating = (classes == OccurrenceClass.VIBRATING) & np.isfinite(values)
     for row, column in np.argwhere(vibrating):
-        (fill,) = _fills(OccurrenceClass.VIBRATING, fills[row : row + 1, column], scale)
+        (fill,) = fills_of(OccurrenceClass.VIBRATING, fills[row : row + 1, column], scale)
         axes.annotate(
             f"{values[row, column]:.0f}",
             (x.centres[column], y.centres[row]),
@@ -176,7 +185,7 @@ def _cell(x: Ruler, y: Ruler, row: int, column: int) -> Rectangle:
     return Rectangle(corner, x.edges[column + 1] - corner[0], y.edges[row + 1] - corner[1])
 
 
-def _fills(kind: OccurrenceClass, values: Array, scale: Scale) -> Array:
+def fills_of(kind: OccurrenceClass, values: Array, scale: Scale) -> Array:
     """Colours (cell, rgba) of cells of one class."""
     fills = np.tile(to_rgba(STYLES[kind].fill), (len(values), 1))
     if kind is OccurrenceClass.VIBRATING:

@@ -19,7 +19,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -32,7 +31,8 @@ from cvt_hpc.analysis.classes import (
     map_classes,
     occurrence_classes,
 )
-from cvt_hpc.analysis.figures import STYLE, WIDTH, check_format, save_figure
+from cvt_hpc.analysis.figures import STYLE, WIDTH, check_format, headline, save_figure
+from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 
 MOST_STACKED = 5  # panels in one column; more go into two
 TITLE_HEIGHT = 0.42  # [inch], of a panel with the space around it
@@ -46,7 +46,8 @@ def draw_map(dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None
     ----------
     dataset : Dataset
         Results of a study: `status` and `vibrates` over the job's axes; `amplitude` [m] and `frequency`
-        [Hz], per strand, where known; `inferred_class` of a trace. The stronger strand is shown.
+        [Hz], per strand, where known; `inferred_class` of a trace. The stronger strand is shown. Of a study
+        of samples the axes lie along `run`: each run is a mark, and there is a panel for each pair of axes.
     out : Path
         The picture: .png, .svg or .pdf.
     at : mapping, optional
@@ -60,12 +61,14 @@ def draw_map(dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None
     Raises
     ------
     InputError
-        The dataset holds no results or a single run, `at` names no axis or no value on it, or the suffix
-        is not a picture's.
+        The dataset holds no results or a single run, `at` names no axis or no value on it or the results
+        are of samples, or the suffix is not a picture's.
     """
     check_format(Path(out))
     occurrence_classes(dataset)
     with matplotlib.rc_context(STYLE):
+        if is_sampled(dataset):
+            return save_figure(scatter_figure(dataset, at or {}), Path(out))
         return save_figure(map_figure(arrange(dataset, at or {})), Path(out))
 
 
@@ -121,13 +124,15 @@ def map_figure(arrangement: Arrangement) -> Figure:
     blocks = 2 if has_frequency and not written else 1
     figure = Figure((WIDTH, blocks * sheet.rows * sheet.panel_height + 1.9), layout="constrained")
     axes = figure.subplots(blocks * sheet.rows, sheet.columns, sharex=True, sharey=True, squeeze=False)
-    amplitude = cells.Scale(cells.AMPLITUDE_COLOURS, _norm(sheet.amplitude, 0.0), "amplitude [µm]")
+    amplitude = cells.Scale(cells.AMPLITUDE_COLOURS, cells.norm_over(sheet.amplitude, 0.0), "amplitude [µm]")
     _draw_block(figure, axes[: sheet.rows], sheet, sheet.amplitude, amplitude)
     if written:
         for ax, *shown in zip(axes.flat, sheet.classes, sheet.frequency, sheet.amplitude, strict=False):
             cells.write_values(ax, sheet.x, sheet.y, *shown, amplitude)
     elif has_frequency:
-        frequency = cells.Scale(cells.FREQUENCY_COLOURS, _norm(sheet.frequency), "dominant frequency [Hz]")
+        frequency = cells.Scale(
+            cells.FREQUENCY_COLOURS, cells.norm_over(sheet.frequency), "dominant frequency [Hz]"
+        )
         _draw_block(figure, axes[sheet.rows :], sheet, sheet.frequency, frequency)
     figure.suptitle(_title(sheet, written))
     figure.supylabel(sheet.y.label, fontsize=10)
@@ -155,15 +160,6 @@ def _sheet(arrangement: Arrangement) -> _Sheet:
         np.where(vibrating, grid(at_strongest_strand(dataset, "amplitude")) * 1e6, np.nan),
         np.where(vibrating, grid(at_strongest_strand(dataset, "frequency")), np.nan),
     )
-
-
-def _norm(values: NDArray[np.float64], lowest: float | None = None) -> Normalize:
-    """Scale over the finite values, from `lowest` if given."""
-    known = values[np.isfinite(values)]
-    if known.size == 0:
-        return Normalize(0.0, 1.0)
-    low, high = known.min() if lowest is None else lowest, known.max()
-    return Normalize(low, high) if high > low else Normalize(low - 0.5, high + 0.5)
 
 
 def _draw_block(
@@ -204,11 +200,8 @@ def _label_panel(ax: Axes, sheet: _Sheet, panel: int) -> None:
 
 def _title(sheet: _Sheet, written: bool) -> str:
     """What, of which job, how many runs of each class, and what is fixed."""
-    attributes = sheet.arrangement.dataset.attrs
-    job = attributes.get("job_name", "")
     runs, inferred = sheet.classes[~sheet.inferred], sheet.classes[sheet.inferred]
-    lines = [f"Vibration occurrence: {job}" if job else "Vibration occurrence"]
-    lines.append(f"{runs.size} runs: {count_classes(runs)}")
+    lines = [headline(sheet.arrangement.dataset.attrs), f"{runs.size} runs: {count_classes(runs)}"]
     if inferred.size:
         lines.append(f"{inferred.size} cells inferred: {count_classes(inferred)}")
     lines.extend(sheet.arrangement.notes)

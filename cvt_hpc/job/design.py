@@ -77,27 +77,24 @@ def resolve_spacing(design: Design, axes: tuple[Axis, ...], source: str) -> Desi
     """
     where = f"{source}: [design] first_spacing"
     found = design["first_spacing"]
-    if not isinstance(found, Mapping):
-        spacing = read_value(_SPACING, found, where)
-        spacings = {
-            axis.name: spacing for axis in axes if _is_numeric(axis) and len(axis.values) > 2 * spacing
-        }
-    else:
-        known = {axis.name: axis for axis in axes}
-        for name in found:
-            if name not in known:
-                raise unknown(f"{where}.{name}", "axis", name, known)
-            if not _is_numeric(known[name]):
-                raise mismatch(f"{where}.{name}", "an axis of numbers", "one of texts")
+    if isinstance(found, Mapping):
         spacings = {name: read_value(_SPACING, raw, f"{where}.{name}") for name, raw in found.items()}
-    for axis in axes:
-        if axis.name in spacings and list(axis.values) not in (
-            sorted(axis.values),
-            sorted(axis.values)[::-1],
-        ):
-            raise mismatch(
-                f"{source}: [axes] {axis.name}", "rising or falling values, to trace along them", "neither"
-            )
+    else:
+        spacing = read_value(_SPACING, found, where)
+        long = [axis for axis in axes if len(axis.values) > 2 * spacing]
+        spacings = {axis.name: spacing for axis in long if _is_numeric(axis)}
+        if not spacings:
+            raise mismatch(where, f"an axis of more than {2 * spacing} numbers, to trace along", "none")
+    known = {axis.name: axis for axis in axes}
+    for name in spacings:
+        if name not in known:
+            raise unknown(f"{where}.{name}", "axis", name, known)
+        if not _is_numeric(known[name]):
+            raise mismatch(f"{where}.{name}", "an axis of numbers", "one of texts")
+        rising = sorted(known[name].values)
+        if list(known[name].values) not in (rising, rising[::-1]):
+            expected = "values that rise or fall all the way, to trace along them"
+            raise mismatch(f"{source}: [axes] {name}", expected, "others")
     return {**design, "first_spacing": spacings}
 
 

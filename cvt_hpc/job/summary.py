@@ -32,7 +32,9 @@ def summarize(job: Job, core_seconds: float) -> str:
     for section, rows in _tables(job).items():
         lines += ["", f"[{section}]", *_columns(rows)]
     if job.axes:
-        axes = [(axis.name, _values_in_words(axis), f"{len(axis.values)} values") for axis in job.axes]
+        noun = "samples" if job.is_sampled else "values"
+        in_short = _range_in_words if job.is_sampled else _values_in_words
+        axes = [(axis.name, in_short(axis), f"{len(axis.values)} {noun}") for axis in job.axes]
         lines += ["", "[axes]", *_columns(axes)]
     if job.design:
         lines += [
@@ -77,6 +79,10 @@ def _values_in_words(axis: Axis) -> str:
     if len(words) > _FEW:
         words = [*words[:3], "...", words[-1]]
     return f"{', '.join(words)} {axis.unit}".rstrip()
+
+
+def _range_in_words(axis: Axis) -> str:
+    return f"{in_words(min(axis.values), '')} to {in_words(max(axis.values), '')} {axis.unit}".rstrip()
 
 
 def _setting_in_words(value: Any) -> str:

@@ -17,6 +17,8 @@ def test_serial_claims_follow_the_plan():
     with SerialCounter() as counter:
         assert list(claimed_batches(PLAN, counter, lambda: True)) == PLAN
         assert list(claimed_batches(PLAN, counter, lambda: True)) == []
+        counter.rewind()
+        assert list(claimed_batches(PLAN, counter, lambda: True)) == PLAN
 
 
 def test_no_claim_when_it_is_not_allowed():
@@ -30,6 +32,7 @@ def test_serial_interruption_is_beyond_every_plan():
     counter = SerialCounter()
     assert not counter.is_interrupted()
     counter.interrupt_all()
+    counter.rewind()
     assert counter.is_interrupted()
     assert list(claimed_batches(PLAN, counter, lambda: True)) == []
 
@@ -40,6 +43,7 @@ def test_three_ranks_claim_every_number_once(start):
     assert sorted(sum(claims, [])) == list(range(600))
     assert all(mine == sorted(mine) for mine in claims)
     assert len(claims) == 3
+    assert sorted(found["rewound"]) == [0, 1, 2]
     assert found["tallies"] == [[600, 60]] * 3
 
 
