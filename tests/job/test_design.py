@@ -77,10 +77,14 @@ def test_an_axis_that_is_replaced_by_one_value_is_no_dimension_of_the_samples(wr
     assert {job.point(i)["sheave_stiffness"] for i in range(32)} == {2.0}
 
 
-def test_every_sample_is_checked(write_job):
-    text = SAMPLED.format(kind="sobol").replace("seed = 7", "seed = 7\n[mesh]").replace("load =", "ratio =")
-    with pytest.raises(InputError, match="ratio"):
-        load_job(write_job(text.replace('"20 N m", to = "0.2 kN m"', "-1, to = 2")))
+def test_every_sample_is_checked_and_the_first_bad_one_is_named(write_job):
+    text = SAMPLED.format(kind="sobol").replace('to = "0.2 kN m"', 'to = "0.22 kN m"')  # 20 kN carry 200 N m
+    loads = 20 + 200 * qmc.Sobol(2, seed=np.random.default_rng(7)).random(32)[:, 0]
+    first = next(load for load in loads if load > 200)
+    with pytest.raises(
+        InputError, match=rf"at most 200 N m at this thrust.*\(at load = {first:.10g} N m, sheave"
+    ):
+        load_job(write_job(text))
 
 
 def test_a_trace_is_along_the_long_axes_of_numbers(write_job):
@@ -90,8 +94,9 @@ def test_a_trace_is_along_the_long_axes_of_numbers(write_job):
     named = TRACED.replace('"trace"', '"trace"\nfirst_spacing = { ratio = 1, load = 2 }')
     assert load_job(write_job(named)).design["first_spacing"] == {"ratio": 1, "load": 2}
     # a whole grid is a trace by command
-    plain = write_job(TRACED.replace('kind = "trace"', ""))
-    assert load_job(plain, ["design.kind=trace"]).design == load_job(path).design
+    path = write_job(TRACED.replace('kind = "trace"', ""))
+    assert load_job(path).design == {}
+    assert load_job(path, ["design.kind=trace"]).design == {"kind": "trace", "first_spacing": {"load": 4}}
 
 
 def test_a_design_is_told(write_job):
