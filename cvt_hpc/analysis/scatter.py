@@ -27,7 +27,7 @@ _FIRST = ("load", "friction_gradient")  # along x and along y, where they are
 
 def is_sampled(dataset: xr.Dataset) -> bool:
     """Whether the runs of a dataset are samples, not a grid."""
-    return dataset["status"].dims == ("run",) and "run" not in dataset.coords
+    return dataset["status"].dims == ("run",)
 
 
 def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any]) -> Figure:

@@ -1,6 +1,7 @@
 """The table [design] of a job file: traces, and samples of the ranges of the axes."""
 
 import json
+import re
 
 import numpy as np
 import pytest
