@@ -56,7 +56,7 @@ def status_lines(status: StudyStatus) -> Iterator[str]:
     yield f"job     {status.name} ({'running' if status.running else 'not running'})"
     yield f"runs    {status.total}"
     if status.unneeded:
-        yield f"grid    {status.total + status.unneeded} cells, {status.unneeded} of them not needed so far"
+        yield f"grid    {status.total + status.unneeded} cells, {status.unneeded} not needed so far"
     yield f"done    {status.done} ({status.done / status.total:.1%})"
     yield f"failed  {status.failed}"
     yield f"left    {status.left}"

@@ -80,11 +80,10 @@ def test_an_axis_that_is_replaced_by_one_value_is_no_dimension_of_the_samples(wr
 
 def test_every_sample_is_checked_and_the_first_bad_one_is_named(write_job):
     text = SAMPLED.format(kind="sobol").replace('to = "0.2 kN m"', 'to = "0.22 kN m"')  # 20 kN carry 200 N m
-    loads = 20 + 200 * qmc.Sobol(2, seed=np.random.default_rng(7)).random(32)[:, 0]
-    first = next(load for load in loads if load > 200)
-    with pytest.raises(
-        InputError, match=rf"at most 200 N m at this thrust.*\(at load = {first:.10g} N m, sheave"
-    ):
+    unit = qmc.Sobol(2, seed=np.random.default_rng(7)).random(32)
+    load, share = next((20 + 200 * u, v) for u, v in unit if u > 0.9)
+    place = f"(at load = {load:.10g} N m, sheave_stiffness = {100**share:.10g})"
+    with pytest.raises(InputError, match=f"at most 200 N m at this thrust.*{re.escape(place)}"):
         load_job(write_job(text))
 
 
