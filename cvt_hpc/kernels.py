@@ -24,8 +24,7 @@ import numba
 from numba.core.caching import IndexDataCacheFile
 
 _PACKAGE = Path(__file__).parent
-_ROOMS_WITH_KERNELS = ("physics", "models", "steppers")
-_OTHER_SOURCES = ("kernels.py", "lanes.py")
+_ROOMS_WITH_KERNELS = ("lanes", "physics", "models", "steppers")
 
 # Division by zero gives inf as in numpy, without a test for it. Every operation is rounded once, as written:
 # were products contracted with sums, the bits would depend on which kernels the compiler merges, and so on
@@ -95,12 +94,10 @@ def _entry(packed: bytes) -> Any:
 
 
 def _cache_folder() -> str:
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(Path(__file__).read_bytes())
     for room in _ROOMS_WITH_KERNELS:
         for source in sorted((_PACKAGE / room).rglob("*.py")):
             digest.update(source.read_bytes())
-    for name in _OTHER_SOURCES:
-        digest.update((_PACKAGE / name).read_bytes())
     chosen = numba.config.CACHE_DIR
     if chosen:
         base = Path(chosen)

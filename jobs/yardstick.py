@@ -17,8 +17,9 @@ from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.elastic_belt.belt import TIME, V_RING, W
 from cvt_hpc.models.elastic_belt.explicit import step_explicit
 from cvt_hpc.models.elastic_belt.flat import flat_belt, pack, system, unpack
-from cvt_hpc.models.elastic_belt.imex import derive, imex_work
+from cvt_hpc.models.elastic_belt.imex import imex_work
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state, take_lane
+from cvt_hpc.models.elastic_belt.lane_forces import derive
 from cvt_hpc.models.elastic_belt.march import march_imex
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, PROFILES, Sensors
 from cvt_hpc.models.elastic_belt.structure import SparseJacobian

@@ -24,9 +24,8 @@ def package(tmp_path):
     """A copy of what the folder's name depends on."""
     copy = tmp_path / "site" / "cvt_hpc"
     copy.mkdir(parents=True)
-    for name in ("kernels.py", "lanes.py"):
-        shutil.copy(PACKAGE / name, copy)
-    for room in ("physics", "models", "steppers", "study"):
+    shutil.copy(PACKAGE / "kernels.py", copy)
+    for room in ("lanes", "physics", "models", "steppers", "study"):
         shutil.copytree(PACKAGE / room, copy / room, ignore=shutil.ignore_patterns("__pycache__"))
     return copy
 
@@ -73,7 +72,7 @@ def test_the_folder_is_in_the_package_and_named_by_content(package, no_choice):
         ("models/elastic_belt/new_part.py", True),
         ("steppers/imex.py", True),
         ("kernels.py", True),
-        ("lanes.py", True),
+        ("lanes/functions.py", True),
         ("study/sweep.py", False),
     ],
 )

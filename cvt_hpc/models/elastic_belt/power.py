@@ -21,14 +21,6 @@ from __future__ import annotations
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, sqrt
 from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_FILTERED, V_RING, U, W
-from cvt_hpc.models.elastic_belt.imex import (
-    EPS_0,
-    EPS_1,
-    FORCE,
-    LEAST_SHARE_OF_WIDTH,
-    lane_load,
-    start_damping,
-)
 from cvt_hpc.models.elastic_belt.lane_belt import (
     AXIAL_DAMPING,
     BELT_SPEED,
@@ -63,6 +55,8 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneBelt,
     LaneState,
 )
+from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH, lane_load, start_damping
+from cvt_hpc.models.elastic_belt.lane_work import EPS_0, EPS_1, FORCE
 from cvt_hpc.physics.lane_friction import lane_coefficient, lane_law, lane_saturation, lane_table
 
 POWERS = (

@@ -11,12 +11,6 @@ import numpy as np
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, select
 from cvt_hpc.models.elastic_belt.belt import REGIONS, V_ELEMENT, Mesh, W
-from cvt_hpc.models.elastic_belt.imex import (
-    EPS_0,
-    EPS_1,
-    FORCE,
-    lane_load,
-)
 from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
     DRIVEN_RADIUS,
@@ -31,6 +25,8 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneBelt,
     LaneState,
 )
+from cvt_hpc.models.elastic_belt.lane_forces import lane_load
+from cvt_hpc.models.elastic_belt.lane_work import EPS_0, EPS_1, FORCE
 from cvt_hpc.models.elastic_belt.power import POWERS, audit
 from cvt_hpc.models.elastic_belt.record import MODES
 from cvt_hpc.physics.lane_compliance import SOLVES, UNSOLVED
