@@ -28,6 +28,12 @@ PARAMETERS = {
             "largest time step; a whole number of steps makes a sampling interval",
             minimum=1e-9,
             maximum=1e-3,
-        )
+        ),
+        "precision": Parameter(
+            "double",
+            "",
+            "of the numbers in a step, of which the reference takes no other; 8 runs advance together",
+            choices=("double",),
+        ),
     }
 }

@@ -20,8 +20,8 @@ from cvt_hpc.job import build_job
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, fma, like
 from cvt_hpc.models.elastic_belt import imex, imex_stations, imex_system, lane_forces
+from cvt_hpc.models.elastic_belt.batch import PRECISIONS, Batch
 from cvt_hpc.models.elastic_belt.lane_belt import REPEATS
-from cvt_hpc.models.elastic_belt.transient import PRECISIONS, Batch
 from cvt_hpc.physics import lane_compliance, lane_friction
 
 CALLS = 15

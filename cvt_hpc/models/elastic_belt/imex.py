@@ -16,16 +16,26 @@ limits the step is accuracy, c dt / h about 5, and the transverse contact and be
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import LaneArray, decay, fma, like, minimum, select, sqrt
+from cvt_hpc.lanes import decay, fma, like, minimum, select, sqrt
 from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_FILTERED, U, W
 from cvt_hpc.models.elastic_belt.imex_stations import assemble
 from cvt_hpc.models.elastic_belt.imex_system import eliminate, substitute
+from cvt_hpc.models.elastic_belt.imex_work import (
+    DV_0,
+    FLANK,
+    FLANK_CROSS,
+    FLANK_SLOPE,
+    LAG,
+    LAST_U,
+    LINK_0,
+    PUSH,
+    SLOPE,
+    ImexWork,
+)
 from cvt_hpc.models.elastic_belt.lane_belt import (
-    AXIAL_DAMPING,
     BELT_SPEED,
     COSINE,
     DRIVEN_CARRY,
-    DRIVEN_INERTIA,
     DRIVEN_RADIUS,
     DRIVING_CARRY,
     DRIVING_RADIUS,
@@ -34,39 +44,19 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     ELEMENT_STIFFNESS,
     FORGET,
     LAYER_WORK,
-    POSITION,
-    RATIO,
     SPEED,
-    THRUST,
     LaneBelt,
     LaneState,
 )
-from cvt_hpc.models.elastic_belt.lane_forces import derive, lane_load, lane_sliding, lane_thrust
-from cvt_hpc.models.elastic_belt.lane_work import (
-    DV_0,
+from cvt_hpc.models.elastic_belt.lane_forces import (
     EPS_0,
-    FIELDS_OF_WORK,
-    FLANK,
-    FLANK_CROSS,
-    FLANK_SLOPE,
-    LAG,
-    LAST_U,
-    LINK_0,
-    PUSH,
     SHORT_0,
-    SLOPE,
-    ImexWork,
+    advance_pulley,
+    derive,
+    lane_sliding,
 )
 
 MOST_PASSES = 3  # one, unless friction turns sliding about; a third where the second turns others
-
-
-def imex_work(state: LaneState) -> ImexWork:
-    """Work space for a state; `derive` has to be called before the first step."""
-    rows, _, lanes = state.fields.data.shape
-    stations = LaneArray(rows, FIELDS_OF_WORK, lanes, state.fields.data.dtype)
-    stations.data[:, LAST_U] = state.fields.data[:, U]
-    return ImexWork(stations)
 
 
 @kernel
@@ -88,14 +78,7 @@ def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
         if not substitute(belt, work, scalars):
             break
     moment = _advance(belt, state, work, step)
-    c = belt.constants
-    speed = scalars[0, SPEED]
-    load = like(c[0, RATIO], speed) * lane_load(belt, state.time[0], speed)
-    scalars[0, SPEED] = speed + step * (moment - load) / like(c[0, DRIVEN_INERTIA], speed)
-    axial = like(lane_thrust(belt, state, stations), speed)
-    scalars[0, POSITION] = scalars[0, POSITION] + step * (axial - like(c[0, THRUST], speed)) / like(
-        c[0, AXIAL_DAMPING], speed
-    )
+    advance_pulley(belt, state, stations, moment, step)
     state.time[0] += step
     derive(belt, state, stations)
 

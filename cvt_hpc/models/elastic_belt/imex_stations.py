@@ -3,8 +3,24 @@
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel, merged_kernel
-from cvt_hpc.lanes import anywhere, fma, like, maximum, minimum, reciprocals, select
+from cvt_hpc.lanes import anywhere, fma, like, minimum, reciprocals, select
 from cvt_hpc.models.elastic_belt.belt import V_ELEMENT, V_RING, U, W
+from cvt_hpc.models.elastic_belt.imex_work import (
+    D_00,
+    D_01,
+    D_11,
+    FLANK,
+    FLANK_CROSS,
+    FLANK_SLOPE,
+    LAG,
+    LAST_U,
+    PUSH,
+    REVERSING,
+    SLOPE,
+    Y_0,
+    Y_1,
+    ImexWork,
+)
 from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
     BENDING_STIFFNESS,
@@ -24,30 +40,18 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneBelt,
     LaneState,
 )
-from cvt_hpc.models.elastic_belt.lane_forces import start_damping
-from cvt_hpc.models.elastic_belt.lane_work import (
+from cvt_hpc.models.elastic_belt.lane_forces import (
     COEFFICIENT,
-    D_00,
-    D_01,
-    D_11,
     EPS_0,
     EPS_1,
     FACTOR,
-    FLANK,
-    FLANK_CROSS,
-    FLANK_SLOPE,
     FORCE,
-    LAG,
-    LAST_U,
     PER_SPEED,
-    PUSH,
-    REVERSING,
     RING_FACTOR,
     SLIDING_T,
-    SLOPE,
-    Y_0,
-    Y_1,
-    ImexWork,
+    lane_transverse,
+    ring_grip,
+    start_damping,
 )
 
 
@@ -87,26 +91,15 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
         if again and (share == 0.0 or not anywhere(stations[j, REVERSING] > 0.5)):
             continue
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
-        aa, bb = a - 1 if a > 0 else n - 1, b + 1 if b < n - 1 else 0
-        left, right, dual = belt.cell[a], belt.cell[j], belt.dual[j]
-        per_left, span = belt.per_cell[a], belt.per_span[j]
-        w, u, v0, v1 = fields[j, W], fields[j, U], fields[j, V_ELEMENT], fields[j, V_RING]
-        w_a, w_b = fields[a, W], fields[b, W]
+        dual, per_left, span = belt.dual[j], belt.per_cell[a], belt.per_span[j]
+        u, v0, v1 = fields[j, U], fields[j, V_ELEMENT], fields[j, V_RING]
         ring_left, ring_right = ring_stiffness * stations[a, EPS_1], ring_stiffness * stations[j, EPS_1]
         net_left = fma(element_stiffness, minimum(stations[a, EPS_0], 0.0), ring_left - centrifugal)
         net_right = fma(element_stiffness, minimum(stations[j, EPS_0], 0.0), ring_right - centrifugal)
-        slope = (w_b - w_a) * span
+        slope = (fields[b, W] - fields[a, W]) * span
         # u at t_k, extrapolated: the gyroscopic term then neither damps nor feeds
         change = 1.5 * (fields[b, U] - fields[a, U]) - 0.5 * (stations[b, LAST_U] - stations[a, LAST_U])
-        bent = fma(
-            belt.bending[j, 0],
-            fields[aa, W],
-            fma(belt.bending[j, 4], fields[bb, W], belt.bending[j, 2] * w),
-        )
-        bent = fma(belt.bending[j, 1], w_a, fma(belt.bending[j, 3], w_b, bent))
-        tension = net_right * ((w_b - w) * belt.per_cell[j]) - net_left * ((w - w_a) * per_left)
-        inward = net_right * (0.5 * right * belt.curvature[j]) + net_left * (0.5 * left * belt.curvature[a])
-        transverse = fma(tension - inward, belt.per_dual[j], bending * bent)
+        transverse = lane_transverse(belt, fields, j, net_left, net_right, bending)
         transverse = fma(-gyroscopic, change * span, transverse)
         full_speed = belt_speed + v0
         v_radial = fma(full_speed, slope, u)
@@ -123,10 +116,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
             per_speed, factor = stations[j, PER_SPEED], stations[j, FACTOR]
             ring_factor, meridian, force = stations[j, RING_FACTOR], v_radial * per_cosine, stations[j, FORCE]
 
-            relief = ring_relief * longer
-            pressure = maximum(ring_right - relief, 0.0) * (right * belt.curvature[j])
-            pressure += maximum(ring_left - relief, 0.0) * (left * belt.curvature[a])
-            grip = ring_friction * (0.5 * belt.per_dual[j]) * pressure
+            grip = ring_grip(belt, j, ring_left, ring_right, ring_relief * longer, ring_friction)
             drag = grip * ring_factor
             stiff = grip * (fma(-ring_factor, ring_factor, 1.0) * per_ring_width)
 

@@ -5,6 +5,29 @@ from __future__ import annotations
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, anywhere, fma, like, minimum, select
 from cvt_hpc.models.elastic_belt.belt import V_ELEMENT, V_RING, U
+from cvt_hpc.models.elastic_belt.imex_work import (
+    D_00,
+    D_01,
+    D_11,
+    DV_0,
+    DV_1,
+    G_00,
+    G_01,
+    G_10,
+    G_11,
+    I_00,
+    I_01,
+    I_11,
+    LAG,
+    LINK_0,
+    LINK_1,
+    PUSH,
+    REVERSING,
+    SLOPE,
+    Y_0,
+    Y_1,
+    ImexWork,
+)
 from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
     ELEMENT_DAMPING,
@@ -16,35 +39,14 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneBelt,
     LaneState,
 )
-from cvt_hpc.models.elastic_belt.lane_work import (
-    D_00,
-    D_01,
-    D_11,
-    DV_0,
-    DV_1,
+from cvt_hpc.models.elastic_belt.lane_forces import (
     EPS_0,
     EPS_1,
-    G_00,
-    G_01,
-    G_10,
-    G_11,
-    I_00,
-    I_01,
-    I_11,
-    LAG,
-    LINK_0,
-    LINK_1,
     PER_CONTENT_0,
     PER_CONTENT_1,
-    PUSH,
-    REVERSING,
     SHORT_0,
     SLIDING_R,
     SLIDING_T,
-    SLOPE,
-    Y_0,
-    Y_1,
-    ImexWork,
 )
 
 # Share of the speeds' change in a step that the rings' stress feels. From 1/4 on it is stable for any step

@@ -1,4 +1,8 @@
-"""Forces of the elastic belt in lanes that follow from the present state alone: contact, strains, sliding."""
+"""Forces of the elastic belt in lanes: what steps, recording and audit find of one state.
+
+Steps keep it in a LaneArray of N stations, their work space: its first fields are those named here, further
+ones each step's own.
+"""
 
 from __future__ import annotations
 
@@ -28,8 +32,10 @@ from cvt_hpc.models.elastic_belt.belt import (
     W,
 )
 from cvt_hpc.models.elastic_belt.lane_belt import (
+    AXIAL_DAMPING,
     BELT_SPEED,
     COSINE,
+    DRIVEN_INERTIA,
     DRIVEN_RADIUS,
     DRIVING_POSITION,
     DRIVING_RADIUS,
@@ -41,34 +47,32 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LOAD,
     LOAD_START,
     POSITION,
+    RATIO,
     RING_FRICTION_SPEED,
     RING_OFFSET,
     SPEED,
+    THRUST,
     WEDGE,
     LaneBelt,
     LaneState,
 )
-from cvt_hpc.models.elastic_belt.lane_work import (
-    COEFFICIENT,
-    EPS_0,
-    EPS_1,
-    FACTOR,
-    FORCE,
-    PER_CONTENT_0,
-    PER_CONTENT_1,
-    PER_SPEED,
-    RING_FACTOR,
-    SHORT_0,
-    SHORT_1,
-    SLIDING_R,
-    SLIDING_T,
-)
 from cvt_hpc.physics.lane_compliance import CLOSED, GAP, solve_lane_contact
 from cvt_hpc.physics.lane_compliance import PUSH as PUSHED
-from cvt_hpc.physics.lane_friction import lane_coefficient, lane_law, lane_table
+from cvt_hpc.physics.lane_friction import (
+    lane_coefficient,
+    lane_law,
+    lane_table,
+)
 
 MOST_CONTACT_ROUNDS = 200
 LEAST_SHARE_OF_WIDTH = 1e-3  # of friction_speed: below it friction is linear to 1e-6, and has no direction
+
+# Of a state, by `derive`: axial line force; the cells' strains, 1 / (1 + strain) and 1 / content. By
+# `lane_sliding`: sliding speeds, the law's coefficient, tanh of sliding speed over regularisation, 1 / that
+# speed, the same tanh of rings.
+FORCE, EPS_0, EPS_1, SHORT_0, SHORT_1, PER_CONTENT_0, PER_CONTENT_1 = range(7)
+SLIDING_R, SLIDING_T, COEFFICIENT, FACTOR, PER_SPEED, RING_FACTOR = range(7, 13)
+FIELDS_OF_FORCES = 13
 
 
 @kernel
@@ -105,6 +109,53 @@ def lane_thrust(belt: LaneBelt, state: LaneState, stations: LaneArray):
     for k in range(weight.size):
         total = fma(weight[k], stations[belt.driven_start + k, FORCE], total)
     return total
+
+
+@kernel
+def advance_pulley(belt: LaneBelt, state: LaneState, stations: LaneArray, moment, step: float) -> None:
+    """Driven pulley's speed and opening at the end of a step, by the belt's moment [N m] and axial forces."""
+    c, scalars = belt.constants, state.scalars
+    speed = scalars[0, SPEED]
+    load = like(c[0, RATIO], speed) * lane_load(belt, state.time[0], speed)
+    scalars[0, SPEED] = speed + step * (moment - load) / like(c[0, DRIVEN_INERTIA], speed)
+    axial = like(lane_thrust(belt, state, stations), speed)
+    scalars[0, POSITION] = scalars[0, POSITION] + step * (axial - like(c[0, THRUST], speed)) / like(
+        c[0, AXIAL_DAMPING], speed
+    )
+
+
+@merged_kernel
+def lane_transverse(belt: LaneBelt, fields: LaneArray, j: int, net_left, net_right, bending):
+    """Line force across the belt at station j [N/m], outward, of tension and bending.
+
+    `net_left`, `net_right` are T - P - m v^2 in the cells beside it [N], `bending` is EI [N m^2].
+    """
+    n = belt.cell.size
+    a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
+    aa, bb = a - 1 if a > 0 else n - 1, b + 1 if b < n - 1 else 0
+    w, w_a, w_b = fields[j, W], fields[a, W], fields[b, W]
+    bent = fma(
+        belt.bending[j, 0],
+        fields[aa, W],
+        fma(belt.bending[j, 4], fields[bb, W], belt.bending[j, 2] * w),
+    )
+    bent = fma(belt.bending[j, 1], w_a, fma(belt.bending[j, 3], w_b, bent))
+    tension = net_right * ((w_b - w) * belt.per_cell[j]) - net_left * ((w - w_a) * belt.per_cell[a])
+    inward = net_right * (0.5 * belt.cell[j] * belt.curvature[j])
+    inward += net_left * (0.5 * belt.cell[a] * belt.curvature[a])
+    return fma(tension - inward, belt.per_dual[j], bending * bent)
+
+
+@merged_kernel
+def ring_grip(belt: LaneBelt, j: int, ring_left, ring_right, relief, friction):
+    """Largest friction of the saddles on the rings at station j of an arc [N/m].
+
+    `ring_left`, `ring_right` are T in the cells beside it [N], `relief` what the rings' own weight takes.
+    """
+    a = j - 1 if j > 0 else belt.cell.size - 1
+    pressure = maximum(ring_right - relief, 0.0) * (belt.cell[j] * belt.curvature[j])
+    pressure += maximum(ring_left - relief, 0.0) * (belt.cell[a] * belt.curvature[a])
+    return friction * (0.5 * belt.per_dual[j]) * pressure
 
 
 @kernel

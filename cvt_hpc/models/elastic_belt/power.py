@@ -55,8 +55,14 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneBelt,
     LaneState,
 )
-from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH, lane_load, start_damping
-from cvt_hpc.models.elastic_belt.lane_work import EPS_0, EPS_1, FORCE
+from cvt_hpc.models.elastic_belt.lane_forces import (
+    EPS_0,
+    EPS_1,
+    FORCE,
+    LEAST_SHARE_OF_WIDTH,
+    lane_load,
+    start_damping,
+)
 from cvt_hpc.physics.lane_friction import lane_coefficient, lane_law, lane_saturation, lane_table
 
 POWERS = (
@@ -105,7 +111,7 @@ def audit(
     belt, state
         Constants and state; the work of the dampers since the last audit is used up.
     stations : LaneArray
-        Of `ImexWork`, with the forces and strains of this state.
+        The step's work space, with the forces and strains of this state.
     axial
         Axial force of the belt on the driven sheave [N], in lanes.
     interval : float
