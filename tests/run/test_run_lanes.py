@@ -9,6 +9,7 @@ from marched import CHEAP, job, never
 
 from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.models.elastic_belt.belt import DRIVEN_SPEED, N_RING, W, belt_constants, initial_state
+from cvt_hpc.models.elastic_belt.lane_belt import REPEATS
 from cvt_hpc.models.elastic_belt.record import lane_key
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.physics.lane_compliance import UNSOLVED
@@ -141,6 +142,27 @@ def test_the_first_outcome_counts():
     after = [runs.outcome(lane) for lane in range(8)]
     assert after[1:6] == before[1:6]
     assert {after[k] for k in (0, 6, 7)} == {Outcome.NOT_FINITE}
+
+
+@pytest.mark.parametrize("method", ["double", "explicit"])
+def test_work_is_counted_until_the_run_ends(method):
+    values = METHODS[method] | {"friction_speed": 0.01}
+    batch = Batch(
+        [job(**SHORT | values | {"load": load}).point(0) for load in (120.0, 500.0)], values["stepper"]
+    )
+    while batch.running:
+        batch.advance(1000)
+    through, slipped = batch.runs
+    assert slipped.failure is not None and slipped.steps < through.steps == round(through.time / batch.step)
+    for run in batch.runs:
+        assert run.counters()["steps"] == run.steps
+        assert run.counters()["contact_solves"] == run.contact_solves > run.steps
+    repeats = batch.state.scalars.data[0, REPEATS]
+    if method == "explicit":
+        assert set(through.counters()) == {"steps", "contact_solves"}
+    else:
+        assert through.counters()["repeats"] == repeats[0] > 0
+        assert 0 < slipped.counters()["repeats"] < repeats[1]
 
 
 def test_a_batch_takes_no_more_than_a_register():
