@@ -14,6 +14,7 @@ from cvt_hpc import __version__
 from cvt_hpc.errors import InputError, mismatch
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+RETRIED = ("timed_out", "failed_error", "failed_numerics")
 _SUBJECTS = {
     "JOB": "job file (TOML)",
     "DIR": "output folder of a run",
@@ -70,6 +71,18 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: out/<job name>)")
     run.add_argument("--dry-run", action="store_true", help="as `cvt-hpc check`; runs nothing")
     run.add_argument("--fresh", action="store_true", help="throw earlier results of the folder away")
+    limit = (
+        "time after which no run computes, such as 2h30m (default: until the end of the Slurm job, if any)"
+    )
+    run.add_argument("--time-limit", metavar="TIME", help=limit)
+    run.add_argument("--run-limit", metavar="TIME", help="time that one run may take (default: any)")
+    run.add_argument(
+        "--retry",
+        action="append",
+        default=[],
+        choices=RETRIED,
+        help="do recorded runs that ended so again; may be repeated",
+    )
     _add(commands, "status", _status, "how far a study is", "DIR")
     _add(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
     picture = _add(commands, "map", _map, "draw where vibration occurs", "RESULTS")
@@ -111,10 +124,19 @@ def _run(arguments: argparse.Namespace) -> int:
     if arguments.dry_run:
         return _check(arguments)
     from cvt_hpc.job import load_job
+    from cvt_hpc.job.durations import read_duration
     from cvt_hpc.printing import report_lines, trouble_lines
     from cvt_hpc.study import run
+    from cvt_hpc.variables import Status
 
-    report = run(load_job(arguments.path, arguments.set), arguments.out, fresh=arguments.fresh)
+    limits = {
+        name: read_duration(getattr(arguments, name), f"--{name.replace('_', '-')}")
+        for name in ("time_limit", "run_limit")
+        if getattr(arguments, name) is not None
+    }
+    retry = [Status[name.upper()] for name in arguments.retry]
+    job = load_job(arguments.path, arguments.set)
+    report = run(job, arguments.out, fresh=arguments.fresh, retry=retry, **limits)
     _complain(*trouble_lines(report))
     if _speaks():
         print(*report_lines(report), sep="\n")

@@ -91,7 +91,7 @@ def test_a_stopped_sweep_ends_with_99(write_job, call, monkeypatch, tmp_path):
     write_job(GRID)
     failed = (FailedRun(3, {"load": 5.0, "law": "coulomb"}, "failed_error", "ValueError: x"),)
     report = RunReport(tmp_path, tmp_path / "results.nc", 10, 4, failed, 5, "SIGTERM")
-    monkeypatch.setattr("cvt_hpc.study.run", lambda job, out, fresh: report)
+    monkeypatch.setattr("cvt_hpc.study.run", lambda job, out, **options: report)
     status, out, err = call("run", "x.toml")
     assert status == 99
     assert out[0] == "10 runs: 4 done, 1 failed, 5 left"

@@ -12,6 +12,7 @@ from study_processes import assert_same_numbers, wait_until
 
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.frames import PLACE, RECORD
 from cvt_hpc.study.recovery import read_records
 
 RUNS = 60
@@ -39,8 +40,8 @@ def frames_written(out):
     """Return the number of records in all logs, repeated ones counted each time."""
     study = StudyFolder(out).load()
     paths = out.glob("records/*.log")
-    size = study.record_dtype.itemsize
-    return sum(path.read_bytes().count(b"\xf5RUN" + size.to_bytes(4, "little")) for path in paths)
+    size = PLACE.size + study.record_dtype.itemsize
+    return sum(path.read_bytes().count(RECORD + size.to_bytes(4, "little")) for path in paths)
 
 
 @pytest.mark.parametrize(("ranks", "lanes"), [(0, 1), (2, 1), (0, 4), (2, 4)])

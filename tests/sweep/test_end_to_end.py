@@ -17,7 +17,7 @@ from sweeps import assert_same_numbers, call, environment, kill, records, start,
 from cvt_hpc import open_results
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, occurrence_classes
-from cvt_hpc.study.record import MARKER
+from cvt_hpc.study.frames import RECORD
 from cvt_hpc.variables import Status, Vibrates
 
 JOB = """
@@ -134,7 +134,7 @@ def test_kill_9_at_any_moment_and_resume(meshes, tmp_path, ranks):
 
 def frames_written(out):
     """Number of records in all logs, repeated ones counted each time."""
-    return sum(path.read_bytes().count(MARKER) for path in (out / "records").glob("*.log"))
+    return sum(path.read_bytes().count(RECORD) for path in (out / "records").glob("*.log"))
 
 
 def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):
