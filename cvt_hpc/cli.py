@@ -233,8 +233,11 @@ def _check(arguments: argparse.Namespace) -> int:
     describe(job, default_simulator())  # refuses axes that the dataset of a run could not hold
     if _speaks():
         from cvt_hpc.simulation import estimate_cost
+        from cvt_hpc.study.status import read_machine_factor
 
-        print(summarize(job, estimate_cost(job)))
+        out = getattr(arguments, "out", None) or Path("out") / job.name
+        factor, runs = read_machine_factor(out, job)
+        print(summarize(job, factor * estimate_cost(job), runs))
     return DONE
 
 

@@ -11,6 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from cvt_hpc.files import StorageError, discard
 from cvt_hpc.study.attempts import enter_attempts, later_attempts, plan_runs
 from cvt_hpc.study.batches import Assignment
@@ -113,9 +115,12 @@ def run(
     with SignalWatch() as signals, assembled_team(folder.crash_log) as team, ExitStack() as held:
         plan = team.on_root(prepare)
         with open_counter(team) as counter:
-            display = Progress(counter, study.size, plan.recorded, plan.failed, progress and team.rank == 0)
+            costs = simulator.run_costs(job)
+            order = [index for assignment in plan.assignments for index in assignment.runs]
+            visible = progress and team.rank == 0
+            display = Progress(counter, study.size, plan.recorded, plan.failed, visible, costs[order])
             stop = Stop(counter, signals, plan.limit, display.show)
-            trouble = _compute(task, folder, plan, team.rank, counter, stop)
+            trouble = _compute(task, folder, plan, costs, team.rank, counter, stop)
             team.wait_for_all(stop.look)
             display.close()
         stopped = _settle(team, trouble, stop.reason)
@@ -166,11 +171,17 @@ def _other_versions(records: Records, session: dict[str, Any]) -> list[str]:
 
 
 def _compute(
-    task: Task, folder: StudyFolder, plan: _Plan, rank: int, counter: Counter, stop: Stop
+    task: Task,
+    folder: StudyFolder,
+    plan: _Plan,
+    costs: np.ndarray,
+    rank: int,
+    counter: Counter,
+    stop: Stop,
 ) -> str | None:
     """Do and record the runs that this rank claims; return why it could not go on, if so."""
     layout = RecordFormat(task.study.fingerprint, task.study.record_dtype)
-    model = CostModel(task.simulator.run_costs(task.job), plan.fit)
+    model = CostModel(costs, plan.fit)
     try:
         with RecordLog(folder.records, layout, plan.session, rank, plan.attempts) as log:
             for runs, alone in claimed_batches(
