@@ -116,7 +116,7 @@ def read_machine_factor(out: Path, job: Job) -> tuple[float, int]:
 
 
 def _latest_session(records: Records, running: bool) -> tuple[np.ndarray, float]:
-    """Return which runs the latest start has recorded, and in what time [s]: until now, or the last record."""
+    """Return which runs the latest start has recorded, and in what time [s]: until now or its last."""
     if not records.sessions:
         return np.zeros(len(records.rows), bool), 0.0
     started = records.sessions[-1]["started"]
