@@ -6,12 +6,13 @@ import argparse
 import logging
 import os
 import sys
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
 from cvt_hpc import __version__
-from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.errors import CRASHED, InputError, mismatch
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 RETRIED = ("timed_out", "failed_error", "failed_numerics")
@@ -33,7 +34,8 @@ def main(arguments: list[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit status: 0 done, 1 some runs failed, 2 bad input, 99 stopped early and to be gone on with.
+        Exit status: 0 done, 1 some runs failed, 2 bad input, 70 a defect of this program, 99 stopped early
+        and to be gone on with.
     """
     logging.basicConfig(format="cvt-hpc: %(message)s")
     try:
@@ -50,6 +52,9 @@ def main(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
+    except Exception:  # Python's own status for a defect, 1, means here that some runs failed
+        traceback.print_exc()
+        return CRASHED
 
 
 class _Parser(argparse.ArgumentParser):

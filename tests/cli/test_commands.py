@@ -316,6 +316,13 @@ def test_other_ranks_are_silent(write_job, call, monkeypatch, variable):
     assert call("run", "x.toml", "--dry-run") == (0, [], [])
 
 
+def test_a_defect_is_no_failed_run(call, monkeypatch):
+    monkeypatch.setattr("cvt_hpc.study.read_status", lambda path: 1 / 0)
+    status, out, err = call("status", "out/x")
+    assert (status, out) == (70, [])
+    assert err[-1] == "ZeroDivisionError: division by zero"
+
+
 def test_an_interrupt_ends_with_130(write_job, call, monkeypatch):
     def interrupt(path):
         raise KeyboardInterrupt

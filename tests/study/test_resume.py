@@ -66,7 +66,7 @@ def test_kill_9_at_any_moment_and_resume(start, tmp_path, reference, ranks, lane
 def test_a_rank_that_dies_takes_the_sweep_down_and_the_rest_is_done_later(start, tmp_path, reference):
     options = {"out": tmp_path / "out", "runs": RUNS}
     finished = start({**options, "parameters": {"pause": 0.01, "crash_at": 20}}, ranks=2).finish()
-    assert finished.returncode != 0
+    assert finished.returncode not in (0, 1, 2, 99)  # those that say how a sweep ended
     assert 0 < recorded(tmp_path / "out").recorded.sum() < RUNS
 
 
