@@ -91,7 +91,7 @@ def test_a_stopped_sweep_ends_with_99(write_job, call, monkeypatch, tmp_path):
     write_job(GRID)
     failed = (FailedRun(3, {"load": 5.0, "law": "coulomb"}, "failed_error", "ValueError: x"),)
     report = RunReport(tmp_path, tmp_path / "results.nc", 10, 4, failed, 5, "SIGTERM")
-    monkeypatch.setattr("cvt_hpc.study.run", lambda job, out, fresh: report)
+    monkeypatch.setattr("cvt_hpc.study.run", lambda job, out, **options: report)
     status, out, err = call("run", "x.toml")
     assert status == 99
     assert out[0] == "10 runs: 4 done, 1 failed, 5 left"
@@ -314,6 +314,13 @@ def test_other_ranks_are_silent(write_job, call, monkeypatch, variable):
     assert call("run", "y.toml") == (2, [], [])
     assert call("run", "--fast") == (2, [], [])
     assert call("run", "x.toml", "--dry-run") == (0, [], [])
+
+
+def test_a_defect_is_no_failed_run(call, monkeypatch):
+    monkeypatch.setattr("cvt_hpc.study.read_status", lambda path: 1 / 0)
+    status, out, err = call("status", "out/x")
+    assert (status, out) == (70, [])
+    assert err[-1] == "ZeroDivisionError: division by zero"
 
 
 def test_an_interrupt_ends_with_130(write_job, call, monkeypatch):

@@ -8,7 +8,8 @@ from study_double import Axis, Job, Simulator
 
 from cvt_hpc.files import StorageError
 from cvt_hpc.study.description import describe
-from cvt_hpc.study.record import FRAME, MARKER, RecordFormat, RecordLog
+from cvt_hpc.study.frames import HEAD, PLACE, RECORD, RecordFormat
+from cvt_hpc.study.record import RecordLog
 from cvt_hpc.study.recovery import read_records
 from cvt_hpc.variables import Status
 
@@ -49,7 +50,7 @@ def rows(study):
 
 @pytest.fixture
 def frame_size(study):
-    return FRAME.size + study.record_dtype.itemsize
+    return HEAD.size + PLACE.size + study.record_dtype.itemsize
 
 
 def assert_recorded(records, rows, indices):
@@ -89,7 +90,7 @@ def test_a_torn_tail_costs_one_record(tmp_path, study, rows, frame_size, cut):
     assert f"last {frame_size - lost} bytes are an unfinished record" in records.warnings[0]
 
 
-@pytest.mark.parametrize("place", range(FRAME.size + 30))
+@pytest.mark.parametrize("place", range(HEAD.size + PLACE.size + 30))
 def test_a_flipped_bit_costs_one_record(tmp_path, study, rows, frame_size, place):
     path = write_log(tmp_path / "r", study, rows, [4, 5, 6])
     flip(path, path.stat().st_size - 2 * frame_size + place)
@@ -100,7 +101,7 @@ def test_a_flipped_bit_costs_one_record(tmp_path, study, rows, frame_size, place
 
 
 def test_a_marker_among_the_numbers_misleads_nobody(tmp_path, study, rows, frame_size):
-    rows["spectrum"].reshape(RUNS, -1)[5].view(np.uint8)[16:20] = np.frombuffer(MARKER, np.uint8)
+    rows["spectrum"].reshape(RUNS, -1)[5].view(np.uint8)[16:20] = np.frombuffer(RECORD, np.uint8)
     path = write_log(tmp_path / "r", study, rows, [4, 5, 6])
     flip(path, path.stat().st_size - 2 * frame_size)
     records = read_records(tmp_path / "r", study)
@@ -122,7 +123,7 @@ def test_records_outlive_their_header(tmp_path, study, rows, place):
     [
         (b"\x00\x01" * 5000, "not a record log"),
         (b"my notes", "not a record log"),
-        (MARKER * 9, "no record of this"),
+        (RECORD * 9, "no record of this"),
     ],
 )
 def test_a_foreign_file_is_named_and_left(tmp_path, study, rows, content, complaint):
@@ -191,7 +192,7 @@ def test_a_refused_write_leaves_whole_records(tmp_path, study, rows, monkeypatch
     system_write = os.write
 
     def short_then_full(descriptor, data):
-        if len(data) < layout.frame_size:
+        if len(data) < layout.record_size:
             raise OSError(28, "No space left on device")
         return system_write(descriptor, data[:50])
 
