@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.lock import is_locked
 from cvt_hpc.study.recovery import Records, read_records
 from cvt_hpc.variables import Status
 
@@ -60,7 +59,7 @@ def read_status(out: str | Path) -> StudyStatus:
     """
     folder = StudyFolder(out)
     study = folder.load()
-    running = is_locked(folder.lock_file)
+    running = folder.is_in_use()
     records = read_records(folder.records, study)
     recorded = int(records.recorded.sum())
     done = int((records.rows["status"] == Status.DONE).sum())

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.files import StorageError, discard
+from cvt_hpc.errors import mismatch
+from cvt_hpc.files import StorageError
 from cvt_hpc.study.batches import Batch
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.gather import write_results
+from cvt_hpc.study.gather import gather_records
 from cvt_hpc.study.launch import Team, assembled_team
-from cvt_hpc.study.lock import locked
+from cvt_hpc.study.part import Part, read_part
 from cvt_hpc.study.progress import Progress
 from cvt_hpc.study.provenance import new_session
 from cvt_hpc.study.record import RecordFormat, RecordLog
@@ -38,6 +39,8 @@ class _Plan(NamedTuple):
     """What rank 0 finds out and all ranks need."""
 
     batches: list[Batch]
+    asked: np.ndarray  # whether a run is one of this start, shape (runs,)
+    total: int
     recorded: int
     failed: int
     session: dict[str, Any]
@@ -47,6 +50,7 @@ def run(
     job: Job,
     out: str | Path | None = None,
     *,
+    part: str | None = None,
     fresh: bool = False,
     simulator: Simulator | None = None,
     progress: bool = True,
@@ -64,6 +68,9 @@ def run(
         What to run.
     out : str or Path, optional
         Output folder; "out/<job name>" by default.
+    part : str, optional
+        Only the runs of one part of the study: "3/16" for the third of sixteen. Different parts may be at
+        work in a folder at the same time; the one that ends last gathers the dataset.
     fresh : bool
         Throw away what earlier runs have left in the folder, instead of going on from there.
     simulator : Simulator, optional
@@ -76,39 +83,43 @@ def run(
     Returns
     -------
     RunReport
-        How the sweep ended.
+        How the sweep ended, or its part.
 
     Raises
     ------
     InputError
-        If the folder holds another job, is in use or cannot be written to, or if ranks are not connected.
+        If the folder holds another job, is in use or cannot be written to, if ranks are not connected, or if
+        there is no such part, or it is to start over: the other parts would lose their runs.
     """
+    share = None if part is None else read_part(part)
+    if share is not None and fresh:
+        raise mismatch("fresh", "a run of the whole study", f"part {share}, and the others would lose theirs")
     deadline = float("inf") if time_limit is None else time.monotonic() + time_limit
     simulator = simulator or default_simulator()
     study = describe(job, simulator)
     task = Task(job, study, simulator)
     folder = StudyFolder(out if out is not None else Path("out") / job.name)
     with SignalWatch() as signals, assembled_team(folder.crash_log) as team, ExitStack() as held:
-        plan = team.on_root(lambda: _prepare(folder, task, fresh, team.size, held))
+        plan = team.on_root(lambda: _prepare(folder, task, share, fresh, team.size, held))
         with open_counter(team) as counter:
-            display = Progress(counter, study.size, plan.recorded, plan.failed, progress and team.rank == 0)
+            display = Progress(counter, plan.total, plan.recorded, plan.failed, progress and team.rank == 0)
             stop = Stop(counter, signals, deadline, display.show)
             trouble = _compute(task, folder, plan, team.rank, counter, stop)
             team.wait_for_all(stop.interrupt)
             display.close()
         stopped = _settle(team, trouble, stop.reason)
-        return team.on_root(lambda: _conclude(folder, study, stopped))
+        return team.on_root(lambda: _conclude(folder, study, share, plan, stopped, held))
 
 
-def _prepare(folder: StudyFolder, task: Task, fresh: bool, ranks: int, held: ExitStack) -> _Plan:
+def _prepare(
+    folder: StudyFolder, task: Task, part: Part | None, fresh: bool, ranks: int, held: ExitStack
+) -> _Plan:
     """Take the folder into possession and find what is left to do; on rank 0 alone."""
     study = task.study
     folder.check_free_for(study, fresh)
     folder.create()
-    held.enter_context(locked(folder.lock_file))
+    held.enter_context(folder.occupied(part))
     folder.check_free_for(study, fresh)  # again: another process may have been there before the lock
-    for leftover in folder.leftovers():
-        discard(leftover)
     if fresh:
         folder.clear()
     folder.save(study)
@@ -116,10 +127,12 @@ def _prepare(folder: StudyFolder, task: Task, fresh: bool, ranks: int, held: Exi
     session = new_session(ranks)
     for warning in records.warnings + _other_versions(records, session):
         _logger.warning(warning)
-    recorded = records.recorded
-    done = int((records.rows["status"] == Status.DONE).sum())
-    batches = task.plan(np.flatnonzero(~recorded), ranks)
-    return _Plan(batches, int(recorded.sum()), int(recorded.sum()) - done, session)
+    index = np.arange(study.size)
+    asked = np.ones_like(index, bool) if part is None else part.holds(index)
+    recorded = records.recorded & asked
+    done = int((records.rows["status"][asked] == Status.DONE).sum())
+    batches = task.plan(np.flatnonzero(asked & ~recorded), ranks)
+    return _Plan(batches, asked, int(asked.sum()), int(recorded.sum()), int(recorded.sum()) - done, session)
 
 
 def _other_versions(records: Records, session: dict[str, Any]) -> list[str]:
@@ -166,8 +179,18 @@ def _settle(team: Team, trouble: str | None, reason: str | None) -> str | None:
     return next((why for _, why in ends if why and why != ELSEWHERE), None)
 
 
-def _conclude(folder: StudyFolder, study: Study, stopped: str | None) -> RunReport:
-    """Gather the dataset and report; on rank 0 alone."""
-    records = read_records(folder.records, study)
-    write_results(folder, study, records)
-    return build_report(folder, study, records, stopped)
+def _conclude(
+    folder: StudyFolder,
+    study: Study,
+    part: Part | None,
+    plan: _Plan,
+    stopped: str | None,
+    held: ExitStack,
+) -> RunReport:
+    """Gather the dataset, unless other parts are at work, and report; on rank 0 alone."""
+    if part is not None:
+        held.close()  # before the look around: of parts that end together the last one sees nobody
+    gathers = part is None or not folder.is_in_use()
+    records = gather_records(folder, study) if gathers else read_records(folder.records, study)
+    gained = int(records.recorded[plan.asked].sum()) - plan.recorded
+    return build_report(folder, study, records, plan.asked, gathers, gained, stopped)
