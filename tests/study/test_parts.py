@@ -6,14 +6,13 @@ import signal
 
 import numpy as np
 import pytest
+from recorded import records
 from study_double import Axis, Job, Simulator
 from study_processes import assert_same_numbers, wait_until
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.study import gather, open_results, read_status, run
-from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.part import Part, read_part
-from cvt_hpc.study.recovery import read_records
 
 RUNS = 60
 
@@ -24,13 +23,6 @@ def job(runs=RUNS, **parameters):
 
 def sweep(out, **options):
     return run(job(), out, simulator=Simulator(), progress=False, **options)
-
-
-def recorded(out):
-    folder = StudyFolder(out)
-    if not folder.job_file.exists():
-        return 0
-    return int(read_records(folder.records, folder.load()).recorded.sum())
 
 
 @pytest.mark.parametrize(("size", "parts"), [(1, 1), (12, 5), (90, 16), (7, 9), (1000, 10)])
@@ -97,7 +89,7 @@ def at_work(start, tmp_path):
     """Part 1/2, at work until it is ended, with one run recorded."""
     slow = {"from": 1, "pause": 300.0}
     first = start({"out": tmp_path, "runs": RUNS, "slow": slow, "sweep": {"part": "1/2"}})
-    wait_until(lambda: recorded(tmp_path) == 1, "the first record")
+    wait_until(lambda: records(tmp_path) == 1, "the first record")
     return first
 
 
@@ -108,7 +100,7 @@ def test_a_part_at_work_refuses_its_double_and_the_whole_but_not_another_part(at
     for fresh in (False, True):
         with pytest.raises(InputError, match="expected a folder that no run is at work in, found process"):
             sweep(tmp_path, fresh=fresh)
-    assert recorded(tmp_path) == 1
+    assert records(tmp_path) == 1
     assert read_status(tmp_path).running
     report = sweep(tmp_path, part="2/2")
     assert (report.done, report.remaining, report.exit_status) == (30, 0, 0)
@@ -136,7 +128,7 @@ def test_a_part_that_was_killed_is_gone_on_with(at_work, tmp_path):
 
 def test_a_part_is_refused_while_the_whole_is_at_work(start, tmp_path):
     whole = start({"out": tmp_path, "runs": RUNS, "slow": {"from": 1, "pause": 300.0}})
-    wait_until(lambda: recorded(tmp_path) == 1, "the first record")
+    wait_until(lambda: records(tmp_path) == 1, "the first record")
     with pytest.raises(InputError, match=f"in, found process {whole.process.pid} on"):
         sweep(tmp_path, part="2/2")
 
@@ -145,7 +137,7 @@ def test_a_part_does_not_start_over(tmp_path):
     sweep(tmp_path, part="1/2")
     with pytest.raises(InputError, match="fresh: expected a run of the whole study, found part 2/2"):
         sweep(tmp_path, part="2/2", fresh=True)
-    assert recorded(tmp_path) == 30
+    assert records(tmp_path) == 30
     assert sweep(tmp_path, fresh=True).gained == RUNS
     assert not list(tmp_path.glob(".part-*"))
 
