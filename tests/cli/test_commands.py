@@ -101,6 +101,33 @@ def test_a_stopped_sweep_ends_with_99(write_job, call, monkeypatch, tmp_path):
     ]
 
 
+def test_limits_and_retries_reach_the_sweep(write_job, call, monkeypatch, tmp_path):
+    write_job(GRID)
+    given = {}
+    report = RunReport(tmp_path, tmp_path / "results.nc", 10, 10, (), 0, None)
+    monkeypatch.setattr("cvt_hpc.study.run", lambda job, out, **options: given.update(options) or report)
+    options = (
+        "--time-limit",
+        "2h30m",
+        "--run-limit",
+        "10 min",
+        "--retry",
+        "timed_out",
+        "--retry",
+        "failed_error",
+    )
+    assert call("run", "x.toml", *options)[0] == 0
+    assert given == {
+        "fresh": False,
+        "time_limit": 9000.0,
+        "run_limit": 600.0,
+        "retry": [Status.TIMED_OUT, Status.FAILED_ERROR],
+    }
+    given.clear()
+    call("run", "x.toml")
+    assert given == {"fresh": False, "retry": []}
+
+
 def test_status_of_a_sweep_at_work(call, monkeypatch):
     status = StudyStatus("x", 40, 10, 2, 28, True, 0.01234, 3725.0, ("a.log: damaged",))
     monkeypatch.setattr("cvt_hpc.study.read_status", lambda path: status)
@@ -264,6 +291,10 @@ def test_simulate_of_a_run_that_fails_ends_with_1(write_job, call):
         (["gather", "x.toml"], "x.toml: expected the output folder of a run, found a file"),
         (["map", "out/x"], None),
         (["run"], "the following arguments are required: JOB; see `cvt-hpc run --help`"),
+        (
+            ["run", "x.toml", "--run-limit", "10 N"],
+            '--run-limit: expected a time above 0, such as "2h30m", "90 min" or a bare number in s, found "10 N"',
+        ),
         (["run", "x.toml", "--fast"], "unrecognized arguments: --fast; see `cvt-hpc --help`"),
         (
             ["chart", "x.toml"],

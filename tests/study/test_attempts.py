@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import time
 
 import numpy as np
 import pytest
@@ -161,6 +162,26 @@ def test_a_run_beyond_its_limit_is_timed_out_and_costs_its_batch_nothing(tmp_pat
         assert dataset["status"].values[11] == Status.TIMED_OUT
     # It is on record, and not done again until asked for.
     assert len(sweep(tmp_path).failed) == 1
+
+
+def test_compiling_kernels_is_no_part_of_a_run(tmp_path, monkeypatch):
+    class Compiling(Simulator):
+        """Takes an hour before it asks for the first time, and a second after it."""
+
+        now = 0.0
+
+        def run_point(self, job, point, interrupt):
+            for seconds in (3600.0, 1.0):
+                self.now += seconds
+                if reason := interrupt():
+                    raise self.Interrupted(reason)
+            return super().run_point(job, point, interrupt)
+
+    simulator = Compiling()
+    monkeypatch.setattr(time, "monotonic", lambda: simulator.now)
+    for out, limit, done in (("ample", 2.0, RUNS), ("scarce", 0.5, 0)):
+        report = run(JOB, tmp_path / out, simulator=simulator, progress=False, run_limit=limit)
+        assert (report.done, len(report.failed)) == (done, RUNS - done)
 
 
 def test_a_batch_beyond_the_limit_whose_runs_are_not_is_pointed_out(tmp_path, caplog):

@@ -66,3 +66,18 @@ def test_a_counter_that_miscounts_is_refused(start):
     errors = claim_under_mpi(start, 2, {"task": "miscount"})["errors"]
     assert len(errors) == 2  # on all ranks alike
     assert all("self-test of the shared counter" in error for error in errors)
+
+
+def test_a_batch_that_does_not_fit_is_passed_over():
+    counter = SerialCounter()
+    assert claimed(counter, fits=lambda batch: batch != (5, 2)) == PLAN[1:]
+    assert claimed(counter) == []  # nobody else does it either
+
+
+def test_runs_that_are_to_be_done_alone_come_one_by_one():
+    plan = [Assignment((4, 5, 6), alone=True), Assignment((1, 2))]
+    singles = [Assignment((index,), alone=True) for index in (4, 5, 6)]
+    assert claimed(SerialCounter(), plan=plan) == [*singles, plan[1]]
+    assert claimed(SerialCounter(), fits=lambda batch: batch != (5,), plan=plan) == [*singles[::2], plan[1]]
+    answers = iter([True, True, False])
+    assert claimed(SerialCounter(), lambda: next(answers), plan=plan) == singles[:2]

@@ -14,7 +14,9 @@ from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.frames import RecordFormat
 from cvt_hpc.study.record import RecordLog
 from cvt_hpc.study.recovery import read_records
-from cvt_hpc.study.time_limit import find_time_limit, gathering_margin
+from cvt_hpc.study.schedule import SerialCounter
+from cvt_hpc.study.stopping import SignalWatch, Stop
+from cvt_hpc.study.time_limit import TimeLimit, find_time_limit, gathering_margin
 from cvt_hpc.variables import Status
 
 JOB = Job((Axis("load", tuple(range(12))),))
@@ -102,6 +104,15 @@ def test_a_run_at_work_is_broken_off_when_time_is_up(start, tmp_path):
         assert (facts["done"], facts["remaining"], facts["stopped"]) == (3, 9, "time limit")
     folder = StudyFolder(tmp_path)
     assert read_records(folder.records, folder.load()).died.sum() == 0
+
+
+def test_time_that_runs_out_when_all_is_done_is_no_early_end():
+    stop = Stop(SerialCounter(), SignalWatch(), TimeLimit(-1.0), lambda: None)
+    stop.look()
+    assert stop.reason is None
+    assert not stop.fits(0.0)
+    assert not stop.may_claim()
+    assert stop.reason.startswith("time limit")
 
 
 def test_the_end_of_the_slurm_job_is_a_limit(start, tmp_path):
