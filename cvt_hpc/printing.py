@@ -34,7 +34,7 @@ def report_lines(report: RunReport) -> Iterator[str]:
     if report.unneeded:
         cells = report.total + report.unneeded
         yield f"{report.unneeded} of {cells} cells of the grid not run: their class is inferred"
-    yield f"results: {report.results}"
+    yield f"results: {report.results or 'gathered by the part that ends last'}"
 
 
 def trouble_lines(report: RunReport) -> Iterator[str]:
@@ -44,9 +44,10 @@ def trouble_lines(report: RunReport) -> Iterator[str]:
         yield f"run {run.index}{f' ({place})' if place else ''}: {run.status}: {run.reason}"
     unnamed = len(report.failed) - MOST_FAILURES_NAMED
     if unnamed > 0:
-        yield f"{unnamed} more runs failed; `status` and `reason` in {report.results} tell which"
+        yield f"{unnamed} more runs failed; `status` and `reason` in the results tell which"
     if report.remaining:
-        yield f"stopped early ({report.stopped}); the same command goes on from here"
+        gain = "" if report.gained else ", and no run has ended since the start"
+        yield f"stopped early ({report.stopped}){gain}; the same command goes on from here"
 
 
 def status_lines(status: StudyStatus) -> Iterator[str]:

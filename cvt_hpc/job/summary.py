@@ -12,7 +12,7 @@ from cvt_hpc.job.values import in_words
 _FEW = 8
 
 
-def summarize(job: Job, core_seconds: float) -> str:
+def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
     """Return what a job runs: every parameter with where it is from, the axes, and the cost.
 
     Parameters
@@ -21,6 +21,8 @@ def summarize(job: Job, core_seconds: float) -> str:
         A validated job.
     core_seconds : float
         Estimated cost of one run [s].
+    measured : int
+        Number of recorded runs that the estimate rests on.
 
     Returns
     -------
@@ -37,15 +39,13 @@ def summarize(job: Job, core_seconds: float) -> str:
         axes = [(axis.name, in_short(axis), f"{len(axis.values)} {noun}") for axis in job.axes]
         lines += ["", "[axes]", *_columns(axes)]
     if job.design:
-        lines += [
-            "",
-            "[design]",
-            *_columns([(key, _setting_in_words(value)) for key, value in job.design.items()]),
-        ]
+        design = [(key, _setting_in_words(value)) for key, value in job.design.items()]
+        lines += ["", "[design]", *_columns(design)]
     product = f" = {' x '.join(map(str, job.shape))}" if len(job.shape) > 1 else ""
     at_most = "at most " if "first_spacing" in job.design else ""
-    lines += ["", f"runs: {at_most}{job.size}{product}"]
-    lines += [f"estimated cost: {at_most}{_cost_in_words(core_seconds, job.size)}"]
+    basis = f" (by what {measured} runs on record took)" if measured else ""
+    cost = f"estimated cost: {at_most}{_cost_in_words(core_seconds, job.size)}{basis}"
+    lines += ["", f"runs: {at_most}{job.size}{product}", cost]
     return "\n".join(lines)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 import time
 
+import numpy as np
+
 from cvt_hpc.study.schedule import Counter
 
 _BAR_INTERVAL = 0.5  # [s]
@@ -25,25 +27,30 @@ class Progress:
         Number of runs that earlier sessions have recorded, and of the failed ones among them.
     visible : bool
         Whether anything is shown at all.
-
-    Attributes
-    ----------
-    total : int
-        Number of runs of the study, as far as is known.
+    costs : numpy.ndarray
+        Predicted durations of the runs to be done, in any unit and in the order in which they are started.
     """
 
-    def __init__(self, counter: Counter, total: int, recorded: int, failed: int, visible: bool) -> None:
+    def __init__(
+        self, counter: Counter, total: int, recorded: int, failed: int, visible: bool, costs: np.ndarray
+    ) -> None:
         self._counter = counter
-        self.total = total
+        self._total = total
         self._recorded = recorded
         self._failed = failed
         self._started = self._shown = time.monotonic()
         self._visible = visible
+        self._work = np.cumsum(costs)
         self._bar = None
         if visible and sys.stderr.isatty():
             from tqdm import tqdm
 
             self._bar = tqdm(total=total, initial=recorded, unit="run", dynamic_ncols=True)
+
+    def expect(self, costs: np.ndarray) -> None:
+        """Add runs to those that are to be done, after all of these; `costs` as before."""
+        self._total += costs.size
+        self._work = np.append(self._work, self._work[-1] + np.cumsum(costs))
 
     def show(self) -> None:
         """Show the state of things, if the last time is long enough ago."""
@@ -68,15 +75,18 @@ class Progress:
         tally = self._counter.tally()
         finished, failed = self._recorded + tally.finished, self._failed + tally.failed
         if self._bar is not None:
-            self._bar.total = self.total
+            self._bar.total = self._total
             self._bar.set_postfix_str(f"{failed} failed", refresh=False)
             self._bar.update(finished - self._bar.n)
             self._bar.refresh()
             return
-        line = f"{finished}/{self.total} runs ({finished / self.total:.1%}), {failed} failed"
+        line = f"{finished}/{self._total} runs ({finished / self._total:.1%}), {failed} failed"
         if tally.finished and elapsed > 0:
             rate = tally.finished / elapsed
-            line += f", {rate:.3g} runs/s, {show_duration((self.total - finished) / rate)} to go"
+            # The longest come first: by their number alone, too long a time would be left.
+            done = self._work[tally.finished - 1]
+            to_go = elapsed * (self._work[-1] - done) / done
+            line += f", {rate:.3g} runs/s, {show_duration(to_go)} to go"
         print(line, file=sys.stderr, flush=True)
 
 

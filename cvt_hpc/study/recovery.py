@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.files import naming_refusals
+from cvt_hpc.study.batches import Batch
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.record import FORMAT_VERSION, FRAME, MAGIC, MARKER, PREAMBLE, RecordFormat, header_check
+from cvt_hpc.study.frames import AGAIN, ALONE, RECORD, ForeignLog, Frame, RecordFormat, read_preamble
+
+
+class Timing(NamedTuple):
+    """How long a batch took, from its mark to its records."""
+
+    batch: Batch
+    seconds: float
 
 
 @dataclass
@@ -25,6 +31,13 @@ class Records:
         Records by run index; blank where a run has none.
     written : numpy.ndarray, shape (runs,)
         Time of writing [s] since the epoch; NaN where a run has no record.
+    attempts : numpy.ndarray of int, shape (runs,)
+        The attempt that counts, from 1: how often the run was asked for.
+    died, died_alone : numpy.ndarray of int, shape (runs,)
+        How often, in that attempt, a process was at work at the run when it died: in all, and while it did
+        that run alone because of earlier deaths. Runs that a living process is at count as well.
+    timings : list of Timing
+        Of the batches that were done as a whole, the first of each log excepted: it has loaded kernels.
     sessions : list of dict
         The starts of the sweep that left records, in order of time.
     warnings : list of str
@@ -33,39 +46,41 @@ class Records:
 
     rows: np.ndarray
     written: np.ndarray
+    attempts: np.ndarray
+    died: np.ndarray
+    died_alone: np.ndarray
+    timings: list[Timing] = field(default_factory=list)
     sessions: list[dict[str, Any]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
     @property
     def recorded(self) -> np.ndarray:
-        """Whether a run has a record, shape (runs,): it is never repeated, however it ended."""
+        """Whether a run has a record, shape (runs,): it is not repeated unless asked for."""
         return ~np.isnan(self.written)
 
 
-@dataclass(frozen=True)
-class _Frame:
-    """Where a valid record was found; frames compare in the order in which they count."""
+class _Found(NamedTuple):
+    """A record that was found; of several of one run the least counts."""
 
-    written: float
+    # By content, not by the order in which a folder happens to be listed: the latest attempt counts, and of
+    # it the earliest written record; equal times, as in a copied file, are told apart by name and position.
+    order: tuple[int, float, str, int]
     path: Path
-    start: int
+
+
+class _Death(NamedTuple):
+    """A mark without records after it; equal ones, as in a copied file, are one."""
+
     index: int
-
-    @property
-    def order(self) -> tuple[float, str, int]:
-        # By content, not by the order in which a folder happens to be listed: the earliest written record of
-        # a run counts; equal times, as in a copied file, are told apart by file name and position.
-        return (self.written, self.path.name, self.start)
-
-
-class _Foreign(Exception):
-    """A file that does not hold records of the study."""
+    attempt: int
+    alone: bool
+    begun: float
 
 
 def read_records(folder: Path, study: Study) -> Records:
     """Return the records that all logs of a folder hold.
 
-    Of several records of one run the earliest written counts.
+    Of several records of one run that of the latest attempt counts, and of these the earliest written.
 
     Parameters
     ----------
@@ -74,24 +89,14 @@ def read_records(folder: Path, study: Study) -> Records:
     study : Study
         The study that the records have to belong to.
     """
-    layout = RecordFormat(study.fingerprint, study.record_dtype)
-    records = Records(study.blank_rows(study.size), np.full(study.size, np.nan))
-    chosen: dict[int, _Frame] = {}
-    sessions: dict[str, dict[str, Any]] = {}
+    reader = _Reader(study)
     for path in _files(folder):
         try:
-            data = path.read_bytes()
-            session, frames = _read_log(path, data, layout, study.size, records.warnings)
-        except (OSError, _Foreign) as error:
+            reader.read(path, path.read_bytes())
+        except (OSError, ForeignLog) as error:
             text = error.strerror if isinstance(error, OSError) else error
-            records.warnings.append(f"{path}: left out: {text}")
-            continue
-        if session is not None and frames:
-            sessions[session["id"]] = session
-        for frame in frames:
-            _choose(frame, data, chosen, records, study)
-    records.sessions = sorted(sessions.values(), key=lambda session: (session["started"], session["id"]))
-    return records
+            reader.records.warnings.append(f"{path}: left out: {text}")
+    return reader.result()
 
 
 def _files(folder: Path) -> list[Path]:
@@ -101,99 +106,107 @@ def _files(folder: Path) -> list[Path]:
     return [path for path in entries if not path.name.startswith(".")]
 
 
-def _choose(frame: _Frame, data: bytes, chosen: dict[int, _Frame], records: Records, study: Study) -> None:
-    """Enter a record, unless an earlier one of the same run is there."""
-    row = np.frombuffer(data, study.record_dtype, 1, frame.start + FRAME.size)[0]
-    rival = chosen.get(frame.index)
-    if rival is not None:
-        if not _same_numbers(row, records.rows[frame.index], study):
-            first, second = sorted((rival, frame), key=lambda f: f.order)
-            records.warnings.append(
-                f"{second.path}: run {frame.index} has other numbers than in {first.path.name}, which counts"
-            )
-        if rival.order < frame.order:
+class _Reader:
+    """Takes in one log after another."""
+
+    def __init__(self, study: Study) -> None:
+        zeros = np.zeros(study.size, np.int64)
+        blank = study.blank_rows(study.size)
+        self.records = Records(blank, np.full(study.size, np.nan), zeros + 1, zeros.copy(), zeros.copy())
+        self._study = study
+        self._layout = RecordFormat(study.fingerprint, study.record_dtype)
+        self._chosen: dict[int, _Found] = {}
+        self._deaths: set[_Death] = set()
+        self._sessions: dict[str, dict[str, Any]] = {}
+
+    def read(self, path: Path, data: bytes) -> None:
+        """Take in a log; what is damaged goes to the warnings.
+
+        Raises
+        ------
+        ForeignLog
+            If the file is no log, or a log of another job.
+        """
+        if not data:  # a process that died before its first record
             return
-    chosen[frame.index] = frame
-    records.rows[frame.index] = row
-    records.written[frame.index] = frame.written
+        session, start = read_preamble(data, self._layout)
+        frames, flaws = self._sound_frames(path, data, start)
+        if session is None and not frames:
+            raise ForeignLog("no record of this study in it")
+        if session is None:
+            self.records.warnings.append(f"{path}: the header is damaged; the records found in it count")
+        self.records.warnings.extend(flaws)
+        if session is not None and any(frame.kind == RECORD for frame in frames):
+            self._sessions[session["id"]] = session
+        self._take_in(path, data, frames)
+
+    def result(self) -> Records:
+        """Return what all logs hold."""
+        records = self.records
+        for index, found in self._chosen.items():
+            if -found.order[0] < records.attempts[index]:  # it is to be done again, and has not been yet
+                records.rows[index] = self._study.blank_rows()
+                records.written[index] = np.nan
+        for death in self._deaths:
+            if death.attempt == records.attempts[death.index] and np.isnan(records.written[death.index]):
+                records.died[death.index] += 1
+                records.died_alone[death.index] += death.alone
+        records.sessions = sorted(self._sessions.values(), key=lambda s: (s["started"], s["id"]))
+        return records
+
+    def _sound_frames(self, path: Path, data: bytes, start: int) -> tuple[list[Frame], list[str]]:
+        frames, flaws = [], []
+        for begin, end, frame in self._layout.frames(data, start):
+            if frame is not None and all(0 <= index < self._study.size for index, _ in frame.places):
+                frames.append(frame)
+            elif end == len(data) and end - begin < self._layout.record_size:
+                flaws.append(f"{path}: the last {end - begin} bytes are an unfinished record; left out")
+            else:
+                flaws.append(f"{path}: bytes {begin} to {end} are damaged; left out")
+        return frames, flaws
+
+    def _take_in(self, path: Path, data: bytes, frames: list[Frame]) -> None:
+        """Enter the records of a log, and follow from mark to mark what its process was at."""
+        mark: Frame | None = None
+        at_work: dict[int, int] = {}
+        batches = 0
+        for frame in frames:
+            for index, attempt in frame.places:
+                self.records.attempts[index] = max(self.records.attempts[index], attempt)
+            if frame.kind == RECORD:
+                ((index, _),) = frame.places
+                self._choose(frame, path, data)
+                if at_work.pop(index, None) is not None and not at_work:
+                    batches += 1
+                    if batches > 1:
+                        seconds = frame.written - mark.written
+                        self.records.timings.append(Timing(tuple(i for i, _ in mark.places), seconds))
+            elif frame.kind != AGAIN:
+                mark, at_work = frame, dict(frame.places)
+        for index, attempt in at_work.items():
+            self._deaths.add(_Death(index, attempt, mark.kind == ALONE, mark.written))
+
+    def _choose(self, frame: Frame, path: Path, data: bytes) -> None:
+        """Enter a record, unless one that counts before it is there."""
+        ((index, attempt),) = frame.places
+        row, records = self._layout.row(data, frame), self.records
+        found = _Found((-attempt, frame.written, path.name, frame.start), path)
+        rival = self._chosen.get(index)
+        if rival is not None:
+            same_attempt = rival.order[0] == found.order[0]
+            if same_attempt and not _same_numbers(row, records.rows[index], self._study):
+                first, second = sorted((rival, found), key=lambda f: f.order)
+                records.warnings.append(
+                    f"{second.path}: run {index} has other numbers than in {first.path.name}, which counts"
+                )
+            if rival.order < found.order:
+                return
+        self._chosen[index] = found
+        records.rows[index] = row
+        records.written[index] = frame.written
 
 
 def _same_numbers(one: np.void, other: np.void, study: Study) -> bool:
     """Return whether two records agree bitwise, timings and the like excepted."""
     names = [variable.name for variable in study.variables if not variable.volatile]
     return all(one[name].tobytes() == other[name].tobytes() for name in names)
-
-
-def _read_log(
-    path: Path, data: bytes, layout: RecordFormat, size: int, warnings: list[str]
-) -> tuple[dict[str, Any] | None, list[_Frame]]:
-    """Return the session of a log and its valid frames; what is damaged goes to `warnings`.
-
-    Raises
-    ------
-    _Foreign
-        If the file is no log, or a log of another job.
-    """
-    if not data:  # a process that died before its first record
-        return None, []
-    session, start = _read_preamble(data, layout)
-    frames, flaws = [], []
-    for begin, end, found in _frames(data, start, layout):
-        if found is not None and 0 <= found[0] < size:
-            frames.append(_Frame(found[1], path, begin, found[0]))
-        elif end == len(data) and end - begin < layout.frame_size:
-            flaws.append(f"{path}: the last {end - begin} bytes are an unfinished record; left out")
-        else:
-            flaws.append(f"{path}: bytes {begin} to {end} are damaged; left out")
-    if session is None and not frames:
-        raise _Foreign("no record of this study in it")
-    if session is None:
-        warnings.append(f"{path}: the header is damaged; the records found in it count")
-    warnings.extend(flaws)
-    return session, frames
-
-
-def _read_preamble(data: bytes, layout: RecordFormat) -> tuple[dict[str, Any] | None, int]:
-    """Return a log's session, None if its header is damaged, and where its frames begin.
-
-    Raises
-    ------
-    _Foreign
-        If a sound header says that the file is not of this study, or nothing in it looks like a log.
-    """
-    if not data.startswith(MAGIC):
-        if MARKER not in data:
-            raise _Foreign("not a record log")
-        return None, 0
-    if len(data) < PREAMBLE.size:
-        return None, len(data)
-    _, version, length, check = PREAMBLE.unpack_from(data)
-    text = data[PREAMBLE.size : PREAMBLE.size + length]
-    if check != header_check(version, text):
-        return None, len(MAGIC)
-    if version != FORMAT_VERSION:
-        raise _Foreign(f"expected format {FORMAT_VERSION} of the record log, found {version}")
-    header = json.loads(text)
-    if header["fingerprint"] != layout.fingerprint:
-        raise _Foreign(f"a record log of another job (fingerprint {header['fingerprint'][:12]})")
-    if header["dtype"] != layout.descr:
-        raise _Foreign("a record log of this job with other recorded quantities")
-    return header["session"], PREAMBLE.size + length
-
-
-def _frames(
-    data: bytes, start: int, layout: RecordFormat
-) -> Iterator[tuple[int, int, tuple[int, float] | None]]:
-    """Yield begin, end and (index, time of writing) of each frame; None for a stretch that is not valid."""
-    while start < len(data):
-        found = layout.unframe(data, start)
-        if found is not None:
-            yield start, start + layout.frame_size, found
-            start += layout.frame_size
-            continue
-        begin = start
-        while start >= 0 and layout.unframe(data, start) is None:
-            start = data.find(MARKER, start + 1)
-        if start < 0:
-            start = len(data)
-        yield begin, start, None

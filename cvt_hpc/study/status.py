@@ -5,14 +5,21 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cvt_hpc.errors import InputError
+from cvt_hpc.job import build_job
+from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.lock import is_locked
 from cvt_hpc.study.recovery import Records, read_records
+from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.tracing import needed_runs
 from cvt_hpc.variables import Status
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
 
 
 @dataclass(frozen=True)
@@ -31,7 +38,8 @@ class StudyStatus:
     rate : float or None
         Runs recorded per second [1/s] in the latest session; None before its first record.
     time_to_go : float or None
-        Time [s] that the runs left take at this rate; None where there is no rate.
+        Time [s] that the runs left take at the pace of that session, by their predicted costs; None before
+        its first record.
     warnings : tuple of str
         One line for each record file that is not sound.
     unneeded : int
@@ -65,32 +73,69 @@ def read_status(out: str | Path) -> StudyStatus:
     """
     folder = StudyFolder(out)
     study = folder.load()
-    running = is_locked(folder.lock_file)
+    running = folder.is_in_use()
     records = read_records(folder.records, study)
     recorded = int(records.recorded.sum())
     done = int((records.rows["status"] == Status.DONE).sum())
     needed = needed_runs(study, records)
-    left = int((needed & ~records.recorded).sum())
-    rate = _session_rate(records, running)
+    left = needed & ~records.recorded
+    latest, elapsed = _latest_session(records, running)
+    costs = _predicted_costs(study, folder)
+    spent = costs[latest].sum()
     return StudyStatus(
         name=study.name,
         total=int(needed.sum()),
         done=done,
         failed=recorded - done,
-        left=left,
+        left=int(left.sum()),
         running=running,
-        rate=rate,
-        time_to_go=left / rate if rate else None,
+        rate=latest.sum() / elapsed if elapsed else None,
+        time_to_go=float(costs[left].sum() * elapsed / spent) if elapsed else None,
         warnings=tuple(records.warnings),
         unneeded=int((~needed).sum()),
     )
 
 
-def _session_rate(records: Records, running: bool) -> float | None:
-    """Return the runs per second [1/s] since the latest start, until now or until the last record."""
+def read_machine_factor(out: Path, job: Job) -> tuple[float, int]:
+    """Return processor time over predicted cost of the recorded runs of a job, and their number.
+
+    Parameters
+    ----------
+    out : Path
+        The output folder; without records of this job in it the factor is 1, by 0 runs.
+    job : Job
+        A validated job.
+    """
+    folder = StudyFolder(out)
+    try:
+        study = folder.load()
+    except InputError:
+        return 1.0, 0
+    if study.fingerprint != job.fingerprint() or "core_seconds" not in study.record_dtype.names:
+        return 1.0, 0
+    rows = read_records(folder.records, study).rows
+    done = rows["status"] == Status.DONE
+    if not done.any():
+        return 1.0, 0
+    predicted = default_simulator().run_costs(job)[done].sum()
+    return float(rows["core_seconds"][done].sum() / predicted), int(done.sum())
+
+
+def _latest_session(records: Records, running: bool) -> tuple[np.ndarray, float]:
+    """Return which runs the latest start has recorded, and in what time [s]: until now or its last."""
     if not records.sessions:
-        return None
+        return np.zeros(len(records.rows), bool), 0.0
     started = records.sessions[-1]["started"]
-    count = int(np.sum(records.written >= started))  # NaN, of a run without a record, is not
-    elapsed = (time.time() if running else np.nanmax(records.written)) - started
-    return count / elapsed if count and elapsed > 0 else None
+    chosen = records.written >= started  # NaN, of a run without a record, is not
+    if not chosen.any():
+        return chosen, 0.0
+    return chosen, max((time.time() if running else np.nanmax(records.written)) - started, 0.0)
+
+
+def _predicted_costs(study: Study, folder: StudyFolder) -> np.ndarray:
+    """Return the predicted duration of each run, in some unit; all alike where there is no such model."""
+    try:
+        job = build_job(study.job, str(folder.job_file))
+        return default_simulator().run_costs(job)
+    except InputError:
+        return np.ones(study.size)

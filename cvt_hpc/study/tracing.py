@@ -34,14 +34,14 @@ Box = tuple[Interval, ...]
 
 
 def needed_runs(study: Study, records: Records) -> NDArray[np.bool_]:
-    """Return which runs a study needs by what is known so far, shape (runs,): of a grid or of samples all.
+    """Return which runs a study needs by what is on record, shape (runs,): of a grid or of samples all.
 
     Parameters
     ----------
     study : Study
         With its design.
     records : Records
-        The runs recorded so far. Those that are needed are among the runs needed later on.
+        What is on record; these runs count as needed. Those needed now are among those needed later on.
     """
     if not study.is_traced:
         return np.ones(study.size, bool)
@@ -49,12 +49,7 @@ def needed_runs(study: Study, records: Records) -> NDArray[np.bool_]:
     needed = np.zeros(study.shape, bool)
     for box in leaf_boxes(classes, first_intervals(study)):
         needed[np.ix_(*box)] = True
-    return needed.ravel()
-
-
-def pending_runs(study: Study, records: Records) -> NDArray[np.intp]:
-    """Return the indices of the runs that are needed by what is known so far, and have no record."""
-    return np.flatnonzero(needed_runs(study, records) & ~records.recorded)
+    return needed.ravel() | records.recorded
 
 
 def inferred_classes(study: Study, records: Records) -> NDArray[np.int8]:

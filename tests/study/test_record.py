@@ -7,8 +7,10 @@ import pytest
 from study_double import Axis, Job, Simulator
 
 from cvt_hpc.files import StorageError
+from cvt_hpc.study import frames
 from cvt_hpc.study.description import describe
-from cvt_hpc.study.record import FRAME, MARKER, RecordFormat, RecordLog
+from cvt_hpc.study.frames import BEGUN, HEAD, PLACE, RECORD, RecordFormat
+from cvt_hpc.study.record import RecordLog
 from cvt_hpc.study.recovery import read_records
 from cvt_hpc.variables import Status
 
@@ -49,7 +51,7 @@ def rows(study):
 
 @pytest.fixture
 def frame_size(study):
-    return FRAME.size + study.record_dtype.itemsize
+    return HEAD.size + PLACE.size + study.record_dtype.itemsize
 
 
 def assert_recorded(records, rows, indices):
@@ -89,7 +91,7 @@ def test_a_torn_tail_costs_one_record(tmp_path, study, rows, frame_size, cut):
     assert f"last {frame_size - lost} bytes are an unfinished record" in records.warnings[0]
 
 
-@pytest.mark.parametrize("place", range(FRAME.size + 30))
+@pytest.mark.parametrize("place", range(HEAD.size + PLACE.size + 30))
 def test_a_flipped_bit_costs_one_record(tmp_path, study, rows, frame_size, place):
     path = write_log(tmp_path / "r", study, rows, [4, 5, 6])
     flip(path, path.stat().st_size - 2 * frame_size + place)
@@ -100,7 +102,7 @@ def test_a_flipped_bit_costs_one_record(tmp_path, study, rows, frame_size, place
 
 
 def test_a_marker_among_the_numbers_misleads_nobody(tmp_path, study, rows, frame_size):
-    rows["spectrum"].reshape(RUNS, -1)[5].view(np.uint8)[16:20] = np.frombuffer(MARKER, np.uint8)
+    rows["spectrum"].reshape(RUNS, -1)[5].view(np.uint8)[16:20] = np.frombuffer(RECORD, np.uint8)
     path = write_log(tmp_path / "r", study, rows, [4, 5, 6])
     flip(path, path.stat().st_size - 2 * frame_size)
     records = read_records(tmp_path / "r", study)
@@ -122,7 +124,7 @@ def test_records_outlive_their_header(tmp_path, study, rows, place):
     [
         (b"\x00\x01" * 5000, "not a record log"),
         (b"my notes", "not a record log"),
-        (MARKER * 9, "no record of this"),
+        (RECORD * 9, "no record of this"),
     ],
 )
 def test_a_foreign_file_is_named_and_left(tmp_path, study, rows, content, complaint):
@@ -143,6 +145,46 @@ def test_a_folder_among_the_logs_is_named(tmp_path, study, rows):
     records = read_records(tmp_path / "r", study)
     assert_recorded(records, rows, [2])
     assert "sub: left out: Is a directory" in records.warnings[0]
+
+
+def test_a_log_of_another_version_is_named(tmp_path, study, rows, monkeypatch):
+    monkeypatch.setattr(frames, "FORMAT_VERSION", 1)
+    path = write_log(tmp_path / "r", study, rows, [2])
+    monkeypatch.undo()
+    records = read_records(tmp_path / "r", study)
+    assert_recorded(records, rows, [])
+    assert records.warnings == [f"{path}: left out: expected format 2 of the record log, found 1"]
+
+
+def test_marks_are_no_records_and_damage_to_them_costs_no_record(tmp_path, study, rows):
+    layout = RecordFormat(study.fingerprint, study.record_dtype)
+    with RecordLog(tmp_path, layout, SESSION, rank=0, attempts={5: 3}) as log:
+        for index in (4, 5):
+            log.begin([index])
+            log.append([(index, rows[index])])
+    records = read_records(tmp_path, study)
+    assert_recorded(records, rows, [4, 5])
+    assert records.attempts.tolist() == [1] * 5 + [3] + [1] * 2
+    mark = log.path.read_bytes().rindex(BEGUN)
+    for place in range(HEAD.size + PLACE.size):
+        flip(log.path, mark + place)
+        records = read_records(tmp_path, study)
+        assert_recorded(records, rows, [4, 5])
+        assert records.warnings == [
+            f"{log.path}: bytes {mark} to {mark + HEAD.size + PLACE.size} are damaged; left out"
+        ]
+        flip(log.path, mark + place)
+
+
+def test_a_torn_mark_is_no_death(tmp_path, study, rows):
+    path = write_log(tmp_path, study, rows, [4])
+    layout = RecordFormat(study.fingerprint, study.record_dtype)
+    with path.open("ab") as file:
+        file.write(layout.mark(BEGUN, [(5, 1), (6, 1)], 2.0)[:-1])
+    records = read_records(tmp_path, study)
+    assert_recorded(records, rows, [4])
+    assert records.died.sum() == 0
+    assert "unfinished" in records.warnings[0]
 
 
 def test_records_of_another_job_do_not_count(tmp_path, study, rows):
@@ -191,7 +233,7 @@ def test_a_refused_write_leaves_whole_records(tmp_path, study, rows, monkeypatch
     system_write = os.write
 
     def short_then_full(descriptor, data):
-        if len(data) < layout.frame_size:
+        if len(data) < layout.record_size:
             raise OSError(28, "No space left on device")
         return system_write(descriptor, data[:50])
 

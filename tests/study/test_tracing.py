@@ -10,10 +10,11 @@ from scipy import ndimage
 from study_double import Axis, Job, Simulator
 from study_processes import HERE, assert_same_numbers
 
+from cvt_hpc.errors import InputError
 from cvt_hpc.study import open_results, read_status, run
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.recovery import Records
-from cvt_hpc.study.tracing import inferred_classes, pending_runs
+from cvt_hpc.study.tracing import inferred_classes, needed_runs
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.classes import OccurrenceClass
 
@@ -33,13 +34,22 @@ def study_of(shape, spacings):
     return describe(Job(axes, design={"kind": "trace", "first_spacing": traced}), Simulator())
 
 
+def blank_records(study):
+    zeros = np.zeros(study.size, int)
+    return Records(study.blank_rows(study.size), np.full(study.size, np.nan), zeros + 1, zeros, zeros)
+
+
+def pending_runs(study, records):
+    return np.flatnonzero(needed_runs(study, records) & ~records.recorded)
+
+
 def traced(truth, spacings, order=None):
     """Return which cells of a map of classes are run, and the classes that are inferred from these.
 
     With `order` runs are done singly, as it chooses from those that are pending.
     """
     study = study_of(truth.shape, spacings)
-    records = Records(study.blank_rows(study.size), np.full(study.size, np.nan))
+    records = blank_records(study)
     while (pending := pending_runs(study, records)).size:
         for index in pending if order is None else [order.choice(pending)]:
             flags = FLAGS[OccurrenceClass(truth.flat[index])]
@@ -132,7 +142,7 @@ def test_a_window_between_the_first_runs_is_missed():
 
 def test_nothing_is_inferred_before_all_corners_of_a_box_are_run():
     study = study_of((9,), [4])
-    records = Records(study.blank_rows(9), np.full(9, np.nan))
+    records = blank_records(study)
     records.rows["status"][[0, 4]], records.rows["vibrates"][[0, 4]] = FLAGS[VIBRATING]
     records.written[[0, 4]] = 1.0
     assert inferred_classes(study, records).tolist() == [VIBRATING] * 5 + [NOT_RUN] * 4
@@ -256,3 +266,26 @@ def test_failed_runs_of_a_trace_are_reported(tmp_path):
     assert [failed.at for failed in report.failed] == [{"load": 48}]
     cells = results(tmp_path)["inferred_class"].values
     assert np.flatnonzero(cells == FAILED).tolist() == [48]
+
+
+def test_a_run_that_is_done_again_may_change_its_class(tmp_path):
+    class Broken(Simulator):
+        def run_point(self, job, point, interrupt):
+            if point["load"] == 48:
+                raise RuntimeError("out of luck")
+            return super().run_point(job, point, interrupt)
+
+    report = run(JOB, tmp_path, simulator=Broken(), progress=False)
+    assert (len(report.failed), report.total) == (1, 24)  # the failed run is a class: 46, 47, 49, 50 as well
+    simulator = Counting()
+    report = run(JOB, tmp_path, simulator=simulator, progress=False, retry=[Status.FAILED_ERROR])
+    assert simulator.runs == 1
+    assert (report.exit_status, report.done, report.total, report.unneeded) == (0, 24, 24, 36)
+    expected = [VIBRATING if 22 <= load <= 33 else QUIET for load in range(RUNS)]
+    assert results(tmp_path)["inferred_class"].values.tolist() == expected
+
+
+def test_a_trace_is_not_done_in_parts(tmp_path):
+    with pytest.raises(InputError, match="part: expected a whole study, since a trace goes by"):
+        run(JOB, tmp_path / "out", simulator=Simulator(), part="1/2")
+    assert not (tmp_path / "out").exists()

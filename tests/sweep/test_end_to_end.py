@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from PIL import Image
-from sweeps import assert_same_numbers, call, environment, kill, records, start, wait_for_records
+from recorded import assert_same_numbers, frames_written, records
+from sweeps import call, environment, kill, start, wait_for_records
 
 from cvt_hpc import open_results
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, occurrence_classes
-from cvt_hpc.study.record import MARKER
 from cvt_hpc.variables import Status, Vibrates
 
 JOB = """
@@ -104,6 +104,17 @@ def test_the_dataset_of_a_sweep(serial):
     assert json.loads(dataset.attrs["job"])["axes"]["sheave_stiffness"] == [1.0, "inf"]
 
 
+def test_costs_are_estimated_by_what_is_on_record(serial):
+    estimate = {}
+    for name in ("small", "other"):
+        done = call("check", "small.toml", "--set", f"name={name}", cwd=serial.parents[1])
+        estimate[name] = done.stdout.splitlines()[-1]
+    took = load_results(serial)["core_seconds"].values[:, :3].mean()
+    assert estimate["small"].startswith(f"estimated cost: {took:.3g} core-seconds per run")
+    assert estimate["small"].endswith("(by what 6 runs on record took)")
+    assert "record" not in estimate["other"]
+
+
 def test_two_ranks_give_the_same_bits(serial, folder):
     done = call("run", "small.toml", "--out", "two", cwd=folder, ranks=2)
     assert done.returncode == 1, done.stderr
@@ -130,11 +141,6 @@ def test_kill_9_at_any_moment_and_resume(meshes, tmp_path, ranks):
     started = f"python -m cvt_hpc run meshes.toml (on {platform.node()}, {max(ranks, 1)} rank(s))"
     assert load_results(out).attrs["history"].count(started) == 2
     assert frames_written(out) == meshes["status"].size
-
-
-def frames_written(out):
-    """Number of records in all logs, repeated ones counted each time."""
-    return sum(path.read_bytes().count(MARKER) for path in (out / "records").glob("*.log"))
 
 
 def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):

@@ -38,12 +38,12 @@ from cvt_hpc.models.elastic_belt.belt import (
     U,
     W,
 )
-from cvt_hpc.models.elastic_belt.explicit import driven_thrust
 from cvt_hpc.models.elastic_belt.flat import (
     SIZE_OF_POSITION,
     SIZE_OF_SPEED,
     SIZES,
     FlatBelt,
+    driven_thrust,
     flat_belt,
     set_inlets,
 )
