@@ -31,6 +31,11 @@ class StudyFolder:
         self.results = self.path / "results.nc"
         self.lock_file = self.path / "run.lock"
         self.crash_log = self.path / "crash.log"
+        self.histories = self.path / "histories"
+
+    def history(self, index: int) -> Path:
+        """Return the file of the history of run `index`."""
+        return self.histories / f"run-{index:06d}.nc"
 
     def load(self) -> Study:
         """Return the study that the folder holds.
@@ -98,13 +103,15 @@ class StudyFolder:
     def clear(self) -> None:
         """Remove what runs have written: results, records, and last the job.json that vouches for them."""
         logs = self.records.glob("rank-*.log")
+        histories = self.histories.glob("run-*.nc")
         with naming_refusals(self.path, "a folder that results can be removed from"):
-            for path in [self.results, self.crash_log, *self.leftovers(), *logs, self.job_file]:
+            for path in [self.results, self.crash_log, *self.leftovers(), *histories, *logs, self.job_file]:
                 path.unlink(missing_ok=True)
 
     def leftovers(self) -> list[Path]:
         """Return the half-written files of processes that died while they wrote."""
-        return [*self.path.glob(".results.nc.*.part"), *self.path.glob(".job.json.*.part")]
+        patterns = (".results.nc.*.part", ".job.json.*.part", "histories/.run-*.nc.*.part")
+        return [path for pattern in patterns for path in self.path.glob(pattern)]
 
     def _read_job(self) -> Study | None:
         """Return the study of job.json, None if there is no such file."""

@@ -7,6 +7,7 @@ import math
 import time
 from collections.abc import Collection
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,10 +18,11 @@ from cvt_hpc.files import StorageError, discard
 from cvt_hpc.study.attempts import enter_attempts, later_attempts, plan_runs
 from cvt_hpc.study.batches import Assignment
 from cvt_hpc.study.cost_model import CostModel, Fit, fit_recorded
-from cvt_hpc.study.description import Study, describe
+from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.frames import RecordFormat
 from cvt_hpc.study.gather import write_results
+from cvt_hpc.study.histories import keep_histories, missing_histories
 from cvt_hpc.study.launch import Team, assembled_team
 from cvt_hpc.study.lock import locked
 from cvt_hpc.study.progress import Progress
@@ -124,7 +126,7 @@ def run(
             team.wait_for_all(stop.look)
             display.close()
         stopped = _settle(team, trouble, stop.reason)
-        return team.on_root(lambda: _conclude(folder, study, stopped))
+        return team.on_root(lambda: _conclude(folder, task, stopped))
 
 
 def _prepare(
@@ -146,6 +148,7 @@ def _prepare(
     for warning in records.warnings + _other_versions(records, session):
         _logger.warning(warning)
     records = enter_attempts(folder, study, records, retry, session)
+    records.written[missing_histories(task.job, folder, records)] = np.nan  # done again; the record stays
     done = records.rows["status"] == Status.DONE
     recorded = int(records.recorded.sum())
     return _Plan(
@@ -188,6 +191,7 @@ def _compute(
                 plan.assignments, counter, stop.may_claim, lambda batch: stop.fits(model.upper(batch))
             ):
                 for result in task.do(runs, stop.interrupt, partial(log.begin, alone=alone)):
+                    keep_histories(folder, result.histories)
                     log.append(result.records)
                     counter.report(len(result.records), result.failed)
                     if result.failed < len(result.records):  # those that all failed ended before their time
@@ -213,8 +217,10 @@ def _settle(team: Team, trouble: str | None, reason: str | None) -> str | None:
     return next((why for _, why in ends if why and why != ELSEWHERE), None)
 
 
-def _conclude(folder: StudyFolder, study: Study, stopped: str | None) -> RunReport:
+def _conclude(folder: StudyFolder, task: Task, stopped: str | None) -> RunReport:
     """Gather the dataset and report; on rank 0 alone."""
-    records = read_records(folder.records, study)
-    write_results(folder, study, records)
-    return build_report(folder, study, records, stopped)
+    records = read_records(folder.records, task.study)
+    write_results(folder, task.study, records)
+    report = build_report(folder, task.study, records, stopped)
+    missing = missing_histories(task.job, folder, records)
+    return replace(report, remaining=report.remaining + len(missing))
