@@ -35,7 +35,7 @@ def main(arguments: list[str] | None = None) -> int:
     -------
     int
         Exit status: 0 done, 1 some runs failed, 2 bad input, 70 a defect of this program, 99 stopped early
-        and to be gone on with.
+        and to be gone on with, 98 the same without any gain.
     """
     logging.basicConfig(format="cvt-hpc: %(message)s")
     try:
@@ -68,12 +68,18 @@ def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="cvt-hpc",
         description="Vibration-occurrence maps of metal pushbelt CVTs.",
-        epilog="Exit status: 0 done, 1 some runs failed, 2 bad input, 99 stopped early (run again to go on).",
+        epilog="Exit status: 0 done, 1 some runs failed, 2 bad input, 99 stopped early (run again to go on), "
+        "98 stopped before any run had ended.",
     )
     parser.add_argument("--version", action="version", version=f"cvt_hpc {__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     run = _add(commands, "run", _run, "do all runs of a job, or those that an earlier start has left", "JOB")
     run.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: out/<job name>)")
+    run.add_argument(
+        "--part",
+        metavar="K/N",
+        help="only the K-th of N parts of the runs; parts may be at work in one folder at the same time",
+    )
     run.add_argument("--dry-run", action="store_true", help="as `cvt-hpc check`; runs nothing")
     run.add_argument("--fresh", action="store_true", help="throw earlier results of the folder away")
     limit = (
@@ -141,7 +147,7 @@ def _run(arguments: argparse.Namespace) -> int:
     }
     retry = [Status[name.upper()] for name in arguments.retry]
     job = load_job(arguments.path, arguments.set)
-    report = run(job, arguments.out, fresh=arguments.fresh, retry=retry, **limits)
+    report = run(job, arguments.out, part=arguments.part, fresh=arguments.fresh, retry=retry, **limits)
     _complain(*trouble_lines(report))
     if _speaks():
         print(*report_lines(report), sep="\n")

@@ -30,8 +30,10 @@ DEATHS = 3  # at a run, until it is done alone
 DEATHS_ALONE = 2  # while it was done alone, until it is given up
 
 
-def plan_runs(job: Job, simulator: Simulator, records: Records, ranks: int) -> list[Assignment]:
-    """Return all runs without a record, as assignments in the order in which to start them.
+def plan_runs(
+    job: Job, simulator: Simulator, records: Records, asked: np.ndarray, ranks: int
+) -> list[Assignment]:
+    """Return the runs to be done, as assignments in the order in which to start them.
 
     Parameters
     ----------
@@ -41,18 +43,21 @@ def plan_runs(job: Job, simulator: Simulator, records: Records, ranks: int) -> l
         What does the runs.
     records : Records
         What is on record; no run in it is to be given up.
+    asked : numpy.ndarray of bool, shape (runs,)
+        Which runs are to be on record in the end.
     ranks : int
         Number of processes that compute.
     """
     costs = simulator.run_costs(job)
-    suspect = records.died >= DEATHS
+    pending = asked & ~records.recorded
+    suspect = pending & (records.died >= DEATHS)
     groups = []
     for struck in (False, True):
-        chosen = ~records.recorded & ~suspect & ((records.died > 0) == struck)
+        chosen = pending & ~suspect & ((records.died > 0) == struck)
         groups += simulator.lane_groups(job, np.flatnonzero(chosen).tolist())
     batches = share_out(groups, costs, ranks)
     batches.sort(key=lambda batch: bool(records.died[batch[0]]))
-    suspects = sorted(np.flatnonzero(~records.recorded & suspect).tolist(), key=lambda i: (-costs[i], i))
+    suspects = sorted(np.flatnonzero(suspect).tolist(), key=lambda i: (-costs[i], i))
     lethal = tuple(index for index in suspects if records.died_alone[index])
     return [
         *(Assignment(batch) for batch in batches),
@@ -61,9 +66,9 @@ def plan_runs(job: Job, simulator: Simulator, records: Records, ranks: int) -> l
     ]
 
 
-def given_up(records: Records) -> dict[int, str]:
-    """Return the runs that are not to be tried again, with the reason."""
-    lost = np.flatnonzero(~records.recorded & (records.died_alone >= DEATHS_ALONE))
+def given_up(records: Records, asked: np.ndarray) -> dict[int, str]:
+    """Return the runs, of those that `asked` marks, that are not to be tried again, with the reason."""
+    lost = np.flatnonzero(asked & ~records.recorded & (records.died_alone >= DEATHS_ALONE))
     return {
         int(index): f"its process died {records.died[index]} times, the last "
         f"{records.died_alone[index]} while it did this run alone"
@@ -71,7 +76,7 @@ def given_up(records: Records) -> dict[int, str]:
     }
 
 
-def runs_to_repeat(records: Records, statuses: Collection[Status]) -> np.ndarray:
+def runs_to_repeat(records: Records, asked: np.ndarray, statuses: Collection[Status]) -> np.ndarray:
     """Return the indices of recorded runs that a retry begins again.
 
     None while runs are left of a sweep in which an earlier retry was begun: the same command, given again
@@ -81,20 +86,30 @@ def runs_to_repeat(records: Records, statuses: Collection[Status]) -> np.ndarray
     ----------
     records : Records
         What is on record.
+    asked : numpy.ndarray of bool, shape (runs,)
+        Which runs are in question.
     statuses : collection of Status
         How the runs ended that are to be done again.
     """
-    goes_on = (records.attempts > 1).any() and not records.recorded.all()
+    goes_on = (records.attempts[asked] > 1).any() and not records.recorded[asked].all()
     if goes_on:
         return np.zeros(0, np.int64)
-    return np.flatnonzero(records.recorded & np.isin(records.rows["status"], list(statuses)))
+    return np.flatnonzero(asked & records.recorded & np.isin(records.rows["status"], list(statuses)))
 
 
 def enter_attempts(
-    folder: StudyFolder, study: Study, records: Records, retry: Collection[Status], session: dict[str, Any]
+    folder: StudyFolder,
+    study: Study,
+    records: Records,
+    asked: np.ndarray,
+    retry: Collection[Status],
+    session: dict[str, Any],
 ) -> Records:
-    """Record which runs are given up and which are begun again, and return the records as they are then."""
-    lost, again = given_up(records), runs_to_repeat(records, retry)
+    """Record which runs are given up and which are begun again, and return the records as they are then.
+
+    Only of those that `asked`, shape (runs,), marks: others may be at work just now.
+    """
+    lost, again = given_up(records, asked), runs_to_repeat(records, asked, retry)
     if not lost and not len(again):
         return records
     records.attempts[again] += 1

@@ -13,7 +13,6 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.lock import is_locked
 from cvt_hpc.study.recovery import Records, read_records
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.variables import Status
@@ -69,7 +68,7 @@ def read_status(out: str | Path) -> StudyStatus:
     """
     folder = StudyFolder(out)
     study = folder.load()
-    running = is_locked(folder.lock_file)
+    running = folder.is_in_use()
     records = read_records(folder.records, study)
     recorded = int(records.recorded.sum())
     done = int((records.rows["status"] == Status.DONE).sum())

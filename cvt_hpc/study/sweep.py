@@ -7,13 +7,13 @@ import math
 import time
 from collections.abc import Collection
 from contextlib import ExitStack
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.errors import mismatch
 from cvt_hpc.files import StorageError, discard
 from cvt_hpc.study.attempts import enter_attempts, later_attempts, plan_runs
 from cvt_hpc.study.batches import Assignment
@@ -21,10 +21,10 @@ from cvt_hpc.study.cost_model import CostModel, Fit, fit_recorded
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.frames import RecordFormat
-from cvt_hpc.study.gather import write_results
+from cvt_hpc.study.gather import gather_records
 from cvt_hpc.study.histories import keep_histories, missing_histories
 from cvt_hpc.study.launch import Team, assembled_team
-from cvt_hpc.study.lock import locked
+from cvt_hpc.study.part import Part, read_part
 from cvt_hpc.study.progress import Progress
 from cvt_hpc.study.provenance import new_session
 from cvt_hpc.study.record import RecordLog
@@ -49,6 +49,8 @@ class _Plan(NamedTuple):
     assignments: list[Assignment]
     attempts: dict[int, int]  # of runs that were begun again
     fit: Fit
+    asked: np.ndarray  # whether a run is one of this start, shape (runs,)
+    total: int
     recorded: int
     failed: int
     session: dict[str, Any]
@@ -59,6 +61,7 @@ def run(
     job: Job,
     out: str | Path | None = None,
     *,
+    part: str | None = None,
     fresh: bool = False,
     simulator: Simulator | None = None,
     progress: bool = True,
@@ -78,6 +81,9 @@ def run(
         What to run.
     out : str or Path, optional
         Output folder; "out/<job name>" by default.
+    part : str, optional
+        Only the runs of one part of the study: "3/16" for the third of sixteen. Different parts may be at
+        work in a folder at the same time; the one that ends last gathers the dataset.
     fresh : bool
         Throw away what earlier runs have left in the folder, instead of going on from there.
     simulator : Simulator, optional
@@ -96,20 +102,24 @@ def run(
     Returns
     -------
     RunReport
-        How the sweep ended.
+        How the sweep ended, or its part.
 
     Raises
     ------
     InputError
-        If the folder holds another job, is in use or cannot be written to, or if ranks are not connected.
+        If the folder holds another job, is in use or cannot be written to, if ranks are not connected, or if
+        there is no such part, or it is to start over: the other parts would lose their runs.
     """
     started = time.monotonic()
+    share = None if part is None else read_part(part)
+    if share is not None and fresh:
+        raise mismatch("fresh", "a run of the whole study", f"part {share}, and the others would lose theirs")
     simulator = simulator or default_simulator()
     study = describe(job, simulator)
     task = Task(job, study, simulator, run_limit)
 
     def prepare() -> _Plan:
-        plan = _prepare(folder, task, fresh, retry, team.size, held)
+        plan = _prepare(folder, task, share, fresh, retry, team.size, held)
         asked = None if time_limit is None else time_limit - (time.monotonic() - started)
         return plan._replace(limit=find_time_limit(asked, study.size))
 
@@ -120,26 +130,33 @@ def run(
             costs = simulator.run_costs(job)
             order = [index for assignment in plan.assignments for index in assignment.runs]
             visible = progress and team.rank == 0
-            display = Progress(counter, study.size, plan.recorded, plan.failed, visible, costs[order])
+            display = Progress(counter, plan.total, plan.recorded, plan.failed, visible, costs[order])
             stop = Stop(counter, signals, plan.limit, display.show)
             trouble = _compute(task, folder, plan, costs, team.rank, counter, stop)
             team.wait_for_all(stop.look)
             display.close()
         stopped = _settle(team, trouble, stop.reason)
-        return team.on_root(lambda: _conclude(folder, task, stopped))
+        return team.on_root(lambda: _conclude(folder, task, share, plan, stopped, held))
 
 
 def _prepare(
-    folder: StudyFolder, task: Task, fresh: bool, retry: Collection[Status], ranks: int, held: ExitStack
+    folder: StudyFolder,
+    task: Task,
+    part: Part | None,
+    fresh: bool,
+    retry: Collection[Status],
+    ranks: int,
+    held: ExitStack,
 ) -> _Plan:
     """Take the folder into possession and find what is left to do; on rank 0 alone."""
     study = task.study
     folder.check_free_for(study, fresh)
     folder.create()
-    held.enter_context(locked(folder.lock_file))
+    held.enter_context(folder.occupied(part))
     folder.check_free_for(study, fresh)  # again: another process may have been there before the lock
-    for leftover in folder.leftovers():
-        discard(leftover)
+    if part is None:
+        for leftover in folder.half_histories():
+            discard(leftover)
     if fresh:
         folder.clear()
     folder.save(study)
@@ -147,16 +164,20 @@ def _prepare(
     session = new_session(ranks)
     for warning in records.warnings + _other_versions(records, session):
         _logger.warning(warning)
-    records = enter_attempts(folder, study, records, retry, session)
+    index = np.arange(study.size)
+    asked = np.ones_like(index, bool) if part is None else part.holds(index)
+    records = enter_attempts(folder, study, records, asked, retry, session)
     records.written[missing_histories(task.job, folder, records)] = np.nan  # done again; the record stays
     done = records.rows["status"] == Status.DONE
-    recorded = int(records.recorded.sum())
+    recorded = int((records.recorded & asked).sum())
     return _Plan(
-        assignments=plan_runs(task.job, task.simulator, records, ranks),
+        assignments=plan_runs(task.job, task.simulator, records, asked, ranks),
         attempts=later_attempts(records),
         fit=fit_recorded(task.simulator.run_costs(task.job), records.timings, done),
+        asked=asked,
+        total=int(asked.sum()),
         recorded=recorded,
-        failed=recorded - int(done.sum()),
+        failed=recorded - int((done & asked).sum()),
         session=session,
         limit=TimeLimit(),
     )
@@ -217,10 +238,19 @@ def _settle(team: Team, trouble: str | None, reason: str | None) -> str | None:
     return next((why for _, why in ends if why and why != ELSEWHERE), None)
 
 
-def _conclude(folder: StudyFolder, task: Task, stopped: str | None) -> RunReport:
-    """Gather the dataset and report; on rank 0 alone."""
-    records = read_records(folder.records, task.study)
-    write_results(folder, task.study, records)
-    report = build_report(folder, task.study, records, stopped)
-    missing = missing_histories(task.job, folder, records)
-    return replace(report, remaining=report.remaining + len(missing))
+def _conclude(
+    folder: StudyFolder,
+    task: Task,
+    part: Part | None,
+    plan: _Plan,
+    stopped: str | None,
+    held: ExitStack,
+) -> RunReport:
+    """Gather the dataset, unless other parts are at work, and report; on rank 0 alone."""
+    if part is not None:
+        held.close()  # before the look around: of parts that end together the last one sees nobody
+    gathers = part is None or not folder.is_in_use()
+    records = gather_records(folder, task.study) if gathers else read_records(folder.records, task.study)
+    records.written[missing_histories(task.job, folder, records)] = np.nan
+    gained = int(records.recorded[plan.asked].sum()) - plan.recorded
+    return build_report(folder, task.study, records, plan.asked, gathers, gained, stopped)

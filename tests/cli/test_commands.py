@@ -84,13 +84,13 @@ def test_ten_failed_runs_are_named_and_the_rest_counted(write_job, call):
               "[axes]\nload = {from = 0, to = 11, step = 1}\n")  # fmt: skip
     named = [line for line in call("run", "x.toml")[2] if line.startswith("cvt-hpc:")]
     assert [line.split()[2] for line in named[:10]] == [str(i) for i in range(10)]
-    assert named[10:] == ["cvt-hpc: 2 more runs failed; `status` and `reason` in out/x/results.nc tell which"]
+    assert named[10:] == ["cvt-hpc: 2 more runs failed; `status` and `reason` in the results tell which"]
 
 
 def test_a_stopped_sweep_ends_with_99(write_job, call, monkeypatch, tmp_path):
     write_job(GRID)
     failed = (FailedRun(3, {"load": 5.0, "law": "coulomb"}, "failed_error", "ValueError: x"),)
-    report = RunReport(tmp_path, tmp_path / "results.nc", 10, 4, failed, 5, "SIGTERM")
+    report = RunReport(tmp_path, tmp_path / "results.nc", 10, 4, failed, 5, "SIGTERM", 1)
     monkeypatch.setattr("cvt_hpc.study.run", lambda job, out, **options: report)
     status, out, err = call("run", "x.toml")
     assert status == 99
@@ -104,7 +104,7 @@ def test_a_stopped_sweep_ends_with_99(write_job, call, monkeypatch, tmp_path):
 def test_limits_and_retries_reach_the_sweep(write_job, call, monkeypatch, tmp_path):
     write_job(GRID)
     given = {}
-    report = RunReport(tmp_path, tmp_path / "results.nc", 10, 10, (), 0, None)
+    report = RunReport(tmp_path, tmp_path / "results.nc", 10, 10, (), 0, None, 10)
     monkeypatch.setattr("cvt_hpc.study.run", lambda job, out, **options: given.update(options) or report)
     options = (
         "--time-limit",
@@ -118,6 +118,7 @@ def test_limits_and_retries_reach_the_sweep(write_job, call, monkeypatch, tmp_pa
     )
     assert call("run", "x.toml", *options)[0] == 0
     assert given == {
+        "part": None,
         "fresh": False,
         "time_limit": 9000.0,
         "run_limit": 600.0,
@@ -125,7 +126,7 @@ def test_limits_and_retries_reach_the_sweep(write_job, call, monkeypatch, tmp_pa
     }
     given.clear()
     call("run", "x.toml")
-    assert given == {"fresh": False, "retry": []}
+    assert given == {"part": None, "fresh": False, "retry": []}
 
 
 def test_status_of_a_sweep_at_work(call, monkeypatch):

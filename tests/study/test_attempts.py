@@ -11,7 +11,7 @@ from study_double import Axis, Job, Simulator
 from study_processes import wait_until
 
 from cvt_hpc.study import open_results, read_status, run
-from cvt_hpc.study.attempts import plan_runs
+from cvt_hpc.study.attempts import given_up, plan_runs, runs_to_repeat
 from cvt_hpc.study.batches import Assignment
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.frames import RecordFormat
@@ -21,6 +21,7 @@ from cvt_hpc.variables import Status
 
 RUNS = 12
 JOB = Job((Axis("load", tuple(range(RUNS))),))
+ALL = np.ones(RUNS, bool)
 
 
 def recorded(out):
@@ -117,7 +118,7 @@ def test_the_plan_puts_the_suspicious_last(tmp_path):
     )
     assert records.died.tolist() == [1, 1, 1, 1, 3, 3, 0, 3, 4, 3, 0, 0]
     assert records.died_alone.tolist() == [0] * 8 + [1] + [0] * 3
-    assert plan_runs(JOB, Simulator(lanes=4), records, ranks=1) == [
+    assert plan_runs(JOB, Simulator(lanes=4), records, ALL, ranks=1) == [
         Assignment((6, 11)),
         Assignment((0, 1, 2, 3)),
         *[Assignment((index,), alone=True) for index in (4, 5, 7, 9)],
@@ -127,9 +128,19 @@ def test_the_plan_puts_the_suspicious_last(tmp_path):
 
 def test_runs_that_have_killed_alone_are_claimed_as_one(tmp_path):
     marks = [((1, 2, 3), False)] * 3 + [((1,), True), ((3,), True)]
-    plan = plan_runs(JOB, Simulator(), marked(tmp_path, *marks), ranks=4)
+    plan = plan_runs(JOB, Simulator(), marked(tmp_path, *marks), ALL, ranks=4)
     assert plan[-2:] == [Assignment((2,), alone=True), Assignment((1, 3), alone=True)]
     assert plan[-1].parts() == [Assignment((1,), alone=True), Assignment((3,), alone=True)]
+
+
+def test_only_the_runs_asked_for_are_planned_retried_and_given_up(tmp_path):
+    marks = [((1, 2), False)] * 3 + [((1,), True), ((2,), True)] * 2 + [((4, 5), False)]
+    records = marked(tmp_path, *marks, records=[(4, 5)])
+    asked = np.isin(np.arange(12), (1, 4, 6))
+    planned = [index for runs, _ in plan_runs(JOB, Simulator(), records, asked, 1) for index in runs]
+    assert sorted(planned) == [1, 6]
+    assert list(given_up(records, asked)) == [1]
+    assert runs_to_repeat(records, asked, [Status.FAILED_ERROR]).tolist() == [4]
 
 
 def test_a_copied_log_is_no_further_death(tmp_path):
@@ -205,7 +216,7 @@ def test_retry_does_runs_of_a_status_again_and_the_later_record_counts(tmp_path)
 def test_a_retry_that_was_stopped_goes_on_with_the_same_command(tmp_path):
     sweep(tmp_path, slow={"from": 10, "pause": 300.0}, run_limit=0.02)
     report = sweep(tmp_path, retry=[Status.TIMED_OUT], time_limit=0.0)
-    assert (report.done, report.remaining, report.exit_status) == (10, 2, 99)
+    assert (report.done, report.remaining, report.exit_status) == (10, 2, 98)
     assert read_status(tmp_path).left == 2
     with open_results(tmp_path) as dataset:
         assert (dataset["status"].values[10:] == Status.NOT_RUN).all()

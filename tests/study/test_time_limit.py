@@ -99,7 +99,7 @@ def test_a_run_at_work_is_broken_off_when_time_is_up(start, tmp_path):
     options = {"out": tmp_path, "slow": {"from": 3, "pause": 300.0}, "sweep": {"time_limit": 1.0}}
     for ranks in (0, 2):
         finished = start(options, ranks).finish()
-        assert finished.returncode == 99, finished.stderr
+        assert finished.returncode == 98, finished.stderr
         facts = json.loads(finished.stdout)
         assert (facts["done"], facts["remaining"], facts["stopped"]) == (3, 9, "time limit")
     folder = StudyFolder(tmp_path)
@@ -119,7 +119,7 @@ def test_the_end_of_the_slurm_job_is_a_limit(start, tmp_path):
     end = str(int(time.time()) + 20)  # within the margin for gathering
     slurm = {"SLURM_JOB_ID": "17", "SLURM_JOB_END_TIME": end}
     finished = start({"out": tmp_path}, environment=slurm).finish()
-    assert finished.returncode == 99, finished.stderr
+    assert finished.returncode == 98, finished.stderr
     facts = json.loads(finished.stdout)
     assert (facts["done"], facts["stopped"]) == (0, "end of the Slurm job")
     # An explicit limit counts before it.

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from PIL import Image
-from sweeps import assert_same_numbers, call, environment, kill, records, start, wait_for_records
+from recorded import assert_same_numbers, frames_written, records
+from sweeps import call, environment, kill, start, wait_for_records
 
 from cvt_hpc import open_results
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, occurrence_classes
-from cvt_hpc.study.frames import RECORD
 from cvt_hpc.variables import Status, Vibrates
 
 JOB = """
@@ -146,11 +146,6 @@ def test_kill_9_at_any_moment_and_resume(meshes, tmp_path, ranks):
     started = f"python -m cvt_hpc run meshes.toml (on {platform.node()}, {max(ranks, 1)} rank(s))"
     assert load_results(out).attrs["history"].count(started) == 2
     assert frames_written(out) == meshes["status"].size
-
-
-def frames_written(out):
-    """Number of records in all logs, repeated ones counted each time."""
-    return sum(path.read_bytes().count(RECORD) for path in (out / "records").glob("*.log"))
 
 
 def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):
