@@ -38,7 +38,9 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
     product = f" = {' x '.join(map(str, job.shape))}" if len(job.axes) > 1 else ""
     basis = f" (by what {measured} runs on record took)" if measured else ""
     cost = f"estimated cost: {_cost_in_words(core_seconds, job.size)}{basis}"
-    lines += ["", f"runs: {job.size}{product}", cost]
+    lines += ["", f"runs: {job.size}{product}"]
+    lines += [f"histories kept: of runs {', '.join(map(str, job.histories))}"] if job.histories else []
+    lines += [cost]
     return "\n".join(lines)
 
 

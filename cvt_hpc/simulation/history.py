@@ -1,9 +1,9 @@
-"""One run with its history, as a dataset."""
+"""Runs with their histories, as datasets."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -40,10 +40,39 @@ def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
     InputError
         If a value is not fit for its key.
     """
-    import xarray as xr
-
     point = job.point_at(at or {})
     ((run, record),) = march(job, [point], lambda: None)
+    return _history(job, point, run, record)
+
+
+def run_points_keeping(
+    job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None], kept: Collection[int]
+) -> tuple[list[dict[str, Any]], dict[int, xr.Dataset]]:
+    """Do as `run_points`, and return the histories of the runs at some places of `points` as well.
+
+    Parameters
+    ----------
+    job, points, interrupt
+        As `run_points` takes them.
+    kept : collection of int
+        Places in `points`.
+
+    Returns
+    -------
+    records : list of dict
+        As of `run_points`.
+    histories : dict
+        Datasets as `simulate` returns them, by place.
+    """
+    marched = march(job, points, interrupt)
+    histories = {place: _history(job, points[place], *marched[place]) for place in kept}
+    return [record for _, record in marched], histories
+
+
+def _history(job: Job, point: dict[str, Any], run: Any, record: dict[str, Any]) -> xr.Dataset:
+    """A run that has ended, as a dataset."""
+    import xarray as xr
+
     coordinates = {
         name: (name, c.values, _attributes(c.long_name, c.units))
         for name, c in record_coordinates(job).items()

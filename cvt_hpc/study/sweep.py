@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.errors import mismatch
-from cvt_hpc.files import StorageError
+from cvt_hpc.files import StorageError, discard
 from cvt_hpc.study.attempts import enter_attempts, later_attempts, plan_runs
 from cvt_hpc.study.batches import Assignment
 from cvt_hpc.study.cost_model import CostModel, Fit, fit_recorded
-from cvt_hpc.study.description import Study, describe
+from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.frames import RecordFormat
 from cvt_hpc.study.gather import gather_records
+from cvt_hpc.study.histories import keep_histories, missing_histories
 from cvt_hpc.study.launch import Team, assembled_team
 from cvt_hpc.study.part import Part, read_part
 from cvt_hpc.study.progress import Progress
@@ -135,7 +136,7 @@ def run(
             team.wait_for_all(stop.look)
             display.close()
         stopped = _settle(team, trouble, stop.reason)
-        return team.on_root(lambda: _conclude(folder, study, share, plan, stopped, held))
+        return team.on_root(lambda: _conclude(folder, task, share, plan, stopped, held))
 
 
 def _prepare(
@@ -153,6 +154,9 @@ def _prepare(
     folder.create()
     held.enter_context(folder.occupied(part))
     folder.check_free_for(study, fresh)  # again: another process may have been there before the lock
+    if part is None:
+        for leftover in folder.half_histories():
+            discard(leftover)
     if fresh:
         folder.clear()
     folder.save(study)
@@ -163,6 +167,7 @@ def _prepare(
     index = np.arange(study.size)
     asked = np.ones_like(index, bool) if part is None else part.holds(index)
     records = enter_attempts(folder, study, records, asked, retry, session)
+    records.written[missing_histories(task.job, folder, records)] = np.nan  # done again; the record stays
     done = records.rows["status"] == Status.DONE
     recorded = int((records.recorded & asked).sum())
     return _Plan(
@@ -207,6 +212,7 @@ def _compute(
                 plan.assignments, counter, stop.may_claim, lambda batch: stop.fits(model.upper(batch))
             ):
                 for result in task.do(runs, stop.interrupt, partial(log.begin, alone=alone)):
+                    keep_histories(folder, result.histories)
                     log.append(result.records)
                     counter.report(len(result.records), result.failed)
                     if result.failed < len(result.records):  # those that all failed ended before their time
@@ -234,7 +240,7 @@ def _settle(team: Team, trouble: str | None, reason: str | None) -> str | None:
 
 def _conclude(
     folder: StudyFolder,
-    study: Study,
+    task: Task,
     part: Part | None,
     plan: _Plan,
     stopped: str | None,
@@ -244,6 +250,7 @@ def _conclude(
     if part is not None:
         held.close()  # before the look around: of parts that end together the last one sees nobody
     gathers = part is None or not folder.is_in_use()
-    records = gather_records(folder, study) if gathers else read_records(folder.records, study)
+    records = gather_records(folder, task.study) if gathers else read_records(folder.records, task.study)
+    records.written[missing_histories(task.job, folder, records)] = np.nan
     gained = int(records.recorded[plan.asked].sum()) - plan.recorded
-    return build_report(folder, study, records, plan.asked, gathers, gained, stopped)
+    return build_report(folder, task.study, records, plan.asked, gathers, gained, stopped)
