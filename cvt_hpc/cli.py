@@ -194,7 +194,8 @@ def _simulate(arguments: argparse.Namespace) -> int:
     job.point_at(at, "--at")
     _check_output(arguments.out, (".nc",))
     _check_output(arguments.plot, (".png", ".svg", ".pdf"))
-    from cvt_hpc.analysis.histories import draw_history, is_history, write_history
+    from cvt_hpc.analysis.histories import draw_history
+    from cvt_hpc.history_files import is_history, write_history
     from cvt_hpc.printing import outcome_lines, point_lines
     from cvt_hpc.simulation import simulate
     from cvt_hpc.variables import Status

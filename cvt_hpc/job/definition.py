@@ -35,6 +35,8 @@ class Job:
         The keys that the file or an override sets, defaults excluded.
     design : dict
         The table [design], resolved; empty for the full grid of the axes.
+    histories : tuple of int
+        Indices of the runs whose history a sweep keeps; without effect on any number.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Job:
     axes: tuple[Axis, ...]
     given: frozenset[str] = field(default=frozenset(), compare=False)
     design: Design = field(default_factory=dict)
+    histories: tuple[int, ...] = field(default=(), compare=False)
 
     @property
     def is_sampled(self) -> bool:

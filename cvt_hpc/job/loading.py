@@ -14,6 +14,7 @@ from cvt_hpc.job.crosscheck import check_grid
 from cvt_hpc.job.definition import HEADER, Job
 from cvt_hpc.job.design import Design, read_design, resolve_spacing
 from cvt_hpc.job.document import read_document
+from cvt_hpc.job.histories import KEY, read_histories
 from cvt_hpc.job.sampling import sampled_axes
 from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.values import expectation, read_value
@@ -90,9 +91,10 @@ def build_job(
     given = {**tables, **replaced}
     parameters = _resolve({**{axis.name: axis.values[0] for axis in axes}, **given}, schema, source)
     check_grid(schema, parameters, axes, source, sampled="runs" in design)
-    return Job(
-        name, schema.model, schema.stepper, description, source, parameters, axes, frozenset(given), design
-    )
+    histories = document.get(KEY[0], {}).get(KEY[1], [])
+    kept = read_histories(histories, schema, axes, replaced, source, design.get("runs"))
+    given = frozenset(given)
+    return Job(name, schema.model, schema.stepper, description, source, parameters, axes, given, design, kept)
 
 
 def _read_name(head: Mapping[str, Any], source: str) -> str:
@@ -136,6 +138,8 @@ def _read_tables(document: Mapping[str, Any], schema: Schema, source: str) -> di
     values = {}
     for section in schema.sections:
         for name, raw in document.get(section, {}).items():
+            if (section, name) == KEY:
+                continue
             where = f"{source}: [{section}] {name}"
             key = schema.find(name, where, section)
             values[key] = read_value(schema.parameters[key], raw, where)

@@ -45,7 +45,9 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
     at_most = "at most " if "first_spacing" in job.design else ""
     basis = f" (by what {measured} runs on record took)" if measured else ""
     cost = f"estimated cost: {at_most}{_cost_in_words(core_seconds, job.size)}{basis}"
-    lines += ["", f"runs: {at_most}{job.size}{product}", cost]
+    lines += ["", f"runs: {at_most}{job.size}{product}"]
+    lines += [f"histories kept: of runs {', '.join(map(str, job.histories))}"] if job.histories else []
+    lines += [cost]
     return "\n".join(lines)
 
 

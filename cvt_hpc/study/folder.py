@@ -37,6 +37,11 @@ class StudyFolder:
         self.lock_file = self.path / "run.lock"  # held by a run of the whole, shared by runs of parts
         self.gather_lock = self.path / "gather.lock"
         self.crash_log = self.path / "crash.log"
+        self.histories = self.path / "histories"
+
+    def history(self, index: int) -> Path:
+        """Return the file of the history of run `index`."""
+        return self.histories / f"run-{index:06d}.nc"
 
     def load(self) -> Study:
         """Return the study that the folder holds.
@@ -110,13 +115,19 @@ class StudyFolder:
         """Remove what runs have written: results, records, and last the job.json that vouches for them."""
         logs = self.records.glob("rank-*.log")
         locks = self.path.glob(_PART_LOCKS)
+        histories = [*self.histories.glob("run-*.nc"), *self.half_histories()]
         with naming_refusals(self.path, "a folder that results can be removed from"):
-            for path in [self.results, self.crash_log, *self.leftovers(), *locks, *logs, self.job_file]:
+            for path in [self.results, self.crash_log, *self.leftovers(), *locks, *histories, *logs]:
                 path.unlink(missing_ok=True)
+            self.job_file.unlink(missing_ok=True)
 
     def leftovers(self) -> list[Path]:
         """Return the half-written files of processes that died while they wrote."""
         return [*self.path.glob(".results.nc.*.part"), *self.path.glob(".job.json.*.part")]
+
+    def half_histories(self) -> list[Path]:
+        """Return the same of histories; only who is alone at work can tell them from those being written."""
+        return [*self.histories.glob(".run-*.nc.*.part")]
 
     @contextmanager
     def occupied(self, part: Part | None) -> Iterator[None]:

@@ -107,7 +107,7 @@ def build_report(
         out=folder.path,
         results=folder.results if gathered else None,
         total=int(asked.sum()),
-        done=int((status[asked] == Status.DONE).sum()),
+        done=int((asked & records.recorded & (status == Status.DONE)).sum()),
         failed=failed,
         remaining=int((asked & ~records.recorded).sum()),
         stopped=stopped,

@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.errors import mismatch
-from cvt_hpc.files import StorageError
+from cvt_hpc.files import StorageError, discard
 from cvt_hpc.study.attempts import enter_attempts, later_attempts, plan_runs
 from cvt_hpc.study.batches import Assignment
 from cvt_hpc.study.cost_model import CostModel, Fit, fit_recorded
-from cvt_hpc.study.description import Study, describe
+from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.frames import RecordFormat
 from cvt_hpc.study.gather import gather_records
+from cvt_hpc.study.histories import keep_histories, missing_histories
 from cvt_hpc.study.launch import Team, assembled_team
 from cvt_hpc.study.part import Part, read_part
 from cvt_hpc.study.progress import Progress
@@ -49,7 +50,6 @@ class _Plan(NamedTuple):
     assignments: list[Assignment]
     attempts: dict[int, int]  # of runs that were begun again
     fit: Fit
-    asked: np.ndarray  # whether a run is one of this start, shape (runs,)
     total: int
     recorded: int
     failed: int
@@ -144,7 +144,7 @@ def run(
                         break
                     next_round = partial(_next_round, folder, task, plan, team.size, counter, display)
                     plan = team.on_root(next_round)
-        return team.on_root(lambda: _conclude(folder, study, share, plan, stopped, held))
+        return team.on_root(lambda: _conclude(folder, task, share, plan, stopped, held))
 
 
 def _prepare(
@@ -162,6 +162,9 @@ def _prepare(
     folder.create()
     held.enter_context(folder.occupied(part))
     folder.check_free_for(study, fresh)  # again: another process may have been there before the lock
+    if part is None:
+        for leftover in folder.half_histories():
+            discard(leftover)
     if fresh:
         folder.clear()
     folder.save(study)
@@ -169,15 +172,15 @@ def _prepare(
     session = new_session(ranks)
     for warning in records.warnings + _other_versions(records, session):
         _logger.warning(warning)
-    asked = needed_runs(study, records) if part is None else part.holds(np.arange(study.size))
+    asked = _asked(task, records, part)
     records = enter_attempts(folder, study, records, asked, retry, session)
+    records.written[missing_histories(task.job, folder, records)] = np.nan  # done again; the record stays
     done = records.rows["status"] == Status.DONE
     recorded = int((records.recorded & asked).sum())
     return _Plan(
         assignments=plan_runs(task.job, task.simulator, records, asked, ranks),
         attempts=later_attempts(records),
         fit=fit_recorded(task.simulator.run_costs(task.job), records.timings, done),
-        asked=asked,
         total=int(asked.sum()),
         recorded=recorded,
         failed=recorded - int((done & asked).sum()),
@@ -186,13 +189,22 @@ def _prepare(
     )
 
 
+def _asked(task: Task, records: Records, part: Part | None = None) -> np.ndarray:
+    """Return whether a run is one of this start, shape (runs,); a trace comes to ask for more."""
+    if part is not None:
+        return part.holds(np.arange(task.study.size))
+    asked = needed_runs(task.study, records)
+    asked[list(task.job.histories)] = True
+    return asked
+
+
 def _next_round(
     folder: StudyFolder, task: Task, plan: _Plan, ranks: int, counter: Counter, display: Progress
 ) -> _Plan:
     """Return the plan of what a trace asks for after the runs of a round; on rank 0 alone."""
     records = read_records(folder.records, task.study)
     costs = task.simulator.run_costs(task.job)
-    assignments = plan_runs(task.job, task.simulator, records, needed_runs(task.study, records), ranks)
+    assignments = plan_runs(task.job, task.simulator, records, _asked(task, records), ranks)
     counter.rewind()
     display.expect(costs[[index for assignment in assignments for index in assignment.runs]])
     fit = fit_recorded(costs, records.timings, records.rows["status"] == Status.DONE)
@@ -228,6 +240,7 @@ def _compute(
                 plan.assignments, counter, stop.may_claim, lambda batch: stop.fits(model.upper(batch))
             ):
                 for result in task.do(runs, stop.interrupt, partial(log.begin, alone=alone)):
+                    keep_histories(folder, result.histories)
                     log.append(result.records)
                     counter.report(len(result.records), result.failed)
                     if result.failed < len(result.records):  # those that all failed ended before their time
@@ -255,7 +268,7 @@ def _settle(team: Team, trouble: str | None, reason: str | None) -> str | None:
 
 def _conclude(
     folder: StudyFolder,
-    study: Study,
+    task: Task,
     part: Part | None,
     plan: _Plan,
     stopped: str | None,
@@ -265,7 +278,8 @@ def _conclude(
     if part is not None:
         held.close()  # before the look around: of parts that end together the last one sees nobody
     gathers = part is None or not folder.is_in_use()
-    records = gather_records(folder, study) if gathers else read_records(folder.records, study)
-    asked = needed_runs(study, records) if study.is_traced else plan.asked
+    records = gather_records(folder, task.study) if gathers else read_records(folder.records, task.study)
+    records.written[missing_histories(task.job, folder, records)] = np.nan
+    asked = _asked(task, records, part)
     gained = int(records.recorded[asked].sum()) - plan.recorded
-    return build_report(folder, study, records, asked, gathers, gained, stopped)
+    return build_report(folder, task.study, records, asked, gathers, gained, stopped)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,6 +18,8 @@ from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from cvt_hpc.job import Job
 
 Interrupt = Callable[[], str | None]
@@ -27,10 +29,21 @@ _logger = logging.getLogger(__name__)
 
 
 class Result(NamedTuple):
-    """Records of runs that were done together, and the time [s] that this took; 0 where it is not known."""
+    """What came of runs that were done together.
+
+    Attributes
+    ----------
+    records : list of (int, numpy.ndarray)
+        Run index and record of each.
+    seconds : float
+        Time [s] that they took together; 0 where it is not known.
+    histories : list of (int, xarray.Dataset)
+        Run index and history of those whose history is kept.
+    """
 
     records: list[Record]
     seconds: float = 0.0
+    histories: Sequence[tuple[int, xr.Dataset]] = ()
 
     @property
     def batch(self) -> Batch:
@@ -109,9 +122,14 @@ class Task:
         watch = _Watch(interrupt, self.run_limit)
         try:
             points = [self.job.point(index) for index in batch]
-            found = self.simulator.run_points(self.job, points, watch)
+            kept = [place for place, index in enumerate(batch) if index in self.job.histories]
+            if kept:
+                found, histories = self.simulator.run_points_keeping(self.job, points, watch, kept)
+            else:
+                found, histories = self.simulator.run_points(self.job, points, watch), {}
             records = [(index, self._pack(values)) for index, values in zip(batch, found, strict=True)]
-            return Result(records, watch.elapsed()), None
+            named = [(batch[place], history) for place, history in histories.items()]
+            return Result(records, watch.elapsed(), named), None
         except self.simulator.Interrupted:
             if not watch.is_over:
                 raise

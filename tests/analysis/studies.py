@@ -71,3 +71,11 @@ def traced(**axes):
 def sampled():
     """The study's runs as samples, all in a row."""
     return study().stack(run=("friction_gradient", "sheave_stiffness", "load")).reset_index("run")
+
+
+def two_flags(status, vibrates):
+    """A study along the load by its flags alone."""
+    dims = ("load",)
+    return xr.Dataset(
+        {"status": (dims, status), "vibrates": (dims, vibrates)}, {"load": np.arange(float(len(status)))}
+    )

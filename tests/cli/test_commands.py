@@ -104,7 +104,7 @@ def test_a_stopped_sweep_ends_with_99(write_job, call, monkeypatch, tmp_path):
 def test_limits_and_retries_reach_the_sweep(write_job, call, monkeypatch, tmp_path):
     write_job(GRID)
     given = {}
-    report = RunReport(tmp_path, tmp_path / "results.nc", 10, 10, (), 0, None)
+    report = RunReport(tmp_path, tmp_path / "results.nc", 10, 10, (), 0, None, 10)
     monkeypatch.setattr("cvt_hpc.study.run", lambda job, out, **options: given.update(options) or report)
     options = (
         "--time-limit",
@@ -118,6 +118,7 @@ def test_limits_and_retries_reach_the_sweep(write_job, call, monkeypatch, tmp_pa
     )
     assert call("run", "x.toml", *options)[0] == 0
     assert given == {
+        "part": None,
         "fresh": False,
         "time_limit": 9000.0,
         "run_limit": 600.0,
@@ -125,7 +126,7 @@ def test_limits_and_retries_reach_the_sweep(write_job, call, monkeypatch, tmp_pa
     }
     given.clear()
     call("run", "x.toml")
-    assert given == {"fresh": False, "retry": []}
+    assert given == {"part": None, "fresh": False, "retry": []}
 
 
 def test_status_of_a_sweep_at_work(call, monkeypatch):

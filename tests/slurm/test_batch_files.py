@@ -94,7 +94,7 @@ def test_a_warned_sweep_is_requeued_and_goes_on(cluster, job_file, serial, tmp_p
 
 def test_a_job_that_gains_nothing_is_not_requeued(cluster, tmp_path):
     endless = tmp_path / "endless.toml"
-    endless.write_text(JOB.replace("0.1 s", "1000 s"))
+    endless.write_text(JOB.replace("0.1 s", "5 s"))
     job = cluster.submit("sweep.sbatch", endless, "--out", tmp_path / "out", options=("--ntasks=1",))
     wait_until((tmp_path / "out" / "job.json").exists, "the start", lambda: cluster.output(job))
     cluster.ask("scancel", "--batch", "--signal=USR1", job)
@@ -138,16 +138,14 @@ def test_parts_of_an_array_are_submitted_one_by_one(cluster, job_file, serial, t
 def test_the_loss_of_a_node_costs_no_record(cluster, job_file, serial, tmp_path):
     out = tmp_path / "out"
     job = cluster.submit("sweep.sbatch", job_file, "--out", out, options=TWO_NODES)
+    # The node of the batch file, of rank 0, and of the counter that all ranks share.
+    first = cluster.wait_for(job, "RUNNING")["BatchHost"]
     wait_for_records(cluster, job, out)
-    cluster.lose_node("n2")
+    cluster.lose_node(first)
     try:
-        recorded = records(out)
-        wait_until(
-            lambda: cluster.ask("sinfo", "-h", "-n", "n2", "-o", "%T") == "down", "the loss", cluster.logs
-        )
+        start_again(cluster, job)  # Slurm has put it back into the queue
+        assert 0 < records(out) < RUNS
     finally:
-        cluster.start_node("n2")
-    start_again(cluster, job)
-    assert 0 < recorded < RUNS
+        cluster.start_node(first)
     assert_completed(cluster, job)
     assert_same_as_serial(out, serial)

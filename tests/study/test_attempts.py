@@ -109,18 +109,18 @@ def test_the_plan_puts_the_suspicious_last(tmp_path):
     together, alone = False, True
     records = marked(
         tmp_path,
-        ((2, 3), together),
+        ((0, 1, 2, 3), together),
         *[((4, 5), together)] * 3,
         *[((7, 8, 9), together)] * 3,
         ((8,), alone),
         ((10,), together),
         records=[(10,)],
     )
-    assert records.died.tolist() == [0, 0, 1, 1, 3, 3, 0, 3, 4, 3, 0, 0]
+    assert records.died.tolist() == [1, 1, 1, 1, 3, 3, 0, 3, 4, 3, 0, 0]
     assert records.died_alone.tolist() == [0] * 8 + [1] + [0] * 3
     assert plan_runs(JOB, Simulator(lanes=4), records, ALL, ranks=1) == [
-        Assignment((0, 1, 6, 11)),
-        Assignment((2, 3)),
+        Assignment((6, 11)),
+        Assignment((0, 1, 2, 3)),
         *[Assignment((index,), alone=True) for index in (4, 5, 7, 9)],
         Assignment((8,), alone=True),
     ]
@@ -223,6 +223,26 @@ def test_a_retry_that_was_stopped_goes_on_with_the_same_command(tmp_path):
     report = sweep(tmp_path, retry=[Status.TIMED_OUT])
     assert (report.done, report.remaining) == (RUNS, 0)
     assert recorded(tmp_path).attempts.max() == 2
+
+
+def test_a_retry_that_goes_on_does_not_begin_again(tmp_path):
+    class Ended(Simulator):
+        def run_point(self, job, point, interrupt):
+            if point["load"] == 11:
+                os.kill(os.getpid(), signal.SIGTERM)
+            return super().run_point(job, point, interrupt)
+
+    slow = {"from": 10, "pause": 300.0}
+    again = {"retry": [Status.TIMED_OUT], "run_limit": 0.02}
+    sweep(tmp_path, slow=slow, run_limit=0.02)
+    report = run(JOB, tmp_path, simulator=Ended(slow), progress=False, **again)
+    assert (report.remaining, report.stopped) == (1, "SIGTERM")
+    sweep(tmp_path, **again)
+    records = recorded(tmp_path)
+    assert records.attempts[10:].tolist() == [2, 2]
+    assert records.rows["status"][10:].tolist() == [Status.TIMED_OUT, Status.DONE]
+    sweep(tmp_path, **again)  # and once all are on record, it does
+    assert recorded(tmp_path).attempts[10:].tolist() == [3, 2]
 
 
 def test_a_retry_on_two_ranks(start, tmp_path):

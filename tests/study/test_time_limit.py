@@ -194,15 +194,13 @@ def test_one_batch_in_forty_exceeds_the_margin():
     # prior is wider than this spread, so that few batches give a wider margin, and never a narrower one.
     generator = np.random.default_rng(2)
     for batches, most in ((1, 0.023), (5, 0.023), (200, 0.026)):
-        beyond = 0
-        for _ in range(2000):
-            fit = Fit()
-            logs = generator.normal(0.0, 0.2, batches + 1)
-            for ratio in np.exp(logs[:-1]):
-                fit = fit.with_ratio(ratio)
-            beyond += math.exp(logs[-1]) > fit.upper()
-        # three standard deviations of a count among 2000
-        assert beyond / 2000 < most + 3 * math.sqrt(most / 2000)
+        logs = generator.normal(0.0, 0.2, (20_000, batches + 1))
+        known = logs[:, :-1]
+        fits = zip(known.mean(axis=1), batches * known.var(axis=1), strict=True)
+        upper = [Fit(batches, mean, squares).upper() for mean, squares in fits]
+        beyond = int((np.exp(logs[:, -1]) > upper).sum())
+        # three standard deviations of a count
+        assert beyond / 20_000 < most + 3 * math.sqrt(most / 20_000)
     assert beyond > 0
 
 

@@ -1,6 +1,7 @@
 """Traces: what is run, what is inferred, and that neither depends on the order, on ranks or on interruptions."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from study_processes import HERE, assert_same_numbers
 from cvt_hpc.errors import InputError
 from cvt_hpc.study import open_results, read_status, run
 from cvt_hpc.study.description import describe
+from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.recovery import Records
 from cvt_hpc.study.tracing import inferred_classes, needed_runs
 from cvt_hpc.variables import Status, Vibrates
@@ -289,3 +291,10 @@ def test_a_trace_is_not_done_in_parts(tmp_path):
     with pytest.raises(InputError, match="part: expected a whole study, since a trace goes by"):
         run(JOB, tmp_path / "out", simulator=Simulator(), part="1/2")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_run_whose_history_is_wanted_is_run(tmp_path):
+    report = run(replace(JOB, histories=(10,)), tmp_path, simulator=Simulator(), progress=False)
+    assert (report.exit_status, report.total) == (0, 21)
+    assert results(tmp_path)["status"].values[10] == Status.DONE
+    assert StudyFolder(tmp_path).history(10).exists()

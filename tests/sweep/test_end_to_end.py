@@ -40,6 +40,11 @@ duration = "0.08 s"
 """
 
 
+HISTORY = """
+[record]
+history = [{ sheave_stiffness = 1.0, load = "120 N m" }]
+"""
+
 # Runs with different meshes cannot be done as one batch: records come one after another.
 MESHES = """
 name = "meshes"
@@ -65,7 +70,7 @@ def folder(tmp_path):
 def serial(tmp_path_factory):
     """The folder of an undisturbed serial run."""
     folder = tmp_path_factory.mktemp("serial")
-    (folder / "small.toml").write_text(JOB)
+    (folder / "small.toml").write_text(JOB + HISTORY)
     done = call("run", "small.toml", cwd=folder)
     assert done.returncode == 1, done.stderr  # both sheaves slip through at 500 N m
     assert done.stdout.splitlines() == [
@@ -155,6 +160,11 @@ def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):
             if swept[name].attrs.get("volatile") != "yes" and swept[name].dtype.kind == "f":
                 assert history[name].values.tobytes() == swept[name].values.tobytes(), name
         assert history.sizes["time"] == 1600
+        # and so does the history that the sweep has kept, of a run in a batch
+        (kept,) = (serial / "histories").iterdir()
+        assert kept.name == "run-000002.nc"
+        with xr.open_dataset(kept, decode_times=False) as beside:
+            assert_same_numbers(beside.drop_vars("core_seconds"), history.drop_vars("core_seconds"))
     with Image.open(folder / "h.png") as picture:
         assert min(picture.size) > 500
         # lines, shades and letters, not an empty sheet
