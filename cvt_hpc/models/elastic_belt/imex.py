@@ -9,8 +9,11 @@ kept to round-off.
 
 The rings' stress is centred in time and damps nothing; the elements' is taken at the end of the step, since
 a centred one rings where they meet and part: it damps them like EA dt [N s], in first order. The set of
-separated elements is frozen during a step: those that are apart and, with the old speeds, stay apart. What
-limits the step is accuracy, c dt / h about 5, and the transverse contact and bending.
+separated elements is frozen during a step: those that are apart and, with the old speeds, stay apart.
+Elements meet where their gap closes and part where their push, damper included, has ended: were it where
+they reach their length at rest, the cell in which gaps run into pressed elements would be neither, and rattle
+from step to step with pushes in proportion to the step (`EDGES.md`). What limits the step is accuracy,
+c dt / h about 5, and the transverse contact and bending.
 """
 
 from __future__ import annotations
@@ -418,7 +421,7 @@ def _stations(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
 
 
 @merged_kernel
-def _element_stress(stiffness, grip, eps, closing, ahead, per_length):
+def _element_stress(stiffness, grip, eps, closing, ahead, per_length, last):
     """-P in a cell [N] with the speeds that the step begins with, and its slope with their change.
 
     Parameters
@@ -429,12 +432,14 @@ def _element_stress(stiffness, grip, eps, closing, ahead, per_length):
         Strain and difference of the speeds at both ends [m/s].
     ahead, per_length
         Strain at the end of the step with these speeds, and its slope with the difference [s/m].
+    last
+        Slope of -P in the step before [N s/m]: 0 where the elements were apart.
     """
     viscous = grip * closing
     # elements never pull: their damper ends where it would outweigh the push force
     pulls = viscous > -stiffness * eps
     viscous, grip = select(pulls, -stiffness * minimum(eps, 0.0), viscous), select(pulls, 0.0, grip)
-    apart = (eps >= 0.0) & (ahead >= 0.0)
+    apart = (eps >= 0.0) & (ahead >= 0.0) & (pulls | (last <= 0.0))
     stress = select(apart, 0.0, fma(stiffness, ahead, viscous))
     return stress, select(apart, 0.0, fma(stiffness, per_length, grip))
 
@@ -472,6 +477,7 @@ def _eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) ->
             closing_0,
             fma(per_length, outflow, eps),
             per_length,
+            stations[j, LINK_0],
         )
         grip = ring_damping * per_cell
         stress_1 = fma(ring_stiffness, stations[j, EPS_1], grip * closing_1)
@@ -592,6 +598,8 @@ def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
             viscous = damper * per_cell * closing
             damped = fma(damper * per_cell, change, viscous)
             if layer == 0:
+                # what is left of the push beyond the length at rest stores nothing: all of it is damping
+                damped = fma(stiffness, maximum(eps, 0.0), damped)
                 damped = select(viscous > -stiffness * eps, -stiffness * minimum(eps, 0.0), damped)
                 damped = select(stations[j, LINK_0] > 0.0, damped, 0.0)
             work_done = fma(damped, fma(0.5, change, closing), work_done)
