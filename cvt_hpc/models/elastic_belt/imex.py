@@ -599,7 +599,7 @@ def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
             damped = fma(damper * per_cell, change, viscous)
             if layer == 0:
                 # what is left of the push beyond the length at rest stores nothing: all of it is damping
-                damped = fma(stiffness, maximum(eps, 0.0), damped)
+                damped = select(eps > 0.0, minimum(fma(stiffness, eps, damped), 0.0), damped)
                 damped = select(viscous > -stiffness * eps, -stiffness * minimum(eps, 0.0), damped)
                 damped = select(stations[j, LINK_0] > 0.0, damped, 0.0)
             work_done = fma(damped, fma(0.5, change, closing), work_done)
