@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -191,6 +192,19 @@ class GeneralTransient:
     def regions(self) -> np.ndarray:
         """Name of the region behind each station, (N,)."""
         return np.array(REGIONS)[self.mesh.region]
+
+    def take_over(self, runs: Sequence[Any]) -> None:
+        """Go on from where a run by another stepper stands, its history included but for the mean profiles.
+
+        Parameters
+        ----------
+        runs : sequence of one Transient or GeneralTransient
+            Of the same mesh, sampling and duration.
+        """
+        (run,) = runs
+        self.done, self._disturbed = run.done, run.done >= self._kick
+        self._rows.data[: self.done, :, 0] = run.rows
+        self._marching.begin(run.time, self._form.pack(run.state))
 
     def advance(self, samples: int) -> tuple[Status, str] | None:
         """March on.

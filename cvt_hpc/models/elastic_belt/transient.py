@@ -14,6 +14,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     FIELDS,
     REGIONS,
     Mesh,
+    State,
     W,
     belt_constants,
     initial_state,
@@ -22,7 +23,7 @@ from cvt_hpc.models.elastic_belt.belt import (
 )
 from cvt_hpc.models.elastic_belt.doubts import slack_doubt
 from cvt_hpc.models.elastic_belt.imex import derive, imex_work
-from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
+from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state, take_lane
 from cvt_hpc.models.elastic_belt.march import march_explicit, march_imex
 from cvt_hpc.models.elastic_belt.record import lanes
 from cvt_hpc.models.elastic_belt.sampling import (
@@ -131,6 +132,8 @@ class Batch:
         Samples of a whole run.
     done : int
         Samples taken so far.
+    begun : float
+        When it took over from another stepper [s]; 0 where it did not.
     interval, step : float
         Sampling interval and time step [s].
     """
@@ -160,7 +163,7 @@ class Batch:
         self.sensing = sensors(self.mesh, self.probes, self.interval, self.dtype)
         self.rows = LaneArray(self.samples, self.sensing.matrix.shape[0] + len(CHANNELS), width)
         self._ordered: np.ndarray | None = None
-        self.done = 0
+        self.done, self.begun = 0, 0.0
         n = self.mesh.cell.size
         self.profiles = [LaneArray(n, len(PROFILES), width) for _ in range(2)]
         self.ended = LaneArray(1, 3, width)
@@ -206,6 +209,31 @@ class Batch:
             lane = (self._belt, self.state, self._work)
             self._solves += march_explicit(*self._explicit, *lane, *pace)
         self.done = last
+
+    def take_over(self, runs: Sequence[Any]) -> None:
+        """Go on from where runs by another stepper stand, their history included but for the mean profiles.
+
+        Parameters
+        ----------
+        runs : sequence of Transient or GeneralTransient
+            One for each run, of the same mesh, sampling and duration, all at the same time.
+        """
+        self.done, self._disturbed = runs[0].done, runs[0].done >= self._kick
+        states = [run.state for run in runs]
+        states += [states[-1].copy() for _ in self.belts[len(runs) :]]
+        self.state = lane_state(self.belts, states, self.dtype)
+        derive(self._belt, self.state, self._work.stations)
+        self.begun = self.ended.data[0, 1] = runs[0].time
+        for lane, run in enumerate(runs):
+            self.rows.data[: self.done, :, lane] = run.rows
+        if self._explicit is not None:
+            self._explicit = (self.belts[0], states[0], *self._explicit[2:])
+
+    def state_of(self, lane: int) -> State:
+        """Return the present state of a run; a copy."""
+        if self._explicit is not None:
+            return self._explicit[1].copy()
+        return take_lane(self.state, lane, self.belts[lane])
 
     def _displace(self, lane: int, shape: np.ndarray) -> None:
         if self._explicit is None:
@@ -281,6 +309,11 @@ class Transient:
         return float(self.batch.ended.data[0, 1, self._lane])
 
     @property
+    def state(self) -> State:
+        """The present state; a copy."""
+        return self.batch.state_of(self._lane)
+
+    @property
     def done(self) -> int:
         """Samples recorded so far, up to the one at which the run failed."""
         taken = round(self.time / self.interval)
@@ -289,7 +322,7 @@ class Transient:
     @property
     def steps(self) -> int:
         """Steps taken so far."""
-        return round(self.time / self.step)
+        return round((self.time - self.batch.begun) / self.step)
 
     @property
     def contact_solves(self) -> int:
