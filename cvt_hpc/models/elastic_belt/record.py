@@ -41,6 +41,7 @@ SHARED = (
     "arc_probes",
     "step",
     "precision",
+    "contact_sweeps",
 )
 
 

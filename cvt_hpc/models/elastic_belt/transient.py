@@ -151,7 +151,8 @@ class Batch:
         self.belts = [belt_constants(point) for point in padded]
         self.dtype = PRECISIONS[p["precision"]] if stepper == "imex" else np.float64
         starts = [initial_state(point, belt) for point, belt in zip(padded, self.belts, strict=True)]
-        self.state = lane_state(self.belts, starts, self.dtype)
+        self._sweeps = p["contact_sweeps"] if stepper == "imex" else 0
+        self.state = lane_state(self.belts, starts, self.dtype, self._sweeps)
         self._belt = lane_belt(self.belts, self.dtype)
         self._work = imex_work(self.state)
         derive(self._belt, self.state, self._work.stations)
@@ -221,7 +222,7 @@ class Batch:
         self.done, self._disturbed = runs[0].done, runs[0].done >= self._kick
         states = [run.state for run in runs]
         states += [states[-1].copy() for _ in self.belts[len(runs) :]]
-        self.state = lane_state(self.belts, states, self.dtype)
+        self.state = lane_state(self.belts, states, self.dtype, self._sweeps)
         derive(self._belt, self.state, self._work.stations)
         self.begun = self.ended.data[0, 1] = runs[0].time
         for lane, run in enumerate(runs):
