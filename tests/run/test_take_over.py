@@ -38,12 +38,11 @@ def test_a_run_taken_over_is_the_run_that_was_not_broken_off(stepper):
     assert run.steps == pytest.approx(1e-3 / STEPS[stepper], abs=1)  # its own, without those before
     expected, found = whole.runs[0].displacement, run.displacement
     assert np.array_equal(found[:BEFORE], expected[:BEFORE])
-    # the same steps from a state that was handed on to a part in 1e16; imex has an error of its own, of some nm
     moved = np.abs(expected[BEFORE:] - expected[BEFORE - 1]).max()
-    assert moved > 1e-6
-    assert found[BEFORE:] == pytest.approx(
-        expected[BEFORE:], abs=moved * (0.02 if stepper == "imex" else 1e-8)
-    )
+    assert moved > 1e-4
+    # the general form moves the sheave by forces of the end of a step, not of its start; imex has an error of its own
+    allowed = {"explicit": 0.0, "symplectic_euler": 1e-3, "imex": 0.01}[stepper]
+    assert found[BEFORE:] == pytest.approx(expected[BEFORE:], abs=moved * allowed)
 
 
 def test_lanes_take_over_each_its_own_run():
@@ -53,24 +52,21 @@ def test_lanes_take_over_each_its_own_run():
     marched(taken, BEFORE + TOGETHER)
     marched(led, BEFORE + TOGETHER)
     for run, other in zip(taken.runs, led.runs, strict=True):
-        moved = np.abs(other.displacement[BEFORE:] - other.displacement[BEFORE - 1]).max()
-        assert run.displacement == pytest.approx(other.displacement, abs=1e-8 * moved)
+        # what imex remembers of the step before is lost: the force of a step of 2 us, taken a step later
+        assert run.displacement == pytest.approx(other.displacement, abs=1e-9)
     assert np.abs(taken.runs[0].displacement - taken.runs[2].displacement).max() > 1e-7
 
 
 @pytest.mark.parametrize("stepper", ["imex", "symplectic_euler"])
 def test_the_disturbance_comes_once(stepper):
     kick = 80
-    late, early = marched(runs("explicit"), kick + 1), marched(runs("explicit"), kick)
-    shift = []
-    for led in (late, early):
+    whole = marched(runs("explicit"), kick + 2).runs[0].displacement
+    for before in (kick, kick + 1):
         taken = runs(stepper)
-        taken.take_over(led.runs)
-        before = taken.runs[0].state.fields[0]
+        taken.take_over(marched(runs("explicit"), before).runs)
         taken.advance(1)
-        shift.append(np.abs(taken.runs[0].state.fields[0] - before).max())
-    # 1 um at the kick; within a sample the coarse belt moves by some nm otherwise
-    assert shift[0] < 0.2e-6 < 0.5e-6 < shift[1]
+        # 1 um, given twice or not at all, would show at the probes as 0.5 um or more; imex is some nm off
+        assert taken.runs[0].displacement[before] == pytest.approx(whole[before], abs=0.1e-6)
 
 
 def test_another_model_of_the_belt_takes_over_what_it_can_represent():
@@ -78,5 +74,5 @@ def test_another_model_of_the_belt_takes_over_what_it_can_represent():
     taken = runs("scipy_bdf", "quasi_static_belt", quasi_static_batch)
     taken.take_over(led.runs)
     (before,), (run,) = led.runs, taken.runs
-    assert run.state.fields[0] == pytest.approx(before.state.fields[0], abs=2e-5)  # its splines are coarse
+    assert run.state.fields[0] == pytest.approx(before.state.fields[0], abs=1e-4)  # its splines are coarse
     assert run.state.scalars[1] == pytest.approx(before.state.scalars[1], rel=1e-12)

@@ -202,7 +202,7 @@ class GeneralTransient:
             Of the same mesh, sampling and duration.
         """
         (run,) = runs
-        self.done, self._disturbed = run.done, run.done >= self._kick
+        self.done, self._disturbed = run.done, run.done > self._kick
         self._rows.data[: self.done, :, 0] = run.rows
         self._marching.begin(run.time, self._form.pack(run.state))
 

@@ -219,10 +219,11 @@ class Batch:
         runs : sequence of Transient or GeneralTransient
             One for each run, of the same mesh, sampling and duration, all at the same time.
         """
-        self.done, self._disturbed = runs[0].done, runs[0].done >= self._kick
+        self.done, self._disturbed = runs[0].done, runs[0].done > self._kick
         states = [run.state for run in runs]
         states += [states[-1].copy() for _ in self.belts[len(runs) :]]
         self.state = lane_state(self.belts, states, self.dtype, self._sweeps)
+        self._work = imex_work(self.state)
         derive(self._belt, self.state, self._work.stations)
         self.begun = self.ended.data[0, 1] = runs[0].time
         for lane, run in enumerate(runs):
