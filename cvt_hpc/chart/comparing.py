@@ -164,7 +164,8 @@ def error(quantity: Quantity, measurement: Measurement, reference: Measurement) 
     name = quantity.name
     if name not in measurement.values or name not in reference.values:
         return math.nan
-    found, true = measurement.values[name], reference.values[name]
+    found = measurement.values[name]
+    true = reference.values[name][: len(found)]  # of a choice the first starts may be enough
     if name == "occurrence":
         return float(np.mean(found != true))
     if name == "trajectory":

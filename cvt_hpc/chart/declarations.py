@@ -17,7 +17,19 @@ CHART = {
         300.0, "s", "core-seconds after which a run is given up", minimum=0.0, exclusive=True
     ),
 }
+LEAD = {
+    "stepper": Parameter(None, "", "stepper"),
+    "until": Parameter(None, "s", "when the methods take over", minimum=0.0, exclusive=True),
+}
 SCENE = {
+    "time_limit": Parameter(
+        math.inf,
+        "s",
+        "core-seconds after which a run of this scene is given up, where the chart allows more",
+        minimum=0.0,
+        exclusive=True,
+        allow_infinite=True,
+    ),
     "title": Parameter("", "", "heading of the scene's picture"),
     "model": Parameter(
         "", "", "model, where it is not that of the job; the job's own tables then do not count"
@@ -49,6 +61,8 @@ CHOICE = {
     "stepper": Parameter(
         "", "", "stepper, where it is not the base's; what the base sets then does not count"
     ),
+    "model": Parameter("", "", "model, where it is not the scene's; it is told all that the scene sets"),
+    "starts": Parameter(0, "", "the first of the scene's starts, so many; 0: all", minimum=0),
     "refines": Parameter(
         False, "", "nearer to the truth than the base: the difference is an error of the base"
     ),

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
+
+from threadpoolctl import threadpool_limits
 
 from cvt_hpc.chart.budget_drawing import draw_budget
 from cvt_hpc.chart.comparing import Comparison, compare
@@ -122,5 +125,8 @@ def _measure_together(
 
 
 def _measure(chart: Chart, point: Point) -> Measurement:
-    limit = chart.time_limit if point.timed else float("inf")
-    return measure(point, chart.scene(point.scene), chart.repeats, limit)
+    scene = chart.scene(point.scene)
+    limit = min(chart.time_limit, scene.time_limit) if point.timed else math.inf
+    # threads of the linear algebra wait for each other in loops, which would count as a method's own time
+    with threadpool_limits(1):
+        return measure(point, scene, chart.repeats, limit)

@@ -13,7 +13,7 @@ from typing import Any
 from cvt_hpc.models import MODELS
 from cvt_hpc.variables import Status
 
-_FIRST_SLICE = 20  # samples; doubled while a slice takes less than _SLICE, so that a time limit can be kept
+_FIRST_SLICE = 1  # sample; doubled while a slice takes less than _SLICE, so that a time limit can be kept
 _SLICE = 0.2  # [s]
 _TOO_LONG = (Status.TIMED_OUT, "takes longer than the chart's time_limit")
 
@@ -63,6 +63,7 @@ def march(
     lanes: int,
     until: float,
     time_limit: float = math.inf,
+    led: Sequence[Any] = (),
 ) -> Marched:
     """Do several runs, in groups that advance together.
 
@@ -79,20 +80,40 @@ def march(
     time_limit : float
         Core-seconds after which a group is given up and counts as failed [s]; without one nothing but the
         runs is in their time.
+    led : sequence of Transient
+        What the runs take over from, one for each; none: they start by themselves.
     """
     runs: list[Any] = []
     failures: list[tuple[Status, str] | None] = []
-    seconds = 0.0
+    seconds = simulated = 0.0
     for first in range(0, len(points), lanes):
         batch = _module(model).batch(points[first : first + lanes], stepper)
+        if led:
+            batch.take_over(led[first : first + lanes])
+        begun = batch.done
         samples = batch.samples if math.isinf(until) else min(batch.samples, round(until / batch.interval))
         piece = samples if math.isinf(time_limit) else _FIRST_SLICE
         started = time.process_time()
         in_time = _advance(batch, samples, piece, started + time_limit)
         seconds += time.process_time() - started
         runs += batch.runs
+        simulated += sum(run.time - begun * batch.interval for run in batch.runs)
         failures += [run.failure or (None if in_time else _TOO_LONG) for run in batch.runs]
-    return Marched(tuple(runs), tuple(failures), seconds, sum(run.time for run in runs))
+    return Marched(tuple(runs), tuple(failures), seconds, simulated)
+
+
+def lead(model: str, stepper: str, points: Sequence[dict[str, Any]], until: float) -> tuple[Any, ...]:
+    """Return runs that have been brought to a time, from where others can take over.
+
+    Parameters
+    ----------
+    model, stepper, points
+        As for `march`.
+    until : float
+        The time [s].
+    """
+    lanes = most_lanes(model, stepper, points[0])
+    return march(model, stepper, points, lanes, until).runs
 
 
 def _advance(batch: Any, samples: int, piece: int, deadline: float) -> bool:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.chart.marching import Marched, march, most_lanes, warm_up
-from cvt_hpc.chart.plan import Point, Scene
+from cvt_hpc.chart.marching import Marched, lead, march, most_lanes, warm_up
+from cvt_hpc.chart.plan import Point, Scene, start_parameters
 from cvt_hpc.chart.quantities import History, observe, strand_of
 from cvt_hpc.models import MODELS
 from cvt_hpc.variables import Status
@@ -33,8 +33,8 @@ class Measurement:
     values : dict
         By quantity an array with the starts along the first axis; empty where it failed.
     cost : float
-        Core-seconds for each simulated second of a run, the shortest of all repeats; nan where it is of no
-        interest.
+        Core-seconds for each simulated second of a run, the shortest of all repeats; of a run that failed or
+        was given up until then; nan where it is of no interest.
     core_seconds : float
         Processor time that the first pass took [s].
     simulated : float
@@ -73,15 +73,27 @@ def measure(point: Point, scene: Scene, repeats: int, time_limit: float) -> Meas
     runs = math.ceil(point.starts / lanes) * lanes if point.timed else point.starts
     points = [point.parameters(k) for k in range(runs)]
     warm_up(model, stepper, points[:lanes])
-    marched = march(model, stepper, points, lanes, point.until, time_limit)
+    led = _led(point, scene, runs)
+    for run in led:
+        if run.failure is not None:
+            return Measurement(f"{_explained(run, run.failure)}, before the method takes over")
+    marched = march(model, stepper, points, lanes, point.until, time_limit, led)
     reason, values = _outcome(point, scene, marched)
-    cost = math.nan
+    cost = marched.cost if point.timed else math.nan
     if point.timed and not reason:
         again = repeats if marched.core_seconds < _LONG * runs / lanes else 0
-        costs = [march(model, stepper, points, lanes, point.until).cost for _ in range(again)]
+        costs = [march(model, stepper, points, lanes, point.until, led=led).cost for _ in range(again)]
         cost = min([marched.cost, *costs])
     counters = _mean_counters(marched)
     return Measurement(reason, values, cost, marched.core_seconds, marched.simulated, counters)
+
+
+def _led(point: Point, scene: Scene, runs: int) -> tuple[Any, ...]:
+    """Runs that a point's take over from; none where they start by themselves."""
+    if scene.lead is None:
+        return ()
+    job, until = scene.lead.job, scene.lead.until
+    return lead(job.model, job.stepper, [start_parameters(job, k) for k in range(runs)], until)
 
 
 def exact_displacement(point: Point, start: int) -> tuple[Any, NDArray[np.float64]]:
@@ -113,7 +125,7 @@ def _exact(point: Point, scene: Scene) -> Measurement:
 
 def _outcome(point: Point, scene: Scene, marched: Marched) -> tuple[str, dict[str, NDArray[np.float64]]]:
     """Why a point failed, or else its values."""
-    whole = math.isinf(point.until)
+    whole = math.isinf(point.until) and scene.lead is None
     observed = []
     for k, run in enumerate(marched.runs[: point.starts]):
         failure = marched.failures[k]
@@ -122,11 +134,15 @@ def _outcome(point: Point, scene: Scene, marched: Marched) -> tuple[str, dict[st
         if failure is None and whole:
             failure = _doubt(point.job.model, run)
         if failure is not None:
-            status, why = failure
             count = f" (start {k + 1} of {point.starts})" if point.starts > 1 else ""
-            return f"{status.name.lower()}{count} at {run.time * 1e3:.4g} ms: {why}", {}
+            return _explained(run, failure, count), {}
         observed.append(observe(_history(run), scene.quantities, whole))
     return "", _stacked(observed)
+
+
+def _explained(run: Any, failure: tuple[Status, str], count: str = "") -> str:
+    status, why = failure
+    return f"{status.name.lower()}{count} at {run.time * 1e3:.4g} ms: {why}"
 
 
 def _history(run: Any) -> History:

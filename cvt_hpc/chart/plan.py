@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from enum import Enum
 from typing import Any
 
@@ -52,6 +52,22 @@ class Quantity:
 
 
 @dataclass(frozen=True)
+class Lead:
+    """How runs get to the state from which the methods of a scene march.
+
+    Attributes
+    ----------
+    job : Job
+        The stepper that leads there, with its settings.
+    until : float
+        When the methods take over [s].
+    """
+
+    job: Job
+    until: float
+
+
+@dataclass(frozen=True)
 class Scene:
     """One problem on which methods compete.
 
@@ -65,6 +81,11 @@ class Scene:
         Number of runs, from as many random starts.
     exact : bool
         Whether the reference is the model's exact solution.
+    time_limit : float
+        Core-seconds [s] after which a run is given up, where the chart allows more.
+    lead : Lead or None
+        What brings all runs, the reference's too, to a state from which they start; only trajectories are
+        judged then.
     """
 
     name: str
@@ -72,6 +93,8 @@ class Scene:
     quantities: tuple[Quantity, ...]
     starts: int
     exact: bool
+    time_limit: float = math.inf
+    lead: Lead | None = None
 
 
 @dataclass(frozen=True)
@@ -139,9 +162,14 @@ class Point:
 
     def parameters(self, start: int) -> dict[str, Any]:
         """Return the flat parameters [SI] of one of the runs."""
-        if start == 0:
-            return dict(self.job.parameters)
-        return {**self.job.parameters, "seed": self.job.parameters["seed"] + start}
+        return start_parameters(self.job, start)
+
+
+def start_parameters(job: Job, start: int) -> dict[str, Any]:
+    """Return the flat parameters [SI] of a job's run from one of its random starts."""
+    if start == 0:
+        return dict(job.parameters)
+    return {**job.parameters, "seed": job.parameters["seed"] + start}
 
 
 @dataclass(frozen=True)
@@ -189,7 +217,7 @@ class Chart:
             "repeats": self.repeats,
             "time_limit": self.time_limit,
             "budgeted": list(self.budgeted),
-            "scenes": {scene.name: _to_json(asdict(scene)) for scene in self.scenes},
+            "scenes": {scene.name: _scene_to_json(scene) for scene in self.scenes},
             "points": {
                 point.name: {
                     "role": point.role.value,
@@ -198,7 +226,7 @@ class Chart:
                     "lanes": point.lanes,
                     "until": _to_json(point.until),
                     "refines": point.refines,
-                    "job": {**point.job.resolved(), "name": "", "description": ""},
+                    "job": _job_to_json(point.job),
                 }
                 for point in self.points
             },
@@ -208,6 +236,15 @@ class Chart:
         """Return the SHA-256 [hex] of `resolved`; name and description do not count."""
         document = {**self.resolved(), "name": "", "description": ""}
         return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
+
+
+def _scene_to_json(scene: Scene) -> dict[str, Any]:
+    lead = {"until": scene.lead.until, "job": _job_to_json(scene.lead.job)} if scene.lead else None
+    return {**_to_json(asdict(replace(scene, lead=None))), "lead": lead}
+
+
+def _job_to_json(job: Job) -> dict[str, Any]:
+    return {**job.resolved(), "name": "", "description": ""}
 
 
 def _to_json(value: Any) -> Any:

@@ -27,6 +27,8 @@ def check_prospects(chart: Chart) -> None:
         if scene.exact:
             _check_exact(point, where)
         _check_channels(point, scene, where)
+        if scene.lead is not None:
+            _check_lead(point, where)
     for point in chart.points:
         most = most_lanes(point.job.model, point.job.stepper, point.parameters(0))
         if point.lanes > most:
@@ -44,12 +46,20 @@ def _check_exact(point: Point, where: str) -> None:
         raise InputError(f"{where} reference: {error}") from error
 
 
+def _check_lead(point: Point, where: str) -> None:
+    module = import_module(MODELS[point.job.model] + ".transient")
+    if not hasattr(module.batch([point.parameters(0)], point.job.stepper), "take_over"):
+        raise mismatch(f"{where} lead", "a model whose runs can take over from others", point.job.model)
+
+
 def _check_channels(point: Point, scene: Scene, where: str) -> None:
     needed = channels_needed(scene.quantities)
     if scene.exact and needed:
         raise mismatch(f"{where} quantities", "those that an exact solution has", f"channel {needed[0]}")
-    transient = import_module(MODELS[point.job.model] + ".transient").Transient
-    run = transient(point.parameters(0), point.job.stepper)
+    if not needed:
+        return
+    module = import_module(MODELS[point.job.model] + ".transient")
+    run = module.batch([point.parameters(0)], point.job.stepper).runs[0]
     for channel in needed:
         if not _has_channel(run, channel):
             expected = f"a model that records {channel}"

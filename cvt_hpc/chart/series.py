@@ -52,8 +52,9 @@ def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
     if coarser.parameters[key] <= fine.parameters[key]:
         raise mismatch(f"{where} coarser", f"more than {key} = {fine.parameters[key]:g}", f"{coarse}")
     label = in_words(raw["stepper"])
-    yield Point(f"{name}-reference", name, Role.REFERENCE, raw["stepper"], label, key, fine, starts)
-    yield Point(f"{name}-coarser", name, Role.COARSER, raw["stepper"], label, key, coarser, starts)
+    both = {"starts": starts, "until": stage.until}
+    yield Point(f"{name}-reference", name, Role.REFERENCE, raw["stepper"], label, key, fine, **both)
+    yield Point(f"{name}-coarser", name, Role.COARSER, raw["stepper"], label, key, coarser, **both)
 
 
 def method_points(name: str, raw: Any, stages: list[Stage], where: str) -> Iterator[Point]:
@@ -82,7 +83,7 @@ def method_points(name: str, raw: Any, stages: list[Stage], where: str) -> Itera
     for stage in _chosen_stages(raw.get("scenes"), stages, where):
         for i, value in enumerate(raw[key], 1):
             job = stage.job(where, stepper=own["stepper"], **read_set(raw, where), **{key: value})
-            until = own["until"] if own["until"] < job.parameters["duration"] else math.inf
+            until = own["until"] if own["until"] < job.parameters["duration"] else stage.until
             _check_until(until, stage.scene.quantities, where)
             yield Point(
                 f"{stage.scene.name}-{name}-{i}",
@@ -113,7 +114,7 @@ def budget_points(raw: Any, stages: list[Stage], where: str) -> tuple[list[Point
         choice = read_table(CHOICE, table, place, ("set",))
         # what is set for the base's stepper may be unknown to another
         changed = {**({} if choice["stepper"] else base), **read_set(table, place)}
-        job = stage.job(place, stepper=choice["stepper"] or stepper, **changed)
+        job = stage.job(place, choice["model"], stepper=choice["stepper"] or stepper, **changed)
         points.append(
             Point(
                 f"{scene}-choice-{name}",
@@ -123,7 +124,7 @@ def budget_points(raw: Any, stages: list[Stage], where: str) -> tuple[list[Point
                 choice["label"] or in_words(name),
                 "",
                 job,
-                starts,
+                min(choice["starts"] or starts, starts),
                 refines=choice["refines"],
             )
         )

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from cvt_hpc.chart.declarations import SCENE, read_set, read_table, read_tables
-from cvt_hpc.chart.plan import Scene
+from cvt_hpc.chart.declarations import LEAD, SCENE, read_set, read_table, read_tables
+from cvt_hpc.chart.plan import Lead, Quantity, Scene
 from cvt_hpc.chart.quantities import read_quantity
 from cvt_hpc.errors import mismatch, show
 from cvt_hpc.job import Job, build_job
@@ -36,11 +37,17 @@ class Stage:
     values: dict[str, Any]
     where: str
 
-    def job(self, where: str, **values: Any) -> Job:
-        """Return the job of a run of this scene with further values set."""
+    @property
+    def until(self) -> float:
+        """How far its runs are marched [s]: where methods take over, to the end of what is judged."""
+        return max(q.until for q in self.scene.quantities) if self.scene.lead else math.inf
+
+    def job(self, where: str, model: str = "", **values: Any) -> Job:
+        """Return the job of a run of this scene, or of another model, with further values set."""
         # None: the model's own choice of a stepper
         values = {key: value for key, value in values.items() if value is not None}
-        return build_job(self.document, where, {**self.values, **values}, "set")
+        document = {**self.document, "model": model} if model else self.document
+        return build_job(document, where, {**self.values, **values}, "set")
 
 
 def read_stage(name: str, raw: Any, document: dict[str, Any], replaced: dict[str, Any], source: str) -> Stage:
@@ -66,7 +73,7 @@ def read_stage(name: str, raw: Any, document: dict[str, Any], replaced: dict[str
     """
     where = f"{source}: [chart.scenes.{name}]"
     check_word(name, where)
-    own = read_table(SCENE, raw, where, ("set", "quantities", "reference"))
+    own = read_table(SCENE, raw, where, ("set", "quantities", "reference", "lead"))
     base = document
     if own["model"]:
         head = {key: document[key] for key in ("name", "description") if key in document}
@@ -77,8 +84,31 @@ def read_stage(name: str, raw: Any, document: dict[str, Any], replaced: dict[str
         for key, table in asked.items()
     )
     exact = raw.get("reference") == "exact"
-    scene = Scene(name, own["title"] or in_words(name), quantities, own["starts"], exact)
-    return Stage(scene, base, {**read_set(raw, where), **replaced}, where)
+    title = own["title"] or in_words(name)
+    scene = Scene(name, title, quantities, own["starts"], exact, own["time_limit"])
+    stage = Stage(scene, base, {**read_set(raw, where), **replaced}, where)
+    if "lead" not in raw:
+        return stage
+    return replace(stage, scene=replace(scene, lead=_read_lead(stage, raw["lead"])))
+
+
+def _read_lead(stage: Stage, raw: Any) -> Lead:
+    """What brings the runs of a scene to where its methods take over."""
+    where = f"{stage.where} lead"
+    own = read_table(LEAD, raw, where, ("set",))
+    if stage.scene.exact:
+        raise mismatch(f"{stage.where} reference", "a stepper, because methods take over", '"exact"')
+    for quantity in stage.scene.quantities:
+        _check_led(quantity, own["until"], f"{stage.where} quantities.{quantity.name}")
+    return Lead(stage.job(where, stepper=own["stepper"], **read_set(raw, where)), own["until"])
+
+
+def _check_led(quantity: Quantity, until: float, where: str) -> None:
+    if quantity.name != "trajectory":
+        raise mismatch(where, "the trajectory alone, because methods take over", quantity.name)
+    if quantity.since < until:
+        expected = f"{until:g} s or more, when methods take over"
+        raise mismatch(f"{where}.since", expected, f"{quantity.since:g} s")
 
 
 def check_word(name: str, where: str) -> None:

@@ -41,6 +41,8 @@ class LaneContact(NamedTuple):
         solves so far, and whether (1) a search for the closed set did not end.
     fresh : (1,) bool array
         False until the factors belong to the closed set.
+    sweeps : int
+        Sweeps of projected Gauss-Seidel instead (`lane_gauss_seidel`); 0: none, the exact solution.
     """
 
     weight: np.ndarray
@@ -49,9 +51,10 @@ class LaneContact(NamedTuple):
     stations: LaneArray
     scalars: LaneArray
     fresh: np.ndarray
+    sweeps: int
 
 
-def lane_contact(wraps: list[Sheaves], dtype: type) -> LaneContact:
+def lane_contact(wraps: list[Sheaves], dtype: type, sweeps: int = 0) -> LaneContact:
     """All stations closed, for wraps of the same stations, one for each lane.
 
     Parameters
@@ -60,6 +63,8 @@ def lane_contact(wraps: list[Sheaves], dtype: type) -> LaneContact:
         One for each lane.
     dtype : type
         np.float64 or np.float32.
+    sweeps : int
+        As in `LaneContact`.
     """
     weight = wraps[0].weight
     stations = LaneArray(weight.size, 9, len(wraps), dtype)
@@ -75,7 +80,7 @@ def lane_contact(wraps: list[Sheaves], dtype: type) -> LaneContact:
             wrap.tilt_compliance,
         )
     shared = (weight.astype(dtype), wraps[0].tilt[0].astype(dtype), wraps[0].tilt[1].astype(dtype))
-    return LaneContact(*shared, stations, scalars, np.zeros(1, dtype=np.bool_))
+    return LaneContact(*shared, stations, scalars, np.zeros(1, dtype=np.bool_), sweeps)
 
 
 @kernel

@@ -39,5 +39,12 @@ PARAMETERS = {
             "of the numbers in a step: 8 runs advance together in double, 16 in single",
             choices=("double", "single"),
         ),
+        "contact_sweeps": Parameter(
+            0,
+            "",
+            "sweeps of projected Gauss-Seidel in each step's contact, for comparison; 0: solved exactly",
+            minimum=0,
+            maximum=10_000,
+        ),
     }
 }

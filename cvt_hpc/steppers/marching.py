@@ -52,12 +52,25 @@ class Marching:
         self._system = system
         self._control = self._method.control(parameters)
         self._work = self._method.work(system)
-        self._clock = np.zeros(1)
+        self._clock, self._begun = np.zeros(1), 0.0
         self._counts = np.zeros(len(COUNTERS), dtype=np.int64)
 
     def tell(self, **options: Any) -> None:
         """Tell an integrator of SciPy more of the system, such as its Jacobian by `jac`."""
         self._work.options |= options
+
+    def begin(self, time: float, state: np.ndarray) -> None:
+        """Start from a later state.
+
+        Parameters
+        ----------
+        time : float
+            Simulated time [s].
+        state : (n,) array
+            The unknowns there.
+        """
+        self._begun = self._clock[0] = time
+        self.y[:] = state
 
     def advance(self, rows: np.ndarray) -> Result:
         """March on.
@@ -85,7 +98,9 @@ class Marching:
     @property
     def step(self) -> float:
         """Mean time step so far [s]; before the first one the step that was asked for, nan if none was."""
-        return self.time / self.steps if self.steps else float(getattr(self._control, "step", np.nan))
+        if not self.steps:
+            return float(getattr(self._control, "step", np.nan))
+        return (self.time - self._begun) / self.steps
 
     def counters(self) -> dict[str, int]:
         """Work done so far, by the names of COUNTERS."""

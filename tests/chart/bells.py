@@ -49,7 +49,7 @@ class Transient:
         self.probes = (Probe("rim 1/2"), Probe("foot"), Probe("driving arc 1/2"))
         self.interval = 1 / parameters["sampling_rate"]
         self.samples = round(parameters["duration"] * parameters["sampling_rate"])
-        self.done = 0
+        self.done, self.led = 0, None
         self.setting = parameters["step"] if "step" in parameters else parameters["tolerance"]
 
     @property
@@ -65,7 +65,14 @@ class Transient:
         p = self.parameters
         factor = 1.0 + LOUDER[self.stepper] * self.setting
         factor *= 1.0 + p["scatter"] * np.random.default_rng(p["seed"]).standard_normal()
-        return np.column_stack([factor * exact(p, self.times), np.full(self.done, 7.0)])
+        found = np.column_stack([factor * exact(p, self.times), np.full(self.done, 7.0)])
+        if self.led is not None:
+            found[: len(self.led)] = self.led
+        return found
+
+    def take_over(self, runs):
+        (run,) = runs
+        self.done, self.led = run.done, run.displacement
 
     def channel(self, name):
         return {"load": self.parameters["load_slope"] * self.times}[name]
@@ -79,6 +86,7 @@ class Transient:
             and self.setting >= LONGEST_STEP
             and self.done + samples > self.samples // 2
         ):
+            Transient.clock.now += (self.samples // 2 - self.done) * 1.1e-9 / self.setting
             self.done = self.samples // 2
             return Status.FAILED_NUMERICS, "the bell has cracked (by 3 mm)"
         self.done += samples

@@ -58,6 +58,13 @@ def test_the_occurrence_is_the_share_of_starts_that_are_judged_differently():
     assert error(quantity("occurrence"), found, reference) == 0.5
 
 
+def test_a_choice_of_fewer_starts_is_compared_with_the_same_starts():
+    reference = measurement(amplitude=[[3.0], [5.0]], occurrence=[[1], [0]])
+    found = measurement(amplitude=[[3.3]], occurrence=[[1]])
+    assert error(quantity("amplitude"), found, reference) == pytest.approx(0.1)
+    assert error(quantity("occurrence"), found, reference) == 0.0
+
+
 def test_what_is_missing_is_no_error_of_zero():
     known, nothing = measurement(onset=[[100.0]]), measurement(onset=[[np.nan]])
     assert error(quantity("onset"), nothing, known) == math.inf

@@ -1,12 +1,14 @@
 """What a chart job says, and what is wrong with a bad one."""
 
 import math
+import sys
 
 import pytest
 
 from cvt_hpc.chart import load_chart
 from cvt_hpc.chart.plan import Role
 from cvt_hpc.errors import InputError
+from cvt_hpc.models import MODELS
 
 
 def test_a_chart_holds_every_run_that_it_needs(write_chart):
@@ -104,6 +106,56 @@ def test_a_scene_may_be_of_another_model(write_chart):
     assert (
         other.job.parameters["duration"] == 0.3
     )  # its own default: the job's tables are for the job's model
+
+
+def test_a_choice_may_be_of_another_model_and_of_fewer_starts(write_chart, monkeypatch):
+    monkeypatch.setitem(sys.modules, "gong", sys.modules["bell"])
+    monkeypatch.setitem(MODELS, "gong", "gong")
+    chart = load_chart(write_chart(('title = "Ringing"', "starts = 3"),
+                                   ('set = { loudness = "22 um" }', 'model = "gong"\nstepper = "hard"\nstarts = 2')))  # fmt: skip
+    choice = next(point for point in chart.points if point.name == "ringing-choice-louder")
+    assert (choice.job.model, choice.job.stepper, choice.starts) == ("gong", "hard", 2)
+    assert choice.job.parameters["loudness"] == 20e-6  # of the scene
+    assert chart.points_of("ringing", Role.BASE)[0].starts == 3
+
+
+LEAD = 'lead = { stepper = "hard", until = "40 ms", set = { step = "1 us" } }'
+PART = ('trajectory = { until = "10 ms"', 'trajectory = { since = "40 ms", until = "60 ms"')
+OTHERS = 'amplitude = { tolerance = "1 %" }\nfrequency = { tolerance = "1 %" }\noccurrence = {}\n'
+
+
+def test_where_methods_take_over_all_runs_end_with_what_is_judged(write_chart):
+    chart = load_chart(
+        write_chart((REFERENCE[0], f"{REFERENCE[1]}\n{LEAD}"), PART, (OTHERS, ""), ('until = "20 ms"', ""))
+    )
+    (scene,) = chart.scenes
+    assert scene.lead.until == 0.04 and scene.lead.job.stepper == "hard"
+    assert scene.lead.job.parameters["step"] == 1e-6 and scene.lead.job.parameters["loudness"] == 20e-6
+    measured = [p for p in chart.points if p.role in (Role.REFERENCE, Role.COARSER, Role.METHOD)]
+    assert {point.until for point in measured} == {0.06}
+    later = load_chart(write_chart((REFERENCE[0], f"{REFERENCE[1]}\n{LEAD.replace('1 us', '2 us')}"), PART, (OTHERS, ""),
+                                   ('until = "20 ms"', "")))  # fmt: skip
+    assert later.fingerprint() != chart.fingerprint()
+
+
+@pytest.mark.parametrize(
+    ("replacements", "message"),
+    [
+        (((REFERENCE[0], f"{REFERENCE[0]}\n{LEAD}"), PART, (OTHERS, "")),
+         'reference: expected a stepper, because methods take over, found "exact"'),
+        (((REFERENCE[0], f"{REFERENCE[1]}\n{LEAD}"), PART),
+         "quantities.amplitude: expected the trajectory alone, because methods take over, found amplitude"),
+        (((REFERENCE[0], f"{REFERENCE[1]}\n{LEAD}"), (OTHERS, "")),
+         "quantities.trajectory.since: expected 0.04 s or more, when methods take over, found 0 s"),
+        (((REFERENCE[0], f"{REFERENCE[1]}\n{LEAD.replace('until', 'til')}"), PART, (OTHERS, "")),
+         "lead til: unknown key; did you mean until?"),
+        ((('title = "Ringing"', 'time_limit = "0 s"'),), 'time_limit: expected > 0 s, found "0 s"'),
+    ],
+)  # fmt: skip
+def test_a_bad_lead_is_one_clear_error(write_chart, replacements, message):
+    with pytest.raises(InputError) as caught:
+        load_chart(write_chart(*replacements))
+    assert str(caught.value) == f"{WHERE}] {message}"
 
 
 WHERE = "c.toml: [chart.scenes.ringing"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from bells import Transient
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from cvt_hpc.chart import load_chart, make_chart
 from cvt_hpc.chart.table import table_lines
@@ -40,7 +41,8 @@ def test_the_table_holds_every_point_with_its_outcome(report):
     failed = rows[1]
     assert failed["outcome"] == "failed_numerics at 50 ms: the bell has cracked (by 3 mm)"
     assert (failed["setting"], failed["value"]) == ("step", "0.002")
-    assert failed["amplitude_error"] == failed["core_s_per_s"] == ""
+    assert failed["amplitude_error"] == ""
+    assert float(failed["core_s_per_s"]) == pytest.approx(20e3 * 1.1e-9 / 2e-3, rel=1e-2)  # until then
     good = rows[3]
     assert good["outcome"] == "done" and good["stepper"] == "soft"
     assert float(good["core_s_per_s"]) == pytest.approx(20e3 * 1.1e-9 / 1e-5, rel=1e-3)
@@ -48,6 +50,30 @@ def test_the_table_holds_every_point_with_its_outcome(report):
     assert float(good["amplitude_error"]) == 0.001
     assert (good["steps"], good["rates"]) == ("6000", "14000")
     assert [row["method"] for row in rows if row["chosen"] == "yes"] == ["clever"]
+
+
+def test_what_takes_longer_than_its_scene_allows_is_in_the_table_with_its_cost_so_far(write_chart, undrawn):
+    report = made(write_chart(('title = "Ringing"', 'time_limit = "0.5 s"')))
+    with report.table.open() as file:
+        (row,) = [
+            row for row in csv.DictReader(file) if row["method"] == "soft hammer" and row["value"] == "1e-06"
+        ]
+    assert row["outcome"].startswith("timed_out at ")
+    assert float(row["core_s_per_s"]) == pytest.approx(20e3 * 1.1e-9 / 1e-6, rel=1e-3)
+
+
+def test_a_method_is_measured_with_one_thread_of_linear_algebra(write_chart, undrawn, monkeypatch):
+    seen = set()
+    advance = Transient.advance
+
+    def watched(run, samples):
+        seen.update(library["num_threads"] for library in threadpool_info())
+        return advance(run, samples)
+
+    monkeypatch.setattr(Transient, "advance", watched)
+    with threadpool_limits(2):
+        made(write_chart())
+    assert seen == {1}
 
 
 def test_people_read_the_same(report):

@@ -17,7 +17,7 @@ from cvt_hpc.models.elastic_belt.lane_run import LaneRun
 from cvt_hpc.models.elastic_belt.march import march_explicit, march_imex
 from cvt_hpc.models.elastic_belt.record import lanes
 from cvt_hpc.models.elastic_belt.recorded_run import recording
-from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, PROFILES
+from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, ENDED_AT, PROFILES
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
 STEPS = {"imex": (imex_work, march_imex), "explicit": (explicit_work, march_explicit)}
@@ -45,6 +45,8 @@ class Batch:
         Samples of a whole run.
     done : int
         Samples taken so far.
+    begun : float
+        When it took over from another stepper [s]; 0 where it did not.
     interval, step : float
         Sampling interval and time step [s].
     """
@@ -61,10 +63,11 @@ class Batch:
         self.belts = [belt_constants(point) for point in padded]
         self.dtype = PRECISIONS[p["precision"]]
         starts = [initial_state(point, belt) for point, belt in zip(padded, self.belts, strict=True)]
-        self.state = lane_state(self.belts, starts, self.dtype)
+        self._sweeps = p["contact_sweeps"] if stepper == "imex" else 0
+        self.state = lane_state(self.belts, starts, self.dtype, self._sweeps)
         self._belt = lane_belt(self.belts, self.dtype)
-        work_space, self._march = STEPS[stepper]
-        self._work = work_space(self.state)
+        self._work_space, self._march = STEPS[stepper]
+        self._work = self._work_space(self.state)
         derive(self._belt, self.state, self._work.stations)
         self.plan = recording(p, self.dtype)
         self.interval, self.samples = self.plan.interval, self.plan.samples
@@ -73,7 +76,7 @@ class Batch:
         sensed = self.plan.sensing.matrix.shape[0]
         self.rows = LaneArray(self.samples, sensed + len(CHANNELS), width)
         self._ordered: np.ndarray | None = None
-        self.done = 0
+        self.done, self.begun = 0, 0.0
         n = self.plan.mesh.cell.size
         self.profiles = [LaneArray(n, len(PROFILES), width) for _ in range(2)]
         self.ended = LaneArray(1, len(ENDED), width)
@@ -116,6 +119,24 @@ class Batch:
             self.ended,
         )
         self.done = last
+
+    def take_over(self, runs: Sequence[Any]) -> None:
+        """Go on from where runs by another stepper stand, their history included but for the mean profiles.
+
+        Parameters
+        ----------
+        runs : sequence of LaneRun or GeneralTransient
+            One for each run, of the same mesh, sampling and duration, all at the same time.
+        """
+        self.done, self._disturbed = runs[0].done, runs[0].done > self.plan.kick
+        states = [run.state for run in runs]
+        states += [states[-1].copy() for _ in self.belts[len(runs) :]]
+        self.state = lane_state(self.belts, states, self.dtype, self._sweeps)
+        self._work = self._work_space(self.state)
+        derive(self._belt, self.state, self._work.stations)
+        self.begun = self.ended.data[0, ENDED_AT] = runs[0].time
+        for lane, run in enumerate(runs):
+            self.rows.data[: self.done, :, lane] = run.rows
 
     def history(self, lane: int) -> np.ndarray:
         """Rows of a run, (samples, S + C); put in order of lanes and channels once all are there.

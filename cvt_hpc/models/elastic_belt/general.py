@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -142,6 +143,19 @@ class GeneralTransient(RecordedRun):
     def rows(self) -> np.ndarray:
         """The sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C)."""
         return self._rows.data[: self.done, :, 0]
+
+    def take_over(self, runs: Sequence[Any]) -> None:
+        """Go on from where a run by another stepper stands, its history included but for the mean profiles.
+
+        Parameters
+        ----------
+        runs : sequence of one LaneRun or GeneralTransient
+            Of the same mesh, sampling and duration.
+        """
+        (run,) = runs
+        self.done, self._disturbed = run.done, run.done > self._plan.kick
+        self._rows.data[: self.done, :, 0] = run.rows
+        self._marching.begin(run.time, self._form.pack(run.state))
 
     def advance(self, samples: int) -> tuple[Status, str] | None:
         """March on.

@@ -242,7 +242,7 @@ def _carry(belt: Belt, spacing: float) -> float:
     return np.exp(-spacing / way) / (-np.expm1(-spacing / way) * memory)
 
 
-def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState:
+def lane_state(belts: list[Belt], states: list[State], dtype: type, sweeps: int = 0) -> LaneState:
     """State of several runs on the same mesh, with fresh contacts.
 
     Parameters
@@ -251,6 +251,8 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState
         One for each lane, all at the same time.
     dtype : type
         np.float64 or np.float32.
+    sweeps : int
+        Of the contact, as `LaneContact` has them.
     """
     n, lanes = belts[0].cell.size, len(belts)
     fields = LaneArray(n, states[0].fields.shape[0], lanes, dtype)
@@ -258,7 +260,7 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState
     for lane, (belt, state) in enumerate(zip(belts, states, strict=True)):
         put_lane(fields.data, scalars.data, lane, belt, state)
     wraps = [[belt.driving for belt in belts], [belt.driven for belt in belts]]
-    contacts = (lane_contact(wraps[0], dtype), lane_contact(wraps[1], dtype))
+    contacts = (lane_contact(wraps[0], dtype, sweeps), lane_contact(wraps[1], dtype, sweeps))
     return LaneState(fields, scalars, np.array([states[0].scalars[0]]), contacts)
 
 
@@ -276,7 +278,7 @@ def put_lane(fields: np.ndarray, scalars: np.ndarray, lane: int, belt: Belt, sta
 
 def take_lane(state: LaneState, lane: int, belt: Belt) -> State:
     """One run's state out of its lane."""
-    values = state.fields.data[:, :, lane].T.astype(float)
+    values = state.fields.data[:, :, lane].T.astype(float, order="C")
     values[V_ELEMENT] += belt.belt_speed
     values[V_RING] += belt.belt_speed
     values[N_ELEMENT] += 1.0

@@ -63,6 +63,7 @@ from cvt_hpc.physics.lane_friction import (
     lane_law,
     lane_table,
 )
+from cvt_hpc.physics.lane_gauss_seidel import sweep_lane_contact
 
 MOST_CONTACT_ROUNDS = 200
 LEAST_SHARE_OF_WIDTH = 1e-3  # of friction_speed: below it friction is linear to 1e-6, and has no direction
@@ -170,7 +171,10 @@ def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -
         wrap_stations = contact.stations
         for k in range(contact.weight.size):
             wrap_stations[k, GAP] = fma(wedge, fields[first + k, W], opening)
-        solve_lane_contact(contact, MOST_CONTACT_ROUNDS)
+        if contact.sweeps > 0:
+            sweep_lane_contact(contact)
+        else:
+            solve_lane_contact(contact, MOST_CONTACT_ROUNDS)
         for k in range(contact.weight.size):
             push = maximum(wrap_stations[k, PUSHED], 0.0)
             stations[first + k, FORCE] = select(wrap_stations[k, CLOSED] > 0.5, push, 0.0)

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.belt import State
 from cvt_hpc.models.elastic_belt.doubts import FAILURES
+from cvt_hpc.models.elastic_belt.lane_belt import take_lane
 from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
 from cvt_hpc.models.elastic_belt.sampling import CONTACT_SOLVES, ENDED_AT, OUTCOME, REPEATED, Outcome
 from cvt_hpc.variables import Status
@@ -50,6 +52,11 @@ class LaneRun(RecordedRun):
         return self._ended(ENDED_AT)
 
     @property
+    def state(self) -> State:
+        """The present state; a copy."""
+        return take_lane(self.batch.state, self._lane, self.batch.belts[self._lane])
+
+    @property
     def done(self) -> int:
         """Samples recorded so far, up to the one at which the run failed."""
         taken = round(self.time / self.interval)
@@ -58,7 +65,7 @@ class LaneRun(RecordedRun):
     @property
     def steps(self) -> int:
         """Steps taken so far."""
-        return round(self.time / self.step)
+        return round((self.time - self.batch.begun) / self.step)
 
     @property
     def contact_solves(self) -> int:

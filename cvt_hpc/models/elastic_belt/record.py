@@ -42,6 +42,7 @@ SHARED = (
     "arc_probes",
     "step",
     "precision",
+    "contact_sweeps",
 )
 
 
