@@ -49,7 +49,7 @@ SelectTypeParameters=CR_Core
 SchedulerParameters=sched_interval=1,bf_interval=1,batch_sched_delay=0,sched_min_interval=0
 MpiDefault=none
 ReturnToService=2
-KillWait=5
+KillWait=2
 SlurmdTimeout=5
 SlurmdParameters=config_overrides
 {nodes}
