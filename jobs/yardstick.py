@@ -4,7 +4,8 @@ The belt at 120 N m, vibrating, 120 ms after its start (160 stations, memory 0.3
 one state by every method. Error: root mean square over the stations of w [um] at the end, and of the rings'
 speed [mm/s], against the explicit step extrapolated from 25 and 12.5 ns. Cost: processor time over simulated
 time, kernels compiled before. SciPy's integrators are given the Jacobian by coloured differences. Where
-element_damping=0 no force jumps, which is what implicit methods need.
+element_damping=0 no force jumps, which is what implicit methods need. Set OMP_NUM_THREADS=1: threads of the
+linear algebra library use processor time while they wait.
 """
 
 import sys
@@ -92,7 +93,8 @@ def main(table, chosen):
     """Write the table."""
     SCENE.update((key, float(value)) for key, value in (text.split("=") for text in chosen if "=" in text))
     chosen = [text for text in chosen if "=" not in text]
-    run = Transient(parameters("imex", {}), "imex")
+    common = parameters("imex", {})
+    damping, run = common["element_damping"], Transient(common, "imex")
     while run.done < BEFORE:
         assert run.advance(BEFORE - run.done) is None
     belt = run.batch.belts[0]
@@ -100,8 +102,10 @@ def main(table, chosen):
     fine, finer = (march_own(belt, state, "explicit", step)[1] for step in (25e-9, 12.5e-9))
     exact = 2.0 * finer.fields - fine.fields
     with open(table, "w", encoding="utf-8") as out:
-        heads = "stepper,option,value,core_seconds_per_second,error_w [um],error_v_ring [mm/s]"
-        print(f"{heads},steps,rates,jacobians,factorisations,outcome", file=out)
+        heads = "element_damping,stepper,option,value,core_seconds_per_second"
+        print(
+            f"{heads},error_w [um],error_v_ring [mm/s],steps,rates,jacobians,factorisations,outcome", file=out
+        )
         for stepper, options in METHODS:
             if chosen and stepper not in chosen:
                 continue
@@ -119,8 +123,9 @@ def main(table, chosen):
                 for row, scale in ((W, 1e6), (V_RING, 1e3))
             ]
             counts = [counters.get(name, "") for name in ("steps", "rates", "jacobians", "factorisations")]
-            cells = [label, key, f"{options[key]:g}", f"{spent / WINDOW:.3g}", *(f"{e:.3g}" for e in errors)]
-            print(",".join(map(str, [*cells, *counts, found])), file=out, flush=True)
+            cells = [f"{damping:g}", label, key, f"{options[key]:g}", f"{spent / WINDOW:.3g}"]
+            cells += [*(f"{error:.3g}" for error in errors), *map(str, counts), found]
+            print(",".join(cells), file=out, flush=True)
 
 
 if __name__ == "__main__":
