@@ -87,14 +87,6 @@ def test_every_sample_is_checked_and_the_first_bad_one_is_named(write_job):
         load_job(write_job(text))
 
 
-def test_histories_of_samples_are_chosen_by_their_index(write_job):
-    text = SAMPLED.format(kind="sobol")
-    assert load_job(write_job(text + "[record]\nhistory = [31, 4, 4]\n")).histories == (4, 31)
-    for entry, found in (("32", "32"), ("{ load = 100 }", "a table"), ("true", "true")):
-        with pytest.raises(InputError, match=f"run 1: expected an index from 0 to 31, found {found}"):
-            load_job(write_job(text + f"[record]\nhistory = [{entry}]\n"))
-
-
 def test_a_trace_is_along_the_long_axes_of_numbers(write_job):
     path = write_job(TRACED)
     assert load_job(path).design == {"kind": "trace", "first_spacing": {"load": 4}}

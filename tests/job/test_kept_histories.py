@@ -83,3 +83,11 @@ def test_what_is_no_run_of_the_grid_is_refused(write, history, complaint):
         load(write, history)
     assert "[record] history" in str(caught.value)
     assert complaint in str(caught.value)
+
+
+def test_samples_are_named_by_their_index(write):
+    samples = "[design]\nkind = 'sobol'\nruns = 32\n[axes]\nload = {{from = 0, to = 100}}\n[record]\nhistory = [{}]\n"
+    assert load_job(write(samples.format("31, 4, 4"))).histories == (4, 31)
+    for entry, found in (("32", "32"), ("{load = 100}", "a table"), ("true", "true")):
+        with pytest.raises(InputError, match=f"run 1: expected an index from 0 to 31, found {found}"):
+            load_job(write(samples.format(entry)))
