@@ -16,13 +16,15 @@ from cvt_hpc.study.description import Dimension, Study
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.provenance import command, git_revision, versions
 from cvt_hpc.study.record import KEPT
-from cvt_hpc.study.recovery import Records, read_records
+from cvt_hpc.study.records import Records, block_length
+from cvt_hpc.study.recovery import read_records
 from cvt_hpc.variables import Variable
 
 if TYPE_CHECKING:
     import xarray as xr
 
 _COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
+CHUNK = 1 << 17  # [bytes] at most; a map takes some hundred of them, the spectra of one run a single one
 _logger = logging.getLogger(__name__)
 
 
@@ -98,60 +100,84 @@ def write_results(folder: StudyFolder, study: Study, records: Records) -> Path:
     StorageError
         If the system refuses; the dataset that was there is then untouched.
     """
+    import dask
+
     dataset = build_dataset(study, records)
-    encoding = {name: _encoding(array) for name, array in dataset.variables.items()}
-    for name in dataset.coords:
-        encoding[name]["_FillValue"] = None  # xarray would give them one, and CF forbids it
-    with written_aside(folder.results, advice=KEPT) as aside:
-        dataset.to_netcdf(aside, engine="netcdf4", format="NETCDF4", encoding=encoding)
+    # Two threads: one reads ahead while the other compresses; more would only hold more in memory.
+    with written_aside(folder.results, advice=KEPT) as aside, dask.config.set(num_workers=2):
+        dataset.to_netcdf(aside, engine="netcdf4", format="NETCDF4")
     return folder.results
 
 
 def build_dataset(study: Study, records: Records) -> xr.Dataset:
-    """Return the dataset of a study: one variable per quantity over the grid, `status` first."""
+    """Return the dataset of a study: one variable per quantity over the grid, `status` first.
+
+    Its arrays are of dask: a block of runs is read from the logs when it is needed.
+    """
+    import dask.array as da
     import xarray as xr
 
     grid = tuple(axis.name for axis in study.axes)
-    variables = {}
-    for variable in study.variables:
-        values = records.rows[variable.name]
-        values = np.array(values.reshape(study.shape + values.shape[1:]), order="C")
-        if values.dtype.kind == "S":
-            values = np.char.decode(values, "utf-8", "replace")
-        variables[variable.name] = (grid + variable.dims, values, _attributes(variable, values.dtype))
+    runs = np.arange(study.size).reshape(study.shape)
+    block = contiguous_part(study.shape, block_length(study))
+    meta = np.empty((0,) * runs.ndim, study.record_dtype)
+    rows = da.from_array(runs, chunks=block).map_blocks(records.read, dtype=meta.dtype, meta=meta)
+    variables = {
+        v.name: (grid + v.dims, rows[v.name], _attributes(v), _encoding(study, v)) for v in study.variables
+    }
     coordinates = {dimension.name: _coordinate(dimension) for dimension in (*study.axes, *study.coordinates)}
     return xr.Dataset(variables, coordinates, _global_attributes(study, records))
 
 
-def _attributes(variable: Variable, dtype: np.dtype) -> dict[str, Any]:
+def contiguous_part(shape: tuple[int, ...], most: int) -> tuple[int, ...]:
+    """Return the shape of a part of a grid with at most `most` points, at least one, that follow each other.
+
+    Trailing axes are whole; of the first that is not, as many points as a power of two: so smaller parts
+    never straddle larger ones.
+    """
+    part: list[int] = []
+    for length in reversed(shape):
+        most = max(most, 1)
+        part.append(length if length <= most else 1 << (most.bit_length() - 1))
+        most //= length
+    return tuple(reversed(part))
+
+
+def _attributes(variable: Variable) -> dict[str, Any]:
     attributes: dict[str, Any] = {"long_name": variable.long_name}
     if variable.flags is not None:
-        attributes["flag_values"] = np.array([int(flag) for flag in variable.flags], dtype)
+        attributes["flag_values"] = np.array([int(flag) for flag in variable.flags], variable.dtype)
         attributes["flag_meanings"] = " ".join(flag.name.lower() for flag in variable.flags)
     elif variable.units:
         attributes["units"] = variable.units
+    if np.dtype(variable.dtype).kind == "S":
+        attributes["_Encoding"] = "utf-8"  # the netCDF library's convention: readers return texts
     if variable.volatile:
         attributes["volatile"] = "yes"
         attributes["comment"] = "depends on the machine and the hour; not reproduced bitwise"
     return attributes
 
 
-def _coordinate(dimension: Dimension) -> tuple[str, np.ndarray, dict[str, str]]:
+def _coordinate(dimension: Dimension) -> tuple[str, np.ndarray, dict[str, str], dict[str, Any]]:
     attributes = {"long_name": dimension.long_name}
     if dimension.units:
         attributes["units"] = dimension.units
     values = np.array(dimension.values, dtype=object if dimension.holds_texts else None)
-    return dimension.name, values, attributes
+    # xarray would give it a fill value, and CF forbids that.
+    return dimension.name, values, attributes, {} if dimension.holds_texts else {"_FillValue": None}
 
 
-def _encoding(array: xr.Variable) -> dict[str, Any]:
-    """Return how a variable is stored; a fill value is for real numbers alone, flags and counts have none."""
-    if array.dtype.kind == "O":
-        return {}
-    kind = {"f": {}, "U": {"dtype": "S1"}}.get(
-        array.dtype.kind, {"_FillValue": None}
-    )  # S1: texts that compress
-    return {**kind, **(_COMPRESSION if array.ndim else {})}
+def _encoding(study: Study, variable: Variable) -> dict[str, Any]:
+    """Return how a quantity is stored; a fill value is for real numbers alone, flags and counts have none."""
+    dtype = study.record_dtype[variable.name]
+    encoding: dict[str, Any] = {} if dtype.base.kind == "f" else {"_FillValue": None}
+    of_run = dtype.shape
+    if dtype.kind == "S":  # as characters, which compress
+        encoding["dtype"] = "S1"
+        of_run = (dtype.itemsize,)
+    most = min(block_length(study), CHUNK // dtype.itemsize)
+    chunk = contiguous_part(study.shape, most) + of_run
+    return encoding | ({"chunksizes": chunk} | _COMPRESSION if chunk else {})
 
 
 def _global_attributes(study: Study, records: Records) -> dict[str, str]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.recovery import Records
+from cvt_hpc.study.records import Records
 from cvt_hpc.variables import Status
 
 DONE, SOME_FAILED, STOPPED = 0, 1, 99  # exit statuses; 2 is bad input, raised as InputError
@@ -72,13 +72,13 @@ class RunReport:
 
 def build_report(folder: StudyFolder, study: Study, records: Records, stopped: str | None) -> RunReport:
     """Return the report of a sweep that left these records."""
-    status = records.rows["status"]
+    status = records.status
     failed = tuple(
         FailedRun(
             index=int(index),
             at=study.place(int(index)),
             status=Status(status[index]).name.lower(),
-            reason=records.rows["reason"][index].decode(errors="replace"),
+            reason=records.read(index)["reason"].item().decode(errors="replace"),
         )
         for index in np.flatnonzero(records.recorded & (status != Status.DONE))
     )

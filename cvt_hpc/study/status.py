@@ -10,7 +10,8 @@ import numpy as np
 
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.lock import is_locked
-from cvt_hpc.study.recovery import Records, read_records
+from cvt_hpc.study.records import Records
+from cvt_hpc.study.recovery import read_records
 from cvt_hpc.variables import Status
 
 
@@ -63,7 +64,7 @@ def read_status(out: str | Path) -> StudyStatus:
     running = is_locked(folder.lock_file)
     records = read_records(folder.records, study)
     recorded = int(records.recorded.sum())
-    done = int((records.rows["status"] == Status.DONE).sum())
+    done = int((records.status == Status.DONE).sum())
     left = study.size - recorded
     rate = _session_rate(records, running)
     return StudyStatus(

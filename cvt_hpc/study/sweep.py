@@ -20,7 +20,8 @@ from cvt_hpc.study.lock import locked
 from cvt_hpc.study.progress import Progress
 from cvt_hpc.study.provenance import new_session
 from cvt_hpc.study.record import RecordFormat, RecordLog
-from cvt_hpc.study.recovery import Records, read_records
+from cvt_hpc.study.records import Records
+from cvt_hpc.study.recovery import read_records
 from cvt_hpc.study.report import RunReport, build_report
 from cvt_hpc.study.schedule import Counter, claimed_batches, open_counter
 from cvt_hpc.study.simulator import Simulator, default_simulator
@@ -117,7 +118,7 @@ def _prepare(folder: StudyFolder, task: Task, fresh: bool, ranks: int, held: Exi
     for warning in records.warnings + _other_versions(records, session):
         _logger.warning(warning)
     recorded = records.recorded
-    done = int((records.rows["status"] == Status.DONE).sum())
+    done = int((records.status == Status.DONE).sum())
     batches = task.plan(np.flatnonzero(~recorded), ranks)
     return _Plan(batches, int(recorded.sum()), int(recorded.sum()) - done, session)
 

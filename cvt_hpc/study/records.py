@@ -1,0 +1,139 @@
+"""Which record of each run counts and where it lies; the records themselves are read when they are needed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.files import StorageError, naming_refusals
+from cvt_hpc.study.description import Study
+
+# A valid record: run index, time of writing [s], number of the log, place of the payload in it [bytes], status.
+ENTRY = np.dtype([("run", "i8"), ("written", "f8"), ("log", "i4"), ("place", "i8"), ("status", "i1")])
+
+
+@dataclass
+class Records:
+    """What the logs of a study hold, about 30 bytes a run.
+
+    Attributes
+    ----------
+    study : Study
+        The study that the records belong to.
+    logs : sequence of Path
+        The files in which records were looked for.
+    entries : numpy.ndarray of ENTRY, shape (runs,)
+        The record that counts of each run; `log` is -1, `written` NaN where a run has none.
+    sessions : list of dict
+        The starts of the sweep that left records, in order of time.
+    warnings : list of str
+        One line for each file that is not sound.
+    """
+
+    study: Study
+    logs: Sequence[Path]
+    entries: np.ndarray
+    sessions: list[dict[str, Any]] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def written(self) -> np.ndarray:
+        """Time of writing [s] since the epoch, shape (runs,); NaN where a run has no record."""
+        return self.entries["written"]
+
+    @property
+    def recorded(self) -> np.ndarray:
+        """Whether a run has a record, shape (runs,): it is never repeated, however it ended."""
+        return ~np.isnan(self.written)
+
+    @property
+    def status(self) -> np.ndarray:
+        """How each run ended, shape (runs,), a `Status`."""
+        return self.entries["status"]
+
+    def read(self, runs: np.ndarray | int) -> np.ndarray:
+        """Return the records of some runs, in the shape of `runs`; blank where a run has none.
+
+        Raises
+        ------
+        StorageError
+            If a log cannot be read, or is no longer what it was.
+        """
+        return read_rows(self.study, self.logs, self.entries[runs])
+
+
+def read_rows(study: Study, logs: Sequence[Path], entries: np.ndarray) -> np.ndarray:
+    """Return the records at some places in the logs, in the shape of `entries`."""
+    rows = study.blank_rows(entries.shape)
+    flat, targets = entries.reshape(-1), rows.reshape(-1).view(np.uint8).reshape(entries.size, -1)
+    for number in np.unique(flat["log"][flat["log"] >= 0]):
+        path = logs[number]
+        with naming_refusals(path, "a record log that can be read"), path.open("rb", buffering=0) as file:
+            for i in np.flatnonzero(flat["log"] == number):
+                # Read, not mapped: to touch a mapped file that a full disk has cut short ends the process.
+                if os.preadv(file.fileno(), [targets[i]], flat["place"][i]) < targets.shape[1]:
+                    raise StorageError(f"{path}: expected run {flat['run'][i]}, found the file cut short")
+    return rows
+
+
+def choose(study: Study, logs: Sequence[Path], found: np.ndarray) -> Records:
+    """Return of several records of one run the earliest written.
+
+    By content, not by the order in which a folder happens to be listed; equal times, as in a copied file, are
+    told apart by file name and place.
+
+    Parameters
+    ----------
+    study : Study
+        The study that the records belong to.
+    logs : sequence of Path
+        The files, by name.
+    found : numpy.ndarray of ENTRY
+        All valid records.
+    """
+    found = found[np.lexsort((found["place"], found["log"], found["written"], found["run"]))]
+    first = np.diff(found["run"], prepend=-1) > 0
+    entries = np.zeros(study.size, ENTRY)
+    entries["log"], entries["written"] = -1, np.nan
+    entries[found["run"][first]] = found[first]
+    records = Records(study, logs, entries)
+    records.warnings = _contradictions(records, found[~first])
+    return records
+
+
+def _contradictions(records: Records, later: np.ndarray) -> list[str]:
+    """Return a line for each later record that has other numbers than the one that counts."""
+    lines = []
+    block = block_length(records.study)
+    for first in range(0, later.size, block):
+        part = later[first : first + block]
+        rows = read_rows(records.study, records.logs, part)
+        for entry in part[_differ(rows, records.read(part["run"]), records.study)]:
+            chosen = records.logs[records.entries["log"][entry["run"]]]
+            lines.append(
+                f"{records.logs[entry['log']]}: run {entry['run']} has other numbers than in {chosen.name}, "
+                "which counts"
+            )
+    return lines
+
+
+def _differ(one: np.ndarray, other: np.ndarray, study: Study) -> np.ndarray:
+    """Return which of two times n records differ in a bit, timings and the like excepted."""
+    differ = np.zeros(one.size, bool)
+    for name in (variable.name for variable in study.variables if not variable.volatile):
+        bits = [np.ascontiguousarray(rows[name]).view(np.uint8).reshape(one.size, -1) for rows in (one, other)]
+        differ |= (bits[0] != bits[1]).any(axis=1)
+    return differ
+
+
+BLOCK = 1 << 25  # [bytes] of records that are in memory at a time
+
+
+def block_length(study: Study) -> int:
+    """Return how many records are in memory at a time."""
+    return max(BLOCK // study.record_dtype.itemsize, 1)
