@@ -12,19 +12,18 @@ import numpy as np
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import naming_refusals, written_aside
+from cvt_hpc.study.chunks import chunk_shape, fill
 from cvt_hpc.study.description import Dimension, Study
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.provenance import command, git_revision, versions
 from cvt_hpc.study.record import KEPT
-from cvt_hpc.study.records import Records, block_length
+from cvt_hpc.study.records import Records
 from cvt_hpc.study.recovery import read_records
 from cvt_hpc.variables import Variable
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
-CHUNK = 1 << 17  # [bytes] at most; a map takes some hundred of them, the spectra of one run a single one
 _logger = logging.getLogger(__name__)
 
 
@@ -100,47 +99,41 @@ def write_results(folder: StudyFolder, study: Study, records: Records) -> Path:
     StorageError
         If the system refuses; the dataset that was there is then untouched.
     """
-    import dask
+    import xarray as xr
 
-    dataset = build_dataset(study, records)
-    # Two threads: one reads ahead while the other compresses; more would only hold more in memory.
-    with written_aside(folder.results, advice=KEPT) as aside, dask.config.set(num_workers=2):
-        dataset.to_netcdf(aside, engine="netcdf4", format="NETCDF4")
+    coordinates = {dimension.name: _coordinate(dimension) for dimension in (*study.axes, *study.coordinates)}
+    frame = xr.Dataset(coords=coordinates, attrs=_global_attributes(study, records))
+    with written_aside(folder.results, advice=KEPT) as aside:
+        frame.to_netcdf(aside, engine="netcdf4", format="NETCDF4")
+        _declare(aside, study)
+        fill(aside, study, records)
     return folder.results
 
 
-def build_dataset(study: Study, records: Records) -> xr.Dataset:
-    """Return the dataset of a study: one variable per quantity over the grid, `status` first.
-
-    Its arrays are of dask: a block of runs is read from the logs when it is needed.
-    """
-    import dask.array as da
-    import xarray as xr
+def _declare(path: Path, study: Study) -> None:
+    """Add one variable per quantity over the grid, `status` first, to a file with the coordinates."""
+    import netCDF4
 
     grid = tuple(axis.name for axis in study.axes)
-    runs = np.arange(study.size).reshape(study.shape)
-    block = contiguous_part(study.shape, block_length(study))
-    meta = np.empty((0,) * runs.ndim, study.record_dtype)
-    rows = da.from_array(runs, chunks=block).map_blocks(records.read, dtype=meta.dtype, meta=meta)
-    variables = {
-        v.name: (grid + v.dims, rows[v.name], _attributes(v), _encoding(study, v)) for v in study.variables
-    }
-    coordinates = {dimension.name: _coordinate(dimension) for dimension in (*study.axes, *study.coordinates)}
-    return xr.Dataset(variables, coordinates, _global_attributes(study, records))
-
-
-def contiguous_part(shape: tuple[int, ...], most: int) -> tuple[int, ...]:
-    """Return the shape of a part of a grid with at most `most` points, at least one, that follow each other.
-
-    Trailing axes are whole; of the first that is not, as many points as a power of two: so smaller parts
-    never straddle larger ones.
-    """
-    part: list[int] = []
-    for length in reversed(shape):
-        most = max(most, 1)
-        part.append(length if length <= most else 1 << (most.bit_length() - 1))
-        most //= length
-    return tuple(reversed(part))
+    with netCDF4.Dataset(path, "a") as file:
+        for variable in study.variables:
+            dtype = study.record_dtype[variable.name].base
+            dims = grid + variable.dims
+            is_text = dtype.kind == "S"  # stored as characters, which compress
+            if is_text:
+                dims += (f"string{dtype.itemsize}",)
+                if dims[-1] not in file.dimensions:
+                    file.createDimension(dims[-1], dtype.itemsize)
+            stored = file.createVariable(
+                variable.name,
+                "S1" if is_text else dtype,
+                dims,
+                compression="zlib" if dims else None,
+                chunksizes=chunk_shape(study, variable.name) or None,
+                endian="native" if is_text else "little",  # as in the records
+                fill_value=np.nan if dtype.kind == "f" else None,  # flags and counts have none
+            )
+            stored.setncatts(_attributes(variable))
 
 
 def _attributes(variable: Variable) -> dict[str, Any]:
@@ -165,19 +158,6 @@ def _coordinate(dimension: Dimension) -> tuple[str, np.ndarray, dict[str, str], 
     values = np.array(dimension.values, dtype=object if dimension.holds_texts else None)
     # xarray would give it a fill value, and CF forbids that.
     return dimension.name, values, attributes, {} if dimension.holds_texts else {"_FillValue": None}
-
-
-def _encoding(study: Study, variable: Variable) -> dict[str, Any]:
-    """Return how a quantity is stored; a fill value is for real numbers alone, flags and counts have none."""
-    dtype = study.record_dtype[variable.name]
-    encoding: dict[str, Any] = {} if dtype.base.kind == "f" else {"_FillValue": None}
-    of_run = dtype.shape
-    if dtype.kind == "S":  # as characters, which compress
-        encoding["dtype"] = "S1"
-        of_run = (dtype.itemsize,)
-    most = min(block_length(study), CHUNK // dtype.itemsize)
-    chunk = contiguous_part(study.shape, most) + of_run
-    return encoding | ({"chunksizes": chunk} | _COMPRESSION if chunk else {})
 
 
 def _global_attributes(study: Study, records: Records) -> dict[str, str]:

@@ -13,7 +13,8 @@ import numpy as np
 from cvt_hpc.files import StorageError, naming_refusals
 from cvt_hpc.study.description import Study
 
-# A valid record: run index, time of writing [s], number of the log, place of the payload in it [bytes], status.
+# A valid record: run index, time of writing [s], number of its log, place of the payload there [byte],
+# and how the run ended.
 ENTRY = np.dtype([("run", "i8"), ("written", "f8"), ("log", "i4"), ("place", "i8"), ("status", "i1")])
 
 
@@ -56,27 +57,42 @@ class Records:
         """How each run ended, shape (runs,), a `Status`."""
         return self.entries["status"]
 
-    def read(self, runs: np.ndarray | int) -> np.ndarray:
-        """Return the records of some runs, in the shape of `runs`; blank where a run has none.
+    def read(self, runs: np.ndarray | int, name: str | None = None) -> np.ndarray:
+        """Return the records of some runs, or one of their quantities; blank where a run has none.
+
+        Parameters
+        ----------
+        runs : numpy.ndarray of int
+            Run indices.
+        name : str, optional
+            The quantity; all by default.
+
+        Returns
+        -------
+        numpy.ndarray, shape (*runs.shape, *quantity's)
 
         Raises
         ------
         StorageError
             If a log cannot be read, or is no longer what it was.
         """
-        return read_rows(self.study, self.logs, self.entries[runs])
+        return read_rows(self.study, self.logs, self.entries[runs], name)
 
 
-def read_rows(study: Study, logs: Sequence[Path], entries: np.ndarray) -> np.ndarray:
-    """Return the records at some places in the logs, in the shape of `entries`."""
-    rows = study.blank_rows(entries.shape)
-    flat, targets = entries.reshape(-1), rows.reshape(-1).view(np.uint8).reshape(entries.size, -1)
+def read_rows(study: Study, logs: Sequence[Path], entries: np.ndarray, name: str | None = None) -> np.ndarray:
+    """Return what lies at some places in the logs; see `Records.read`."""
+    dtype, offset = study.record_dtype.fields[name][:2] if name else (study.record_dtype, 0)
+    blank = study.blank_rows()
+    rows = np.empty(np.shape(entries), dtype)
+    rows[...] = blank[name] if name else blank
+    targets = rows.reshape(-1).view(np.uint8).reshape(-1, dtype.itemsize)
+    flat = np.reshape(entries, -1)
     for number in np.unique(flat["log"][flat["log"] >= 0]):
         path = logs[number]
         with naming_refusals(path, "a record log that can be read"), path.open("rb", buffering=0) as file:
             for i in np.flatnonzero(flat["log"] == number):
                 # Read, not mapped: to touch a mapped file that a full disk has cut short ends the process.
-                if os.preadv(file.fileno(), [targets[i]], flat["place"][i]) < targets.shape[1]:
+                if os.preadv(file.fileno(), [targets[i]], flat["place"][i] + offset) < dtype.itemsize:
                     raise StorageError(f"{path}: expected run {flat['run'][i]}, found the file cut short")
     return rows
 
@@ -126,8 +142,9 @@ def _differ(one: np.ndarray, other: np.ndarray, study: Study) -> np.ndarray:
     """Return which of two times n records differ in a bit, timings and the like excepted."""
     differ = np.zeros(one.size, bool)
     for name in (variable.name for variable in study.variables if not variable.volatile):
-        bits = [np.ascontiguousarray(rows[name]).view(np.uint8).reshape(one.size, -1) for rows in (one, other)]
-        differ |= (bits[0] != bits[1]).any(axis=1)
+        values = (np.ascontiguousarray(rows[name]) for rows in (one, other))
+        bits, others = (found.view(np.uint8).reshape(one.size, -1) for found in values)
+        differ |= (bits != others).any(axis=1)
     return differ
 
 

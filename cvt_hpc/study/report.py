@@ -73,14 +73,16 @@ class RunReport:
 def build_report(folder: StudyFolder, study: Study, records: Records, stopped: str | None) -> RunReport:
     """Return the report of a sweep that left these records."""
     status = records.status
+    without_results = np.flatnonzero(records.recorded & (status != Status.DONE))
+    reasons = records.read(without_results, "reason")
     failed = tuple(
         FailedRun(
             index=int(index),
             at=study.place(int(index)),
             status=Status(status[index]).name.lower(),
-            reason=records.read(index)["reason"].item().decode(errors="replace"),
+            reason=reason.decode(errors="replace"),
         )
-        for index in np.flatnonzero(records.recorded & (status != Status.DONE))
+        for index, reason in zip(without_results, reasons, strict=True)
     )
     return RunReport(
         out=folder.path,
