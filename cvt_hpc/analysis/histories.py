@@ -15,6 +15,7 @@ from cvt_hpc.analysis import history_panels as panels
 from cvt_hpc.analysis.figures import STYLE, WIDTH, check_format, save_figure
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.files import written_aside
+from cvt_hpc.netcdf import write_netcdf
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.criterion import PARAMETERS
 
@@ -51,11 +52,8 @@ def write_history(dataset: xr.Dataset, path: Path) -> Path:
             str(path), "a new file, or a history written by cvt_hpc", "another file, left as it is"
         )
     marked = dataset.assign_attrs({CONTENT: HISTORY})
-    encoding = {
-        name: _encoding(variable, name in marked.coords) for name, variable in marked.variables.items()
-    }
     with written_aside(path, parents=True) as aside:
-        marked.to_netcdf(aside, engine="netcdf4", format="NETCDF4", encoding=encoding)
+        write_netcdf(marked, aside)
     return path
 
 
@@ -66,15 +64,6 @@ def is_history(path: Path) -> bool:
             return dataset.attrs.get(CONTENT) == HISTORY
     except (OSError, ValueError):
         return False
-
-
-def _encoding(variable: xr.Variable, is_coordinate: bool) -> dict:
-    """Compress numbers, and leave coordinates without fill values."""
-    if variable.dtype.kind not in "iuf":
-        return {}
-    packing = {"zlib": True, "complevel": 4} if variable.ndim else {}
-    needs_fill = variable.dtype.kind == "f" and not is_coordinate
-    return packing if needs_fill else {**packing, "_FillValue": None}
 
 
 def draw_history(dataset: xr.Dataset, out: Path) -> Path:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import logging
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,10 +11,11 @@ import numpy as np
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import naming_refusals, written_aside
+from cvt_hpc.netcdf import write_netcdf
 from cvt_hpc.study.chunks import chunk_shape, fill
 from cvt_hpc.study.description import Dimension, Study
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.provenance import command, git_revision, versions
+from cvt_hpc.study.provenance import command, git_revision, history_line, versions
 from cvt_hpc.study.record import KEPT
 from cvt_hpc.study.records import Records
 from cvt_hpc.study.recovery import read_records
@@ -104,7 +104,7 @@ def write_results(folder: StudyFolder, study: Study, records: Records) -> Path:
     coordinates = {dimension.name: _coordinate(dimension) for dimension in (*study.axes, *study.coordinates)}
     frame = xr.Dataset(coords=coordinates, attrs=_global_attributes(study, records))
     with written_aside(folder.results, advice=KEPT) as aside:
-        frame.to_netcdf(aside, engine="netcdf4", format="NETCDF4")
+        write_netcdf(frame, aside)
         _declare(aside, study)
         fill(aside, study, records)
     return folder.results
@@ -151,20 +151,19 @@ def _attributes(variable: Variable) -> dict[str, Any]:
     return attributes
 
 
-def _coordinate(dimension: Dimension) -> tuple[str, np.ndarray, dict[str, str], dict[str, Any]]:
+def _coordinate(dimension: Dimension) -> tuple[str, np.ndarray, dict[str, str]]:
     attributes = {"long_name": dimension.long_name}
     if dimension.units:
         attributes["units"] = dimension.units
     values = np.array(dimension.values, dtype=object if dimension.holds_texts else None)
-    # xarray would give it a fill value, and CF forbids that.
-    return dimension.name, values, attributes, {} if dimension.holds_texts else {"_FillValue": None}
+    return dimension.name, values, attributes
 
 
 def _global_attributes(study: Study, records: Records) -> dict[str, str]:
     sessions = records.sessions
     lines = [
-        f"{_timestamp(s['started'])}: {s['command']} (on {s['host']}, {s['ranks']} rank(s))" for s in sessions
-    ] + [f"{_timestamp(time.time())}: {command()} (gathered)"]
+        history_line(f"{s['command']} (on {s['host']}, {s['ranks']} rank(s))", s["started"]) for s in sessions
+    ] + [history_line(f"{command()} (gathered)")]
     return {
         "Conventions": "CF-1.11",
         "title": study.description or study.name,
@@ -185,7 +184,3 @@ def merge_versions(found: list[dict[str, str]]) -> dict[str, str]:
         for package, version in versions_of_session.items():
             merged.setdefault(package, {})[version] = None
     return {package: ", ".join(different) for package, different in merged.items()}
-
-
-def _timestamp(seconds: float) -> str:
-    return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(seconds))

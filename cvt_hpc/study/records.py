@@ -17,6 +17,8 @@ from cvt_hpc.study.description import Study
 # and how the run ended.
 ENTRY = np.dtype([("run", "i8"), ("written", "f8"), ("log", "i4"), ("place", "i8"), ("status", "i1")])
 
+BLOCK = 1 << 25  # [bytes] of records that are in memory at a time
+
 
 @dataclass
 class Records:
@@ -146,9 +148,6 @@ def _differ(one: np.ndarray, other: np.ndarray, study: Study) -> np.ndarray:
         bits, others = (found.view(np.uint8).reshape(one.size, -1) for found in values)
         differ |= (bits != others).any(axis=1)
     return differ
-
-
-BLOCK = 1 << 25  # [bytes] of records that are in memory at a time
 
 
 def block_length(study: Study) -> int:

@@ -16,6 +16,7 @@ from cvt_hpc.study.description import Study
 from cvt_hpc.study.record import FORMAT_VERSION, FRAME, MAGIC, MARKER, PREAMBLE, RecordFormat, header_check
 from cvt_hpc.study.records import ENTRY, Records, choose
 
+PREAMBLE_LIMIT = 1 << 20  # [bytes]; beyond is none
 WINDOW = 1 << 22  # [bytes] of a log that are in memory at a time
 
 
@@ -75,7 +76,7 @@ def _read_log(
         If the file is no log, or a log of another job.
     """
     size = os.fstat(file.fileno()).st_size
-    head = os.pread(file.fileno(), WINDOW, 0)
+    head = os.pread(file.fileno(), PREAMBLE_LIMIT, 0)
     if not head:  # a process that died before its first record
         return None, np.zeros(0, ENTRY)
     session, start = _read_preamble(head, layout)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from bells import Transient
+from cf import cf_findings
 
 from cvt_hpc.chart import load_chart, make_chart
 from cvt_hpc.chart.table import table_lines
@@ -48,6 +49,10 @@ def test_the_table_holds_every_point_with_its_outcome(report):
     assert float(good["amplitude_error"]) == 0.001
     assert (good["steps"], good["rates"]) == ("6000", "14000")
     assert [row["method"] for row in rows if row["chosen"] == "yes"] == ["clever"]
+
+
+def test_the_cf_checker_finds_nothing(report):
+    assert cf_findings(report.dataset) == []
 
 
 def test_people_read_the_same(report):

@@ -11,6 +11,7 @@ import time
 import numpy as np
 import pytest
 import xarray as xr
+from cf import cf_findings
 from PIL import Image
 from sweeps import assert_same_numbers, call, environment, kill, records, start, wait_for_records
 
@@ -104,6 +105,10 @@ def test_the_dataset_of_a_sweep(serial):
     assert json.loads(dataset.attrs["job"])["axes"]["sheave_stiffness"] == [1.0, "inf"]
 
 
+def test_the_cf_checker_finds_nothing_in_a_sweep(serial):
+    assert cf_findings(serial / "results.nc") == []
+
+
 def test_two_ranks_give_the_same_bits(serial, folder):
     done = call("run", "small.toml", "--out", "two", cwd=folder, ranks=2)
     assert done.returncode == 1, done.stderr
@@ -149,6 +154,11 @@ def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):
             if swept[name].attrs.get("volatile") != "yes" and swept[name].dtype.kind == "f":
                 assert history[name].values.tobytes() == swept[name].values.tobytes(), name
         assert history.sizes["time"] == 1600
+    # By CF a time coordinate is known by units "... since ...", and time since the start is none; the checker
+    # goes by the name alone.
+    assert [
+        finding for finding in cf_findings(folder / "h.nc") if "Coordinate variable 'time'" not in finding
+    ] == []
     with Image.open(folder / "h.png") as picture:
         assert min(picture.size) > 500
         # lines, shades and letters, not an empty sheet
