@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 def write_netcdf(dataset: xr.Dataset, path: Path) -> None:
     """Write a dataset as netCDF-4.
 
-    All is compressed. Texts are stored as characters, since CF wants labels of a dimension to be arrays of them.
-    Only real numbers that are no coordinates have a fill value: CF forbids it for coordinates.
+    Texts are stored as characters: a variable of strings with the name of its dimension would be a coordinate
+    by CF, and these have to be numbers. Only real numbers have a fill value, and coordinates must not.
 
     Parameters
     ----------
