@@ -70,8 +70,8 @@ def assert_holds(path, study, rows):
 
 
 @pytest.mark.parametrize("shape", [(), (1,), (60,), (7, 9), (9, 7), (3, 4, 5), (2, 1, 17)])
-@pytest.mark.parametrize("block", [1, 5, 20, 10_000])
-@pytest.mark.parametrize("chunk", [1, 700, 1 << 17])
+@pytest.mark.parametrize("block", [1, 5, 10_000])
+@pytest.mark.parametrize("chunk", [1, 700])
 def test_the_dataset_does_not_depend_on_its_pieces(tmp_path, monkeypatch, shape, block, chunk):
     study = describe(grid(*shape), Simulator())
     monkeypatch.setattr("cvt_hpc.study.records.BLOCK", block * study.record_dtype.itemsize)

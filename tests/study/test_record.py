@@ -37,6 +37,12 @@ def write_log(folder, study, rows, indices, session=SESSION):
     return log.path
 
 
+@pytest.fixture(autouse=True, params=[1 << 22, 100])
+def window(request, monkeypatch):
+    """Logs are read as a whole, and in windows of which several lie in one frame."""
+    monkeypatch.setattr("cvt_hpc.study.recovery.WINDOW", request.param)
+
+
 @pytest.fixture
 def study():
     return make_study()
