@@ -71,6 +71,8 @@ def make_rows(study: Study, count: int, generator: np.random.Generator) -> np.nd
 def make_logs(path: Path, runs: int) -> None:
     """Write the folder of a finished sweep."""
     folder, study = StudyFolder(path), make_study(runs)
+    if folder.job_file.exists():
+        return
     folder.create()
     folder.save(study)
     generator = np.random.default_rng(0)
