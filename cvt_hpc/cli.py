@@ -6,14 +6,16 @@ import argparse
 import logging
 import os
 import sys
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
 from cvt_hpc import __version__
-from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.errors import CRASHED, InputError, mismatch
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+RETRIED = ("timed_out", "failed_error", "failed_numerics")
 _SUBJECTS = {
     "JOB": "job file (TOML)",
     "DIR": "output folder of a run",
@@ -32,7 +34,8 @@ def main(arguments: list[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit status: 0 done, 1 some runs failed, 2 bad input, 99 stopped early and to be gone on with.
+        Exit status: 0 done, 1 some runs failed, 2 bad input, 70 a defect of this program, 99 stopped early
+        and to be gone on with, 98 the same without any gain.
     """
     logging.basicConfig(format="cvt-hpc: %(message)s")
     try:
@@ -49,6 +52,9 @@ def main(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
+    except Exception:  # Python's own status for a defect, 1, means here that some runs failed
+        traceback.print_exc()
+        return CRASHED
 
 
 class _Parser(argparse.ArgumentParser):
@@ -62,14 +68,32 @@ def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="cvt-hpc",
         description="Vibration-occurrence maps of metal pushbelt CVTs.",
-        epilog="Exit status: 0 done, 1 some runs failed, 2 bad input, 99 stopped early (run again to go on).",
+        epilog="Exit status: 0 done, 1 some runs failed, 2 bad input, 99 stopped early (run again to go on), "
+        "98 stopped before any run had ended.",
     )
     parser.add_argument("--version", action="version", version=f"cvt_hpc {__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     run = _add(commands, "run", _run, "do all runs of a job, or those that an earlier start has left", "JOB")
     run.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: out/<job name>)")
+    run.add_argument(
+        "--part",
+        metavar="K/N",
+        help="only the K-th of N parts of the runs; parts may be at work in one folder at the same time",
+    )
     run.add_argument("--dry-run", action="store_true", help="as `cvt-hpc check`; runs nothing")
     run.add_argument("--fresh", action="store_true", help="throw earlier results of the folder away")
+    limit = (
+        "time after which no run computes, such as 2h30m (default: until the end of the Slurm job, if any)"
+    )
+    run.add_argument("--time-limit", metavar="TIME", help=limit)
+    run.add_argument("--run-limit", metavar="TIME", help="time that one run may take (default: any)")
+    run.add_argument(
+        "--retry",
+        action="append",
+        default=[],
+        choices=RETRIED,
+        help="do recorded runs that ended so again; may be repeated",
+    )
     _add(commands, "status", _status, "how far a study is", "DIR")
     _add(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
     picture = _add(commands, "map", _map, "draw where vibration occurs", "RESULTS")
@@ -111,10 +135,19 @@ def _run(arguments: argparse.Namespace) -> int:
     if arguments.dry_run:
         return _check(arguments)
     from cvt_hpc.job import load_job
+    from cvt_hpc.job.durations import read_duration
     from cvt_hpc.printing import report_lines, trouble_lines
     from cvt_hpc.study import run
+    from cvt_hpc.variables import Status
 
-    report = run(load_job(arguments.path, arguments.set), arguments.out, fresh=arguments.fresh)
+    limits = {
+        name: read_duration(getattr(arguments, name), f"--{name.replace('_', '-')}")
+        for name in ("time_limit", "run_limit")
+        if getattr(arguments, name) is not None
+    }
+    retry = [Status[name.upper()] for name in arguments.retry]
+    job = load_job(arguments.path, arguments.set)
+    report = run(job, arguments.out, part=arguments.part, fresh=arguments.fresh, retry=retry, **limits)
     _complain(*trouble_lines(report))
     if _speaks():
         print(*report_lines(report), sep="\n")
@@ -161,7 +194,8 @@ def _simulate(arguments: argparse.Namespace) -> int:
     job.point_at(at, "--at")
     _check_output(arguments.out, (".nc",))
     _check_output(arguments.plot, (".png", ".svg", ".pdf"))
-    from cvt_hpc.analysis.histories import draw_history, is_history, write_history
+    from cvt_hpc.analysis.histories import draw_history
+    from cvt_hpc.history_files import is_history, write_history
     from cvt_hpc.printing import outcome_lines, point_lines
     from cvt_hpc.simulation import simulate
     from cvt_hpc.study.provenance import command, history_line
@@ -212,8 +246,11 @@ def _check(arguments: argparse.Namespace) -> int:
     describe(job, default_simulator())  # refuses axes that the dataset of a run could not hold
     if _speaks():
         from cvt_hpc.simulation import estimate_cost
+        from cvt_hpc.study.status import read_machine_factor
 
-        print(summarize(job, estimate_cost(job)))
+        out = getattr(arguments, "out", None) or Path("out") / job.name
+        factor, runs = read_machine_factor(out, job)
+        print(summarize(job, factor * estimate_cost(job), runs))
     return DONE
 
 

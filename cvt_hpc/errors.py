@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterable
 from typing import Any
 
+CRASHED = 70  # exit status after a defect of this program; EX_SOFTWARE of sysexits.h
 _LONGEST_QUOTE = 60
 
 

@@ -2,7 +2,8 @@
 
 The compiler keeps machine code beside a file's date alone, and would go on with the old code of a kernel when
 one that it calls, in another file, has changed. So the code is kept in a folder named by the content of all
-kernels' sources: below NUMBA_CACHE_DIR if that is set, else in the package, else in the user's cache.
+kernels' sources: below NUMBA_CACHE_DIR if that is set, else in the package, else in the user's cache. A
+folder that no process has asked for in a month goes when another is made.
 
 A kernel may be handed to another as an argument, as a right-hand side to a stepper. The compiler tells
 kernels apart by an identity drawn at random, so that it would never find such code again: here it is the
@@ -15,7 +16,9 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
+import shutil
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -24,8 +27,8 @@ import numba
 from numba.core.caching import IndexDataCacheFile
 
 _PACKAGE = Path(__file__).parent
-_ROOMS_WITH_KERNELS = ("physics", "models", "steppers")
-_OTHER_SOURCES = ("kernels.py", "lanes.py")
+_MONTH = 30 * 86400.0  # [s]: longer than any job lasts, so that none loses the folder it works in
+_ROOMS_WITH_KERNELS = ("lanes", "physics", "models", "steppers")
 
 # Division by zero gives inf as in numpy, without a test for it. Every operation is rounded once, as written:
 # were products contracted with sums, the bits would depend on which kernels the compiler merges, and so on
@@ -94,13 +97,11 @@ def _entry(packed: bytes) -> Any:
         return packed
 
 
-def _cache_folder() -> str:
-    digest = hashlib.sha256()
+def _cache_folder() -> Path:
+    digest = hashlib.sha256(Path(__file__).read_bytes())
     for room in _ROOMS_WITH_KERNELS:
         for source in sorted((_PACKAGE / room).rglob("*.py")):
             digest.update(source.read_bytes())
-    for name in _OTHER_SOURCES:
-        digest.update((_PACKAGE / name).read_bytes())
     chosen = numba.config.CACHE_DIR
     if chosen:
         base = Path(chosen)
@@ -108,7 +109,7 @@ def _cache_folder() -> str:
         base = _PACKAGE / "__pycache__"
     else:
         base = Path(os.environ.get("XDG_CACHE_HOME") or _home_or_temporary() / ".cache") / "cvt_hpc"
-    return str(base / f"kernels-{digest.hexdigest()[:16]}")
+    return base / f"kernels-{digest.hexdigest()[:16]}"
 
 
 def _home_or_temporary() -> Path:
@@ -116,4 +117,21 @@ def _home_or_temporary() -> Path:
     return home if os.access(home, os.W_OK) else Path(tempfile.gettempdir())
 
 
-_CACHE = _cache_folder()
+def _asked_for(folder: Path) -> str:
+    """The folder, its date set to now; where it had to be made, what nobody has asked for in a month goes.
+
+    All by best effort: what the system refuses, or another process has done, is left.
+    """
+    try:
+        made = not folder.exists()
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        for other in folder.parent.glob("kernels-" + 16 * "[0-9a-f]") if made else ():
+            if time.time() - other.stat().st_mtime > _MONTH:
+                shutil.rmtree(other, ignore_errors=True)
+    except OSError:
+        pass
+    return str(folder)
+
+
+_CACHE = _asked_for(_cache_folder())

@@ -31,7 +31,7 @@ _LARGEST_LINE = 4  # values: one per strand or pulley, but no spectrum and no hi
 def report_lines(report: RunReport) -> Iterator[str]:
     """Yield the lines that say how a sweep ended."""
     yield f"{report.total} runs: {report.done} done, {len(report.failed)} failed, {report.remaining} left"
-    yield f"results: {report.results}"
+    yield f"results: {report.results or 'gathered by the part that ends last'}"
 
 
 def trouble_lines(report: RunReport) -> Iterator[str]:
@@ -41,9 +41,10 @@ def trouble_lines(report: RunReport) -> Iterator[str]:
         yield f"run {run.index}{f' ({place})' if place else ''}: {run.status}: {run.reason}"
     unnamed = len(report.failed) - MOST_FAILURES_NAMED
     if unnamed > 0:
-        yield f"{unnamed} more runs failed; `status` and `reason` in {report.results} tell which"
+        yield f"{unnamed} more runs failed; `status` and `reason` in the results tell which"
     if report.remaining:
-        yield f"stopped early ({report.stopped}); the same command goes on from here"
+        gain = "" if report.gained else ", and no run has ended since the start"
+        yield f"stopped early ({report.stopped}){gain}; the same command goes on from here"
 
 
 def status_lines(status: StudyStatus) -> Iterator[str]:

@@ -14,16 +14,14 @@ import numpy as np
 
 from cvt_hpc.job import build_job
 from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.elastic_belt.batch import STEPS
 from cvt_hpc.models.elastic_belt.belt import TIME, V_RING, W
-from cvt_hpc.models.elastic_belt.explicit import step_explicit
 from cvt_hpc.models.elastic_belt.flat import flat_belt, pack, system, unpack
-from cvt_hpc.models.elastic_belt.imex import derive, imex_work
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state, take_lane
-from cvt_hpc.models.elastic_belt.march import march_imex
-from cvt_hpc.models.elastic_belt.sampling import CHANNELS, PROFILES, Sensors
+from cvt_hpc.models.elastic_belt.lane_forces import derive
+from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, PROFILES, Sensors
 from cvt_hpc.models.elastic_belt.structure import SparseJacobian
 from cvt_hpc.models.elastic_belt.transient import Transient
-from cvt_hpc.physics.compliance import contact_state
 from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.marching import Marching
 
@@ -55,36 +53,25 @@ def parameters(stepper, options):
     return build_job(document, "yardstick", SCENE | options).point(0)
 
 
-def march_explicit(belt, state, step):
-    """By the belt's explicit step; the outcome, the end, and core-seconds."""
-    state = state.copy()
-    contacts = contact_state(belt.driving.weight.size), contact_state(belt.driven.weight.size)
-    work = np.zeros((10, belt.cell.size))
-    step_explicit(belt, state.copy(), contacts, work, 1e-12)
-    started = time.process_time()
-    for _ in range(round(WINDOW / step)):
-        step_explicit(belt, state, contacts, work, step)
-    return "ok", state, time.process_time() - started
-
-
-def march_fast(belt, state, step):
-    """By the belt's fast step, one run in double precision; as `march_explicit`."""
+def march_own(belt, state, stepper, step):
+    """By a step of the belt's own, one run in double precision; the outcome, the end, and core-seconds."""
     n, nowhere = belt.cell.size, np.zeros(2, dtype=np.int64)
     constants, lane = lane_belt([belt], np.float64), lane_state([belt], [state], np.float64)
-    work = imex_work(lane)
+    work_space, march = STEPS[stepper]
+    work = work_space(lane)
     derive(constants, lane, work.stations)
     sensing = Sensors(np.zeros((0, n)), nowhere, nowhere, nowhere, WINDOW)
-    rows, profiles, ended = LaneArray(1, len(CHANNELS), 1), LaneArray(n, len(PROFILES), 1), LaneArray(1, 3, 1)
-    spent = 0.0
+    rows, profiles = LaneArray(1, len(CHANNELS), 1), LaneArray(n, len(PROFILES), 1)
+    ended, spent = LaneArray(1, len(ENDED), 1), 0.0
     for steps in (0, round(WINDOW / step)):  # the first call compiles
         started = time.process_time()
-        march_imex(constants, lane, work, step, steps, sensing, rows, 0, 1, profiles, ended)
+        march(constants, lane, work, step, steps, sensing, rows, 0, 1, profiles, ended)
         spent = time.process_time() - started
     return "ok", take_lane(lane, 0, belt), spent
 
 
 def march_general(belt, state, stepper, options):
-    """By a general stepper; as `march_explicit`, core-seconds of a failed march scaled to the window."""
+    """By a general stepper; as `march_own`, core-seconds of a failed march scaled to the window."""
     flat = flat_belt(belt, state.scalars[TIME])
     march = Marching(stepper, parameters(stepper, options), system(flat), pack(flat, state), WINDOW)
     if stepper.startswith("scipy_"):
@@ -110,7 +97,7 @@ def main(table, chosen):
         assert run.advance(BEFORE - run.done) is None
     belt = run.batch.belts[0]
     state = take_lane(run.batch.state, 0, belt)
-    fine, finer = (march_explicit(belt, state, step)[1] for step in (25e-9, 12.5e-9))
+    fine, finer = (march_own(belt, state, "explicit", step)[1] for step in (25e-9, 12.5e-9))
     exact = 2.0 * finer.fields - fine.fields
     with open(table, "w", encoding="utf-8") as out:
         heads = "stepper,option,value,core_seconds_per_second,error_w [um],error_v_ring [mm/s]"
@@ -118,9 +105,8 @@ def main(table, chosen):
         for stepper, options in METHODS:
             if chosen and stepper not in chosen:
                 continue
-            if stepper in ("imex", "explicit"):
-                march = march_fast if stepper == "imex" else march_explicit
-                found, end, spent = march(belt, state, options["step"])
+            if stepper in STEPS:
+                found, end, spent = march_own(belt, state, stepper, options["step"])
                 counters = {"steps": round(WINDOW / options["step"])}
             else:
                 found, end, spent, counters = march_general(belt, state, stepper, options)

@@ -1,16 +1,16 @@
-"""The fast step for tests: runs with a state of their own choice, each in a lane of its own."""
+"""The belt's own steps for tests: runs with a state of their own choice, each in a lane of its own."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.elastic_belt.batch import STEPS
 from cvt_hpc.models.elastic_belt.belt import LAYER_WORK, Belt, State
-from cvt_hpc.models.elastic_belt.imex import derive, imex_work
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state, take_lane
-from cvt_hpc.models.elastic_belt.march import march_imex
+from cvt_hpc.models.elastic_belt.lane_forces import derive
 from cvt_hpc.models.elastic_belt.power import LAYER_LOSS, POWERS
-from cvt_hpc.models.elastic_belt.sampling import CHANNELS, PROFILES, Outcome, Sensors
+from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFILES, Outcome, Sensors
 
 
 class FastRuns:
@@ -24,12 +24,17 @@ class FastRuns:
         One for each lane; the states stay as they are.
     dtype : type
         np.float64 or np.float32.
+    stepper : str
+        "imex" or "explicit".
     """
 
-    def __init__(self, belts: list[Belt], states: list[State], dtype: type = np.float64) -> None:
+    def __init__(
+        self, belts: list[Belt], states: list[State], dtype: type = np.float64, stepper: str = "imex"
+    ) -> None:
         self.belts = belts
         self.lanes = lane_state(belts, states, dtype)
-        self.work = imex_work(self.lanes)
+        work_space, self._march = STEPS[stepper]
+        self.work = work_space(self.lanes)
         self._constants = lane_belt(belts, dtype)
         n, width = belts[0].cell.size, len(belts)
         nowhere = np.zeros(2, dtype=np.int64)
@@ -37,14 +42,14 @@ class FastRuns:
         self._sensing = Sensors(np.zeros((0, n), dtype), nowhere, nowhere, nowhere, 1.0)
         self._rows = LaneArray(1, len(CHANNELS), width)
         self._profiles = LaneArray(n, len(PROFILES), width)
-        self._ended = LaneArray(1, 3, width)
+        self._ended = LaneArray(1, len(ENDED), width)
         self._layer_work = np.array([state.scalars[LAYER_WORK] for state in states])
 
     def advance(self, steps: int, step: float) -> None:
         """March, and take a sample at the end: with no step at all, of the state as it is."""
         # a test may have changed the state since
         derive(self._constants, self.lanes, self.work.stations)
-        march_imex(
+        self._march(
             self._constants,
             self.lanes,
             self.work,
@@ -61,7 +66,7 @@ class FastRuns:
 
     def outcome(self, lane: int = 0) -> Outcome:
         """Why the run has ended, or that it goes on."""
-        return Outcome(int(self._ended.data[0, 0, lane]))
+        return Outcome(int(self._ended.data[0, OUTCOME, lane]))
 
     def state(self, lane: int = 0) -> State:
         """The state, with the dampers' work since the start."""
@@ -74,9 +79,14 @@ class FastRuns:
         return dict(zip(CHANNELS, self._rows.data[0, :, lane].tolist(), strict=True))
 
 
-def march_fast(belt: Belt, state: State, step: float, steps: int) -> State:
-    """State of one run after some steps, alone in its lane."""
-    run = FastRuns([belt], [state])
+def march(stepper: str, belt: Belt, state: State, step: float, steps: int) -> State:
+    """State of one run after some steps, alone in its lane, with the dampers' work in them."""
+    run = FastRuns([belt], [state], stepper=stepper)
     run.advance(steps, step)
     assert run.outcome() is Outcome.OK, run.outcome()
     return run.state()
+
+
+def march_fast(belt: Belt, state: State, step: float, steps: int) -> State:
+    """As `march`, by the fast step."""
+    return march("imex", belt, state, step, steps)

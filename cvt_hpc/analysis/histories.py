@@ -1,4 +1,4 @@
-"""The history of one run: as a file, and as a picture."""
+"""The history of one run as a picture."""
 
 from __future__ import annotations
 
@@ -13,57 +13,11 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis import history_panels as panels
 from cvt_hpc.analysis.figures import STYLE, WIDTH, check_format, save_figure
-from cvt_hpc.errors import InputError, mismatch
-from cvt_hpc.files import written_aside
-from cvt_hpc.netcdf import write_netcdf
+from cvt_hpc.errors import InputError
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.criterion import PARAMETERS
 
-CONTENT = "cvt_hpc_content"  # global attribute by which this program knows its own files
-HISTORY = "history of one run"
 LEFT, RIGHT, WHOLE = slice(0, 2), 2, slice(0, 3)  # columns of a panel
-
-
-def write_history(dataset: xr.Dataset, path: Path) -> Path:
-    """Write the history of one run as netCDF.
-
-    The file is complete or not there: it is written aside and renamed.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        As `cvt_hpc.simulate` returns it.
-    path : Path
-        The file; its folder is made if needed.
-
-    Returns
-    -------
-    Path
-        `path`.
-
-    Raises
-    ------
-    InputError
-        `path` exists and is not a history that this program wrote, or the system refuses.
-    """
-    path = Path(path)
-    if path.exists() and not is_history(path):
-        raise mismatch(
-            str(path), "a new file, or a history written by cvt_hpc", "another file, left as it is"
-        )
-    marked = dataset.assign_attrs({CONTENT: HISTORY})
-    with written_aside(path, parents=True) as aside:
-        write_netcdf(marked, aside)
-    return path
-
-
-def is_history(path: Path) -> bool:
-    """Whether a file is a history that this program wrote."""
-    try:
-        with xr.open_dataset(path, engine="netcdf4", decode_cf=False) as dataset:
-            return dataset.attrs.get(CONTENT) == HISTORY
-    except (OSError, ValueError):
-        return False
 
 
 def draw_history(dataset: xr.Dataset, out: Path) -> Path:

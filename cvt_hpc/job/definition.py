@@ -32,6 +32,8 @@ class Job:
         What the study varies, the last axis fastest; empty for a single run.
     given : frozenset of str
         The keys that the file or an override sets, defaults excluded.
+    histories : tuple of int
+        Indices of the runs whose history a sweep keeps; without effect on any number.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Job:
     parameters: dict[str, Any]
     axes: tuple[Axis, ...]
     given: frozenset[str] = field(default=frozenset(), compare=False)
+    histories: tuple[int, ...] = field(default=(), compare=False)
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -13,6 +13,7 @@ from cvt_hpc.job.axes import Axis, read_axis
 from cvt_hpc.job.crosscheck import check_grid
 from cvt_hpc.job.definition import HEADER, Job
 from cvt_hpc.job.document import read_document
+from cvt_hpc.job.histories import KEY, read_histories
 from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.values import expectation, read_value
 
@@ -82,7 +83,10 @@ def build_job(
     given = {**tables, **replaced}
     parameters = _resolve({**{axis.name: axis.values[0] for axis in axes}, **given}, schema, source)
     check_grid(schema, parameters, axes, source)
-    return Job(name, schema.model, schema.stepper, description, source, parameters, axes, frozenset(given))
+    histories = document.get(KEY[0], {}).get(KEY[1], [])
+    kept = read_histories(histories, schema, axes, replaced, source)
+    given = frozenset(given)
+    return Job(name, schema.model, schema.stepper, description, source, parameters, axes, given, kept)
 
 
 def _read_name(head: Mapping[str, Any], source: str) -> str:
@@ -126,6 +130,8 @@ def _read_tables(document: Mapping[str, Any], schema: Schema, source: str) -> di
     values = {}
     for section in schema.sections:
         for name, raw in document.get(section, {}).items():
+            if (section, name) == KEY:
+                continue
             where = f"{source}: [{section}] {name}"
             key = schema.find(name, where, section)
             values[key] = read_value(schema.parameters[key], raw, where)

@@ -11,7 +11,7 @@ from cvt_hpc.job.values import in_words
 _FEW = 8
 
 
-def summarize(job: Job, core_seconds: float) -> str:
+def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
     """Return what a job runs: every parameter with where it is from, the axes, and the cost.
 
     Parameters
@@ -20,6 +20,8 @@ def summarize(job: Job, core_seconds: float) -> str:
         A validated job.
     core_seconds : float
         Estimated cost of one run [s].
+    measured : int
+        Number of recorded runs that the estimate rests on.
 
     Returns
     -------
@@ -34,7 +36,11 @@ def summarize(job: Job, core_seconds: float) -> str:
         axes = [(axis.name, _values_in_words(axis), f"{len(axis.values)} values") for axis in job.axes]
         lines += ["", "[axes]", *_columns(axes)]
     product = f" = {' x '.join(map(str, job.shape))}" if len(job.axes) > 1 else ""
-    lines += ["", f"runs: {job.size}{product}", f"estimated cost: {_cost_in_words(core_seconds, job.size)}"]
+    basis = f" (by what {measured} runs on record took)" if measured else ""
+    cost = f"estimated cost: {_cost_in_words(core_seconds, job.size)}{basis}"
+    lines += ["", f"runs: {job.size}{product}"]
+    lines += [f"histories kept: of runs {', '.join(map(str, job.histories))}"] if job.histories else []
+    lines += [cost]
     return "\n".join(lines)
 
 

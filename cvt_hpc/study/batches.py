@@ -10,10 +10,30 @@ longer than a large one; the price is processor time of ranks that would have wa
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 Batch = tuple[int, ...]  # run indices
+
+
+class Assignment(NamedTuple):
+    """What one claim gets.
+
+    Attributes
+    ----------
+    runs : tuple of int
+        Run indices.
+    alone : bool
+        Whether they are done one by one, because processes have died at them, and not together.
+    """
+
+    runs: Batch
+    alone: bool = False
+
+    def parts(self) -> list[Assignment]:
+        """Return what is to be done at a time."""
+        return [Assignment((index,), alone=True) for index in self.runs] if self.alone else [self]
 
 
 def share_out(groups: Sequence[Batch], costs: np.ndarray, ranks: int) -> list[Batch]:

@@ -141,10 +141,10 @@ class Study:
             raise ValueError("a run that ended has the status not_run")
         return row
 
-    def pack_failure(self, reason: str) -> np.ndarray:
-        """Return the record, shape (), of a run that ended in a Python exception."""
+    def pack_failure(self, reason: str, status: Status = Status.FAILED_ERROR) -> np.ndarray:
+        """Return the record, shape (), of a run that ended without results."""
         row = self.blank_rows()
-        row["status"] = Status.FAILED_ERROR
+        row["status"] = status
         row["reason"] = fit_text(reason, row.dtype["reason"].itemsize)
         return row
 

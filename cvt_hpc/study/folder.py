@@ -5,14 +5,19 @@ from __future__ import annotations
 import json
 import os
 import platform
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import naming_refusals, written_aside
 from cvt_hpc.study.description import Study
+from cvt_hpc.study.lock import is_locked, locked
+from cvt_hpc.study.part import Part
 
 FORMAT = "cvt_hpc study 1"
+_PART_LOCKS = ".part-*.lock"
 
 
 class StudyFolder:
@@ -29,8 +34,14 @@ class StudyFolder:
         self.job_file = self.path / "job.json"
         self.records = self.path / "records"
         self.results = self.path / "results.nc"
-        self.lock_file = self.path / "run.lock"
+        self.lock_file = self.path / "run.lock"  # held by a run of the whole, shared by runs of parts
+        self.gather_lock = self.path / "gather.lock"
         self.crash_log = self.path / "crash.log"
+        self.histories = self.path / "histories"
+
+    def history(self, index: int) -> Path:
+        """Return the file of the history of run `index`."""
+        return self.histories / f"run-{index:06d}.nc"
 
     def load(self) -> Study:
         """Return the study that the folder holds.
@@ -66,10 +77,15 @@ class StudyFolder:
         """
         with naming_refusals(self.path, "a folder that can be read"):
             if self.path.is_dir():
+                # In this order: a run of another part writes its job.json before any records.
+                unexplained = self._results_or_records()
                 found = self._read_job()
-                if found is None:
-                    self._refuse_unexplained()
-                elif not fresh:
+                if found is None and unexplained is not None:
+                    raise InputError(
+                        f"{self.path}: expected an empty folder or that of an earlier run, found "
+                        f"{unexplained.name} without a job.json; choose another --out"
+                    )
+                if found is not None and not fresh:
                     self._refuse_other(found, study)
             elif self.path.exists():
                 raise InputError(f"{self.path}: expected a folder for the results, found a file")
@@ -98,13 +114,40 @@ class StudyFolder:
     def clear(self) -> None:
         """Remove what runs have written: results, records, and last the job.json that vouches for them."""
         logs = self.records.glob("rank-*.log")
+        locks = self.path.glob(_PART_LOCKS)
+        histories = [*self.histories.glob("run-*.nc"), *self.half_histories()]
         with naming_refusals(self.path, "a folder that results can be removed from"):
-            for path in [self.results, self.crash_log, *self.leftovers(), *logs, self.job_file]:
+            for path in [self.results, self.crash_log, *self.leftovers(), *locks, *histories, *logs]:
                 path.unlink(missing_ok=True)
+            self.job_file.unlink(missing_ok=True)
 
     def leftovers(self) -> list[Path]:
         """Return the half-written files of processes that died while they wrote."""
         return [*self.path.glob(".results.nc.*.part"), *self.path.glob(".job.json.*.part")]
+
+    def half_histories(self) -> list[Path]:
+        """Return the same of histories; only who is alone at work can tell them from those being written."""
+        return [*self.histories.glob(".run-*.nc.*.part")]
+
+    @contextmanager
+    def occupied(self, part: Part | None) -> Iterator[None]:
+        """Be at work in the folder for the time of a `with`, alone or beside runs of other parts.
+
+        Raises
+        ------
+        InputError
+            If a run of the whole, or of the same part, is at work.
+        """
+        with ExitStack() as held:
+            held.enter_context(locked(self.lock_file, shared=part is not None))
+            if part is not None:
+                lock = self.path / f".part-{part.number}-of-{part.parts}.lock"
+                held.enter_context(locked(lock, f"a part {part}"))
+            yield
+
+    def is_in_use(self) -> bool:
+        """Return whether a run is at work in the folder, of the whole or of a part."""
+        return any(map(is_locked, [self.lock_file, *self.path.glob(_PART_LOCKS)]))
 
     def _read_job(self) -> Study | None:
         """Return the study of job.json, None if there is no such file."""
@@ -122,13 +165,12 @@ class StudyFolder:
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"{self.job_file}: expected a job as runs write it, found: {error!r}") from error
 
-    def _refuse_unexplained(self) -> None:
+    def _results_or_records(self) -> Path | None:
+        """Return what is here that only a job.json explains; hidden files are probes of another start."""
         for path in (self.results, self.records):
-            if path.is_file() or (path.is_dir() and any(path.iterdir())):
-                raise InputError(
-                    f"{self.path}: expected an empty folder or that of an earlier run, found {path.name} "
-                    "without a job.json; choose another --out"
-                )
+            if path.is_file() or (path.is_dir() and any(p.name[0] != "." for p in path.iterdir())):
+                return path
+        return None
 
     def _refuse_other(self, found: Study, study: Study) -> None:
         if found.fingerprint != study.fingerprint:

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.files import naming_refusals, written_aside
+from cvt_hpc.files import discard, naming_refusals, written_aside
 from cvt_hpc.netcdf import write_netcdf
 from cvt_hpc.study.chunks import chunk_shape, fill
 from cvt_hpc.study.description import Dimension, Study
 from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.lock import locked
 from cvt_hpc.study.provenance import command, git_revision, history_line, versions
 from cvt_hpc.study.record import KEPT
 from cvt_hpc.study.records import Records
@@ -46,11 +47,22 @@ def gather(out: str | Path) -> Path:
         If the folder is not that of a run, or cannot be written to.
     """
     folder = StudyFolder(out)
-    study = folder.load()
-    records = read_records(folder.records, study)
-    for warning in records.warnings:
+    for warning in gather_records(folder, folder.load()).warnings:
         _logger.warning(warning)
-    return write_results(folder, study, records)
+    return folder.results
+
+
+def gather_records(folder: StudyFolder, study: Study) -> Records:
+    """Write the dataset of all runs recorded so far, and return their records.
+
+    One process at a time reads and writes, so that of several the last one's dataset holds most.
+    """
+    with locked(folder.gather_lock, patience=float("inf")):
+        for leftover in folder.leftovers():
+            discard(leftover)
+        records = read_records(folder.records, study)
+        write_results(folder, study, records)
+    return records
 
 
 def open_results(path: str | Path) -> xr.Dataset:

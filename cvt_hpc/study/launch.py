@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from cvt_hpc.errors import InputError
+from cvt_hpc.errors import CRASHED, InputError
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -189,4 +189,4 @@ def _abort(world: MPI.Intracomm, text: str, crash_log: Path) -> None:
         print(message, end="", file=sys.stderr, flush=True)
         time.sleep(0.5)  # mpirun, once told to abort, drops output that it has not yet passed on
     finally:  # whatever became of the message: without this the other ranks wait for ever
-        world.Abort(1)
+        world.Abort(CRASHED)

@@ -1,4 +1,4 @@
-"""One run at a time in an output folder, by a lock that dies with the process that holds it."""
+"""Who may be at work in an output folder at a time, by locks that die with the process that holds them."""
 
 from __future__ import annotations
 
@@ -20,23 +20,31 @@ _logger = logging.getLogger(__name__)
 
 
 @contextmanager
-def locked(path: Path) -> Iterator[None]:
-    """Hold a lock file for this process alone, for the time of a `with`.
+def locked(
+    path: Path, what: str = "a folder", *, shared: bool = False, patience: float = _PATIENCE
+) -> Iterator[None]:
+    """Hold a lock file for the time of a `with`.
 
     Parameters
     ----------
     path : Path
         The lock file, made where missing; it stays behind, without meaning, when the lock is gone.
+    what : str
+        What it stands for, for the error.
+    shared : bool
+        Whether others may hold it as well, who share it too; for this process alone if not.
+    patience : float
+        Time [s] to wait for those who hold it.
 
     Raises
     ------
     InputError
-        If another process holds it.
+        If they still hold it then.
     """
     with naming_refusals(path, "to be able to write"):
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
     try:
-        _take(descriptor, path)
+        _take(descriptor, path, what, fcntl.LOCK_SH if shared else fcntl.LOCK_EX, patience)
         yield
     finally:
         os.close(descriptor)
@@ -59,18 +67,18 @@ def is_locked(path: Path) -> bool:
     return False
 
 
-def _take(descriptor: int, path: Path) -> None:
+def _take(descriptor: int, path: Path, what: str, kind: int, patience: float) -> None:
     """Take the lock and leave word of who has it."""
-    deadline = time.monotonic() + _PATIENCE
+    deadline = time.monotonic() + patience
     while True:
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
             break
         except BlockingIOError:
             if time.monotonic() > deadline:
                 holder = os.pread(descriptor, 200, 0).decode(errors="replace").strip() or "another"
                 raise InputError(
-                    f"{path.parent}: expected a folder that no run is at work in, found {holder}"
+                    f"{path.parent}: expected {what} that no run is at work in, found {holder}"
                 ) from None
             time.sleep(0.02)
         except OSError as error:  # some network file systems have no locks: no reason not to run there

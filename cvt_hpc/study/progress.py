@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 import time
 
+import numpy as np
+
 from cvt_hpc.study.schedule import Counter
 
 _BAR_INTERVAL = 0.5  # [s]
@@ -25,15 +27,20 @@ class Progress:
         Number of runs that earlier sessions have recorded, and of the failed ones among them.
     visible : bool
         Whether anything is shown at all.
+    costs : numpy.ndarray
+        Predicted durations of the runs to be done, in any unit and in the order in which they are started.
     """
 
-    def __init__(self, counter: Counter, total: int, recorded: int, failed: int, visible: bool) -> None:
+    def __init__(
+        self, counter: Counter, total: int, recorded: int, failed: int, visible: bool, costs: np.ndarray
+    ) -> None:
         self._counter = counter
         self._total = total
         self._recorded = recorded
         self._failed = failed
         self._started = self._shown = time.monotonic()
         self._visible = visible
+        self._work = np.cumsum(costs)
         self._bar = None
         if visible and sys.stderr.isatty():
             from tqdm import tqdm
@@ -70,7 +77,10 @@ class Progress:
         line = f"{finished}/{self._total} runs ({finished / self._total:.1%}), {failed} failed"
         if tally.finished and elapsed > 0:
             rate = tally.finished / elapsed
-            line += f", {rate:.3g} runs/s, {show_duration((self._total - finished) / rate)} to go"
+            # The longest come first: by their number alone, too long a time would be left.
+            done = self._work[tally.finished - 1]
+            to_go = elapsed * (self._work[-1] - done) / done
+            line += f", {rate:.3g} runs/s, {show_duration(to_go)} to go"
         print(line, file=sys.stderr, flush=True)
 
 

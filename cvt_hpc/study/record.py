@@ -1,33 +1,22 @@
-"""The durable record: one append-only log per rank and session, one unbuffered write per batch of runs.
+"""The durable record: one log per rank and session, one unbuffered write per batch of runs.
 
-A log is a preamble (magic, format version, a JSON header and its checksum) and then frames of one length:
-marker, payload length, run index, time of writing, checksum, payload. A frame's checksum starts from the
-job's fingerprint and the payload's type, so a frame is known to belong to its study even where the header is
-lost, and reading can take up again at the next frame after a damaged stretch.
+Before a batch begins a mark is written. A process that dies leaves it without records after it, which tells
+at what runs it died; one that ends in any orderly way takes it back.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 import time
-import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from struct import Struct
 from typing import Any
 
 import numpy as np
 
 from cvt_hpc.files import storage_error, sync_folder
-
-MAGIC = b"\x89CVTREC\n"
-FORMAT_VERSION = 1
-MARKER = b"\xf5RUN"
-PREAMBLE = Struct("<8sIII")  # magic, format version, header length, header checksum
-FRAME = Struct("<4sIqdI")  # marker, payload length, run index, time of writing [s], checksum
-_CHECKED = Struct("<Iqd")  # the part of a frame's head that its checksum covers
+from cvt_hpc.study.frames import AGAIN, ALONE, BEGUN, Place, RecordFormat
 
 KEPT = "The runs recorded so far are kept, and the same command goes on from them"
 SYNC_INTERVAL = 5.0  # [s]; a dead process loses nothing, a power failure at most this much
@@ -35,72 +24,8 @@ SYNC_INTERVAL = 5.0  # [s]; a dead process loses nothing, a power failure at mos
 Record = tuple[int, np.ndarray]  # run index, and the record of that run, shape ()
 
 
-class RecordFormat:
-    """How a study's records are framed.
-
-    Parameters
-    ----------
-    fingerprint : str
-        Of the job.
-    dtype : numpy.dtype
-        Structured type of one record.
-    """
-
-    def __init__(self, fingerprint: str, dtype: np.dtype) -> None:
-        self.fingerprint = fingerprint
-        self.dtype = dtype
-        self.descr = json.loads(json.dumps(np.lib.format.dtype_to_descr(dtype)))
-        self._seed = zlib.crc32(json.dumps([fingerprint, self.descr]).encode())
-
-    @property
-    def frame_size(self) -> int:
-        """Bytes of one framed record."""
-        return FRAME.size + self.dtype.itemsize
-
-    def frame(self, index: int, written: float, payload: bytes) -> bytes:
-        """Return one framed record.
-
-        Parameters
-        ----------
-        index : int
-            Run index.
-        written : float
-            Time of writing [s] since the epoch.
-        payload : bytes
-            The record, of the format's dtype.
-        """
-        return (
-            FRAME.pack(MARKER, len(payload), index, written, self._check(index, written, payload)) + payload
-        )
-
-    def unframe(self, data: bytes, start: int) -> tuple[int, float] | None:
-        """Return run index and time of the frame that starts at `start`, None if there is no valid one."""
-        stop = start + self.frame_size
-        if stop > len(data):
-            return None
-        marker, length, index, written, check = FRAME.unpack_from(data, start)
-        if marker != MARKER or length != self.dtype.itemsize:
-            return None
-        payload = memoryview(data)[start + FRAME.size : stop]
-        return (index, written) if check == self._check(index, written, payload) else None
-
-    def preamble(self, session: dict[str, Any], rank: int) -> bytes:
-        """Return the bytes with which a log begins."""
-        header = {"fingerprint": self.fingerprint, "dtype": self.descr, "rank": rank, "session": session}
-        text = json.dumps(header).encode()
-        return PREAMBLE.pack(MAGIC, FORMAT_VERSION, len(text), header_check(FORMAT_VERSION, text)) + text
-
-    def _check(self, index: int, written: float, payload: bytes | memoryview) -> int:
-        return zlib.crc32(payload, zlib.crc32(_CHECKED.pack(len(payload), index, written), self._seed))
-
-
-def header_check(version: int, text: bytes) -> int:
-    """Return the checksum of a log's format version and JSON header."""
-    return zlib.crc32(text, version)
-
-
 class RecordLog:
-    """A rank's log of one session; the file comes into being with the first record.
+    """A rank's log of one session; the file comes into being with what is first written.
 
     Parameters
     ----------
@@ -112,16 +37,49 @@ class RecordLog:
         What is to be known of this start of the sweep, see `provenance.new_session`.
     rank : int
         Of this process.
+    attempts : mapping, optional
+        Which attempt of a run this is, by run index; the first one where it is not named.
     """
 
-    def __init__(self, folder: Path, layout: RecordFormat, session: dict[str, Any], rank: int) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        layout: RecordFormat,
+        session: dict[str, Any],
+        rank: int,
+        attempts: Mapping[int, int] | None = None,
+    ) -> None:
         # Host, process and time keep two sessions, or two nodes, from ever writing to one file.
         unique = f"{platform.node()}-{os.getpid()}-{time.time_ns():x}"
         self.path = folder / f"rank-{rank:04d}-{unique}.log"
         self._layout = layout
         self._preamble = layout.preamble(session, rank)
+        self._attempts = attempts or {}
         self._descriptor: int | None = None
         self._synced = 0.0
+        self._open_mark: int | None = None  # where the mark of the batch at work begins [byte]
+
+    def begin(self, batch: Sequence[int], *, alone: bool = False) -> None:
+        """Write that this process is at work at some runs.
+
+        Parameters
+        ----------
+        batch : sequence of int
+            Run indices.
+        alone : bool
+            Whether it is one that is done alone because its process has died before.
+
+        Raises
+        ------
+        StorageError
+            If the system refuses the write.
+        """
+        mark = self._layout.mark(ALONE if alone else BEGUN, self._places(batch), time.time())
+        self._open_mark = self._append(mark)
+
+    def begin_again(self, indices: Sequence[int]) -> None:
+        """Write that the earlier records of some runs count no more; errors as for `begin`."""
+        self._append(self._layout.mark(AGAIN, self._places(indices), time.time()))
 
     def append(self, records: Sequence[Record]) -> None:
         """Write the records of some runs; when this returns, the death of the process cannot lose them.
@@ -132,20 +90,20 @@ class RecordLog:
             If the system refuses the write. The log then ends with the record before, and none of these.
         """
         now = time.time()
-        try:
-            if self._descriptor is None:
-                self._open()
-            self._write(b"".join(self._layout.frame(index, now, row.tobytes()) for index, row in records))
-            if time.monotonic() - self._synced > SYNC_INTERVAL:
-                self._sync()
-        except OSError as error:
-            raise storage_error(self.path, error, KEPT) from error
+        places = self._places([index for index, _ in records])
+        frames = (self._layout.record(at, now, row) for at, (_, row) in zip(places, records, strict=True))
+        self._append(b"".join(frames))
+        self._open_mark = None
 
     def close(self) -> None:
-        """Bring everything to the disk and close the file."""
+        """Take back the mark of runs that were broken off, bring the rest to the disk, and close the file."""
         if self._descriptor is None:
             return
         try:
+            if self._open_mark is not None:
+                os.ftruncate(self._descriptor, self._open_mark)  # which a full disk allows
+            if self._open_mark == len(self._preamble):  # nothing else was ever in it
+                self.path.unlink()
             self._sync()
         except OSError as error:
             raise storage_error(self.path, error, KEPT) from error
@@ -159,13 +117,28 @@ class RecordLog:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def _places(self, indices: Sequence[int]) -> list[Place]:
+        return [(int(index), self._attempts.get(int(index), 1)) for index in indices]
+
+    def _append(self, data: bytes) -> int:
+        """Write and now and then bring to the disk; return where in the file the data begin."""
+        try:
+            if self._descriptor is None:
+                self._open()
+            before = self._write(data)
+            if time.monotonic() - self._synced > SYNC_INTERVAL:
+                self._sync()
+        except OSError as error:
+            raise storage_error(self.path, error, KEPT) from error
+        return before
+
     def _open(self) -> None:
         self._descriptor = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o666)
         self._write(self._preamble)
         sync_folder(self.path.parent)
         self._synced = time.monotonic()
 
-    def _write(self, data: bytes) -> None:
+    def _write(self, data: bytes) -> int:
         """Write all of `data` or nothing: a write that the system cut short is taken back."""
         before = os.fstat(self._descriptor).st_size
         rest = memoryview(data)
@@ -175,6 +148,7 @@ class RecordLog:
         except OSError:
             os.ftruncate(self._descriptor, before)
             raise
+        return before
 
     def _sync(self) -> None:
         os.fsync(self._descriptor)

@@ -6,23 +6,33 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.files import StorageError, naming_refusals
+from cvt_hpc.study.batches import Batch
 from cvt_hpc.study.description import Study
 
-# A valid record: run index, time of writing [s], number of its log, place of the payload there [byte],
-# and how the run ended.
-ENTRY = np.dtype([("run", "i8"), ("written", "f8"), ("log", "i4"), ("place", "i8"), ("status", "i1")])
+# A valid record: run index, attempt, time of writing [s], number of its log, its place there [byte], and how
+# the run ended.
+ENTRY = np.dtype(
+    [("run", "i8"), ("attempt", "i8"), ("written", "f8"), ("log", "i4"), ("place", "i8"), ("status", "i1")]
+)
 
 BLOCK = 1 << 25  # [bytes] of records that are in memory at a time
 
 
+class Timing(NamedTuple):
+    """How long a batch took, from its mark to its records."""
+
+    batch: Batch
+    seconds: float
+
+
 @dataclass
 class Records:
-    """What the logs of a study hold, about 30 bytes a run.
+    """What the logs of a study hold; the records themselves stay there, some 60 bytes a run are in memory.
 
     Attributes
     ----------
@@ -32,6 +42,13 @@ class Records:
         The files in which records were looked for.
     entries : numpy.ndarray of ENTRY, shape (runs,)
         The record that counts of each run; `log` is -1, `written` NaN where a run has none.
+    attempts : numpy.ndarray of int, shape (runs,)
+        The attempt that counts, from 1: how often the run was asked for.
+    died, died_alone : numpy.ndarray of int, shape (runs,)
+        How often, in that attempt, a process was at work at the run when it died: in all, and while it did
+        that run alone because of earlier deaths. Runs that a living process is at count as well.
+    timings : list of Timing
+        Of the batches that were done as a whole, the first of each log excepted: it has loaded kernels.
     sessions : list of dict
         The starts of the sweep that left records, in order of time.
     warnings : list of str
@@ -41,6 +58,10 @@ class Records:
     study: Study
     logs: Sequence[Path]
     entries: np.ndarray
+    attempts: np.ndarray
+    died: np.ndarray
+    died_alone: np.ndarray
+    timings: list[Timing] = field(default_factory=list)
     sessions: list[dict[str, Any]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
@@ -51,7 +72,7 @@ class Records:
 
     @property
     def recorded(self) -> np.ndarray:
-        """Whether a run has a record, shape (runs,): it is never repeated, however it ended."""
+        """Whether a run has a record, shape (runs,): it is not repeated unless asked for."""
         return ~np.isnan(self.written)
 
     @property
@@ -99,8 +120,8 @@ def read_rows(study: Study, logs: Sequence[Path], entries: np.ndarray, name: str
     return rows
 
 
-def choose(study: Study, logs: Sequence[Path], found: np.ndarray) -> Records:
-    """Return of several records of one run the earliest written.
+def choose(study: Study, logs: Sequence[Path], found: np.ndarray, marked: np.ndarray) -> Records:
+    """Return of several records of one run that of the latest attempt, and of these the earliest written.
 
     By content, not by the order in which a folder happens to be listed; equal times, as in a copied file, are
     told apart by file name and place.
@@ -113,14 +134,21 @@ def choose(study: Study, logs: Sequence[Path], found: np.ndarray) -> Records:
         The files, by name.
     found : numpy.ndarray of ENTRY
         All valid records.
+    marked : numpy.ndarray of int, shape (runs,)
+        The latest attempt of each run that a mark names.
     """
-    found = found[np.lexsort((found["place"], found["log"], found["written"], found["run"]))]
+    keys = (found["place"], found["log"], found["written"], -found["attempt"], found["run"])
+    found = found[np.lexsort(keys)]
     first = np.diff(found["run"], prepend=-1) > 0
-    entries = np.zeros(study.size, ENTRY)
-    entries["log"], entries["written"] = -1, np.nan
+    blank = np.zeros((), ENTRY)
+    blank["log"], blank["written"] = -1, np.nan
+    entries = np.full(study.size, blank)
     entries[found["run"][first]] = found[first]
-    records = Records(study, logs, entries)
-    records.warnings = _contradictions(records, found[~first])
+    attempts = np.maximum(marked, entries["attempt"])
+    records = Records(study, logs, entries, attempts, np.zeros_like(attempts), np.zeros_like(attempts))
+    later = found[~first]
+    records.warnings = _contradictions(records, later[later["attempt"] == entries["attempt"][later["run"]]])
+    entries[entries["attempt"] < attempts] = blank  # to be done again, and not done yet
     return records
 
 

@@ -1,33 +1,46 @@
-"""Reading records back, whatever happened to the files: damage is named and skipped, never fatal."""
+"""Reading logs, whatever happened to the files: damage is named and skipped, never fatal."""
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from io import FileIO
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.files import naming_refusals
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.record import FORMAT_VERSION, FRAME, MAGIC, MARKER, PREAMBLE, RecordFormat, header_check
-from cvt_hpc.study.records import ENTRY, Records, choose
+from cvt_hpc.study.frames import (
+    AGAIN,
+    ALONE,
+    HEAD,
+    MAGIC,
+    PLACE,
+    PREAMBLE_LIMIT,
+    RECORD,
+    ForeignLog,
+    Frame,
+    RecordFormat,
+    read_preamble,
+)
+from cvt_hpc.study.records import ENTRY, Records, Timing, choose
 
-PREAMBLE_LIMIT = 1 << 20  # [bytes]; beyond is none
-WINDOW = 1 << 22  # [bytes] of a log that are in memory at a time
 
+class _Death(NamedTuple):
+    """A mark without records after it; equal ones, as in a copied file, are one."""
 
-class _Foreign(Exception):
-    """A file that does not hold records of the study."""
+    index: int
+    attempt: int
+    alone: bool
+    begun: float
 
 
 def read_records(folder: Path, study: Study) -> Records:
     """Return which records all logs of a folder hold.
 
-    Of several records of one run the earliest written counts.
+    Of several records of one run that of the latest attempt counts, and of these the earliest written.
 
     Parameters
     ----------
@@ -36,26 +49,16 @@ def read_records(folder: Path, study: Study) -> Records:
     study : Study
         The study that the records have to belong to.
     """
-    layout = RecordFormat(study.fingerprint, study.record_dtype)
-    sessions: dict[str, dict[str, Any]] = {}
-    found, warnings = [np.zeros(0, ENTRY)], []
     logs = _files(folder)
+    reader = _Reader(study)
     for number, path in enumerate(logs):
         try:
             with path.open("rb", buffering=0) as file:
-                session, entries = _read_log(file, layout, study.size, warnings)
-        except (OSError, _Foreign) as error:
+                reader.read(number, file)
+        except (OSError, ForeignLog) as error:
             text = error.strerror if isinstance(error, OSError) else error
-            warnings.append(f"{path}: left out: {text}")
-            continue
-        if session is not None and entries.size:
-            sessions[session["id"]] = session
-        entries["log"] = number
-        found.append(entries)
-    records = choose(study, logs, np.concatenate(found))
-    records.warnings[:0] = warnings
-    records.sessions = sorted(sessions.values(), key=lambda session: (session["started"], session["id"]))
-    return records
+            reader.warnings.append(f"{path}: left out: {text}")
+    return reader.result(logs)
 
 
 def _files(folder: Path) -> list[Path]:
@@ -65,92 +68,117 @@ def _files(folder: Path) -> list[Path]:
     return [path for path in entries if not path.name.startswith(".")]
 
 
-def _read_log(
-    file: FileIO, layout: RecordFormat, runs: int, warnings: list[str]
-) -> tuple[dict[str, Any] | None, np.ndarray]:
-    """Return the session of a log and its valid records; what is damaged goes to `warnings`.
+class _Reader:
+    """Takes in one log after another."""
 
-    Raises
-    ------
-    _Foreign
-        If the file is no log, or a log of another job.
+    def __init__(self, study: Study) -> None:
+        self.warnings: list[str] = []
+        self._study = study
+        self._layout = RecordFormat(study.fingerprint, study.record_dtype)
+        self._found = [np.zeros(0, ENTRY)]
+        self._attempts = np.ones(study.size, np.int64)
+        self._status = study.record_dtype.fields["status"][1]  # where it is in a record [byte]
+        self._deaths: set[_Death] = set()
+        self._timings: list[Timing] = []
+        self._sessions: dict[str, dict[str, Any]] = {}
+
+    def read(self, number: int, file: FileIO) -> None:
+        """Take in a log; what is damaged goes to the warnings.
+
+        Raises
+        ------
+        ForeignLog
+            If the file is no log, or a log of another job.
+        """
+        head = os.pread(file.fileno(), PREAMBLE_LIMIT, 0)
+        if not head:  # a process that died before its first record
+            return
+        session, start = read_preamble(head, self._layout)
+        flaws: list[str] = []
+        trace = _Trace()
+        frames = self._sound_frames(file, start, flaws)
+        found = np.fromiter(self._entries(frames, number, trace), ENTRY)
+        if session is None and not trace.followed:
+            known = head.startswith(MAGIC)
+            raise ForeignLog("no record of this study in it" if known else "not a record log")
+        if session is None:
+            self.warnings.append(f"{file.name}: the header is damaged; the records found in it count")
+        self.warnings.extend(f"{file.name}: {flaw}; left out" for flaw in flaws)
+        if session is not None and found.size:
+            self._sessions[session["id"]] = session
+        self._found.append(found)
+        self._timings += trace.timings[1:]
+        self._deaths |= trace.deaths()
+
+    def result(self, logs: list[Path]) -> Records:
+        """Return what all logs hold."""
+        records = choose(self._study, logs, np.concatenate(self._found), self._attempts)
+        for death in self._deaths:
+            if death.attempt == records.attempts[death.index] and not records.recorded[death.index]:
+                records.died[death.index] += 1
+                records.died_alone[death.index] += death.alone
+        records.timings = self._timings
+        records.sessions = sorted(self._sessions.values(), key=lambda s: (s["started"], s["id"]))
+        records.warnings[:0] = self.warnings
+        return records
+
+    def _sound_frames(self, file: FileIO, start: int, flaws: list[str]) -> Iterator[tuple[int, Frame]]:
+        """Yield place and content of the frames that name runs of the study; the rest goes to `flaws`."""
+        size = os.fstat(file.fileno()).st_size
+        for begin, end, frame in self._layout.frames(file, start, size):
+            if frame is not None and all(0 <= index < self._study.size for index, _ in frame.places):
+                yield begin, frame
+            elif end == size and end - begin < self._layout.record_size:
+                flaws.append(f"the last {end - begin} bytes are an unfinished record")
+            else:
+                flaws.append(f"bytes {begin} to {end} are damaged")
+
+    def _entries(
+        self, frames: Iterable[tuple[int, Frame]], number: int, trace: _Trace
+    ) -> Iterator[tuple[int, int, float, int, int, int]]:
+        """Yield the records of a log as an ENTRY has them, and follow what its process was at."""
+        for begin, frame in frames:
+            trace.follow(frame)
+            if frame.kind == RECORD:
+                ((index, attempt),) = frame.places
+                place = begin + HEAD.size + PLACE.size
+                yield index, attempt, frame.written, number, place, frame.row[self._status]
+            else:
+                for index, attempt in frame.places:
+                    self._attempts[index] = max(self._attempts[index], attempt)
+
+
+class _Trace:
+    """Follows from mark to mark what a process was at.
+
+    Attributes
+    ----------
+    followed : int
+        Number of frames.
+    timings : list of Timing
+        Of the batches that were done as a whole.
     """
-    size = os.fstat(file.fileno()).st_size
-    head = os.pread(file.fileno(), PREAMBLE_LIMIT, 0)
-    if not head:  # a process that died before its first record
-        return None, np.zeros(0, ENTRY)
-    session, start = _read_preamble(head, layout)
-    flaws: list[str] = []
-    entries = np.fromiter(_entries(file, start, size, layout, runs, flaws), ENTRY)
-    if session is None and not entries.size:
-        raise _Foreign("no record of this study in it" if head.startswith(MAGIC) else "not a record log")
-    if session is None:
-        warnings.append(f"{file.name}: the header is damaged; the records found in it count")
-    warnings.extend(f"{file.name}: {flaw}; left out" for flaw in flaws)
-    return session, entries
 
+    def __init__(self) -> None:
+        self.followed = 0
+        self.timings: list[Timing] = []
+        self._mark: Frame | None = None
+        self._at_work: dict[int, int] = {}
 
-def _read_preamble(head: bytes, layout: RecordFormat) -> tuple[dict[str, Any] | None, int]:
-    """Return a log's session, None if its header is damaged, and where its frames begin.
+    def follow(self, frame: Frame) -> None:
+        """Take in the next frame."""
+        self.followed += 1
+        if frame.kind == RECORD:
+            ((index, _),) = frame.places
+            if self._at_work.pop(index, None) is not None and not self._at_work:
+                batch = tuple(index for index, _ in self._mark.places)
+                self.timings.append(Timing(batch, frame.written - self._mark.written))
+        elif frame.kind != AGAIN:
+            self._mark, self._at_work = frame, dict(frame.places)
 
-    Raises
-    ------
-    _Foreign
-        If a sound header says that the file is not of this study.
-    """
-    if not head.startswith(MAGIC):
-        return None, 0
-    if len(head) < PREAMBLE.size:
-        return None, len(head)
-    _, version, length, check = PREAMBLE.unpack_from(head)
-    text = head[PREAMBLE.size : PREAMBLE.size + length]
-    if check != header_check(version, text):
-        return None, len(MAGIC)
-    if version != FORMAT_VERSION:
-        raise _Foreign(f"expected format {FORMAT_VERSION} of the record log, found {version}")
-    header = json.loads(text)
-    if header["fingerprint"] != layout.fingerprint:
-        raise _Foreign(f"a record log of another job (fingerprint {header['fingerprint'][:12]})")
-    if header["dtype"] != layout.descr:
-        raise _Foreign("a record log of this job with other recorded quantities")
-    return header["session"], PREAMBLE.size + length
-
-
-def _entries(
-    file: FileIO, start: int, size: int, layout: RecordFormat, runs: int, flaws: list[str]
-) -> Iterator[tuple[int, float, int, int, int]]:
-    """Yield the valid records of a log as an ENTRY has them; what is damaged goes to `flaws`."""
-    for begin, end, frame in _frames(file, start, size, layout):
-        if frame is not None and 0 <= frame[0] < runs:
-            index, written, status = frame
-            yield index, written, -1, begin + FRAME.size, status
-        elif end == size and end - begin < layout.frame_size:
-            flaws.append(f"the last {end - begin} bytes are an unfinished record")
-        else:
-            flaws.append(f"bytes {begin} to {end} are damaged")
-
-
-def _frames(
-    file: FileIO, start: int, size: int, layout: RecordFormat
-) -> Iterator[tuple[int, int, tuple[int, float, int] | None]]:
-    """Yield begin, end and (index, time of writing, status) of each frame; None for what is not valid."""
-    status = FRAME.size + layout.dtype.fields["status"][1]
-    place, damaged = start, None  # where a stretch without a valid frame begins
-    for base in range(start, size, WINDOW):
-        # So much longer than its step that a frame which begins in a window is whole in it.
-        data = os.pread(file.fileno(), WINDOW + layout.frame_size, base)
-        while place < min(base + WINDOW, size):
-            at = place - base
-            frame = layout.unframe(data, at)
-            if frame is None:
-                damaged = place if damaged is None else damaged
-                ahead = data.find(MARKER, at + 1)
-                place = base + (ahead if ahead >= 0 else WINDOW)
-                continue
-            if damaged is not None:
-                yield damaged, place, None
-                damaged = None
-            yield place, place + layout.frame_size, (*frame, data[at + status])
-            place += layout.frame_size
-    if damaged is not None:
-        yield damaged, size, None
+    def deaths(self) -> set[_Death]:
+        """Return a death at each run that the process was at in the end."""
+        return {
+            _Death(index, attempt, self._mark.kind == ALONE, self._mark.written)
+            for index, attempt in self._at_work.items()
+        }

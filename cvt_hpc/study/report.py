@@ -13,7 +13,8 @@ from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.records import Records
 from cvt_hpc.variables import Status
 
-DONE, SOME_FAILED, STOPPED = 0, 1, 99  # exit statuses; 2 is bad input, raised as InputError
+# exit statuses; 2 is bad input, raised as InputError
+DONE, SOME_FAILED, STALLED, STOPPED = 0, 1, 98, 99
 
 
 @dataclass(frozen=True)
@@ -40,40 +41,56 @@ class FailedRun:
 
 @dataclass(frozen=True)
 class RunReport:
-    """How a sweep ended; the same on all ranks.
+    """How a sweep, or a part of one, ended; the same on all ranks.
 
     Attributes
     ----------
-    out, results : Path
-        The output folder, and the dataset in it.
+    out : Path
+        The output folder.
+    results : Path or None
+        The dataset in it; None where another part is at work, and will gather it.
     total, done, remaining : int
-        Number of runs: all, with results, not yet run.
+        Number of runs, of the part where one was asked for: all, with results, not yet run.
     failed : tuple of FailedRun
         The runs that ended without results.
     stopped : str or None
         Why the sweep ended early: the name of a signal, or "time limit".
+    gained : int
+        Number of runs recorded since this start.
     """
 
     out: Path
-    results: Path
+    results: Path | None
     total: int
     done: int
     failed: tuple[FailedRun, ...]
     remaining: int
     stopped: str | None
+    gained: int
 
     @property
     def exit_status(self) -> int:
-        """Return 0 if all runs are done, 1 if some failed, 99 if some remain: the same command goes on."""
+        """Return 0 if all runs are done, 1 if some failed, 99 if some remain: the same command goes on.
+
+        98 if some remain and none has ended since the start: the same command may get no further.
+        """
         if self.remaining:
-            return STOPPED
+            return STOPPED if self.gained else STALLED
         return SOME_FAILED if self.failed else DONE
 
 
-def build_report(folder: StudyFolder, study: Study, records: Records, stopped: str | None) -> RunReport:
-    """Return the report of a sweep that left these records."""
+def build_report(
+    folder: StudyFolder,
+    study: Study,
+    records: Records,
+    asked: np.ndarray,
+    gathered: bool,
+    gained: int,
+    stopped: str | None,
+) -> RunReport:
+    """Return the report of a sweep of the runs that `asked`, shape (runs,), marks."""
     status = records.status
-    without_results = np.flatnonzero(records.recorded & (status != Status.DONE))
+    without_results = np.flatnonzero(asked & records.recorded & (status != Status.DONE))
     reasons = records.read(without_results, "reason")
     failed = tuple(
         FailedRun(
@@ -86,10 +103,11 @@ def build_report(folder: StudyFolder, study: Study, records: Records, stopped: s
     )
     return RunReport(
         out=folder.path,
-        results=folder.results,
-        total=study.size,
-        done=int((status == Status.DONE).sum()),
+        results=folder.results if gathered else None,
+        total=int(asked.sum()),
+        done=int((asked & records.recorded & (status == Status.DONE)).sum()),
         failed=failed,
-        remaining=int((~records.recorded).sum()),
+        remaining=int((asked & ~records.recorded).sum()),
         stopped=stopped,
+        gained=gained,
     )

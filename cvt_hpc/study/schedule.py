@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, Protocol, Self
 
-from cvt_hpc.study.batches import Batch
+from cvt_hpc.study.batches import Assignment, Batch
 from cvt_hpc.study.launch import Team
 
 INTERRUPTED = 2**40  # claims count from here when all are interrupted: beyond every plan
@@ -51,24 +51,34 @@ def open_counter(team: Team) -> Counter:
 
 
 def claimed_batches(
-    plan: Sequence[Batch], counter: Counter, may_claim: Callable[[], bool]
-) -> Iterator[Batch]:
-    """Yield the batches that this rank is to do.
+    plan: Sequence[Assignment],
+    counter: Counter,
+    may_claim: Callable[[], bool],
+    fits: Callable[[Batch], bool],
+) -> Iterator[Assignment]:
+    """Yield what this rank is to do, one batch at a time.
 
     Parameters
     ----------
-    plan : sequence of tuple of int
-        Run indices of each batch, in the order in which they are to be started; the same on all ranks.
+    plan : sequence of Assignment
+        All that is to be done, in the order in which to start; the same on all ranks.
     counter : Counter
         Where positions in `plan` are claimed.
     may_claim : callable
-        Asked before each claim; when it answers False, there are no more.
+        Asked before each batch; when it answers False, there are no more.
+    fits : callable
+        Whether there is time for a batch. One that does not fit is passed over, and nobody does it in this
+        session; shorter ones stand later in the plan.
     """
     while may_claim():
         position = counter.claim()
         if position >= len(plan):
             return
-        yield plan[position]
+        for place, part in enumerate(plan[position].parts()):
+            if place > 0 and not may_claim():
+                return
+            if fits(part.runs):
+                yield part
 
 
 class SerialCounter:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -11,6 +11,8 @@ import numpy as np
 from cvt_hpc.variables import Variable
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from cvt_hpc.job import Job
 
 
@@ -39,6 +41,15 @@ class Simulator(Protocol):
         No number of a record depends on the other runs of its batch. When `interrupt()` returns a text, all
         runs end by `Interrupted`.
         """
+
+    def run_points_keeping(
+        self,
+        job: Job,
+        points: Sequence[dict[str, Any]],
+        interrupt: Callable[[], str | None],
+        kept: Collection[int],
+    ) -> tuple[Sequence[Mapping[str, Any]], dict[int, xr.Dataset]]:
+        """Do as `run_points`, and return the histories of the runs at the places `kept` as well."""
 
 
 def default_simulator() -> Simulator:

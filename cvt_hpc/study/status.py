@@ -5,14 +5,21 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cvt_hpc.errors import InputError
+from cvt_hpc.job import build_job
+from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.lock import is_locked
 from cvt_hpc.study.records import Records
 from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.variables import Status
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
 
 
 @dataclass(frozen=True)
@@ -30,7 +37,8 @@ class StudyStatus:
     rate : float or None
         Runs recorded per second [1/s] in the latest session; None before its first record.
     time_to_go : float or None
-        Time [s] that the runs left take at this rate; None where there is no rate.
+        Time [s] that the runs left take at the pace of that session, by their predicted costs; None before
+        its first record.
     warnings : tuple of str
         One line for each record file that is not sound.
     """
@@ -61,12 +69,14 @@ def read_status(out: str | Path) -> StudyStatus:
     """
     folder = StudyFolder(out)
     study = folder.load()
-    running = is_locked(folder.lock_file)
+    running = folder.is_in_use()
     records = read_records(folder.records, study)
     recorded = int(records.recorded.sum())
     done = int((records.status == Status.DONE).sum())
     left = study.size - recorded
-    rate = _session_rate(records, running)
+    latest, elapsed = _latest_session(records, running)
+    costs = _predicted_costs(study, folder)
+    spent = costs[latest].sum()
     return StudyStatus(
         name=study.name,
         total=study.size,
@@ -74,17 +84,52 @@ def read_status(out: str | Path) -> StudyStatus:
         failed=recorded - done,
         left=left,
         running=running,
-        rate=rate,
-        time_to_go=left / rate if rate else None,
+        rate=latest.sum() / elapsed if elapsed else None,
+        time_to_go=float(costs[~records.recorded].sum() * elapsed / spent) if elapsed else None,
         warnings=tuple(records.warnings),
     )
 
 
-def _session_rate(records: Records, running: bool) -> float | None:
-    """Return the runs per second [1/s] since the latest start, until now or until the last record."""
+def read_machine_factor(out: Path, job: Job) -> tuple[float, int]:
+    """Return processor time over predicted cost of the recorded runs of a job, and their number.
+
+    Parameters
+    ----------
+    out : Path
+        The output folder; without records of this job in it the factor is 1, by 0 runs.
+    job : Job
+        A validated job.
+    """
+    folder = StudyFolder(out)
+    try:
+        study = folder.load()
+    except InputError:
+        return 1.0, 0
+    if study.fingerprint != job.fingerprint() or "core_seconds" not in study.record_dtype.names:
+        return 1.0, 0
+    records = read_records(folder.records, study)
+    done = np.flatnonzero(records.status == Status.DONE)
+    if not done.size:
+        return 1.0, 0
+    predicted = default_simulator().run_costs(job)[done].sum()
+    return float(records.read(done, "core_seconds").sum() / predicted), done.size
+
+
+def _latest_session(records: Records, running: bool) -> tuple[np.ndarray, float]:
+    """Return which runs the latest start has recorded, and in what time [s]: until now or its last."""
     if not records.sessions:
-        return None
+        return np.zeros(records.study.size, bool), 0.0
     started = records.sessions[-1]["started"]
-    count = int(np.sum(records.written >= started))  # NaN, of a run without a record, is not
-    elapsed = (time.time() if running else np.nanmax(records.written)) - started
-    return count / elapsed if count and elapsed > 0 else None
+    chosen = records.written >= started  # NaN, of a run without a record, is not
+    if not chosen.any():
+        return chosen, 0.0
+    return chosen, max((time.time() if running else np.nanmax(records.written)) - started, 0.0)
+
+
+def _predicted_costs(study: Study, folder: StudyFolder) -> np.ndarray:
+    """Return the predicted duration of each run, in some unit; all alike where there is no such model."""
+    try:
+        job = build_job(study.job, str(folder.job_file))
+        return default_simulator().run_costs(job)
+    except InputError:
+        return np.ones(study.size)

@@ -9,7 +9,9 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any, Self
 
+from cvt_hpc.study.progress import show_duration
 from cvt_hpc.study.schedule import Counter
+from cvt_hpc.study.time_limit import TimeLimit
 
 # What a person at the terminal, Slurm at the end of a job, and Slurm as a warning before that send.
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
@@ -60,40 +62,59 @@ class Stop:
         Through which ranks tell each other.
     signals : SignalWatch
         What this process was sent.
-    deadline : float
-        Time [s] of the monotonic clock after which no run is started; runs that compute then are finished.
+    limit : TimeLimit
+        How much time there is from here on. No batch is begun that is not expected to end in it, and those at
+        work when it is over are broken off.
     meanwhile : callable
         Called about twice a second while a run computes: shows the progress.
     """
 
     def __init__(
-        self, counter: Counter, signals: SignalWatch, deadline: float, meanwhile: Callable[[], None]
+        self, counter: Counter, signals: SignalWatch, limit: TimeLimit, meanwhile: Callable[[], None]
     ) -> None:
         self._counter = counter
         self._signals = signals
-        self._deadline = deadline
+        self._limit = limit
         self._meanwhile = meanwhile
         self._looked = time.monotonic()
-        self._late = False
+        self._deadline = self._looked + limit.seconds
+        self._late = ""
         self._told = False
         self._heard = False
 
     @property
     def reason(self) -> str | None:
-        """Why this rank starts no more runs, None if it goes on."""
+        """Why this rank starts no more runs, or not all; None if it goes on."""
         if self._signals.noted:
             return self._signals.noted
         if self._heard:
             return ELSEWHERE
-        return "time limit" if self._late else None
+        return self._late or None
 
     def may_claim(self) -> bool:
         """Return whether this rank may start another run."""
-        self._late = self._late or time.monotonic() >= self._deadline
-        return self.interrupt() is None and not self._late
+        return self.interrupt() is None
+
+    def fits(self, seconds: float) -> bool:
+        """Return whether there is so much time [s] left."""
+        left = self._deadline - time.monotonic()
+        if seconds > left and not self._late:
+            self._late = (
+                f"{self._limit.name}: {show_duration(max(left, 0.0))} were left, a batch may take "
+                f"{show_duration(seconds)}"
+            )
+        return seconds <= left
 
     def interrupt(self) -> str | None:
         """Return why the run that computes now should be broken off, None if it should go on."""
+        self.look()
+        over = time.monotonic() >= self._deadline
+        if over:
+            self._late = self._late or self._limit.name
+        return self.reason if self._signals.noted or self._heard or over else None
+
+    def look(self) -> None:
+        """Look now and then at what the other ranks say, and tell them if this one is to stop."""
         now = time.monotonic()
         if now - self._looked > _LOOK_INTERVAL:
             self._looked = now
@@ -101,7 +122,6 @@ class Stop:
             self._heard = self._counter.is_interrupted()
         if self._signals.noted:
             self.tell_all()
-        return self.reason if self._signals.noted or self._heard else None
 
     def tell_all(self) -> None:
         """Let all ranks stop, as this one does."""

@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
+from collections.abc import Collection
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.errors import mismatch
 from cvt_hpc.files import StorageError, discard
-from cvt_hpc.study.batches import Batch
-from cvt_hpc.study.description import Study, describe
+from cvt_hpc.study.attempts import enter_attempts, later_attempts, plan_runs
+from cvt_hpc.study.batches import Assignment
+from cvt_hpc.study.cost_model import CostModel, Fit, fit_recorded
+from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.gather import write_results
+from cvt_hpc.study.frames import RecordFormat
+from cvt_hpc.study.gather import gather_records
+from cvt_hpc.study.histories import keep_histories, missing_histories
 from cvt_hpc.study.launch import Team, assembled_team
-from cvt_hpc.study.lock import locked
+from cvt_hpc.study.part import Part, read_part
 from cvt_hpc.study.progress import Progress
 from cvt_hpc.study.provenance import new_session
-from cvt_hpc.study.record import RecordFormat, RecordLog
+from cvt_hpc.study.record import RecordLog
 from cvt_hpc.study.records import Records
 from cvt_hpc.study.recovery import read_records
 from cvt_hpc.study.report import RunReport, build_report
@@ -27,6 +35,7 @@ from cvt_hpc.study.schedule import Counter, claimed_batches, open_counter
 from cvt_hpc.study.simulator import Simulator, default_simulator
 from cvt_hpc.study.stopping import ELSEWHERE, SignalWatch, Stop
 from cvt_hpc.study.task import Task
+from cvt_hpc.study.time_limit import TimeLimit, find_time_limit
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
@@ -38,20 +47,28 @@ _logger = logging.getLogger(__name__)
 class _Plan(NamedTuple):
     """What rank 0 finds out and all ranks need."""
 
-    batches: list[Batch]
+    assignments: list[Assignment]
+    attempts: dict[int, int]  # of runs that were begun again
+    fit: Fit
+    asked: np.ndarray  # whether a run is one of this start, shape (runs,)
+    total: int
     recorded: int
     failed: int
     session: dict[str, Any]
+    limit: TimeLimit
 
 
 def run(
     job: Job,
     out: str | Path | None = None,
     *,
+    part: str | None = None,
     fresh: bool = False,
     simulator: Simulator | None = None,
     progress: bool = True,
     time_limit: float | None = None,
+    run_limit: float = math.inf,
+    retry: Collection[Status] = (),
 ) -> RunReport:
     """Do all runs of a job that are not yet recorded, and gather the dataset.
 
@@ -65,6 +82,9 @@ def run(
         What to run.
     out : str or Path, optional
         Output folder; "out/<job name>" by default.
+    part : str, optional
+        Only the runs of one part of the study: "3/16" for the third of sixteen. Different parts may be at
+        work in a folder at the same time; the one that ends last gathers the dataset.
     fresh : bool
         Throw away what earlier runs have left in the folder, instead of going on from there.
     simulator : Simulator, optional
@@ -72,44 +92,72 @@ def run(
     progress : bool
         Whether rank 0 shows on stderr how far the sweep is.
     time_limit : float, optional
-        Time [s] after which no more runs are started.
+        Time [s] after which no run computes; the dataset is gathered after it. Within a Slurm job, that until
+        its end by default. Runs that are not expected to end in time are not started.
+    run_limit : float, optional
+        Time [s] that a run may take; runs that take longer are recorded as timed out.
+    retry : collection of Status, optional
+        Recorded runs that ended so are done again, from the beginning; their earlier records do not count any
+        more.
 
     Returns
     -------
     RunReport
-        How the sweep ended.
+        How the sweep ended, or its part.
 
     Raises
     ------
     InputError
-        If the folder holds another job, is in use or cannot be written to, or if ranks are not connected.
+        If the folder holds another job, is in use or cannot be written to, if ranks are not connected, or if
+        there is no such part, or it is to start over: the other parts would lose their runs.
     """
-    deadline = float("inf") if time_limit is None else time.monotonic() + time_limit
+    started = time.monotonic()
+    share = None if part is None else read_part(part)
+    if share is not None and fresh:
+        raise mismatch("fresh", "a run of the whole study", f"part {share}, and the others would lose theirs")
     simulator = simulator or default_simulator()
     study = describe(job, simulator)
-    task = Task(job, study, simulator)
+    task = Task(job, study, simulator, run_limit)
+
+    def prepare() -> _Plan:
+        plan = _prepare(folder, task, share, fresh, retry, team.size, held)
+        asked = None if time_limit is None else time_limit - (time.monotonic() - started)
+        return plan._replace(limit=find_time_limit(asked, study.size))
+
     folder = StudyFolder(out if out is not None else Path("out") / job.name)
     with SignalWatch() as signals, assembled_team(folder.crash_log) as team, ExitStack() as held:
-        plan = team.on_root(lambda: _prepare(folder, task, fresh, team.size, held))
+        plan = team.on_root(prepare)
         with open_counter(team) as counter:
-            display = Progress(counter, study.size, plan.recorded, plan.failed, progress and team.rank == 0)
-            stop = Stop(counter, signals, deadline, display.show)
-            trouble = _compute(task, folder, plan, team.rank, counter, stop)
-            team.wait_for_all(stop.interrupt)
+            costs = simulator.run_costs(job)
+            order = [index for assignment in plan.assignments for index in assignment.runs]
+            visible = progress and team.rank == 0
+            display = Progress(counter, plan.total, plan.recorded, plan.failed, visible, costs[order])
+            stop = Stop(counter, signals, plan.limit, display.show)
+            trouble = _compute(task, folder, plan, costs, team.rank, counter, stop)
+            team.wait_for_all(stop.look)
             display.close()
         stopped = _settle(team, trouble, stop.reason)
-        return team.on_root(lambda: _conclude(folder, study, stopped))
+        return team.on_root(lambda: _conclude(folder, task, share, plan, stopped, held))
 
 
-def _prepare(folder: StudyFolder, task: Task, fresh: bool, ranks: int, held: ExitStack) -> _Plan:
+def _prepare(
+    folder: StudyFolder,
+    task: Task,
+    part: Part | None,
+    fresh: bool,
+    retry: Collection[Status],
+    ranks: int,
+    held: ExitStack,
+) -> _Plan:
     """Take the folder into possession and find what is left to do; on rank 0 alone."""
     study = task.study
     folder.check_free_for(study, fresh)
     folder.create()
-    held.enter_context(locked(folder.lock_file))
+    held.enter_context(folder.occupied(part))
     folder.check_free_for(study, fresh)  # again: another process may have been there before the lock
-    for leftover in folder.leftovers():
-        discard(leftover)
+    if part is None:
+        for leftover in folder.half_histories():
+            discard(leftover)
     if fresh:
         folder.clear()
     folder.save(study)
@@ -117,10 +165,23 @@ def _prepare(folder: StudyFolder, task: Task, fresh: bool, ranks: int, held: Exi
     session = new_session(ranks)
     for warning in records.warnings + _other_versions(records, session):
         _logger.warning(warning)
-    recorded = records.recorded
-    done = int((records.status == Status.DONE).sum())
-    batches = task.plan(np.flatnonzero(~recorded), ranks)
-    return _Plan(batches, int(recorded.sum()), int(recorded.sum()) - done, session)
+    index = np.arange(study.size)
+    asked = np.ones_like(index, bool) if part is None else part.holds(index)
+    records = enter_attempts(folder, study, records, asked, retry, session)
+    records.written[missing_histories(task.job, folder, records)] = np.nan  # done again; the record stays
+    done = records.status == Status.DONE
+    recorded = int((records.recorded & asked).sum())
+    return _Plan(
+        assignments=plan_runs(task.job, task.simulator, records, asked, ranks),
+        attempts=later_attempts(records),
+        fit=fit_recorded(task.simulator.run_costs(task.job), records.timings, done),
+        asked=asked,
+        total=int(asked.sum()),
+        recorded=recorded,
+        failed=recorded - int((done & asked).sum()),
+        session=session,
+        limit=TimeLimit(),
+    )
 
 
 def _other_versions(records: Records, session: dict[str, Any]) -> list[str]:
@@ -135,17 +196,28 @@ def _other_versions(records: Records, session: dict[str, Any]) -> list[str]:
 
 
 def _compute(
-    task: Task, folder: StudyFolder, plan: _Plan, rank: int, counter: Counter, stop: Stop
+    task: Task,
+    folder: StudyFolder,
+    plan: _Plan,
+    costs: np.ndarray,
+    rank: int,
+    counter: Counter,
+    stop: Stop,
 ) -> str | None:
     """Do and record the runs that this rank claims; return why it could not go on, if so."""
     layout = RecordFormat(task.study.fingerprint, task.study.record_dtype)
+    model = CostModel(costs, plan.fit)
     try:
-        with RecordLog(folder.records, layout, plan.session, rank) as log:
-            for batch in claimed_batches(plan.batches, counter, stop.may_claim):
-                for records in task.do(batch, stop.interrupt):
-                    log.append(records)
-                    failed = sum(bool(row["status"] != Status.DONE) for _, row in records)
-                    counter.report(len(records), failed)
+        with RecordLog(folder.records, layout, plan.session, rank, plan.attempts) as log:
+            for runs, alone in claimed_batches(
+                plan.assignments, counter, stop.may_claim, lambda batch: stop.fits(model.upper(batch))
+            ):
+                for result in task.do(runs, stop.interrupt, partial(log.begin, alone=alone)):
+                    keep_histories(folder, result.histories)
+                    log.append(result.records)
+                    counter.report(len(result.records), result.failed)
+                    if result.failed < len(result.records):  # those that all failed ended before their time
+                        model.learn(result.batch, result.seconds)
     except StorageError as error:
         stop.tell_all()
         return str(error)
@@ -167,8 +239,19 @@ def _settle(team: Team, trouble: str | None, reason: str | None) -> str | None:
     return next((why for _, why in ends if why and why != ELSEWHERE), None)
 
 
-def _conclude(folder: StudyFolder, study: Study, stopped: str | None) -> RunReport:
-    """Gather the dataset and report; on rank 0 alone."""
-    records = read_records(folder.records, study)
-    write_results(folder, study, records)
-    return build_report(folder, study, records, stopped)
+def _conclude(
+    folder: StudyFolder,
+    task: Task,
+    part: Part | None,
+    plan: _Plan,
+    stopped: str | None,
+    held: ExitStack,
+) -> RunReport:
+    """Gather the dataset, unless other parts are at work, and report; on rank 0 alone."""
+    if part is not None:
+        held.close()  # before the look around: of parts that end together the last one sees nobody
+    gathers = part is None or not folder.is_in_use()
+    records = gather_records(folder, task.study) if gathers else read_records(folder.records, task.study)
+    records.written[missing_histories(task.job, folder, records)] = np.nan
+    gained = int(records.recorded[plan.asked].sum()) - plan.recorded
+    return build_report(folder, task.study, records, plan.asked, gathers, gained, stopped)

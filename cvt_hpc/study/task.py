@@ -3,23 +3,65 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.study.batches import Batch, share_out
+from cvt_hpc.study.batches import Batch
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.record import Record
 from cvt_hpc.study.simulator import Simulator
+from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from cvt_hpc.job import Job
 
 Interrupt = Callable[[], str | None]
+Begin = Callable[[Batch], None]
 
 _logger = logging.getLogger(__name__)
+
+
+class Result(NamedTuple):
+    """What came of runs that were done together.
+
+    Attributes
+    ----------
+    records : list of (int, numpy.ndarray)
+        Run index and record of each.
+    seconds : float
+        Time [s] that they took together; 0 where it is not known.
+    histories : list of (int, xarray.Dataset)
+        Run index and history of those whose history is kept.
+    """
+
+    records: list[Record]
+    seconds: float = 0.0
+    histories: Sequence[tuple[int, xr.Dataset]] = ()
+
+    @property
+    def batch(self) -> Batch:
+        """The run indices."""
+        return tuple(index for index, _ in self.records)
+
+    @property
+    def failed(self) -> int:
+        """Number of runs without results."""
+        return sum(bool(row["status"] != Status.DONE) for _, row in self.records)
+
+
+class _Trouble(NamedTuple):
+    """Why a batch has no records: status and reason of a run, and what to say of several."""
+
+    status: Status
+    reason: str
+    in_company: str
 
 
 @dataclass(frozen=True)
@@ -34,55 +76,71 @@ class Task:
         The layout of its records.
     simulator : Simulator
         What does the runs.
+    run_limit : float
+        Time [s] that a run may take; infinite for no limit.
     """
 
     job: Job
     study: Study
     simulator: Simulator
+    run_limit: float = math.inf
 
-    def plan(self, pending: np.ndarray, ranks: int) -> list[Batch]:
-        """Return the runs that are to be done, in batches, in the order in which to start them."""
-        groups = self.simulator.lane_groups(self.job, pending.tolist())
-        return share_out(groups, self.simulator.run_costs(self.job), ranks)
-
-    def do(self, batch: Batch, interrupt: Interrupt) -> Iterator[list[Record]]:
+    def do(self, batch: Batch, interrupt: Interrupt, begin: Begin) -> Iterator[Result]:
         """Do the runs of a batch, and yield their records as they come; none of runs that are broken off.
 
-        All come at once, unless an exception ends the batch. Then its runs are done one by one, so that only
-        those that raise it fail, and each record comes when its run ends.
+        All come at once, unless an exception or the time limit ends the batch. Then its runs are done one by
+        one, so that only those fail that do so alone, and each record comes when its run ends. `begin` is
+        told beforehand what is done.
         """
         try:
-            records, error = self._attempt(batch, interrupt)
-            if error is None:
-                yield records
+            result, trouble = self._attempt(batch, interrupt, begin)
+            if trouble is None:
+                yield result
             elif len(batch) == 1:
-                yield [(batch[0], self.study.pack_failure(error))]
+                yield self._failure(batch[0], trouble)
             else:
-                yield from self._do_one_by_one(batch, error, interrupt)
+                yield from self._do_one_by_one(batch, trouble, interrupt, begin)
         except self.simulator.Interrupted:
             return
 
-    def _do_one_by_one(self, batch: Batch, error: str, interrupt: Interrupt) -> Iterator[list[Record]]:
+    def _do_one_by_one(
+        self, batch: Batch, trouble: _Trouble, interrupt: Interrupt, begin: Begin
+    ) -> Iterator[Result]:
         found = False
         for index in batch:
-            records, own_error = self._attempt((index,), interrupt)
-            found = found or own_error is not None
-            yield records if own_error is None else [(index, self.study.pack_failure(own_error))]
+            result, own_trouble = self._attempt((index,), interrupt, begin)
+            found = found or own_trouble is not None
+            yield result if own_trouble is None else self._failure(index, own_trouble)
         if not found:
             # Every record is sound, but the time that lanes save is lost, and nobody would know.
             runs = ", ".join(map(str, batch))
-            _logger.warning("runs %s, done together, raised %s; none of them does alone", runs, error)
+            _logger.warning("runs %s, done together, %s; none of them does alone", runs, trouble.in_company)
 
-    def _attempt(self, batch: Batch, interrupt: Interrupt) -> tuple[list[Record], str | None]:
-        """Return the records of all runs, or none and the exception that ended the batch."""
+    def _attempt(self, batch: Batch, interrupt: Interrupt, begin: Begin) -> tuple[Result, _Trouble | None]:
+        """Return the records of all runs, or none and what ended the batch."""
+        begin(batch)
+        watch = _Watch(interrupt, self.run_limit)
         try:
             points = [self.job.point(index) for index in batch]
-            found = self.simulator.run_points(self.job, points, interrupt)
-            return [(index, self._pack(values)) for index, values in zip(batch, found, strict=True)], None
+            kept = [place for place, index in enumerate(batch) if index in self.job.histories]
+            if kept:
+                found, histories = self.simulator.run_points_keeping(self.job, points, watch, kept)
+            else:
+                found, histories = self.simulator.run_points(self.job, points, watch), {}
+            records = [(index, self._pack(values)) for index, values in zip(batch, found, strict=True)]
+            named = [(batch[place], history) for place, history in histories.items()]
+            return Result(records, watch.elapsed(), named), None
         except self.simulator.Interrupted:
-            raise
+            if not watch.is_over:
+                raise
+            reason = f"took longer than the limit of {self.run_limit:g} s for a run"
+            return Result([]), _Trouble(Status.TIMED_OUT, reason, reason)
         except Exception as error:  # one run's defect must not cost the others
-            return [], _in_words(error)
+            words = _in_words(error)
+            return Result([]), _Trouble(Status.FAILED_ERROR, words, f"raised {words}")
+
+    def _failure(self, index: int, trouble: _Trouble) -> Result:
+        return Result([(index, self.study.pack_failure(trouble.reason, trouble.status))])
 
     def _pack(self, values: Mapping[str, Any]) -> np.ndarray:
         """Return the record of what a run delivered, that of a failure if it is no record."""
@@ -90,6 +148,40 @@ class Task:
             return self.study.pack(values)
         except Exception as error:
             return self.study.pack_failure(_in_words(error))
+
+
+class _Watch:
+    """What a run asks whether to go on: it passes the question on, and looks at the run's own limit.
+
+    The clock starts with the first question: kernels, which a run may have to wait for, are compiled by then.
+
+    Parameters
+    ----------
+    interrupt : callable
+        Asked first.
+    limit : float
+        Time [s] that the run may take.
+    """
+
+    def __init__(self, interrupt: Interrupt, limit: float) -> None:
+        self.is_over = False
+        self._interrupt = interrupt
+        self._limit = limit
+        self._started: float | None = None
+
+    def __call__(self) -> str | None:
+        """Return why the run should end, None if it should go on."""
+        if self._started is None:
+            self._started = time.monotonic()
+        reason = self._interrupt()
+        if reason is None and self.elapsed() > self._limit:
+            self.is_over = True
+            reason = "run limit"
+        return reason
+
+    def elapsed(self) -> float:
+        """Return the time [s] since the first question; 0 before it."""
+        return 0.0 if self._started is None else time.monotonic() - self._started
 
 
 def _in_words(error: Exception) -> str:

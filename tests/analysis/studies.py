@@ -53,3 +53,11 @@ def study(gradients=GRADIENTS, stiffnesses=STIFFNESSES, loads=LOADS):
         },
         {"job_name": "occurrence", "title": "Vibration occurrence over load, friction and stiffness"},
     )
+
+
+def two_flags(status, vibrates):
+    """A study along the load by its flags alone."""
+    dims = ("load",)
+    return xr.Dataset(
+        {"status": (dims, status), "vibrates": (dims, vibrates)}, {"load": np.arange(float(len(status)))}
+    )

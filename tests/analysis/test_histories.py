@@ -10,9 +10,10 @@ import xarray as xr
 from runs import PROBES, RATE, run
 
 from cvt_hpc.analysis.figures import STYLE
-from cvt_hpc.analysis.histories import draw_history, history_figure, is_history, write_history
+from cvt_hpc.analysis.histories import draw_history, history_figure
 from cvt_hpc.analysis.history_panels import read_strands
 from cvt_hpc.errors import InputError
+from cvt_hpc.history_files import is_history, write_history
 from cvt_hpc.variables import Status
 
 BAND = (100.0, 1500.0)

@@ -19,9 +19,9 @@ from cvt_hpc import lanes
 from cvt_hpc.job import build_job
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, fma, like
-from cvt_hpc.models.elastic_belt import imex
+from cvt_hpc.models.elastic_belt import imex, imex_stations, imex_system, lane_forces
+from cvt_hpc.models.elastic_belt.batch import PRECISIONS, Batch
 from cvt_hpc.models.elastic_belt.lane_belt import REPEATS
-from cvt_hpc.models.elastic_belt.transient import PRECISIONS, Batch
 from cvt_hpc.physics import lane_compliance, lane_friction
 
 CALLS = 15
@@ -150,7 +150,7 @@ def count(step: float, precision: str) -> collections.Counter:
     batch.advance(700)
     functions = _counting_functions(7 if precision == "single" else 13)
     kept = []
-    for module in (imex, lane_compliance, lane_friction):
+    for module in (imex, imex_stations, imex_system, lane_forces, lane_compliance, lane_friction):
         for name, thing in list(vars(module).items()):
             plain = functions.get(name) or getattr(thing, "py_func", None)
             if plain is not None:

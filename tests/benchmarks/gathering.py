@@ -23,33 +23,34 @@ from pathlib import Path
 import numpy as np
 
 from cvt_hpc import simulation
-from cvt_hpc.job import load_job
+from cvt_hpc.job import build_job
 from cvt_hpc.study import gather, open_results, read_status
 from cvt_hpc.study.description import Dimension, Study, describe
 from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.frames import RecordFormat
 from cvt_hpc.study.provenance import new_session
-from cvt_hpc.study.record import RecordFormat, RecordLog
+from cvt_hpc.study.record import RecordLog
 from cvt_hpc.variables import Status
 
 BINS = 256
 RANKS = 16
 LANES = 16
 FAILED = 0.01  # share of the runs
-JOB = Path(__file__).parents[2] / "jobs" / "lebrecht_2004.toml"
 MEGA = 1e6
 
 
 def make_study(runs: int) -> Study:
     """Return a study of the elastic belt over a grid of `runs` runs, with spectra of 256 points."""
-    study = describe(load_job(JOB), simulation)
-    frequencies = Dimension("frequency_bin", tuple(10.0 * np.arange(BINS)), "Hz", "frequency")
     loads = 100 if runs % 100 == 0 else 1
-    axes = (
-        Dimension("thrust", tuple(np.linspace(10e3, 60e3, runs // loads)), "N", "axial force"),
-        Dimension("load", tuple(np.linspace(0.0, 200.0, loads)), "N m", "torque at the driving pulley"),
-    )
+    axes = {
+        "thrust": {"from": "50 kN", "to": "60 kN", "count": runs // loads},
+        "load": {"from": "0 N m", "to": "200 N m", "count": loads},
+    }
+    job = build_job({"name": "gathering", "model": "elastic_belt", "axes": axes}, "gathering.toml")
+    study = describe(job, simulation)
+    frequencies = Dimension("frequency_bin", tuple(10.0 * np.arange(BINS)), "Hz", "frequency")
     coordinates = tuple(frequencies if d.name == frequencies.name else d for d in study.coordinates)
-    return replace(study, axes=axes, coordinates=coordinates)
+    return replace(study, coordinates=coordinates)
 
 
 def make_rows(study: Study, count: int, generator: np.random.Generator) -> np.ndarray:
@@ -82,6 +83,7 @@ def make_logs(path: Path, runs: int) -> None:
         with RecordLog(folder.records, layout, session, rank) as log:
             for batch in batches[rank::RANKS]:
                 indices = range(LANES * batch, min(LANES * (batch + 1), runs))
+                log.begin(indices)
                 log.append(list(zip(indices, make_rows(study, len(indices), generator), strict=True)))
 
 

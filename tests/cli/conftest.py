@@ -72,9 +72,11 @@ def mechanics(monkeypatch):
     )
     histories = ModuleType("cvt_hpc.analysis.histories")
     calls = {"written": [], "drawn": []}
-    histories.write_history = lambda dataset, path: calls["written"].append((dataset, path)) or path
-    histories.is_history = lambda path: path.name == "history.nc"
+    files = ModuleType("cvt_hpc.history_files")
+    files.write_history = lambda dataset, path: calls["written"].append((dataset, path)) or path
+    files.is_history = lambda path: path.name == "history.nc"
     histories.draw_history = lambda dataset, path: calls["drawn"].append((dataset, path)) or path
     monkeypatch.setitem(sys.modules, "cvt_hpc.simulation", double)
     monkeypatch.setitem(sys.modules, "cvt_hpc.analysis.histories", histories)
+    monkeypatch.setitem(sys.modules, "cvt_hpc.history_files", files)
     return calls

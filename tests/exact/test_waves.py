@@ -6,7 +6,7 @@ from fast_runs import FastRuns
 from straight import LENGTH, WAVE, moving_straight, straight_belt
 
 from cvt_hpc.models.elastic_belt.belt import U, W
-from cvt_hpc.models.elastic_belt.imex import LAST_U
+from cvt_hpc.models.elastic_belt.imex_work import LAST_U
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.steppers import imex
 

@@ -1,11 +1,13 @@
 """What models, steppers and all runs declare is something that a job file can set."""
 
+import re
 from importlib import import_module
+from pathlib import Path
 
 import pint
 import pytest
 
-from cvt_hpc import recording
+from cvt_hpc import recording, steppers
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.job.schema import load_schema
@@ -13,8 +15,10 @@ from cvt_hpc.job.summary import summarize
 from cvt_hpc.job.units import to_si
 from cvt_hpc.job.values import read_value
 from cvt_hpc.models import MODELS
+from cvt_hpc.models.elastic_belt import OWN_STEPPERS
 from cvt_hpc.simulation import estimate_cost, simulate
 from cvt_hpc.steppers import STEPPERS
+from cvt_hpc.steppers.facts import Facts
 from cvt_hpc.study import run
 from cvt_hpc.vibration import criterion
 
@@ -69,15 +73,51 @@ def test_every_job_is_checked_for_what_all_runs_share(model, stepper, tables, me
 @pytest.mark.parametrize("model", MODELS)
 def test_every_stepper_is_taken_or_refused_with_a_reason(model):
     module = import_module(MODELS[model])
-    for stepper in STEPPERS:
-        if stepper not in module.STEPPER_NAMES:
-            with pytest.raises(InputError) as caught:
-                build_job({"name": "x", "model": model, "stepper": stepper}, "x.toml")
-            reason = module.REFUSED.get(stepper, "the model does not take it")
-            assert str(caught.value).startswith(f"x.toml: stepper: expected one that {model} takes (")
-            assert str(caught.value).endswith(f'found "{stepper}": {reason}')
+    assert sorted((*module.STEPPER_NAMES, *module.REFUSED)) == sorted(STEPPERS)
     assert module.DEFAULT_STEPPER in module.STEPPER_NAMES
-    assert set(module.STEPPER_NAMES) | set(module.REFUSED) <= set(STEPPERS)
+    for stepper in set(module.STEPPER_NAMES) - set(getattr(module, "OWN_STEPPERS", ())):
+        assert hasattr(import_module(STEPPERS[stepper]), "march"), (
+            stepper
+        )  # of any system; others are a model's own
+    for stepper, reason in module.REFUSED.items():
+        assert len(reason.split()) > 3, stepper
+        with pytest.raises(InputError) as caught:
+            build_job({"name": "x", "model": model, "stepper": stepper}, "x.toml")
+        assert str(caught.value).startswith(f"x.toml: stepper: expected one that {model} takes (")
+        assert str(caught.value).endswith(f'found "{stepper}": {reason}')
+
+
+@pytest.mark.parametrize("stepper", STEPPERS)
+def test_every_stepper_says_what_a_chooser_has_to_know(stepper):
+    module = import_module(STEPPERS[stepper])
+    facts = module.FACTS
+    assert isinstance(facts, Facts)
+    assert isinstance(facts.order, int) and facts.order >= 1
+    assert all(type(flag) is bool for flag in (facts.adaptive, facts.implicit, facts.l_stable))
+    # a step or a tolerance is what a job sets; a method that chooses its step follows the events
+    table = module.PARAMETERS["numerics"]
+    assert ("tolerance" in table, "step" in table) == (facts.adaptive, not facts.adaptive)
+    assert (facts.order_at_events is None) == facts.adaptive
+    assert facts.adaptive or 0.0 < facts.order_at_events <= facts.order
+    assert facts.damping_limit > 0.0
+    assert len(facts.stability.split()) > 1 and facts.damping.strip()
+    if stepper in OWN_STEPPERS:
+        assert facts.needs == frozenset()
+    else:
+        assert "rates" in facts.needs and facts.needs <= {"rates", "partition", "friction"}
+        assert all(callable(getattr(module, name)) for name in ("control", "work", "march"))
+
+
+def test_every_stepper_stands_in_the_table_of_methods():
+    table = (
+        Path(steppers.__file__)
+        .with_name("README.md")
+        .read_text()
+        .split("## The methods")[1]
+        .split("\n## ")[0]
+    )
+    for stepper in set(STEPPERS) - set(OWN_STEPPERS):
+        assert re.search(rf"^\|[^|]*`{stepper}`", table, re.MULTILINE), stepper
 
 
 @pytest.mark.parametrize("model", ["oscillator", "moving_string"])

@@ -7,6 +7,7 @@ import pkgutil
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numba
@@ -24,9 +25,8 @@ def package(tmp_path):
     """A copy of what the folder's name depends on."""
     copy = tmp_path / "site" / "cvt_hpc"
     copy.mkdir(parents=True)
-    for name in ("kernels.py", "lanes.py"):
-        shutil.copy(PACKAGE / name, copy)
-    for room in ("physics", "models", "steppers", "study"):
+    shutil.copy(PACKAGE / "kernels.py", copy)
+    for room in ("lanes", "physics", "models", "steppers", "study"):
         shutil.copytree(PACKAGE / room, copy / room, ignore=shutil.ignore_patterns("__pycache__"))
     return copy
 
@@ -73,7 +73,7 @@ def test_the_folder_is_in_the_package_and_named_by_content(package, no_choice):
         ("models/elastic_belt/new_part.py", True),
         ("steppers/imex.py", True),
         ("kernels.py", True),
-        ("lanes.py", True),
+        ("lanes/functions.py", True),
         ("study/sweep.py", False),
     ],
 )
@@ -89,6 +89,41 @@ def test_the_name_does_not_depend_on_dates(package, no_choice):
     for source in package.rglob("*.py"):
         os.utime(source, (1e9, 1e9))
     assert folder(package) == before
+
+
+def aged(folder, days):
+    """A folder with code that was last asked for some days ago."""
+    (folder / "physics_0").mkdir(parents=True, exist_ok=True)
+    (folder / "physics_0" / "saturation.nbi").write_bytes(b"code")
+    os.utime(folder, 2 * (time.time() - days * 86400.0,))
+    return folder
+
+
+def test_a_new_folder_takes_the_place_of_those_that_nobody_asks_for(package, no_choice):
+    rooms = package / "__pycache__"
+    forgotten = [aged(rooms / f"kernels-{k:016x}", 31.0) for k in range(2)]
+    used, not_ours = aged(rooms / f"kernels-{2:016x}", 29.0), aged(rooms / "kernels-of-somebody-else", 31.0)
+    made = folder(package)
+    assert made.is_dir() and used.is_dir() and not_ours.is_dir()
+    assert not any(path.exists() for path in forgotten)
+
+
+def test_asking_for_a_folder_renews_it_and_removes_none(package, no_choice):
+    asked = aged(folder(package), 31.0)
+    other = aged(asked.parent / f"kernels-{0:016x}", 31.0)
+    assert folder(package) == asked
+    assert time.time() - asked.stat().st_mtime < 86400.0
+    assert other.is_dir()
+
+
+@pytest.mark.parametrize("refused", ["pathlib.Path.mkdir", "os.utime", "os.rmdir"])
+def test_a_folder_that_cannot_be_renewed_or_removed_is_no_error(package, no_choice, monkeypatch, refused):
+    def refuse(*arguments, **options):
+        raise PermissionError(13, "Permission denied")
+
+    aged(package / "__pycache__" / f"kernels-{0:016x}", 31.0)
+    monkeypatch.setattr(refused, refuse)
+    assert load(package).kernel(plus_one)
 
 
 def test_code_lies_in_the_users_folder_where_one_is_chosen(tmp_path):

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from marched import CHEAP, job, record
 
+from cvt_hpc.models.elastic_belt.batch import Batch
+from cvt_hpc.models.elastic_belt.doubts import FAILURES, LARGEST_POWER_RESIDUAL
 from cvt_hpc.models.elastic_belt.lane_belt import POSITION, SPEED
 from cvt_hpc.models.elastic_belt.sampling import LEAST_SPEED, Outcome
-from cvt_hpc.models.elastic_belt.transient import FAILURES, LARGEST_POWER_RESIDUAL, Batch
+from cvt_hpc.physics.lane_compliance import ROUND_OFF
 from cvt_hpc.simulation import record_variables, run_point
 from cvt_hpc.variables import Status, Vibrates
 
@@ -82,7 +84,7 @@ def test_torque_that_friction_just_carries_does_not():
     assert record(load=1.2 * carried, duration=0.1)["status"] == Status.FAILED_ERROR
 
 
-def poisoned(monkeypatch, spoil, when=300):
+def poisoned(monkeypatch, spoil, when=300, **values):
     """The record of a run whose state is spoiled after some samples."""
     advance = Batch.advance
 
@@ -92,7 +94,7 @@ def poisoned(monkeypatch, spoil, when=300):
         return advance(batch, samples)
 
     monkeypatch.setattr(Batch, "advance", spoiling)
-    asked = job(**CHEAP, load=60.0)
+    asked = job(**CHEAP, load=60.0, **values)
     return run_point(asked, asked.point(0), lambda: None)
 
 
@@ -123,6 +125,19 @@ def test_a_state_that_is_not_a_number_never_reaches_a_done_record(monkeypatch, r
 def test_nor_does_a_pulley_that_is_nowhere(monkeypatch, index):
     found = poisoned(monkeypatch, set_scalar(index, np.nan))
     assert found["status"] == Status.FAILED_NUMERICS
+    assert_no_numbers(found)
+
+
+@pytest.mark.parametrize(("stepper", "step"), [("imex", 4.6e-6), ("explicit", 2e-7)])
+def test_a_search_for_the_closed_stations_that_does_not_end_ends_the_run(monkeypatch, stepper, step):
+    # forces below no round-off: there is no station on whose side the search can settle
+    def spoil(batch):
+        batch.state.contacts[1].scalars.data[0, ROUND_OFF] = -np.inf
+
+    found = poisoned(monkeypatch, spoil, stepper=stepper, step=step)
+    assert found["status"] == Status.FAILED_NUMERICS
+    assert "the search for the closed stations of belt and sheaves did not end" in found["reason"]
+    assert found["simulated_seconds"] < 0.021
     assert_no_numbers(found)
 
 

@@ -7,15 +7,21 @@ import pytest
 from fast_runs import FastRuns
 from marched import CHEAP, job, never
 
+from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.models.elastic_belt.belt import DRIVEN_SPEED, N_RING, W, belt_constants, initial_state
+from cvt_hpc.models.elastic_belt.lane_belt import REPEATS
 from cvt_hpc.models.elastic_belt.record import lane_key
 from cvt_hpc.models.elastic_belt.sampling import Outcome
-from cvt_hpc.models.elastic_belt.transient import Batch
 from cvt_hpc.physics.lane_compliance import UNSOLVED
 from cvt_hpc.simulation import lane_groups, record_variables, run_point, run_points
 from cvt_hpc.variables import Status, Vibrates
 
 WIDTHS = {"double": 8, "single": 16}
+METHODS = {
+    "double": {"stepper": "imex", "precision": "double"},
+    "single": {"stepper": "imex", "precision": "single"},
+    "explicit": {"stepper": "explicit", "precision": "double", "step": 2e-7},
+}
 SHORT = CHEAP | {"stations": 40}
 # Of all that may differ between the lanes of a batch, and of all endings.
 DIFFERENT = [
@@ -30,20 +36,26 @@ DIFFERENT = [
 ]
 
 
-def points(precision):
+def of(method):
+    """A job by that method."""
+    return job(**SHORT | METHODS[method])
+
+
+def points(method):
     """As many as a batch takes."""
-    rounds = WIDTHS[precision] // len(DIFFERENT)
+    settings = METHODS[method]
+    rounds = WIDTHS[settings["precision"]] // len(DIFFERENT)
     return [
-        job(**SHORT | values | {"precision": precision, "disturbance": 1e-6 * (1 + k)}).point(0)
+        job(**SHORT | values | settings | {"disturbance": 1e-6 * (1 + k)}).point(0)
         for k in range(rounds)
         for values in DIFFERENT
     ]
 
 
 @cache
-def together(precision):
+def together(method):
     """Records of the batch."""
-    return run_points(job(**SHORT), points(precision), never)
+    return run_points(of(method), points(method), never)
 
 
 def assert_same_bits(record, other):
@@ -53,26 +65,27 @@ def assert_same_bits(record, other):
             assert one.tobytes() == two.tobytes(), variable.name
 
 
-@pytest.mark.parametrize("precision", WIDTHS)
-def test_records_are_those_of_the_runs_alone(precision):
-    records = together(precision)
-    for point, record in zip(points(precision), records, strict=True):
-        assert_same_bits(record, run_point(job(**SHORT), point, never))
+@pytest.mark.parametrize("method", METHODS)
+def test_records_are_those_of_the_runs_alone(method):
+    records = together(method)
+    for point, record in zip(points(method), records, strict=True):
+        assert_same_bits(record, run_point(of(method), point, never))
     ends = [record["status"] for record in records]
-    assert ends.count(Status.FAILED_ERROR) == WIDTHS[precision] // 8 and ends.count(Status.DONE) >= 6
+    assert ends.count(Status.FAILED_ERROR) == len(records) // 8 and ends.count(Status.DONE) >= 6
     assert len({float(record["driving_power"]) for record in records if record["status"] == Status.DONE}) >= 6
 
 
-def test_a_batch_that_is_not_full_gives_the_same_in_the_order_of_its_points():
+@pytest.mark.parametrize("method", ["double", "explicit"])
+def test_a_batch_that_is_not_full_gives_the_same_in_the_order_of_its_points(method):
     chosen = [6, 2, 0]
-    for k, record in zip(
-        chosen, run_points(job(**SHORT), [points("double")[k] for k in chosen], never), strict=True
-    ):
-        assert_same_bits(record, together("double")[k])
+    records = run_points(of(method), [points(method)[k] for k in chosen], never)
+    for k, record in zip(chosen, records, strict=True):
+        assert_same_bits(record, together(method)[k])
 
 
+@pytest.mark.parametrize("method", ["double", "explicit"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_run_that_is_not_a_number_fails_alone(monkeypatch, value):
+def test_a_run_that_is_not_a_number_fails_alone(monkeypatch, value, method):
     advance, spoiled = Batch.advance, 4
 
     def spoiling(batch, samples):
@@ -81,14 +94,14 @@ def test_a_run_that_is_not_a_number_fails_alone(monkeypatch, value):
         return advance(batch, samples)
 
     monkeypatch.setattr(Batch, "advance", spoiling)
-    for k, record in enumerate(run_points(job(**SHORT), points("double"), never)):
+    for k, record in enumerate(run_points(of(method), points(method), never)):
         if k == spoiled:
             assert record["status"] == Status.FAILED_NUMERICS
             assert "off its path" in record["reason"] or "not a number" in record["reason"]
             assert 0.015 < record["simulated_seconds"] < 0.021
             assert np.isnan(record["amplitude"]).all()
         else:
-            assert_same_bits(record, together("double")[k])
+            assert_same_bits(record, together(method)[k])
 
 
 def spoiled_lanes(lanes):
@@ -131,13 +144,34 @@ def test_the_first_outcome_counts():
     assert {after[k] for k in (0, 6, 7)} == {Outcome.NOT_FINITE}
 
 
+@pytest.mark.parametrize("method", ["double", "explicit"])
+def test_work_is_counted_until_the_run_ends(method):
+    values = METHODS[method] | {"friction_speed": 0.01}
+    batch = Batch(
+        [job(**SHORT | values | {"load": load}).point(0) for load in (120.0, 500.0)], values["stepper"]
+    )
+    while batch.running:
+        batch.advance(1000)
+    through, slipped = batch.runs
+    assert slipped.failure is not None and slipped.steps < through.steps == round(through.time / batch.step)
+    for run in batch.runs:
+        assert run.counters()["steps"] == run.steps
+        assert run.counters()["contact_solves"] == run.contact_solves > run.steps
+    repeats = batch.state.scalars.data[0, REPEATS]
+    if method == "explicit":
+        assert set(through.counters()) == {"steps", "contact_solves"}
+    else:
+        assert through.counters()["repeats"] == repeats[0] > 0
+        assert 0 < slipped.counters()["repeats"] < repeats[1]
+
+
 def test_a_batch_takes_no_more_than_a_register():
     point = points("double")[0]
     for count in (0, 9):
         with pytest.raises(ValueError, match="1 to 8 runs"):
             Batch([point] * count, "imex") if count else run_points(job(), [point] * 9, never)
-    with pytest.raises(ValueError, match="1 to 1 runs"):
-        Batch([point] * 2, "explicit")
+    with pytest.raises(ValueError, match="1 to 8 runs"):
+        Batch(points("explicit")[:1] * 9, "explicit")
 
 
 AXES = {
@@ -159,16 +193,15 @@ def test_groups_hold_each_run_once_and_only_what_is_alike(stepper):
     for group in groups:
         all_points = [asked.point(index) for index in group]
         assert len({lane_key(point) for point in all_points}) == 1
-        for key in ("friction_law", "stations", *(["precision"] if stepper == "imex" else [])):
+        for key in ("friction_law", "stations", "precision"):
             assert len({point[key] for point in all_points}) == 1, key
         assert len({point["friction_memory"] > 0 for point in all_points}) == 1
-        assert len(group) <= (WIDTHS[all_points[0]["precision"]] if stepper == "imex" else 1)
+        assert len(group) <= WIDTHS[all_points[0]["precision"]]
         # in the order in which they were given
         places = [indices.index(index) for index in group]
         assert places == sorted(places)
-    if stepper == "imex":
-        # as few as can be: 5 loads without memory, 10 with, of each law, mesh and precision
-        assert len(groups) == 2 * 2 * ((1 + 2) + (1 + 1))
+    # as few as can be: 5 loads without memory, 10 with, of each law, mesh and precision
+    assert len(groups) == 2 * 2 * {"imex": (1 + 2) + (1 + 1), "explicit": 1 + 2}[stepper]
     assert lane_groups(asked, indices) == groups
 
 

@@ -6,7 +6,7 @@ stations, judged over 40 ms, these are 10 W: 0.03 % of the power of a loaded bel
 
 import numpy as np
 import pytest
-from fast_runs import FastRuns
+from fast_runs import FastRuns, march
 from marched import balance, finished, job, mean
 
 from cvt_hpc.models.elastic_belt.belt import (
@@ -21,14 +21,12 @@ from cvt_hpc.models.elastic_belt.belt import (
     W,
     belt_constants,
 )
-from cvt_hpc.models.elastic_belt.explicit import step_explicit
+from cvt_hpc.models.elastic_belt.doubts import LARGEST_POWER_RESIDUAL
 from cvt_hpc.models.elastic_belt.lane_belt import take_lane
 from cvt_hpc.models.elastic_belt.power import LAYER_LOSS, POWERS, STORED_ENERGY
 from cvt_hpc.models.elastic_belt.record import LOSSES
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.sampling import Outcome
-from cvt_hpc.models.elastic_belt.transient import LARGEST_POWER_RESIDUAL
-from cvt_hpc.physics.compliance import contact_state
 
 COARSE = {"stations": 64, "duration": 0.08}
 CONSTANT = {"friction_law": "coulomb", "friction_gradient": 0.0}
@@ -175,17 +173,12 @@ def powers_and_storing(state, **values):
     belt = belt_constants(job(**COARSE | {"load": 100.0} | values).parameters)
     now, rates, works = _audited(belt, state), [], []
     for step in (TINY, 2 * TINY):
-        after, contacts = state.copy(), _fresh_contacts(belt)
-        assert step_explicit(belt, after, contacts, np.zeros((10, belt.cell.size)), step) > 0
+        after = march("explicit", belt, state, step, 1)
         rates.append((_audited(belt, after)[STORED_ENERGY] - now[STORED_ENERGY]) / step)
         works.append(after.scalars[LAYER_WORK] / step)
     # extrapolated to step 0; the dampers' loss is their work in steps
     powers = dict(zip(POWERS, now, strict=True)) | {POWERS[LAYER_LOSS]: 2 * works[0] - works[1]}
     return powers, 2 * rates[0] - rates[1]
-
-
-def _fresh_contacts(belt):
-    return contact_state(belt.driving.weight.size), contact_state(belt.driven.weight.size)
 
 
 def _audited(belt, state: State) -> list[float]:
@@ -233,12 +226,12 @@ def test_each_term_is_what_it_takes_from_the_stored_energy(rough, name):
 
 def explicit_damper_work(belt, state, steps, step):
     """The state after some explicit steps, and the dampers' work in them [J], force times mean closing speed."""
-    state, work, contacts = state.copy(), 0.0, _fresh_contacts(belt)
+    work = 0.0
     for _ in range(steps):
         eps = np.zeros((2, belt.cell.size))
         strains(belt, state.fields, eps)
         before = state.fields[[V_ELEMENT, V_RING]]
-        assert step_explicit(belt, state, contacts, np.zeros((10, belt.cell.size)), step) > 0
+        state = march("explicit", belt, state, step, 1)
         after = state.fields[[V_ELEMENT, V_RING]]
         opening, mean_opening = (np.roll(v, -1, axis=1) - v for v in (before, 0.5 * (before + after)))
         elements, rings = np.array([[belt.element_damping], [belt.ring_damping]]) * opening / belt.cell

@@ -5,6 +5,7 @@ import pytest
 from marched import CHEAP, finished, fresh_record, job, record
 
 from cvt_hpc import simulation
+from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt.record import MODES, evaluate
 from cvt_hpc.simulation import Interrupted, estimate_cost, record_coordinates, record_variables, run_point
 from cvt_hpc.study.description import describe
@@ -158,6 +159,12 @@ def test_the_explicit_stepper_gives_the_same_run():
     assert plain["time_step"] == pytest.approx(1e-7)
     for name in ("mean_ring_tension", "axial_force", "driving_power", "thrust_ratio"):
         assert plain[name] == pytest.approx(fast[name], rel=0.01), name
+
+
+def test_the_explicit_stepper_is_double_and_says_so():
+    assert job(stepper="explicit", precision="double").parameters == job(stepper="explicit").parameters
+    with pytest.raises(InputError, match='precision: expected one of double, found "single"'):
+        job(stepper="explicit", precision="single")
 
 
 def test_the_estimated_cost_is_the_mean_over_the_grid():

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.variables import Status, Variable, Vibrates
@@ -47,6 +48,7 @@ class Job:
     model: str = "logistic"
     stepper: str = "none"
     source: str = "double.toml"
+    histories: tuple[int, ...] = ()
 
     def point(self, index: int) -> dict[str, Any]:
         shape = tuple(len(axis.values) for axis in self.axes)
@@ -119,6 +121,18 @@ class Simulator:
     ) -> list[dict[str, Any]]:
         return [self.run_point(job, point, interrupt) for point in points]
 
+    def run_points_keeping(
+        self,
+        job: Job,
+        points: Sequence[dict[str, Any]],
+        interrupt: Callable[[], str | None],
+        kept: Sequence[int],
+    ) -> tuple[list[dict[str, Any]], dict[int, xr.Dataset]]:
+        histories = {
+            place: xr.Dataset({"x": ("time", logistic_numbers(points[place], job))}) for place in kept
+        }
+        return self.run_points(job, points, interrupt), histories
+
     def run_point(
         self, job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]
     ) -> dict[str, Any]:
@@ -167,7 +181,7 @@ def logistic_numbers(point: dict[str, Any], job: Job) -> np.ndarray:
 def main(options: dict[str, Any]) -> int:
     """Sweep the double as the command line would.
 
-    Options: `out`; `runs`, the length of the only axis; `parameters` of the job; `sweep`, further arguments of
+    Options: `out`; `runs`, the length of the only axis; `parameters` and `histories` of the job; `sweep`, further arguments of
     `run`; `slow`, `largest_file` and `lanes`, see `Simulator`; `thread_level` of MPI; `break_rank`, the rank whose log
     has a defect, and whether the program `swallows_defects`; `break_rank_after`, the rank that raises when the
     sweep is over.
@@ -181,7 +195,8 @@ def main(options: dict[str, Any]) -> int:
 
     if process_rank() == options.get("break_rank"):
         RecordLog.append = raise_defect
-    job = Job((Axis("load", tuple(range(options.get("runs", 12)))),), options.get("parameters", {}))
+    axes = (Axis("load", tuple(range(options.get("runs", 12)))),)
+    job = Job(axes, options.get("parameters", {}), histories=tuple(options.get("histories", ())))
     simulator = Simulator(options.get("slow"), options.get("largest_file"), options.get("lanes", 1))
     try:
         report = run(job, Path(options["out"]), simulator=simulator, **options.get("sweep", {}))

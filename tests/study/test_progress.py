@@ -7,14 +7,16 @@ import pty
 import termios
 import time
 
+import numpy as np
 import pytest
 from study_double import Job, Simulator
 from study_processes import wait_until
 
 from cvt_hpc.study import read_status, run
 from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.frames import RecordFormat
 from cvt_hpc.study.progress import Progress, show_duration
-from cvt_hpc.study.record import RecordFormat, RecordLog
+from cvt_hpc.study.record import RecordLog
 from cvt_hpc.study.schedule import SerialCounter
 
 
@@ -68,6 +70,25 @@ def test_rate_is_that_of_the_latest_session(tmp_path):
     assert status.left == 3
 
 
+def test_time_left_is_by_predicted_costs(tmp_path, monkeypatch):
+    run(Job(), tmp_path, simulator=Simulator(), progress=False, time_limit=0.0)
+    study = StudyFolder(tmp_path).load()
+    session = {"id": "a", "started": time.time() - 100.0}
+    with RecordLog(
+        tmp_path / "records", RecordFormat(study.fingerprint, study.record_dtype), session, rank=0
+    ) as log:
+        log.append([(0, study.pack_failure("none"))])
+    monkeypatch.setattr("cvt_hpc.study.status.build_job", lambda document, source: Job())
+    simulator = Simulator()
+    simulator.run_costs = lambda job: np.array([2.0] + [1.0] * 11)
+    monkeypatch.setattr("cvt_hpc.study.status.default_simulator", lambda: simulator)
+    status = read_status(tmp_path)
+    assert status.time_to_go == pytest.approx(100.0 * 11 / 2, rel=0.05)  # a loaded machine writes late
+    # without a prediction all runs count the same
+    monkeypatch.undo()
+    assert read_status(tmp_path).time_to_go == pytest.approx(100.0 * 11, rel=0.05)
+
+
 def test_status_names_damage(tmp_path):
     run(Job(), tmp_path, simulator=Simulator(), progress=False)
     (tmp_path / "records" / "notes").write_text("mine")
@@ -86,13 +107,26 @@ def test_lines_where_there_is_no_terminal(start, tmp_path):
 
 def test_progress_counts_all_ranks_and_earlier_sessions(capsys):
     counter = SerialCounter()
-    progress = Progress(counter, total=100, recorded=40, failed=2, visible=True)
+    progress = Progress(counter, total=100, recorded=40, failed=2, visible=True, costs=np.ones(60))
     counter.report(8, failed=0)
     counter.report(3, failed=1)
     progress.show()
     assert capsys.readouterr().err == ""  # too soon after the start
     progress.close()
     assert capsys.readouterr().err.startswith("51/100 runs (51.0%), 3 failed, ")
+
+
+def test_time_to_go_is_by_cost_not_by_number(capsys, monkeypatch):
+    now = 1000.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    counter = SerialCounter()
+    progress = Progress(
+        counter, total=5, recorded=1, failed=0, visible=True, costs=np.array([6.0, 2.0, 1.0, 1.0])
+    )
+    counter.report(1, failed=0)
+    now += 60.0
+    progress.close()
+    assert capsys.readouterr().err == "2/5 runs (40.0%), 0 failed, 0.0167 runs/s, 0:00:40 to go\n"
 
 
 def test_no_progress_if_not_wanted(start, tmp_path):
@@ -106,7 +140,7 @@ def test_a_bar_on_a_terminal(monkeypatch):
     with os.fdopen(theirs, "w") as terminal:
         monkeypatch.setattr("sys.stderr", terminal)
         counter = SerialCounter()
-        progress = Progress(counter, total=10, recorded=2, failed=0, visible=True)
+        progress = Progress(counter, total=10, recorded=2, failed=0, visible=True, costs=np.ones(8))
         counter.report(5, failed=5)
         progress.close()
     shown = read_terminal(ours)

@@ -7,8 +7,10 @@ import pytest
 from study_double import Axis, Job, Simulator
 
 from cvt_hpc.files import StorageError
+from cvt_hpc.study import frames
 from cvt_hpc.study.description import describe
-from cvt_hpc.study.record import FRAME, MARKER, RecordFormat, RecordLog
+from cvt_hpc.study.frames import BEGUN, HEAD, PLACE, RECORD, RecordFormat
+from cvt_hpc.study.record import RecordLog
 from cvt_hpc.study.recovery import read_records
 from cvt_hpc.variables import Status
 
@@ -40,7 +42,7 @@ def write_log(folder, study, rows, indices, session=SESSION):
 @pytest.fixture(autouse=True, params=[1 << 22, 100])
 def window(request, monkeypatch):
     """Logs are read as a whole, and in windows of which several lie in one frame."""
-    monkeypatch.setattr("cvt_hpc.study.recovery.WINDOW", request.param)
+    monkeypatch.setattr("cvt_hpc.study.frames.WINDOW", request.param)
 
 
 @pytest.fixture
@@ -55,7 +57,7 @@ def rows(study):
 
 @pytest.fixture
 def frame_size(study):
-    return FRAME.size + study.record_dtype.itemsize
+    return HEAD.size + PLACE.size + study.record_dtype.itemsize
 
 
 def assert_recorded(records, rows, indices):
@@ -97,7 +99,7 @@ def test_a_torn_tail_costs_one_record(tmp_path, study, rows, frame_size, cut):
     assert f"last {frame_size - lost} bytes are an unfinished record" in records.warnings[0]
 
 
-@pytest.mark.parametrize("place", range(FRAME.size + 30))
+@pytest.mark.parametrize("place", range(HEAD.size + PLACE.size + 30))
 def test_a_flipped_bit_costs_one_record(tmp_path, study, rows, frame_size, place):
     path = write_log(tmp_path / "r", study, rows, [4, 5, 6])
     flip(path, path.stat().st_size - 2 * frame_size + place)
@@ -108,7 +110,7 @@ def test_a_flipped_bit_costs_one_record(tmp_path, study, rows, frame_size, place
 
 
 def test_a_marker_among_the_numbers_misleads_nobody(tmp_path, study, rows, frame_size):
-    rows["spectrum"].reshape(RUNS, -1)[5].view(np.uint8)[16:20] = np.frombuffer(MARKER, np.uint8)
+    rows["spectrum"].reshape(RUNS, -1)[5].view(np.uint8)[16:20] = np.frombuffer(RECORD, np.uint8)
     path = write_log(tmp_path / "r", study, rows, [4, 5, 6])
     flip(path, path.stat().st_size - 2 * frame_size)
     records = read_records(tmp_path / "r", study)
@@ -130,7 +132,7 @@ def test_records_outlive_their_header(tmp_path, study, rows, place):
     [
         (b"\x00\x01" * 5000, "not a record log"),
         (b"my notes", "not a record log"),
-        (MARKER * 9, "not a record log"),
+        (RECORD * 9, "not a record log"),
     ],
 )
 def test_a_foreign_file_is_named_and_left(tmp_path, study, rows, content, complaint):
@@ -151,6 +153,46 @@ def test_a_folder_among_the_logs_is_named(tmp_path, study, rows):
     records = read_records(tmp_path / "r", study)
     assert_recorded(records, rows, [2])
     assert "sub: left out: Is a directory" in records.warnings[0]
+
+
+def test_a_log_of_another_version_is_named(tmp_path, study, rows, monkeypatch):
+    monkeypatch.setattr(frames, "FORMAT_VERSION", 1)
+    path = write_log(tmp_path / "r", study, rows, [2])
+    monkeypatch.undo()
+    records = read_records(tmp_path / "r", study)
+    assert_recorded(records, rows, [])
+    assert records.warnings == [f"{path}: left out: expected format 2 of the record log, found 1"]
+
+
+def test_marks_are_no_records_and_damage_to_them_costs_no_record(tmp_path, study, rows):
+    layout = RecordFormat(study.fingerprint, study.record_dtype)
+    with RecordLog(tmp_path, layout, SESSION, rank=0, attempts={5: 3}) as log:
+        for index in (4, 5):
+            log.begin([index])
+            log.append([(index, rows[index])])
+    records = read_records(tmp_path, study)
+    assert_recorded(records, rows, [4, 5])
+    assert records.attempts.tolist() == [1] * 5 + [3] + [1] * 2
+    mark = log.path.read_bytes().rindex(BEGUN)
+    for place in range(HEAD.size + PLACE.size):
+        flip(log.path, mark + place)
+        records = read_records(tmp_path, study)
+        assert_recorded(records, rows, [4, 5])
+        assert records.warnings == [
+            f"{log.path}: bytes {mark} to {mark + HEAD.size + PLACE.size} are damaged; left out"
+        ]
+        flip(log.path, mark + place)
+
+
+def test_a_torn_mark_is_no_death(tmp_path, study, rows):
+    path = write_log(tmp_path, study, rows, [4])
+    layout = RecordFormat(study.fingerprint, study.record_dtype)
+    with path.open("ab") as file:
+        file.write(layout.mark(BEGUN, [(5, 1), (6, 1)], 2.0)[:-1])
+    records = read_records(tmp_path, study)
+    assert_recorded(records, rows, [4])
+    assert records.died.sum() == 0
+    assert "unfinished" in records.warnings[0]
 
 
 def test_records_of_another_job_do_not_count(tmp_path, study, rows):
@@ -199,7 +241,7 @@ def test_a_refused_write_leaves_whole_records(tmp_path, study, rows, monkeypatch
     system_write = os.write
 
     def short_then_full(descriptor, data):
-        if len(data) < layout.frame_size:
+        if len(data) < layout.record_size:
             raise OSError(28, "No space left on device")
         return system_write(descriptor, data[:50])
 

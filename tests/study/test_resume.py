@@ -12,6 +12,7 @@ from study_processes import assert_same_numbers, wait_until
 
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.frames import PLACE, RECORD
 from cvt_hpc.study.recovery import read_records
 
 RUNS = 60
@@ -39,8 +40,8 @@ def frames_written(out):
     """Return the number of records in all logs, repeated ones counted each time."""
     study = StudyFolder(out).load()
     paths = out.glob("records/*.log")
-    size = study.record_dtype.itemsize
-    return sum(path.read_bytes().count(b"\xf5RUN" + size.to_bytes(4, "little")) for path in paths)
+    size = PLACE.size + study.record_dtype.itemsize
+    return sum(path.read_bytes().count(RECORD + size.to_bytes(4, "little")) for path in paths)
 
 
 @pytest.mark.parametrize(("ranks", "lanes"), [(0, 1), (2, 1), (0, 4), (2, 4)])
@@ -65,7 +66,7 @@ def test_kill_9_at_any_moment_and_resume(start, tmp_path, reference, ranks, lane
 def test_a_rank_that_dies_takes_the_sweep_down_and_the_rest_is_done_later(start, tmp_path, reference):
     options = {"out": tmp_path / "out", "runs": RUNS}
     finished = start({**options, "parameters": {"pause": 0.01, "crash_at": 20}}, ranks=2).finish()
-    assert finished.returncode != 0
+    assert finished.returncode not in (0, 1, 2, 99)  # those that say how a sweep ended
     assert 0 < recorded(tmp_path / "out").recorded.sum() < RUNS
 
 

@@ -2,9 +2,14 @@
 
 import json
 
+from cvt_hpc.study.batches import Assignment
 from cvt_hpc.study.schedule import SerialCounter, claimed_batches
 
-PLAN = [(5, 2), (9,), (0, 1, 3)]
+PLAN = [Assignment((5, 2)), Assignment((9,)), Assignment((0, 1, 3))]
+
+
+def claimed(counter, may_claim=lambda: True, fits=lambda batch: True, plan=PLAN):
+    return list(claimed_batches(plan, counter, may_claim, fits))
 
 
 def claim_under_mpi(start, ranks, options, environment=None):
@@ -15,14 +20,14 @@ def claim_under_mpi(start, ranks, options, environment=None):
 
 def test_serial_claims_follow_the_plan():
     with SerialCounter() as counter:
-        assert list(claimed_batches(PLAN, counter, lambda: True)) == PLAN
-        assert list(claimed_batches(PLAN, counter, lambda: True)) == []
+        assert claimed(counter) == PLAN
+        assert claimed(counter) == []
 
 
 def test_no_claim_when_it_is_not_allowed():
     counter = SerialCounter()
     answers = iter([True, True, False])
-    assert list(claimed_batches(PLAN, counter, lambda: next(answers))) == PLAN[:2]
+    assert claimed(counter, lambda: next(answers)) == PLAN[:2]
     assert counter.claim() == 2  # the refusal has cost no number
 
 
@@ -31,7 +36,7 @@ def test_serial_interruption_is_beyond_every_plan():
     assert not counter.is_interrupted()
     counter.interrupt_all()
     assert counter.is_interrupted()
-    assert list(claimed_batches(PLAN, counter, lambda: True)) == []
+    assert claimed(counter) == []
 
 
 def test_three_ranks_claim_every_number_once(start):
@@ -61,3 +66,18 @@ def test_a_counter_that_miscounts_is_refused(start):
     errors = claim_under_mpi(start, 2, {"task": "miscount"})["errors"]
     assert len(errors) == 2  # on all ranks alike
     assert all("self-test of the shared counter" in error for error in errors)
+
+
+def test_a_batch_that_does_not_fit_is_passed_over():
+    counter = SerialCounter()
+    assert claimed(counter, fits=lambda batch: batch != (5, 2)) == PLAN[1:]
+    assert claimed(counter) == []  # nobody else does it either
+
+
+def test_runs_that_are_to_be_done_alone_come_one_by_one():
+    plan = [Assignment((4, 5, 6), alone=True), Assignment((1, 2))]
+    singles = [Assignment((index,), alone=True) for index in (4, 5, 6)]
+    assert claimed(SerialCounter(), plan=plan) == [*singles, plan[1]]
+    assert claimed(SerialCounter(), fits=lambda batch: batch != (5,), plan=plan) == [*singles[::2], plan[1]]
+    answers = iter([True, True, False])
+    assert claimed(SerialCounter(), lambda: next(answers), plan=plan) == singles[:2]

@@ -10,9 +10,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-
-from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.recovery import read_records
+from recorded import records
 
 PATIENCE = 120.0  # [s] until a process that should end counts as hanging; kernels may have to be compiled
 _LAUNCHERS = ("SLURM_", "PMI", "OMPI_", "MPI_")
@@ -77,14 +75,6 @@ def kill(process: subprocess.Popen) -> None:
     psutil.wait_procs(family, timeout=PATIENCE)
 
 
-def records(out: Path) -> int:
-    """How many runs an output folder has on record so far."""
-    folder = StudyFolder(out)
-    if not folder.job_file.exists():
-        return 0
-    return int(read_records(folder.records, folder.load()).recorded.sum())
-
-
 def wait_for_records(out: Path, count: int, process: subprocess.Popen) -> None:
     """Return when so many runs are on record."""
     deadline = time.monotonic() + PATIENCE
@@ -94,16 +84,3 @@ def wait_for_records(out: Path, count: int, process: subprocess.Popen) -> None:
         if time.monotonic() > deadline:
             pytest.fail(f"waited in vain for {count} records")
         time.sleep(0.005)
-
-
-def assert_same_numbers(found, expected) -> None:
-    """Assert that all variables of two datasets agree bitwise, but those that depend on the hour."""
-    assert list(found.variables) == list(expected.variables)
-    for name, variable in expected.variables.items():
-        if variable.attrs.get("volatile") != "yes":
-            one, other = found[name].values, variable.values
-            assert one.dtype == other.dtype, name
-            same = (
-                one.tolist() == other.tolist() if one.dtype.kind in "OU" else one.tobytes() == other.tobytes()
-            )
-            assert same, name

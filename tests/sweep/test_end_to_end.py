@@ -13,12 +13,12 @@ import pytest
 import xarray as xr
 from cf import cf_findings
 from PIL import Image
-from sweeps import assert_same_numbers, call, environment, kill, records, start, wait_for_records
+from recorded import assert_same_numbers, frames_written, records
+from sweeps import call, environment, kill, start, wait_for_records
 
 from cvt_hpc import open_results
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, occurrence_classes
-from cvt_hpc.study.record import MARKER
 from cvt_hpc.variables import Status, Vibrates
 
 JOB = """
@@ -40,6 +40,11 @@ stations = 48
 duration = "0.08 s"
 """
 
+
+HISTORY = """
+[record]
+history = [{ sheave_stiffness = 1.0, load = "120 N m" }]
+"""
 
 # Runs with different meshes cannot be done as one batch: records come one after another.
 MESHES = """
@@ -66,7 +71,7 @@ def folder(tmp_path):
 def serial(tmp_path_factory):
     """The folder of an undisturbed serial run."""
     folder = tmp_path_factory.mktemp("serial")
-    (folder / "small.toml").write_text(JOB)
+    (folder / "small.toml").write_text(JOB + HISTORY)
     done = call("run", "small.toml", cwd=folder)
     assert done.returncode == 1, done.stderr  # both sheaves slip through at 500 N m
     assert done.stdout.splitlines() == [
@@ -109,6 +114,17 @@ def test_the_cf_checker_finds_nothing_in_a_sweep(serial):
     assert cf_findings(serial / "results.nc") == []
 
 
+def test_costs_are_estimated_by_what_is_on_record(serial):
+    estimate = {}
+    for name in ("small", "other"):
+        done = call("check", "small.toml", "--set", f"name={name}", cwd=serial.parents[1])
+        estimate[name] = done.stdout.splitlines()[-1]
+    took = load_results(serial)["core_seconds"].values[:, :3].mean()
+    assert estimate["small"].startswith(f"estimated cost: {took:.3g} core-seconds per run")
+    assert estimate["small"].endswith("(by what 6 runs on record took)")
+    assert "record" not in estimate["other"]
+
+
 def test_two_ranks_give_the_same_bits(serial, folder):
     done = call("run", "small.toml", "--out", "two", cwd=folder, ranks=2)
     assert done.returncode == 1, done.stderr
@@ -137,11 +153,6 @@ def test_kill_9_at_any_moment_and_resume(meshes, tmp_path, ranks):
     assert frames_written(out) == meshes["status"].size
 
 
-def frames_written(out):
-    """Number of records in all logs, repeated ones counted each time."""
-    return sum(path.read_bytes().count(MARKER) for path in (out / "records").glob("*.log"))
-
-
 def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):
     done = call(
         "simulate", "small.toml", "--at", "load=120 N m", "--out", "h.nc", "--plot", "h.png", cwd=folder
@@ -154,11 +165,15 @@ def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):
             if swept[name].attrs.get("volatile") != "yes" and swept[name].dtype.kind == "f":
                 assert history[name].values.tobytes() == swept[name].values.tobytes(), name
         assert history.sizes["time"] == 1600
+        # and so does the history that the sweep has kept, of a run in a batch
+        (kept,) = (serial / "histories").iterdir()
+        assert kept.name == "run-000002.nc"
+        with xr.open_dataset(kept, decode_times=False) as beside:
+            assert_same_numbers(beside.drop_vars("core_seconds"), history.drop_vars("core_seconds"))
     # By CF a time coordinate is known by units "... since ...", and time since the start is none; the checker
     # goes by the name alone.
-    assert [
-        finding for finding in cf_findings(folder / "h.nc") if "Coordinate variable 'time'" not in finding
-    ] == []
+    findings = cf_findings(folder / "h.nc")
+    assert [finding for finding in findings if "Coordinate variable 'time'" not in finding] == []
     with Image.open(folder / "h.png") as picture:
         assert min(picture.size) > 500
         # lines, shades and letters, not an empty sheet

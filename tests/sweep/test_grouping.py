@@ -91,8 +91,8 @@ def test_groups_are_of_one_kind_and_no_larger_than_the_lanes(monkeypatch):
     # more of a kind than lanes
     many = job({"load": [0.0, 20.0, 40.0, 60.0, 80.0]})
     assert sorted(map(len, simulation.lane_groups(many, range(5)))) == [2, 3]
-    explicit = job({"load": [0.0, 60.0]}, "explicit")  # takes one run at a time
-    assert simulation.lane_groups(explicit, [0, 1]) == [(0,), (1,)]
+    general = job({"load": [0.0, 60.0]}, "symplectic_euler")  # takes one run at a time
+    assert simulation.lane_groups(general, [0, 1]) == [(0,), (1,)]
 
 
 def test_the_cost_of_each_run_is_that_of_a_job_of_its_own():

@@ -1,8 +1,41 @@
-"""Whether a run that reached its end left the ground on which its numbers stand."""
+"""What ends a run, and whether one that reached its end left the ground on which its numbers stand."""
 
 from __future__ import annotations
 
+from typing import Any
+
+from cvt_hpc.models.elastic_belt.belt import Mesh
+from cvt_hpc.models.elastic_belt.sampling import (
+    LARGEST_DISPLACEMENT,
+    LARGEST_ELEMENT_STRAIN,
+    LARGEST_STRAIN,
+    LEAST_SPEED,
+    Outcome,
+)
 from cvt_hpc.variables import Status
+
+LARGEST_POWER_RESIDUAL = 0.02
+
+FAILURES = {
+    Outcome.NO_CONTACT_SOLUTION: (
+        Status.FAILED_NUMERICS,
+        "the search for the closed stations of belt and sheaves did not end",
+    ),
+    Outcome.NOT_FINITE: (Status.FAILED_NUMERICS, "the state is not a number"),
+    Outcome.LEFT_THE_GROOVES: (
+        Status.FAILED_NUMERICS,
+        f"the belt is more than {LARGEST_DISPLACEMENT * 1e3:g} mm off its path",
+    ),
+    Outcome.OVERSTRAINED: (
+        Status.FAILED_NUMERICS,
+        f"strain is beyond {LARGEST_STRAIN:.0%} in the rings or {LARGEST_ELEMENT_STRAIN:.0%} in the elements",
+    ),
+    # physics, no fault of the numerics: the torque is more than friction carries
+    Outcome.SLIPPED_THROUGH: (
+        Status.FAILED_ERROR,
+        f"the belt slips through: the driven pulley has lost {1 - LEAST_SPEED:.0%} of its speed",
+    ),
+}
 
 
 def slack_doubt(bending_stiffness: float, cell: float, least_force: float) -> tuple[Status, str] | None:
@@ -32,3 +65,27 @@ def slack_doubt(bending_stiffness: float, cell: float, least_force: float) -> tu
         return None
     found = f"a strand is slack, T - P - m v^2 down to {least_force:.3g} N"
     return Status.FAILED_NUMERICS, f"{found}, where waves as short as its cells grow from {bearable:.3g} N on"
+
+
+def doubt(record: dict[str, Any], bending_stiffness: float, grid: Mesh) -> tuple[Status, str] | None:
+    """Whether a run that reached its end is not to be trusted.
+
+    Parameters
+    ----------
+    record : dict
+        With `power_residual` and `least_strand_force`.
+    bending_stiffness : float
+        EI [N m^2].
+    grid : Mesh
+        The belt's mesh.
+
+    Returns
+    -------
+    (Status, str) or None
+        What is wrong.
+    """
+    residual = abs(record["power_residual"])
+    if not residual <= LARGEST_POWER_RESIDUAL:
+        why = f"the power balance is open by {residual:.3g} of the power that flows"
+        return Status.FAILED_NUMERICS, why
+    return slack_doubt(bending_stiffness, float(grid.cell[grid.starts[1]]), record["least_strand_force"])

@@ -1,107 +1,227 @@
-"""The plain explicit step of the elastic belt: symplectic Euler, the judge of faster ones."""
+"""The plain explicit step of the elastic belt: symplectic Euler, the judge of faster ones, in lanes.
+
+Velocities by the forces of the present state, then positions by the new velocities. Each rate is that of
+`rhs.py` to round-off (tests/run/test_explicit_step.py); its form is that of lanes: velocities and contents as
+deviations, each cell's stresses computed once.
+"""
 
 from __future__ import annotations
 
-import numpy as np
+from typing import NamedTuple
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_POSITION,
-    DRIVEN_SPEED,
+from cvt_hpc.lanes import LaneArray, fma, like, minimum, reciprocals, select, sqrt
+from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_FILTERED, V_RING, U, W
+from cvt_hpc.models.elastic_belt.lane_belt import (
+    BELT_SPEED,
+    BENDING_STIFFNESS,
+    COSINE,
+    DRIVEN_CARRY,
+    DRIVEN_RADIUS,
+    DRIVING_CARRY,
+    DRIVING_RADIUS,
+    DRIVING_SPEED,
+    ELEMENT_DAMPING,
+    ELEMENT_MASS,
+    ELEMENT_STIFFNESS,
+    FORGET,
     LAYER_WORK,
-    N_ELEMENT,
-    TIME,
-    V_ELEMENT,
-    V_FILTERED,
-    V_RING,
-    Belt,
-    State,
-    U,
-    W,
+    MASS,
+    RING_DAMPING,
+    RING_FRICTION,
+    RING_MASS,
+    RING_OFFSET,
+    RING_RELIEF,
+    RING_STIFFNESS,
+    SINE,
+    SPEED,
+    TRANSVERSE_DAMPING,
+    LaneBelt,
+    LaneState,
 )
-from cvt_hpc.models.elastic_belt.rhs import (
-    accelerations,
-    contact_forces,
-    content_rates,
-    load_at,
-    memory_rates,
-    strains,
+from cvt_hpc.models.elastic_belt.lane_forces import (
+    COEFFICIENT,
+    EPS_0,
+    EPS_1,
+    FACTOR,
+    FIELDS_OF_FORCES,
+    FORCE,
+    PER_SPEED,
+    RING_FACTOR,
+    SHORT_0,
+    SLIDING_R,
+    SLIDING_T,
+    advance_pulley,
+    derive,
+    lane_sliding,
+    lane_transverse,
+    ring_grip,
+    start_damping,
 )
-from cvt_hpc.physics.compliance import ContactState
+
+# fields of ExplicitWork.stations, after those of `lane_forces`
+SLOPE, DU, DV_0, DV_1, DAMPED_0, DAMPED_1 = range(FIELDS_OF_FORCES, FIELDS_OF_FORCES + 6)
+FIELDS_OF_WORK = FIELDS_OF_FORCES + 6
+
+
+class ExplicitWork(NamedTuple):
+    """Work space of the step.
+
+    Attributes
+    ----------
+    stations : (N, 19) LaneArray
+        The fields of `lane_forces`; slope w_s; a step's increments of u, v_element and v_ring; forces of the
+        layers' dampers in the cells.
+    """
+
+    stations: LaneArray
+
+
+def explicit_work(state: LaneState) -> ExplicitWork:
+    """Work space for a state; `derive` has to be called before the first step."""
+    rows, _, lanes = state.fields.data.shape
+    return ExplicitWork(LaneArray(rows, FIELDS_OF_WORK, lanes))
 
 
 @kernel
-def step_explicit(
-    belt: Belt,
-    state: State,
-    contacts: tuple[ContactState, ContactState],
-    work: np.ndarray,
-    step: float,
-) -> int:
-    """One step: velocities by the forces of the present state, then positions by the new velocities.
+def step_explicit(belt: LaneBelt, state: LaneState, work: ExplicitWork, step: float) -> None:
+    """One step.
 
     Parameters
     ----------
-    belt, state, contacts
-        Constants, state (advanced in place) and the contact solver's memory.
-    work : (10, N) array
-        Work space.
+    belt, state, work
+        Constants, state (advanced in place), work space, that holds what `derive` finds of this state.
     step : float
         Step [s]; stable below 2 / (largest rate), some 0.2 us with the default belt.
-
-    Returns
-    -------
-    int
-        Solves of the contact problem; 0 where it failed.
     """
-    force, eps, rate = work[0], work[1:3], work[3:10]
-    fields, scalars = state.fields, state.scalars
-    solves = contact_forces(belt, state, contacts, force)
-    strains(belt, fields, eps)
-    moment = accelerations(belt, state, force, eps, rate)
-    axial = driven_thrust(belt, force)
-
-    scalars[LAYER_WORK] += step * damper_power(belt, fields, eps, rate, step)
-    for row in (U, V_ELEMENT, V_RING):
-        fields[row] += step * rate[row]
-    load = belt.ratio * load_at(belt, scalars[TIME])
-    scalars[DRIVEN_SPEED] += step * (moment - load) / belt.driven_inertia
-
-    memory_rates(belt, state, rate)
-    content_rates(belt, state, eps, rate)
-    fields[W] += step * fields[U]
-    for row in range(V_FILTERED, N_ELEMENT + 2):
-        fields[row] += step * rate[row]
-    scalars[DRIVEN_POSITION] += step * (axial - belt.thrust) / belt.axial_damping
-    scalars[TIME] += step
-    return solves
+    stations = work.stations
+    lane_sliding(belt, state, stations)
+    moment = _accelerate(belt, state, stations, step)
+    advance_pulley(belt, state, stations, moment, step)
+    _advance_layers(belt, state, stations, step)
+    _advance_across(belt, state, stations, step)
+    state.time[0] += step
+    derive(belt, state, stations)
 
 
 @kernel
-def damper_power(belt: Belt, fields: np.ndarray, eps: np.ndarray, rate: np.ndarray, step: float) -> float:
-    """Power of the layers' dampers in a step [W]: forces at its start times the mean closing speeds."""
-    n = belt.cell.size
-    power = 0.0
+def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float):
+    """Increments of the velocities into DU and DV; the moment of the flanks on the driven pulley [N m]."""
+    n, fields, c = belt.cell.size, state.fields, belt.constants
+    sine, cosine, offset = c[0, SINE], c[0, COSINE], c[0, RING_OFFSET]
+    per_cosine, radius = 1.0 / cosine, c[0, DRIVEN_RADIUS]
+    element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
+    element_damping, ring_damping = c[0, ELEMENT_DAMPING], c[0, RING_DAMPING]
+    mass, ring_mass, belt_speed = c[0, MASS], c[0, RING_MASS], c[0, BELT_SPEED]
+    bending, ring_friction, ring_relief = c[0, BENDING_STIFFNESS], c[0, RING_FRICTION], c[0, RING_RELIEF]
+    centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
+    damping = c[0, TRANSVERSE_DAMPING] + start_damping(belt, state.time[0])
+    mobility, element_mobility, ring_mobility = step / mass, step / c[0, ELEMENT_MASS], step / ring_mass
+    zero = like(0.0, sine)
+    moment = net_left = ring_left = stress_left_0 = stress_left_1 = zero
+    gap_left_0 = gap_left_1 = zero
+    for k in range(-1, n):
+        # the last cell first, which is behind station 0
+        j = k if k >= 0 else n - 1
+        a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
+        per_cell = belt.per_cell[j]
+        v0, v1 = fields[j, V_ELEMENT], fields[j, V_RING]
+        push = element_stiffness * minimum(stations[j, EPS_0], 0.0)
+        ring_right = ring_stiffness * stations[j, EPS_1]
+        net_right = push + (ring_right - centrifugal)
+        gap_0, gap_1 = (fields[b, V_ELEMENT] - v0) * per_cell, (fields[b, V_RING] - v1) * per_cell
+        # elements that are apart have no damper, and it never makes them pull
+        damped_0 = select(push < 0.0, minimum(element_damping * gap_0, -push), 0.0)
+        damped_1 = ring_damping * gap_1
+        stress_0, stress_1 = push + damped_0, ring_right + damped_1
+        if k >= 0:
+            stations[j, DAMPED_0], stations[j, DAMPED_1] = damped_0, damped_1
+            span, per_dual, share = belt.per_span[j], belt.per_dual[j], belt.arc_share[j]
+            u, full_speed = fields[j, U], belt_speed + v0
+            slope = (fields[b, W] - fields[a, W]) * span
+            across = lane_transverse(belt, fields, j, net_left, net_right, bending)
+            across = fma(-gyroscopic, (fields[b, U] - fields[a, U]) * span, across)
+            v_radial = fma(full_speed, slope, u)
+            outward = -damping * v_radial
+            along_element = (stress_0 - stress_left_0) * per_dual
+            along_ring = (stress_1 - stress_left_1) * per_dual
+            if share > 0.0:
+                longer = fma(offset, belt.ring_curvature[j], 1.0)
+                lever = fma(offset, belt.arc_curvature[j], 1.0)
+                grip = ring_grip(belt, j, ring_left, ring_right, ring_relief * longer, ring_friction)
+                drag = grip * stations[j, RING_FACTOR]
+                # Bullinger et al. 2005, eqs 37-39
+                mu, per_speed = stations[j, COEFFICIENT] * stations[j, FACTOR], stations[j, PER_SPEED]
+                upward = mu * (stations[j, SLIDING_R] * per_cosine * per_speed)
+                per_normal, per_ring = reciprocals(fma(upward, sine, cosine), longer * ring_mass)
+                twice_normal = (2.0 * share) * stations[j, FORCE] * per_normal
+                outward = fma(twice_normal, fma(-upward, cosine, sine), outward)
+                tangential = -twice_normal * (mu * (stations[j, SLIDING_T] * per_speed))
+                if j >= belt.driven_start:
+                    moment = fma(-tangential, (radius + fields[j, W]) * belt.dual[j], moment)
+                along_element += fma(-lever, drag, tangential)
+                along_ring = (along_ring + drag) * (per_ring * step)
+            else:
+                along_ring *= ring_mobility
+            along_element = fma(outward, slope, along_element)
+            stations[j, SLOPE] = slope
+            stations[j, DU] = (across + outward) * mobility
+            stations[j, DV_0] = fma(along_element, element_mobility, -full_speed * (step * gap_left_0))
+            stations[j, DV_1] = fma(-(belt_speed + v1), step * gap_left_1, along_ring)
+        net_left, ring_left, stress_left_0, stress_left_1 = net_right, ring_right, stress_0, stress_1
+        gap_left_0, gap_left_1 = gap_0, gap_1
+    return moment
+
+
+@kernel
+def _advance_layers(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float) -> None:
+    """Speeds of both layers, contents by the fluxes of the new speeds, work of the layers' dampers."""
+    n, fields, scalars = belt.cell.size, state.fields, state.scalars
+    belt_speed = belt.constants[0, BELT_SPEED]
+    work_done = like(0.0, belt_speed)
     for layer in range(2):
-        v, change = fields[V_ELEMENT + layer], rate[V_ELEMENT + layer]
-        damper = belt.ring_damping if layer else belt.element_damping
-        for c in range(n):
-            b = c + 1 if c < n - 1 else 0
-            damped = damper * (v[b] - v[c]) / belt.cell[c]
-            if layer == 0:
-                # as in `accelerations`: elements that are apart have none, and it never makes them pull
-                damped = (
-                    min(damped, max(-belt.element_stiffness * eps[0, c], 0.0)) if eps[0, c] < 0.0 else 0.0
-                )
-            power += damped * (v[b] - v[c] + 0.5 * step * (change[b] - change[c]))
-    return power
+        v_row, dv_row, eps_row, n_row = V_ELEMENT + layer, DV_0 + layer, EPS_0 + layer, N_ELEMENT + layer
+        short_row, damped_row = SHORT_0 + layer, DAMPED_0 + layer
+        # at the station ahead of a cell: increment, speed, and the flux of content less the belt speed
+        dv_b = stations[0, dv_row]
+        v_b = fields[0, v_row] + dv_b
+        flux_b = fma(-belt_speed, stations[n - 1, eps_row], v_b) * stations[n - 1, short_row]
+        for j in range(n - 1, -1, -1):
+            a = j - 1 if j > 0 else n - 1
+            dv = stations[j, dv_row]
+            v = fields[j, v_row] + dv
+            flux = fma(-belt_speed, stations[a, eps_row], v) * stations[a, short_row]
+            # a damper's force at the start of the step times the mean closing speed
+            work_done = fma(stations[j, damped_row], fma(-0.5, dv_b - dv, v_b - v), work_done)
+            fields[j, n_row] = fma(step * belt.per_cell[j], flux - flux_b, fields[j, n_row])
+            fields[j, v_row] = v
+            dv_b, v_b, flux_b = dv, v, flux
+    scalars[0, LAYER_WORK] = scalars[0, LAYER_WORK] + work_done * step
 
 
 @kernel
-def driven_thrust(belt: Belt, force: np.ndarray) -> float:
-    """Axial force of the belt on the driven sheave [N]."""
-    first = belt.driven_start
-    total = 0.0
-    for k in range(belt.driven.weight.size):
-        total += belt.driven.weight[k] * force[first + k]
-    return total
+def _advance_across(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float) -> None:
+    """Transverse velocity, memory by the sliding speeds of the new velocities, and displacement."""
+    n, fields, c = belt.cell.size, state.fields, belt.constants
+    per_cosine, belt_speed, driven_speed = 1.0 / c[0, COSINE], c[0, BELT_SPEED], state.scalars[0, SPEED]
+    forget, carry, turning = step * c[0, FORGET], step * c[0, DRIVING_CARRY], c[0, DRIVING_SPEED]
+    surface = turning * c[0, DRIVING_RADIUS] - belt_speed
+    behind = like(0.0, forget)
+    for j in range(n):
+        u, w = fields[j, U] + stations[j, DU], fields[j, W]
+        if belt.memory and belt.arc_share[j] > 0.0:
+            if j == belt.driven_start:
+                carry, turning = step * c[0, DRIVEN_CARRY], driven_speed
+                surface = turning * c[0, DRIVEN_RADIUS] - belt_speed
+            v0, remembered = fields[j, V_ELEMENT], fields[j, V_FILTERED]
+            v_tangential = v0 - fma(turning, w, surface)
+            meridian = fma(belt_speed + v0, stations[j, SLOPE], u) * per_cosine
+            speed = sqrt(fma(meridian, meridian, v_tangential * v_tangential))
+            if j == 0 or j == belt.driven_start:
+                remembered = speed
+                fields[j, V_FILTERED] = speed
+            else:
+                change = fma(carry, behind - remembered, forget * (speed - remembered))
+                fields[j, V_FILTERED] = remembered + change
+            behind = remembered
+        fields[j, U], fields[j, W] = u, fma(step, u, w)

@@ -31,7 +31,6 @@ from cvt_hpc.models.elastic_belt.belt import (
     U,
     W,
 )
-from cvt_hpc.models.elastic_belt.explicit import driven_thrust
 from cvt_hpc.models.elastic_belt.rhs import (
     accelerations,
     contact_forces,
@@ -134,6 +133,16 @@ def set_inlets(flat: FlatBelt) -> None:
     if flat.belt.friction_memory > 0.0:
         for j in (0, flat.belt.driven_start):
             flat.state.fields[V_FILTERED, j] = sliding_speed(flat.belt, flat.state, j)
+
+
+@kernel
+def driven_thrust(belt: Belt, force: np.ndarray) -> float:
+    """Axial force of the belt on the driven sheave [N]."""
+    first = belt.driven_start
+    total = 0.0
+    for k in range(belt.driven.weight.size):
+        total += belt.driven.weight[k] * force[first + k]
+    return total
 
 
 @kernel

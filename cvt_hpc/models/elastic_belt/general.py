@@ -6,29 +6,27 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.elastic_belt import flat
 from cvt_hpc.models.elastic_belt.belt import (
-    LAYER_WORK,
-    N_ELEMENT,
-    REGIONS,
+    V_ELEMENT,
     Belt,
     Mesh,
     State,
     W,
     belt_constants,
     initial_state,
-    mesh,
     random_strands,
 )
-from cvt_hpc.models.elastic_belt.explicit import damper_power
-from cvt_hpc.models.elastic_belt.imex import imex_work
-from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
-from cvt_hpc.models.elastic_belt.march import record_state
+from cvt_hpc.models.elastic_belt.doubts import FAILURES
+from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK, lane_belt, lane_state, put_lane
+from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES
+from cvt_hpc.models.elastic_belt.march import sample_state
+from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, recording
 from cvt_hpc.models.elastic_belt.rhs import strains
-from cvt_hpc.models.elastic_belt.sampling import CHANNELS, PROFILES, Outcome, probes, sensors
+from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFILES, Outcome
 from cvt_hpc.models.elastic_belt.structure import SparseJacobian
-from cvt_hpc.models.elastic_belt.transient import FAILURES, doubt
 from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.marching import Marching
 from cvt_hpc.steppers.stiffness import STABLE, fastest_rate
@@ -74,8 +72,8 @@ class Form:
         return {"jac": jacobian}
 
 
-class GeneralTransient:
-    """One run, advanced sample by sample.
+class GeneralTransient(RecordedRun):
+    """One run, advanced sample by sample; attributes as of `RecordedRun`.
 
     Parameters
     ----------
@@ -83,48 +81,33 @@ class GeneralTransient:
         Resolved parameters of the run [SI], the stepper's among them.
     stepper : str
         Name of a general stepper that the model does not refuse.
-
-    Attributes
-    ----------
-    probes : tuple of Probe
-        Where displacement is recorded.
-    samples : int
-        Samples of the whole run.
-    interval : float
-        Sampling interval [s].
-    done : int
-        Samples recorded so far.
     """
 
     form = Form
 
     def __init__(self, parameters: dict[str, Any], stepper: str) -> None:
-        p = self.parameters = parameters
-        self.mesh = mesh(p)
-        self.belt = belt_constants(p)
-        self.interval = 1.0 / p["sampling_rate"]
-        self.samples = max(int(round(p["duration"] * p["sampling_rate"])), 1)
-        self.probes = probes(self.mesh, p["strand_probes"], p["arc_probes"])
-        self._sensing = sensors(self.mesh, self.probes, self.interval, np.float64)
-        self._rows = LaneArray(self.samples, self._sensing.matrix.shape[0] + len(CHANNELS), 1)
-        self._kick = min(int(np.ceil(p["rise_time"] * p["sampling_rate"])), self.samples)
-        self._first_judged = self.samples - round(p["judged_fraction"] * self.samples)
-        self._disturbed = False
-        n = self.mesh.cell.size
+        p, plan = parameters, recording(parameters, np.float64)
+        n = plan.mesh.cell.size
         self._profiles = [LaneArray(n, len(PROFILES), 1) for _ in range(2)]
-        self._ended = LaneArray(1, 3, 1)
+        super().__init__(p, plan, self._profiles[1].data[:, :, 0])
+        self.belt = belt_constants(p)
+        self._rows = LaneArray(self.samples, self._sensed + len(CHANNELS), 1)
+        self._disturbed = False
+        self._ended = LaneArray(1, len(ENDED), 1)
         self._form = self.form(self.belt, self.mesh, p)
         first = initial_state(p, self.belt)
         start = self._form.pack(first)
         # the same run as a single lane, which is what can be sampled
-        lane = lane_state([self.belt], [first], np.float64)
-        self._lane = (lane_belt([self.belt], np.float64), lane, imex_work(lane))
+        self._lane_belt = lane_belt([self.belt], np.float64)
+        self._lane = lane_state([self.belt], [first], np.float64)
+        self._stations = LaneArray(n, FIELDS_OF_FORCES, 1)
         self._marching = Marching(stepper, p, self._form.system, start, self.interval)
         self._stable = STABLE.get(stepper, np.inf)
         self._fastest = np.random.default_rng(0).normal(size=start.size)
         if stepper.startswith("scipy_"):
             self._marching.tell(**self._form.hints(stepper))
         self.done = 0
+        self.failure: tuple[Status, str] | None = None
 
     @property
     def time(self) -> float:
@@ -160,38 +143,6 @@ class GeneralTransient:
         """The sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C)."""
         return self._rows.data[: self.done, :, 0]
 
-    @property
-    def displacement(self) -> np.ndarray:
-        """Displacement at the probes, (done, probe) [m]."""
-        return self.rows[:, : len(self.probes)]
-
-    @property
-    def modes(self) -> np.ndarray:
-        """Sine amplitudes of both strands, (done, 2, MODES) [m]."""
-        first, last = len(self.probes), self._sensing.matrix.shape[0]
-        return self.rows[:, first:last].reshape(self.done, 2, -1)
-
-    def channel(self, name: str) -> np.ndarray:
-        """History of one of CHANNELS, (done,)."""
-        return self.rows[:, self._sensing.matrix.shape[0] + CHANNELS.index(name)]
-
-    @property
-    def judged(self) -> slice:
-        """Samples of the judged part."""
-        return slice(self._first_judged, self.samples)
-
-    @property
-    def profiles(self) -> dict[str, np.ndarray]:
-        """PROFILES around the belt, (N,) each: mean over the judged part at the stations, nan before it."""
-        count = self.done - self._first_judged
-        sums = self._profiles[1].data[:, :, 0].T
-        return dict(zip(PROFILES, sums / (count if count > 0 else np.nan), strict=True))
-
-    @property
-    def regions(self) -> np.ndarray:
-        """Name of the region behind each station, (N,)."""
-        return np.array(REGIONS)[self.mesh.region]
-
     def advance(self, samples: int) -> tuple[Status, str] | None:
         """March on.
 
@@ -208,12 +159,13 @@ class GeneralTransient:
         last = min(self.done + samples, self.samples)
         found = self._march(0) if samples == 0 else None
         while found is None and self.done < last:
-            if self.done == self._kick and not self._disturbed:
+            if self.done == self._plan.kick and not self._disturbed:
                 self._disturb()
             stop = min(last, self.done + SAMPLES_TOGETHER)
-            if self.done < self._kick:
-                stop = min(stop, self._kick)
+            if self.done < self._plan.kick:
+                stop = min(stop, self._plan.kick)
             found = self._march(stop - self.done)
+        self.failure = found
         return found
 
     def _disturb(self) -> None:
@@ -249,30 +201,34 @@ class GeneralTransient:
     def _sample(self, y: np.ndarray) -> int:
         """Record one state."""
         state = self._form.state((self.done + 1) * self.interval, y)
-        profiles = self._profiles[int(self.done >= self._first_judged)]
+        lane = self._lane
+        put_lane(lane.fields.data, lane.scalars.data, 0, self.belt, state)
+        lane.time[0] = (self.done + 1) * self.interval
         # a general stepper knows nothing of dampers: their work is taken from the state, as over the interval
-        eps = np.empty((2, self.mesh.cell.size))
-        strains(self.belt, state.fields, eps)
-        power = damper_power(self.belt, state.fields, eps, np.zeros((N_ELEMENT + 2, eps.shape[1])), 0.0)
-        state.scalars[LAYER_WORK] = power * self.interval
-        record_state(
-            self.belt, state, *self._lane, self._sensing, self._rows, self.done, profiles, self._ended
-        )
-        outcome = int(self._ended.data[0, 0, 0])
+        lane.scalars.data[0, LAYER_WORK] = damper_power(self.belt, state) * self.interval
+        profiles = self._profiles[int(self.done >= self._plan.first_judged)]
+        place = self._plan.sensing, self._rows, self.done, profiles, self._ended
+        sample_state(self._lane_belt, lane, self._stations, *place)
+        outcome = int(self._ended.data[0, OUTCOME, 0])
         self.done += int(outcome == Outcome.OK)
         return outcome
 
-    def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
-        """Whether a run that reached its end is not to be trusted.
 
-        Parameters
-        ----------
-        record : dict
-            With `power_residual` and `least_strand_force`.
-
-        Returns
-        -------
-        (Status, str) or None
-            As `advance`.
-        """
-        return doubt(record, self.parameters["bending_stiffness"], self.mesh)
+@kernel
+def damper_power(belt: Belt, state: State) -> float:
+    """Power of the layers' dampers in a state [W], as `rhs.accelerations` has their forces."""
+    n = belt.cell.size
+    eps = np.empty((2, n))
+    strains(belt, state.fields, eps)
+    power = 0.0
+    for layer in range(2):
+        v = state.fields[V_ELEMENT + layer]
+        damper = belt.ring_damping if layer else belt.element_damping
+        for c in range(n):
+            closing = v[c + 1 if c < n - 1 else 0] - v[c]
+            damped = damper * closing / belt.cell[c]
+            if layer == 0:
+                # elements that are apart have none, and it never makes them pull
+                damped = min(damped, -belt.element_stiffness * eps[0, c]) if eps[0, c] < 0.0 else 0.0
+            power += damped * closing
+    return power

@@ -21,14 +21,6 @@ from __future__ import annotations
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, sqrt
 from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_FILTERED, V_RING, U, W
-from cvt_hpc.models.elastic_belt.imex import (
-    EPS_0,
-    EPS_1,
-    FORCE,
-    LEAST_SHARE_OF_WIDTH,
-    lane_load,
-    start_damping,
-)
 from cvt_hpc.models.elastic_belt.lane_belt import (
     AXIAL_DAMPING,
     BELT_SPEED,
@@ -62,6 +54,14 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     WEDGE,
     LaneBelt,
     LaneState,
+)
+from cvt_hpc.models.elastic_belt.lane_forces import (
+    EPS_0,
+    EPS_1,
+    FORCE,
+    LEAST_SHARE_OF_WIDTH,
+    lane_load,
+    start_damping,
 )
 from cvt_hpc.physics.lane_friction import lane_coefficient, lane_law, lane_saturation, lane_table
 
@@ -111,7 +111,7 @@ def audit(
     belt, state
         Constants and state; the work of the dampers since the last audit is used up.
     stations : LaneArray
-        Of `ImexWork`, with the forces and strains of this state.
+        The step's work space, with the forces and strains of this state.
     axial
         Axial force of the belt on the driven sheave [N], in lanes.
     interval : float

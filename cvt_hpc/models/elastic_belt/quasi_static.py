@@ -38,12 +38,12 @@ from cvt_hpc.models.elastic_belt.belt import (
     U,
     W,
 )
-from cvt_hpc.models.elastic_belt.explicit import driven_thrust
 from cvt_hpc.models.elastic_belt.flat import (
     SIZE_OF_POSITION,
     SIZE_OF_SPEED,
     SIZES,
     FlatBelt,
+    driven_thrust,
     flat_belt,
     set_inlets,
 )
@@ -54,7 +54,7 @@ from cvt_hpc.models.elastic_belt.rhs import (
     memory_rates,
     strains,
 )
-from cvt_hpc.physics.compliance import flexibility
+from cvt_hpc.physics.sheaves import flexibility
 from cvt_hpc.physics.splines import Splines, hierarchical_splines
 from cvt_hpc.steppers.system import System
 

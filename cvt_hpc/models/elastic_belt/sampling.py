@@ -11,12 +11,6 @@ import numpy as np
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, select
 from cvt_hpc.models.elastic_belt.belt import REGIONS, V_ELEMENT, Mesh, W
-from cvt_hpc.models.elastic_belt.imex import (
-    EPS_0,
-    EPS_1,
-    FORCE,
-    lane_load,
-)
 from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
     DRIVEN_RADIUS,
@@ -26,10 +20,17 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     MASS,
     POSITION,
     RATIO,
+    REPEATS,
     RING_STIFFNESS,
     SPEED,
     LaneBelt,
     LaneState,
+)
+from cvt_hpc.models.elastic_belt.lane_forces import (
+    EPS_0,
+    EPS_1,
+    FORCE,
+    lane_load,
 )
 from cvt_hpc.models.elastic_belt.power import POWERS, audit
 from cvt_hpc.models.elastic_belt.record import MODES
@@ -69,6 +70,12 @@ class Outcome(IntEnum):
     LEFT_THE_GROOVES = 3
     OVERSTRAINED = 4
     SLIPPED_THROUGH = 5
+
+
+# Where a lane's run has to be stopped for the first time, or the last one: the `Outcome`, the time [s], and
+# until then the linear solves of the contact problem and what friction had to be redone.
+ENDED = ("outcome", "time", "contact_solves", "repeats")
+OUTCOME, ENDED_AT, CONTACT_SOLVES, REPEATED = range(len(ENDED))
 
 
 class Sensors(NamedTuple):
@@ -165,7 +172,7 @@ def sample(
     belt, state
         Constants and state.
     stations : LaneArray
-        Of `ImexWork`, with what `derive` finds of this state.
+        The step's work space, with what `derive` finds of this state.
     sensing : Sensors
         S rows.
     rows : (samples, S + C) LaneArray of doubles
@@ -174,9 +181,8 @@ def sample(
         Which row.
     profiles : (N, 4) LaneArray of doubles
         PROFILES of this state are added to it; those of cells are averaged onto stations.
-    ended : (1, 3) LaneArray of doubles
-        Where a lane's run has to be stopped for the first time, or the last one: the `Outcome`, the time [s],
-        and the linear solves of the contact problem until then.
+    ended : (1, 4) LaneArray of doubles
+        ENDED of each lane.
     """
     _watch(belt, state, stations, ended)
     n, fields, c = belt.cell.size, state.fields, belt.constants
@@ -259,8 +265,9 @@ def _watch(belt: LaneBelt, state: LaneState, stations: LaneArray, ended: LaneArr
     code = select(speed < least, 5.0, code)
     code = select(like(largest, speed) > LARGEST_DISPLACEMENT, 3.0, code)
     code = select(total <= 0.0, code, 2.0)
-    running = ended[0, 0] < 0.5
-    ended[0, 1] = select(running, like(state.time[0], speed), ended[0, 1])
+    running = ended[0, OUTCOME] < 0.5
+    ended[0, ENDED_AT] = select(running, like(state.time[0], speed), ended[0, ENDED_AT])
     solves = state.contacts[0].scalars[0, SOLVES] + state.contacts[1].scalars[0, SOLVES]
-    ended[0, 2] = select(running, like(solves, speed), ended[0, 2])
-    ended[0, 0] = select(running, code, ended[0, 0])
+    ended[0, CONTACT_SOLVES] = select(running, like(solves, speed), ended[0, CONTACT_SOLVES])
+    ended[0, REPEATED] = select(running, state.scalars[0, REPEATS], ended[0, REPEATED])
+    ended[0, OUTCOME] = select(running, code, ended[0, OUTCOME])

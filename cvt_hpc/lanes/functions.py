@@ -1,0 +1,181 @@
+"""Functions of lanes: those that the processor has, and those that are made of them."""
+
+from __future__ import annotations
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, overload
+
+from cvt_hpc.lanes.kinds import Lanes, converted, vector_type
+
+
+def _library(name: str):
+    """A function of lanes that the processor has: `llvm.<name>`."""
+
+    def build(context, builder, sig, arguments):
+        kind = sig.return_type
+        values = [converted(context, builder, x, t, kind) for x, t in zip(arguments, sig.args, strict=True)]
+        vector = vector_type(kind)
+        suffix = f"v{kind.count}f{kind.dtype.bitwidth}"
+        function_type = ir.FunctionType(vector, [vector] * len(values))
+        function = cgutils.get_or_insert_function(builder.module, function_type, f"llvm.{name}.{suffix}")
+        return builder.call(function, values)
+
+    return build
+
+
+@intrinsic
+def sqrt(context, x):
+    """Square root of each lane."""
+    return x(x), _library("sqrt")
+
+
+@intrinsic
+def absolute(context, x):
+    """Absolute value of each lane."""
+    return x(x), _library("fabs")
+
+
+@intrinsic
+def nearest_integer(context, x):
+    """Nearest whole number of each lane."""
+    return x(x), _library("rint")
+
+
+@intrinsic
+def with_sign_of(context, size, sign):
+    """`size` with the sign of `sign`, lane by lane."""
+    return size(size, sign), _library("copysign")
+
+
+@intrinsic
+def fma(context, a, b, c):
+    """A b + c in each lane, rounded once."""
+    kind = next(t for t in (a, b, c) if isinstance(t, Lanes))
+    return kind(a, b, c), _library("fma")
+
+
+@intrinsic
+def select(context, mask, yes, no):
+    """`yes` in lanes where `mask` holds, `no` in the others."""
+    kind = yes if isinstance(yes, Lanes) else no
+
+    def build(context, builder, sig, arguments):
+        a, b = (
+            converted(context, builder, x, t, sig.return_type)
+            for x, t in zip(arguments[1:], sig.args[1:], strict=True)
+        )
+        return builder.select(arguments[0], a, b)
+
+    return kind(mask, yes, no), build
+
+
+@intrinsic
+def like(context, x, pattern):
+    """A number, or lanes of another precision, as lanes of `pattern`'s type."""
+
+    def build(context, builder, sig, arguments):
+        return converted(context, builder, arguments[0], sig.args[0], sig.return_type)
+
+    return pattern(x, pattern), build
+
+
+@intrinsic
+def anywhere(context, mask):
+    """Whether a mask holds in any lane."""
+
+    def build(context, builder, sig, arguments):
+        bits = builder.bitcast(arguments[0], ir.IntType(sig.args[0].count))
+        return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+
+    return types.boolean(mask), build
+
+
+@intrinsic
+def _two_to(context, n):
+    """2^n of whole numbers n within the range of the exponent."""
+
+    def build(context, builder, sig, arguments):
+        kind = sig.return_type
+        bits, mantissa, bias = (32, 23, 127) if kind.dtype == types.float32 else (64, 52, 1023)
+        whole = ir.VectorType(ir.IntType(bits), kind.count)
+
+        def constant(value):
+            return ir.Constant(whole, [value] * kind.count)
+
+        shifted = builder.add(builder.fptosi(arguments[0], whole), constant(bias))
+        return builder.bitcast(builder.shl(shifted, constant(mantissa)), vector_type(kind))
+
+    return n(n), build
+
+
+def minimum(a, b):
+    """The lesser, lane by lane; b where one is not a number."""
+    raise NotImplementedError("for kernels")
+
+
+def maximum(a, b):
+    """The greater, lane by lane; b where one is not a number."""
+    raise NotImplementedError("for kernels")
+
+
+def decay(x):
+    """e^-x of each lane for x >= 0, to two units in the last place.
+
+    x is held within the range of the exponent, at its upper end where it is not a number.
+    """
+    raise NotImplementedError("for kernels")
+
+
+def reciprocals(a, b):
+    """1 / a and 1 / b by one division, the dearest of operations; a b must be within the exponent's range."""
+    raise NotImplementedError("for kernels")
+
+
+@overload(minimum, inline="always")
+def _minimum(a, b):
+    return lambda a, b: select(a < b, a, b)
+
+
+@overload(maximum, inline="always")
+def _maximum(a, b):
+    return lambda a, b: select(a > b, a, b)
+
+
+@overload(reciprocals, inline="always")
+def _reciprocals(a, b):
+    def both(a, b):
+        per_both = 1.0 / (a * b)
+        return b * per_both, a * per_both
+
+    return both
+
+
+# ln 2 in two parts, the first with bits to spare, so that n times it is exact; largest argument
+_SINGLE = (0.693359375, -2.12194440e-4, 87.0)
+_DOUBLE = (0.693145751953125, 1.42860682030941723212e-6, 708.0)
+_PER_LN_2 = 1.4426950408889634
+
+
+@overload(decay)
+def _decay(x):
+    if not isinstance(x, Lanes):
+        return None
+    high, low, largest = _SINGLE if x.dtype == types.float32 else _DOUBLE
+    # Taylor's terms are as good as any on |r| < ln 2 / 2: the first one left out is below the round-off
+    terms = 7 if x.dtype == types.float32 else 13
+    factors = tuple(1.0 / float(np.prod(np.arange(1.0, k + 1.0))) for k in range(terms, -1, -1))
+    first, others = factors[0], factors[1:]
+
+    def compute(x):
+        x = minimum(x, largest)
+        n = nearest_integer(x * -_PER_LN_2)
+        r = fma(n, -low, fma(n, -high, -x))
+        total = like(first, x)
+        for factor in others:
+            total = fma(total, r, factor)
+        return total * _two_to(n)
+
+    return compute

@@ -1,0 +1,113 @@
+"""The types of lanes, masks and arrays of lanes, as the compiler knows them."""
+
+from __future__ import annotations
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import NativeValue, models, register_model, typeof_impl, unbox
+
+ALIGNMENT = 64  # bytes: the widest register, so that no access crosses a line of the cache
+
+
+class LaneArray:
+    """Array of W-lane numbers.
+
+    Parameters
+    ----------
+    rows, fields, lanes : int
+        Shape.
+    dtype : type
+        np.float64 or np.float32.
+
+    Attributes
+    ----------
+    data : (rows, fields, lanes) array
+        The values, in order of memory; zero at first.
+    """
+
+    def __init__(self, rows: int, fields: int, lanes: int, dtype: type = np.float64) -> None:
+        size = rows * fields * lanes * np.dtype(dtype).itemsize
+        memory = np.zeros(size + ALIGNMENT, dtype=np.uint8)
+        first = -memory.ctypes.data % ALIGNMENT
+        self.data = memory[first : first + size].view(dtype).reshape(rows, fields, lanes)
+
+
+class Lanes(types.Type):
+    """Type of a number of `count` lanes."""
+
+    def __init__(self, dtype: types.Float, count: int) -> None:
+        self.dtype, self.count = dtype, count
+        super().__init__(name=f"Lanes({dtype} x {count})")
+
+
+class Mask(types.Type):
+    """Type of a truth of `count` lanes."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        super().__init__(name=f"Mask({count})")
+
+
+class LaneArrayKind(types.Type):
+    """Type of a LaneArray."""
+
+    def __init__(self, dtype: types.Float, count: int) -> None:
+        self.dtype, self.count = dtype, count
+        self.array = types.Array(dtype, 3, "C")
+        self.element = Lanes(dtype, count)
+        super().__init__(name=f"LaneArray({dtype} x {count})")
+
+
+def vector_type(kind: Lanes) -> ir.VectorType:
+    """The register that holds lanes of a type."""
+    return ir.VectorType(ir.FloatType() if kind.dtype == types.float32 else ir.DoubleType(), kind.count)
+
+
+@register_model(Lanes)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, vector_type(kind))
+
+
+@register_model(Mask)
+class _MaskModel(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, ir.VectorType(ir.IntType(1), kind.count))
+
+
+@register_model(LaneArrayKind)
+class _LaneArrayModel(models.StructModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, [("data", kind.array)])
+
+
+@typeof_impl.register(LaneArray)
+def _type_of_lane_array(value, context):
+    dtype = types.float32 if value.data.dtype == np.float32 else types.float64
+    return LaneArrayKind(dtype, value.data.shape[2])
+
+
+@unbox(LaneArrayKind)
+def _unbox_lane_array(kind, value, context):
+    data = context.pyapi.object_getattr_string(value, "data")
+    native = context.unbox(kind.array, data)
+    context.pyapi.decref(data)
+    box = cgutils.create_struct_proxy(kind)(context.context, context.builder)
+    box.data = native.value
+    return NativeValue(box._getvalue(), is_error=native.is_error)
+
+
+def converted(context, builder, value, kind, wanted: Lanes):
+    """A value of any numeric type or precision as one of type `wanted`."""
+    if isinstance(kind, Lanes):
+        if kind == wanted:
+            return value
+        narrows = wanted.dtype == types.float32
+        return (builder.fptrunc if narrows else builder.fpext)(value, vector_type(wanted))
+    plain = context.cast(builder, value, kind, wanted.dtype)
+    vector = vector_type(wanted)
+    first = builder.insert_element(ir.Constant(vector, ir.Undefined), plain, ir.Constant(ir.IntType(32), 0))
+    zeros = ir.Constant(ir.VectorType(ir.IntType(32), wanted.count), [0] * wanted.count)
+    return builder.shuffle_vector(first, ir.Constant(vector, ir.Undefined), zeros)

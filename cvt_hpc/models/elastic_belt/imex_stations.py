@@ -1,0 +1,159 @@
+"""The fast step at each station: forces, and slopes with the speeds, without the stresses T and P."""
+
+from __future__ import annotations
+
+from cvt_hpc.kernels import kernel, merged_kernel
+from cvt_hpc.lanes import anywhere, fma, like, minimum, reciprocals, select
+from cvt_hpc.models.elastic_belt.belt import V_ELEMENT, V_RING, U, W
+from cvt_hpc.models.elastic_belt.imex_work import (
+    D_00,
+    D_01,
+    D_11,
+    FLANK,
+    FLANK_CROSS,
+    FLANK_SLOPE,
+    LAG,
+    LAST_U,
+    PUSH,
+    REVERSING,
+    SLOPE,
+    Y_0,
+    Y_1,
+    ImexWork,
+)
+from cvt_hpc.models.elastic_belt.lane_belt import (
+    BELT_SPEED,
+    BENDING_STIFFNESS,
+    COSINE,
+    ELEMENT_MASS,
+    ELEMENT_STIFFNESS,
+    FRICTION_SPEED,
+    MASS,
+    RING_FRICTION,
+    RING_FRICTION_SPEED,
+    RING_MASS,
+    RING_OFFSET,
+    RING_RELIEF,
+    RING_STIFFNESS,
+    SINE,
+    TRANSVERSE_DAMPING,
+    LaneBelt,
+    LaneState,
+)
+from cvt_hpc.models.elastic_belt.lane_forces import (
+    COEFFICIENT,
+    EPS_0,
+    EPS_1,
+    FACTOR,
+    FORCE,
+    PER_SPEED,
+    RING_FACTOR,
+    SLIDING_T,
+    lane_transverse,
+    ring_grip,
+    start_damping,
+)
+
+
+@merged_kernel
+def implicit_shares(one, other, inertia):
+    """Two slopes, weighted by 1/2 (time-centred) where slow, 1 where stiff; inertia = mass / dt.
+
+    The linearised step then multiplies the velocity by an approximation of exp(-slope / inertia) that never
+    changes sign.
+    """
+    per_one, per_other = reciprocals(fma(2.0, one, 12.0 * inertia), fma(2.0, other, 12.0 * inertia))
+    return one * fma(one, per_one, 0.5), other * fma(other, per_other, 0.5)
+
+
+@kernel
+def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, again: bool) -> None:
+    """Forces and slopes at the stations, but for the stresses T and P: the system's blocks and right side.
+
+    `again` looks at stations alone that some lane's friction would throw back.
+    """
+    n, fields, stations, c = belt.cell.size, state.fields, work.stations, belt.constants
+    per_step = 1.0 / step
+    sine, cosine, width = c[0, SINE], c[0, COSINE], c[0, FRICTION_SPEED]
+    per_cosine, per_width = 1.0 / cosine, 1.0 / width
+    element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
+    element_mass, ring_mass, mass, offset = c[0, ELEMENT_MASS], c[0, RING_MASS], c[0, MASS], c[0, RING_OFFSET]
+    belt_speed, bending = c[0, BELT_SPEED], c[0, BENDING_STIFFNESS]
+    ring_friction, per_ring_width = c[0, RING_FRICTION], 1.0 / c[0, RING_FRICTION_SPEED]
+    ring_relief = c[0, RING_RELIEF]
+    centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
+    damping = c[0, TRANSVERSE_DAMPING] + start_damping(belt, state.time[0])
+    base_mass = fma(mass, per_step, 0.5 * damping)
+    element_rate = element_mass * per_step
+    zero = like(0.0, sine)
+    for j in range(n):
+        share = belt.arc_share[j]
+        if again and (share == 0.0 or not anywhere(stations[j, REVERSING] > 0.5)):
+            continue
+        a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
+        dual, per_left, span = belt.dual[j], belt.per_cell[a], belt.per_span[j]
+        u, v0, v1 = fields[j, U], fields[j, V_ELEMENT], fields[j, V_RING]
+        ring_left, ring_right = ring_stiffness * stations[a, EPS_1], ring_stiffness * stations[j, EPS_1]
+        net_left = fma(element_stiffness, minimum(stations[a, EPS_0], 0.0), ring_left - centrifugal)
+        net_right = fma(element_stiffness, minimum(stations[j, EPS_0], 0.0), ring_right - centrifugal)
+        slope = (fields[b, W] - fields[a, W]) * span
+        # u at t_k, extrapolated: the gyroscopic term then neither damps nor feeds
+        change = 1.5 * (fields[b, U] - fields[a, U]) - 0.5 * (stations[b, LAST_U] - stations[a, LAST_U])
+        transverse = lane_transverse(belt, fields, j, net_left, net_right, bending)
+        transverse = fma(-gyroscopic, change * span, transverse)
+        full_speed = belt_speed + v0
+        v_radial = fma(full_speed, slope, u)
+        outward = -damping * v_radial
+        longer = fma(offset, belt.ring_curvature[j], 1.0)
+        ring_here = ring_mass * longer
+        element, ring, coupling = element_rate, ring_here * per_step, zero
+        along_element = -full_speed * ((v0 - fields[a, V_ELEMENT]) * per_left) * element_mass
+        along_ring = -(belt_speed + v1) * ((v1 - fields[a, V_RING]) * per_left) * ring_here
+        radial_mass, cross = base_mass, zero
+        if share > 0.0:
+            lever = fma(offset, belt.arc_curvature[j], 1.0)
+            v_tangential, coefficient = stations[j, SLIDING_T], stations[j, COEFFICIENT]
+            per_speed, factor = stations[j, PER_SPEED], stations[j, FACTOR]
+            ring_factor, meridian, force = stations[j, RING_FACTOR], v_radial * per_cosine, stations[j, FORCE]
+
+            grip = ring_grip(belt, j, ring_left, ring_right, ring_relief * longer, ring_friction)
+            drag = grip * ring_factor
+            stiff = grip * (fma(-ring_factor, ring_factor, 1.0) * per_ring_width)
+
+            # Bullinger et al. 2005, eqs 37-39, with the slopes of friction along and across the sliding
+            mu = coefficient * factor
+            climb, run = meridian * per_speed, v_tangential * per_speed
+            upward = mu * climb
+            per_normal, per_stiff = reciprocals(fma(upward, sine, cosine), fma(2.0, stiff, 12.0 * ring))
+            twice_normal = (2.0 * share) * force * per_normal
+            outward += twice_normal * fma(-upward, cosine, sine)
+            friction = twice_normal * mu
+            tangential = -friction * run
+            across = friction * per_speed
+            # by the secant friction stops, and never throws back
+            thrown = stations[j, REVERSING] > 0.5 if again else share < zero
+            along = twice_normal * coefficient * (fma(-factor, factor, 1.0) * per_width)
+            along, across = implicit_shares(select(thrown, across, along), across, element_rate)
+            excess = along - across
+            radial_mass = fma(fma(excess, climb * climb, across), per_cosine * per_cosine, radial_mass)
+            cross = excess * climb * run * per_cosine
+            flank_slope = fma(excess, run * run, across)
+            stiff *= fma(stiff, per_stiff, 0.5)
+            along_element += fma(-lever, drag, tangential)
+            along_ring += drag
+            element += fma(lever * lever, stiff, flank_slope)
+            ring += stiff
+            coupling = -lever * stiff
+            stations[j, FLANK], stations[j, FLANK_SLOPE] = tangential, flank_slope
+            stations[j, FLANK_CROSS] = cross
+            if not again:
+                stations[j, REVERSING] = zero
+        along_element = fma(outward, slope, along_element)
+        mobility = 1.0 / radial_mass
+        push, lag = (transverse + outward) * mobility, cross * mobility
+        stations[j, PUSH], stations[j, LAG], stations[j, SLOPE] = push, lag, slope
+        stations[j, D_00] = dual * fma(-cross, lag, element)
+        stations[j, D_01] = dual * coupling
+        stations[j, D_11] = dual * ring
+        stations[j, Y_0] = dual * fma(-cross, push, along_element)
+        stations[j, Y_1] = dual * along_ring

@@ -1,0 +1,40 @@
+"""Work space of the fast step: what it keeps at each station beside the state."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.elastic_belt.belt import U
+from cvt_hpc.models.elastic_belt.lane_belt import LaneState
+from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES
+
+# fields of ImexWork.stations, after those of `lane_forces`
+LAST_U, PUSH, LAG, SLOPE, FLANK, FLANK_SLOPE, FLANK_CROSS, REVERSING = range(FIELDS_OF_FORCES, 21)
+D_00, D_01, D_11, Y_0, Y_1 = range(21, 26)
+I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(26, 37)
+FIELDS_OF_WORK = 37
+
+
+class ImexWork(NamedTuple):
+    """Work space of the step.
+
+    Attributes
+    ----------
+    stations : (N, 37) LaneArray
+        The fields of `lane_forces`; u one step earlier. Of the step: pending increment of u, its sensitivity
+        to v_element's, slope w_s, the flanks' tangential force and its slopes, whether (1) the linearised
+        friction would throw the station back; the blocks of the system and its right side; the eliminated
+        system: inverse pivots, the increments of v_element and v_ring, the border, the stresses' slopes with
+        the speeds' differences.
+    """
+
+    stations: LaneArray
+
+
+def imex_work(state: LaneState) -> ImexWork:
+    """Work space for a state; `derive` has to be called before the first step."""
+    rows, _, lanes = state.fields.data.shape
+    stations = LaneArray(rows, FIELDS_OF_WORK, lanes, state.fields.data.dtype)
+    stations.data[:, LAST_U] = state.fields.data[:, U]
+    return ImexWork(stations)

@@ -1,0 +1,253 @@
+"""Forces of the elastic belt in lanes: what steps, recording and audit find of one state.
+
+Steps keep it in a LaneArray of N stations, their work space: its first fields are those named here, further
+ones each step's own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel, merged_kernel
+from cvt_hpc.lanes import (
+    LaneArray,
+    absolute,
+    decay,
+    fma,
+    like,
+    maximum,
+    reciprocals,
+    select,
+    sqrt,
+    with_sign_of,
+)
+from cvt_hpc.models.elastic_belt.belt import (
+    N_ELEMENT,
+    N_RING,
+    START_DAMPING,
+    V_ELEMENT,
+    V_FILTERED,
+    V_RING,
+    U,
+    W,
+)
+from cvt_hpc.models.elastic_belt.lane_belt import (
+    AXIAL_DAMPING,
+    BELT_SPEED,
+    COSINE,
+    DRIVEN_INERTIA,
+    DRIVEN_RADIUS,
+    DRIVING_POSITION,
+    DRIVING_RADIUS,
+    DRIVING_SPEED,
+    FRICTION_GRADIENT,
+    FRICTION_SPEED,
+    KINETIC_FRICTION,
+    LAW_SPEED,
+    LOAD,
+    LOAD_START,
+    POSITION,
+    RATIO,
+    RING_FRICTION_SPEED,
+    RING_OFFSET,
+    SPEED,
+    THRUST,
+    WEDGE,
+    LaneBelt,
+    LaneState,
+)
+from cvt_hpc.physics.lane_compliance import CLOSED, GAP, solve_lane_contact
+from cvt_hpc.physics.lane_compliance import PUSH as PUSHED
+from cvt_hpc.physics.lane_friction import (
+    lane_coefficient,
+    lane_law,
+    lane_table,
+)
+
+MOST_CONTACT_ROUNDS = 200
+LEAST_SHARE_OF_WIDTH = 1e-3  # of friction_speed: below it friction is linear to 1e-6, and has no direction
+
+# Of a state, by `derive`: axial line force; the cells' strains, 1 / (1 + strain) and 1 / content. By
+# `lane_sliding`: sliding speeds, the law's coefficient, tanh of sliding speed over regularisation, 1 / that
+# speed, the same tanh of rings.
+FORCE, EPS_0, EPS_1, SHORT_0, SHORT_1, PER_CONTENT_0, PER_CONTENT_1 = range(7)
+SLIDING_R, SLIDING_T, COEFFICIENT, FACTOR, PER_SPEED, RING_FACTOR = range(7, 13)
+FIELDS_OF_FORCES = 13
+
+
+@kernel
+def derive(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
+    """Contact forces and strains of the present state."""
+    lane_contact_forces(belt, state, stations)
+    lane_strains(belt, state, stations)
+
+
+@merged_kernel
+def lane_load(belt: LaneBelt, time: float, pattern):
+    """Torque at the driving pulley [N m], as `rhs.load_at` has it, in lanes like `pattern`."""
+    c = belt.constants
+    load, start = like(c[0, LOAD], pattern), like(c[0, LOAD_START], pattern)
+    if time < belt.rise_time:
+        return start * (0.5 * (1.0 - np.cos(np.pi * time / belt.rise_time)))
+    if time < belt.ramp_end:
+        return start + (load - start) * ((time - belt.rise_time) / (belt.ramp_end - belt.rise_time))
+    return load
+
+
+@merged_kernel
+def start_damping(belt: LaneBelt, time: float) -> float:
+    """What the start-up adds to the transverse damping [N s/m^2]."""
+    left = max(1.0 - time / belt.rise_time, 0.0)
+    return START_DAMPING * left * left
+
+
+@kernel
+def lane_thrust(belt: LaneBelt, state: LaneState, stations: LaneArray):
+    """Axial force of the belt on the driven sheave [N]."""
+    weight = state.contacts[1].weight
+    total = like(0.0, stations[0, FORCE])
+    for k in range(weight.size):
+        total = fma(weight[k], stations[belt.driven_start + k, FORCE], total)
+    return total
+
+
+@kernel
+def advance_pulley(belt: LaneBelt, state: LaneState, stations: LaneArray, moment, step: float) -> None:
+    """Driven pulley's speed and opening at the end of a step, by the belt's moment [N m] and axial forces."""
+    c, scalars = belt.constants, state.scalars
+    speed = scalars[0, SPEED]
+    load = like(c[0, RATIO], speed) * lane_load(belt, state.time[0], speed)
+    scalars[0, SPEED] = speed + step * (moment - load) / like(c[0, DRIVEN_INERTIA], speed)
+    axial = like(lane_thrust(belt, state, stations), speed)
+    scalars[0, POSITION] = scalars[0, POSITION] + step * (axial - like(c[0, THRUST], speed)) / like(
+        c[0, AXIAL_DAMPING], speed
+    )
+
+
+@merged_kernel
+def lane_transverse(belt: LaneBelt, fields: LaneArray, j: int, net_left, net_right, bending):
+    """Line force across the belt at station j [N/m], outward, of tension and bending.
+
+    `net_left`, `net_right` are T - P - m v^2 in the cells beside it [N], `bending` is EI [N m^2].
+    """
+    n = belt.cell.size
+    a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
+    aa, bb = a - 1 if a > 0 else n - 1, b + 1 if b < n - 1 else 0
+    w, w_a, w_b = fields[j, W], fields[a, W], fields[b, W]
+    bent = fma(
+        belt.bending[j, 0],
+        fields[aa, W],
+        fma(belt.bending[j, 4], fields[bb, W], belt.bending[j, 2] * w),
+    )
+    bent = fma(belt.bending[j, 1], w_a, fma(belt.bending[j, 3], w_b, bent))
+    tension = net_right * ((w_b - w) * belt.per_cell[j]) - net_left * ((w - w_a) * belt.per_cell[a])
+    inward = net_right * (0.5 * belt.cell[j] * belt.curvature[j])
+    inward += net_left * (0.5 * belt.cell[a] * belt.curvature[a])
+    return fma(tension - inward, belt.per_dual[j], bending * bent)
+
+
+@merged_kernel
+def ring_grip(belt: LaneBelt, j: int, ring_left, ring_right, relief, friction):
+    """Largest friction of the saddles on the rings at station j of an arc [N/m].
+
+    `ring_left`, `ring_right` are T in the cells beside it [N], `relief` what the rings' own weight takes.
+    """
+    a = j - 1 if j > 0 else belt.cell.size - 1
+    pressure = maximum(ring_right - relief, 0.0) * (belt.cell[j] * belt.curvature[j])
+    pressure += maximum(ring_left - relief, 0.0) * (belt.cell[a] * belt.curvature[a])
+    return friction * (0.5 * belt.per_dual[j]) * pressure
+
+
+@kernel
+def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
+    """Axial line forces of both wraps into FORCE [N/m]; on the strands it stays 0."""
+    fields, c = state.fields, belt.constants
+    wedge = c[0, WEDGE]
+    for wrap in range(2):
+        contact = state.contacts[1] if wrap else state.contacts[0]
+        opening = like(state.scalars[0, POSITION], wedge) if wrap else c[0, DRIVING_POSITION]
+        first = belt.driven_start if wrap else 0
+        wrap_stations = contact.stations
+        for k in range(contact.weight.size):
+            wrap_stations[k, GAP] = fma(wedge, fields[first + k, W], opening)
+        solve_lane_contact(contact, MOST_CONTACT_ROUNDS)
+        for k in range(contact.weight.size):
+            push = maximum(wrap_stations[k, PUSHED], 0.0)
+            stations[first + k, FORCE] = select(wrap_stations[k, CLOSED] > 0.5, push, 0.0)
+
+
+@kernel
+def lane_strains(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
+    """Strains of elements and rings in the cells, with 1 / (1 + strain) and 1 / content."""
+    n, fields = belt.cell.size, state.fields
+    offset = belt.constants[0, RING_OFFSET]
+    w_b = fields[0, W]
+    for k in range(n - 1, -1, -1):
+        kappa = belt.curvature[k]
+        w = fields[k, W]
+        more_0, more_1 = fields[k, N_ELEMENT], fields[k, N_RING]
+        content_0, content_1 = more_0 + 1.0, fma(offset, kappa, more_1 + 1.0)
+        per_0, per_1 = reciprocals(content_0, content_1)
+        if kappa > 0.0:
+            bent = (w + w_b) * (0.5 * kappa)
+            length_0, length_1 = bent + 1.0, fma(offset, kappa, bent + 1.0)
+            per_length_0, per_length_1 = reciprocals(length_0, length_1)
+            stations[k, EPS_0], stations[k, EPS_1] = (bent - more_0) * per_0, (bent - more_1) * per_1
+            stations[k, SHORT_0] = content_0 * per_length_0
+            stations[k, SHORT_1] = content_1 * per_length_1
+        else:
+            stations[k, EPS_0], stations[k, EPS_1] = -more_0 * per_0, -more_1 * per_1
+            stations[k, SHORT_0], stations[k, SHORT_1] = content_0, content_1
+        stations[k, PER_CONTENT_0], stations[k, PER_CONTENT_1] = per_0, per_1
+        w_b = w
+
+
+@kernel
+def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
+    """Sliding speeds on the arcs, and what friction does of them alone.
+
+    A loop of its own: the chain of operations from a speed to the system's rows is longer than what a
+    processor looks ahead, so that it would not begin a station before the last one is nearly done.
+    """
+    n, fields, c = belt.cell.size, state.fields, belt.constants
+    kind, memory = belt.law.kind, belt.memory
+    table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
+    kinetic, fall, per_scale = lane_law(
+        kind, c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED]
+    )
+    per_cosine, belt_speed, offset = 1.0 / c[0, COSINE], c[0, BELT_SPEED], c[0, RING_OFFSET]
+    least = LEAST_SHARE_OF_WIDTH * c[0, FRICTION_SPEED]
+    per_width, per_ring_width = 1.0 / c[0, FRICTION_SPEED], 1.0 / c[0, RING_FRICTION_SPEED]
+    driven_speed = state.scalars[0, SPEED]
+    driven_base = driven_speed * like(c[0, DRIVEN_RADIUS], driven_speed) - like(belt_speed, driven_speed)
+    turning = c[0, DRIVING_SPEED]
+    surface = turning * c[0, DRIVING_RADIUS] - belt_speed
+    for j in range(n):
+        if j == belt.driven_start:
+            surface, turning = like(driven_base, least), like(driven_speed, least)
+        if belt.arc_share[j] == 0.0:
+            continue
+        a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
+        full_speed = belt_speed + fields[j, V_ELEMENT]
+        slope = (fields[b, W] - fields[a, W]) * belt.per_span[j]
+        v_radial = fma(full_speed, slope, fields[j, U])
+        v_tangential = fields[j, V_ELEMENT] - fma(turning, fields[j, W], surface)
+        meridian = v_radial * per_cosine
+        speed = sqrt(fma(meridian, meridian, v_tangential * v_tangential))
+        v_law = fields[j, V_FILTERED] if memory else speed
+        if kind == 5:
+            coefficient = lane_table(table, v_law, stations[j, FORCE] * per_cosine)
+        else:
+            coefficient = lane_coefficient(kind, kinetic, fall, per_scale, v_law)
+        # tanh(x) = (1 - e^-2x) / (1 + e^-2x) for flanks and rings
+        speed = maximum(speed, least)
+        saddle = fma(fma(offset, belt.arc_curvature[j], 1.0), full_speed, -(belt_speed + fields[j, V_RING]))
+        rest, ring_rest = decay(speed * (2.0 * per_width)), decay(absolute(saddle) * (2.0 * per_ring_width))
+        per_flank = 1.0 / (speed * (1.0 + rest))
+        stations[j, SLIDING_R], stations[j, SLIDING_T] = v_radial, v_tangential
+        stations[j, COEFFICIENT] = coefficient
+        stations[j, FACTOR], stations[j, PER_SPEED] = (
+            (1.0 - rest) * (speed * per_flank),
+            (1.0 + rest) * per_flank,
+        )
+        stations[j, RING_FACTOR] = with_sign_of((1.0 - ring_rest) / (1.0 + ring_rest), saddle)

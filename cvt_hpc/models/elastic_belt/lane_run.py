@@ -1,0 +1,81 @@
+"""One run of a batch, as its lane holds it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cvt_hpc.models.elastic_belt.doubts import FAILURES
+from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
+from cvt_hpc.models.elastic_belt.sampling import CONTACT_SOLVES, ENDED_AT, OUTCOME, REPEATED, Outcome
+from cvt_hpc.variables import Status
+
+if TYPE_CHECKING:
+    from cvt_hpc.models.elastic_belt.batch import Batch
+
+
+class LaneRun(RecordedRun):
+    """One run of a batch; attributes as of `RecordedRun`.
+
+    Parameters
+    ----------
+    batch : Batch
+        Which it belongs to.
+    lane : int
+        Its lane there.
+
+    Attributes
+    ----------
+    batch : Batch
+        As given.
+    step : float
+        Time step [s].
+    """
+
+    def __init__(self, batch: Batch, lane: int) -> None:
+        super().__init__(batch.points[lane], batch.plan, batch.profiles[1].data[:, :, lane])
+        self.batch, self.step = batch, batch.step
+        self._lane = lane
+
+    @property
+    def failure(self) -> tuple[Status, str] | None:
+        """What has gone wrong, where the run cannot go on."""
+        outcome = int(self._ended(OUTCOME))
+        return FAILURES[Outcome(outcome)] if outcome else None
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._ended(ENDED_AT)
+
+    @property
+    def done(self) -> int:
+        """Samples recorded so far, up to the one at which the run failed."""
+        taken = round(self.time / self.interval)
+        return taken if self.failure is None else taken - 1
+
+    @property
+    def steps(self) -> int:
+        """Steps taken so far."""
+        return round(self.time / self.step)
+
+    @property
+    def contact_solves(self) -> int:
+        """Linear solves of the contact problem so far."""
+        return int(self._ended(CONTACT_SOLVES))
+
+    def counters(self) -> dict[str, int]:
+        """Work done so far, by its name."""
+        counts = {"steps": self.steps, "contact_solves": self.contact_solves}
+        if self.batch.stepper == "imex":
+            counts["repeats"] = int(self._ended(REPEATED))
+        return counts
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C)."""
+        return self.batch.history(self._lane)[: self.done]
+
+    def _ended(self, what: int) -> float:
+        return float(self.batch.ended.data[0, what, self._lane])

@@ -1,0 +1,154 @@
+"""What every run of the elastic belt records, however it is marched: plan of recording and its reading."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cvt_hpc.models.elastic_belt.belt import REGIONS, Mesh, mesh
+from cvt_hpc.models.elastic_belt.doubts import doubt
+from cvt_hpc.models.elastic_belt.sampling import CHANNELS, PROFILES, Probe, Sensors, probes, sensors
+from cvt_hpc.variables import Status
+
+
+class Recording(NamedTuple):
+    """What is recorded, where, and when.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The belt's mesh.
+    probes : tuple of Probe
+        Where displacement is recorded.
+    sensing : Sensors
+        The same for kernels.
+    interval : float
+        Sampling interval [s].
+    samples : int
+        Samples of the whole run.
+    kick : int
+        Samples before the strands are disturbed. The start-up's damping has gone by then: from there on a
+        disturbance grows or decays by the belt's own nature.
+    first_judged : int
+        Samples before the judged part.
+    """
+
+    mesh: Mesh
+    probes: tuple[Probe, ...]
+    sensing: Sensors
+    interval: float
+    samples: int
+    kick: int
+    first_judged: int
+
+
+def recording(parameters: dict[str, Any], dtype: type) -> Recording:
+    """Plan of a run's recording.
+
+    Parameters
+    ----------
+    parameters : dict
+        Resolved parameters of the run [SI].
+    dtype : type
+        np.float64 or np.float32, that of the lanes.
+    """
+    p, grid = parameters, mesh(parameters)
+    interval = 1.0 / p["sampling_rate"]
+    samples = max(int(round(p["duration"] * p["sampling_rate"])), 1)
+    places = probes(grid, p["strand_probes"], p["arc_probes"])
+    return Recording(
+        grid,
+        places,
+        sensors(grid, places, interval, dtype),
+        interval,
+        samples,
+        min(int(np.ceil(p["rise_time"] * p["sampling_rate"])), samples),
+        samples - round(p["judged_fraction"] * samples),
+    )
+
+
+class RecordedRun:
+    """One run, as it is judged and recorded.
+
+    Parameters
+    ----------
+    parameters : dict
+        Resolved parameters of the run [SI].
+    plan : Recording
+        What is recorded.
+    sums : (N, 4) array
+        PROFILES, summed over the judged part's samples; it may be filled later.
+
+    Attributes
+    ----------
+    parameters
+        As given.
+    mesh, probes, interval, samples
+        Of the plan.
+    rows : (done, S + C) array
+        The sensors' displacement [m], the strands' modes [m], and CHANNELS; of who marches the run.
+    done : int
+        Samples recorded so far, up to the one at which the run failed; of who marches it.
+    failure : (Status, str) or None
+        What has gone wrong, where the run cannot go on; of who marches it.
+    """
+
+    rows: np.ndarray
+    done: int
+    failure: tuple[Status, str] | None
+
+    def __init__(self, parameters: dict[str, Any], plan: Recording, sums: np.ndarray) -> None:
+        self.parameters = parameters
+        self.mesh, self.probes = plan.mesh, plan.probes
+        self.interval, self.samples = plan.interval, plan.samples
+        self._plan, self._sums = plan, sums
+        self._sensed = plan.sensing.matrix.shape[0]
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Displacement at the probes, (done, probe) [m]."""
+        return self.rows[:, : len(self.probes)]
+
+    @property
+    def modes(self) -> np.ndarray:
+        """Sine amplitudes of both strands, (done, 2, MODES) [m]."""
+        return self.rows[:, len(self.probes) : self._sensed].reshape(self.done, 2, -1)
+
+    def channel(self, name: str) -> np.ndarray:
+        """History of one of CHANNELS, (done,)."""
+        return self.rows[:, self._sensed + CHANNELS.index(name)]
+
+    @property
+    def judged(self) -> slice:
+        """Samples of the judged part."""
+        return slice(self._plan.first_judged, self.samples)
+
+    @property
+    def profiles(self) -> dict[str, np.ndarray]:
+        """PROFILES around the belt, (N,) each: mean over the judged part at the stations.
+
+        Not a number before that part, and where the run has failed.
+        """
+        count = self.done - self._plan.first_judged if self.failure is None else 0
+        return dict(zip(PROFILES, self._sums.T / (count if count > 0 else np.nan), strict=True))
+
+    @property
+    def regions(self) -> np.ndarray:
+        """Name of the region behind each station, (N,)."""
+        return np.array(REGIONS)[self.mesh.region]
+
+    def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
+        """Whether a run that reached its end is not to be trusted.
+
+        Parameters
+        ----------
+        record : dict
+            With `power_residual` and `least_strand_force`.
+
+        Returns
+        -------
+        (Status, str) or None
+            What is wrong.
+        """
+        return doubt(record, self.parameters["bending_stiffness"], self.mesh)

@@ -1,0 +1,128 @@
+"""Runs that are done again, done alone, or given up: rules for retries, and for runs at which a process died.
+
+A process that dies, by a kill, for lack of memory or in compiled code, leaves no record of its runs. They
+are done again, after all others, so that a run that kills its process keeps no other from being done. A
+process that dies takes the other ranks along, so most of these runs are innocent: after `DEATHS` each is
+done alone, and where the process dies even then, by one rank alone, at the very end. After `DEATHS_ALONE`
+of these deaths the run is given up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cvt_hpc.study.batches import Assignment, share_out
+from cvt_hpc.study.description import Study
+from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.frames import RecordFormat
+from cvt_hpc.study.record import RecordLog
+from cvt_hpc.study.records import Records
+from cvt_hpc.study.recovery import read_records
+from cvt_hpc.variables import Status
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
+    from cvt_hpc.study.simulator import Simulator
+
+DEATHS = 3  # at a run, until it is done alone
+DEATHS_ALONE = 2  # while it was done alone, until it is given up
+
+
+def plan_runs(
+    job: Job, simulator: Simulator, records: Records, asked: np.ndarray, ranks: int
+) -> list[Assignment]:
+    """Return the runs to be done, as assignments in the order in which to start them.
+
+    Parameters
+    ----------
+    job : Job
+        What is run.
+    simulator : Simulator
+        What does the runs.
+    records : Records
+        What is on record; no run in it is to be given up.
+    asked : numpy.ndarray of bool, shape (runs,)
+        Which runs are to be on record in the end.
+    ranks : int
+        Number of processes that compute.
+    """
+    costs = simulator.run_costs(job)
+    pending = asked & ~records.recorded
+    suspect = pending & (records.died >= DEATHS)
+    groups = []
+    for struck in (False, True):
+        chosen = pending & ~suspect & ((records.died > 0) == struck)
+        groups += simulator.lane_groups(job, np.flatnonzero(chosen).tolist())
+    batches = share_out(groups, costs, ranks)
+    batches.sort(key=lambda batch: bool(records.died[batch[0]]))
+    suspects = sorted(np.flatnonzero(suspect).tolist(), key=lambda i: (-costs[i], i))
+    lethal = tuple(index for index in suspects if records.died_alone[index])
+    return [
+        *(Assignment(batch) for batch in batches),
+        *(Assignment((index,), alone=True) for index in suspects if index not in lethal),
+        *([Assignment(lethal, alone=True)] if lethal else []),
+    ]
+
+
+def given_up(records: Records, asked: np.ndarray) -> dict[int, str]:
+    """Return the runs, of those that `asked` marks, that are not to be tried again, with the reason."""
+    lost = np.flatnonzero(asked & ~records.recorded & (records.died_alone >= DEATHS_ALONE))
+    return {
+        int(index): f"its process died {records.died[index]} times, the last "
+        f"{records.died_alone[index]} while it did this run alone"
+        for index in lost
+    }
+
+
+def runs_to_repeat(records: Records, asked: np.ndarray, statuses: Collection[Status]) -> np.ndarray:
+    """Return the indices of recorded runs that a retry begins again.
+
+    None while runs are left of a sweep in which an earlier retry was begun: the same command, given again
+    after an early end, goes on instead of beginning anew.
+
+    Parameters
+    ----------
+    records : Records
+        What is on record.
+    asked : numpy.ndarray of bool, shape (runs,)
+        Which runs are in question.
+    statuses : collection of Status
+        How the runs ended that are to be done again.
+    """
+    goes_on = (records.attempts[asked] > 1).any() and not records.recorded[asked].all()
+    if goes_on:
+        return np.zeros(0, np.int64)
+    return np.flatnonzero(asked & records.recorded & np.isin(records.status, list(statuses)))
+
+
+def enter_attempts(
+    folder: StudyFolder,
+    study: Study,
+    records: Records,
+    asked: np.ndarray,
+    retry: Collection[Status],
+    session: dict[str, Any],
+) -> Records:
+    """Record which runs are given up and which are begun again, and return the records as they are then.
+
+    Only of those that `asked`, shape (runs,), marks: others may be at work just now.
+    """
+    lost, again = given_up(records, asked), runs_to_repeat(records, asked, retry)
+    if not lost and not len(again):
+        return records
+    records.attempts[again] += 1
+    layout = RecordFormat(study.fingerprint, study.record_dtype)
+    with RecordLog(folder.records, layout, session, 0, later_attempts(records)) as log:
+        if lost:
+            log.append([(index, study.pack_failure(reason)) for index, reason in lost.items()])
+        if len(again):
+            log.begin_again(again)
+    return read_records(folder.records, study)
+
+
+def later_attempts(records: Records) -> dict[int, int]:
+    """Return the attempts that are not the first, by run index."""
+    return {int(index): int(records.attempts[index]) for index in np.flatnonzero(records.attempts > 1)}

@@ -1,0 +1,35 @@
+"""Histories of chosen runs, a file each beside the records."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.records import Records
+from cvt_hpc.variables import Status
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from cvt_hpc.job import Job
+
+
+def keep_histories(folder: StudyFolder, histories: Iterable[tuple[int, xr.Dataset]]) -> None:
+    """Write histories, by run index; before the records, so that a run on record has its history.
+
+    Raises
+    ------
+    StorageError
+        If the system refuses.
+    """
+    for index, history in histories:
+        from cvt_hpc.history_files import store_history  # late: most sweeps keep none
+
+        store_history(history, folder.history(index))
+
+
+def missing_histories(job: Job, folder: StudyFolder, records: Records) -> list[int]:
+    """Return the runs that are done, but whose history is wanted and not there: it was asked for later."""
+    done = records.status == Status.DONE
+    return [index for index in job.histories if done[index] and not folder.history(index).exists()]

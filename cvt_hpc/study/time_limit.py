@@ -1,0 +1,85 @@
+"""How much time a sweep has: what was asked for, or the rest of the Slurm job that it runs in."""
+
+from __future__ import annotations
+
+import logging
+import math
+import os
+import re
+import subprocess
+import time
+from collections.abc import Mapping
+from typing import NamedTuple
+
+_SQUEUE = ("squeue", "--noheader", "--format=%L")  # %L: time left, as days-hours:minutes:seconds
+_PATIENCE = 20.0  # [s] with a busy controller
+_TIME_LEFT = re.compile(r"(?:(\d+)-)?(?:(\d+):)?(?:(\d+):)?(\d+)")
+_logger = logging.getLogger(__name__)
+
+
+class TimeLimit(NamedTuple):
+    """Time [s] that is left to compute in, and what to call its end."""
+
+    seconds: float = math.inf
+    name: str = "time limit"
+
+
+def find_time_limit(asked: float | None, runs: int, environment: Mapping[str, str] = os.environ) -> TimeLimit:
+    """Return how much time is left.
+
+    Parameters
+    ----------
+    asked : float or None
+        Time [s] that the user has given; without it that of the Slurm job counts, if there is one.
+    runs : int
+        Number of runs of the study, which have to be gathered before a Slurm job ends.
+    environment : mapping
+        Of this process.
+    """
+    if asked is not None:
+        return TimeLimit(asked)
+    left = _left_to_slurm_job(environment)
+    return (
+        TimeLimit(left - gathering_margin(runs), "end of the Slurm job") if left < math.inf else TimeLimit()
+    )
+
+
+def gathering_margin(runs: int) -> float:
+    """Return the time [s] to keep for ending the sweep and for writing the dataset of so many runs."""
+    return 30.0 + 1e-3 * runs
+
+
+def _left_to_slurm_job(environment: Mapping[str, str]) -> float:
+    """Return the time [s] that the Slurm job has left; infinite where there is no job or no limit."""
+    job = environment.get("SLURM_JOB_ID", "")
+    if not job:
+        return math.inf
+    end = environment.get("SLURM_JOB_END_TIME", "")
+    if end.isdigit():
+        return int(end) - time.time()
+    try:
+        found = subprocess.run(
+            [*_SQUEUE, f"--jobs={job}"], capture_output=True, text=True, timeout=_PATIENCE, check=True
+        ).stdout.strip()
+    except (OSError, subprocess.SubprocessError) as error:
+        found = str(error)
+    if found == "UNLIMITED":
+        return math.inf
+    left = _TIME_LEFT.fullmatch(found)
+    if left is None:
+        _logger.warning(
+            "the end of Slurm job %s is not known (SLURM_JOB_END_TIME is not set, squeue: %s); "
+            "--time-limit tells it",
+            job,
+            found or "no such job",
+        )
+        return math.inf
+    return _in_seconds(left)
+
+
+def _in_seconds(left: re.Match[str]) -> float:
+    """Return [days-][[hours:]minutes:]seconds as seconds."""
+    days, *clock = left.groups()
+    *larger, seconds = [int(part) for part in clock if part is not None]
+    hours, minutes = [0, 0, *larger][-2:]
+    return ((int(days or 0) * 24 + hours) * 60 + minutes) * 60 + seconds

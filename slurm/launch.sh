@@ -1,0 +1,55 @@
+# To be sourced by the batch files, in the root of the checkout: `launch COMMAND` runs a command on all tasks of the
+# Slurm job, tells it when the job is about to end, and puts the job back into the queue if it gets on but is not done.
+#
+# Environment, at submission:
+#     CVT_HPC_LAUNCHER=srun|mpirun    what starts the ranks: Slurm itself, or the mpirun of the MPI library
+#     CVT_HPC_SRUN_MPI=pmi2|pmix|...  how srun connects them: pmi2 for MPICH and its kin, pmix for Open MPI; `srun
+#                                     --mpi=list` shows what there is. A wrong one is refused before anything is
+#                                     computed
+#
+# Exit statuses of `cvt-hpc run`, and what becomes of the job:
+#     0  all runs done             1  some runs failed, their reasons are in the output             2  bad input
+#     99 runs remain, and some were done: back into the queue, to go on with what is not yet recorded
+#     98 runs remain, and none was done: the job ends, since it would go round in circles; it needs more time
+# A sweep that was cancelled or lost its node goes on when the same command is submitted again. A job that lost
+# its node is put back into the queue by Slurm. What is recorded is never computed twice.
+
+set -u
+
+# SITE: the MPI and the Python that mpi4py was built with, where they come from modules.
+# module load python mpich
+
+export PATH="$PWD/.venv/bin:$PATH"
+# One rank a core: threads of numerical libraries would only get in each other's way.
+export OMP_NUM_THREADS=1
+# Compiled kernels are kept on a disk of the node: caches on network file systems are slow, and not always sound.
+export NUMBA_CACHE_DIR="${NUMBA_CACHE_DIR:-${TMPDIR:-/tmp}/cvt_hpc-numba-$(id -u)}"
+
+launch() {
+    local launcher status
+    case ${CVT_HPC_LAUNCHER:-srun} in
+        # --wait: should a rank die without a word (out of memory), the others are ended a minute later, not left
+        # waiting.
+        srun) srun --mpi="${CVT_HPC_SRUN_MPI:-pmi2}" --wait=60 "$@" & ;;
+        mpirun) mpirun -n "$SLURM_NTASKS" "$@" & ;;
+        *)
+            echo "CVT_HPC_LAUNCHER: expected srun or mpirun, found $CVT_HPC_LAUNCHER" >&2
+            exit 2
+            ;;
+    esac
+    launcher=$!
+    # Slurm warns this shell alone (--signal=B:USR1@...), since it knows of no ranks that mpirun has started on this
+    # node; both launchers pass the warning on to all ranks.
+    trap 'kill -USR1 "$launcher"' USR1
+    wait "$launcher"
+    status=$?
+    while [ "$status" -eq $((128 + $(kill -l USR1))) ]; do # it was the wait that the signal ended
+        wait "$launcher"
+        status=$?
+    done
+    if [ "$status" -eq 99 ]; then
+        echo "runs remain: back into the queue"
+        scontrol requeue "$SLURM_JOB_ID" || echo "to go on, submit the same command again"
+    fi
+    exit "$status"
+}

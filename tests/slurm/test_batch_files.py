@@ -1,0 +1,151 @@
+"""The batch files as they are, submitted to a real Slurm: whatever happens to a job, its results are those of a
+serial run and nothing is done twice."""
+
+import pytest
+from cluster import wait_until
+from recorded import assert_same_numbers, frames_written, records
+
+from cvt_hpc import load_job, open_results, run
+
+# Runs with different meshes cannot be done as one batch: records come one after another.
+JOB = """
+name = "meshes"
+model = "elastic_belt"
+
+[axes]
+stations = { from = 48, to = 68, step = 4 }
+load = ["0 N m", "60 N m"]
+
+[run]
+duration = "0.1 s"
+"""
+RUNS = 12
+TWO_NODES = ("--nodes=2", "--ntasks=2")
+
+
+@pytest.fixture(scope="module")
+def job_file(tmp_path_factory):
+    """The job."""
+    path = tmp_path_factory.mktemp("job") / "meshes.toml"
+    path.write_text(JOB)
+    return path
+
+
+@pytest.fixture(scope="module")
+def serial(job_file):
+    """The dataset of an undisturbed serial run."""
+    report = run(load_job(job_file), job_file.parent / "serial", progress=False)
+    assert report.exit_status == 0
+    with open_results(report.out) as dataset:
+        return dataset.load()
+
+
+def wait_for_records(cluster, job, out, count=1):
+    wait_until(
+        lambda: records(out) >= count, f"{count} records", lambda: cluster.output(job) + cluster.logs()
+    )
+
+
+def start_again(cluster, job):
+    """Let a job that Slurm has put back into its queue start at once, not after its two minutes."""
+    wait_until(
+        lambda: cluster.facts(job)["Restarts"] == "1" and cluster.facts(job)["JobState"] == "PENDING",
+        f"job {job} back in the queue",
+        lambda: f"{cluster.facts(job)}\n{cluster.output(job)}",
+    )
+    # Not within the same second: a node tells a second start from the one that it has just ended by whole seconds.
+    cluster.ask("scontrol", "update", f"JobId={job}", "StartTime=now+2")
+
+
+def assert_completed(cluster, job):
+    facts = cluster.wait_for(job, "COMPLETED", "FAILED", "CANCELLED", "NODE_FAIL")
+    assert (facts["JobState"], facts["ExitCode"]) == ("COMPLETED", "0:0"), cluster.output(job)
+
+
+def assert_same_as_serial(out, serial):
+    """Assert that the gathered dataset is the serial run's, bitwise, and that no run was recorded twice."""
+    with open_results(out) as found:
+        assert_same_numbers(found, serial)
+    assert frames_written(out) == RUNS
+
+
+def test_a_sweep_on_two_nodes(cluster, job_file, serial, tmp_path):
+    job = cluster.submit("sweep.sbatch", job_file, "--out", tmp_path / "out", options=TWO_NODES)
+    assert_completed(cluster, job)
+    assert len(list((tmp_path / "out" / "records").glob("rank-0001-*.log"))) == 1
+    assert_same_as_serial(tmp_path / "out", serial)
+
+
+@pytest.mark.parametrize("launcher", ["srun", "mpirun"])
+def test_a_warned_sweep_is_requeued_and_goes_on(cluster, job_file, serial, tmp_path, launcher):
+    out = tmp_path / "out"
+    job = cluster.submit("sweep.sbatch", job_file, "--out", out, options=TWO_NODES, CVT_HPC_LAUNCHER=launcher)
+    wait_for_records(cluster, job, out)
+    cluster.ask("scancel", "--batch", "--signal=USR1", job)
+    start_again(cluster, job)
+    assert "stopped early (SIGUSR1); the same command goes on" in cluster.output(job)
+    assert "runs remain: back into the queue" in cluster.output(job)  # that is exit status 99
+    with open_results(out) as gathered:
+        recorded = int((gathered["status"] != 0).sum())
+    assert 0 < recorded < RUNS
+    assert_completed(cluster, job)
+    assert_same_as_serial(out, serial)
+
+
+def test_a_job_that_gains_nothing_is_not_requeued(cluster, tmp_path):
+    endless = tmp_path / "endless.toml"
+    endless.write_text(JOB.replace("0.1 s", "5 s"))
+    job = cluster.submit("sweep.sbatch", endless, "--out", tmp_path / "out", options=("--ntasks=1",))
+    wait_until((tmp_path / "out" / "job.json").exists, "the start", lambda: cluster.output(job))
+    cluster.ask("scancel", "--batch", "--signal=USR1", job)
+    facts = cluster.wait_for(job, "FAILED", "PENDING")
+    assert (facts["JobState"], facts["ExitCode"], facts["Restarts"]) == ("FAILED", "98:0", "0")
+
+
+def test_ranks_that_cannot_see_each_other_are_refused(cluster, job_file, tmp_path):
+    out = tmp_path / "out"
+    job = cluster.submit("sweep.sbatch", job_file, "--out", out, options=TWO_NODES, CVT_HPC_SRUN_MPI="none")
+    assert cluster.wait_for(job, "FAILED", "COMPLETED")["ExitCode"] == "2:0"
+    assert "SLURM_STEP_NUM_TASKS: expected 2 connected ranks, found 1" in cluster.output(job)
+    assert not out.exists()
+
+
+def test_an_array_shares_a_folder(cluster, job_file, serial, tmp_path):
+    out = tmp_path / "out"
+    array = cluster.submit("array.sbatch", job_file, "--out", out, options=("--array=1-2",))
+    tasks = [f"{array}_1", f"{array}_2"]
+    wait_for_records(cluster, array, out)
+    cluster.ask("scancel", "--batch", "--signal=USR1", tasks[0])
+    start_again(cluster, tasks[0])
+    for task in tasks:
+        assert_completed(cluster, task)
+    assert_same_as_serial(out, serial)
+
+
+def test_parts_of_an_array_are_submitted_one_by_one(cluster, job_file, serial, tmp_path):
+    out = tmp_path / "out"
+    for array, count in (("3", 4), ("1-2", RUNS), ("1-3", RUNS)):
+        job = cluster.submit(
+            "array.sbatch", job_file, "--out", out, options=(f"--array={array}",), CVT_HPC_PARTS="3"
+        )
+        for task in range(int(array[0]), int(array[-1]) + 1):
+            assert_completed(cluster, f"{job}_{task}")
+        assert records(out) == count
+    assert cluster.output(job).count("4 runs: 4 done, 0 failed, 0 left") == 3
+    assert_same_as_serial(out, serial)
+
+
+def test_the_loss_of_a_node_costs_no_record(cluster, job_file, serial, tmp_path):
+    out = tmp_path / "out"
+    job = cluster.submit("sweep.sbatch", job_file, "--out", out, options=TWO_NODES)
+    # The node of the batch file, of rank 0, and of the counter that all ranks share.
+    first = cluster.wait_for(job, "RUNNING")["BatchHost"]
+    wait_for_records(cluster, job, out)
+    cluster.lose_node(first)
+    try:
+        start_again(cluster, job)  # Slurm has put it back into the queue
+        assert 0 < records(out) < RUNS
+    finally:
+        cluster.start_node(first)
+    assert_completed(cluster, job)
+    assert_same_as_serial(out, serial)
