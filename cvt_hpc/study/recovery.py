@@ -124,9 +124,9 @@ class _Reader:
 
     def _sound_frames(self, file: FileIO, start: int, flaws: list[str]) -> Iterator[tuple[int, Frame]]:
         """Yield place and content of the frames that name runs of the study; the rest goes to `flaws`."""
-        size = os.fstat(file.fileno()).st_size
+        size, runs = os.fstat(file.fileno()).st_size, self._study.size
         for begin, end, frame in self._layout.frames(file, start, size):
-            if frame is not None and all(0 <= index < self._study.size for index, _ in frame.places):
+            if frame is not None and all(0 <= index < runs for index, _ in frame.places):
                 yield begin, frame
             elif end == size and end - begin < self._layout.record_size:
                 flaws.append(f"the last {end - begin} bytes are an unfinished record")
