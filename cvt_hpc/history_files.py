@@ -8,6 +8,7 @@ import xarray as xr
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import written_aside
+from cvt_hpc.netcdf import write_netcdf
 
 CONTENT = "cvt_hpc_content"  # global attribute by which this program knows its own files
 HISTORY = "history of one run"
@@ -51,11 +52,8 @@ def store_history(dataset: xr.Dataset, path: Path) -> None:
         If the system refuses.
     """
     marked = dataset.assign_attrs({CONTENT: HISTORY})
-    encoding = {
-        name: _encoding(variable, name in marked.coords) for name, variable in marked.variables.items()
-    }
     with written_aside(path, parents=True) as aside:
-        marked.to_netcdf(aside, engine="netcdf4", format="NETCDF4", encoding=encoding)
+        write_netcdf(marked, aside)
 
 
 def is_history(path: Path) -> bool:
@@ -65,12 +63,3 @@ def is_history(path: Path) -> bool:
             return dataset.attrs.get(CONTENT) == HISTORY
     except (OSError, ValueError):
         return False
-
-
-def _encoding(variable: xr.Variable, is_coordinate: bool) -> dict:
-    """Compress numbers, and leave coordinates without fill values."""
-    if variable.dtype.kind not in "iuf":
-        return {}
-    packing = {"zlib": True, "complevel": 4} if variable.ndim else {}
-    needs_fill = variable.dtype.kind == "f" and not is_coordinate
-    return packing if needs_fill else {**packing, "_FillValue": None}

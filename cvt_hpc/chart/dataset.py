@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import platform
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,8 @@ from cvt_hpc.chart.comparing import Comparison, Result
 from cvt_hpc.chart.plan import Chart
 from cvt_hpc.chart.quantities import KINDS
 from cvt_hpc.files import written_aside
-from cvt_hpc.study.provenance import command, git_revision, versions
+from cvt_hpc.netcdf import write_netcdf
+from cvt_hpc.study.provenance import command, git_revision, history_line, versions
 
 _TIMED = "depends on the machine and the hour"
 
@@ -41,7 +41,7 @@ def write_dataset(chart: Chart, comparisons: Sequence[Comparison], path: Path) -
     """
     dataset = chart_dataset(chart, comparisons)
     with written_aside(path, parents=True) as aside:
-        dataset.to_netcdf(aside, engine="netcdf4", format="NETCDF4")
+        write_netcdf(dataset, aside)
     return path
 
 
@@ -114,12 +114,11 @@ def _flag(values: Sequence[bool] | np.ndarray, long_name: str) -> tuple[str, np.
 
 
 def _attributes(chart: Chart, comparisons: Sequence[Comparison]) -> dict[str, str]:
-    now = time.strftime("%Y-%m-%dT%H:%M:%S%z")
     return {
         "Conventions": "CF-1.11",
         "title": chart.description or chart.name,
         "source": f"cvt_hpc {versions()['cvt_hpc']}, speed against accuracy",
-        "history": f"{now}: {command()} (on {platform.node()})",
+        "history": history_line(f"{command()} (on {platform.node()})"),
         "job_name": chart.name,
         "job": json.dumps(chart.resolved()),
         "job_fingerprint": chart.fingerprint(),

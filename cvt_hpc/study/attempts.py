@@ -19,7 +19,8 @@ from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.frames import RecordFormat
 from cvt_hpc.study.record import RecordLog
-from cvt_hpc.study.recovery import Records, read_records
+from cvt_hpc.study.records import Records
+from cvt_hpc.study.recovery import read_records
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def runs_to_repeat(records: Records, asked: np.ndarray, statuses: Collection[Sta
     goes_on = (records.attempts[asked] > 1).any() and not records.recorded[asked].all()
     if goes_on:
         return np.zeros(0, np.int64)
-    return np.flatnonzero(asked & records.recorded & np.isin(records.rows["status"], list(statuses)))
+    return np.flatnonzero(asked & records.recorded & np.isin(records.status, list(statuses)))
 
 
 def enter_attempts(

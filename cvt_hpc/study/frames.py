@@ -9,9 +9,11 @@ can take up again at the next frame after a damaged stretch.
 from __future__ import annotations
 
 import json
+import os
 import re
 import zlib
 from collections.abc import Iterator, Sequence
+from io import FileIO
 from struct import Struct
 from typing import Any, NamedTuple
 
@@ -28,6 +30,10 @@ RECORD = b"\xf5RUN"  # payload: a place and the record of that run
 BEGUN = b"\xf5BEG"  # payload: the places of a batch that this process is at from here on
 ALONE = b"\xf5ALO"  # the same of a run that is done alone, because its process has died before
 AGAIN = b"\xf5AGN"  # payload: the places of runs that are to be done again, with their new attempt
+MARK_LIMIT = 1 << 28  # [bytes] of payload: 22 million runs
+
+PREAMBLE_LIMIT = 1 << 20  # [bytes]; none is longer
+WINDOW = 1 << 22  # [bytes] of a log that are read at a time
 _MARKERS = re.compile(b"\xf5(?:RUN|BEG|ALO|AGN)")
 
 Place = tuple[int, int]  # run index, and the attempt, counted from 1
@@ -38,13 +44,13 @@ class ForeignLog(Exception):
 
 
 class Frame(NamedTuple):
-    """A valid frame: what it is, where it begins and ends [byte], when it was written, and of which runs."""
+    """A valid frame: what it is, its size [bytes], when it was written, of which runs, and a run's record."""
 
     kind: bytes
-    start: int
-    stop: int
+    size: int
     written: float
     places: list[Place]
+    row: memoryview
 
 
 class RecordFormat:
@@ -87,10 +93,6 @@ class RecordFormat:
         """Return one framed mark of some runs."""
         return self._frame(kind, written, b"".join(PLACE.pack(*place) for place in places))
 
-    def row(self, data: bytes, frame: Frame) -> np.void:
-        """Return the record in a frame of one."""
-        return np.frombuffer(data, self.dtype, 1, frame.start + HEAD.size + PLACE.size)[0]
-
     def unframe(self, data: bytes, start: int) -> Frame | None:
         """Return the frame that starts at `start`, None if there is no valid one."""
         if start + HEAD.size > len(data):
@@ -102,21 +104,41 @@ class RecordFormat:
         payload = memoryview(data)[start + HEAD.size : stop]
         if check != self._check(kind, written, payload):
             return None
-        listed = payload[: PLACE.size] if kind == RECORD else payload
-        return Frame(kind, start, stop, written, list(PLACE.iter_unpack(listed)))
+        listed = PLACE.size if kind == RECORD else len(payload)
+        places = list(PLACE.iter_unpack(payload[:listed]))
+        return Frame(kind, stop - start, written, places, payload[listed:])
 
-    def frames(self, data: bytes, start: int) -> Iterator[tuple[int, int, Frame | None]]:
-        """Yield begin, end and content of each frame; None for a stretch that is not valid."""
-        while start < len(data):
-            frame = self.unframe(data, start)
+    def frames(self, file: FileIO, start: int, size: int) -> Iterator[tuple[int, int, Frame | None]]:
+        """Yield begin, end and content of each frame of a file; None for a stretch that is not valid.
+
+        Parameters
+        ----------
+        file : FileIO
+            Of it no more than some windows are in memory.
+        start, size : int
+            Where the first frame begins, and the size of the file [bytes].
+        """
+        data, base, place, damaged = b"", start, start, None  # window and its place; where damage begins
+        while place < size:
+            at = place - base
+            frame = self.unframe(data, at)
             if frame is not None:
-                yield start, frame.stop, frame
-                start = frame.stop
-                continue
-            begin = start
-            places = (found.start() for found in _MARKERS.finditer(data, start + 1))
-            start = next((place for place in places if self.unframe(data, place)), len(data))
-            yield begin, start, None
+                if damaged is not None:
+                    yield damaged, place, None
+                    damaged = None
+                yield place, place + frame.size, frame
+                place += frame.size
+            elif at + self._span(data, at) > len(data) and base + len(data) < size:
+                wanted = max(WINDOW, self._span(data, at))
+                data, base = os.pread(file.fileno(), wanted, place), place
+                if len(data) < wanted:  # the end; what comes after `size` by now is not looked for
+                    size = min(size, base + len(data))
+            else:
+                damaged = place if damaged is None else damaged
+                ahead = _MARKERS.search(data, at + 1)
+                place = base + (ahead.start() if ahead else max(len(data) - len(RECORD) + 1, at + 1))
+        if damaged is not None:
+            yield damaged, size, None
 
     def preamble(self, session: dict[str, Any], rank: int) -> bytes:
         """Return the bytes with which a log begins."""
@@ -130,11 +152,18 @@ class RecordFormat:
     def _check(self, kind: bytes, written: float, payload: bytes | memoryview) -> int:
         return zlib.crc32(payload, zlib.crc32(_CHECKED.pack(kind, len(payload), written), self._seed))
 
+    def _span(self, data: bytes, start: int) -> int:
+        """Return how many bytes it takes to tell whether a frame starts at `start`."""
+        if start + HEAD.size > len(data):
+            return HEAD.size
+        kind, length, *_ = HEAD.unpack_from(data, start)
+        return HEAD.size + (length if self._is_length_of(kind, length) else 0)
+
     def _is_length_of(self, kind: bytes, length: int) -> bool:
         if kind == RECORD:
             return length == PLACE.size + self.dtype.itemsize
         is_mark = kind in (BEGUN, ALONE, AGAIN)
-        return is_mark and length > 0 and length % PLACE.size == 0
+        return is_mark and 0 < length <= MARK_LIMIT and length % PLACE.size == 0
 
 
 def read_preamble(data: bytes, layout: RecordFormat) -> tuple[dict[str, Any] | None, int]:
@@ -143,11 +172,9 @@ def read_preamble(data: bytes, layout: RecordFormat) -> tuple[dict[str, Any] | N
     Raises
     ------
     ForeignLog
-        If a sound header says that the file is not of this study, or nothing in it looks like a log.
+        If a sound header says that the file is not of this study.
     """
     if not data.startswith(MAGIC):
-        if not _MARKERS.search(data):
-            raise ForeignLog("not a record log")
         return None, 0
     if len(data) < PREAMBLE.size:
         return None, len(data)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import logging
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,17 +11,21 @@ import numpy as np
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import discard, naming_refusals, written_aside
+from cvt_hpc.netcdf import write_netcdf
+from cvt_hpc.study.chunks import chunk_shape, fill
 from cvt_hpc.study.description import Dimension, Study
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.lock import locked
-from cvt_hpc.study.provenance import command, git_revision, versions
+from cvt_hpc.study.provenance import command, git_revision, history_line, versions
 from cvt_hpc.study.record import KEPT
-from cvt_hpc.study.recovery import Records, read_records
+from cvt_hpc.study.records import Records
+from cvt_hpc.study.recovery import read_records
 from cvt_hpc.study.tracing import inferred_classes
 from cvt_hpc.variables import Variable
 from cvt_hpc.vibration.classes import OccurrenceClass
 
 if TYPE_CHECKING:
+    import netCDF4
     import xarray as xr
 
 _INFERRED = Variable(
@@ -33,7 +36,6 @@ _INFERRED = Variable(
     "class of the run; where status is not_run, the class of the runs around it, which is inferred",
     OccurrenceClass,
 )
-_COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
 _logger = logging.getLogger(__name__)
 
 
@@ -120,43 +122,62 @@ def write_results(folder: StudyFolder, study: Study, records: Records) -> Path:
     StorageError
         If the system refuses; the dataset that was there is then untouched.
     """
-    dataset = build_dataset(study, records)
-    encoding = {name: _encoding(array) for name, array in dataset.variables.items()}
-    for name in dataset.coords:
-        encoding[name]["_FillValue"] = None  # xarray would give them one, and CF forbids it
+    import xarray as xr
+
+    coordinates = {
+        axis.name: _coordinate(axis, study.dims if study.is_sampled else axis.name) for axis in study.axes
+    }
+    coordinates |= {dimension.name: _coordinate(dimension, dimension.name) for dimension in study.coordinates}
+    frame = xr.Dataset(coords=coordinates, attrs=_global_attributes(study, records))
     with written_aside(folder.results, advice=KEPT) as aside:
-        dataset.to_netcdf(aside, engine="netcdf4", format="NETCDF4", encoding=encoding)
+        write_netcdf(frame, aside)
+        _declare(aside, study, records)
+        fill(aside, study, records)
     return folder.results
 
 
-def build_dataset(study: Study, records: Records) -> xr.Dataset:
-    """Return the dataset of a study: one variable per quantity over the runs, `status` first."""
-    import xarray as xr
+def _declare(path: Path, study: Study, records: Records) -> None:
+    """Add one variable per quantity over the runs, `status` first, to a file with the coordinates."""
+    import netCDF4
 
-    grid = study.dims
-    variables = {}
-    for variable in study.variables:
-        values = records.rows[variable.name]
-        values = np.array(values.reshape(study.shape + values.shape[1:]), order="C")
-        if values.dtype.kind == "S":
-            values = np.char.decode(values, "utf-8", "replace")
-        variables[variable.name] = (grid + variable.dims, values, _attributes(variable, values.dtype))
-    if study.is_traced:
-        variables[_INFERRED.name] = (grid, inferred_classes(study, records), _attributes(_INFERRED, np.int8))
-    coordinates = {
-        axis.name: _coordinate(axis, grid if study.is_sampled else axis.name) for axis in study.axes
-    }
-    coordinates |= {dimension.name: _coordinate(dimension, dimension.name) for dimension in study.coordinates}
-    return xr.Dataset(variables, coordinates, _global_attributes(study, records))
+    with netCDF4.Dataset(path, "a") as file:
+        for variable in study.variables:
+            _create(file, study, variable, chunk_shape(study, variable.name))
+        if study.is_traced:
+            _create(file, study, _INFERRED, study.shape)[:] = inferred_classes(study, records)
 
 
-def _attributes(variable: Variable, dtype: np.dtype) -> dict[str, Any]:
+def _create(file: netCDF4.Dataset, study: Study, variable: Variable, chunk: tuple[int, ...]) -> Any:
+    """Return a variable that has been added to a file, without values."""
+    dtype = np.dtype(variable.dtype)
+    dims = study.dims + variable.dims
+    is_text = dtype.kind == "S"  # stored as characters, which compress
+    if is_text:
+        dims += (f"string{dtype.itemsize}",)
+        if dims[-1] not in file.dimensions:
+            file.createDimension(dims[-1], dtype.itemsize)
+    stored = file.createVariable(
+        variable.name,
+        "S1" if is_text else dtype,
+        dims,
+        compression="zlib" if dims else None,
+        chunksizes=chunk or None,
+        endian="native" if is_text else "little",  # as in the records
+        fill_value=np.nan if dtype.kind == "f" else None,  # flags and counts have none
+    )
+    stored.setncatts(_attributes(variable))
+    return stored
+
+
+def _attributes(variable: Variable) -> dict[str, Any]:
     attributes: dict[str, Any] = {"long_name": variable.long_name}
     if variable.flags is not None:
-        attributes["flag_values"] = np.array([int(flag) for flag in variable.flags], dtype)
+        attributes["flag_values"] = np.array([int(flag) for flag in variable.flags], variable.dtype)
         attributes["flag_meanings"] = " ".join(flag.name.lower() for flag in variable.flags)
     elif variable.units:
         attributes["units"] = variable.units
+    if np.dtype(variable.dtype).kind == "S":
+        attributes["_Encoding"] = "utf-8"  # the netCDF library's convention: readers return texts
     if variable.volatile:
         attributes["volatile"] = "yes"
         attributes["comment"] = "depends on the machine and the hour; not reproduced bitwise"
@@ -171,21 +192,11 @@ def _coordinate(dimension: Dimension, along: str | tuple[str, ...]) -> tuple[Any
     return along, values, attributes
 
 
-def _encoding(array: xr.Variable) -> dict[str, Any]:
-    """Return how a variable is stored; a fill value is for real numbers alone, flags and counts have none."""
-    if array.dtype.kind == "O":
-        return {}
-    kind = {"f": {}, "U": {"dtype": "S1"}}.get(
-        array.dtype.kind, {"_FillValue": None}
-    )  # S1: texts that compress
-    return {**kind, **(_COMPRESSION if array.ndim else {})}
-
-
 def _global_attributes(study: Study, records: Records) -> dict[str, str]:
     sessions = records.sessions
     lines = [
-        f"{_timestamp(s['started'])}: {s['command']} (on {s['host']}, {s['ranks']} rank(s))" for s in sessions
-    ] + [f"{_timestamp(time.time())}: {command()} (gathered)"]
+        history_line(f"{s['command']} (on {s['host']}, {s['ranks']} rank(s))", s["started"]) for s in sessions
+    ] + [history_line(f"{command()} (gathered)")]
     return {
         "Conventions": "CF-1.11",
         "title": study.description or study.name,
@@ -206,7 +217,3 @@ def merge_versions(found: list[dict[str, str]]) -> dict[str, str]:
         for package, version in versions_of_session.items():
             merged.setdefault(package, {})[version] = None
     return {package: ", ".join(different) for package, different in merged.items()}
-
-
-def _timestamp(seconds: float) -> str:
-    return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(seconds))

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.recovery import Records
+from cvt_hpc.study.records import Records
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
@@ -31,5 +31,5 @@ def keep_histories(folder: StudyFolder, histories: Iterable[tuple[int, xr.Datase
 
 def missing_histories(job: Job, folder: StudyFolder, records: Records) -> list[int]:
     """Return the runs that are done, but whose history is wanted and not there: it was asked for later."""
-    done = records.rows["status"] == Status.DONE
+    done = records.status == Status.DONE
     return [index for index in job.histories if done[index] and not folder.history(index).exists()]

@@ -43,6 +43,11 @@ def command() -> str:
     return shlex.join([*started, *sys.argv[1:]])
 
 
+def history_line(what: str, seconds: float | None = None) -> str:
+    """Return an entry of the CF attribute `history`: what was done, and when [s] since the epoch, or now."""
+    return f"{time.strftime('%Y-%m-%dT%H:%M:%SZ', time.gmtime(seconds))}: {what}"
+
+
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that numbers may depend on."""
     found = {"cvt_hpc": cvt_hpc.__version__, "python": platform.python_version()}

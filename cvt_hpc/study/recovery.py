@@ -1,71 +1,31 @@
-"""Reading records back, whatever happened to the files: damage is named and skipped, never fatal."""
+"""Reading logs, whatever happened to the files: damage is named and skipped, never fatal."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import os
+from collections.abc import Iterable, Iterator
+from io import FileIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.files import naming_refusals
-from cvt_hpc.study.batches import Batch
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.frames import AGAIN, ALONE, RECORD, ForeignLog, Frame, RecordFormat, read_preamble
-
-
-class Timing(NamedTuple):
-    """How long a batch took, from its mark to its records."""
-
-    batch: Batch
-    seconds: float
-
-
-@dataclass
-class Records:
-    """What the logs of a study hold.
-
-    Attributes
-    ----------
-    rows : numpy.ndarray, shape (runs,)
-        Records by run index; blank where a run has none.
-    written : numpy.ndarray, shape (runs,)
-        Time of writing [s] since the epoch; NaN where a run has no record.
-    attempts : numpy.ndarray of int, shape (runs,)
-        The attempt that counts, from 1: how often the run was asked for.
-    died, died_alone : numpy.ndarray of int, shape (runs,)
-        How often, in that attempt, a process was at work at the run when it died: in all, and while it did
-        that run alone because of earlier deaths. Runs that a living process is at count as well.
-    timings : list of Timing
-        Of the batches that were done as a whole, the first of each log excepted: it has loaded kernels.
-    sessions : list of dict
-        The starts of the sweep that left records, in order of time.
-    warnings : list of str
-        One line for each file that is not sound.
-    """
-
-    rows: np.ndarray
-    written: np.ndarray
-    attempts: np.ndarray
-    died: np.ndarray
-    died_alone: np.ndarray
-    timings: list[Timing] = field(default_factory=list)
-    sessions: list[dict[str, Any]] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-
-    @property
-    def recorded(self) -> np.ndarray:
-        """Whether a run has a record, shape (runs,): it is not repeated unless asked for."""
-        return ~np.isnan(self.written)
-
-
-class _Found(NamedTuple):
-    """A record that was found; of several of one run the least counts."""
-
-    # By content, not by the order in which a folder happens to be listed: the latest attempt counts, and of
-    # it the earliest written record; equal times, as in a copied file, are told apart by name and position.
-    order: tuple[int, float, str, int]
-    path: Path
+from cvt_hpc.study.frames import (
+    AGAIN,
+    ALONE,
+    HEAD,
+    MAGIC,
+    PLACE,
+    PREAMBLE_LIMIT,
+    RECORD,
+    ForeignLog,
+    Frame,
+    RecordFormat,
+    read_preamble,
+)
+from cvt_hpc.study.records import ENTRY, Records, Timing, choose
 
 
 class _Death(NamedTuple):
@@ -78,7 +38,7 @@ class _Death(NamedTuple):
 
 
 def read_records(folder: Path, study: Study) -> Records:
-    """Return the records that all logs of a folder hold.
+    """Return which records all logs of a folder hold.
 
     Of several records of one run that of the latest attempt counts, and of these the earliest written.
 
@@ -89,14 +49,16 @@ def read_records(folder: Path, study: Study) -> Records:
     study : Study
         The study that the records have to belong to.
     """
+    logs = _files(folder)
     reader = _Reader(study)
-    for path in _files(folder):
+    for number, path in enumerate(logs):
         try:
-            reader.read(path, path.read_bytes())
+            with path.open("rb", buffering=0) as file:
+                reader.read(number, file)
         except (OSError, ForeignLog) as error:
             text = error.strerror if isinstance(error, OSError) else error
-            reader.records.warnings.append(f"{path}: left out: {text}")
-    return reader.result()
+            reader.warnings.append(f"{path}: left out: {text}")
+    return reader.result(logs)
 
 
 def _files(folder: Path) -> list[Path]:
@@ -110,16 +72,17 @@ class _Reader:
     """Takes in one log after another."""
 
     def __init__(self, study: Study) -> None:
-        zeros = np.zeros(study.size, np.int64)
-        blank = study.blank_rows(study.size)
-        self.records = Records(blank, np.full(study.size, np.nan), zeros + 1, zeros.copy(), zeros.copy())
+        self.warnings: list[str] = []
         self._study = study
         self._layout = RecordFormat(study.fingerprint, study.record_dtype)
-        self._chosen: dict[int, _Found] = {}
+        self._found = [np.zeros(0, ENTRY)]
+        self._attempts = np.ones(study.size, np.int64)
+        self._status = study.record_dtype.fields["status"][1]  # where it is in a record [byte]
         self._deaths: set[_Death] = set()
+        self._timings: list[Timing] = []
         self._sessions: dict[str, dict[str, Any]] = {}
 
-    def read(self, path: Path, data: bytes) -> None:
+    def read(self, number: int, file: FileIO) -> None:
         """Take in a log; what is damaged goes to the warnings.
 
         Raises
@@ -127,86 +90,95 @@ class _Reader:
         ForeignLog
             If the file is no log, or a log of another job.
         """
-        if not data:  # a process that died before its first record
+        head = os.pread(file.fileno(), PREAMBLE_LIMIT, 0)
+        if not head:  # a process that died before its first record
             return
-        session, start = read_preamble(data, self._layout)
-        frames, flaws = self._sound_frames(path, data, start)
-        if session is None and not frames:
-            raise ForeignLog("no record of this study in it")
+        session, start = read_preamble(head, self._layout)
+        flaws: list[str] = []
+        trace = _Trace()
+        frames = self._sound_frames(file, start, flaws)
+        found = np.fromiter(self._entries(frames, number, trace), ENTRY)
+        if session is None and not trace.followed:
+            known = head.startswith(MAGIC)
+            raise ForeignLog("no record of this study in it" if known else "not a record log")
         if session is None:
-            self.records.warnings.append(f"{path}: the header is damaged; the records found in it count")
-        self.records.warnings.extend(flaws)
-        if session is not None and any(frame.kind == RECORD for frame in frames):
+            self.warnings.append(f"{file.name}: the header is damaged; the records found in it count")
+        self.warnings.extend(f"{file.name}: {flaw}; left out" for flaw in flaws)
+        if session is not None and found.size:
             self._sessions[session["id"]] = session
-        self._take_in(path, data, frames)
+        self._found.append(found)
+        self._timings += trace.timings[1:]
+        self._deaths |= trace.deaths()
 
-    def result(self) -> Records:
+    def result(self, logs: list[Path]) -> Records:
         """Return what all logs hold."""
-        records = self.records
-        for index, found in self._chosen.items():
-            if -found.order[0] < records.attempts[index]:  # it is to be done again, and has not been yet
-                records.rows[index] = self._study.blank_rows()
-                records.written[index] = np.nan
+        records = choose(self._study, logs, np.concatenate(self._found), self._attempts)
         for death in self._deaths:
-            if death.attempt == records.attempts[death.index] and np.isnan(records.written[death.index]):
+            if death.attempt == records.attempts[death.index] and not records.recorded[death.index]:
                 records.died[death.index] += 1
                 records.died_alone[death.index] += death.alone
+        records.timings = self._timings
         records.sessions = sorted(self._sessions.values(), key=lambda s: (s["started"], s["id"]))
+        records.warnings[:0] = self.warnings
         return records
 
-    def _sound_frames(self, path: Path, data: bytes, start: int) -> tuple[list[Frame], list[str]]:
-        frames, flaws = [], []
-        for begin, end, frame in self._layout.frames(data, start):
-            if frame is not None and all(0 <= index < self._study.size for index, _ in frame.places):
-                frames.append(frame)
-            elif end == len(data) and end - begin < self._layout.record_size:
-                flaws.append(f"{path}: the last {end - begin} bytes are an unfinished record; left out")
+    def _sound_frames(self, file: FileIO, start: int, flaws: list[str]) -> Iterator[tuple[int, Frame]]:
+        """Yield place and content of the frames that name runs of the study; the rest goes to `flaws`."""
+        size, runs = os.fstat(file.fileno()).st_size, self._study.size
+        for begin, end, frame in self._layout.frames(file, start, size):
+            if frame is not None and all(0 <= index < runs for index, _ in frame.places):
+                yield begin, frame
+            elif end == size and end - begin < self._layout.record_size:
+                flaws.append(f"the last {end - begin} bytes are an unfinished record")
             else:
-                flaws.append(f"{path}: bytes {begin} to {end} are damaged; left out")
-        return frames, flaws
+                flaws.append(f"bytes {begin} to {end} are damaged")
 
-    def _take_in(self, path: Path, data: bytes, frames: list[Frame]) -> None:
-        """Enter the records of a log, and follow from mark to mark what its process was at."""
-        mark: Frame | None = None
-        at_work: dict[int, int] = {}
-        batches = 0
-        for frame in frames:
-            for index, attempt in frame.places:
-                self.records.attempts[index] = max(self.records.attempts[index], attempt)
+    def _entries(
+        self, frames: Iterable[tuple[int, Frame]], number: int, trace: _Trace
+    ) -> Iterator[tuple[int, int, float, int, int, int]]:
+        """Yield the records of a log as an ENTRY has them, and follow what its process was at."""
+        for begin, frame in frames:
+            trace.follow(frame)
             if frame.kind == RECORD:
-                ((index, _),) = frame.places
-                self._choose(frame, path, data)
-                if at_work.pop(index, None) is not None and not at_work:
-                    batches += 1
-                    if batches > 1:
-                        seconds = frame.written - mark.written
-                        self.records.timings.append(Timing(tuple(i for i, _ in mark.places), seconds))
-            elif frame.kind != AGAIN:
-                mark, at_work = frame, dict(frame.places)
-        for index, attempt in at_work.items():
-            self._deaths.add(_Death(index, attempt, mark.kind == ALONE, mark.written))
-
-    def _choose(self, frame: Frame, path: Path, data: bytes) -> None:
-        """Enter a record, unless one that counts before it is there."""
-        ((index, attempt),) = frame.places
-        row, records = self._layout.row(data, frame), self.records
-        found = _Found((-attempt, frame.written, path.name, frame.start), path)
-        rival = self._chosen.get(index)
-        if rival is not None:
-            same_attempt = rival.order[0] == found.order[0]
-            if same_attempt and not _same_numbers(row, records.rows[index], self._study):
-                first, second = sorted((rival, found), key=lambda f: f.order)
-                records.warnings.append(
-                    f"{second.path}: run {index} has other numbers than in {first.path.name}, which counts"
-                )
-            if rival.order < found.order:
-                return
-        self._chosen[index] = found
-        records.rows[index] = row
-        records.written[index] = frame.written
+                ((index, attempt),) = frame.places
+                place = begin + HEAD.size + PLACE.size
+                yield index, attempt, frame.written, number, place, frame.row[self._status]
+            else:
+                for index, attempt in frame.places:
+                    self._attempts[index] = max(self._attempts[index], attempt)
 
 
-def _same_numbers(one: np.void, other: np.void, study: Study) -> bool:
-    """Return whether two records agree bitwise, timings and the like excepted."""
-    names = [variable.name for variable in study.variables if not variable.volatile]
-    return all(one[name].tobytes() == other[name].tobytes() for name in names)
+class _Trace:
+    """Follows from mark to mark what a process was at.
+
+    Attributes
+    ----------
+    followed : int
+        Number of frames.
+    timings : list of Timing
+        Of the batches that were done as a whole.
+    """
+
+    def __init__(self) -> None:
+        self.followed = 0
+        self.timings: list[Timing] = []
+        self._mark: Frame | None = None
+        self._at_work: dict[int, int] = {}
+
+    def follow(self, frame: Frame) -> None:
+        """Take in the next frame."""
+        self.followed += 1
+        if frame.kind == RECORD:
+            ((index, _),) = frame.places
+            if self._at_work.pop(index, None) is not None and not self._at_work:
+                batch = tuple(index for index, _ in self._mark.places)
+                self.timings.append(Timing(batch, frame.written - self._mark.written))
+        elif frame.kind != AGAIN:
+            self._mark, self._at_work = frame, dict(frame.places)
+
+    def deaths(self) -> set[_Death]:
+        """Return a death at each run that the process was at in the end."""
+        return {
+            _Death(index, attempt, self._mark.kind == ALONE, self._mark.written)
+            for index, attempt in self._at_work.items()
+        }

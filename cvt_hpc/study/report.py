@@ -10,7 +10,7 @@ import numpy as np
 
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.recovery import Records
+from cvt_hpc.study.records import Records
 from cvt_hpc.variables import Status
 
 # exit statuses; 2 is bad input, raised as InputError
@@ -93,15 +93,17 @@ def build_report(
     stopped: str | None,
 ) -> RunReport:
     """Return the report of a sweep of the runs that `asked`, shape (runs,), marks."""
-    status = records.rows["status"]
+    status = records.status
+    without_results = np.flatnonzero(asked & records.recorded & (status != Status.DONE))
+    reasons = records.read(without_results, "reason")
     failed = tuple(
         FailedRun(
             index=int(index),
             at=study.place(int(index)),
             status=Status(status[index]).name.lower(),
-            reason=records.rows["reason"][index].decode(errors="replace"),
+            reason=reason.decode(errors="replace"),
         )
-        for index in np.flatnonzero(asked & records.recorded & (status != Status.DONE))
+        for index, reason in zip(without_results, reasons, strict=True)
     )
     return RunReport(
         out=folder.path,

@@ -13,7 +13,8 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.recovery import Records, read_records
+from cvt_hpc.study.records import Records
+from cvt_hpc.study.recovery import read_records
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.tracing import needed_runs
 from cvt_hpc.variables import Status
@@ -76,7 +77,7 @@ def read_status(out: str | Path) -> StudyStatus:
     running = folder.is_in_use()
     records = read_records(folder.records, study)
     recorded = int(records.recorded.sum())
-    done = int((records.rows["status"] == Status.DONE).sum())
+    done = int((records.status == Status.DONE).sum())
     needed = needed_runs(study, records)
     left = needed & ~records.recorded
     latest, elapsed = _latest_session(records, running)
@@ -113,18 +114,18 @@ def read_machine_factor(out: Path, job: Job) -> tuple[float, int]:
         return 1.0, 0
     if study.fingerprint != job.fingerprint() or "core_seconds" not in study.record_dtype.names:
         return 1.0, 0
-    rows = read_records(folder.records, study).rows
-    done = rows["status"] == Status.DONE
-    if not done.any():
+    records = read_records(folder.records, study)
+    done = np.flatnonzero(records.status == Status.DONE)
+    if not done.size:
         return 1.0, 0
     predicted = default_simulator().run_costs(job)[done].sum()
-    return float(rows["core_seconds"][done].sum() / predicted), int(done.sum())
+    return float(records.read(done, "core_seconds").sum() / predicted), done.size
 
 
 def _latest_session(records: Records, running: bool) -> tuple[np.ndarray, float]:
     """Return which runs the latest start has recorded, and in what time [s]: until now or its last."""
     if not records.sessions:
-        return np.zeros(len(records.rows), bool), 0.0
+        return np.zeros(records.study.size, bool), 0.0
     started = records.sessions[-1]["started"]
     chosen = records.written >= started  # NaN, of a run without a record, is not
     if not chosen.any():

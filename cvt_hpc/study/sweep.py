@@ -28,7 +28,8 @@ from cvt_hpc.study.part import Part, read_part
 from cvt_hpc.study.progress import Progress
 from cvt_hpc.study.provenance import new_session
 from cvt_hpc.study.record import RecordLog
-from cvt_hpc.study.recovery import Records, read_records
+from cvt_hpc.study.records import Records
+from cvt_hpc.study.recovery import read_records
 from cvt_hpc.study.report import RunReport, build_report
 from cvt_hpc.study.schedule import Counter, claimed_batches, open_counter
 from cvt_hpc.study.simulator import Simulator, default_simulator
@@ -175,7 +176,7 @@ def _prepare(
     asked = _asked(task, records, part)
     records = enter_attempts(folder, study, records, asked, retry, session)
     records.written[missing_histories(task.job, folder, records)] = np.nan  # done again; the record stays
-    done = records.rows["status"] == Status.DONE
+    done = records.status == Status.DONE
     recorded = int((records.recorded & asked).sum())
     return _Plan(
         assignments=plan_runs(task.job, task.simulator, records, asked, ranks),
@@ -207,7 +208,7 @@ def _next_round(
     assignments = plan_runs(task.job, task.simulator, records, _asked(task, records), ranks)
     counter.rewind()
     display.expect(costs[[index for assignment in assignments for index in assignment.runs]])
-    fit = fit_recorded(costs, records.timings, records.rows["status"] == Status.DONE)
+    fit = fit_recorded(costs, records.timings, records.status == Status.DONE)
     return plan._replace(assignments=assignments, fit=fit)
 
 

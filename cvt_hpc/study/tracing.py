@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.recovery import Records
+from cvt_hpc.study.records import Records
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 
 UNKNOWN = OccurrenceClass.NOT_RUN
@@ -69,7 +69,8 @@ def inferred_classes(study: Study, records: Records) -> NDArray[np.int8]:
 
 def run_classes(study: Study, records: Records) -> NDArray[np.int8]:
     """Return the class of each run, shape of the grid; NOT_RUN where there is no record."""
-    return classify_runs(records.rows["status"], records.rows["vibrates"]).reshape(study.shape)
+    vibrates = records.read(np.arange(study.size), "vibrates")
+    return classify_runs(records.status, vibrates).reshape(study.shape)
 
 
 def first_intervals(study: Study) -> list[list[Interval]]:

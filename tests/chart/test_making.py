@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from bells import Transient
+from cf import cf_findings
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from cvt_hpc.chart import load_chart, make_chart
@@ -74,6 +75,10 @@ def test_a_method_is_measured_with_one_thread_of_linear_algebra(write_chart, und
     with threadpool_limits(2):
         made(write_chart())
     assert seen == {1}
+
+
+def test_the_cf_checker_finds_nothing(report):
+    assert cf_findings(report.dataset) == []
 
 
 def test_people_read_the_same(report):

@@ -34,7 +34,7 @@ def sweep(out, job=JOB, lanes=1, slow=None, **options):
 
 
 def reason_of(out, index):
-    return recorded(out).rows["reason"][index].decode()
+    return recorded(out).read(index, "reason").item().decode()
 
 
 def test_a_run_that_kills_its_process_is_found_and_given_up(start, tmp_path):
@@ -66,7 +66,7 @@ def test_no_innocent_run_is_given_up_with_the_one_that_kills_all_ranks(start, tm
         starts += 1
         finished = start(options, ranks=2).finish()
     assert finished.returncode == 1, finished.stderr
-    status = recorded(tmp_path).rows["status"]
+    status = recorded(tmp_path).status
     assert np.flatnonzero(status != Status.DONE).tolist() == [5]
     assert "its process died" in reason_of(tmp_path, 5)
 
@@ -240,7 +240,7 @@ def test_a_retry_that_goes_on_does_not_begin_again(tmp_path):
     sweep(tmp_path, **again)
     records = recorded(tmp_path)
     assert records.attempts[10:].tolist() == [2, 2]
-    assert records.rows["status"][10:].tolist() == [Status.TIMED_OUT, Status.DONE]
+    assert records.status[10:].tolist() == [Status.TIMED_OUT, Status.DONE]
     sweep(tmp_path, **again)  # and once all are on record, it does
     assert recorded(tmp_path).attempts[10:].tolist() == [3, 2]
 

@@ -9,6 +9,7 @@ import sys
 import netCDF4
 import numpy as np
 import pytest
+from cf import cf_findings
 from study_double import Axis, Job, Simulator
 from study_processes import HERE, clean_environment
 
@@ -88,6 +89,10 @@ def test_every_variable_is_named_and_only_real_results_have_a_fill_value(out):
         assert file["spectrum"].dimensions[-2:] == ("strand", "frequency_bin")
         assert file["spectrum"].units == "m"
         assert file["frequency_bin"].units == "Hz"
+
+
+def test_the_cf_checker_finds_nothing(out):
+    assert cf_findings(out / "results.nc") == []
 
 
 def test_data_are_compressed(out):

@@ -39,6 +39,12 @@ def write_log(folder, study, rows, indices, session=SESSION):
     return log.path
 
 
+@pytest.fixture(autouse=True, params=[1 << 22, 100])
+def window(request, monkeypatch):
+    """Logs are read as a whole, and in windows of which several lie in one frame."""
+    monkeypatch.setattr("cvt_hpc.study.frames.WINDOW", request.param)
+
+
 @pytest.fixture
 def study():
     return make_study()
@@ -57,12 +63,14 @@ def frame_size(study):
 def assert_recorded(records, rows, indices):
     """Assert that exactly these runs are recorded, bitwise, and the others blank."""
     assert list(np.flatnonzero(records.recorded)) == sorted(indices)
+    found = records.read(np.arange(RUNS))
+    assert found["status"].tolist() == records.status.tolist()
     for index in range(RUNS):
         if index in indices:
-            assert records.rows[index].tobytes() == rows[index].tobytes()
+            assert found[index].tobytes() == rows[index].tobytes()
         else:
-            assert records.rows["status"][index] == Status.NOT_RUN
-            assert np.isnan(records.rows["amplitude"][index]).all()
+            assert found["status"][index] == Status.NOT_RUN
+            assert np.isnan(found["amplitude"][index]).all()
 
 
 def test_records_come_back_bitwise(tmp_path, study, rows):
@@ -124,7 +132,7 @@ def test_records_outlive_their_header(tmp_path, study, rows, place):
     [
         (b"\x00\x01" * 5000, "not a record log"),
         (b"my notes", "not a record log"),
-        (RECORD * 9, "no record of this"),
+        (RECORD * 9, "not a record log"),
     ],
 )
 def test_a_foreign_file_is_named_and_left(tmp_path, study, rows, content, complaint):
@@ -204,8 +212,8 @@ def test_the_earliest_of_two_records_counts_whatever_the_file_names(tmp_path, st
         first = first.rename(first.with_name(names[0]))
         second = second.rename(second.with_name(names[1]))
         records = read_records(tmp_path / "r", study)
-        assert records.rows[2].tobytes() == rows[2].tobytes()
-        assert records.rows[3].tobytes() == later[3].tobytes()
+        assert records.read(2).tobytes() == rows[2].tobytes()
+        assert records.read(3).tobytes() == later[3].tobytes()
         assert "run 2 has other numbers" in records.warnings[0]
         assert f"{names[0]}, which counts" in records.warnings[0]
 

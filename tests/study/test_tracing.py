@@ -15,7 +15,6 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.study import open_results, read_status, run
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.recovery import Records
 from cvt_hpc.study.tracing import inferred_classes, needed_runs
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.classes import OccurrenceClass
@@ -36,9 +35,22 @@ def study_of(shape, spacings):
     return describe(Job(axes, design={"kind": "trace", "first_spacing": traced}), Simulator())
 
 
-def blank_records(study):
-    zeros = np.zeros(study.size, int)
-    return Records(study.blank_rows(study.size), np.full(study.size, np.nan), zeros + 1, zeros, zeros)
+class Found:
+    """Records of runs that never were, as far as a trace asks for them."""
+
+    def __init__(self, study):
+        self.rows, self.recorded = study.blank_rows(study.size), np.zeros(study.size, bool)
+
+    @property
+    def status(self):
+        return self.rows["status"]
+
+    def read(self, runs, name):
+        return self.rows[name][runs]
+
+    def enter(self, runs, found):
+        self.rows["status"][runs], self.rows["vibrates"][runs] = FLAGS[found]
+        self.recorded[runs] = True
 
 
 def pending_runs(study, records):
@@ -51,12 +63,10 @@ def traced(truth, spacings, order=None):
     With `order` runs are done singly, as it chooses from those that are pending.
     """
     study = study_of(truth.shape, spacings)
-    records = blank_records(study)
+    records = Found(study)
     while (pending := pending_runs(study, records)).size:
         for index in pending if order is None else [order.choice(pending)]:
-            flags = FLAGS[OccurrenceClass(truth.flat[index])]
-            records.rows["status"][index], records.rows["vibrates"][index] = flags
-            records.written[index] = 1.0
+            records.enter(index, OccurrenceClass(truth.flat[index]))
     return records.recorded.reshape(truth.shape), inferred_classes(study, records)
 
 
@@ -144,9 +154,8 @@ def test_a_window_between_the_first_runs_is_missed():
 
 def test_nothing_is_inferred_before_all_corners_of_a_box_are_run():
     study = study_of((9,), [4])
-    records = blank_records(study)
-    records.rows["status"][[0, 4]], records.rows["vibrates"][[0, 4]] = FLAGS[VIBRATING]
-    records.written[[0, 4]] = 1.0
+    records = Found(study)
+    records.enter([0, 4], VIBRATING)
     assert inferred_classes(study, records).tolist() == [VIBRATING] * 5 + [NOT_RUN] * 4
     assert pending_runs(study, records).tolist() == [8]
 

@@ -11,6 +11,7 @@ import time
 import numpy as np
 import pytest
 import xarray as xr
+from cf import cf_findings
 from PIL import Image
 from recorded import assert_same_numbers, frames_written, records
 from sweeps import call, environment, kill, start, wait_for_records
@@ -109,6 +110,10 @@ def test_the_dataset_of_a_sweep(serial):
     assert json.loads(dataset.attrs["job"])["axes"]["sheave_stiffness"] == [1.0, "inf"]
 
 
+def test_the_cf_checker_finds_nothing_in_a_sweep(serial):
+    assert cf_findings(serial / "results.nc") == []
+
+
 def test_costs_are_estimated_by_what_is_on_record(serial):
     estimate = {}
     for name in ("small", "other"):
@@ -165,6 +170,10 @@ def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):
         assert kept.name == "run-000002.nc"
         with xr.open_dataset(kept, decode_times=False) as beside:
             assert_same_numbers(beside.drop_vars("core_seconds"), history.drop_vars("core_seconds"))
+    # By CF a time coordinate is known by units "... since ...", and time since the start is none; the checker
+    # goes by the name alone.
+    findings = cf_findings(folder / "h.nc")
+    assert [finding for finding in findings if "Coordinate variable 'time'" not in finding] == []
     with Image.open(folder / "h.png") as picture:
         assert min(picture.size) > 500
         # lines, shades and letters, not an empty sheet

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sweeps import assert_same_numbers
+from recorded import assert_same_numbers
 
 from cvt_hpc import simulation
 from cvt_hpc.job import build_job

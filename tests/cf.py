@@ -1,0 +1,21 @@
+"""What the IOOS compliance checker finds in a netCDF file."""
+
+from pathlib import Path
+
+CONVENTIONS = "cf:1.11"
+
+
+def cf_findings(path: Path) -> list[str]:
+    """Return the complaints about a file, those of lowest weight too, and checks that broke down over it."""
+    from compliance_checker.cf.cf import CF1_11Check
+    from compliance_checker.suite import CheckSuite
+
+    CheckSuite.checkers = {CONVENTIONS: CF1_11Check}
+    suite = CheckSuite()
+    dataset = suite.load_dataset(str(path))
+    results, errors = suite.run_all(dataset, [CONVENTIONS])[CONVENTIONS]
+    dataset.close()
+    assert len(results) > 20  # it has looked
+    broken = [f"{check}: {error[0]}" for check, error in errors.items()]
+    failed = (result for result in results if result.value[0] < result.value[1])  # points of how many
+    return broken + [f"{result.name}: {text}" for result in failed for text in result.msgs]
