@@ -37,3 +37,13 @@ class Parameter:
     exclusive: bool = False
     allow_infinite: bool = False
     choices: tuple[str, ...] = ()
+
+
+def positive(default: float, unit: str, description: str) -> Parameter:
+    """Return a number above 0."""
+    return Parameter(default, unit, description, minimum=0.0, exclusive=True)
+
+
+def not_negative(default: float, unit: str, description: str) -> Parameter:
+    """Return a number of 0 or more."""
+    return Parameter(default, unit, description, minimum=0.0)

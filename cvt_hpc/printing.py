@@ -31,6 +31,9 @@ _LARGEST_LINE = 4  # values: one per strand or pulley, but no spectrum and no hi
 def report_lines(report: RunReport) -> Iterator[str]:
     """Yield the lines that say how a sweep ended."""
     yield f"{report.total} runs: {report.done} done, {len(report.failed)} failed, {report.remaining} left"
+    if report.unneeded:
+        cells = report.total + report.unneeded
+        yield f"{report.unneeded} of {cells} cells of the grid not run: their class is inferred"
     yield f"results: {report.results or 'gathered by the part that ends last'}"
 
 
@@ -53,6 +56,8 @@ def status_lines(status: StudyStatus) -> Iterator[str]:
 
     yield f"job     {status.name} ({'running' if status.running else 'not running'})"
     yield f"runs    {status.total}"
+    if status.unneeded:
+        yield f"grid    {status.total + status.unneeded} cells, {status.unneeded} not needed so far"
     yield f"done    {status.done} ({status.done / status.total:.1%})"
     yield f"failed  {status.failed}"
     yield f"left    {status.left}"

@@ -15,14 +15,15 @@ COLUMNS = {
 
 def rows(results):
     """Yield the lines, one per run: axes, status, verdict, and per strand amplitude, frequency, mode."""
-    axes = results["status"].dims
+    dims = results["status"].dims
+    axes = [str(name) for name, values in results.coords.items() if set(values.dims) <= set(dims)]
     strands = [str(strand) for strand in results["strand"].values]
     units = {name: f" [{unit}]" if unit else "" for name, (unit, *_) in COLUMNS.items()}
     heads = [f"{name}_{strand}{unit}" for name, unit in units.items() for strand in strands]
     yield ",".join([*axes, "status", "vibrates", *heads, "power_residual", "core_seconds"])
     words = {name: results[name].attrs["flag_meanings"].split() for name in ("status", "vibrates")}
     for place in np.ndindex(results["status"].shape):
-        run = results.isel(dict(zip(axes, place, strict=True)))
+        run = results.isel(dict(zip(dims, place, strict=True)))
         done = words["status"][int(run["status"])] == "done"
         cells = [f"{run[axis].item():g}" for axis in axes]
         cells += [

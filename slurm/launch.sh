@@ -38,8 +38,8 @@ launch() {
             ;;
     esac
     launcher=$!
-    # Slurm warns this shell alone (--signal=B:USR1@...), and both launchers pass the warning on to all ranks. Sent to
-    # all processes of the job, it would end those by which mpirun holds its ranks.
+    # Slurm warns this shell alone (--signal=B:USR1@...), since it knows of no ranks that mpirun has started on this
+    # node; both launchers pass the warning on to all ranks.
     trap 'kill -USR1 "$launcher"' USR1
     wait "$launcher"
     status=$?

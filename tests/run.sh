@@ -4,5 +4,20 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . jobs/environment.sh
 
+# The batch files are tested with a real Slurm, which the tests start themselves. Without one they are skipped, or, in
+# continuous integration (CI=true), fail.
+install_slurm() {
+    local packages=(slurmctld slurmd slurm-client munge)
+    if PATH="$PATH:/usr/sbin:/sbin" type slurmctld slurmd sbatch munged > /dev/null 2>&1; then
+        return
+    elif [ "$(id -u)" -ne 0 ] || ! command -v apt-get > /dev/null; then
+        echo "No Slurm here, and only root on Debian can install it: apt-get install ${packages[*]}"
+    elif ! { apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install --no-install-recommends \
+        "${packages[@]}"; } > /dev/null; then
+        echo "No Slurm here, and it could not be installed: apt-get install ${packages[*]}"
+    fi
+}
+
 prepare_environment mpich,test
+install_slurm
 exec .venv/bin/python -m pytest "$@"

@@ -19,6 +19,7 @@ from cvt_hpc.analysis.arrangement import Ruler
 from cvt_hpc.analysis.classes import OccurrenceClass
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,11 @@ STYLES = {
 }
 
 
+# Inferred cells: level lines, no mark. Of vibrating ones the amplitude is not known: a colour of no scale.
+LINES = {"facecolor": "none", "edgecolor": "#8a8a8a", "linewidth": 0, "hatch": "---"}
+INFERRED_VIBRATION = "#d795ab"
+
+
 def _part_of(name: str, start: float, stop: float) -> Colormap:
     """Part of a colour map of the plotting library, in steps that an eye finds again on the colour bar."""
     return ListedColormap(matplotlib.colormaps[name](np.linspace(start, stop, 24)), name)
@@ -63,8 +69,17 @@ class Scale:
     label: str
 
 
+def norm_over(values: Array, lowest: float | None = None) -> Normalize:
+    """Scale over the finite values, from `lowest` if given."""
+    known = values[np.isfinite(values)]
+    if known.size == 0:
+        return Normalize(0.0, 1.0)
+    low, high = known.min() if lowest is None else lowest, known.max()
+    return Normalize(low, high) if high > low else Normalize(low - 0.5, high + 0.5)
+
+
 def draw_cells(
-    axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], values: Array, scale: Scale
+    axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], inferred: Mask, values: Array, scale: Scale
 ) -> None:
     """Draw the cells of one panel, and borders between the classes.
 
@@ -76,6 +91,8 @@ def draw_cells(
         Places of the columns and rows.
     classes : array, shape (row, column)
         `OccurrenceClass` of each run.
+    inferred : array of bool, shape (row, column)
+        Whether a cell's class is not that of a run.
     values : array, shape (row, column)
         What colours the vibrating cells; where it is nan they keep the colour of their class.
     scale : Scale
@@ -84,7 +101,9 @@ def draw_cells(
     for kind, style in STYLES.items():
         inside = classes == kind
         cells = [_cell(x, y, row, column) for row, column in np.argwhere(inside)]
-        fills = _fills(kind, values[inside], scale)
+        fills = fills_of(kind, values[inside], scale)
+        if kind is OccurrenceClass.VIBRATING:
+            fills[inferred[inside]] = to_rgba(INFERRED_VIBRATION)
         # Cells and marks are pixels even in a vector format: thousands of shapes would make megabytes of it.
         axes.add_collection(
             PatchCollection(cells, facecolors=fills, edgecolors="white", linewidths=0.3, rasterized=True)
@@ -92,14 +111,16 @@ def draw_cells(
         if style.hatch:
             lines = {"facecolors": "none", "edgecolors": style.ink, "linewidths": 0, "hatch": style.hatch}
             axes.add_collection(PatchCollection(cells, rasterized=True, **lines))
+    cells = [_cell(x, y, row, column) for row, column in np.argwhere(inferred)]
+    axes.add_collection(PatchCollection(cells, rasterized=True, **LINES))
     axes.add_collection(LineCollection(_borders(x, y, classes), colors="#202020", linewidths=1.0))
     axes.set(xlim=x.edges[[0, -1]], ylim=y.edges[[0, -1]])
 
 
-def draw_marks(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], size: float) -> None:
-    """Mark the grid points by class; arguments as for `draw_cells`, and the size of a dot [point]."""
+def draw_marks(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], marked: Mask, size: float) -> None:
+    """Mark grid points by class; arguments as for `draw_cells`, which ones, and the size of a dot [point]."""
     for kind, style in STYLES.items():
-        rows, columns = np.nonzero(classes == kind)
+        rows, columns = np.nonzero((classes == kind) & marked)
         axes.plot(
             x.centres[columns],
             y.centres[rows],
@@ -119,7 +140,7 @@ def write_values(
     """Write `values` as whole numbers above the grid points of vibrating cells that are filled by `fills`."""
     vibrating = (classes == OccurrenceClass.VIBRATING) & np.isfinite(values)
     for row, column in np.argwhere(vibrating):
-        (fill,) = _fills(OccurrenceClass.VIBRATING, fills[row : row + 1, column], scale)
+        (fill,) = fills_of(OccurrenceClass.VIBRATING, fills[row : row + 1, column], scale)
         axes.annotate(
             f"{values[row, column]:.0f}",
             (x.centres[column], y.centres[row]),
@@ -132,8 +153,8 @@ def write_values(
         )
 
 
-def class_legend(figure: Figure) -> None:
-    """Legend of all classes below the panels: fill, hatching and mark."""
+def class_legend(figure: Figure, *, with_inferred: bool = False) -> None:
+    """Legend of all classes below the panels: fill, hatching and mark; and of cells that are inferred."""
     handles, labels = [], []
     for kind, style in STYLES.items():
         outline = style.ink if style.hatch else "#606060"
@@ -142,11 +163,15 @@ def class_legend(figure: Figure) -> None:
         mark = Line2D([], [], ls="", marker=style.mark, color=style.ink, markersize=size, mec=style.rim)
         handles.append((cell, mark))
         labels.append(kind.label)
+    if with_inferred:
+        for label, fill in (("inferred", "none"), ("inferred, vibrating", INFERRED_VIBRATION)):
+            handles.append(Patch(**{**LINES, "facecolor": fill, "linewidth": 0.8}))
+            labels.append(label)
     figure.legend(
         handles,
         labels,
         loc="outside lower center",
-        ncols=len(handles),
+        ncols=len(OccurrenceClass),
         frameon=False,
         handler_map={tuple: HandlerTuple(ndivide=1, pad=0)},
         handlelength=2.2,
@@ -160,7 +185,7 @@ def _cell(x: Ruler, y: Ruler, row: int, column: int) -> Rectangle:
     return Rectangle(corner, x.edges[column + 1] - corner[0], y.edges[row + 1] - corner[1])
 
 
-def _fills(kind: OccurrenceClass, values: Array, scale: Scale) -> Array:
+def fills_of(kind: OccurrenceClass, values: Array, scale: Scale) -> Array:
     """Colours (cell, rgba) of cells of one class."""
     fills = np.tile(to_rgba(STYLES[kind].fill), (len(values), 1))
     if kind is OccurrenceClass.VIBRATING:

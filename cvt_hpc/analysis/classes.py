@@ -1,37 +1,17 @@
-"""One class per run of a study: the two flags of a record, and what they leave open, as one category."""
+"""One class per run of a dataset, and what a map shows of the runs that vibrate."""
 
 from __future__ import annotations
-
-from enum import IntEnum
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from cvt_hpc.errors import mismatch
-from cvt_hpc.variables import Status, Vibrates
-
-
-class OccurrenceClass(IntEnum):
-    """What a map says of a run."""
-
-    QUIET = 0
-    VIBRATING = 1
-    UNDECIDED = 2
-    FAILED = 3
-    NOT_RUN = 4
-
-    @property
-    def label(self) -> str:
-        """Name for people."""
-        return self.name.lower().replace("_", " ")
+from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 
 
 def occurrence_classes(dataset: xr.Dataset) -> xr.DataArray:
     """Class of each run.
-
-    Whatever is not known to have ended well is never quiet nor vibrating: a status that this program does
-    not know counts as failed, a missing one as not run, an unknown verdict as undecided.
 
     Parameters
     ----------
@@ -53,14 +33,7 @@ def occurrence_classes(dataset: xr.Dataset) -> xr.DataArray:
             found = ", ".join(map(str, dataset.data_vars)) or "no variables"
             raise mismatch("the dataset", f"results of a study, with the variable {name}", found)
     status = dataset["status"]
-    vibrates = dataset["vibrates"].transpose(*status.dims).values
-    classes = np.full(status.shape, OccurrenceClass.FAILED, np.int8)
-    done = status.values == Status.DONE
-    classes[done] = OccurrenceClass.UNDECIDED
-    classes[done & (vibrates == Vibrates.NO)] = OccurrenceClass.QUIET
-    classes[done & (vibrates == Vibrates.YES)] = OccurrenceClass.VIBRATING
-    missing = np.isnan(status.values.astype(float))
-    classes[(status.values == Status.NOT_RUN) | missing] = OccurrenceClass.NOT_RUN
+    classes = classify_runs(status.values, dataset["vibrates"].transpose(*status.dims).values)
     attributes = {
         "long_name": "vibration occurrence",
         "flag_values": np.array(list(OccurrenceClass), np.int8),
@@ -69,9 +42,24 @@ def occurrence_classes(dataset: xr.Dataset) -> xr.DataArray:
     return xr.DataArray(classes, status.coords, status.dims, "occurrence_class", attributes)
 
 
-def count_classes(classes: NDArray[np.int8]) -> dict[OccurrenceClass, int]:
-    """Number of runs of each class."""
-    return {c: int(np.count_nonzero(classes == c)) for c in OccurrenceClass}
+def map_classes(dataset: xr.Dataset) -> xr.DataArray:
+    """Class of each cell of a map: that of its run, or in a trace what was inferred where there was none.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        As `occurrence_classes` takes it, with `inferred_class` if it is of a trace.
+    """
+    classes = occurrence_classes(dataset)
+    if "inferred_class" not in dataset:
+        return classes
+    return classes.where(classes != OccurrenceClass.NOT_RUN, dataset["inferred_class"])
+
+
+def count_classes(classes: NDArray[np.int8]) -> str:
+    """Number of runs of each class that occurs, in words."""
+    counts = {c: int(np.count_nonzero(classes == c)) for c in OccurrenceClass}
+    return ", ".join(f"{count} {kind.label}" for kind, count in counts.items() if count)
 
 
 def at_strongest_strand(dataset: xr.Dataset, name: str) -> xr.DataArray:

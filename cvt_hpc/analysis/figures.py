@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -53,6 +55,12 @@ def axis_label(name: str, unit: str) -> str:
     """Name of a variable in words, with its display unit in brackets."""
     words = name.replace("_", " ")
     return f"{words} [{unit}]" if unit else words
+
+
+def headline(attributes: Mapping[str, Any]) -> str:
+    """First line above a map of a dataset with these attributes."""
+    job = attributes.get("job_name", "")
+    return f"Vibration occurrence: {job}" if job else "Vibration occurrence"
 
 
 def save_figure(figure: Figure, out: Path) -> Path:

@@ -1,9 +1,9 @@
 """Maps of vibration occurrence over a study's grid: classes first, then amplitude and frequency.
 
 The classes differ in lightness, in hatching and in the mark on the grid point, so that a map reads the
-same in colour, in grey and in small print. Vibrating cells are coloured by amplitude, darker for larger.
-Their dominant frequency is written into the cells where there is room, and drawn as a second set of
-panels where there is none.
+same in colour, in grey and in small print. Cells whose class is inferred have level lines and no mark.
+Vibrating cells are coloured by amplitude, darker for larger. Their dominant frequency is written into the
+cells where there is room, and drawn as a second set of panels where there is none.
 """
 
 from __future__ import annotations
@@ -19,14 +19,20 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, value_text
-from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, count_classes, occurrence_classes
-from cvt_hpc.analysis.figures import STYLE, WIDTH, check_format, save_figure
+from cvt_hpc.analysis.classes import (
+    OccurrenceClass,
+    at_strongest_strand,
+    count_classes,
+    map_classes,
+    occurrence_classes,
+)
+from cvt_hpc.analysis.figures import STYLE, WIDTH, check_format, headline, save_figure
+from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 
 MOST_STACKED = 5  # panels in one column; more go into two
 TITLE_HEIGHT = 0.42  # [inch], of a panel with the space around it
@@ -40,7 +46,8 @@ def draw_map(dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None
     ----------
     dataset : Dataset
         Results of a study: `status` and `vibrates` over the job's axes; `amplitude` [m] and `frequency`
-        [Hz], per strand, where known. The stronger strand is shown.
+        [Hz], per strand, where known; `inferred_class` of a trace. The stronger strand is shown. Of a study
+        of samples the axes lie along `run`: each run is a mark, and there is a panel for each pair of axes.
     out : Path
         The picture: .png, .svg or .pdf.
     at : mapping, optional
@@ -54,12 +61,14 @@ def draw_map(dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None
     Raises
     ------
     InputError
-        The dataset holds no results or a single run, `at` names no axis or no value on it, or the suffix
-        is not a picture's.
+        The dataset holds no results or a single run, `at` names no axis or no value on it or the results
+        are of samples, or the suffix is not a picture's.
     """
     check_format(Path(out))
     occurrence_classes(dataset)
     with matplotlib.rc_context(STYLE):
+        if is_sampled(dataset):
+            return save_figure(scatter_figure(dataset, at or {}), Path(out))
         return save_figure(map_figure(arrange(dataset, at or {})), Path(out))
 
 
@@ -71,6 +80,7 @@ class _Sheet:
     x: Ruler
     y: Ruler
     classes: NDArray[np.int8]
+    inferred: NDArray[np.bool_]  # whether the class of a cell is not that of a run
     amplitude: NDArray[np.float64]  # [um], nan where a run does not vibrate
     frequency: NDArray[np.float64]  # [Hz], likewise
 
@@ -114,17 +124,19 @@ def map_figure(arrangement: Arrangement) -> Figure:
     blocks = 2 if has_frequency and not written else 1
     figure = Figure((WIDTH, blocks * sheet.rows * sheet.panel_height + 1.9), layout="constrained")
     axes = figure.subplots(blocks * sheet.rows, sheet.columns, sharex=True, sharey=True, squeeze=False)
-    amplitude = cells.Scale(cells.AMPLITUDE_COLOURS, _norm(sheet.amplitude, 0.0), "amplitude [µm]")
+    amplitude = cells.Scale(cells.AMPLITUDE_COLOURS, cells.norm_over(sheet.amplitude, 0.0), "amplitude [µm]")
     _draw_block(figure, axes[: sheet.rows], sheet, sheet.amplitude, amplitude)
     if written:
         for ax, *shown in zip(axes.flat, sheet.classes, sheet.frequency, sheet.amplitude, strict=False):
             cells.write_values(ax, sheet.x, sheet.y, *shown, amplitude)
     elif has_frequency:
-        frequency = cells.Scale(cells.FREQUENCY_COLOURS, _norm(sheet.frequency), "dominant frequency [Hz]")
+        frequency = cells.Scale(
+            cells.FREQUENCY_COLOURS, cells.norm_over(sheet.frequency), "dominant frequency [Hz]"
+        )
         _draw_block(figure, axes[sheet.rows :], sheet, sheet.frequency, frequency)
     figure.suptitle(_title(sheet, written))
     figure.supylabel(sheet.y.label, fontsize=10)
-    cells.class_legend(figure)
+    cells.class_legend(figure, with_inferred=bool(sheet.inferred.any()))
     return figure
 
 
@@ -137,25 +149,17 @@ def _sheet(arrangement: Arrangement) -> _Sheet:
         present = variable.transpose(*filter(None, names))
         return present.values.reshape([dataset.sizes[name] if name else 1 for name in names])
 
-    classes = grid(occurrence_classes(dataset))
-    vibrating = classes == OccurrenceClass.VIBRATING
+    runs, classes = grid(occurrence_classes(dataset)), grid(map_classes(dataset))
+    vibrating = runs == OccurrenceClass.VIBRATING
     return _Sheet(
         arrangement,
         ruler(dataset[arrangement.x]),
         ruler(dataset[arrangement.y]) if arrangement.y else ONE_ROW,
         classes,
+        classes != runs,
         np.where(vibrating, grid(at_strongest_strand(dataset, "amplitude")) * 1e6, np.nan),
         np.where(vibrating, grid(at_strongest_strand(dataset, "frequency")), np.nan),
     )
-
-
-def _norm(values: NDArray[np.float64], lowest: float | None = None) -> Normalize:
-    """Scale over the finite values, from `lowest` if given."""
-    known = values[np.isfinite(values)]
-    if known.size == 0:
-        return Normalize(0.0, 1.0)
-    low, high = known.min() if lowest is None else lowest, known.max()
-    return Normalize(low, high) if high > low else Normalize(low - 0.5, high + 0.5)
 
 
 def _draw_block(
@@ -167,8 +171,9 @@ def _draw_block(
         if panel >= sheet.panels:
             ax.set_axis_off()
             continue
-        cells.draw_cells(ax, sheet.x, sheet.y, sheet.classes[panel], values[panel], scale)
-        cells.draw_marks(ax, sheet.x, sheet.y, sheet.classes[panel], mark)
+        classes, inferred = sheet.classes[panel], sheet.inferred[panel]
+        cells.draw_cells(ax, sheet.x, sheet.y, classes, inferred, values[panel], scale)
+        cells.draw_marks(ax, sheet.x, sheet.y, classes, ~inferred, mark)
         _label_panel(ax, sheet, panel)
     if np.isfinite(values).any():
         bar = figure.colorbar(
@@ -195,12 +200,10 @@ def _label_panel(ax: Axes, sheet: _Sheet, panel: int) -> None:
 
 def _title(sheet: _Sheet, written: bool) -> str:
     """What, of which job, how many runs of each class, and what is fixed."""
-    attributes = sheet.arrangement.dataset.attrs
-    job = attributes.get("job_name", "")
-    counts = count_classes(sheet.classes)
-    runs = ", ".join(f"{count} {kind.label}" for kind, count in counts.items() if count)
-    lines = [f"Vibration occurrence: {job}" if job else "Vibration occurrence"]
-    lines.append(f"{sheet.classes.size} runs: {runs}")
+    runs, inferred = sheet.classes[~sheet.inferred], sheet.classes[sheet.inferred]
+    lines = [headline(sheet.arrangement.dataset.attrs), f"{runs.size} runs: {count_classes(runs)}"]
+    if inferred.size:
+        lines.append(f"{inferred.size} cells inferred: {count_classes(inferred)}")
     lines.extend(sheet.arrangement.notes)
     if written:
         lines.append("in the cells: dominant frequency [Hz]")

@@ -9,12 +9,13 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
+from cvt_hpc.chart.budget_drawing import draw_budget
 from cvt_hpc.chart.comparing import Comparison, compare
 from cvt_hpc.chart.dataset import write_dataset
-from cvt_hpc.chart.drawing import draw_budget, draw_scene
 from cvt_hpc.chart.measuring import Measurement, measure
 from cvt_hpc.chart.plan import Chart, Point
 from cvt_hpc.chart.prospects import check_prospects
+from cvt_hpc.chart.scene_drawing import draw_scene
 from cvt_hpc.chart.store import ChartFolder
 from cvt_hpc.chart.table import write_table
 

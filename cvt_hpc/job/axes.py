@@ -97,19 +97,34 @@ def _read_range(parameter: Parameter, raw: dict[str, Any], where: str) -> tuple[
             raise unknown(f"{where}.{key}", "key", key, _RANGE_KEYS)
     if kind_of(parameter) not in (int, float):
         raise mismatch(where, "a list of values, because the parameter is not a number", "a range")
-    for key in ("from", "to"):
-        if key not in raw:
-            raise mismatch(f"{where}.{key}", f"the {'first' if key == 'from' else 'last'} value", "nothing")
+    start, stop = read_bounds(parameter, raw, where)
     if ("count" in raw) == ("step" in raw):
         raise mismatch(where, "a range with either count or step", "both" if "step" in raw else "neither")
-    start, stop = (_read_bound(parameter, raw[key], f"{where}.{key}") for key in ("from", "to"))
     if "step" in raw:
         return _stepped(start, stop, _read_step(parameter, raw, where), where)
     return _counted(start, stop, raw, where)
 
 
-def _read_bound(parameter: Parameter, raw: Any, where: str) -> float:
-    return read_value(replace(parameter, allow_infinite=False), raw, where)
+def read_bounds(parameter: Parameter, raw: dict[str, Any], where: str) -> tuple[float, float]:
+    """Return `from` and `to` [parameter.unit] of a range; an infinite one is refused."""
+    for key in ("from", "to"):
+        if key not in raw:
+            raise mismatch(f"{where}.{key}", f"the {'first' if key == 'from' else 'last'} value", "nothing")
+    finite = replace(parameter, allow_infinite=False)
+    start, stop = (read_value(finite, raw[key], f"{where}.{key}") for key in ("from", "to"))
+    return start, stop
+
+
+def read_spacing(raw: dict[str, Any], start: float, stop: float, where: str) -> str:
+    """Return the spacing of a range from `start` to `stop`: "linear", or "log" if that can be."""
+    spacing = raw.get("spacing", "linear")
+    if spacing not in _SPACINGS:
+        raise unknown(f"{where}.spacing", f"spacing {show(spacing)}", str(spacing), _SPACINGS)
+    if start == stop:
+        raise mismatch(where, "a range with from and to apart", f"{start:g} for both")
+    if spacing == "log" and (start <= 0 or stop <= 0):
+        raise mismatch(where, "from > 0 and to > 0 for log spacing", f"{start:g} and {stop:g}")
+    return spacing
 
 
 def _read_step(parameter: Parameter, raw: dict[str, Any], where: str) -> float:
@@ -126,17 +141,11 @@ def _read_step(parameter: Parameter, raw: dict[str, Any], where: str) -> float:
 def _counted(start: float, stop: float, raw: dict[str, Any], where: str) -> tuple[float, ...]:
     """Return `count` values; in decimal, so that a third step of 0.1 is 0.3 and can be asked for as that."""
     count = read_value(_COUNT, raw["count"], f"{where}.count")
-    spacing = raw.get("spacing", "linear")
-    if spacing not in _SPACINGS:
-        raise unknown(f"{where}.spacing", f"spacing {show(spacing)}", str(spacing), _SPACINGS)
-    if start == stop:
-        raise mismatch(where, "a range with from and to apart", f"{start:g} for both")
+    spacing = read_spacing(raw, start, stop, where)
     first, last = _decimal(start), _decimal(stop)
     shares = [Decimal(i) / (count - 1) for i in range(1, count - 1)]
     if spacing == "linear":
         return (start, *(float(first + (last - first) * share) for share in shares), stop)
-    if first <= 0 or last <= 0:
-        raise mismatch(where, "from > 0 and to > 0 for log spacing", f"{start:g} and {stop:g}")
     return (start, *(float(first * (last / first) ** share) for share in shares), stop)
 
 

@@ -15,7 +15,9 @@ from cvt_hpc.job.values import in_words
 MOST_CHECKED_POINTS = 20_000
 
 
-def check_grid(schema: Schema, parameters: dict[str, Any], axes: tuple[Axis, ...], source: str) -> None:
+def check_grid(
+    schema: Schema, parameters: dict[str, Any], axes: tuple[Axis, ...], source: str, *, sampled: bool = False
+) -> None:
     """Check the base scene and every run, and that axes are of effect; of a huge grid, the axes' extremes.
 
     Parameters
@@ -28,6 +30,8 @@ def check_grid(schema: Schema, parameters: dict[str, Any], axes: tuple[Axis, ...
         The grid.
     source : str
         The job file, for the error.
+    sampled : bool
+        Whether the values of the axes at one place make a run, instead of all their combinations.
 
     Raises
     ------
@@ -37,7 +41,7 @@ def check_grid(schema: Schema, parameters: dict[str, Any], axes: tuple[Axis, ...
     check_point(schema, parameters, source)
     sizes = {axis.name: len(axis.values) for axis in axes}
     idle = {name: "" for name, size in sizes.items() if size > 1}
-    for values in _points_to_check(axes):
+    for values in zip(*(axis.values for axis in axes), strict=True) if sampled else _points_to_check(axes):
         varied = dict(zip(sizes, values, strict=True))
         point = {**parameters, **varied}
         check_point(schema, point, source, varied)

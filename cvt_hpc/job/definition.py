@@ -11,6 +11,7 @@ from typing import Any
 from cvt_hpc.job.assignments import Assignments, read_assignments
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.crosscheck import check_point
+from cvt_hpc.job.design import Design
 from cvt_hpc.job.schema import Schema, load_schema
 
 HEADER = ("name", "model", "stepper", "description")
@@ -32,6 +33,8 @@ class Job:
         What the study varies, the last axis fastest; empty for a single run.
     given : frozenset of str
         The keys that the file or an override sets, defaults excluded.
+    design : dict
+        The table [design], resolved; empty for the full grid of the axes.
     histories : tuple of int
         Indices of the runs whose history a sweep keeps; without effect on any number.
     """
@@ -44,16 +47,24 @@ class Job:
     parameters: dict[str, Any]
     axes: tuple[Axis, ...]
     given: frozenset[str] = field(default=frozenset(), compare=False)
+    design: Design = field(default_factory=dict)
     histories: tuple[int, ...] = field(default=(), compare=False)
 
     @property
+    def is_sampled(self) -> bool:
+        """Whether the values of the axes at one place make a run, instead of all their combinations."""
+        return "runs" in self.design
+
+    @property
     def shape(self) -> tuple[int, ...]:
-        """Number of values on each axis; () for a single run."""
+        """Number of values on each axis, () for a single run; the number of runs of a sampled job."""
+        if self.is_sampled:
+            return (self.design["runs"],)
         return tuple(len(axis.values) for axis in self.axes)
 
     @property
     def size(self) -> int:
-        """Number of runs."""
+        """Number of runs; of a trace, of those that it chooses from."""
         return math.prod(self.shape)
 
     def __len__(self) -> int:
@@ -66,7 +77,7 @@ class Job:
         return load_schema(self.model, self.stepper, self.source)
 
     def point(self, index: int) -> dict[str, Any]:
-        """Return the parameters of run `index`, counted in C order over the axes.
+        """Return the parameters of run `index`, counted in C order over the grid, or over the samples.
 
         Raises
         ------
@@ -75,6 +86,8 @@ class Job:
         """
         if not 0 <= index < self.size:
             raise IndexError(f"run {index} of {self.size}")
+        if self.is_sampled:
+            return {**self.parameters, **{axis.name: axis.values[index] for axis in self.axes}}
         values = {}
         for axis in reversed(self.axes):
             index, place = divmod(index, len(axis.values))
@@ -118,6 +131,7 @@ class Job:
         return {
             **{key: getattr(self, key) for key in HEADER},
             **tables,
+            **({"design": self.design} if self.design else {}),
             "axes": {axis.name: [_to_json(value) for value in axis.values] for axis in self.axes},
         }
 

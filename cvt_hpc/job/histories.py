@@ -19,7 +19,12 @@ _FORMS = "a list of runs, each a table {axis = value, ...} with all axes, or a r
 
 
 def read_histories(
-    raw: Any, schema: Schema, axes: tuple[Axis, ...], replaced: Mapping[str, Any], source: str
+    raw: Any,
+    schema: Schema,
+    axes: tuple[Axis, ...],
+    replaced: Mapping[str, Any],
+    source: str,
+    samples: int | None = None,
 ) -> tuple[int, ...]:
     """Return the indices of the runs, in order.
 
@@ -36,6 +41,8 @@ def read_histories(
         taken off the grid is left out.
     source : str
         The job file, for the errors.
+    samples : int, optional
+        Their number, if the runs are samples and no grid: these have an index alone.
 
     Raises
     ------
@@ -45,6 +52,10 @@ def read_histories(
     where = f"{source}: [record] history"
     if not isinstance(raw, (list, tuple)):
         raise mismatch(where, _FORMS, show(raw))
+    if samples is not None:
+        return tuple(
+            sorted({_numbered(entry, samples, f"{where}, run {i}") for i, entry in enumerate(raw, 1)})
+        )
     found = {_index(entry, schema, axes, replaced, f"{where}, run {i}") for i, entry in enumerate(raw, 1)}
     return tuple(sorted(found - {None}))
 
@@ -54,9 +65,7 @@ def _index(
 ) -> int | None:
     size = math.prod(len(axis.values) for axis in axes)
     if isinstance(entry, int) and not isinstance(entry, bool):
-        if not 0 <= entry < size:
-            raise mismatch(where, f"an index from 0 to {size - 1}", show(entry))
-        return entry
+        return _numbered(entry, size, where)
     if not isinstance(entry, Mapping):
         raise mismatch(where, _FORMS, show(entry))
     values = {}
@@ -71,6 +80,12 @@ def _index(
     for key in values.keys() - replaced.keys():
         raise mismatch(where, f"axes of this job ({', '.join(axis.name for axis in axes)})", key)
     return index if all(replaced[key] == value for key, value in values.items()) else None
+
+
+def _numbered(entry: Any, size: int, where: str) -> int:
+    if isinstance(entry, bool) or not isinstance(entry, int) or not 0 <= entry < size:
+        raise mismatch(where, f"an index from 0 to {size - 1}", show(entry))
+    return entry
 
 
 def _place(axis: Axis, value: Any, where: str) -> int:

@@ -12,11 +12,15 @@ from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignm
 from cvt_hpc.job.axes import Axis, read_axis
 from cvt_hpc.job.crosscheck import check_grid
 from cvt_hpc.job.definition import HEADER, Job
+from cvt_hpc.job.design import Design, read_design, resolve_spacing
 from cvt_hpc.job.document import read_document
 from cvt_hpc.job.histories import KEY, read_histories
+from cvt_hpc.job.sampling import sampled_axes
 from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.values import expectation, read_value
+from cvt_hpc.parameters import Parameter
 
+_OF_DESIGN = "design."
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -76,17 +80,21 @@ def build_job(
     schema = load_schema(head.get("model"), head.get("stepper"), source)
     _check_top_level(document, schema, source)
     tables = _read_tables(document, schema, source)
-    axes = _read_axes(document.get("axes", {}), schema, source)
-    others = {key: value for key, value in pairs.items() if key not in HEADER}
+    of_design = {key: value for key, value in pairs.items() if key.startswith(_OF_DESIGN)}
+    others = {key: value for key, value in pairs.items() if key not in (*HEADER, *of_design)}
     replaced = read_assignments(others, schema, source, label)
-    axes = tuple(axis for axis in axes if axis.name not in replaced)
+    changed = {key.removeprefix(_OF_DESIGN): value for key, value in of_design.items()}
+    design = read_design({**document.get("design", {}), **changed}, source)
+    axes = _read_axes(document.get("axes", {}), design, replaced, schema, source)
+    if "first_spacing" in design:
+        design = resolve_spacing(design, axes, source)
     given = {**tables, **replaced}
     parameters = _resolve({**{axis.name: axis.values[0] for axis in axes}, **given}, schema, source)
-    check_grid(schema, parameters, axes, source)
+    check_grid(schema, parameters, axes, source, sampled="runs" in design)
     histories = document.get(KEY[0], {}).get(KEY[1], [])
-    kept = read_histories(histories, schema, axes, replaced, source)
+    kept = read_histories(histories, schema, axes, replaced, source, design.get("runs"))
     given = frozenset(given)
-    return Job(name, schema.model, schema.stepper, description, source, parameters, axes, given, kept)
+    return Job(name, schema.model, schema.stepper, description, source, parameters, axes, given, design, kept)
 
 
 def _read_name(head: Mapping[str, Any], source: str) -> str:
@@ -105,7 +113,7 @@ def _read_description(head: Mapping[str, Any], source: str) -> str:
 
 
 def _check_top_level(document: Mapping[str, Any], schema: Schema, source: str) -> None:
-    tables = [*schema.sections, "axes"]
+    tables = [*schema.sections, "axes", "design"]
     for key, value in document.items():
         if key in HEADER:
             continue
@@ -138,15 +146,22 @@ def _read_tables(document: Mapping[str, Any], schema: Schema, source: str) -> di
     return values
 
 
-def _read_axes(table: Mapping[str, Any], schema: Schema, source: str) -> tuple[Axis, ...]:
-    axes: dict[str, Axis] = {}
+def _read_axes(
+    table: Mapping[str, Any], design: Design, replaced: Mapping[str, Any], schema: Schema, source: str
+) -> tuple[Axis, ...]:
+    """Return the axes, but those that are replaced by one value."""
+    found: dict[str, tuple[Parameter, Any, str]] = {}
     for name, raw in _flatten(table, schema):
         where = f"{source}: [axes] {name}"
         key = schema.find(name, where)
-        if key in axes:
+        if key in found:
             raise mismatch(where, "one axis for a parameter", f"a second one for {key}")
-        axes[key] = read_axis(key, schema.parameters[key], raw, where)
-    return tuple(axes.values())
+        found[key] = (schema.parameters[key], raw, where)
+    if "runs" in design:
+        left = {key: entry for key, entry in found.items() if key not in replaced}
+        return sampled_axes(left, design, source)
+    axes = tuple(read_axis(key, *entry) for key, entry in found.items())
+    return tuple(axis for axis in axes if axis.name not in replaced)
 
 
 def _flatten(table: Mapping[str, Any], schema: Schema) -> Iterator[tuple[str, Any]]:

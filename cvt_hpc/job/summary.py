@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.definition import Job
@@ -33,12 +34,18 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
     for section, rows in _tables(job).items():
         lines += ["", f"[{section}]", *_columns(rows)]
     if job.axes:
-        axes = [(axis.name, _values_in_words(axis), f"{len(axis.values)} values") for axis in job.axes]
+        noun = "samples" if job.is_sampled else "values"
+        in_short = _range_in_words if job.is_sampled else _values_in_words
+        axes = [(axis.name, in_short(axis), f"{len(axis.values)} {noun}") for axis in job.axes]
         lines += ["", "[axes]", *_columns(axes)]
-    product = f" = {' x '.join(map(str, job.shape))}" if len(job.axes) > 1 else ""
+    if job.design:
+        design = [(key, _setting_in_words(value)) for key, value in job.design.items()]
+        lines += ["", "[design]", *_columns(design)]
+    product = f" = {' x '.join(map(str, job.shape))}" if len(job.shape) > 1 else ""
+    at_most = "at most " if "first_spacing" in job.design else ""
     basis = f" (by what {measured} runs on record took)" if measured else ""
-    cost = f"estimated cost: {_cost_in_words(core_seconds, job.size)}{basis}"
-    lines += ["", f"runs: {job.size}{product}"]
+    cost = f"estimated cost: {at_most}{_cost_in_words(core_seconds, job.size)}{basis}"
+    lines += ["", f"runs: {at_most}{job.size}{product}"]
     lines += [f"histories kept: of runs {', '.join(map(str, job.histories))}"] if job.histories else []
     lines += [cost]
     return "\n".join(lines)
@@ -74,6 +81,16 @@ def _values_in_words(axis: Axis) -> str:
     if len(words) > _FEW:
         words = [*words[:3], "...", words[-1]]
     return f"{', '.join(words)} {axis.unit}".rstrip()
+
+
+def _range_in_words(axis: Axis) -> str:
+    return f"{in_words(min(axis.values), '')} to {in_words(max(axis.values), '')} {axis.unit}".rstrip()
+
+
+def _setting_in_words(value: Any) -> str:
+    if not isinstance(value, dict):
+        return in_words(value, "")
+    return ", ".join(f"{count} along {name}" for name, count in value.items())
 
 
 def _cost_in_words(core_seconds: float, runs: int) -> str:

@@ -13,7 +13,8 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, anywhere, fma, like, select
-from cvt_hpc.physics.compliance import ROUNDS_OF_BLOCK_FLIPS, Sheaves
+from cvt_hpc.physics.compliance import ROUNDS_OF_BLOCK_FLIPS
+from cvt_hpc.physics.sheaves import Sheaves
 
 # fields of LaneContact.stations
 GAP, PUSH, DIAGONAL, PIVOT, MULTIPLIER, RESPONSE_1, RESPONSE_2, Y, CLOSED = range(9)

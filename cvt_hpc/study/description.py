@@ -70,7 +70,8 @@ class Study:
     job : dict
         The whole resolved job, as JSON types.
     axes : tuple of Dimension
-        The grid; run indices count through it in C order. Empty for a single run.
+        What is varied: a grid, through which run indices count in C order, or the values of all samples.
+        Empty for a single run.
     variables : tuple of Variable
         The quantities of a record, `status` first.
     coordinates : tuple of Dimension
@@ -86,13 +87,33 @@ class Study:
     coordinates: tuple[Dimension, ...]
 
     @property
+    def design(self) -> dict[str, Any]:
+        """The job's table [design]; empty for the full grid."""
+        return self.job.get("design", {})
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether the values of the axes at one place make a run, instead of all their combinations."""
+        return "runs" in self.design
+
+    @property
+    def is_traced(self) -> bool:
+        """Whether the runs depend on what earlier ones have found."""
+        return "first_spacing" in self.design
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of the dimensions along which the runs lie: those of the axes, or `run` for samples."""
+        return ("run",) if self.is_sampled else tuple(axis.name for axis in self.axes)
+
+    @property
     def shape(self) -> tuple[int, ...]:
-        """Number of values on each axis."""
-        return tuple(len(axis.values) for axis in self.axes)
+        """Number of runs along each dimension."""
+        return (self.design["runs"],) if self.is_sampled else tuple(len(axis.values) for axis in self.axes)
 
     @property
     def size(self) -> int:
-        """Number of runs."""
+        """Number of runs; of a trace, of those that it chooses from."""
         return math.prod(self.shape)
 
     @cached_property
@@ -108,6 +129,7 @@ class Study:
     def place(self, index: int) -> dict[str, Any]:
         """Return the axes' values of run `index`, by axis name."""
         position = np.unravel_index(index, self.shape) if self.axes else ()
+        position = [index] * len(self.axes) if self.is_sampled else position
         return {axis.name: axis.values[i] for axis, i in zip(self.axes, position, strict=True)}
 
     def blank_rows(self, shape: int | tuple[int, ...] = ()) -> np.ndarray:

@@ -18,11 +18,21 @@ from cvt_hpc.study.lock import locked
 from cvt_hpc.study.provenance import command, git_revision, versions
 from cvt_hpc.study.record import KEPT
 from cvt_hpc.study.recovery import Records, read_records
+from cvt_hpc.study.tracing import inferred_classes
 from cvt_hpc.variables import Variable
+from cvt_hpc.vibration.classes import OccurrenceClass
 
 if TYPE_CHECKING:
     import xarray as xr
 
+_INFERRED = Variable(
+    "inferred_class",
+    (),
+    "i1",
+    "",
+    "class of the run; where status is not_run, the class of the runs around it, which is inferred",
+    OccurrenceClass,
+)
 _COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
 _logger = logging.getLogger(__name__)
 
@@ -120,10 +130,10 @@ def write_results(folder: StudyFolder, study: Study, records: Records) -> Path:
 
 
 def build_dataset(study: Study, records: Records) -> xr.Dataset:
-    """Return the dataset of a study: one variable per quantity over the grid, `status` first."""
+    """Return the dataset of a study: one variable per quantity over the runs, `status` first."""
     import xarray as xr
 
-    grid = tuple(axis.name for axis in study.axes)
+    grid = study.dims
     variables = {}
     for variable in study.variables:
         values = records.rows[variable.name]
@@ -131,7 +141,12 @@ def build_dataset(study: Study, records: Records) -> xr.Dataset:
         if values.dtype.kind == "S":
             values = np.char.decode(values, "utf-8", "replace")
         variables[variable.name] = (grid + variable.dims, values, _attributes(variable, values.dtype))
-    coordinates = {dimension.name: _coordinate(dimension) for dimension in (*study.axes, *study.coordinates)}
+    if study.is_traced:
+        variables[_INFERRED.name] = (grid, inferred_classes(study, records), _attributes(_INFERRED, np.int8))
+    coordinates = {
+        axis.name: _coordinate(axis, grid if study.is_sampled else axis.name) for axis in study.axes
+    }
+    coordinates |= {dimension.name: _coordinate(dimension, dimension.name) for dimension in study.coordinates}
     return xr.Dataset(variables, coordinates, _global_attributes(study, records))
 
 
@@ -148,12 +163,12 @@ def _attributes(variable: Variable, dtype: np.dtype) -> dict[str, Any]:
     return attributes
 
 
-def _coordinate(dimension: Dimension) -> tuple[str, np.ndarray, dict[str, str]]:
+def _coordinate(dimension: Dimension, along: str | tuple[str, ...]) -> tuple[Any, np.ndarray, dict[str, str]]:
     attributes = {"long_name": dimension.long_name}
     if dimension.units:
         attributes["units"] = dimension.units
     values = np.array(dimension.values, dtype=object if dimension.holds_texts else None)
-    return dimension.name, values, attributes
+    return along, values, attributes
 
 
 def _encoding(array: xr.Variable) -> dict[str, Any]:

@@ -47,6 +47,11 @@ class Progress:
 
             self._bar = tqdm(total=total, initial=recorded, unit="run", dynamic_ncols=True)
 
+    def expect(self, costs: np.ndarray) -> None:
+        """Add runs to those that are to be done, after all of these; `costs` as before."""
+        self._total += costs.size
+        self._work = np.append(self._work, self._work[-1] + np.cumsum(costs))
+
     def show(self) -> None:
         """Show the state of things, if the last time is long enough ago."""
         if not self._visible:
@@ -70,6 +75,7 @@ class Progress:
         tally = self._counter.tally()
         finished, failed = self._recorded + tally.finished, self._failed + tally.failed
         if self._bar is not None:
+            self._bar.total = self._total
             self._bar.set_postfix_str(f"{failed} failed", refresh=False)
             self._bar.update(finished - self._bar.n)
             self._bar.refresh()

@@ -24,7 +24,7 @@ class FailedRun:
     Attributes
     ----------
     index : int
-        Its place in the grid, in C order.
+        Its place in the grid, in C order, or among the samples.
     at : dict
         Values of the axes there, by name [SI].
     status : str
@@ -50,13 +50,16 @@ class RunReport:
     results : Path or None
         The dataset in it; None where another part is at work, and will gather it.
     total, done, remaining : int
-        Number of runs, of the part where one was asked for: all, with results, not yet run.
+        Number of runs, of the part where one was asked for: all, with results, not yet run. While runs of a
+        trace remain, they may ask for more.
     failed : tuple of FailedRun
         The runs that ended without results.
     stopped : str or None
         Why the sweep ended early: the name of a signal, or "time limit".
     gained : int
         Number of runs recorded since this start.
+    unneeded : int
+        Number of cells of the grid that a trace does not run.
     """
 
     out: Path
@@ -67,6 +70,7 @@ class RunReport:
     remaining: int
     stopped: str | None
     gained: int
+    unneeded: int = 0
 
     @property
     def exit_status(self) -> int:
@@ -108,4 +112,5 @@ def build_report(
         remaining=int((asked & ~records.recorded).sum()),
         stopped=stopped,
         gained=gained,
+        unneeded=int((~asked).sum()) if study.is_traced else 0,
     )

@@ -24,6 +24,9 @@ class Counter(Protocol):
     def claim(self) -> int:
         """Return a position that no other claim gets: 0, 1, 2, ... over all ranks."""
 
+    def rewind(self) -> None:
+        """Let claims begin at 0 again, unless all are interrupted; by one rank, while none claims."""
+
     def report(self, finished: int, failed: int) -> None:
         """Count runs that are finished, and those of them that failed."""
 
@@ -93,6 +96,10 @@ class SerialCounter:
         """Return the next position."""
         self._next += 1
         return self._next - 1
+
+    def rewind(self) -> None:
+        """Let claims begin at 0 again, unless interrupted."""
+        self._next = 0 if self._next < INTERRUPTED else INTERRUPTED
 
     def report(self, finished: int, failed: int) -> None:
         """Count runs that are finished, and those of them that failed."""

@@ -59,6 +59,12 @@ class SharedCounter:
         """Return a position that no other claim gets."""
         return self._fetch(self._NEXT, 1, MPI.SUM)
 
+    def rewind(self) -> None:
+        """Let claims begin at 0 again, unless all are interrupted."""
+        found = self._fetch(self._NEXT, 0, MPI.NO_OP)
+        if found < INTERRUPTED:
+            self._fetch(self._NEXT, -found, MPI.SUM)  # an interrupt that comes between is not lost
+
     def report(self, finished: int, failed: int) -> None:
         """Count runs that are finished, and those of them that failed."""
         self._fetch(self._FINISHED, finished, MPI.SUM)

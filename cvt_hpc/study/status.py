@@ -15,6 +15,7 @@ from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.recovery import Records, read_records
 from cvt_hpc.study.simulator import default_simulator
+from cvt_hpc.study.tracing import needed_runs
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
@@ -30,7 +31,8 @@ class StudyStatus:
     name : str
         Of the job.
     total, done, failed, left : int
-        Number of runs: all, with results, ended without results, not yet recorded.
+        Number of runs: all that are needed, with results, ended without results, not yet recorded. While runs
+        of a trace are left, they may ask for more.
     running : bool
         Whether a sweep is at work in the folder now.
     rate : float or None
@@ -40,6 +42,8 @@ class StudyStatus:
         its first record.
     warnings : tuple of str
         One line for each record file that is not sound.
+    unneeded : int
+        Number of cells of the grid that a trace does not run, as far as is known.
     """
 
     name: str
@@ -51,6 +55,7 @@ class StudyStatus:
     rate: float | None
     time_to_go: float | None
     warnings: tuple[str, ...]
+    unneeded: int = 0
 
 
 def read_status(out: str | Path) -> StudyStatus:
@@ -72,20 +77,22 @@ def read_status(out: str | Path) -> StudyStatus:
     records = read_records(folder.records, study)
     recorded = int(records.recorded.sum())
     done = int((records.rows["status"] == Status.DONE).sum())
-    left = study.size - recorded
+    needed = needed_runs(study, records)
+    left = needed & ~records.recorded
     latest, elapsed = _latest_session(records, running)
     costs = _predicted_costs(study, folder)
     spent = costs[latest].sum()
     return StudyStatus(
         name=study.name,
-        total=study.size,
+        total=int(needed.sum()),
         done=done,
         failed=recorded - done,
-        left=left,
+        left=int(left.sum()),
         running=running,
         rate=latest.sum() / elapsed if elapsed else None,
-        time_to_go=float(costs[~records.recorded].sum() * elapsed / spent) if elapsed else None,
+        time_to_go=float(costs[left].sum() * elapsed / spent) if elapsed else None,
         warnings=tuple(records.warnings),
+        unneeded=int((~needed).sum()),
     )
 
 

@@ -6,7 +6,7 @@ import logging
 import math
 import time
 from collections.abc import Collection
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -36,6 +36,7 @@ from cvt_hpc.study.simulator import Simulator, default_simulator
 from cvt_hpc.study.stopping import ELSEWHERE, SignalWatch, Stop
 from cvt_hpc.study.task import Task
 from cvt_hpc.study.time_limit import TimeLimit, find_time_limit
+from cvt_hpc.study.tracing import needed_runs
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
@@ -50,7 +51,6 @@ class _Plan(NamedTuple):
     assignments: list[Assignment]
     attempts: dict[int, int]  # of runs that were begun again
     fit: Fit
-    asked: np.ndarray  # whether a run is one of this start, shape (runs,)
     total: int
     recorded: int
     failed: int
@@ -117,6 +117,8 @@ def run(
         raise mismatch("fresh", "a run of the whole study", f"part {share}, and the others would lose theirs")
     simulator = simulator or default_simulator()
     study = describe(job, simulator)
+    if share is not None and study.is_traced:
+        raise mismatch("part", "a whole study, since a trace goes by the runs of all parts", f"part {share}")
     task = Task(job, study, simulator, run_limit)
 
     folder = StudyFolder(out if out is not None else Path("out") / job.name)
@@ -139,10 +141,16 @@ def run(
                 visible = progress and team.rank == 0
                 display = Progress(counter, plan.total, plan.recorded, plan.failed, visible, costs[order])
                 stop = Stop(counter, signals, plan.limit, display.show)
-                trouble = _compute(task, folder, plan, costs, team.rank, counter, stop)
-                team.wait_for_all(stop.look)
-                display.close()
-            stopped = _settle(team, trouble, stop.reason)
+                stopped = None
+                with closing(display):
+                    while plan.assignments:
+                        trouble = _compute(task, folder, plan, costs, team.rank, counter, stop)
+                        team.wait_for_all(stop.look)
+                        stopped = _settle(team, trouble, stop.reason)
+                        if stopped or not study.is_traced:
+                            break
+                        next_round = partial(_next_round, folder, task, plan, team.size, counter, display)
+                        plan = team.on_root(next_round)
             return team.on_root(lambda: _conclude(folder, task, share, plan, stopped, held))
 
     with SignalWatch() as signals, assembled_team(folder.crash_log) as team:
@@ -174,8 +182,7 @@ def _prepare(
     session = new_session(ranks)
     for warning in records.warnings + _other_versions(records, session):
         _logger.warning(warning)
-    index = np.arange(study.size)
-    asked = np.ones_like(index, bool) if part is None else part.holds(index)
+    asked = _asked(task, records, part)
     records = enter_attempts(folder, study, records, asked, retry, session)
     records.written[missing_histories(task.job, folder, records)] = np.nan  # done again; the record stays
     done = records.rows["status"] == Status.DONE
@@ -184,13 +191,34 @@ def _prepare(
         assignments=plan_runs(task.job, task.simulator, records, asked, ranks),
         attempts=later_attempts(records),
         fit=fit_recorded(task.simulator.run_costs(task.job), records.timings, done),
-        asked=asked,
         total=int(asked.sum()),
         recorded=recorded,
         failed=recorded - int((done & asked).sum()),
         session=session,
         limit=TimeLimit(),
     )
+
+
+def _asked(task: Task, records: Records, part: Part | None = None) -> np.ndarray:
+    """Return whether a run is one of this start, shape (runs,); a trace comes to ask for more."""
+    if part is not None:
+        return part.holds(np.arange(task.study.size))
+    asked = needed_runs(task.study, records)
+    asked[list(task.job.histories)] = True
+    return asked
+
+
+def _next_round(
+    folder: StudyFolder, task: Task, plan: _Plan, ranks: int, counter: Counter, display: Progress
+) -> _Plan:
+    """Return the plan of what a trace asks for after the runs of a round; on rank 0 alone."""
+    records = read_records(folder.records, task.study)
+    costs = task.simulator.run_costs(task.job)
+    assignments = plan_runs(task.job, task.simulator, records, _asked(task, records), ranks)
+    counter.rewind()
+    display.expect(costs[[index for assignment in assignments for index in assignment.runs]])
+    fit = fit_recorded(costs, records.timings, records.rows["status"] == Status.DONE)
+    return plan._replace(assignments=assignments, fit=fit)
 
 
 def _other_versions(records: Records, session: dict[str, Any]) -> list[str]:
@@ -262,5 +290,6 @@ def _conclude(
     gathers = part is None or not folder.is_in_use()
     records = gather_records(folder, task.study) if gathers else read_records(folder.records, task.study)
     records.written[missing_histories(task.job, folder, records)] = np.nan
-    gained = int(records.recorded[plan.asked].sum()) - plan.recorded
-    return build_report(folder, task.study, records, plan.asked, gathers, gained, stopped)
+    asked = _asked(task, records, part)
+    gained = int(records.recorded[asked].sum()) - plan.recorded
+    return build_report(folder, task.study, records, asked, gathers, gained, stopped)

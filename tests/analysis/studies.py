@@ -3,6 +3,7 @@
 import numpy as np
 import xarray as xr
 
+from cvt_hpc.analysis.classes import occurrence_classes
 from cvt_hpc.variables import Status, Vibrates
 
 GRADIENTS = (-2.4, -1.6, -0.8)
@@ -52,4 +53,29 @@ def study(gradients=GRADIENTS, stiffnesses=STIFFNESSES, loads=LOADS):
             "strand": ("strand", ["t1", "t2"]),
         },
         {"job_name": "occurrence", "title": "Vibration occurrence over load, friction and stiffness"},
+    )
+
+
+def traced(**axes):
+    """The study as a trace along the load leaves it: every third load is run, what lies between them is inferred."""
+    results = study(**axes)
+    inferred = occurrence_classes(results)
+    skipped = np.arange(results.sizes["load"]) % 3 > 0
+    results["status"].values[..., skipped] = Status.NOT_RUN
+    results["vibrates"].values[..., skipped] = Vibrates.UNDECIDED
+    for name in ("amplitude", "frequency"):
+        results[name].values[..., skipped, :] = np.nan
+    return results.assign(inferred_class=inferred)
+
+
+def sampled():
+    """The study's runs as samples, all in a row."""
+    return study().stack(run=("friction_gradient", "sheave_stiffness", "load")).reset_index("run")
+
+
+def two_flags(status, vibrates):
+    """A study along the load by its flags alone."""
+    dims = ("load",)
+    return xr.Dataset(
+        {"status": (dims, status), "vibrates": (dims, vibrates)}, {"load": np.arange(float(len(status)))}
     )

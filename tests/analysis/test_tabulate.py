@@ -47,3 +47,9 @@ def test_a_run_that_failed_has_no_numbers():
         assert not any(
             row[key] for key in row if key.startswith(("vibrates", "amplitude", "frequency", "mode"))
         )
+
+
+def test_samples_have_their_place_in_the_table():
+    results, rows = table()
+    stacked = results.stack(run=("friction_gradient", "sheave_stiffness", "load")).reset_index("run")
+    assert list(csv.DictReader(ROWS(stacked.transpose("run", ...)))) == rows

@@ -6,13 +6,8 @@ import pytest
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.physics.complementarity import ComplementarityError, solve_lcp
-from cvt_hpc.physics.compliance import (
-    ROUNDS_OF_BLOCK_FLIPS,
-    contact_state,
-    flexibility,
-    sheaves,
-    solve_contact,
-)
+from cvt_hpc.physics.compliance import ROUNDS_OF_BLOCK_FLIPS, contact_state, solve_contact
+from cvt_hpc.physics.sheaves import flexibility, sheaves
 
 STATIONS, ARC, RADIUS = 60, 0.27, 0.075
 DEPTH = 2e-5  # [m]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cvt_hpc.physics.complementarity import solve_lcp
-from cvt_hpc.physics.compliance import contact_state, flexibility, sheaves, solve_contact
+from cvt_hpc.physics.compliance import contact_state, solve_contact
 from cvt_hpc.physics.lane_compliance import (
     CLOSED,
     GAP,
@@ -14,6 +14,7 @@ from cvt_hpc.physics.lane_compliance import (
     lane_contact,
     solve_lane_contact,
 )
+from cvt_hpc.physics.sheaves import flexibility, sheaves
 
 STATIONS, ARC, RADIUS = 20, 0.27, 0.075
 ELEMENTS = 3e10  # c_e [N/m^2] in the middle of what is tried

@@ -42,16 +42,17 @@ SCENES = {
     "no load, rigid": ({"load": 0.0, "sheave_stiffness": np.inf}, 5e-3),
     "no load, damped": ({"load": 0.0, "transverse_damping": 2e4}, 5e-3),
 }
-# The default mesh carries waves that are so short that they last a few steps only. Without load one cell at the driven
-# pulley's inlet closes and opens all the time. The step feeds it, in proportion to its length: 14 W of 1.9 kW at 3 us, which
-# its damper takes out again. So it does, with more cells and power, between rigid sheaves.
+# The default mesh carries waves that are so short that they last a few steps only, and fronts of pressed elements into which
+# gaps run: at the driven pulley's inlet without load, on the driving pulley between rigid sheaves. A step in which the cell of
+# such a front is neither open nor closed rattles there: 3 % of the power at 120 N m, 2 % at 40 N m, 0.7 % without load.
 NO_LOAD = {"load": 0.0, "duration": 0.06}
 DEFAULT_MESH = {
-    "vibrating": ({"load": 120.0}, 1.5e-3),
-    "rigid": ({"load": 120.0, "sheave_stiffness": np.inf}, LARGEST_POWER_RESIDUAL),
-    "no load": (NO_LOAD, 0.01),
+    "vibrating": ({"load": 120.0}, 5e-4),
+    "rigid": ({"load": 120.0, "sheave_stiffness": np.inf} | CONSTANT, 5e-4),
+    "rigid, small load": ({"load": 40.0, "sheave_stiffness": np.inf} | CONSTANT, 5e-4),
+    "no load": (NO_LOAD, 2e-3),
     # of a step that begins at every sample in the same phase: dampers that were sampled too were 80 W off here, 4 %
-    "no load, in phase": (NO_LOAD | {"step": 2.5e-6}, 0.015),
+    "no load, in phase": (NO_LOAD | {"step": 2.5e-6}, 2e-3),
 }
 
 
@@ -135,16 +136,12 @@ def test_powers_are_torque_times_speed(name):
     assert found["ring_loss"] == pytest.approx(mean(run, "ring_loss"))
 
 
-def test_what_a_closing_cell_leaves_open_falls_with_the_step():
-    found = [balance(finished(**NO_LOAD, stations=80, step=step)) for step in (3e-6, 1.5e-6, 0.3e-6)]
-    residuals = [f["power_residual"] for f in found]
-    # first order: three quarters of what is fed at 3 us, and more is in the dampers' loss, are gone at a quarter of it
-    assert residuals[0] < residuals[1] < residuals[2]
-    assert abs(residuals[2]) < 1e-3
-    fed, damped = np.diff(residuals) * found[2]["driving_power"], -np.diff([f["layer_loss"] for f in found])
-    assert damped == pytest.approx(
-        fed, abs=2.0
-    )  # W: what else differs is the mesh's part, and 60 ms are short
+def test_a_front_into_which_gaps_run_leaves_the_same_open_at_any_step():
+    found = [balance(finished(**NO_LOAD, stations=80, step=step)) for step in (4.6e-6, 1.5e-6, 0.3e-6)]
+    # 0.06 %, as the explicit step has it, is the mesh's; a cell that rattles leaves -0.7 % at 3 us, and its damper takes
+    # 19 W instead of 5.6 W
+    assert np.ptp([f["power_residual"] for f in found]) < 3e-4
+    assert [f["layer_loss"] for f in found] == pytest.approx([found[-1]["layer_loss"]] * 3, rel=1e-3)
 
 
 # One term at a time: the rate of the stored energy, with and without the term, in one and the same rough state

@@ -20,7 +20,7 @@ import psutil
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PATIENCE = 60.0  # [s] until a thing that should happen counts as not happening
+PATIENCE = 120.0  # [s] until a thing that should happen counts as not happening
 NODES = ("n1", "n2")
 _DAEMONS = ("munged", "slurmctld", "slurmd", "sbatch")
 _LAUNCHERS = ("SLURM_", "SBATCH_", "PMI", "OMPI_", "MPI_")
@@ -49,7 +49,7 @@ SelectTypeParameters=CR_Core
 SchedulerParameters=sched_interval=1,bf_interval=1,batch_sched_delay=0,sched_min_interval=0
 MpiDefault=none
 ReturnToService=2
-KillWait=5
+KillWait=2
 SlurmdTimeout=5
 SlurmdParameters=config_overrides
 {nodes}
@@ -98,18 +98,17 @@ class Cluster:
         wait_until(lambda: self.ask("sinfo", "-h", "-o", "%T") == "idle", "both nodes", self.logs)
 
     def start_node(self, node: str) -> None:
-        """Start the daemon of a node."""
-        self._start("slurmd", "-D", "-N", node, name=node)
+        """Start the daemon of a node; those that it starts to hold jobs inherit TEST_NODE."""
+        self._start("slurmd", "-D", "-N", node, name=node, TEST_NODE=node)
 
     def lose_node(self, node: str) -> None:
         """Kill -9 the daemon of a node and all that runs there, as a power failure would."""
-        self._daemons[node].kill()
+        self._kill(TEST_NODE=node)
         self._daemons[node].wait()
-        kill([process for process in self._processes() if process.environ().get("SLURMD_NODENAME") == node])
 
     def stop(self) -> None:
         """End all daemons and all that they have started."""
-        kill(self._processes())
+        self._kill()
         for daemon in self._daemons.values():
             daemon.wait()
 
@@ -173,12 +172,12 @@ class Cluster:
             "NUMBA_CACHE_DIR": str(ROOT / "cvt_hpc" / "__pycache__"),  # with the kernels of the other tests
         }
 
-    def _start(self, program: str, *arguments: str, name: str = "") -> None:
+    def _start(self, program: str, *arguments: str, name: str = "", **environment: str) -> None:
         name = name or program
         with (self.folder / f"{name}.log").open("a") as log:
             self._daemons[name] = subprocess.Popen(
                 [_which(program), *arguments],
-                env=self.environment,
+                env={**self.environment, **environment},
                 cwd=self.folder,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
@@ -193,16 +192,23 @@ class Cluster:
         assert done.returncode == 0, f"{command}: {done.stderr}"
         return done.stdout.strip()
 
-    def _processes(self) -> list[psutil.Process]:
+    def _kill(self, **environment: str) -> None:
+        """Kill -9 daemons with these variables and what came of them, until nothing is left."""
+
+        def nothing_left() -> bool:
+            found = self._processes(**environment)
+            # Those that hold jobs come first, lest they report how their jobs end.
+            kill([*found, *(child for process in found for child in _children(process))])
+            return not found
+
+        wait_until(nothing_left, "the end of all daemons")
+
+    def _processes(self, **environment: str) -> list[psutil.Process]:
         """Return the daemons and what came of them, told by the configuration in their environment."""
-        found = []
-        for process in psutil.process_iter():
-            try:
-                if process.environ().get("SLURM_CONF") == self.environment["SLURM_CONF"]:
-                    found.append(process)
-            except psutil.Error:  # ended meanwhile, or somebody else's
-                continue
-        return found
+        wanted = {"SLURM_CONF": self.environment["SLURM_CONF"], **environment}
+        entries = {f"{name}={value}".encode() for name, value in wanted.items()}
+        # Not by psutil: slurmstepd writes its title over the beginning of its environment.
+        return [process for process in psutil.process_iter() if entries <= _environment(process.pid)]
 
 
 def kill(processes: list[psutil.Process]) -> None:
@@ -221,7 +227,21 @@ def wait_until(condition: Callable[[], Any], what: str, explain: Callable[[], st
     while not condition():
         if time.monotonic() > deadline:
             pytest.fail(f"waited in vain for {what}\n{explain()}")
-        time.sleep(0.1)
+        time.sleep(0.05)
+
+
+def _environment(pid: int) -> set[bytes]:
+    try:
+        return set(Path(f"/proc/{pid}/environ").read_bytes().split(b"\0"))
+    except OSError:  # ended meanwhile, or somebody else's
+        return set()
+
+
+def _children(process: psutil.Process) -> list[psutil.Process]:
+    try:
+        return process.children(recursive=True)
+    except psutil.NoSuchProcess:
+        return []
 
 
 def _host() -> str:

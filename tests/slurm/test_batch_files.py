@@ -94,7 +94,7 @@ def test_a_warned_sweep_is_requeued_and_goes_on(cluster, job_file, serial, tmp_p
 
 def test_a_job_that_gains_nothing_is_not_requeued(cluster, tmp_path):
     endless = tmp_path / "endless.toml"
-    endless.write_text(JOB.replace("0.1 s", "1000 s"))
+    endless.write_text(JOB.replace("0.1 s", "5 s"))
     job = cluster.submit("sweep.sbatch", endless, "--out", tmp_path / "out", options=("--ntasks=1",))
     wait_until((tmp_path / "out" / "job.json").exists, "the start", lambda: cluster.output(job))
     cluster.ask("scancel", "--batch", "--signal=USR1", job)
@@ -122,32 +122,30 @@ def test_an_array_shares_a_folder(cluster, job_file, serial, tmp_path):
     assert_same_as_serial(out, serial)
 
 
-def test_parts_of_an_array_are_submitted_one_by_one(cluster, job_file, serial, tmp_path):
+def test_a_part_of_an_array_alone_and_then_all(cluster, job_file, serial, tmp_path):
     out = tmp_path / "out"
-    for array, count in (("3", 4), ("1-2", RUNS), ("1-3", RUNS)):
+    for array, parts, count in (("2", [2], 4), ("1-3", [1, 2, 3], RUNS)):
         job = cluster.submit(
             "array.sbatch", job_file, "--out", out, options=(f"--array={array}",), CVT_HPC_PARTS="3"
         )
-        for task in range(int(array[0]), int(array[-1]) + 1):
-            assert_completed(cluster, f"{job}_{task}")
+        for part in parts:
+            assert_completed(cluster, f"{job}_{part}")
+        assert cluster.output(job).count("4 runs: 4 done, 0 failed, 0 left") == len(parts)
         assert records(out) == count
-    assert cluster.output(job).count("4 runs: 4 done, 0 failed, 0 left") == 3
     assert_same_as_serial(out, serial)
 
 
 def test_the_loss_of_a_node_costs_no_record(cluster, job_file, serial, tmp_path):
     out = tmp_path / "out"
     job = cluster.submit("sweep.sbatch", job_file, "--out", out, options=TWO_NODES)
+    # The node of the batch file, of rank 0, and of the counter that all ranks share.
+    first = cluster.wait_for(job, "RUNNING")["BatchHost"]
     wait_for_records(cluster, job, out)
-    cluster.lose_node("n2")
+    cluster.lose_node(first)
     try:
-        recorded = records(out)
-        wait_until(
-            lambda: cluster.ask("sinfo", "-h", "-n", "n2", "-o", "%T") == "down", "the loss", cluster.logs
-        )
+        start_again(cluster, job)  # Slurm has put it back into the queue
+        assert 0 < records(out) < RUNS
     finally:
-        cluster.start_node("n2")
-    start_again(cluster, job)
-    assert 0 < recorded < RUNS
+        cluster.start_node(first)
     assert_completed(cluster, job)
     assert_same_as_serial(out, serial)

@@ -17,7 +17,7 @@ PATIENCE = 20.0  # [s] that rank 0 computes at most while it waits for the other
 
 
 def claim_all(team: Team, counter: Counter, options: dict[str, Any]) -> dict[str, Any]:
-    """Claim below a limit from all ranks; return the claims by rank, and the tally as all ranks see it."""
+    """Claim below a limit from all ranks, and once more after a rewind; return the claims and tallies by rank."""
     mine = [counter.claim()]
     counter.report(1, failed=mine[0] % 10 == 0)
     team.wait_for_all(lambda: None)  # each has one
@@ -25,7 +25,12 @@ def claim_all(team: Team, counter: Counter, options: dict[str, Any]) -> dict[str
         mine.append(position)
         counter.report(1, failed=position % 10 == 0)
     team.wait_for_all(lambda: None)
-    return {"claims": team.collect(mine), "tallies": team.collect(tuple(counter.tally()))}
+    team.on_root(counter.rewind)
+    return {
+        "claims": team.collect(mine),
+        "rewound": team.collect(counter.claim()),
+        "tallies": team.collect(tuple(counter.tally())),
+    }
 
 
 def compute_on_host(team: Team, counter: Counter, options: dict[str, Any]) -> dict[str, Any]:
@@ -50,6 +55,7 @@ def interrupt_from_last(team: Team, counter: Counter, options: dict[str, Any]) -
     if team.rank == team.size - 1:
         counter.interrupt_all()
     team.wait_for_all(lambda: None)
+    team.on_root(counter.rewind)  # a rewind is for the next round, and lets no rank miss an interruption
     return {
         "before": before,
         "after": team.collect(counter.is_interrupted()),

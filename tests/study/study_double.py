@@ -39,7 +39,8 @@ class Job:
     """Satisfies what the study asks of a `cvt_hpc.job.Job`.
 
     Parameters that steer the double: `pause` [s] per run; `raise_at` and `diverge_at`, the value of the first
-    axis at which a run raises, or fails as a diverging integration does; `crash_at`, at which the process dies.
+    axis at which a run raises, or fails as a diverging integration does; `crash_at`, at which the process dies;
+    `window`, the first and last value of that axis between which runs vibrate, instead of by their numbers.
     """
 
     axes: tuple[Axis, ...] = (Axis("load", tuple(range(12))),)
@@ -49,6 +50,7 @@ class Job:
     model: str = "logistic"
     stepper: str = "none"
     source: str = "double.toml"
+    design: dict[str, Any] = field(default_factory=dict)
     histories: tuple[int, ...] = ()
 
     def point(self, index: int) -> dict[str, Any]:
@@ -58,7 +60,8 @@ class Job:
 
     def resolved(self) -> dict[str, Any]:
         axes = {a.name: [str(v) if v == math.inf else v for v in a.values] for a in self.axes}
-        return {"model": self.model, "scene": self.parameters, "axes": axes}
+        design = {"design": self.design} if self.design else {}
+        return {"model": self.model, "scene": self.parameters, **design, "axes": axes}
 
     def fingerprint(self) -> str:
         # What steers only the pace is no part of the numbers.
@@ -149,9 +152,11 @@ class Simulator:
             os.kill(os.getpid(), signal.SIGKILL)  # as for lack of memory
         diverges = first is not None and first == point.get("diverge_at")
         numbers = np.full(24, np.nan) if diverges else logistic_numbers(point, job)
+        window = point.get("window")
+        vibrates = window[0] <= first <= window[1] if window else numbers[0] > 0.5
         return {
             "status": Status.FAILED_NUMERICS if diverges else Status.DONE,
-            "vibrates": Vibrates.YES if numbers[0] > 0.5 else Vibrates.NO,
+            "vibrates": Vibrates.YES if vibrates else Vibrates.NO,
             "reason": "step 17: the state is not finite" if diverges else "",
             "amplitude": numbers[:2],
             "spectrum": numbers[2:].reshape(2, 11),
@@ -182,7 +187,7 @@ def logistic_numbers(point: dict[str, Any], job: Job) -> np.ndarray:
 def main(options: dict[str, Any]) -> int:
     """Sweep the double as the command line would.
 
-    Options: `out`; `runs`, the length of the only axis; `parameters` and `histories` of the job; `sweep`, further arguments of
+    Options: `out`; `runs`, the length of the only axis; `parameters`, `design` and `histories` of the job; `sweep`, further arguments of
     `run`; `slow`, `largest_file` and `lanes`, see `Simulator`; `thread_level` of MPI; `break_rank`, the rank whose log
     has a defect, and whether the program `swallows_defects`; `break_rank_after`, the rank that raises when the
     sweep is over.
@@ -198,7 +203,8 @@ def main(options: dict[str, Any]) -> int:
     if process_rank() == options.get("break_rank"):
         RecordLog.append = raise_defect
     axes = (Axis("load", tuple(range(options.get("runs", 12)))),)
-    job = Job(axes, options.get("parameters", {}), histories=tuple(options.get("histories", ())))
+    kept = tuple(options.get("histories", ()))
+    job = Job(axes, options.get("parameters", {}), design=options.get("design", {}), histories=kept)
     simulator = Simulator(options.get("slow"), options.get("largest_file"), options.get("lanes", 1))
     try:
         report = run(job, Path(options["out"]), simulator=simulator, **options.get("sweep", {}))

@@ -3,15 +3,19 @@
 import json
 import math
 import signal
+import threading
+import time
 
 import numpy as np
 import pytest
 from recorded import records
 from study_double import Axis, Job, Simulator
-from study_processes import assert_same_numbers, wait_until
+from study_processes import PATIENCE, assert_same_numbers, wait_until
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.study import gather, open_results, read_status, run
+from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.lock import locked
 from cvt_hpc.study.part import Part, read_part
 
 RUNS = 60
@@ -82,6 +86,19 @@ def test_a_part_that_is_done_does_nothing(tmp_path):
     report = run(job(), tmp_path, simulator=Idle(), progress=False, part="2/3")
     assert (report.done, report.exit_status, report.gained) == (20, 0, 0)
     assert set((tmp_path / "records").iterdir()) == logs
+
+
+def test_one_gathers_at_a_time(tmp_path):
+    sweep(tmp_path)
+    folder = StudyFolder(tmp_path)
+    folder.results.unlink()
+    other = threading.Thread(target=gather, args=(tmp_path,))
+    with locked(folder.gather_lock):
+        other.start()
+        time.sleep(0.3)  # long enough to gather
+        assert not folder.results.exists()
+    other.join(PATIENCE)
+    assert folder.results.exists()
 
 
 @pytest.fixture

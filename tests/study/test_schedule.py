@@ -22,6 +22,8 @@ def test_serial_claims_follow_the_plan():
     with SerialCounter() as counter:
         assert claimed(counter) == PLAN
         assert claimed(counter) == []
+        counter.rewind()
+        assert claimed(counter) == PLAN
 
 
 def test_no_claim_when_it_is_not_allowed():
@@ -35,6 +37,7 @@ def test_serial_interruption_is_beyond_every_plan():
     counter = SerialCounter()
     assert not counter.is_interrupted()
     counter.interrupt_all()
+    counter.rewind()
     assert counter.is_interrupted()
     assert claimed(counter) == []
 
@@ -45,6 +48,7 @@ def test_three_ranks_claim_every_number_once(start):
     assert sorted(sum(claims, [])) == list(range(600))
     assert all(mine == sorted(mine) for mine in claims)
     assert len(claims) == 3
+    assert sorted(found["rewound"]) == [0, 1, 2]
     assert found["tallies"] == [[600, 60]] * 3
 
 

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.physics.compliance import Sheaves, flexibility, sheaves
 from cvt_hpc.physics.friction import FrictionLaw, friction_law
 from cvt_hpc.physics.geometry import Variator, variator
+from cvt_hpc.physics.sheaves import Sheaves, flexibility, sheaves
 
 FIELDS = ("w", "u", "v_element", "v_ring", "v_filtered", "n_element", "n_ring")
 W, U, V_ELEMENT, V_RING, V_FILTERED, N_ELEMENT, N_RING = range(len(FIELDS))

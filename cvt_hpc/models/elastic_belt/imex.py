@@ -9,8 +9,11 @@ kept to round-off.
 
 The rings' stress is centred in time and damps nothing; the elements' is taken at the end of the step, since
 a centred one rings where they meet and part: it damps them like EA dt [N s], in first order. The set of
-separated elements is frozen during a step: those that are apart and, with the old speeds, stay apart. What
-limits the step is accuracy, c dt / h about 5, and the transverse contact and bending.
+separated elements is frozen during a step: those that are apart and, with the old speeds, stay apart.
+Elements meet where their gap closes and part where their push, damper included, has ended: were it where
+they reach their length at rest, the cell in which gaps run into pressed elements would be neither, and rattle
+from step to step with pushes in proportion to the step (`EDGES.md`). What limits the step is accuracy,
+c dt / h about 5, and the transverse contact and bending.
 """
 
 from __future__ import annotations
@@ -116,6 +119,8 @@ def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
             viscous = damper * per_cell * closing
             damped = fma(damper * per_cell, change, viscous)
             if layer == 0:
+                # what is left of the push beyond the length at rest stores nothing: all of it is damping
+                damped = select(eps > 0.0, minimum(fma(stiffness, eps, damped), 0.0), damped)
                 damped = select(viscous > -stiffness * eps, -stiffness * minimum(eps, 0.0), damped)
                 damped = select(stations[j, LINK_0] > 0.0, damped, 0.0)
             work_done = fma(damped, fma(0.5, change, closing), work_done)

@@ -56,7 +56,7 @@ FADED = 0.1  # [N s/m]: couplings of stations are 1e3 and more
 
 
 @merged_kernel
-def _element_stress(stiffness, grip, eps, closing, ahead, per_length):
+def _element_stress(stiffness, grip, eps, closing, ahead, per_length, last):
     """-P in a cell [N] with the speeds that the step begins with, and its slope with their change.
 
     Parameters
@@ -67,12 +67,14 @@ def _element_stress(stiffness, grip, eps, closing, ahead, per_length):
         Strain and difference of the speeds at both ends [m/s].
     ahead, per_length
         Strain at the end of the step with these speeds, and its slope with the difference [s/m].
+    last
+        Slope of -P in the step before [N s/m]: 0 where the elements were apart.
     """
     viscous = grip * closing
     # elements never pull: their damper ends where it would outweigh the push force
     pulls = viscous > -stiffness * eps
     viscous, grip = select(pulls, -stiffness * minimum(eps, 0.0), viscous), select(pulls, 0.0, grip)
-    apart = (eps >= 0.0) & (ahead >= 0.0)
+    apart = (eps >= 0.0) & (ahead >= 0.0) & (pulls | (last <= 0.0))
     stress = select(apart, 0.0, fma(stiffness, ahead, viscous))
     return stress, select(apart, 0.0, fma(stiffness, per_length, grip))
 
@@ -110,6 +112,7 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
             closing_0,
             fma(per_length, outflow, eps),
             per_length,
+            stations[j, LINK_0],
         )
         grip = ring_damping * per_cell
         stress_1 = fma(ring_stiffness, stations[j, EPS_1], grip * closing_1)

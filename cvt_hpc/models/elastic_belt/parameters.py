@@ -10,17 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.parameters import Parameter
-from cvt_hpc.physics.friction_table import table_problems
+from cvt_hpc.parameters import Parameter, not_negative, positive
+from cvt_hpc.physics.friction_problems import friction_problems
 from cvt_hpc.physics.geometry import variator
-
-
-def _positive(default: float, unit: str, description: str) -> Parameter:
-    return Parameter(default, unit, description, minimum=0.0, exclusive=True)
-
-
-def _not_negative(default: float, unit: str, description: str) -> Parameter:
-    return Parameter(default, unit, description, minimum=0.0)
 
 
 def _stiffness(default: float, unit: str, description: str) -> Parameter:
@@ -29,11 +21,11 @@ def _stiffness(default: float, unit: str, description: str) -> Parameter:
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {
-        "ratio": _positive(2.52, "", "speed ratio, driven radius / driving radius (Lebrecht 2004: LOW stop)"),
-        "driven_radius": _positive(0.075, "m", "pitch radius on the driven pulley"),
-        "centre_distance": _positive(0.155, "m", "distance of the shafts"),
-        "driving_speed": _positive(3000.0 * np.pi / 30.0, "rad/s", "speed of the driving pulley, prescribed"),
-        "thrust": _positive(50e3, "N", "axial force on the driven pulley"),
+        "ratio": positive(2.52, "", "speed ratio, driven radius / driving radius (Lebrecht 2004: LOW stop)"),
+        "driven_radius": positive(0.075, "m", "pitch radius on the driven pulley"),
+        "centre_distance": positive(0.155, "m", "distance of the shafts"),
+        "driving_speed": positive(3000.0 * np.pi / 30.0, "rad/s", "speed of the driving pulley, prescribed"),
+        "thrust": positive(50e3, "N", "axial force on the driven pulley"),
         "load": Parameter(
             0.0, "N m", "torque at the driving pulley; the driven one is loaded by ratio x load"
         ),
@@ -44,33 +36,33 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             choices=("constant", "ramp"),
         ),
         "load_start": Parameter(0.0, "N m", "load at the start of a ramp"),
-        "rise_time": _positive(
+        "rise_time": positive(
             0.03, "s", "start-up: load rises smoothly, extra damping of the belt fades out"
         ),
-        "disturbance": _not_negative(
+        "disturbance": not_negative(
             1e-6, "m", "largest random displacement of the strands, given to them at rise_time"
         ),
         "seed": Parameter(1, "", "seed of that disturbance", minimum=0),
     },
     "belt": {
-        "element_mass": _positive(1.0, "kg/m", "mass per length of the elements"),
-        "ring_mass": _positive(0.3, "kg/m", "mass per length of the rings"),
-        "element_stiffness": _positive(4e7, "N", "longitudinal stiffness EA of the pressed elements"),
-        "ring_stiffness": _positive(7.7e6, "N", "longitudinal stiffness EA of all rings"),
-        "bending_stiffness": _not_negative(
+        "element_mass": positive(1.0, "kg/m", "mass per length of the elements"),
+        "ring_mass": positive(0.3, "kg/m", "mass per length of the rings"),
+        "element_stiffness": positive(4e7, "N", "longitudinal stiffness EA of the pressed elements"),
+        "ring_stiffness": positive(7.7e6, "N", "longitudinal stiffness EA of all rings"),
+        "bending_stiffness": not_negative(
             0.5, "N m^2", "EI of the belt against leaving its path's curvature"
         ),
         "play": Parameter(0.3e-3, "m", "sum of the gaps between elements on the reference path"),
-        "reference_tension": _not_negative(
+        "reference_tension": not_negative(
             5.3e3, "N", "ring tension at which the rings fit the reference path"
         ),
         "ring_offset": Parameter(1e-3, "m", "radial offset of the rings' neutral line from the pitch line"),
-        "ring_friction": _not_negative(0.08, "", "friction coefficient between rings and elements"),
-        "ring_friction_speed": _positive(0.01, "m/s", "regularisation speed of that friction"),
-        "transverse_damping": _not_negative(500.0, "N s/m^2", "viscous damping of the transverse motion"),
-        "element_damping": _not_negative(20.0, "N s", "longitudinal damping of the pressed elements"),
-        "ring_damping": _not_negative(4.0, "N s", "longitudinal damping of the rings"),
-        "longitudinal_mass": _positive(
+        "ring_friction": not_negative(0.08, "", "friction coefficient between rings and elements"),
+        "ring_friction_speed": positive(0.01, "m/s", "regularisation speed of that friction"),
+        "transverse_damping": not_negative(500.0, "N s/m^2", "viscous damping of the transverse motion"),
+        "element_damping": not_negative(20.0, "N s", "longitudinal damping of the pressed elements"),
+        "ring_damping": not_negative(4.0, "N s", "longitudinal damping of the rings"),
+        "longitudinal_mass": positive(
             1.0, "", "factor on the layers' inertia along the path; other than 1 it is another belt"
         ),
     },
@@ -81,9 +73,9 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "tilt_stiffness": _stiffness(
             3e5, "N m/rad", "reference stiffness against tilting, shaft bending included"
         ),
-        "local_stiffness": _positive(4e9, "N/m^2", "reference stiffness against local bending, per length"),
-        "local_length": _positive(0.012, "m", "decay length of local bending"),
-        "flank_stiffness": _positive(3e10, "N/m^2", "axial stiffness of the elements, per length"),
+        "local_stiffness": positive(4e9, "N/m^2", "reference stiffness against local bending, per length"),
+        "local_length": positive(0.012, "m", "decay length of local bending"),
+        "flank_stiffness": positive(3e10, "N/m^2", "axial stiffness of the elements, per length"),
         "half_wedge_angle": Parameter(
             np.deg2rad(11.0),
             "rad",
@@ -93,9 +85,9 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             exclusive=True,
         ),
         "driving_position": Parameter(0.0, "m", "axial opening of the driving pulley, prescribed (LOW stop)"),
-        "sheave_lag": _positive(2e-3, "s", "time constant T1 of the driven sheave's axial motion"),
-        "lag_stiffness": _positive(2e8, "N/m", "stiffness that scales that lag"),
-        "driven_inertia": _positive(0.02, "kg m^2", "moment of inertia of the driven pulley"),
+        "sheave_lag": positive(2e-3, "s", "time constant T1 of the driven sheave's axial motion"),
+        "lag_stiffness": positive(2e8, "N/m", "stiffness that scales that lag"),
+        "driven_inertia": positive(0.02, "kg m^2", "moment of inertia of the driven pulley"),
     },
     "friction": {
         "friction_law": Parameter(
@@ -110,10 +102,10 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "slope dmu/dv of the friction law at v -> 0+, its steepest fall, without regularisation",
             maximum=0.0,
         ),
-        "kinetic_friction": _positive(0.1, "", "the level that does not change with the gradient"),
-        "stribeck_velocity": _positive(0.05, "m/s", "speed scale of the fall"),
-        "friction_speed": _positive(0.03, "m/s", "regularisation speed of the flanks' friction"),
-        "friction_memory": _not_negative(
+        "kinetic_friction": positive(0.1, "", "the level that does not change with the gradient"),
+        "stribeck_velocity": positive(0.05, "m/s", "speed scale of the fall"),
+        "friction_speed": positive(0.03, "m/s", "regularisation speed of the flanks' friction"),
+        "friction_memory": not_negative(
             0.3e-3, "s", "time constant of the filtered sliding speed; 0: no memory"
         ),
         "table_force": Parameter((), "N/m", "normal line forces of a friction table, ascending"),
@@ -160,13 +152,7 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if p["rise_time"] > before * (1.0 + 1e-9):
         expected = f"a load that has risen before the run is judged, within {before:g} s"
         problems.append(("rise_time", expected, f"{p['rise_time']:g} s"))
-    if p["friction_law"] == "coulomb" and p["friction_gradient"] != 0.0:
-        problems.append(
-            ("friction_gradient", "0 with friction_law coulomb", f"{p['friction_gradient']:g} s/m")
-        )
-    if p["friction_law"] == "table":
-        problems += table_problems(p["table_force"], p["table_speed"], p["table_mu"])
-    return problems
+    return problems + friction_problems(p)
 
 
 def inert(parameters: dict[str, Any]) -> dict[str, str]:

@@ -54,7 +54,7 @@ from cvt_hpc.models.elastic_belt.rhs import (
     memory_rates,
     strains,
 )
-from cvt_hpc.physics.compliance import flexibility
+from cvt_hpc.physics.sheaves import flexibility
 from cvt_hpc.physics.splines import Splines, hierarchical_splines
 from cvt_hpc.steppers.system import System
 

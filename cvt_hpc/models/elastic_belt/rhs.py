@@ -40,8 +40,9 @@ from cvt_hpc.models.elastic_belt.belt import (
     W,
 )
 from cvt_hpc.models.elastic_belt.flank import flank_forces, sliding
-from cvt_hpc.physics.compliance import ContactState, Sheaves, solve_contact
+from cvt_hpc.physics.compliance import ContactState, solve_contact
 from cvt_hpc.physics.friction import friction_coefficient, saturation
+from cvt_hpc.physics.sheaves import Sheaves
 
 
 @merged_kernel

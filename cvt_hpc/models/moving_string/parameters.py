@@ -6,12 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.parameters import Parameter
-
-
-def _positive(default: float, unit: str, description: str) -> Parameter:
-    return Parameter(default, unit, description, minimum=0.0, exclusive=True)
-
+from cvt_hpc.parameters import Parameter, positive
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {
@@ -23,13 +18,13 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             choices=("mode", "pulse"),
         ),
         "mode": Parameter(1, "", "number of the eigenmode", minimum=1, maximum=1000),
-        "pulse_width": _positive(0.1, "", "width of the pulse, relative to the length of its way and back"),
-        "largest_displacement": _positive(1e-5, "m", "largest displacement at the start, nearly"),
+        "pulse_width": positive(0.1, "", "width of the pulse, relative to the length of its way and back"),
+        "largest_displacement": positive(1e-5, "m", "largest displacement at the start, nearly"),
     },
     "string": {
-        "length": _positive(0.15, "m", "length between the eyes"),
-        "tension": _positive(5000.0, "N", "tension T"),
-        "line_mass": _positive(1.3, "kg/m", "mass per length"),
+        "length": positive(0.15, "m", "length between the eyes"),
+        "tension": positive(5000.0, "N", "tension T"),
+        "line_mass": positive(1.3, "kg/m", "mass per length"),
     },
     "mesh": {
         "cells": Parameter(64, "", "cells between the eyes", minimum=4, maximum=4096),

@@ -4,29 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from cvt_hpc.parameters import Parameter
-from cvt_hpc.physics.friction_table import table_problems
-
-
-def _positive(default: float, unit: str, description: str) -> Parameter:
-    return Parameter(default, unit, description, minimum=0.0, exclusive=True)
-
-
-def _not_negative(default: float, unit: str, description: str) -> Parameter:
-    return Parameter(default, unit, description, minimum=0.0)
-
+from cvt_hpc.parameters import Parameter, not_negative, positive
+from cvt_hpc.physics.friction_problems import friction_problems
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {
-        "belt_speed": _not_negative(0.2, "m/s", "speed of the belt under the mass"),
-        "normal_load": _positive(1.0, "N", "force that presses the mass on the belt"),
+        "belt_speed": not_negative(0.2, "m/s", "speed of the belt under the mass"),
+        "normal_load": positive(1.0, "N", "force that presses the mass on the belt"),
         "initial_displacement": Parameter(0.0, "m", "displacement of the mass at the start"),
         "initial_speed": Parameter(0.2, "m/s", "speed of the mass at the start; belt_speed: it sticks"),
     },
     "oscillator": {
-        "mass": _positive(1.0, "kg", "the mass"),
-        "stiffness": _positive(1.0, "N/m", "stiffness of its spring"),
-        "damping": _not_negative(0.0, "N s/m", "viscous damping of its spring"),
+        "mass": positive(1.0, "kg", "the mass"),
+        "stiffness": positive(1.0, "N/m", "stiffness of its spring"),
+        "damping": not_negative(0.0, "N s/m", "viscous damping of its spring"),
     },
     "friction": {
         "friction_law": Parameter(
@@ -41,12 +32,12 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "slope dmu/dv of the friction law at v -> 0+, its steepest fall, without regularisation",
             maximum=0.0,
         ),
-        "kinetic_friction": _positive(0.6, "", "the level that does not change with the gradient"),
+        "kinetic_friction": positive(0.6, "", "the level that does not change with the gradient"),
         "static_friction": Parameter(
             1.0, "", "level at rest, of the coulomb law alone; the others have theirs by the law", minimum=0.0
         ),
-        "stribeck_velocity": _positive(0.05, "m/s", "speed scale of the fall"),
-        "friction_speed": _positive(
+        "stribeck_velocity": positive(0.05, "m/s", "speed scale of the fall"),
+        "friction_speed": positive(
             1e-3, "m/s", "regularisation speed of friction at rest; moreau does without"
         ),
         "table_force": Parameter((), "N", "normal loads of a friction table, ascending"),
@@ -70,16 +61,8 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         Empty where all is well.
     """
     p = parameters
-    if p["friction_law"] == "table":
-        return table_problems(p["table_force"], p["table_speed"], p["table_mu"])
-    if p["friction_law"] != "coulomb":
-        return []
-    problems = []
-    if p["friction_gradient"] != 0.0:
-        problems.append(
-            ("friction_gradient", "0 with friction_law coulomb", f"{p['friction_gradient']:g} s/m")
-        )
-    if p["static_friction"] < p["kinetic_friction"]:
+    problems = friction_problems(p)
+    if p["friction_law"] == "coulomb" and p["static_friction"] < p["kinetic_friction"]:
         expected = f"kinetic_friction {p['kinetic_friction']:g} or more with friction_law coulomb"
         problems.append(("static_friction", expected, f"{p['static_friction']:g}"))
     return problems

@@ -1,11 +1,30 @@
-"""What is wrong with a friction table, in the form of a model's check."""
+"""What is wrong with the parameters of a friction law, in the form of a model's check."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 
-def table_problems(force: tuple, speed: tuple, mu: tuple) -> list[tuple[str, str, str]]:
+def friction_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems of a friction law: (key, expected, found).
+
+    Parameters
+    ----------
+    parameters : mapping
+        Values by name [SI], of which those of the law count.
+    """
+    p = parameters
+    if p["friction_law"] == "table":
+        return _table_problems(p["table_force"], p["table_speed"], p["table_mu"])
+    if p["friction_law"] == "coulomb" and p["friction_gradient"] != 0.0:
+        return [("friction_gradient", "0 with friction_law coulomb", f"{p['friction_gradient']:g} s/m")]
+    return []
+
+
+def _table_problems(force: tuple, speed: tuple, mu: tuple) -> list[tuple[str, str, str]]:
     """Problems of a friction table: (key, expected, found); the first one only.
 
     Parameters

@@ -1,0 +1,117 @@
+"""Maps of a sampled study: a mark for each run, in a panel for each pair of axes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import combinations
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.figure import Figure
+from matplotlib.markers import MarkerStyle
+from numpy.typing import NDArray
+
+from cvt_hpc.analysis import cells
+from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, count_classes, occurrence_classes
+from cvt_hpc.analysis.figures import WIDTH, axis_label, display_unit, headline
+from cvt_hpc.errors import InputError
+
+MOST_AXES = 4  # six pairs; the first axes of the job
+_SIZE = 6.0  # [point], of the mark of a vibrating run
+_FIRST = ("load", "friction_gradient")  # along x and along y, where they are
+
+
+def is_sampled(dataset: xr.Dataset) -> bool:
+    """Whether the runs of a dataset are samples, not a grid."""
+    return dataset["status"].dims == ("run",)
+
+
+def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any]) -> Figure:
+    """Compose the map of a sampled study.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        `status` and `vibrates` along `run`, with the values of the axes as coordinates along it; `amplitude`
+        [m], where known.
+    at : mapping
+        Has to be empty: no two samples lie at one value of an axis.
+
+    Raises
+    ------
+    InputError
+        If `at` is not empty.
+    """
+    if at:
+        raise InputError(f"at {next(iter(at))}: expected results over a grid, found samples, all apart")
+    names = [str(name) for name, coordinate in dataset.coords.items() if coordinate.dims == ("run",)]
+    names.sort(key=lambda name: _FIRST.index(name) if name in _FIRST else len(_FIRST))
+    pairs = list(combinations(names[:MOST_AXES], 2)) or [(names[0], None)]
+    columns = min(len(pairs), 2)
+    rows = -(-len(pairs) // columns)
+    figure = Figure((WIDTH, 3.6 if len(pairs) == 1 else 2.6 * rows + 1.2), layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False)
+    classes = occurrence_classes(dataset).values
+    amplitude = np.where(
+        classes == OccurrenceClass.VIBRATING, at_strongest_strand(dataset, "amplitude") * 1e6, np.nan
+    )
+    scale = cells.Scale(cells.AMPLITUDE_COLOURS, cells.norm_over(amplitude, 0.0), "amplitude [µm]")
+    for axes, (x, y) in zip(panels.flat, pairs, strict=False):
+        _draw_runs(axes, dataset, x, y, classes, amplitude, scale)
+    for axes in panels.flat[len(pairs) :]:
+        axes.set_axis_off()
+    if np.isfinite(amplitude).any():
+        figure.colorbar(ScalarMappable(scale.norm, scale.colours), ax=panels, pad=0.02).set_label(scale.label)
+    title = [headline(dataset.attrs), f"{classes.size} samples: {count_classes(classes)}"]
+    if len(names) > MOST_AXES:
+        title.append(f"the first {MOST_AXES} of {len(names)} axes")
+    figure.suptitle("\n".join(fill(line, 72) for line in title))
+    figure.legend(
+        *panels[0, 0].get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=len(OccurrenceClass),
+        frameon=False,
+    )
+    return figure
+
+
+def _draw_runs(
+    axes: Axes,
+    dataset: xr.Dataset,
+    x: str,
+    y: str | None,
+    classes: NDArray[np.int8],
+    amplitude: NDArray[np.float64],
+    scale: cells.Scale,
+) -> None:
+    """Mark the runs of one panel; without a second axis all at one height."""
+    across, x_label = _along(dataset[x])
+    up, y_label = _along(dataset[y]) if y else (np.zeros(across.size), "")
+    for kind, style in cells.STYLES.items():
+        of_kind = classes == kind
+        if not of_kind.any():
+            continue
+        marks = axes.scatter(
+            across[of_kind],
+            up[of_kind],
+            s=(_SIZE * min(style.mark_size, 1.5)) ** 2,
+            marker=style.mark,
+            edgecolors=style.rim if MarkerStyle(style.mark).is_filled() else None,
+            linewidths=0.6,
+            label=kind.label,
+        )
+        is_vibrating = kind is OccurrenceClass.VIBRATING
+        marks.set_facecolor(cells.fills_of(kind, amplitude[of_kind], scale) if is_vibrating else style.ink)
+    axes.set(xlabel=x_label, ylabel=y_label)
+    if y is None:
+        axes.set_yticks([])
+
+
+def _along(coordinate: xr.DataArray) -> tuple[NDArray[np.float64], str]:
+    """Values of an axis in display units, and its label."""
+    factor, unit = display_unit(coordinate.attrs.get("units", ""))
+    return coordinate.values * factor, axis_label(str(coordinate.name), unit)

@@ -1,0 +1,164 @@
+"""The picture of a scene: error against cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from cvt_hpc.analysis.figures import STYLE, WIDTH, save_figure
+from cvt_hpc.chart.comparing import Comparison, Result
+from cvt_hpc.chart.figure_parts import LEGEND, MARGIN, error_label, line_style, set_error_axis
+from cvt_hpc.chart.notes import LARGEST_ERROR, notes
+from cvt_hpc.chart.plan import Quantity
+from cvt_hpc.chart.quantities import KINDS
+
+GREY = "#a8a8a8"
+_COLUMNS = 2
+_PANEL_HEIGHT = 2.55  # [inch]
+_LINE_HEIGHT = 0.16  # [inch], of the text under the panels
+
+
+def draw_scene(comparison: Comparison, out: Path) -> Path:
+    """Draw error against cost, a panel for each quantity.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Results of a scene.
+    out : Path
+        The picture: .png, .svg or .pdf.
+
+    Returns
+    -------
+    Path
+        `out`.
+    """
+    with matplotlib.rc_context(STYLE):
+        return save_figure(scene_figure(comparison), out)
+
+
+def scene_figure(comparison: Comparison) -> Figure:
+    """Compose the picture of `draw_scene`; to be called within STYLE."""
+    quantities = [q for q in comparison.scene.quantities if q.name != "occurrence"]
+    columns = min(_COLUMNS, len(quantities))
+    rows = math.ceil(len(quantities) / columns)
+    series = _series(comparison.methods)
+    lines = notes(comparison)
+    legend_rows = math.ceil((len(series) + 4) / 3)
+    text_height = _LINE_HEIGHT * (len(lines) + 0.5)
+    height = 0.5 + _PANEL_HEIGHT * rows + 0.19 * legend_rows + text_height
+    figure = Figure((WIDTH, height), layout="constrained")
+    figure.suptitle(f"{comparison.scene.title}: error against cost, lower left is better")
+    ratios = [_PANEL_HEIGHT] * rows + [text_height]
+    grid = figure.add_gridspec(rows + 1, columns, height_ratios=ratios)
+    first: Axes | None = None
+    for k, quantity in enumerate(quantities):
+        axes = figure.add_subplot(grid[divmod(k, columns)], sharey=first)
+        first = first or axes
+        _draw_panel(axes, quantity, comparison, series)
+        if k % columns == 0:
+            axes.set_ylabel("core-seconds per\nsimulated second")
+        else:
+            axes.tick_params(labelleft=False)
+    below = figure.add_subplot(grid[rows, :])
+    below.set_axis_off()
+    below.text(0.0, 1.0, "\n".join(lines), va="top", fontsize=7.5, transform=below.transAxes)
+    figure.legend(handles=_legend(comparison, series), ncols=2, **LEGEND)
+    return figure
+
+
+def _draw_panel(
+    axes: Axes, quantity: Quantity, comparison: Comparison, series: dict[str, list[Result]]
+) -> None:
+    own = comparison.reference.errors[quantity.name]
+    axes.set(xscale="log", yscale="log")
+    floor = _floor(quantity, comparison)
+    for name, results in series.items():
+        k = comparison.series.index(name)
+        drawn = [r for r in results if _is_drawn(r, quantity.name)]
+        x = [max(r.errors[quantity.name], floor) for r in drawn]
+        y = [r.measurement.cost for r in drawn]
+        axes.plot(x, y, **line_style(k), label=results[0].point.label)
+        for result, error, cost in zip(drawn, x, y, strict=True):
+            _mark_point(axes, result, quantity.name, error, cost, k)
+    _limit(axes, quantity, own, floor)
+    axes.set_title(_heading(quantity), loc="left", pad=3)
+    axes.set_xlabel(error_label(quantity))
+    axes.grid(which="major", color="#e4e4e4", lw=0.6)
+    axes.set_axisbelow(True)
+
+
+def _mark_point(axes: Axes, result: Result, name: str, error: float, cost: float, k: int) -> None:
+    if name in result.below:
+        hollow = {**line_style(k), "ls": "", "mfc": "white", "mec": GREY}
+        axes.plot(error, cost, **hollow, gid="below")
+    if result.errors.get("occurrence", 0.0) > 0.0:
+        axes.plot(error, cost, marker="x", ms=7, color="black", ls="", gid="occurrence")
+    if result.chosen:
+        axes.plot(error, cost, marker="o", ms=11, mfc="none", mec="black", ls="", gid="chosen")
+
+
+def _limit(axes: Axes, quantity: Quantity, own: float, floor: float) -> None:
+    """Limits of the error's axis, the tolerance, and the part where the reference itself is not known."""
+    drawn = [x for line in axes.lines for x in np.atleast_1d(line.get_xdata())]
+    marks = [x for x in (own, quantity.tolerance) if 0.0 < x < math.inf]
+    low = set_error_axis(axes, [*drawn, *marks])
+    if 0.0 < own < math.inf:
+        axes.axvspan(
+            low, own, facecolor="#f3f3f3", edgecolor="#d0d0d0", hatch="////", lw=0, zorder=0, gid="reference"
+        )
+    if quantity.tolerance < math.inf:
+        axes.axvline(quantity.tolerance, color="black", ls="--", lw=0.9, gid="tolerance")
+
+
+def _series(results: Sequence[Result]) -> dict[str, list[Result]]:
+    """The methods by their name, in the job's order, each along its setting."""
+    series: dict[str, list[Result]] = {}
+    for result in results:
+        series.setdefault(result.point.series, []).append(result)
+    return {name: sorted(found, key=lambda r: r.point.setting) for name, found in series.items()}
+
+
+def _legend(comparison: Comparison, series: dict[str, list[Result]]) -> list[Line2D | Patch]:
+    handles: list[Line2D | Patch] = [
+        Line2D([], [], **line_style(comparison.series.index(name)), label=results[0].point.label)
+        for name, results in series.items()
+        if any(not result.measurement.reason for result in results)
+    ]
+    if not comparison.scene.exact:
+        grey = {"facecolor": "#f3f3f3", "edgecolor": "#d0d0d0", "hatch": "////"}
+        handles.append(Patch(**grey, label="below the reference's error"))
+    handles.append(Line2D([], [], color="black", ls="--", lw=0.9, label="tolerance"))
+    handles.append(
+        Line2D(
+            [], [], ls="", marker="o", ms=9, mfc="none", mec="black", label="cheapest within all tolerances"
+        )
+    )
+    if any(result.errors.get("occurrence", 0.0) > 0.0 for result in comparison.methods):
+        handles.append(Line2D([], [], ls="", marker="x", color="black", label="occurrence differs"))
+    return handles
+
+
+def _is_drawn(result: Result, name: str) -> bool:
+    return not result.measurement.reason and result.errors[name] <= LARGEST_ERROR
+
+
+def _floor(quantity: Quantity, comparison: Comparison) -> float:
+    """Where an error of 0 is drawn: a little left of the smallest one."""
+    errors = [r.errors[quantity.name] for r in comparison.methods if _is_drawn(r, quantity.name)]
+    return min((e for e in errors if e > 0.0), default=1e-3) / MARGIN
+
+
+def _heading(quantity: Quantity) -> str:
+    title = KINDS[quantity.name].title
+    if quantity.name == "trajectory":
+        return f"{title}, {1e3 * quantity.since:g}-{1e3 * quantity.until:g} ms"
+    return title

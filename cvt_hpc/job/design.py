@@ -1,0 +1,102 @@
+"""Which points of the space of its axes a study runs: all of a grid, those along boundaries, or samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from cvt_hpc.errors import mismatch, show, unknown
+from cvt_hpc.job.axes import LARGEST_AXIS, Axis
+from cvt_hpc.job.values import read_value
+from cvt_hpc.parameters import Parameter
+
+_KIND = Parameter("grid", "", "which points are run", choices=("grid", "trace", "sobol", "latin_hypercube"))
+_KEYS = {"trace": ("first_spacing",), "sobol": ("runs", "seed"), "latin_hypercube": ("runs", "seed")}
+_SPACING = Parameter(
+    4, "", "cells between the runs that a trace begins with", minimum=1, maximum=LARGEST_AXIS
+)
+_RUNS = Parameter(64, "", "samples", minimum=1, maximum=2**24)
+_SEED = Parameter(1, "", "of the samples", minimum=0)
+
+Design = dict[str, Any]  # empty: the full grid
+
+
+def read_design(table: Mapping[str, Any], source: str) -> Design:
+    """Check a job file's table [design].
+
+    Parameters
+    ----------
+    table : mapping
+        `kind`, and with "trace" `first_spacing`, with "sobol" and "latin_hypercube" `runs` and `seed`.
+    source : str
+        The job file, for the error.
+
+    Returns
+    -------
+    dict
+        The table with its defaults, in JSON types; empty for the full grid. `first_spacing` is left as it
+        was found, because it depends on the axes.
+
+    Raises
+    ------
+    InputError
+        If a key or a value is not legal.
+    """
+    where = f"{source}: [design]"
+    kind = read_value(_KIND, table.get("kind", _KIND.default), f"{where} kind")
+    known = ("kind", *_KEYS.get(kind, ()))
+    for key in table:
+        if key not in known:
+            raise unknown(f"{where} {key}", f"key of a design of kind {show(kind)}", key, known)
+    if kind == "grid":
+        return {}
+    if kind == "trace":
+        return {"kind": kind, "first_spacing": table.get("first_spacing", _SPACING.default)}
+    if "runs" not in table:
+        raise mismatch(f"{where} runs", "the number of samples", "nothing")
+    runs = read_value(_RUNS, table["runs"], f"{where} runs")
+    if kind == "sobol" and runs & (runs - 1):
+        # Only whole powers of two fill the space evenly: that is the point of such a sequence.
+        lower = 2 ** (runs.bit_length() - 1)
+        raise mismatch(f"{where} runs", f"a power of 2 (the nearest: {lower} and {2 * lower})", str(runs))
+    seed = read_value(_SEED, table.get("seed", _SEED.default), f"{where} seed")
+    return {"kind": kind, "runs": runs, "seed": seed}
+
+
+def resolve_spacing(design: Design, axes: tuple[Axis, ...], source: str) -> Design:
+    """Return the design of a trace with its first spacing on each axis along which it traces.
+
+    A table names these axes. A number stands for all numeric axes of more than twice as many values: shorter
+    ones, on which neighbours are far apart, are run in full.
+
+    Raises
+    ------
+    InputError
+        If an axis is not known, not of numbers, or its values do not rise or fall all the way, or if none is
+        long enough.
+    """
+    where = f"{source}: [design] first_spacing"
+    found = design["first_spacing"]
+    if isinstance(found, Mapping):
+        spacings = {name: read_value(_SPACING, raw, f"{where}.{name}") for name, raw in found.items()}
+    else:
+        spacing = read_value(_SPACING, found, where)
+        long = [axis for axis in axes if len(axis.values) > 2 * spacing]
+        spacings = {axis.name: spacing for axis in long if _is_numeric(axis)}
+        if not spacings:
+            raise mismatch(where, f"an axis of more than {2 * spacing} numbers, to trace along", "none")
+    known = {axis.name: axis for axis in axes}
+    for name in spacings:
+        if name not in known:
+            raise unknown(f"{where}.{name}", "axis", name, known)
+        if not _is_numeric(known[name]):
+            raise mismatch(f"{where}.{name}", "an axis of numbers", "one of texts")
+        rising = sorted(known[name].values)
+        if list(known[name].values) not in (rising, rising[::-1]):
+            expected = "values that rise or fall all the way, to trace along them"
+            raise mismatch(f"{source}: [axes] {name}", expected, "others")
+    return {**design, "first_spacing": spacings}
+
+
+def _is_numeric(axis: Axis) -> bool:
+    return not isinstance(axis.values[0], (str, bool))

@@ -1,0 +1,80 @@
+"""Samples of the space that the ranges of a job's axes span, drawn by scipy.stats.qmc."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.errors import mismatch, show, unknown
+from cvt_hpc.job.axes import Axis, read_axis, read_bounds, read_spacing
+from cvt_hpc.job.design import Design
+from cvt_hpc.job.values import kind_of
+from cvt_hpc.parameters import Parameter
+
+_KEYS = ("from", "to", "spacing")
+
+
+def sampled_axes(
+    found: Mapping[str, tuple[Parameter, Any, str]], design: Design, source: str
+) -> tuple[Axis, ...]:
+    """Return the axes of a sampled study, each with the value of every sample.
+
+    Parameters
+    ----------
+    found : mapping
+        By name what the parameter declares; what stands in the job file, a table with from, to and if wanted
+        spacing; and file and key, for the error. In the place of all ranges may stand the lists of drawn
+        values, as the resolved job in a dataset gives them.
+    design : dict
+        Kind, `runs` and `seed`.
+    source : str
+        The job file, for the error.
+
+    Returns
+    -------
+    tuple of Axis
+        With `runs` values each, of which those at one place belong together.
+
+    Raises
+    ------
+    InputError
+        If there is no axis, or one has no continuous values or no legal range.
+    """
+    if not found:
+        raise mismatch(f"{source}: [axes]", "one axis or more, to draw samples from", "none")
+    for parameter, _, where in found.values():
+        if kind_of(parameter) is not float:
+            raise mismatch(where, "a parameter with continuous values, to draw samples from", "another one")
+    if all(isinstance(raw, list) and len(raw) == design["runs"] for _, raw, _ in found.values()):
+        return tuple(read_axis(name, *entry) for name, entry in found.items())
+    ranges = [_read_range(*entry) for entry in found.values()]
+    shares = _draw(design, len(ranges)).T
+    return tuple(
+        Axis(name, tuple(_between(*ends, share).tolist()), parameter.unit, parameter.description)
+        for (name, (parameter, _, _)), ends, share in zip(found.items(), ranges, shares, strict=True)
+    )
+
+
+def _read_range(parameter: Parameter, raw: Any, where: str) -> tuple[float, float, str]:
+    """Return the ends of a range and the spacing of what is drawn from it."""
+    if not isinstance(raw, dict):
+        raise mismatch(where, "a range {from=, to=}, to draw samples from", show(raw))
+    for key in raw:
+        if key not in _KEYS:
+            raise unknown(f"{where}.{key}", "key of a range to draw samples from", key, _KEYS)
+    start, stop = read_bounds(parameter, raw, where)
+    return start, stop, read_spacing(raw, start, stop, where)
+
+
+def _draw(design: Design, dimensions: int) -> np.ndarray:
+    """Return samples of the unit cube, shape (runs, dimensions)."""
+    from scipy.stats import qmc
+
+    engine = {"sobol": qmc.Sobol, "latin_hypercube": qmc.LatinHypercube}[design["kind"]]
+    return engine(dimensions, seed=np.random.default_rng(design["seed"])).random(design["runs"])
+
+
+def _between(start: float, stop: float, spacing: str, share: np.ndarray) -> np.ndarray:
+    return start * (stop / start) ** share if spacing == "log" else start + (stop - start) * share

@@ -1,0 +1,109 @@
+"""Elastic sheaves under one wrap: the constants of its contact, whose equations stand in `compliance.py`."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Sheaves(NamedTuple):
+    """Constants of one wrap's contact.
+
+    Attributes
+    ----------
+    weight : (m,) array
+        Length h that each station stands for [m].
+    element_stiffness : float
+        c_e [N/m^2].
+    compliance : float
+        a [1]: 1 / sheave_stiffness, 0 for rigid sheaves.
+    diagonal : (m,) array
+        Diagonal of the inverse of the local kernel [N/m].
+    off_diagonal : float
+        Its off-diagonal [N/m].
+    tilt : (2, m) array
+        U [1].
+    tilt_compliance : float
+        r^2 / c_tilt [m/N].
+    """
+
+    weight: np.ndarray
+    element_stiffness: float
+    compliance: float
+    diagonal: np.ndarray
+    off_diagonal: float
+    tilt: np.ndarray
+    tilt_compliance: float
+
+
+def sheaves(
+    spacing: float,
+    stations: int,
+    radius: float,
+    sheave_stiffness: float,
+    tilt_stiffness: float,
+    local_stiffness: float,
+    local_length: float,
+    element_stiffness: float,
+) -> Sheaves:
+    """Constants of the contact over one wrap with equidistant stations, the first and last at its ends.
+
+    Parameters
+    ----------
+    spacing : float
+        Distance of the stations along the arc [m].
+    stations : int
+        Their number m.
+    radius : float
+        Pitch radius [m].
+    sheave_stiffness : float
+        Multiple of the reference stiffness; inf is rigid [1].
+    tilt_stiffness : float
+        c_tilt of the reference [N m/rad].
+    local_stiffness, local_length : float
+        k [N/m^2] and l [m] of the local bending kernel of the reference.
+    element_stiffness : float
+        c_e [N/m^2].
+
+    Returns
+    -------
+    Sheaves
+        For `solve_contact`.
+    """
+    decay = np.exp(-spacing / local_length)
+    scale = 2.0 * local_length * local_stiffness / (1.0 - decay * decay)
+    diagonal = np.full(stations, scale * (1.0 + decay * decay))
+    diagonal[0] = diagonal[-1] = scale
+    weight = np.full(stations, spacing)
+    weight[0] = weight[-1] = 0.5 * spacing
+    phi = np.arange(stations) * spacing / radius
+    return Sheaves(
+        weight,
+        element_stiffness,
+        1.0 / sheave_stiffness,
+        diagonal,
+        -scale * decay,
+        np.array([np.cos(phi), np.sin(phi)]),
+        radius * radius / tilt_stiffness,
+    )
+
+
+def flexibility(sheave: Sheaves) -> np.ndarray:
+    """Dense matrix C of g = G + C f, for comparison with general solvers.
+
+    Parameters
+    ----------
+    sheave : Sheaves
+        The wrap, m stations.
+
+    Returns
+    -------
+    (m, m) array
+        C [m^2/N], force per length in, gap out; C diag(1/h) is symmetric.
+    """
+    m = sheave.weight.size
+    inverse = np.diag(sheave.diagonal)
+    inverse += sheave.off_diagonal * (np.eye(m, k=1) + np.eye(m, k=-1))
+    elastic = np.linalg.inv(inverse) + sheave.tilt_compliance * sheave.tilt.T @ sheave.tilt
+    return np.eye(m) / sheave.element_stiffness + sheave.compliance * elastic * sheave.weight

@@ -1,0 +1,19 @@
+"""One run: a model marched by a stepper, recorded, judged, and turned into one record or a full history."""
+
+from cvt_hpc.simulation.batches import estimate_cost, lane_groups, run_costs
+from cvt_hpc.simulation.history import run_points_keeping, simulate
+from cvt_hpc.simulation.record import record_coordinates, record_variables
+from cvt_hpc.simulation.running import Interrupted, run_point, run_points
+
+__all__ = [
+    "Interrupted",
+    "estimate_cost",
+    "lane_groups",
+    "record_coordinates",
+    "record_variables",
+    "run_costs",
+    "run_point",
+    "run_points",
+    "run_points_keeping",
+    "simulate",
+]

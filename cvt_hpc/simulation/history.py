@@ -1,0 +1,106 @@
+"""Runs with their histories, as datasets."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cvt_hpc.simulation.modules import record_module
+from cvt_hpc.simulation.record import record_coordinates, record_variables
+from cvt_hpc.simulation.running import march
+from cvt_hpc.variables import Variable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from cvt_hpc.job import Job
+
+
+def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
+    """Do one run and keep its history.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    at : mapping, optional
+        Values [SI, or texts with units] by key where the run departs from the base scene.
+
+    Returns
+    -------
+    Dataset
+        The record's names as scalars of the run, `displacement` (time, probe), the model's histories over
+        `time`, and its means over the judged part by `position`.
+
+    Raises
+    ------
+    InputError
+        If a value is not fit for its key.
+    """
+    point = job.point_at(at or {})
+    ((run, record),) = march(job, [point], lambda: None)
+    return _history(job, point, run, record)
+
+
+def run_points_keeping(
+    job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None], kept: Collection[int]
+) -> tuple[list[dict[str, Any]], dict[int, xr.Dataset]]:
+    """Do as `run_points`, and return the histories of the runs at some places of `points` as well.
+
+    Parameters
+    ----------
+    job, points, interrupt
+        As `run_points` takes them.
+    kept : collection of int
+        Places in `points`.
+
+    Returns
+    -------
+    records : list of dict
+        As of `run_points`.
+    histories : dict
+        Datasets as `simulate` returns them, by place.
+    """
+    marched = march(job, points, interrupt)
+    histories = {place: _history(job, points[place], *marched[place]) for place in kept}
+    return [record for _, record in marched], histories
+
+
+def _history(job: Job, point: dict[str, Any], run: Any, record: dict[str, Any]) -> xr.Dataset:
+    """A run that has ended, as a dataset."""
+    import xarray as xr
+
+    coordinates = {
+        name: (name, c.values, _attributes(c.long_name, c.units))
+        for name, c in record_coordinates(job).items()
+    }
+    variables: dict[str, Any] = {}
+    for variable in record_variables(job):
+        value = record[variable.name]
+        value = value if variable.dtype.startswith("S") else np.asarray(value, variable.dtype)
+        variables[variable.name] = (variable.dims, value, _variable_attributes(variable))
+    histories = record_module(job).histories(run)
+    attributes = {
+        "Conventions": "CF-1.11",
+        "title": job.description or job.name,
+        "job_name": job.name,
+        "job": json.dumps(job.resolved()),
+        "point": json.dumps({key: repr(value) if value == np.inf else value for key, value in point.items()}),
+    }
+    dataset = xr.Dataset(variables, coordinates, attributes)
+    return dataset.merge(histories, combine_attrs="override")
+
+
+def _attributes(long_name: str, units: str) -> dict[str, str]:
+    return {"long_name": long_name, **({"units": units} if units else {})}
+
+
+def _variable_attributes(variable: Variable) -> dict[str, Any]:
+    attributes: dict[str, Any] = _attributes(variable.long_name, variable.units)
+    if variable.flags is not None:
+        attributes["flag_values"] = np.array([int(flag) for flag in variable.flags], variable.dtype)
+        attributes["flag_meanings"] = " ".join(flag.name.lower() for flag in variable.flags)
+    return attributes

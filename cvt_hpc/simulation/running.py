@@ -1,0 +1,86 @@
+"""Runs from their start to their records."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from cvt_hpc.simulation.modules import transient_module
+from cvt_hpc.simulation.record import record_of
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
+
+SAMPLES_BETWEEN_POLLS = 200  # 10 ms of simulated time, some 50 ms of computing
+
+
+class Interrupted(Exception):
+    """The run was asked to stop before its end; the text says why."""
+
+
+def run_point(job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]) -> dict[str, Any]:
+    """Do one run.
+
+    Parameters
+    ----------
+    job : Job
+        For its model and stepper.
+    point : dict
+        Flat parameters of the run [SI].
+    interrupt : callable
+        Asked every few tens of milliseconds; a text ends the run.
+
+    Returns
+    -------
+    dict
+        Value of each of `record_variables`. A run that fails has its reason, and no numbers but its cost.
+
+    Raises
+    ------
+    Interrupted
+        With the text of `interrupt`.
+    """
+    return run_points(job, [point], interrupt)[0]
+
+
+def run_points(
+    job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+) -> list[dict[str, Any]]:
+    """Do several runs that advance together, in the lanes of the processor's registers.
+
+    Parameters
+    ----------
+    job : Job
+        For its model and stepper.
+    points : sequence of dict
+        Flat parameters of the runs [SI], as `lane_groups` puts them together.
+    interrupt : callable
+        As `run_point` takes it.
+
+    Returns
+    -------
+    list of dict
+        Records in the order of the points, each bitwise what `run_point` makes of its point alone.
+
+    Raises
+    ------
+    Interrupted
+        With the text of `interrupt`.
+    """
+    return [record for _, record in march(job, points, interrupt)]
+
+
+def march(
+    job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+) -> list[tuple[Any, dict[str, Any]]]:
+    """March a batch of runs, and make their records: as `run_points`, with each run beside its record."""
+    batch = transient_module(job).batch(points, job.stepper)
+    batch.advance(0)  # compiles or loads the kernels, which is no cost of these runs
+    started = time.process_time()
+    while batch.running:
+        if stop := interrupt():
+            raise Interrupted(stop)
+        batch.advance(SAMPLES_BETWEEN_POLLS)
+    marched = (time.process_time() - started) / len(points)
+    return [(run, record_of(job, run, marched)) for run in batch.runs]

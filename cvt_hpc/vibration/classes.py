@@ -1,0 +1,51 @@
+"""One class per run: the two flags of a record, and what they leave open, as one category."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cvt_hpc.variables import Status, Vibrates
+
+
+class OccurrenceClass(IntEnum):
+    """What a map says of a run."""
+
+    QUIET = 0
+    VIBRATING = 1
+    UNDECIDED = 2
+    FAILED = 3
+    NOT_RUN = 4
+
+    @property
+    def label(self) -> str:
+        """Name for people."""
+        return self.name.lower().replace("_", " ")
+
+
+def classify_runs(status: NDArray, vibrates: NDArray) -> NDArray[np.int8]:
+    """Class of each run.
+
+    Whatever is not known to have ended well is never quiet nor vibrating: a status that this program does
+    not know counts as failed, a missing one as not run, an unknown verdict as undecided.
+
+    Parameters
+    ----------
+    status, vibrates : arrays of one shape
+        Values of `Status` and of `Vibrates`.
+
+    Returns
+    -------
+    array of int8
+        Values of `OccurrenceClass`.
+    """
+    classes = np.full(status.shape, OccurrenceClass.FAILED, np.int8)
+    done = status == Status.DONE
+    classes[done] = OccurrenceClass.UNDECIDED
+    classes[done & (vibrates == Vibrates.NO)] = OccurrenceClass.QUIET
+    classes[done & (vibrates == Vibrates.YES)] = OccurrenceClass.VIBRATING
+    missing = np.isnan(status.astype(float))
+    classes[(status == Status.NOT_RUN) | missing] = OccurrenceClass.NOT_RUN
+    return classes

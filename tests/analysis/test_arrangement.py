@@ -1,0 +1,168 @@
+"""The layout of maps of made-up studies: what runs along which axis, and what is said of the rest."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from studies import study
+
+from cvt_hpc.analysis.arrangement import arrange, ruler, value_text
+from cvt_hpc.analysis.classes import OccurrenceClass, occurrence_classes
+from cvt_hpc.analysis.maps import draw_map
+from cvt_hpc.errors import InputError
+from cvt_hpc.variables import Status
+
+
+def test_load_runs_along_x_gradient_along_y_and_stiffness_over_panels():
+    chosen = arrange(study().transpose("load", "sheave_stiffness", ...), {})
+    assert (chosen.x, chosen.y, chosen.panel, chosen.notes) == (
+        "load",
+        "friction_gradient",
+        "sheave_stiffness",
+        (),
+    )
+
+
+def with_axes(**axes):
+    names = tuple(axes)
+    shape = tuple(len(values) for values in axes.values())
+    status = np.full(shape, Status.DONE, np.int8)
+    return xr.Dataset(
+        {"status": (names, status), "vibrates": (names, np.zeros(shape, np.int8))},
+        {name: np.array(values) for name, values in axes.items()},
+    )
+
+
+@pytest.mark.parametrize(
+    ("axes", "at", "expected"),
+    [
+        (("load",), {}, ("load", None, None)),
+        (("sheave_stiffness",), {}, ("sheave_stiffness", None, None)),
+        (("load", "sheave_stiffness"), {}, ("load", "sheave_stiffness", None)),
+        (("ratio", "thrust"), {}, ("thrust", "ratio", None)),
+        (("ratio", "load", "sheave_stiffness"), {}, ("load", "ratio", "sheave_stiffness")),
+        (("sheave_stiffness", "load", "ratio"), {}, ("load", "ratio", "sheave_stiffness")),
+        (("friction_gradient", "load", "thrust"), {}, ("load", "friction_gradient", "thrust")),
+        (
+            ("friction_gradient", "sheave_stiffness", "load"),
+            {"load": 2.0},
+            ("sheave_stiffness", "friction_gradient", None),
+        ),
+        (
+            ("friction_gradient", "sheave_stiffness", "load"),
+            {"sheave_stiffness": "2"},
+            ("load", "friction_gradient", None),
+        ),
+    ],
+)
+def test_other_axes_are_laid_out_sensibly(axes, at, expected):
+    chosen = arrange(with_axes(**{name: [1.0, 2.0] for name in axes}), at)
+    assert (chosen.x, chosen.y, chosen.panel) == expected
+    assert set(chosen.dataset["status"].dims) == {name for name in expected if name}
+
+
+def test_texts_are_no_x_axis_where_there_are_numbers():
+    dataset = with_axes(load_history=["constant", "ramp"], ratio=[1.0, 2.0])
+    assert (arrange(dataset, {}).x, arrange(dataset, {}).y) == ("ratio", "load_history")
+    assert arrange(dataset, {"ratio": 1.0}).x == "load_history"
+    assert arrange(dataset, {"load_history": "ramp"}).notes == ("load history = ramp",)
+    flags_as_axis = with_axes(refined=[False, True], ratio=[1.0, 2.0])
+    assert arrange(flags_as_axis, {"refined": True}).notes == ("refined = True",)
+
+
+def test_what_is_fixed_is_said():
+    dataset = with_axes(
+        ratio=[2.5, 1.0], thrust=[2e4, 3e4], friction_gradient=[-1.0], sheave_stiffness=[1.0], load=[5.0]
+    )
+    dataset["thrust"].attrs["units"] = "N"
+    dataset["status"][0, 1] = Status.TIMED_OUT
+    chosen = arrange(dataset, {"thrust": 3e4})
+    assert chosen.notes == ("thrust = 30 kN", "ratio = 2.5 (first of 2)")
+    assert chosen.dataset["status"].values.tolist() == [[[Status.TIMED_OUT]]]
+
+
+def test_panels_and_rows_are_sorted_with_their_values():
+    chosen = arrange(study(gradients=(-0.8, -2.4), stiffnesses=(np.inf, 1.0), loads=(200.0, 120.0, 20.0)), {})
+    assert chosen.dataset["sheave_stiffness"].values.tolist() == [1.0, np.inf]
+    assert chosen.dataset["load"].values.tolist() == [20.0, 120.0, 200.0]
+    classes = occurrence_classes(chosen.dataset)
+    assert classes.sel(friction_gradient=-2.4, sheave_stiffness=1.0, load=120) == OccurrenceClass.VIBRATING
+
+
+@pytest.mark.parametrize(
+    ("at", "message"),
+    [
+        ({"lod": 20.0}, "unknown axis of the results; did you mean load?"),
+        ({"load": 21.0}, "at load: expected a value of that axis: 20, 40, .* \\[N m\\], found 21.0"),
+        ({"load": "much"}, "found 'much'"),
+        (
+            {"load": 20, "friction_gradient": -2.4, "sheave_stiffness": 1},
+            "one axis or more, found a single run",
+        ),
+    ],
+)
+def test_what_cannot_be_fixed_is_refused(at, message, tmp_path):
+    out = tmp_path / "map.png"
+    with pytest.raises(InputError, match=message):
+        draw_map(study(), out, at)
+    assert not any(tmp_path.iterdir())
+
+
+def test_of_many_values_the_error_names_a_few():
+    dataset = with_axes(load=np.arange(1.0, 101.0), refined=[False, True])
+    with pytest.raises(InputError, match=r"axis: 1, 2, .* 11, [.]{3}, 100, found 0.5"):
+        arrange(dataset, {"load": 0.5})
+    with pytest.raises(InputError, match="axis: False, True, found 'maybe'"):
+        arrange(dataset, {"refined": "maybe"})
+
+
+@pytest.mark.parametrize(
+    ("unit", "value", "shown"),
+    [
+        ("N m", 120.0, "120 N m"),
+        ("s m-1", -2.4, "−2.4 s/m"),
+        ("s/m", -2.4, "−2.4 s/m"),
+        ("N", 5e4, "50 kN"),
+        ("rad s-1", 100 * np.pi, "3000 rpm"),
+        ("rad/s", 100 * np.pi, "3000 rpm"),
+        ("m", 0.155, "155 mm"),
+        ("s", 3e-4, "0.3 ms"),
+        ("1", 1.5, "1.5"),
+        ("N m rad-1", 4e5, "400000 N m rad-1"),
+    ],
+)
+def test_values_are_shown_in_units_for_people(unit, value, shown):
+    assert value_text(coordinate("x", [value], unit), 0) == shown
+
+
+def test_a_value_is_found_by_number_or_text():
+    third = 0.1 + 0.2  # not 0.3, as results of arithmetic are
+    dataset = with_axes(load=[1.0, 2.0], ratio=[0.1, third], sheave_stiffness=[1.0, np.inf])
+    dataset["status"][:, 1, 1] = Status.TIMED_OUT
+    for ratio, stiffness in ((0.3, np.inf), ("0.3", "inf")):
+        chosen = arrange(dataset, {"ratio": ratio, "sheave_stiffness": stiffness})
+        assert (chosen.dataset["status"] == Status.TIMED_OUT).all()
+        assert "sheave stiffness = rigid" in chosen.notes
+
+
+def coordinate(name, values, units="1"):
+    return xr.DataArray(np.array(values), dims=name, name=name, attrs={"units": units})
+
+
+def test_cells_reach_halfway_to_their_neighbours():
+    uneven = ruler(coordinate("load", [10.0, 20.0, 50.0], "N m"))
+    assert uneven.centres.tolist() == [10, 20, 50]
+    assert uneven.edges.tolist() == [5, 15, 35, 65]
+    assert uneven.label == "load [N m]"
+    assert ruler(coordinate("thrust", [2e4, 3e4], "N")).edges == pytest.approx([15, 25, 35])
+    (low, high) = ruler(coordinate("load", [40.0], "N m")).edges
+    assert low < 40 < high and low + high == pytest.approx(80)
+    assert np.ptp(ruler(coordinate("load", [0.0], "N m")).edges) > 0
+
+
+def test_rigid_sheaves_lie_behind_the_stiffest_ones():
+    placed = ruler(coordinate("sheave_stiffness", [1.0, 1.5, 2.0, np.inf]))
+    assert placed.centres.tolist() == [1, 1.5, 2, 2.5]
+    assert placed.tick_labels == ("1", "1.5", "2", "rigid")
+    assert np.isfinite(ruler(coordinate("sheave_stiffness", [np.inf])).edges).all()
+    texts = ruler(coordinate("load_history", ["constant", "ramp"], ""))
+    assert texts.tick_labels == ("constant", "ramp") and texts.centres.tolist() == [0, 1]
