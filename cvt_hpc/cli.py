@@ -138,6 +138,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from cvt_hpc.job.durations import read_duration
     from cvt_hpc.printing import report_lines, trouble_lines
     from cvt_hpc.study import run
+    from cvt_hpc.study.launch import end_process
     from cvt_hpc.variables import Status
 
     limits = {
@@ -151,7 +152,7 @@ def _run(arguments: argparse.Namespace) -> int:
     _complain(*trouble_lines(report))
     if _speaks():
         print(*report_lines(report), sep="\n")
-    return report.exit_status
+    return end_process(report.exit_status)
 
 
 def _status(arguments: argparse.Namespace) -> int:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from cvt_hpc.errors import CRASHED, InputError
+from cvt_hpc.study.deaths import RankDied, noticing_deaths
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -67,9 +68,24 @@ def detect_launch(environment: Mapping[str, str] = os.environ) -> Launch:
     return Launch()
 
 
+_rank_of_survivor: int | None = None
+
+
 def process_rank() -> int:
-    """Return the number of this process among those started together; only 0 should talk to the user."""
-    return detect_launch().rank
+    """Return the number of this process among those that are left; only 0 should talk to the user."""
+    return detect_launch().rank if _rank_of_survivor is None else _rank_of_survivor
+
+
+def end_process(status: int) -> int:
+    """Return the exit status; after the death of a rank, end the process with it instead.
+
+    At the regular end MPI waits for all ranks: of Open MPI 5.0.11, now and then for the dead as well.
+    """
+    if _rank_of_survivor is not None:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+    return status
 
 
 class Team:
@@ -96,23 +112,53 @@ class Team:
                 result = work()
             except InputError as caught:
                 error = caught
-        result, text = self.communicator.bcast((result, error and str(error)))
+        with noticing_deaths():
+            result, text = self.communicator.bcast((result, error and str(error)))
         if text is not None:
             raise error or InputError(text)
         return result
 
     def collect(self, value: Any) -> list[Any]:
         """Return the values of all ranks, on all ranks."""
-        return [value] if self.communicator is None else self.communicator.allgather(value)
+        if self.communicator is None:
+            return [value]
+        with noticing_deaths():
+            return self.communicator.allgather(value)
 
     def wait_for_all(self, meanwhile: Callable[[], None]) -> None:
         """Return when all ranks have come here; calls `meanwhile` every few milliseconds until then."""
         if self.communicator is None:
             return
-        request = self.communicator.Ibarrier()
-        while not request.Test():  # asks now and then: a blocking wait would keep a core busy
-            meanwhile()
-            time.sleep(0.01)
+        with noticing_deaths():
+            request = self.communicator.Ibarrier()
+            while not request.Test():  # asks now and then: a blocking wait would keep a core busy
+                meanwhile()
+                time.sleep(0.01)
+
+    def revoke(self) -> None:
+        """Let all that the ranks of this team do together fail, because one of them is dead."""
+        self.communicator.Revoke()
+
+    def agree(self, fine: bool) -> bool:
+        """Return whether all ranks are alive and say that all is fine; the same on all that are alive."""
+        try:
+            with noticing_deaths():
+                return bool(self.communicator.Agree(int(fine)))
+        except RankDied:
+            return False
+
+    def survivors(self) -> Team:
+        """Return the team of those that are alive; this one is of no more use."""
+        global _rank_of_survivor
+        team = Team(self.communicator.Shrink())
+        _rank_of_survivor = team.rank
+        self.communicator = None
+        return team
+
+    def release(self) -> None:
+        """Free the communicator, if the team is still of use."""
+        if self.communicator is not None:
+            self.communicator.Free()
 
 
 @contextmanager
@@ -138,17 +184,17 @@ def assembled_team(crash_log: Path) -> Iterator[Team]:
         yield Team()
         return
     _abort_on_uncaught(world, crash_log)
-    communicator = world.Dup()  # our messages never mix with those of an application
+    team = Team(world.Dup())  # our messages never mix with those of an application
     try:
-        yield Team(communicator)
+        yield team
     except InputError:  # raised by all ranks alike, so all get here
-        communicator.Free()
+        team.release()
         raise
     except BaseException:
         _abort(world, traceback.format_exc(), crash_log)
         raise
     else:
-        communicator.Free()
+        team.release()
 
 
 def _connect(launch: Launch) -> MPI.Intracomm:

@@ -8,12 +8,14 @@ kernels, which release the interpreter lock, compute.
 from __future__ import annotations
 
 import threading
+from contextlib import suppress
 from typing import Self
 
 import numpy as np
 from mpi4py import MPI
 
 from cvt_hpc.errors import InputError
+from cvt_hpc.study.deaths import RankDied, noticing_deaths
 from cvt_hpc.study.schedule import INTERRUPTED, Tally
 
 _PROGRESS_INTERVAL = 1e-3  # [s]
@@ -89,6 +91,8 @@ class SharedCounter:
         # After an unexpected error the other ranks are elsewhere, and would be waited for without end.
         if kind is None or issubclass(kind, InputError):
             self._release()
+        elif issubclass(kind, RankDied) and self._progress is not None:
+            self._progress.stop()
 
     def _release(self) -> None:
         self._window.Unlock_all()
@@ -99,8 +103,9 @@ class SharedCounter:
     def _fetch(self, place: int, addend: int, operation: MPI.Op) -> int:
         """Apply an operation to a place in the window, and return what was there before."""
         self._addend[0] = addend
-        self._window.Fetch_and_op(self._addend, self._fetched, 0, place, operation)
-        self._window.Flush(0)
+        with noticing_deaths():
+            self._window.Fetch_and_op(self._addend, self._fetched, 0, place, operation)
+            self._window.Flush(0)
         return int(self._fetched[0])
 
     def _reset(self) -> None:
@@ -138,8 +143,9 @@ class _ProgressThread:
         self._thread.join()
 
     def _serve(self) -> None:
-        while not self._done.wait(_PROGRESS_INTERVAL):
-            self._communicator.Iprobe()
+        with suppress(RankDied), noticing_deaths():
+            while not self._done.wait(_PROGRESS_INTERVAL):
+                self._communicator.Iprobe()
 
 
 def _require_threads() -> None:

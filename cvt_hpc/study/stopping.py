@@ -9,6 +9,7 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any, Self
 
+from cvt_hpc.study.deaths import RankDied
 from cvt_hpc.study.progress import show_duration
 from cvt_hpc.study.schedule import Counter
 from cvt_hpc.study.time_limit import TimeLimit
@@ -81,6 +82,7 @@ class Stop:
         self._late = ""
         self._told = False
         self._heard = False
+        self._death: RankDied | None = None
 
     @property
     def reason(self) -> str | None:
@@ -92,8 +94,17 @@ class Stop:
         return self._late or None
 
     def may_claim(self) -> bool:
-        """Return whether this rank may start another run."""
-        return self.interrupt() is None
+        """Return whether this rank may start another run.
+
+        Raises
+        ------
+        RankDied
+            If a rank of the team is dead.
+        """
+        may = self.interrupt() is None
+        if self._death is not None:
+            raise self._death
+        return may
 
     def fits(self, seconds: float) -> bool:
         """Return whether there is so much time [s] left."""
@@ -116,12 +127,15 @@ class Stop:
     def look(self) -> None:
         """Look now and then at what the other ranks say, and tell them if this one is to stop."""
         now = time.monotonic()
-        if now - self._looked > _LOOK_INTERVAL:
-            self._looked = now
-            self._meanwhile()
-            self._heard = self._counter.is_interrupted()
-        if self._signals.noted:
-            self.tell_all()
+        try:
+            if now - self._looked > _LOOK_INTERVAL:
+                self._looked = now
+                self._meanwhile()
+                self._heard = self._counter.is_interrupted()
+            if self._signals.noted:
+                self.tell_all()
+        except RankDied as death:  # no reason to break off the run that asks
+            self._death = death
 
     def tell_all(self) -> None:
         """Let all ranks stop, as this one does."""

@@ -18,6 +18,7 @@ from cvt_hpc.files import StorageError, discard
 from cvt_hpc.study.attempts import enter_attempts, later_attempts, plan_runs
 from cvt_hpc.study.batches import Assignment
 from cvt_hpc.study.cost_model import CostModel, Fit, fit_recorded
+from cvt_hpc.study.deaths import outlive
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.frames import RecordFormat
@@ -73,8 +74,8 @@ def run(
     """Do all runs of a job that are not yet recorded, and gather the dataset.
 
     Serial, or on all ranks when started under mpirun or srun. A run that raises is recorded as failed, and
-    the sweep goes on. SIGINT, SIGTERM and SIGUSR1 end the sweep early and orderly: the runs at work are
-    broken off, and the same call does them later.
+    the sweep goes on; so do the other ranks when one dies, where MPI lets them. SIGINT, SIGTERM and SIGUSR1
+    end the sweep early and orderly: the runs at work are broken off, and the same call does them later.
 
     Parameters
     ----------
@@ -121,31 +122,40 @@ def run(
         raise mismatch("part", "a whole study, since a trace goes by the runs of all parts", f"part {share}")
     task = Task(job, study, simulator, run_limit)
 
-    def prepare() -> _Plan:
-        plan = _prepare(folder, task, share, fresh, retry, team.size, held)
-        asked = None if time_limit is None else time_limit - (time.monotonic() - started)
-        return plan._replace(limit=find_time_limit(asked, study.size))
-
     folder = StudyFolder(out if out is not None else Path("out") / job.name)
-    with SignalWatch() as signals, assembled_team(folder.crash_log) as team, ExitStack() as held:
-        plan = team.on_root(prepare)
-        with open_counter(team) as counter:
-            costs = simulator.run_costs(job)
-            order = [index for assignment in plan.assignments for index in assignment.runs]
-            visible = progress and team.rank == 0
-            display = Progress(counter, plan.total, plan.recorded, plan.failed, visible, costs[order])
-            stop = Stop(counter, signals, plan.limit, display.show)
-            stopped = None
-            with closing(display):
-                while plan.assignments:
-                    trouble = _compute(task, folder, plan, costs, team.rank, counter, stop)
-                    team.wait_for_all(stop.look)
-                    stopped = _settle(team, trouble, stop.reason)
-                    if stopped or not study.is_traced:
-                        break
-                    next_round = partial(_next_round, folder, task, plan, team.size, counter, display)
-                    plan = team.on_root(next_round)
-        return team.on_root(lambda: _conclude(folder, task, share, plan, stopped, held))
+    first = True
+
+    def sweep(team: Team) -> RunReport:
+        nonlocal first
+        begins, first = first, False  # the survivors of a death go on from what is on record
+
+        def prepare() -> _Plan:
+            plan = _prepare(folder, task, share, fresh and begins, retry if begins else (), team.size, held)
+            asked = None if time_limit is None else time_limit - (time.monotonic() - started)
+            return plan._replace(limit=find_time_limit(asked, study.size))
+
+        with ExitStack() as held:
+            plan = team.on_root(prepare)
+            with open_counter(team) as counter:
+                costs = simulator.run_costs(job)
+                order = [index for assignment in plan.assignments for index in assignment.runs]
+                visible = progress and team.rank == 0
+                display = Progress(counter, plan.total, plan.recorded, plan.failed, visible, costs[order])
+                stop = Stop(counter, signals, plan.limit, display.show)
+                stopped = None
+                with closing(display):
+                    while plan.assignments:
+                        trouble = _compute(task, folder, plan, costs, team.rank, counter, stop)
+                        team.wait_for_all(stop.look)
+                        stopped = _settle(team, trouble, stop.reason)
+                        if stopped or not study.is_traced:
+                            break
+                        next_round = partial(_next_round, folder, task, plan, team.size, counter, display)
+                        plan = team.on_root(next_round)
+            return team.on_root(lambda: _conclude(folder, task, share, plan, stopped, held))
+
+    with SignalWatch() as signals, assembled_team(folder.crash_log) as team:
+        return outlive(team, sweep)
 
 
 def _prepare(

@@ -8,12 +8,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from study_processes import HERE, Sweep, clean_environment, find_mpirun
+from study_processes import HERE, Sweep, clean_environment, fault_tolerance, find_mpirun
 
 
 @pytest.fixture
 def start() -> Iterator[Callable[..., Sweep]]:
-    """Start a program under `ranks` ranks of MPI (0: no launcher), with options as JSON."""
+    """Start a program under `ranks` ranks of MPI (0: no launcher), with options as JSON; `tolerant` of deaths."""
     started: list[Sweep] = []
 
     def start_program(
@@ -21,8 +21,11 @@ def start() -> Iterator[Callable[..., Sweep]]:
         ranks: int = 0,
         program: str = "study_double.py",
         environment: dict[str, str] | None = None,
+        tolerant: bool = False,
     ) -> Sweep:
         launcher = [find_mpirun(), "-n", str(ranks)] if ranks else []
+        if tolerant:
+            launcher[1:1] = fault_tolerance(launcher[0])
         command = [*launcher, sys.executable, str(HERE / program), json.dumps(options, default=str)]
         started.append(Sweep(command, {**clean_environment(), **(environment or {})}))
         return started[-1]

@@ -11,6 +11,7 @@ import json
 import math
 import os
 import resource
+import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -148,7 +149,7 @@ class Simulator:
         if first is not None and first == point.get("raise_at"):
             raise ZeroDivisionError("the driven pulley\nstands still")
         if first is not None and first == point.get("crash_at"):
-            os._exit(7)
+            os.kill(os.getpid(), signal.SIGKILL)  # as for lack of memory
         diverges = first is not None and first == point.get("diverge_at")
         numbers = np.full(24, np.nan) if diverges else logistic_numbers(point, job)
         window = point.get("window")
@@ -196,6 +197,7 @@ def main(options: dict[str, Any]) -> int:
 
         mpi4py.rc.thread_level = options["thread_level"]
     from cvt_hpc.study import process_rank, run
+    from cvt_hpc.study.launch import end_process
     from cvt_hpc.study.record import RecordLog
 
     if process_rank() == options.get("break_rank"):
@@ -219,7 +221,7 @@ def main(options: dict[str, Any]) -> int:
     if process_rank() == 0:
         facts = {"done": report.done, "failed": len(report.failed), "remaining": report.remaining}
         print(json.dumps({**facts, "stopped": report.stopped, "mpi": "mpi4py.MPI" in sys.modules}))
-    return report.exit_status
+    return end_process(report.exit_status)
 
 
 def raise_defect(*_: object) -> None:

@@ -84,6 +84,14 @@ def find_mpirun() -> str:
     return mpirun
 
 
+def fault_tolerance(mpirun: str) -> list[str]:
+    """Return the options with which a launcher leaves ranks alive when another one dies."""
+    version = subprocess.run([mpirun, "--version"], capture_output=True, text=True).stdout
+    if "Open MPI" not in version:
+        pytest.skip("this mpirun ends all ranks when one dies")
+    return ["--with-ft", "ulfm"]
+
+
 def wait_until(condition: Callable[[], Any], what: str) -> None:
     deadline = time.monotonic() + PATIENCE
     while not condition():

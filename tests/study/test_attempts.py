@@ -40,7 +40,7 @@ def reason_of(out, index):
 def test_a_run_that_kills_its_process_is_found_and_given_up(start, tmp_path):
     options = {"out": tmp_path, "runs": RUNS, "lanes": 4, "parameters": {"crash_at": 5}}
     counts, finished = [], None
-    while finished is None or finished.returncode == 7:
+    while finished is None or finished.returncode == -9:
         assert len(counts) < 9, "it is done again for ever"
         finished = start(options).finish()
         counts.append(int(recorded(tmp_path).recorded.sum()))
@@ -53,7 +53,7 @@ def test_a_run_that_kills_its_process_is_found_and_given_up(start, tmp_path):
         assert dataset["status"].values[5] == Status.FAILED_ERROR
     # Asked for again, it has its attempts anew.
     finished = start({**options, "sweep": {"retry": [int(Status.FAILED_ERROR)]}}).finish()
-    assert finished.returncode == 7
+    assert finished.returncode == -9
     records = recorded(tmp_path)
     assert (records.recorded.sum(), records.attempts[5], records.died[5]) == (RUNS - 1, 2, 1)
 
@@ -252,3 +252,26 @@ def test_a_retry_on_two_ranks(start, tmp_path):
     records = recorded(tmp_path)
     assert records.recorded.all()
     assert records.attempts.tolist() == [1] * 3 + [2] + [1] * 8
+
+
+@pytest.mark.parametrize("rank", [0, 1])
+def test_survivors_of_a_dead_rank_finish_the_sweep(start, tmp_path, rank):
+    options = {"out": tmp_path, "runs": 60, "parameters": {"pause": 0.05}}
+    sweep = start(options, ranks=3, tolerant=True)
+    wait_until(
+        lambda: (tmp_path / "job.json").exists() and recorded(tmp_path).recorded.sum() > 5, "some runs"
+    )
+    sweep.ranks()[rank].kill()
+    finished = sweep.finish()
+    assert json.loads(finished.stdout)["done"] == 60, finished.stderr
+    assert "a rank has died; 2 go on" in finished.stderr
+    records = recorded(tmp_path)
+    assert records.recorded.all()
+    assert [session["ranks"] for session in records.sessions] == [3, 2]
+
+
+def test_survivors_give_up_a_run_that_keeps_killing(start, tmp_path):
+    options = {"out": tmp_path, "runs": RUNS, "parameters": {"pause": 0.05, "crash_at": 5}}
+    finished = start(options, ranks=7, tolerant=True).finish()
+    assert json.loads(finished.stdout)["failed"] == 1, finished.stderr
+    assert "its process died 5 times" in reason_of(tmp_path, 5)

@@ -184,6 +184,14 @@ def test_marks_are_no_records_and_damage_to_them_costs_no_record(tmp_path, study
         flip(log.path, mark + place)
 
 
+def test_a_batch_without_all_its_records_has_no_time(tmp_path, study, rows):
+    with RecordLog(tmp_path, RecordFormat(study.fingerprint, study.record_dtype), SESSION, rank=0) as log:
+        for batch, recorded in (([0], [0]), ([1, 2], [1, 2]), ([3, 4], [3])):
+            log.begin(batch)
+            log.append([(index, rows[index]) for index in recorded])
+    assert [timing.batch for timing in read_records(tmp_path, study).timings] == [(1, 2)]
+
+
 def test_a_torn_mark_is_no_death(tmp_path, study, rows):
     path = write_log(tmp_path, study, rows, [4])
     layout = RecordFormat(study.fingerprint, study.record_dtype)

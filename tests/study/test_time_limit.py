@@ -97,7 +97,7 @@ def test_a_rank_learns_from_what_it_does_itself(tmp_path, monkeypatch):
 
 def test_a_run_at_work_is_broken_off_when_time_is_up(start, tmp_path):
     options = {"out": tmp_path, "slow": {"from": 3, "pause": 300.0}, "sweep": {"time_limit": 1.0}}
-    for ranks, status in ((0, 99), (2, 98)):  # the second gets no further
+    for ranks, status in ((0, 99), (2, 98)):  # the second start gains nothing
         finished = start(options, ranks).finish()
         assert finished.returncode == status, finished.stderr
         facts = json.loads(finished.stdout)
