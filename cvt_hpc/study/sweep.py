@@ -1,4 +1,4 @@
-"""All runs of a job, on all ranks: plan, resume, compute, record, gather."""
+"""All runs of a job, on all ranks: compute what is planned, record, gather."""
 
 from __future__ import annotations
 
@@ -9,15 +9,13 @@ from collections.abc import Collection
 from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cvt_hpc.errors import mismatch
-from cvt_hpc.files import StorageError, discard
-from cvt_hpc.study.attempts import enter_attempts, later_attempts, plan_runs
-from cvt_hpc.study.batches import Assignment
-from cvt_hpc.study.cost_model import CostModel, Fit, fit_recorded
+from cvt_hpc.files import StorageError
+from cvt_hpc.study.cost_model import CostModel
 from cvt_hpc.study.deaths import outlive
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
@@ -26,37 +24,22 @@ from cvt_hpc.study.gather import gather_records
 from cvt_hpc.study.histories import keep_histories, missing_histories
 from cvt_hpc.study.launch import Team, assembled_team
 from cvt_hpc.study.part import Part, read_part
+from cvt_hpc.study.planning import Plan, asked_runs, next_round, prepare
 from cvt_hpc.study.progress import Progress
-from cvt_hpc.study.provenance import new_session
 from cvt_hpc.study.record import RecordLog
-from cvt_hpc.study.records import Records
 from cvt_hpc.study.recovery import read_records
 from cvt_hpc.study.report import RunReport, build_report
 from cvt_hpc.study.schedule import Counter, claimed_batches, open_counter
 from cvt_hpc.study.simulator import Simulator, default_simulator
 from cvt_hpc.study.stopping import ELSEWHERE, SignalWatch, Stop
 from cvt_hpc.study.task import Task
-from cvt_hpc.study.time_limit import TimeLimit, find_time_limit
-from cvt_hpc.study.tracing import needed_runs
+from cvt_hpc.study.time_limit import find_time_limit
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
 _logger = logging.getLogger(__name__)
-
-
-class _Plan(NamedTuple):
-    """What rank 0 finds out and all ranks need."""
-
-    assignments: list[Assignment]
-    attempts: dict[int, int]  # of runs that were begun again
-    fit: Fit
-    total: int
-    recorded: int
-    failed: int
-    session: dict[str, Any]
-    limit: TimeLimit
 
 
 def run(
@@ -129,13 +112,13 @@ def run(
         nonlocal first
         begins, first = first, False  # the survivors of a death go on from what is on record
 
-        def prepare() -> _Plan:
-            plan = _prepare(folder, task, share, fresh and begins, retry if begins else (), team.size, held)
+        def find_plan() -> Plan:
+            plan = prepare(folder, task, share, fresh and begins, retry if begins else (), team.size, held)
             asked = None if time_limit is None else time_limit - (time.monotonic() - started)
             return plan._replace(limit=find_time_limit(asked, study.size))
 
         with ExitStack() as held:
-            plan = team.on_root(prepare)
+            plan = team.on_root(find_plan)
             with open_counter(team) as counter:
                 costs = simulator.run_costs(job)
                 order = [index for assignment in plan.assignments for index in assignment.runs]
@@ -150,93 +133,18 @@ def run(
                         stopped = _settle(team, trouble, stop.reason)
                         if stopped or not study.is_traced:
                             break
-                        next_round = partial(_next_round, folder, task, plan, team.size, counter, display)
-                        plan = team.on_root(next_round)
+                        more = partial(next_round, folder, task, plan, team.size, counter, display)
+                        plan = team.on_root(more)
             return team.on_root(lambda: _conclude(folder, task, share, plan, stopped, held))
 
     with SignalWatch() as signals, assembled_team(folder.crash_log) as team:
         return outlive(team, sweep)
 
 
-def _prepare(
-    folder: StudyFolder,
-    task: Task,
-    part: Part | None,
-    fresh: bool,
-    retry: Collection[Status],
-    ranks: int,
-    held: ExitStack,
-) -> _Plan:
-    """Take the folder into possession and find what is left to do; on rank 0 alone."""
-    study = task.study
-    folder.check_free_for(study, fresh)
-    folder.create()
-    held.enter_context(folder.occupied(part))
-    folder.check_free_for(study, fresh)  # again: another process may have been there before the lock
-    if part is None:
-        for leftover in folder.half_histories():
-            discard(leftover)
-    if fresh:
-        folder.clear()
-    folder.save(study)
-    records = read_records(folder.records, study)
-    session = new_session(ranks)
-    for warning in records.warnings + _other_versions(records, session):
-        _logger.warning(warning)
-    asked = _asked(task, records, part)
-    records = enter_attempts(folder, study, records, asked, retry, session)
-    records.written[missing_histories(task.job, folder, records)] = np.nan  # done again; the record stays
-    done = records.status == Status.DONE
-    recorded = int((records.recorded & asked).sum())
-    return _Plan(
-        assignments=plan_runs(task.job, task.simulator, records, asked, ranks),
-        attempts=later_attempts(records),
-        fit=fit_recorded(task.simulator.run_costs(task.job), records.timings, done),
-        total=int(asked.sum()),
-        recorded=recorded,
-        failed=recorded - int((done & asked).sum()),
-        session=session,
-        limit=TimeLimit(),
-    )
-
-
-def _asked(task: Task, records: Records, part: Part | None = None) -> np.ndarray:
-    """Return whether a run is one of this start, shape (runs,); a trace comes to ask for more."""
-    if part is not None:
-        return part.holds(np.arange(task.study.size))
-    asked = needed_runs(task.study, records)
-    asked[list(task.job.histories)] = True
-    return asked
-
-
-def _next_round(
-    folder: StudyFolder, task: Task, plan: _Plan, ranks: int, counter: Counter, display: Progress
-) -> _Plan:
-    """Return the plan of what a trace asks for after the runs of a round; on rank 0 alone."""
-    records = read_records(folder.records, task.study)
-    costs = task.simulator.run_costs(task.job)
-    assignments = plan_runs(task.job, task.simulator, records, _asked(task, records), ranks)
-    counter.rewind()
-    display.expect(costs[[index for assignment in assignments for index in assignment.runs]])
-    fit = fit_recorded(costs, records.timings, records.status == Status.DONE)
-    return plan._replace(assignments=assignments, fit=fit)
-
-
-def _other_versions(records: Records, session: dict[str, Any]) -> list[str]:
-    """Return a warning if the records were made by other code than that which is going on now."""
-    keys = ("versions", "git_revision")
-    if all(earlier[key] == session[key] for earlier in records.sessions for key in keys):
-        return []
-    return [
-        "earlier runs of this folder were made with other versions than these (results.nc names them in its "
-        "attributes `versions` and `git_revision`); --fresh repeats them"
-    ]
-
-
 def _compute(
     task: Task,
     folder: StudyFolder,
-    plan: _Plan,
+    plan: Plan,
     costs: np.ndarray,
     rank: int,
     counter: Counter,
@@ -281,7 +189,7 @@ def _conclude(
     folder: StudyFolder,
     task: Task,
     part: Part | None,
-    plan: _Plan,
+    plan: Plan,
     stopped: str | None,
     held: ExitStack,
 ) -> RunReport:
@@ -291,6 +199,6 @@ def _conclude(
     gathers = part is None or not folder.is_in_use()
     records = gather_records(folder, task.study) if gathers else read_records(folder.records, task.study)
     records.written[missing_histories(task.job, folder, records)] = np.nan
-    asked = _asked(task, records, part)
+    asked = asked_runs(task, records, part)
     gained = int(records.recorded[asked].sum()) - plan.recorded
     return build_report(folder, task.study, records, asked, gathers, gained, stopped)

@@ -1,0 +1,117 @@
+"""What a start of a sweep finds on record and plans to do; on rank 0 alone."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Collection
+from contextlib import ExitStack
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cvt_hpc.files import discard
+from cvt_hpc.study.attempts import enter_attempts, later_attempts, plan_runs
+from cvt_hpc.study.batches import Assignment
+from cvt_hpc.study.cost_model import Fit, fit_recorded
+from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.histories import missing_histories
+from cvt_hpc.study.part import Part
+from cvt_hpc.study.progress import Progress
+from cvt_hpc.study.provenance import new_session
+from cvt_hpc.study.records import Records
+from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.schedule import Counter
+from cvt_hpc.study.task import Task
+from cvt_hpc.study.time_limit import TimeLimit
+from cvt_hpc.study.tracing import needed_runs
+from cvt_hpc.variables import Status
+
+_logger = logging.getLogger(__name__)
+
+
+class Plan(NamedTuple):
+    """What rank 0 finds out and all ranks need."""
+
+    assignments: list[Assignment]
+    attempts: dict[int, int]  # of runs that were begun again
+    fit: Fit
+    total: int
+    recorded: int
+    failed: int
+    session: dict[str, Any]
+    limit: TimeLimit
+
+
+def prepare(
+    folder: StudyFolder,
+    task: Task,
+    part: Part | None,
+    fresh: bool,
+    retry: Collection[Status],
+    ranks: int,
+    held: ExitStack,
+) -> Plan:
+    """Take the folder into possession and find what is left to do; on rank 0 alone."""
+    study = task.study
+    folder.check_free_for(study, fresh)
+    folder.create()
+    held.enter_context(folder.occupied(part))
+    folder.check_free_for(study, fresh)  # again: another process may have been there before the lock
+    if part is None:
+        for leftover in folder.half_histories():
+            discard(leftover)
+    if fresh:
+        folder.clear()
+    folder.save(study)
+    records = read_records(folder.records, study)
+    session = new_session(ranks)
+    for warning in records.warnings + _other_versions(records, session):
+        _logger.warning(warning)
+    asked = asked_runs(task, records, part)
+    records = enter_attempts(folder, study, records, asked, retry, session)
+    records.written[missing_histories(task.job, folder, records)] = np.nan  # done again; the record stays
+    done = records.status == Status.DONE
+    recorded = int((records.recorded & asked).sum())
+    return Plan(
+        assignments=plan_runs(task.job, task.simulator, records, asked, ranks),
+        attempts=later_attempts(records),
+        fit=fit_recorded(task.simulator.run_costs(task.job), records.timings, done),
+        total=int(asked.sum()),
+        recorded=recorded,
+        failed=recorded - int((done & asked).sum()),
+        session=session,
+        limit=TimeLimit(),
+    )
+
+
+def asked_runs(task: Task, records: Records, part: Part | None = None) -> np.ndarray:
+    """Return whether a run is one of this start, shape (runs,); a trace comes to ask for more."""
+    if part is not None:
+        return part.holds(np.arange(task.study.size))
+    asked = needed_runs(task.study, records)
+    asked[list(task.job.histories)] = True
+    return asked
+
+
+def next_round(
+    folder: StudyFolder, task: Task, plan: Plan, ranks: int, counter: Counter, display: Progress
+) -> Plan:
+    """Return the plan of what a trace asks for after the runs of a round; on rank 0 alone."""
+    records = read_records(folder.records, task.study)
+    costs = task.simulator.run_costs(task.job)
+    assignments = plan_runs(task.job, task.simulator, records, asked_runs(task, records), ranks)
+    counter.rewind()
+    display.expect(costs[[index for assignment in assignments for index in assignment.runs]])
+    fit = fit_recorded(costs, records.timings, records.status == Status.DONE)
+    return plan._replace(assignments=assignments, fit=fit)
+
+
+def _other_versions(records: Records, session: dict[str, Any]) -> list[str]:
+    """Return a warning if the records were made by other code than that which is going on now."""
+    keys = ("versions", "git_revision")
+    if all(earlier[key] == session[key] for earlier in records.sessions for key in keys):
+        return []
+    return [
+        "earlier runs of this folder were made with other versions than these (results.nc names them in its "
+        "attributes `versions` and `git_revision`); --fresh repeats them"
+    ]
