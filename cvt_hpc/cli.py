@@ -105,6 +105,11 @@ def _parser() -> argparse.ArgumentParser:
     chart.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: out/<job name>)")
     chart.add_argument("--fresh", action="store_true", help="throw earlier results of the folder away")
     check = _add(commands, "check", _check, "validate a job, show its defaults and estimate its cost", "JOB")
+    ranks = "forecast the sweep on so many ranks: makespan, efficiency, core-hours, disk and Slurm's --time"
+    check.add_argument("--ranks", type=int, nargs="+", default=[], metavar="N", help=ranks)
+    pilots = "forecast by K batches that are done for it, shortened (default: by records, else by prediction)"
+    check.add_argument("--pilots", type=int, default=0, metavar="K", help=pilots)
+    check.add_argument("--plot", type=Path, metavar="PNG", help="picture of the forecast, 1 to 10 000 ranks")
     for command in (run, simulate, check):
         _add_assignments(command, "--set", "replace a value of the job, or an axis by one value")
     _add_assignments(chart, "--set", "replace a value of the job and of all its scenes")
@@ -133,7 +138,7 @@ def _add_assignments(command: argparse.ArgumentParser, flag: str, text: str) -> 
 
 def _run(arguments: argparse.Namespace) -> int:
     if arguments.dry_run:
-        return _check(arguments)
+        return _validate(arguments)
     from cvt_hpc.job import load_job
     from cvt_hpc.job.durations import read_duration
     from cvt_hpc.printing import report_lines, trouble_lines
@@ -238,6 +243,43 @@ def _chart(arguments: argparse.Namespace) -> int:
 
 
 def _check(arguments: argparse.Namespace) -> int:
+    if min(arguments.ranks, default=1) < 1:
+        raise mismatch("--ranks", "numbers of ranks, 1 or more", str(min(arguments.ranks)))
+    if arguments.pilots < 0:
+        raise mismatch("--pilots", "a number of batches", str(arguments.pilots))
+    if (arguments.pilots or arguments.plot) and not arguments.ranks:
+        raise mismatch("--pilots" if arguments.pilots else "--plot", "--ranks beside it", "none")
+    _check_output(arguments.plot, (".png", ".svg", ".pdf"))
+    status = _validate(arguments)
+    if arguments.ranks and _speaks():
+        _forecast(arguments)
+    return status
+
+
+def _forecast(arguments: argparse.Namespace) -> None:
+    from cvt_hpc.job import load_job
+    from cvt_hpc.printing import disk_line, forecast_lines
+    from cvt_hpc.study.description import describe
+    from cvt_hpc.study.forecast import CURVE, forecast
+    from cvt_hpc.study.pilots import find_out
+    from cvt_hpc.study.resources import disk_space
+    from cvt_hpc.study.simulator import default_simulator
+
+    job, simulator = load_job(arguments.path, arguments.set), default_simulator()
+    costs, groups = simulator.run_costs(job), simulator.lane_groups(job, range(job.size))
+    known = find_out(job, simulator, groups, Path("out") / job.name, arguments.pilots)
+    found = [forecast(groups, costs, known.fit, ranks) for ranks in arguments.ranks]
+    disk = disk_space(describe(job, simulator), found[-1].batches, len(job.histories), known.history_bytes)
+    print("", *forecast_lines(found, job, known.basis), disk_line(disk, len(job.histories)), sep="\n")
+    if arguments.plot is not None:
+        from cvt_hpc.analysis.efficiency import draw_efficiency
+
+        curve = [forecast(groups, costs, known.fit, ranks) for ranks in CURVE]
+        title = f"{job.name}: {job.size} runs"
+        print(f"picture: {draw_efficiency(curve, title, known.basis, arguments.plot)}")
+
+
+def _validate(arguments: argparse.Namespace) -> int:
     from cvt_hpc.job import load_job
     from cvt_hpc.job.summary import summarize
     from cvt_hpc.study.description import describe
