@@ -46,6 +46,13 @@ MEAN = 0.06  # [s] of a run's predicted duration
 TAIL = 1.0  # standard deviation of its logarithm: the longest of 400 takes twelve times the mean
 SPREAD = 0.35  # of the logarithm of the duration about the predicted one
 MANY = 10**6
+CASES = (  # runs in a batch, tail and spread of the batches, ranks
+    (1, TAIL, SPREAD, 10_000),
+    (16, TAIL, SPREAD, 1_000),
+    (16, TAIL, SPREAD, 10_000),
+    (16, 0.0, SPREAD, 10_000),
+    (16, 0.0, 0.1, 10_000),
+)
 
 
 class Sleepers(Simulator):
@@ -123,7 +130,7 @@ def compare(ranks: int, runs: int) -> None:
     order = [batch[0] for batch in share_out(groups, sleepers.costs, ranks)]
     generator = np.random.default_rng(0)
     simulated = simulate_schedule(sleepers.pauses[order], ranks, SHARED_MEMORY, generator)
-    blind = forecast(groups, sleepers.costs, known_fit(), ranks, SHARED_MEMORY)
+    blind = forecast(groups, sleepers.costs, known_fit(SPREAD), ranks, SHARED_MEMORY)
     makespan, work, longest = measure("sweep", ranks, runs)
     median, mean = measure("claim", ranks, runs)
     print(f"{ranks} ranks, {runs} runs: a claim takes {median:.2f} us, with waiting for a core {mean:.2f} us")
@@ -134,17 +141,17 @@ def compare(ranks: int, runs: int) -> None:
     print(f"  forecast  {blind.makespan[0]:.3f} s, 95 % {blind.makespan[1]:.3f} to {blind.makespan[2]:.3f} s")
 
 
-def known_fit() -> Fit:
-    """Return the fit to many batches of the sleepers' kind."""
-    return Fit(MANY, 0.0, MANY * SPREAD**2)
+def known_fit(spread: float) -> Fit:
+    """Return the fit to many batches."""
+    return Fit(MANY, 0.0, MANY * spread**2)
 
 
-def simulate_many(runs: int, lanes: int, tail: float, ranks: int) -> Forecast:
-    """Return the forecast of runs in batches of `lanes`, each as long as the longest run in it."""
+def simulate_many(lanes: int, tail: float, spread: float, ranks: int) -> Forecast:
+    """Return the forecast of 10^6 runs in batches of `lanes`, all runs of a batch alike."""
     generator = np.random.default_rng(0)
-    batches = np.exp(tail * generator.standard_normal(-(-runs // lanes)))
-    groups = [tuple(range(first, min(first + lanes, runs))) for first in range(0, runs, lanes)]
-    return forecast(groups, np.repeat(batches, lanes)[:runs], known_fit(), ranks)
+    batches = np.exp(tail * generator.standard_normal(MANY // lanes))
+    groups = [tuple(range(first, first + lanes)) for first in range(0, MANY, lanes)]
+    return forecast(groups, np.repeat(batches, lanes), known_fit(spread), ranks)
 
 
 def main() -> None:
@@ -158,13 +165,17 @@ def main() -> None:
         return
     for ranks in RANKS:
         compare(ranks, arguments.runs)
-    for lanes, tail, ranks in ((1, TAIL, 10_000), (16, TAIL, 10_000), (16, 0.0, 10_000), (16, TAIL, 1_000)):
+    for case in CASES:
         started = time.perf_counter()
-        found = simulate_many(MANY, lanes, tail, ranks)
-        taken = time.perf_counter() - started
-        print(f"{MANY} runs in {found.batches} batches, tail {tail:g}, {ranks} ranks ({taken:.0f} s):")
-        print(f"  makespan / bound {found.makespan[0] / found.bound:.4f}, efficiency "
-              f"{found.efficiency[0]:.3f} ({found.efficiency[1]:.3f} to {found.efficiency[2]:.3f})")  # fmt: skip
+        found = simulate_many(*case)
+        median, low, high = found.efficiency
+        lanes, tail, spread, ranks = case
+        print(f"10^6 runs in batches of {lanes} on {ranks} ranks, tail {tail:g}, spread {spread:g}:")
+        print(
+            f"  makespan {found.makespan[0] / found.bound:.4f} of the bound, efficiency {median:.3f}, ",
+            end="",
+        )
+        print(f"95 % {low:.3f} to {high:.3f} ({time.perf_counter() - started:.0f} s)")
 
 
 if __name__ == "__main__":

@@ -235,7 +235,7 @@ def test_check_forecasts_by_what_is_on_record(write_job, call):
     assert "forecast of all 10 runs by batches on record (9):" in call("check", "x.toml", "--ranks", "2")[1]
     # a trace is another job, and has no records
     traced = call("check", "x.toml", "--ranks", "2", *TRACED)[1]
-    assert traced[-3].endswith("factor of two, if all cells of the grid are run:")
+    assert traced[-4].endswith("factor of two, if all cells of the grid are run:")
 
 
 @pytest.mark.parametrize(
