@@ -9,10 +9,13 @@ import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from cvt_hpc import __version__
 from cvt_hpc.errors import CRASHED, InputError, mismatch
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 RETRIED = ("timed_out", "failed_error", "failed_numerics")
@@ -138,7 +141,8 @@ def _add_assignments(command: argparse.ArgumentParser, flag: str, text: str) -> 
 
 def _run(arguments: argparse.Namespace) -> int:
     if arguments.dry_run:
-        return _validate(arguments)
+        _show(arguments)
+        return DONE
     from cvt_hpc.job import load_job
     from cvt_hpc.job.durations import read_duration
     from cvt_hpc.printing import report_lines, trouble_lines
@@ -250,36 +254,27 @@ def _check(arguments: argparse.Namespace) -> int:
     if (arguments.pilots or arguments.plot) and not arguments.ranks:
         raise mismatch("--pilots" if arguments.pilots else "--plot", "--ranks beside it", "none")
     _check_output(arguments.plot, (".png", ".svg", ".pdf"))
-    status = _validate(arguments)
+    job = _show(arguments)
     if arguments.ranks and _speaks():
-        _forecast(arguments)
-    return status
+        from cvt_hpc.printing import disk_line, forecast_lines
+        from cvt_hpc.study.forecast import CURVE
+        from cvt_hpc.study.resources import expect
+
+        ranks = [*arguments.ranks, *(CURVE if arguments.plot else ())]
+        expected = expect(job, Path("out") / job.name, ranks, arguments.pilots)
+        asked, curve = expected.forecasts[: len(arguments.ranks)], expected.forecasts[len(arguments.ranks) :]
+        print("", *forecast_lines(asked, job, expected.basis), sep="\n")
+        print(disk_line(expected.disk, len(job.histories)))
+        if arguments.plot is not None:
+            from cvt_hpc.analysis.efficiency import draw_efficiency
+
+            title = f"{job.name}: {job.size} runs"
+            print(f"picture: {draw_efficiency(curve, title, expected.basis, arguments.plot)}")
+    return DONE
 
 
-def _forecast(arguments: argparse.Namespace) -> None:
-    from cvt_hpc.job import load_job
-    from cvt_hpc.printing import disk_line, forecast_lines
-    from cvt_hpc.study.description import describe
-    from cvt_hpc.study.forecast import CURVE, forecast
-    from cvt_hpc.study.pilots import find_out
-    from cvt_hpc.study.resources import disk_space
-    from cvt_hpc.study.simulator import default_simulator
-
-    job, simulator = load_job(arguments.path, arguments.set), default_simulator()
-    costs, groups = simulator.run_costs(job), simulator.lane_groups(job, range(job.size))
-    known = find_out(job, simulator, groups, Path("out") / job.name, arguments.pilots)
-    found = [forecast(groups, costs, known.fit, ranks) for ranks in arguments.ranks]
-    disk = disk_space(describe(job, simulator), found[-1].batches, len(job.histories), known.history_bytes)
-    print("", *forecast_lines(found, job, known.basis), disk_line(disk, len(job.histories)), sep="\n")
-    if arguments.plot is not None:
-        from cvt_hpc.analysis.efficiency import draw_efficiency
-
-        curve = [forecast(groups, costs, known.fit, ranks) for ranks in CURVE]
-        title = f"{job.name}: {job.size} runs"
-        print(f"picture: {draw_efficiency(curve, title, known.basis, arguments.plot)}")
-
-
-def _validate(arguments: argparse.Namespace) -> int:
+def _show(arguments: argparse.Namespace) -> Job:
+    """Print what a job runs, and return it."""
     from cvt_hpc.job import load_job
     from cvt_hpc.job.summary import summarize
     from cvt_hpc.study.description import describe
@@ -294,7 +289,7 @@ def _validate(arguments: argparse.Namespace) -> int:
         out = getattr(arguments, "out", None) or Path("out") / job.name
         factor, runs = read_machine_factor(out, job)
         print(summarize(job, factor * estimate_cost(job), runs))
-    return DONE
+    return job
 
 
 def _check_output(path: Path | None, suffixes: tuple[str, ...]) -> None:

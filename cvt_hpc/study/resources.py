@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
-from cvt_hpc.study.description import Study
-from cvt_hpc.study.forecast import Forecast
+from cvt_hpc.study.description import Study, describe
+from cvt_hpc.study.forecast import Forecast, forecast
 from cvt_hpc.study.frames import HEAD, PLACE, RecordFormat
+from cvt_hpc.study.pilots import find_out
+from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.time_limit import gathering_margin
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
 
 _START_UP = 60.0  # [s] for MPI, Python and kernels; assumed, with room for slow file systems
 _WARNING = 180.0  # [s]: slurm/*.sbatch ask to be told 120 s before the end, and Slurm may be 60 s early
@@ -21,6 +28,38 @@ class Disk(NamedTuple):
     records: float
     results: float
     histories: float
+
+
+class Expectation(NamedTuple):
+    """What a sweep will take, by what that is known, and the space for its results."""
+
+    forecasts: list[Forecast]
+    basis: str
+    disk: Disk
+
+
+def expect(job: Job, out: Path, ranks: Sequence[int], pilots: int = 0) -> Expectation:
+    """Return what a sweep of all runs of a job will take on each of some numbers of ranks.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    out : Path
+        The output folder, whose records tell how long batches take where no pilots are asked for.
+    ranks : sequence of int
+        Numbers of processes that compute.
+    pilots : int
+        Number of batches to be done for this.
+    """
+    simulator = default_simulator()
+    study, costs = describe(job, simulator), simulator.run_costs(job)
+    groups = simulator.lane_groups(job, range(study.size))
+    known = find_out(job, simulator, groups, out, pilots)
+    forecasts = [forecast(groups, costs, known.fit, number) for number in ranks]
+    most = max(expected.batches for expected in forecasts)
+    disk = disk_space(study, most, len(job.histories), known.history_bytes)
+    return Expectation(forecasts, known.basis, disk)
 
 
 def suggested_time(forecast: Forecast, runs: int) -> float:

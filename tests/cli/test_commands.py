@@ -233,6 +233,8 @@ def test_check_forecasts_by_what_is_on_record(write_job, call):
     write_job(GRID)
     call("run", "x.toml")
     assert "forecast of all 10 runs by batches on record (9):" in call("check", "x.toml", "--ranks", "2")[1]
+    rigid = call("check", "x.toml", "--ranks", "2", "--pilots", "1", "--set", "sheave_stiffness=inf")[1]
+    assert rigid[-4].endswith("within a factor of two; no pilot batch came to its end:")
     # a trace is another job, and has no records
     traced = call("check", "x.toml", "--ranks", "2", *TRACED)[1]
     assert traced[-4].endswith("factor of two, if all cells of the grid are run:")
