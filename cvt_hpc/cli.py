@@ -9,10 +9,13 @@ import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from cvt_hpc import __version__
 from cvt_hpc.errors import CRASHED, InputError, mismatch
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 RETRIED = ("timed_out", "failed_error", "failed_numerics")
@@ -105,6 +108,11 @@ def _parser() -> argparse.ArgumentParser:
     chart.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: out/<job name>)")
     chart.add_argument("--fresh", action="store_true", help="throw earlier results of the folder away")
     check = _add(commands, "check", _check, "validate a job, show its defaults and estimate its cost", "JOB")
+    ranks = "forecast the sweep on so many ranks: makespan, efficiency, core-hours, disk and Slurm's --time"
+    check.add_argument("--ranks", type=int, nargs="+", default=[], metavar="N", help=ranks)
+    pilots = "forecast by K batches that are done for it, shortened (default: by records, else by prediction)"
+    check.add_argument("--pilots", type=int, default=0, metavar="K", help=pilots)
+    check.add_argument("--plot", type=Path, metavar="PNG", help="picture of the forecast, 1 to 10 000 ranks")
     for command in (run, simulate, check):
         _add_assignments(command, "--set", "replace a value of the job, or an axis by one value")
     _add_assignments(chart, "--set", "replace a value of the job and of all its scenes")
@@ -133,7 +141,8 @@ def _add_assignments(command: argparse.ArgumentParser, flag: str, text: str) -> 
 
 def _run(arguments: argparse.Namespace) -> int:
     if arguments.dry_run:
-        return _check(arguments)
+        _show(arguments)
+        return DONE
     from cvt_hpc.job import load_job
     from cvt_hpc.job.durations import read_duration
     from cvt_hpc.printing import report_lines, trouble_lines
@@ -238,6 +247,34 @@ def _chart(arguments: argparse.Namespace) -> int:
 
 
 def _check(arguments: argparse.Namespace) -> int:
+    if min(arguments.ranks, default=1) < 1:
+        raise mismatch("--ranks", "numbers of ranks, 1 or more", str(min(arguments.ranks)))
+    if arguments.pilots < 0:
+        raise mismatch("--pilots", "a number of batches", str(arguments.pilots))
+    if (arguments.pilots or arguments.plot) and not arguments.ranks:
+        raise mismatch("--pilots" if arguments.pilots else "--plot", "--ranks beside it", "none")
+    _check_output(arguments.plot, (".png", ".svg", ".pdf"))
+    job = _show(arguments)
+    if arguments.ranks and _speaks():
+        from cvt_hpc.printing import disk_line, forecast_lines
+        from cvt_hpc.study.forecast import CURVE
+        from cvt_hpc.study.resources import expect
+
+        ranks = [*arguments.ranks, *(CURVE if arguments.plot else ())]
+        expected = expect(job, Path("out") / job.name, ranks, arguments.pilots)
+        asked, curve = expected.forecasts[: len(arguments.ranks)], expected.forecasts[len(arguments.ranks) :]
+        print("", *forecast_lines(asked, job, expected.basis), sep="\n")
+        print(disk_line(expected.disk, len(job.histories)))
+        if arguments.plot is not None:
+            from cvt_hpc.analysis.efficiency import draw_efficiency
+
+            title = f"{job.name}: {job.size} runs"
+            print(f"picture: {draw_efficiency(curve, title, expected.basis, arguments.plot)}")
+    return DONE
+
+
+def _show(arguments: argparse.Namespace) -> Job:
+    """Print what a job runs, and return it."""
     from cvt_hpc.job import load_job
     from cvt_hpc.job.summary import summarize
     from cvt_hpc.study.description import describe
@@ -252,7 +289,7 @@ def _check(arguments: argparse.Namespace) -> int:
         out = getattr(arguments, "out", None) or Path("out") / job.name
         factor, runs = read_machine_factor(out, job)
         print(summarize(job, factor * estimate_cost(job), runs))
-    return DONE
+    return job
 
 
 def _check_output(path: Path | None, suffixes: tuple[str, ...]) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.job.values import in_words
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
 
     from cvt_hpc.job import Job
     from cvt_hpc.study import RunReport, StudyStatus
+    from cvt_hpc.study.forecast import Forecast
+    from cvt_hpc.study.resources import Disk
 
 MOST_FAILURES_NAMED = 10
 _KNOWN_OF_FAILURES = (
@@ -65,6 +68,37 @@ def status_lines(status: StudyStatus) -> Iterator[str]:
         yield f"rate    {status.rate:.3g} runs/s"
     if status.left and status.time_to_go is not None:
         yield f"to go   {show_duration(status.time_to_go)}"
+
+
+def forecast_lines(forecasts: Sequence[Forecast], job: Job, basis: str) -> Iterator[str]:
+    """Yield the lines that say what a sweep will take on several numbers of ranks, a row each."""
+    from cvt_hpc.study.progress import show_duration
+    from cvt_hpc.study.resources import slurm_time, suggested_time
+
+    at_most = ", if all cells of the grid are run" if "first_spacing" in job.design else ""
+    yield f"forecast of all {job.size} runs by {basis}{at_most}:"
+    yield f"  {'ranks':>6}  {'makespan':>9}  {'95 % of sweeps':<20}  efficiency  core-hours  --time"
+    for forecast in forecasts:
+        median, low, high = map(show_duration, forecast.makespan)
+        yield (
+            f"  {forecast.ranks:>6}  {median:>9}  {f'{low} to {high}':<20}  {forecast.efficiency[0]:>10.0%}  "
+            f"{forecast.core_seconds / 3600:>10.3g}  {slurm_time(suggested_time(forecast, job.size))}"
+        )
+
+
+def disk_line(disk: Disk, histories: int) -> str:
+    """Return the line that says what space a study takes on the disk."""
+    line = (
+        f"disk: {_in_megabytes(disk.records)} of records, at most {_in_megabytes(disk.results)} of results.nc"
+    )
+    if not histories:
+        return line
+    size = "of unknown size (--pilots tells)" if math.isnan(disk.histories) else _in_megabytes(disk.histories)
+    return f"{line}, {histories} histories {size}"
+
+
+def _in_megabytes(size: float) -> str:
+    return f"{size / 1e6:.3g} MB"
 
 
 def point_lines(job: Job, at: Mapping[str, Any]) -> Iterator[str]:

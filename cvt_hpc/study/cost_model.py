@@ -61,10 +61,22 @@ class Fit(NamedTuple):
         """Return a factor that one batch in forty exceeds; without any batch there is none, and it is 0."""
         if self.batches == 0:
             return 0.0
-        freedom = _PRIOR_WEIGHT + self.batches - 1
-        spread = math.sqrt((_PRIOR_WEIGHT * _PRIOR_SPREAD**2 + self.squares) / freedom)
         # The mean itself is uncertain as well, the more so the fewer batches there are.
-        return math.exp(self.mean + _DEVIATIONS * spread * math.sqrt(1 + 1 / self.batches))
+        return math.exp(self.mean + _DEVIATIONS * self.spread() * math.sqrt(1 + 1 / self.batches))
+
+    def spread(self) -> float:
+        """Return the standard deviation of the logarithm, by the batches and the prior."""
+        freedom = _PRIOR_WEIGHT + max(self.batches - 1, 0)
+        return math.sqrt((_PRIOR_WEIGHT * _PRIOR_SPREAD**2 + self.squares) / freedom)
+
+    def draw(self, generator: np.random.Generator, count: int) -> np.ndarray:
+        """Return factors of `count` batches of one sweep, as likely as what is known makes them.
+
+        All share the error of the mean, which without any batch is as large as their own scatter.
+        """
+        spread = self.spread()
+        mean = self.mean + spread * generator.standard_normal() / math.sqrt(max(self.batches, 1))
+        return np.exp(mean + spread * generator.standard_normal(count))
 
 
 class CostModel:
@@ -84,21 +96,21 @@ class CostModel:
 
     def learn(self, batch: Batch, seconds: float) -> None:
         """Take in how long [s] a batch has taken."""
-        cost = self._cost(batch)
+        cost = self.cost(batch)
         if seconds > 0 and cost > 0:
             self.fit = self.fit.with_ratio(seconds / cost)
 
     def upper(self, batch: Batch) -> float:
         """Return the time [s] that a batch takes, with the margin; 0 while nothing is known."""
-        return self.fit.upper() * self._cost(batch)
+        return self.fit.upper() * self.cost(batch)
 
-    def _cost(self, batch: Batch) -> float:
-        # Runs that advance together take about as long as the longest of them.
+    def cost(self, batch: Batch) -> float:
+        """Return the predicted cost of a batch: runs that advance together take as long as the longest."""
         return float(max(self._costs[index] for index in batch))
 
 
 def fit_recorded(costs: np.ndarray, timings: Iterable[tuple[Batch, float]], done: np.ndarray) -> Fit:
-    """Return the fit to batches on record, as a rank starts from it.
+    """Return the fit to batches on record.
 
     Parameters
     ----------
@@ -113,4 +125,4 @@ def fit_recorded(costs: np.ndarray, timings: Iterable[tuple[Batch, float]], done
     for batch, seconds in timings:
         if any(done[index] for index in batch):
             model.learn(batch, seconds)
-    return model.fit.inherited()
+    return model.fit

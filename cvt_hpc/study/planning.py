@@ -75,7 +75,7 @@ def prepare(
     return Plan(
         assignments=plan_runs(task.job, task.simulator, records, asked, ranks),
         attempts=later_attempts(records),
-        fit=fit_recorded(task.simulator.run_costs(task.job), records.timings, done),
+        fit=fit_recorded(task.simulator.run_costs(task.job), records.timings, done).inherited(),
         total=int(asked.sum()),
         recorded=recorded,
         failed=recorded - int((done & asked).sum()),
@@ -103,7 +103,7 @@ def next_round(
     counter.rewind()
     display.expect(costs[[index for assignment in assignments for index in assignment.runs]])
     fit = fit_recorded(costs, records.timings, records.status == Status.DONE)
-    return plan._replace(assignments=assignments, fit=fit)
+    return plan._replace(assignments=assignments, fit=fit.inherited())
 
 
 def _other_versions(records: Records, session: dict[str, Any]) -> list[str]:

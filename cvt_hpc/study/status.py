@@ -107,19 +107,24 @@ def read_machine_factor(out: Path, job: Job) -> tuple[float, int]:
     job : Job
         A validated job.
     """
-    folder = StudyFolder(out)
-    try:
-        study = folder.load()
-    except InputError:
+    records = find_records(out, job)
+    if records is None or "core_seconds" not in records.study.record_dtype.names:
         return 1.0, 0
-    if study.fingerprint != job.fingerprint() or "core_seconds" not in study.record_dtype.names:
-        return 1.0, 0
-    records = read_records(folder.records, study)
     done = np.flatnonzero(records.status == Status.DONE)
     if not done.size:
         return 1.0, 0
     predicted = default_simulator().run_costs(job)[done].sum()
     return float(records.read(done, "core_seconds").sum() / predicted), done.size
+
+
+def find_records(out: Path, job: Job) -> Records | None:
+    """Return what is on record in an output folder, None unless it is that of this job."""
+    folder = StudyFolder(out)
+    try:
+        study = folder.load()
+    except InputError:
+        return None
+    return read_records(folder.records, study) if study.fingerprint == job.fingerprint() else None
 
 
 def _latest_session(records: Records, running: bool) -> tuple[np.ndarray, float]:

@@ -12,6 +12,7 @@ from cvt_hpc.variables import Status, Variable
 
 pytestmark = pytest.mark.usefixtures("mechanics")
 
+TRACED = ("--set", "design.kind=trace", "--set", "design.first_spacing=2")
 GRID = """[scene]
 thrust = "20 kN"
 [axes]
@@ -200,6 +201,58 @@ def test_an_axis_that_the_dataset_could_not_hold_is_refused_by_all(
         "cvt-hpc: x.toml: [axes] load: expected a parameter that is not also the name of a recorded quantity, found load"
     ]
     assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
+
+
+def test_check_forecasts_a_sweep_on_several_numbers_of_ranks(write_job, call, tmp_path):
+    write_job(GRID)
+    status, out, err = call("check", "x.toml", "--ranks", "1", "10", "--plot", "x.png")
+    assert (status, err) == (0, [])
+    head, names, *rows, disk, picture = out[-6:]
+    assert head == "forecast of all 10 runs by predicted costs, right within a factor of two:"
+    assert names.split() == [
+        "ranks",
+        "makespan",
+        "95",
+        "%",
+        "of",
+        "sweeps",
+        "efficiency",
+        "core-hours",
+        "--time",
+    ]
+    assert [row.split()[0] for row in rows] == ["1", "10"]
+    assert rows[0].split()[5] == "100%"
+    assert rows[0].endswith("  00:05:00")
+    assert disk == "disk: 0.00306 MB of records, at most 0.00242 MB of results.nc"
+    assert picture == "picture: x.png"
+    assert (tmp_path / "x.png").read_bytes().startswith(b"\x89PNG")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["x.png", "x.toml"]
+
+
+def test_check_forecasts_by_what_is_on_record(write_job, call):
+    write_job(GRID)
+    call("run", "x.toml")
+    assert "forecast of all 10 runs by batches on record (9):" in call("check", "x.toml", "--ranks", "2")[1]
+    rigid = call("check", "x.toml", "--ranks", "2", "--pilots", "1", "--set", "sheave_stiffness=inf")[1]
+    assert rigid[-4].endswith("within a factor of two; no pilot batch came to its end:")
+    # a trace is another job, and has no records
+    traced = call("check", "x.toml", "--ranks", "2", *TRACED)[1]
+    assert traced[-4].endswith("factor of two, if all cells of the grid are run:")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--ranks", "4", "0"], "--ranks: expected numbers of ranks, 1 or more, found 0"),
+        (["--ranks", "4", "--pilots", "-1"], "--pilots: expected a number of batches, found -1"),
+        (["--pilots", "2"], "--pilots: expected --ranks beside it, found none"),
+        (["--plot", "x.png"], "--plot: expected --ranks beside it, found none"),
+        (["--ranks", "4", "--plot", "x.gif"], "x.gif: expected a file name in .png, .svg, .pdf, found .gif"),
+    ],
+)
+def test_a_forecast_that_makes_no_sense_is_refused(write_job, call, options, message):
+    write_job(GRID)
+    assert call("check", "x.toml", *options) == (2, [], [f"cvt-hpc: {message}"])
 
 
 def test_check_shortens_long_axes_and_long_times(write_job, call):

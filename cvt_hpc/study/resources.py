@@ -1,0 +1,106 @@
+"""What to ask a cluster for: time limit and space on the disk."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from cvt_hpc.study.description import Study, describe
+from cvt_hpc.study.forecast import Forecast, forecast
+from cvt_hpc.study.frames import HEAD, PLACE, RecordFormat
+from cvt_hpc.study.pilots import find_out
+from cvt_hpc.study.simulator import default_simulator
+from cvt_hpc.study.time_limit import gathering_margin
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
+
+_START_UP = 60.0  # [s] for MPI, Python and kernels; assumed, with room for slow file systems
+_WARNING = 180.0  # [s]: slurm/*.sbatch ask to be told 120 s before the end, and Slurm may be 60 s early
+_STEP = 300.0  # [s] to which a time limit is rounded up
+
+
+class Disk(NamedTuple):
+    """Space on the disk [byte], at most; `histories` NaN where it is not known."""
+
+    records: float
+    results: float
+    histories: float
+
+
+class Expectation(NamedTuple):
+    """What a sweep will take, by what that is known, and the space for its results."""
+
+    forecasts: list[Forecast]
+    basis: str
+    disk: Disk
+
+
+def expect(job: Job, out: Path, ranks: Sequence[int], pilots: int = 0) -> Expectation:
+    """Return what a sweep of all runs of a job will take on each of some numbers of ranks.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    out : Path
+        The output folder, whose records tell how long batches take where no pilots are asked for.
+    ranks : sequence of int
+        Numbers of processes that compute.
+    pilots : int
+        Number of batches to be done for this.
+    """
+    simulator = default_simulator()
+    study, costs = describe(job, simulator), simulator.run_costs(job)
+    groups = simulator.lane_groups(job, range(study.size))
+    known = find_out(job, simulator, groups, out, pilots)
+    forecasts = [forecast(groups, costs, known.fit, number) for number in ranks]
+    most = max(expected.batches for expected in forecasts)
+    disk = disk_space(study, most, len(job.histories), known.history_bytes)
+    return Expectation(forecasts, known.basis, disk)
+
+
+def suggested_time(forecast: Forecast, runs: int) -> float:
+    """Return the time limit [s] to ask Slurm for: what 39 sweeps in 40 need, start and end included.
+
+    Parameters
+    ----------
+    forecast : Forecast
+        Of the sweep.
+    runs : int
+        Number of runs of the study.
+    """
+    needed = _START_UP + forecast.makespan[2] + max(_WARNING, gathering_margin(runs))
+    return _STEP * math.ceil(needed / _STEP)
+
+
+def disk_space(study: Study, batches: int, histories: int, history_bytes: float) -> Disk:
+    """Return the space that a study takes: the dataset, which is compressed, for no more than its records.
+
+    Parameters
+    ----------
+    study : Study
+        With the layout of its records.
+    batches : int
+        Number of batches that its runs make.
+    histories : int
+        Number of histories that are kept.
+    history_bytes : float
+        Size of one of them [byte].
+    """
+    layout = RecordFormat(study.fingerprint, study.record_dtype)
+    marks = batches * HEAD.size + study.size * PLACE.size
+    values = study.size * study.record_dtype.itemsize
+    return Disk(
+        study.size * layout.record_size + marks, values, histories * history_bytes if histories else 0.0
+    )
+
+
+def slurm_time(seconds: float) -> str:
+    """Return a time span [s] as Slurm's [days-]hours:minutes:seconds."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    days, hours = divmod(hours, 24)
+    return f"{f'{days}-' if days else ''}{hours:02d}:{minutes:02d}:{rest:02d}"
