@@ -94,8 +94,7 @@ class Case:
         self._told = folder / "acknowledged"
         self._output = folder / "output.txt"
         self._reference = reference
-        self._forgiven = 0
-        self._ended: set[int] = set()
+        self._has_dataset = False
 
     def start(self, ranks: int = 0, **options: Any) -> Forked | Launched:
         """Start a sweep, under mpirun if it has ranks."""
@@ -131,6 +130,15 @@ class Case:
             time.sleep(0.001)
         time.sleep(self.random.uniform(0.0, _GATHERING if wanted in (0, RUNS) else 0.03))
 
+    def wait_for_gathering(self, start: Forked | Launched) -> None:
+        """Wait until the dataset is being written, or in half of the cases for a random time."""
+        if self.random.random() < 0.5:
+            time.sleep(self.random.uniform(0.0, _GATHERING))
+            return
+        while start.status() is None and not list(self.out.glob(".results.nc.*")):
+            time.sleep(0.001)
+        time.sleep(10 ** self.random.uniform(-3.0, -0.3))
+
     def strike(self, start: Forked | Launched, number: int = signal.SIGKILL, target: str = "rank 0") -> int:
         """Send a signal and return how the start ended."""
         self.outcome.faults += start.status() is None
@@ -152,13 +160,15 @@ class Case:
             file.truncate(size)
         told = self.acknowledged()
         behind = (told["log"] == logs[-1].name.encode()) & (told["end"] > size)
-        self._forgiven += int(behind.sum())
         self._told.write_bytes(told[~behind].tobytes())
 
     def look_at_dataset(self) -> None:
         """See that what is in the dataset between two starts has the numbers of the undisturbed one."""
         if not (self.out / "results.nc").exists():
+            if self._has_dataset:
+                self.outcome.wrong.append("the dataset that was there is gone")
             return
+        self._has_dataset = True
         try:
             with open_results(self.out) as found:
                 done = found["status"].values == 1
@@ -267,7 +277,7 @@ def _kill_gather(case: Case) -> Outcome:
     case.strike(start)
     for _ in range(case.random.randint(2, 4)):
         start = case.start(gathers=True)
-        time.sleep(case.random.uniform(0.0, _GATHERING))
+        case.wait_for_gathering(start)
         case.strike(start)
         case.look_at_dataset()
     return case.finish()
@@ -276,7 +286,8 @@ def _kill_gather(case: Case) -> Outcome:
 def _kill_last_gather(case: Case) -> Outcome:
     for _ in range(case.random.randint(1, 3)):
         start = case.start()
-        case.wait_for_a_moment(start, RUNS)
+        case.wait_for_a_moment(start, RUNS - 1)
+        case.wait_for_gathering(start)
         case.strike(start)
         case.look_at_dataset()
     return case.finish()
