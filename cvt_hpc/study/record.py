@@ -56,6 +56,8 @@ class RecordLog:
         self._preamble = layout.preamble(session, rank)
         self._attempts = attempts or {}
         self._descriptor: int | None = None
+        # A clock that is set right meanwhile must not make a batch look as if it had taken hours.
+        self._clock_lead = time.time() - time.monotonic()
         self._synced = 0.0
         self._open_mark: int | None = None  # where the mark of the batch at work begins [byte]
 
@@ -74,12 +76,12 @@ class RecordLog:
         StorageError
             If the system refuses the write.
         """
-        mark = self._layout.mark(ALONE if alone else BEGUN, self._places(batch), time.time())
+        mark = self._layout.mark(ALONE if alone else BEGUN, self._places(batch), self._now())
         self._open_mark = self._append(mark)
 
     def begin_again(self, indices: Sequence[int]) -> None:
         """Write that the earlier records of some runs count no more; errors as for `begin`."""
-        self._append(self._layout.mark(AGAIN, self._places(indices), time.time()))
+        self._append(self._layout.mark(AGAIN, self._places(indices), self._now()))
 
     def append(self, records: Sequence[Record]) -> None:
         """Write the records of some runs; when this returns, the death of the process cannot lose them.
@@ -89,7 +91,7 @@ class RecordLog:
         StorageError
             If the system refuses the write. The log then ends with the record before, and none of these.
         """
-        now = time.time()
+        now = self._now()
         places = self._places([index for index, _ in records])
         frames = (self._layout.record(at, now, row) for at, (_, row) in zip(places, records, strict=True))
         self._append(b"".join(frames))
@@ -119,6 +121,10 @@ class RecordLog:
 
     def _places(self, indices: Sequence[int]) -> list[Place]:
         return [(int(index), self._attempts.get(int(index), 1)) for index in indices]
+
+    def _now(self) -> float:
+        """Return the time [s] since 1970 as of the beginning of the log, and what has passed since then."""
+        return self._clock_lead + time.monotonic()
 
     def _append(self, data: bytes) -> int:
         """Write and now and then bring to the disk; return where in the file the data begin."""

@@ -33,25 +33,39 @@ def sweep(out, **options):
     return run(JOB, out, simulator=options.pop("simulator", Uneven()), progress=False, **options)
 
 
-@pytest.fixture
-def history(tmp_path, monkeypatch):
-    """Return a folder in which four long runs are on record, at 1000 s each; their kernels took an hour more."""
-    sweep(tmp_path, time_limit=0.0)
-    study = StudyFolder(tmp_path).load()
+def write_history(out, monkeypatch, jump=0.0):
+    """Put four long runs on record, at 1000 s each; their kernels took an hour more, and the clock jumps [s]."""
+    sweep(out, time_limit=0.0)
+    study = StudyFolder(out).load()
     done = study.blank_rows()
     done["status"] = Status.DONE
-    now = 1e9
-    monkeypatch.setattr("cvt_hpc.study.record.time.time", lambda: now)
+    now, wrong = 1e9, 0.0
+    monkeypatch.setattr("cvt_hpc.study.record.time.time", lambda: now + wrong)
+    monkeypatch.setattr("cvt_hpc.study.record.time.monotonic", lambda: now)
     layout = RecordFormat(study.fingerprint, study.record_dtype)
     session = {"id": "a", "started": now, "versions": {}, "git_revision": "", "command": "", "host": "",
                "ranks": 1}  # fmt: skip
-    with RecordLog(tmp_path / "records", layout, session, rank=0) as log:
+    with RecordLog(out / "records", layout, session, rank=0) as log:
         for index in range(4):
             log.begin((index,))
             now += 1000.0 + 3600.0 * (index == 0)
+            wrong = jump * (-1) ** index
             log.append([(index, done)])
     monkeypatch.undo()
+
+
+@pytest.fixture
+def history(tmp_path, monkeypatch):
+    """Return a folder in which four long runs are on record."""
+    write_history(tmp_path, monkeypatch)
     return tmp_path
+
+
+@pytest.mark.parametrize("jump", [3600.0, -3600.0])
+def test_a_clock_that_is_set_right_changes_no_time_on_record(tmp_path, monkeypatch, jump):
+    # Otherwise a batch seems to take hours, and nothing fits into a time limit any more.
+    write_history(tmp_path, monkeypatch, jump)
+    test_the_time_that_batches_took_is_on_record(tmp_path)
 
 
 def test_the_time_that_batches_took_is_on_record(history):
