@@ -63,8 +63,10 @@ def rough_belt(case):
     belt = belt_constants(parameters)
     state = march_fast(belt, initial_state(parameters, belt), 4e-6, 5000)
     random = np.random.default_rng(5)
-    for row, size in ((W, 2e-5), (U, 0.05), (V_ELEMENT, 0.05), (V_RING, 0.05), (V_FILTERED, 0.02)):
+    for row, size in ((W, 2e-5), (U, 0.05), (V_ELEMENT, 0.2), (V_RING, 0.05), (V_FILTERED, 0.02)):
         state.fields[row] += size * random.normal(size=belt.cell.size)
+    # every sixth cell hardly pressed, 40 N, less than its damper's force
+    state.fields[N_ELEMENT, ::6] *= (1.0 + forces(belt, state)[1][0, ::6]) / (1.0 - 1e-6)
     state.fields[V_FILTERED] = np.abs(state.fields[V_FILTERED])
     state.scalars[LAYER_WORK] = 0.0
     return belt, state
@@ -109,7 +111,7 @@ def test_the_rough_state_tries_every_branch(case):
     opening = (np.roll(state.fields[V_ELEMENT], -1) - state.fields[V_ELEMENT]) / belt.cell
     damped, push = belt.element_damping * opening, -belt.element_stiffness * eps[0]
     # dampers that would make elements pull, and others
-    assert np.any((push > 0.0) & (damped > push)) and np.any((push > 0.0) & (damped < push))
+    assert np.sum((push > 0.0) & (damped > push)) > 3 and np.sum((push > 0.0) & (damped < push)) > 3
 
 
 @pytest.mark.parametrize("case", CASES)
