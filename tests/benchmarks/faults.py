@@ -2,7 +2,7 @@
 
     python tests/benchmarks/faults.py TABLE.csv [--kills 200] [--seed 0] [--slurm 3] [--only KIND]
 
-About 3 s a kill on a crowded core. Kinds of faults and what is looked at: tests/study/fault_cases.py. The table has
+About 3 s a kill on a crowded core. Kinds of faults and what is looked at: tests/study/fault_kinds.py. The table has
 a line for each kind: cases, faults that struck, starts, acknowledged records, those of them that were lost, datasets that
 differ from the undisturbed one, starts that hung, processes left behind, the longest start [s]. The last line is the
 sum. With --slurm, nodes of a Slurm of its own are lost as well, slurmd first; there the records on disk when the node was
@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import csv
 import itertools
+import shutil
 import sys
 import tempfile
 import time
@@ -25,25 +26,15 @@ TESTS = Path(__file__).parents[1]
 sys.path[:0] = [str(TESTS), str(TESTS / "study"), str(TESTS / "slurm")]
 
 from cluster import Cluster, missing, wait_until  # noqa: E402
-from fault_cases import KINDS, NEED_MOUNT, NEED_MPI, Outcome, can_mount, make_reference, play  # noqa: E402
+from fault_cases import Outcome, make_reference  # noqa: E402
+from fault_kinds import KINDS, NEED_MOUNT, NEED_MPI, can_mount, play  # noqa: E402
 from recorded import assert_same_numbers, records  # noqa: E402
+from test_batch_files import JOB, TWO_NODES, start_again  # noqa: E402
 
 from cvt_hpc import load_job, open_results, run  # noqa: E402
 from cvt_hpc.study.folder import StudyFolder  # noqa: E402
 from cvt_hpc.study.recovery import read_records  # noqa: E402
 
-# Runs with different meshes cannot be done as one batch: records come one after another.
-SLURM_JOB = """
-name = "meshes"
-model = "elastic_belt"
-
-[axes]
-stations = { from = 48, to = 68, step = 4 }
-load = ["0 N m", "60 N m"]
-
-[run]
-duration = "0.1 s"
-"""
 SLURMD = "kill -9 of slurmd and its node"
 COUNTS = ("faults", "starts", "acknowledged", "lost", "different", "hangs", "left")
 EVERY = 3  # rounds between cases under mpirun, which take three times as long
@@ -74,7 +65,7 @@ def lose_nodes(folder: Path, count: int) -> Iterator[Outcome]:
         print(f"left out, since there is no Slurm here: {reason}", file=sys.stderr)
         return
     job_file = folder / "meshes.toml"
-    job_file.write_text(SLURM_JOB)
+    job_file.write_text(JOB)
     with open_results(run(load_job(job_file), folder / "serial", progress=False).out) as dataset:
         serial = dataset.load()
     (folder / "slurm").mkdir()
@@ -91,15 +82,13 @@ def lose_node(cluster: Cluster, job_file: Path, out: Path, number: int, serial) 
     """Return what came of a sweep that lost a node after some records."""
     outcome = Outcome(SLURMD, str(number), starts=2)
     began = time.monotonic()
-    two_nodes = ("--nodes=2", "--ntasks=2")
-    job = cluster.submit("sweep.sbatch", job_file, "--out", out, options=two_nodes)
+    job = cluster.submit("sweep.sbatch", job_file, "--out", out, options=TWO_NODES)
     first = cluster.wait_for(job, "RUNNING")["BatchHost"]
     wait_until(lambda: records(out) > number % 6, "records", cluster.logs)
     cluster.lose_node(first)
     outcome.faults = 1
     before = recorded_bytes(out)
-    wait_until(lambda: cluster.facts(job)["Restarts"] == "1", "the job in the queue again", cluster.logs)
-    cluster.ask("scontrol", "update", f"JobId={job}", "StartTime=now+2")
+    start_again(cluster, job)
     cluster.start_node(first)
     state = cluster.wait_for(job, "COMPLETED", "FAILED", "CANCELLED", "NODE_FAIL")["JobState"]
     after = recorded_bytes(out)
@@ -155,8 +144,11 @@ def main() -> int:
         if not outcome.is_sound:
             print(outcome, file=sys.stderr, flush=True)
     print(arguments.table.read_text(), end="")
-    print(f"files of this campaign: {folder}")
-    return int(not all(outcome.is_sound for outcome in outcomes))
+    if all(outcome.is_sound for outcome in outcomes):
+        shutil.rmtree(folder)
+        return 0
+    print(f"the files of what is wrong: {folder}")
+    return 1
 
 
 if __name__ == "__main__":
