@@ -2,17 +2,24 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.frames import RECORD
 from cvt_hpc.study.recovery import read_records
 
 
-def records(out: Path) -> int:
-    """How many runs an output folder has on record so far."""
+def recorded_runs(out: Path) -> np.ndarray:
+    """Indices of the runs that an output folder has on record so far."""
     folder = StudyFolder(out)
     if not folder.job_file.exists():
-        return 0
-    return int(read_records(folder.records, folder.load()).recorded.sum())
+        return np.array([], int)
+    return np.flatnonzero(read_records(folder.records, folder.load()).recorded)
+
+
+def records(out: Path) -> int:
+    """How many runs an output folder has on record so far."""
+    return len(recorded_runs(out))
 
 
 def frames_written(out: Path) -> int:

@@ -95,9 +95,9 @@ class CostModel:
         self.fit = fit or Fit()
 
     def learn(self, batch: Batch, seconds: float) -> None:
-        """Take in how long [s] a batch has taken."""
+        """Take in how long [s] a batch has taken; a time that no clock tells is left out."""
         cost = self.cost(batch)
-        if seconds > 0 and cost > 0:
+        if 0 < seconds < math.inf and cost > 0:
             self.fit = self.fit.with_ratio(seconds / cost)
 
     def upper(self, batch: Batch) -> float:

@@ -96,8 +96,19 @@ def asked_runs(task: Task, records: Records, part: Part | None = None) -> np.nda
 def next_round(
     folder: StudyFolder, task: Task, plan: Plan, ranks: int, counter: Counter, display: Progress
 ) -> Plan:
-    """Return the plan of what a trace asks for after the runs of a round; on rank 0 alone."""
+    """Return the plan of what a trace asks for after the runs of a round; on rank 0 alone.
+
+    Raises
+    ------
+    RuntimeError
+        If a run of that round is not on record: to ask for it once more would never end.
+    """
     records = read_records(folder.records, task.study)
+    lost = [
+        index for assignment in plan.assignments for index in assignment.runs if not records.recorded[index]
+    ]
+    if lost:
+        raise RuntimeError(f"a round of the trace has ended without records of its runs {lost}")
     costs = task.simulator.run_costs(task.job)
     assignments = plan_runs(task.job, task.simulator, records, asked_runs(task, records), ranks)
     counter.rewind()

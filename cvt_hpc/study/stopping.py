@@ -109,12 +109,13 @@ class Stop:
     def fits(self, seconds: float) -> bool:
         """Return whether there is so much time [s] left."""
         left = self._deadline - time.monotonic()
-        if seconds > left and not self._late:
+        late = seconds > left
+        if late and not self._late:
             self._late = (
                 f"{self._limit.name}: {show_duration(max(left, 0.0))} were left, a batch may take "
                 f"{show_duration(seconds)}"
             )
-        return seconds <= left
+        return not late
 
     def interrupt(self) -> str | None:
         """Return why the run that computes now should be broken off, None if it should go on."""

@@ -18,8 +18,8 @@ import numpy as np
 import xarray as xr
 from fault_child import ACKNOWLEDGED
 from fault_starts import Forked, Hang, Launched
+from recorded import assert_same_numbers
 from study_double import Axis, Job, Simulator, logistic_numbers
-from study_processes import assert_same_numbers
 
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder

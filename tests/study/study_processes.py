@@ -12,10 +12,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import psutil
 import pytest
-import xarray as xr
 
 HERE = Path(__file__).parent
 PATIENCE = 40.0  # [s] until a process that should end counts as hanging
@@ -98,17 +96,3 @@ def wait_until(condition: Callable[[], Any], what: str) -> None:
         if time.monotonic() > deadline:
             pytest.fail(f"waited in vain for {what}")
         time.sleep(0.01)
-
-
-def assert_same_numbers(found: xr.Dataset, expected: xr.Dataset) -> None:
-    """Assert that all variables agree bitwise, but those that depend on the hour."""
-    assert list(found.variables) == list(expected.variables)
-    for name, variable in expected.variables.items():
-        if variable.attrs.get("volatile") != "yes":
-            assert found[name].dtype == variable.dtype, name
-            same = np.array_equal if variable.dtype.kind in "OU" else same_bits
-            assert same(found[name].values, variable.values), name
-
-
-def same_bits(one: np.ndarray, other: np.ndarray) -> bool:
-    return one.tobytes() == other.tobytes()

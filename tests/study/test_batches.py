@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from recorded import assert_same_numbers
 from study_double import Axis, Job, Simulator
-from study_processes import assert_same_numbers
 
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.batches import share_out

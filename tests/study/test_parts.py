@@ -8,9 +8,9 @@ import time
 
 import numpy as np
 import pytest
-from recorded import records
+from recorded import assert_same_numbers, records
 from study_double import Axis, Job, Simulator
-from study_processes import PATIENCE, assert_same_numbers, wait_until
+from study_processes import PATIENCE, wait_until
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.study import gather, open_results, read_status, run

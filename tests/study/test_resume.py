@@ -7,8 +7,9 @@ import time
 
 import numpy as np
 import pytest
+from recorded import assert_same_numbers
 from study_double import Axis, Job, Simulator
-from study_processes import assert_same_numbers, wait_until
+from study_processes import wait_until
 
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder

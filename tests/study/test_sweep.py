@@ -4,8 +4,8 @@ import json
 import math
 
 import pytest
+from recorded import assert_same_numbers
 from study_double import Axis, Coordinate, Job, Simulator
-from study_processes import assert_same_numbers
 
 from cvt_hpc.job import load_job
 from cvt_hpc.study import open_results, run

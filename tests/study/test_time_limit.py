@@ -233,3 +233,11 @@ def test_batches_without_results_tell_nothing():
     done = np.array([True, False, False])
     fit = fit_recorded(np.ones(3), [((0, 1), 2.0), ((1, 2), 1e-3)], done)
     assert (fit.batches, fit.likely()) == (1, pytest.approx(2.0))
+
+
+@pytest.mark.parametrize("seconds", [math.inf, math.nan, 0.0, -1.0])
+def test_a_time_that_no_clock_tells_is_left_out(seconds):
+    model = CostModel(np.ones(2))
+    model.learn((0,), seconds)
+    model.learn((0, 1), 3.0)
+    assert (model.fit.batches, model.fit.likely()) == (1, pytest.approx(3.0))

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from recorded import assert_same_numbers
 from scipy import ndimage
 from study_double import Axis, Job, Simulator
-from study_processes import HERE, assert_same_numbers
+from study_processes import HERE
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.study import open_results, read_status, run
@@ -260,6 +261,12 @@ def test_an_interrupted_trace_goes_on_to_the_same_runs(tmp_path, monkeypatch, re
     report = run(JOB, tmp_path, simulator=simulator, progress=False)
     assert (report.exit_status, before + simulator.runs) == (0, len(NEEDED))
     assert_same_numbers(results(tmp_path), reference)
+
+
+def test_a_round_that_leaves_no_records_is_a_defect_and_no_endless_loop(tmp_path, monkeypatch):
+    monkeypatch.setattr("cvt_hpc.study.stopping.Stop.fits", lambda self, seconds: False)
+    with pytest.raises(RuntimeError, match="without records of its runs"):
+        run(JOB, tmp_path, simulator=Simulator(), progress=False)
 
 
 def test_two_ranks_trace_the_same_runs(start, tmp_path, reference):
