@@ -45,8 +45,12 @@ def find_time_limit(asked: float | None, runs: int, environment: Mapping[str, st
 
 
 def gathering_margin(runs: int) -> float:
-    """Return the time [s] to keep for ending the sweep and for writing the dataset of so many runs."""
-    return 30.0 + 1e-3 * runs
+    """Return the time [s] to keep for ending the sweep and for writing the dataset of so many runs.
+
+    Longer than that between Slurm's warning and the end (30 s, asked for in slurm/*.sbatch, and up to a minute
+    more): a batch that is expected to end in time is not broken off by the warning.
+    """
+    return 90.0 + 2e-4 * runs
 
 
 def _left_to_slurm_job(environment: Mapping[str, str]) -> float:

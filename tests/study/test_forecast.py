@@ -204,9 +204,9 @@ def test_the_space_on_the_disk_is_that_of_the_logs(tmp_path):
     assert disk_space(describe(job, simulator), 3, 0, math.nan).histories == 0.0
 
 
-def test_the_time_asked_for_covers_start_warning_and_gathering():
+def test_the_time_asked_for_covers_start_and_gathering():
     expected = Forecast(4, 10, (500.0, 400.0, 700.0), 450.0, (0.9, 0.8, 1.0))
-    assert suggested_time(expected, 100) == 1200.0  # 60 + 700 + 180
-    assert suggested_time(expected, 10**6) == 1800.0  # 60 + 700 + 1030
+    assert suggested_time(expected, 100) == 900.0  # 60 + 700 + 90
+    assert suggested_time(expected, 10**6) == 1200.0  # 60 + 700 + 290
     assert slurm_time(900.0) == "00:15:00"
     assert slurm_time(2 * 86400 + 3 * 3600 + 300) == "2-03:05:00"
