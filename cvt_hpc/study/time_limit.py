@@ -47,8 +47,8 @@ def find_time_limit(asked: float | None, runs: int, environment: Mapping[str, st
 def gathering_margin(runs: int) -> float:
     """Return the time [s] to keep for ending the sweep and for writing the dataset of so many runs.
 
-    Longer than that between Slurm's warning and the end (30 s, as slurm/*.sbatch ask, and up to a minute more):
-    a batch that is expected to end in time is not broken off by the warning.
+    It is longer than that between Slurm's warning and the end, 30 s by slurm/*.sbatch, up to 90 s:
+    no batch that is expected to end in time is broken off by the warning.
     """
     return 90.0 + 2e-4 * runs
 
