@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import matplotlib
@@ -39,14 +40,24 @@ def budget_figure(comparison: Comparison) -> Figure:
         _draw_budget_panel(axes, quantity, choices)
     panels[0].set_yticks(range(len(choices)), [choice.point.label for choice in choices])
     panels[0].set_ylim(len(choices) - 0.5, -0.5)
-    handles = [
-        Line2D([], [], ls="", marker="o", color=COLOURS[1], label=f"error of {comparison.base}"),
-        Line2D([], [], ls="", marker="o", color=COLOURS[0], mfc="white", label="what another choice changes"),
-        Line2D([], [], ls="--", color="black", lw=0.9, label="tolerance"),
-        Line2D([], [], ls="", marker="x", color="black", label="occurrence differs"),
-    ]
-    figure.legend(handles=handles, ncols=2, **LEGEND)
+    figure.legend(handles=_legend(comparison, quantities), ncols=2, **LEGEND)
     return figure
+
+
+def _legend(comparison: Comparison, quantities: Sequence[Quantity]) -> list[Line2D]:
+    """What is drawn in this budget."""
+    drawn = [choice for choice in comparison.choices if not choice.measurement.reason]
+    dot = partial(Line2D, [], [], ls="", marker="o")
+    handles = []
+    if any(choice.point.refines for choice in drawn):
+        handles.append(dot(color=COLOURS[1], label=f"error of {comparison.base}"))
+    if not all(choice.point.refines for choice in drawn):
+        handles.append(dot(color=COLOURS[0], mfc="white", label="what another choice changes"))
+    if any(quantity.tolerance < math.inf for quantity in quantities):
+        handles.append(Line2D([], [], ls="--", color="black", lw=0.9, label="tolerance"))
+    if any(choice.errors.get("occurrence", 0.0) > 0.0 for choice in drawn):
+        handles.append(Line2D([], [], ls="", marker="x", color="black", label="occurrence differs"))
+    return handles
 
 
 def _draw_budget_panel(axes: Axes, quantity: Quantity, choices: Sequence[Result]) -> None:

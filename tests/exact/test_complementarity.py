@@ -4,10 +4,9 @@ from itertools import product
 
 import numpy as np
 import pytest
+from complementarity import ComplementarityError, solve_lcp
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from cvt_hpc.physics.complementarity import ComplementarityError, solve_lcp
 
 
 def murty(n):

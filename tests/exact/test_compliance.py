@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from complementarity import solve_lcp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cvt_hpc.physics.complementarity import solve_lcp
 from cvt_hpc.physics.compliance import ROUNDS_OF_BLOCK_FLIPS, contact_state, solve_contact
 from cvt_hpc.physics.sheaves import flexibility, sheaves
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from complementarity import solve_lcp
 
-from cvt_hpc.physics.complementarity import solve_lcp
 from cvt_hpc.physics.compliance import contact_state, solve_contact
 from cvt_hpc.physics.lane_compliance import (
     CLOSED,

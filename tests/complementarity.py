@@ -1,9 +1,8 @@
-"""Linear complementarity: w = M z + q, w >= 0, z >= 0, w.z = 0, for any small dense M.
+"""The judge of contact solvers: linear complementarity, w = M z + q, w >= 0, z >= 0, w.z = 0, for any small dense M.
 
 Lemke's pivoting with the lexicographic rule of ties: it ends on every matrix, finds a solution for the
 copositive-plus and P-matrices that contacts give, and says so when its ray is secondary (no solution found).
-Source: Cottle, Pang and Stone, The Linear Complementarity Problem, sec. 4.4 and 4.9. The sheaves' contact has
-a solver of its own in linear time (`compliance`), which is tested against this one.
+Source: Cottle, Pang and Stone, The Linear Complementarity Problem, sec. 4.4 and 4.9.
 """
 
 from __future__ import annotations
