@@ -17,8 +17,6 @@ from cvt_hpc.models import MODELS
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.assessment import assess
 
-_BOUND = 1e3  # [m]: linear models know no limits, and an unstable step does not stop at one
-_UNBOUNDED = (Status.FAILED_NUMERICS, "the motion grows without bounds")
 _LONG = 2.0  # [s] of processor time: beyond, a run is timed once, because noise averages out within it
 
 
@@ -129,8 +127,6 @@ def _outcome(point: Point, scene: Scene, marched: Marched) -> tuple[str, dict[st
     observed = []
     for k, run in enumerate(marched.runs[: point.starts]):
         failure = marched.failures[k]
-        if failure is None and np.abs(run.displacement).max() > _BOUND:
-            failure = _UNBOUNDED
         if failure is None and whole:
             failure = _doubt(point.job.model, run)
         if failure is not None:

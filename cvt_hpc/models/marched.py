@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.models.alone import Alone
 from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.marching import Marching
+from cvt_hpc.steppers.system import SetValuedSystem, System
 from cvt_hpc.variables import Status
 
 
@@ -19,19 +21,56 @@ class Probe(NamedTuple):
     position: float
 
 
-class MarchedRun:
+class Marched:
+    """What a run says of its march: how far it has come, and by what work.
+
+    Attributes
+    ----------
+    marching : Marching
+        The stepper at work on the model's equations.
+    """
+
+    marching: Marching
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.marching.time
+
+    @property
+    def steps(self) -> int:
+        """Steps taken so far."""
+        return self.marching.steps
+
+    @property
+    def step(self) -> float:
+        """Mean time step so far [s]."""
+        return self.marching.step
+
+    def counters(self) -> dict[str, int]:
+        """Work done so far: steps, rejected, rates, jacobians, factorisations, solves."""
+        return self.marching.counters()
+
+
+class MarchedRun(Marched):
     """One run, advanced sample by sample.
 
     Parameters
     ----------
     parameters : mapping
-        Resolved parameters of the run [SI].
-    march : Marching
-        The stepper with the model's equations and initial state.
+        Resolved parameters of the run [SI], the stepper's among them.
+    stepper : str
+        Name of a general stepper.
+    system : System or SetValuedSystem
+        The model's equations, as the stepper needs them.
+    state : (n,) array
+        Initial state.
     probes : sequence of Probe
         Where displacement is recorded.
     displacements : sequence of int
         The unknown that is the displacement [m] at each probe.
+    frequency : float
+        The model's fastest undamped vibration [rad/s]: what an explicit step must resolve.
 
     Attributes
     ----------
@@ -50,42 +89,27 @@ class MarchedRun:
     def __init__(
         self,
         parameters: Mapping[str, Any],
-        march: Marching,
+        stepper: str,
+        system: System | SetValuedSystem,
+        state: np.ndarray,
         probes: Sequence[Probe],
         displacements: Sequence[int],
+        frequency: float,
     ) -> None:
         self.parameters = parameters
         self.probes = tuple(probes)
-        self.interval = march.interval
+        self.interval = 1.0 / parameters["sampling_rate"]
         self.samples = max(int(round(parameters["duration"] * parameters["sampling_rate"])), 1)
-        self.rows = np.full((self.samples, march.y.size), np.nan)
+        self.rows = np.full((self.samples, state.size), np.nan)
         self.done = 0
-        self._march = march
+        self.marching = Marching(stepper, parameters, system, state, self.interval)
         self._displacements = list(displacements)
+        self._longest = self.marching.facts.vibration_limit / frequency
 
     @property
     def times(self) -> np.ndarray:
         """Instants of the samples recorded so far, (done,) [s]."""
         return self.interval * np.arange(1, self.done + 1)
-
-    @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-        return self._march.time
-
-    @property
-    def steps(self) -> int:
-        """Steps taken so far."""
-        return self._march.steps
-
-    @property
-    def step(self) -> float:
-        """Mean time step so far [s]."""
-        return self._march.step
-
-    def counters(self) -> dict[str, int]:
-        """Work done so far: steps, rejected, rates, jacobians, factorisations, solves."""
-        return self._march.counters()
 
     @property
     def displacement(self) -> np.ndarray:
@@ -105,9 +129,40 @@ class MarchedRun:
         (Status, str) or None
             What has gone wrong, where the run cannot go on.
         """
-        last = min(self.done + samples, self.samples)
-        outcome = self._march.advance(self.rows[self.done : last])
-        if outcome != Result.OK:
-            return Status.FAILED_NUMERICS, self._march.explain(outcome)
-        self.done = last
+        first, last = self.done, min(self.done + samples, self.samples)
+        outcome = self.marching.advance(self.rows[first:last])
+        wrong = self._too_long()
+        if outcome == Result.OK:
+            self.done = last
+            wrong = wrong or self._doubt(first)
+        else:
+            wrong = wrong or self.marching.explain(outcome)
+        return (Status.FAILED_NUMERICS, wrong) if wrong else None
+
+    def _too_long(self) -> str | None:
+        """Whether the fastest vibration grows from step to step, which shows late in a linear model."""
+        if not self.step > self._longest:
+            return None
+        return f"the step is beyond {self._longest:.3g} s, from where the fastest vibration grows by itself"
+
+    def _doubt(self, first: int) -> str | None:
+        """Why the samples from `first` on are none of the model's motion, by what the model knows of it."""
         return None
+
+
+def batch_of_one(
+    run: Callable[[Mapping[str, Any], str], Any], points: Sequence[Mapping[str, Any]], stepper: str
+) -> Alone:
+    """One run in the form of a batch.
+
+    Parameters
+    ----------
+    run : type
+        The model's Transient.
+    points : sequence of mapping
+        Resolved parameters of the one run [SI].
+    stepper : str
+        One of the model's STEPPER_NAMES.
+    """
+    (parameters,) = points
+    return Alone(run(parameters, stepper))

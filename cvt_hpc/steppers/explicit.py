@@ -17,7 +17,8 @@ FACTS = Facts(
     needs=frozenset(),  # of a general system: it is a step of the belt's own
     implicit=False,
     l_stable=False,
-    damping_limit=2.0,
+    rest_limit=2.0,
+    vibration_limit=2.0,
     stability="step < 2 / the fastest rate: friction near zero sliding speed, then longitudinal waves",
     damping="none",
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from math import inf
 
 
 class Result(IntEnum):
@@ -27,7 +28,8 @@ MESSAGES: dict[Result, str] = {
     Result.SINGULAR: "the matrix of an implicit step is singular",
     Result.TOO_MANY_STEPS: "more steps in a sampling interval than are allowed",
     Result.NOT_UNIQUE: (
-        "friction falls so steeply that an implicit step of this length has more than one solution"
+        "friction falls too steeply for an implicit step of this length, which has more than one solution or "
+        "turns growth into decay"
     ),
 }
 
@@ -56,12 +58,18 @@ class Facts:
         Solves linear systems with the Jacobian.
     l_stable : bool
         Motions much faster than the step are gone after it.
-    damping_limit : float
-        Largest step times the rate of a decay (friction: N mu / (m v_reg)) that stays a decay [1].
     stability : str
         The limit of the step, in a sentence.
     damping : str
         What the method does to a vibration, in a sentence.
+    rest_limit : float
+        Largest step times the rate at which smoothed friction stops sliding, N mu / (m v_reg), with which
+        sliding comes to rest [1].
+    width_limit : float
+        Of an adaptive method: largest error that the tolerance allows in a speed, against the width v_reg of
+        smoothed friction, with which sliding comes to rest and stays there, as measured [1].
+    vibration_limit : float
+        Largest step times the frequency of a vibration that does not grow by itself [1].
     """
 
     order: int
@@ -70,6 +78,8 @@ class Facts:
     needs: frozenset[str]
     implicit: bool
     l_stable: bool
-    damping_limit: float
     stability: str
     damping: str
+    rest_limit: float = inf
+    width_limit: float = inf
+    vibration_limit: float = inf

@@ -2,7 +2,8 @@
 
 Where friction falls more steeply than 1 / shift, I - shift J is no longer positive in its direction, and an
 implicit step has more than one solution. That shows in the sign of the determinant; or, should that have
-turned twice, in that of 1 - shift J_vv - shift^2 J_vx of a velocity v and its position x.
+turned twice, in that of 1 - shift J_vv - shift^2 J_vx of a velocity v and its position x. A method that turns
+growth into decay with shorter steps already has this asked of a longer shift (`reach`).
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ class Frozen(NamedTuple):
     memory : (2,) array
         Shift of that inverse [s], 0 where there is none yet; 1 where friction leaves one solution, -1 where
         several.
+    reach : float
+        Shift with which growth is judged, in those of the inverse [1].
     rates, changed, trial, correction, next_correction : (n,) arrays
         Work space.
     """
@@ -37,6 +40,7 @@ class Frozen(NamedTuple):
     jacobian: np.ndarray
     inverse: np.ndarray
     memory: np.ndarray
+    reach: float
     rates: np.ndarray
     changed: np.ndarray
     trial: np.ndarray
@@ -44,10 +48,10 @@ class Frozen(NamedTuple):
     next_correction: np.ndarray
 
 
-def frozen(system: System) -> Frozen:
-    """Work space for a system; holds no matrix yet."""
+def frozen(system: System, reach: float = 1.0) -> Frozen:
+    """Work space for a system; holds no matrix yet. `reach` as in `Frozen`."""
     n = system.scale.size
-    return Frozen(np.zeros((n, n)), np.zeros((n, n)), np.zeros(2), *(np.zeros(n) for _ in range(5)))
+    return Frozen(np.zeros((n, n)), np.zeros((n, n)), np.zeros(2), reach, *(np.zeros(n) for _ in range(5)))
 
 
 @kernel
@@ -67,8 +71,8 @@ def _invert(frozen: Frozen, position_of: np.ndarray, shift: float, counts: np.nd
     frozen.memory[SHIFT], frozen.memory[SIGN] = shift, sign
     for i in range(n):
         if position_of[i] >= 0:
-            stiffness = -frozen.jacobian[i, position_of[i]]
-            if 1.0 - shift * frozen.jacobian[i, i] + shift * shift * stiffness < 0.0:
+            stiffness, a = -frozen.jacobian[i, position_of[i]], frozen.reach * shift
+            if 1.0 - a * frozen.jacobian[i, i] + a * a * stiffness < 0.0:
                 frozen.memory[SIGN] = -1.0
     return OK
 

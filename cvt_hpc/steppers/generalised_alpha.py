@@ -33,7 +33,6 @@ FACTS = Facts(
     needs=frozenset({"rates"}),
     implicit=True,
     l_stable=False,
-    damping_limit=np.inf,
     stability="no limit; solvable in one way only while step times the steepest growth rate (falling "
     "friction: N |mu'| / m) is below (1 + r) (3 - r) / 2, r the spectral radius",
     damping="a vibration decays at the rate ((1 - r) / (1 + r))^3 step^3 w^4 / 4, what is too fast for the "

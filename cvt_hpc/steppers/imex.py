@@ -8,8 +8,6 @@ visibly, at some loads from 10 us, at all from 12.5 us. At 4.6 us amplitudes of 
 2.5 %, its frequency within 0.5 %, means over eight starts.
 """
 
-from math import inf
-
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers.facts import Facts
 
@@ -20,7 +18,6 @@ FACTS = Facts(
     needs=frozenset(),  # of a general system: it is a step of the belt's own
     implicit=True,
     l_stable=False,
-    damping_limit=inf,
     stability="bending, tension and contact of the strands: step < 2 / their fastest frequency",
     damping="none in strands and rings; pressed elements like a damper EA step [N s]",
 )

@@ -36,7 +36,7 @@ FACTS = Facts(
     needs=frozenset({"rates", "partition", "friction"}),
     implicit=False,
     l_stable=False,
-    damping_limit=np.inf,
+    vibration_limit=2.0,
     stability="step < 2 / w for a vibration of frequency w, step < 2 / d for a damping rate d (rising "
     "friction: N |mu'| / m); dry friction and rigid contact set no limit",
     damping="none where smooth forces depend on positions only",

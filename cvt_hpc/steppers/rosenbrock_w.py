@@ -36,7 +36,7 @@ FACTS = Facts(
     needs=frozenset({"rates"}),
     implicit=True,
     l_stable=True,
-    damping_limit=np.inf,
+    rest_limit=4.0,
     stability="no limit from what the frozen Jacobian holds; sound only while 0.293 step times the steepest "
     "growth rate (falling friction: N |mu'| / m) is below 1",
     damping="a vibration decays at the rate 0.0037 step^3 w^4",

@@ -19,6 +19,7 @@ __all__ = ["FACTS", "PARAMETERS", "control", "march", "work"]
 
 FACTS = replace(
     COMMON,
+    width_limit=1.0,
     stability="orders up to 2 are A-stable, higher ones not near the imaginary axis",
 )
 march = partial(march_by, BDF)

@@ -19,6 +19,7 @@ __all__ = ["FACTS", "PARAMETERS", "control", "march", "work"]
 
 FACTS = replace(
     COMMON,
+    width_limit=0.1,
     stability="backward differences up to order 2 are A-stable, higher ones not near the imaginary axis",
 )
 march = partial(march_by, LSODA)

@@ -25,7 +25,6 @@ FACTS = Facts(
     needs=frozenset({"rates"}),
     implicit=True,
     l_stable=False,
-    damping_limit=np.inf,
     stability="",
     damping="below the tolerance",
 )

@@ -29,7 +29,6 @@ FACTS = Facts(
     needs=frozenset({"rates"}),
     implicit=True,
     l_stable=False,
-    damping_limit=np.inf,
     stability="no limit; solvable in one way only while theta step times the steepest growth rate (falling "
     "friction: N |mu'| / m) is below 1",
     damping="theta = 1/2: none, and none of what is too fast for the step; else at the rate "

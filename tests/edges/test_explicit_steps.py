@@ -35,7 +35,7 @@ def test_the_step_from_which_friction_chatters(stepper):
         0.2 / RATE,
         20.0 / RATE,
     )
-    assert limit == pytest.approx(FACTS[stepper].damping_limit / RATE, rel=0.02)
+    assert limit == pytest.approx(FACTS[stepper].rest_limit / RATE, rel=0.02)
 
 
 @pytest.mark.parametrize("stepper", ["symplectic_euler", "runge_kutta_4"])
@@ -45,7 +45,7 @@ def test_chatter_is_named_and_its_size_is_a_step_of_friction(stepper):
     run = begin("oscillator", stepper, p)
     status, reason = run.advance(run.samples)
     assert status == Status.FAILED_NUMERICS
-    assert f"the step is beyond {FACTS[stepper].damping_limit / RATE:.3g} s" in reason
+    assert f"the step is beyond {FACTS[stepper].rest_limit / RATE:.3g} s" in reason
     # half of a step's change of speed to either side by Euler's method, an eighth of that by the other
     chatter = np.abs(run.rows[-50:, 1]).max()
     assert 0.05 * step * LOAD * MU / MASS < chatter < step * LOAD * MU / MASS

@@ -99,7 +99,7 @@ def test_every_stepper_says_what_a_chooser_has_to_know(stepper):
     assert ("tolerance" in table, "step" in table) == (facts.adaptive, not facts.adaptive)
     assert (facts.order_at_events is None) == facts.adaptive
     assert facts.adaptive or 0.0 < facts.order_at_events <= facts.order
-    assert facts.damping_limit > 0.0
+    assert facts.rest_limit > 0.0
     assert len(facts.stability.split()) > 1 and facts.damping.strip()
     if stepper in OWN_STEPPERS:
         assert facts.needs == frozenset()

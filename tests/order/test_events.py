@@ -33,7 +33,7 @@ def error(p, stepper):
 
 def width(stepper, step):
     """Regularisation speed [m/s]: as small as the method takes it."""
-    limit = FACTS[stepper].damping_limit
+    limit = FACTS[stepper].rest_limit
     return MARGIN * 0.6 * step / limit if np.isfinite(limit) else 1e-6
 
 

@@ -67,7 +67,7 @@ def test_the_strands_are_disturbed_once_the_start_up_is_over():
 def test_a_state_that_is_no_number_ends_the_run():
     run = general("symplectic_euler", step=2e-7)
     assert run.advance(2) is None
-    run._marching.y[7] = np.nan
+    run.marching.y[7] = np.nan
     status, reason = run.advance(2)
     assert status == Status.FAILED_NUMERICS and reason
     assert run.done == 2

@@ -28,6 +28,7 @@ from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, recording
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFILES, Outcome
 from cvt_hpc.models.elastic_belt.structure import SparseJacobian
+from cvt_hpc.models.marched import Marched
 from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.marching import Marching
 from cvt_hpc.steppers.stiffness import STABLE, fastest_rate
@@ -73,7 +74,7 @@ class Form:
         return {"jac": jacobian}
 
 
-class GeneralTransient(RecordedRun):
+class GeneralTransient(Marched, RecordedRun):
     """One run, advanced sample by sample; attributes as of `RecordedRun`.
 
     Parameters
@@ -102,37 +103,18 @@ class GeneralTransient(RecordedRun):
         self._lane_belt = lane_belt([self.belt], np.float64)
         self._lane = lane_state([self.belt], [first], np.float64)
         self._stations = LaneArray(n, FIELDS_OF_FORCES, 1)
-        self._marching = Marching(stepper, p, self._form.system, start, self.interval)
+        self.marching = Marching(stepper, p, self._form.system, start, self.interval)
         self._stable = STABLE.get(stepper, np.inf)
         self._fastest = np.random.default_rng(0).normal(size=start.size)
         if stepper.startswith("scipy_"):
-            self._marching.tell(**self._form.hints(stepper))
+            self.marching.tell(**self._form.hints(stepper))
         self.done = 0
         self.failure: tuple[Status, str] | None = None
 
     @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-        return self._marching.time
-
-    @property
-    def step(self) -> float:
-        """Mean time step so far [s]."""
-        return self._marching.step
-
-    @property
-    def steps(self) -> int:
-        """Steps taken so far."""
-        return self._marching.steps
-
-    def counters(self) -> dict[str, int]:
-        """Work done so far, by name."""
-        return self._marching.counters()
-
-    @property
     def state(self) -> State:
         """The present state; a copy."""
-        return self._form.state(self.time, self._marching.y).copy()
+        return self._form.state(self.time, self.marching.y).copy()
 
     @property
     def contact_solves(self) -> int:
@@ -155,7 +137,7 @@ class GeneralTransient(RecordedRun):
         (run,) = runs
         self.done, self._disturbed = run.done, run.done > self._plan.kick
         self._rows.data[: self.done, :, 0] = run.rows
-        self._marching.begin(run.time, self._form.pack(run.state))
+        self.marching.begin(run.time, self._form.pack(run.state))
 
     def advance(self, samples: int) -> tuple[Status, str] | None:
         """March on.
@@ -186,13 +168,13 @@ class GeneralTransient(RecordedRun):
         """Give the strands their random displacement, once the start-up's damping has gone."""
         p, state = self.parameters, self.state
         state.fields[W] += random_strands(self.mesh, p["disturbance"], p["seed"])
-        self._marching.y[:] = self._form.pack(state)
+        self.marching.y[:] = self._form.pack(state)
         self._disturbed = True
 
     def _march(self, count: int) -> tuple[Status, str] | None:
         """March by `count` sampling intervals and record them."""
-        rows = np.full((count, self._marching.y.size), np.nan)
-        outcome = self._marching.advance(rows)
+        rows = np.full((count, self.marching.y.size), np.nan)
+        outcome = self.marching.advance(rows)
         for row in rows:
             if not np.all(np.isfinite(row)):
                 break
@@ -200,15 +182,15 @@ class GeneralTransient(RecordedRun):
             if seen != Outcome.OK:
                 return FAILURES[Outcome(seen)]
         if outcome != Result.OK:
-            return Status.FAILED_NUMERICS, self._marching.explain(outcome)
+            return Status.FAILED_NUMERICS, self.marching.explain(outcome)
         return self._too_long() if np.isfinite(self._stable) else None
 
     def _too_long(self) -> tuple[Status, str] | None:
         """Whether an explicit step is beyond its limit, where friction only hums and nothing diverges."""
-        rate = fastest_rate(self._form.system, self.time, self._marching.y, self._fastest)
-        if self._marching.step * rate <= self._stable:
+        rate = fastest_rate(self._form.system, self.time, self.marching.y, self._fastest)
+        if self.marching.step * rate <= self._stable:
             return None
-        step, limit = self._marching.step, self._stable / rate
+        step, limit = self.marching.step, self._stable / rate
         found = f"the step {step:.3g} s is beyond what is stable, {limit:.3g} s"
         return Status.FAILED_NUMERICS, f"{found}: some motion has a rate of {rate:.3g}/s"
 

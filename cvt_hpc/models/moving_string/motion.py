@@ -46,6 +46,15 @@ def moving_string(parameters: Mapping[str, Any]) -> String:
     return String(float(p["belt_speed"]), wave, float(p["length"] / p["cells"]), float(p["line_mass"]))
 
 
+def highest_frequency(parameters: Mapping[str, Any]) -> float:
+    """Frequency of the fastest wave that the cells carry [rad/s], from flat parameters [SI]."""
+    string = moving_string(parameters)
+    kh = np.linspace(0.0, np.pi, 1001)
+    drift = string.speed * np.sin(kh) / string.cell
+    squeezed = (string.wave**2 - string.speed**2) * (2.0 * np.sin(0.5 * kh) / string.cell) ** 2
+    return float(np.max(drift + np.sqrt(drift**2 + squeezed)))
+
+
 @kernel
 def string_rates(string: String, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     """Rates of displacements and speeds; see `System`."""

@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.alone import Alone
-from cvt_hpc.models.marched import MarchedRun, Probe
-from cvt_hpc.models.oscillator.motion import (
-    V,
-    X,
-    friction_at_rest,
-    initial_state,
-    largest_rate,
-    oscillator,
-    set_valued_system,
-    system,
-)
-from cvt_hpc.steppers.marching import Marching
-from cvt_hpc.variables import Status
+from cvt_hpc.models.marched import MarchedRun, Probe, batch_of_one
+from cvt_hpc.models.oscillator.motion import V, X, initial_state, oscillator, set_valued_system, system
+from cvt_hpc.models.oscillator.rest import peak, rest_missed, wrongly_held
 
 CHANNELS = ("speed",)
 
@@ -28,9 +18,9 @@ CHANNELS = ("speed",)
 class Transient(MarchedRun):
     """One run of the oscillator, advanced sample by sample.
 
-    A step beyond what the stepper can take of the damping rate of smoothed friction at rest makes friction
-    chatter where the mass should stick: its speed jumps over the belt's in every step, by up to
-    step N mu / m. The run ends as failed at the first sample that lies within that band.
+    A run ends as failed where its friction at rest is not that of the model (`rest`): at the first sample
+    within a step of rest, should step or tolerance be too coarse to find rest; and wherever the mass was let
+    go by less, or held against more, than friction can do.
 
     Parameters
     ----------
@@ -41,46 +31,23 @@ class Transient(MarchedRun):
     """
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
-        equations = set_valued_system if stepper == "moreau" else system
-        march = Marching(
-            stepper,
-            parameters,
-            equations(parameters),
-            initial_state(parameters),
-            1.0 / parameters["sampling_rate"],
-        )
-        super().__init__(parameters, march, (Probe("mass", 0.0),), (X,))
-        constants = oscillator(parameters)
-        self._largest_step = march.facts.damping_limit / largest_rate(constants)
-        self._jump = friction_at_rest(constants) / constants.mass
+        equations = (set_valued_system if stepper == "moreau" else system)(parameters)
+        self._constants = o = oscillator(parameters)
+        self._peak = peak(o)
+        probes = (Probe("mass", 0.0),)
+        frequency = np.sqrt(o.stiffness / o.mass)
+        start = initial_state(parameters)
+        super().__init__(parameters, stepper, equations, start, probes, (X,), frequency)
+        self._allowed = parameters.get("tolerance", 0.0) * float(equations.scale[V])
 
-    def advance(self, samples: int) -> tuple[Status, str] | None:
-        """March on; see `MarchedRun.advance`."""
-        first = self.done
-        failure = super().advance(samples)
-        if failure is None and self.step > self._largest_step:
-            sliding = np.abs(self.parameters["belt_speed"] - self.channel("speed")[first:])
-            if np.any(sliding < self.step * self._jump):
-                return Status.FAILED_NUMERICS, (
-                    f"the step is beyond {self._largest_step:.3g} s, from where friction chatters instead of "
-                    "letting the mass stick"
-                )
-        return failure
+    def _doubt(self, first: int) -> str | None:
+        seen = self.rows[max(first - 1, 0) : self.done]
+        missed = rest_missed(self._constants, self.marching.facts, self.step, self._allowed, seen)
+        return missed or wrongly_held(self._constants, self._peak, seen, self.interval)
 
     def channel(self, name: str) -> np.ndarray:
         """History of one of CHANNELS, (done,): speed of the mass [m/s]."""
         return self.rows[: self.done, {"speed": V}[name]]
 
 
-def batch(points: Sequence[Mapping[str, Any]], stepper: str) -> Alone:
-    """One run in the form of a batch.
-
-    Parameters
-    ----------
-    points : sequence of mapping
-        Resolved parameters of the one run [SI].
-    stepper : str
-        One of the model's STEPPER_NAMES.
-    """
-    (parameters,) = points
-    return Alone(Transient(parameters, stepper))
+batch = partial(batch_of_one, Transient)

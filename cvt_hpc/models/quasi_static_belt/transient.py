@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.alone import Alone
 from cvt_hpc.models.elastic_belt import quasi_static
 from cvt_hpc.models.elastic_belt.belt import Belt, Mesh, State
 from cvt_hpc.models.elastic_belt.general import GeneralTransient
+from cvt_hpc.models.marched import batch_of_one
 
 
 class QuasiStaticForm:
@@ -40,7 +40,4 @@ class Transient(GeneralTransient):
     form = QuasiStaticForm
 
 
-def batch(points: Sequence[dict[str, Any]], stepper: str) -> Alone:
-    """One run in the form of a batch; arguments as of `elastic_belt.transient.batch`."""
-    (parameters,) = points
-    return Alone(Transient(parameters, stepper))
+batch = partial(batch_of_one, Transient)
