@@ -28,7 +28,7 @@ from cvt_hpc.steppers.system import System
 
 FACTS = Facts(
     order=2,
-    order_at_events=1.0,
+    order_at_events=0.98,
     adaptive=False,
     needs=frozenset({"rates"}),
     implicit=True,

@@ -20,7 +20,7 @@ from cvt_hpc.steppers.system import System
 
 FACTS = Facts(
     order=4,
-    order_at_events=1.0,
+    order_at_events=0.92,
     adaptive=False,
     needs=frozenset({"rates"}),
     implicit=False,

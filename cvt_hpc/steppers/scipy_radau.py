@@ -19,7 +19,7 @@ __all__ = ["FACTS", "PARAMETERS", "control", "march", "work"]
 
 FACTS = replace(
     COMMON,
-    width_limit=1.0,
+    width_limit=0.3,
     l_stable=True,
     stability="no limit",
     damping="below the tolerance; what is too fast for the step is gone after it",

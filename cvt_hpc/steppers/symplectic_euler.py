@@ -24,7 +24,7 @@ from cvt_hpc.steppers.system import System
 
 FACTS = Facts(
     order=1,
-    order_at_events=1.0,
+    order_at_events=0.94,
     adaptive=False,
     needs=frozenset({"rates", "partition"}),
     implicit=False,

@@ -15,7 +15,6 @@ PARAMETERS = {
         "loudness": Parameter(1e-5, "m", "amplitude of its rim", minimum=0.0),
         "scatter": Parameter(0.0, "", "relative scatter of the loudness over the starts"),
         "load_slope": Parameter(100.0, "N m/s", "rise of the load"),
-        "swell": Parameter(0.0, "1/s", "growth of the amplitude"),
         "seed": Parameter(1, "", "seed", minimum=0),
     },
 }
@@ -27,7 +26,7 @@ LONGEST_STEP = 1e-3  # from here on runs fail half way
 
 
 def exact(parameters, times):
-    wave = np.sin(2 * np.pi * parameters["pitch"] * times) * np.exp(parameters["swell"] * times)
+    wave = np.sin(2 * np.pi * parameters["pitch"] * times)
     size = parameters["loudness"] * np.array([1.0, 0.2])
     return wave[:, np.newaxis] * size
 

@@ -7,9 +7,10 @@ s / (s^2 + w^2). A vibration of 600 Hz that grows at 50 / s dies from 7 us on.
 
 import numpy as np
 import pytest
-from small_systems import bisect, finished, scene
+from small_systems import begin, bisect, finished, scene
 
 from cvt_hpc.models.oscillator.exact import exact
+from cvt_hpc.variables import Status
 
 FREQUENCY, GROWTH = 2 * np.pi * 600.0, 50.0
 MASS, LOAD = 0.02, 500.0
@@ -36,7 +37,8 @@ def growth(stepper, step, **options):
     """Growth rate of the swing [1/s], from its energy at both ends."""
     interval = step * max(round(5e-5 / step), 1)
     p = SQUEAL | options | {"step": step * (1 + 1e-12), "sampling_rate": 1.0 / interval}
-    run = finished("oscillator", stepper, p)
+    run = begin("oscillator", stepper, p)
+    run.advance(run.samples)
     away, speed = run.displacement[:, 0] - PULL, run.channel("speed")
     # a quadratic form of the motion that exp(2 s t) multiplies without ripple
     energy = (speed - GROWTH * away) ** 2 + (FREQUENCY * away) ** 2
@@ -55,6 +57,25 @@ def test_the_step_from_which_implicit_euler_silences_it():
     limit = bisect(lambda step: growth("theta", step, theta=1.0) < 0.0, 1e-6, 5e-5, times=10)
     assert limit == pytest.approx(2 * GROWTH / (GROWTH**2 + FREQUENCY**2), rel=0.02)
     assert limit == pytest.approx(7.0e-6, rel=0.02)
+
+
+@pytest.mark.parametrize(("share", "named"), [(0.97, False), (1.03, True)])
+def test_silence_is_named(share, named):
+    step = share * 2 * GROWTH / (GROWTH**2 + FREQUENCY**2)
+    p = SQUEAL | {"step": step * (1 + 1e-12), "sampling_rate": 1.0 / (7 * step), "theta": 1.0}
+    run = begin("oscillator", "theta", p)
+    failure = run.advance(1)
+    if named:
+        assert failure[0] == Status.FAILED_NUMERICS
+        assert failure[1].startswith("the step damps, at ")
+        assert failure[1].endswith(" 1/s, a vibration that friction drives at 50 1/s")
+    else:
+        assert failure is None
+
+
+def test_a_vibration_that_friction_does_not_drive_may_be_damped():
+    p = SQUEAL | {"step": 1e-5, "theta": 1.0, "damping": 2 * MASS * 60.0}
+    finished("oscillator", "theta", p)
 
 
 @pytest.mark.parametrize(

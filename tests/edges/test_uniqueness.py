@@ -76,10 +76,10 @@ def test_sdirk_lets_grow_what_grows_up_to_its_limit(share):
     )
     row = np.empty((1, 4))
     assert march.advance(row) == Result.OK
-    # the spring's pull is of the order of rate^-2; at the limit itself nothing grows
+    # the spring's pull is of the order of rate^-2; where R falls to 1, it does so steeply
     assert row[0, 2:] / [1e-3, 2e-3] == pytest.approx(factor, rel=1e-4)
     assert factor > 1.0
-    assert (factor < 1.02) == (share > 0.99)
+    assert (factor < 1.03) == (share > 0.99)
 
 
 def test_all_implicit_methods_are_asked():

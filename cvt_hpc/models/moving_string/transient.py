@@ -13,8 +13,8 @@ from cvt_hpc.models.moving_string.exact import probe_positions
 from cvt_hpc.models.moving_string.motion import energy, highest_frequency, initial_state, system
 
 CHANNELS = ("energy",)
-# Symplectic Euler keeps a wave, but its energy moves by up to (1 + w step / 2) / (1 - w step / 2): by 2 where a
-# period has 9.4 steps
+# Symplectic Euler keeps a wave, but its energy moves by up to (1 + w step / 2) / (1 - w step / 2): by 2 at
+# 9.4 steps for a period
 KEPT = 2.0  # share of the energy, up or down
 
 

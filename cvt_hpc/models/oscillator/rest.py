@@ -36,9 +36,9 @@ class Peak(NamedTuple):
 def rest_missed(o: Oscillator, facts: Facts, step: float, allowed: float, rows: np.ndarray) -> str | None:
     """Say whether the mass comes within a step of rest, by a step or tolerance too coarse to find it.
 
-    Beyond the limit of the step, friction chatters instead of bringing the mass to rest: the speed jumps over
-    the belt's in every step, by up to step N mu / m. Beyond that of the tolerance, errors of the speed hide the
-    width over which friction changes its sign.
+    Beyond the limit of the step, friction chatters instead of bringing the mass to rest: the speed jumps
+    over the belt's in every step, by up to step N mu / m. Beyond that of the tolerance, errors of the speed
+    hide the width over which friction changes its sign.
 
     Parameters
     ----------

@@ -11,6 +11,7 @@ import numpy as np
 from cvt_hpc.models.marched import MarchedRun, Probe, batch_of_one
 from cvt_hpc.models.oscillator.motion import V, X, initial_state, oscillator, set_valued_system, system
 from cvt_hpc.models.oscillator.rest import peak, rest_missed, wrongly_held
+from cvt_hpc.models.oscillator.slide import silenced
 
 CHANNELS = ("speed",)
 
@@ -20,7 +21,8 @@ class Transient(MarchedRun):
 
     A run ends as failed where its friction at rest is not that of the model (`rest`): at the first sample
     within a step of rest, should step or tolerance be too coarse to find rest; and wherever the mass was let
-    go by less, or held against more, than friction can do.
+    go by less, or held against more, than friction can do. So does a run whose step damps a vibration about
+    steady sliding that friction drives (`slide`), at its first sample.
 
     Parameters
     ----------
@@ -38,12 +40,15 @@ class Transient(MarchedRun):
         frequency = np.sqrt(o.stiffness / o.mass)
         start = initial_state(parameters)
         super().__init__(parameters, stepper, equations, start, probes, (X,), frequency)
+        self._silenced = None
+        if not self.marching.facts.adaptive:
+            self._silenced = silenced(o, equations, stepper, parameters, self.interval)
         self._allowed = parameters.get("tolerance", 0.0) * float(equations.scale[V])
 
     def _doubt(self, first: int) -> str | None:
         seen = self.rows[max(first - 1, 0) : self.done]
         missed = rest_missed(self._constants, self.marching.facts, self.step, self._allowed, seen)
-        return missed or wrongly_held(self._constants, self._peak, seen, self.interval)
+        return missed or self._silenced or wrongly_held(self._constants, self._peak, seen, self.interval)
 
     def channel(self, name: str) -> np.ndarray:
         """History of one of CHANNELS, (done,): speed of the mass [m/s]."""

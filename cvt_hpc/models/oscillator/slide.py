@@ -1,0 +1,72 @@
+"""Whether a method silences what friction drives: small swings about steady sliding, by its own steps.
+
+At the belt's speed v the mass can slide steadily. There a friction that falls by F' < 0 drives small swings
+at the rate s = -(c + F') / (2 m). A method whose damping is stronger turns their growth into decay, whatever
+the order, and a run by it is silent where the model vibrates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.models.oscillator.motion import Oscillator, regularised_friction
+from cvt_hpc.steppers.facts import Result
+from cvt_hpc.steppers.marching import Marching
+from cvt_hpc.steppers.system import SetValuedSystem, System
+
+SMALL = 1e-3  # of the belt's speed: the swing, within which friction is a straight line
+
+
+def growth_of_slide(o: Oscillator) -> float:
+    """Rate at which small swings about steady sliding grow [1/s]; negative: they decay."""
+    apart = SMALL * o.belt_speed
+    faster, slower = (regularised_friction(o, o.belt_speed + sign * apart) for sign in (1.0, -1.0))
+    slope = (faster - slower) / (2.0 * apart) if apart > 0.0 else np.inf
+    return -0.5 * (o.damping + slope) / o.mass
+
+
+def silenced(
+    o: Oscillator,
+    system: System | SetValuedSystem,
+    stepper: str,
+    parameters: Mapping[str, Any],
+    interval: float,
+) -> str | None:
+    """Say whether a method damps small swings about steady sliding that friction drives.
+
+    Parameters
+    ----------
+    o : Oscillator
+        Constants.
+    system : System or SetValuedSystem
+        Its equations, as the stepper needs them.
+    stepper : str
+        One with a fixed step.
+    parameters : mapping
+        Resolved parameters of the run [SI].
+    interval : float
+        Sampling interval [s].
+
+    Returns
+    -------
+    str or None
+        The reason, where it does.
+    """
+    true, frequency = growth_of_slide(o), np.sqrt(o.stiffness / o.mass)
+    if not 0.0 < true < frequency:
+        return None
+    rest = regularised_friction(o, o.belt_speed) / o.stiffness
+    start = np.array([rest + SMALL * o.belt_speed / frequency, 0.0])
+    rows = np.empty((int(np.ceil(2.0 * np.pi / frequency / interval)) + 1, 2))
+    if Marching(stepper, parameters, system, start, interval).advance(rows) != Result.OK:
+        return None  # the run itself will say so
+    away, speed = rows[:, 0] - rest, rows[:, 1]
+    # exp(2 s t) without ripple, for swings that grow at the rate s
+    energy = (speed - true * away) ** 2 + (frequency**2 - true**2) * away**2
+    found = 0.5 * np.log(energy[-1] / energy[0]) / (interval * (len(rows) - 1))
+    if found > 0.0:
+        return None
+    return f"the step damps, at {-found:.3g} 1/s, a vibration that friction drives at {true:.3g} 1/s"
