@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 from small_systems import FACTS, begin, bisect, finished, scene
+from test_explicit_steps import LOAD, MASS, MU, RATE, STUCK, WIDTH
 
 from cvt_hpc.models.oscillator.exact import exact
 from cvt_hpc.models.oscillator.motion import oscillator
@@ -114,9 +115,7 @@ def test_the_peak_is_that_of_friction_at_rest():
     assert peak(oscillator(STICK_SLIP | {"static_friction": 0.6})) is None
 
 
-# A mass that slides to rest under a constant pull, a share of what friction holds: it creeps at v_reg atanh(share)
-WIDTH, MU, LOAD, MASS = 1e-3, 0.6, 2.0, 0.5
-RATE = LOAD * MU / (MASS * WIDTH)
+# A mass that slides to rest under a constant pull, a share of what friction holds, creeps at v_reg atanh(share)
 GAMMA = 1.0 - np.sqrt(0.5)  # of the linearly implicit method
 
 
@@ -138,20 +137,14 @@ def found(z, share):
     """Of 16 starts, the part that comes to rest by the linearly implicit method."""
     step, count = z / RATE, 0
     for start in np.linspace(3.0, 4.0, 16):
-        p = scene(
-            "oscillator",
-            mass=MASS,
-            normal_load=LOAD,
-            static_friction=MU,
-            friction_speed=WIDTH,
-            belt_speed=0.0,
-            initial_speed=start * step * LOAD * MU / MASS,
-            stiffness=1e-3,
-            initial_displacement=-share * LOAD * MU / 1e-3,
-            step=step,
-            sampling_rate=1.0 / step,
-            duration=200 * step,
-        )
+        p = STUCK | {
+            "initial_speed": start * step * LOAD * MU / MASS,
+            "stiffness": 1e-3,
+            "initial_displacement": -share * LOAD * MU / 1e-3,
+            "step": step,
+            "sampling_rate": 1.0 / step,
+            "duration": 200 * step,
+        }
         run = begin("oscillator", "rosenbrock_w", p)
         run.advance(run.samples)
         count += np.abs(run.rows[-20:, 1] / WIDTH - np.arctanh(share)).max() < 0.02

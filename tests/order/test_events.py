@@ -58,7 +58,7 @@ def test_order_left_at_events(stepper, options, expected):
         errors.append(np.sqrt(np.mean(np.square(each))))
     # other steps, of 0.002 or 0.0013 at the least, move the slope by up to 0.1
     assert order(steps, errors) == pytest.approx(expected, abs=0.1)
-    assert errors[-1] < 0.002
+    assert errors[-1] < 0.003  # implicit Euler's; all others have less than 0.001
 
 
 def test_stick_slip_with_friction_as_it_is():
