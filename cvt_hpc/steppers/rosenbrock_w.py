@@ -12,7 +12,8 @@ rates over the first stage, against A step k1 = (k1 - f) / g. Where the part tha
 more than a quarter of the stage itself, stability is at risk: A is taken anew and the step repeated.
 
 It solves nothing to the end: a step across the sharp bend of regularised friction follows the tangent, where
-an implicit method would find the bend.
+an implicit method would find the bend. From step d = 4.0 on, d = N mu / (m v_reg), 3 k1 + k2 = 0 has solutions
+beside rest, at which a mass slides on.
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ FACTS = Facts(
     l_stable=True,
     rest_limit=4.0,
     stability="no limit from what the frozen Jacobian holds; sound only while 0.293 step times the steepest "
-    "growth rate (falling friction: N |mu'| / m) is below 1",
+    "growth rate (falling friction: N |mu'| / m) is below 1, and rest under friction is found while step < "
+    "4.0 / d, d = N mu / (m v_reg)",
     damping="a vibration decays at the rate 0.0037 step^3 w^4",
 )
 PARAMETERS = {"numerics": {"step": STEP}}
