@@ -4,8 +4,8 @@ Order 5, seven stages, the last of which is the first of the next step; explicit
 the difference to the embedded method of order 4, with a proportional and an integral part (Hairer, Norsett
 and Wanner 1993, sec. II.4: exponents 0.17 and 0.04). Steps end at the sampling instants, so that many samples
 make it take more steps than the tolerance needs. It is not for stiff friction: there its step hovers about
-3.3 / d, d the rate of the fastest decay, as long as the tolerance allows errors of a speed below a tenth of the
-width of smoothed friction; with coarser tolerances it leaps over rest.
+3.3 / d, d the rate of the fastest decay, as long as the tolerance allows errors of a speed below a tenth of
+the width of smoothed friction; with coarser tolerances it leaps over rest.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ FACTS = Facts(
     implicit=False,
     l_stable=False,
     width_limit=0.1,
-    stability="the control keeps the step below 3.3 / d for a damping rate d (friction: d = N mu / (m v_reg), "
-    "while errors allowed in a speed are below 0.1 v_reg) and 1.0 / w for a vibration of frequency w",
+    stability="the control keeps the step below 3.3 / d for a damping rate d (friction: "
+    "d = N mu / (m v_reg), while errors allowed in a speed are below 0.1 v_reg) and 1.0 / w for a vibration "
+    "of frequency w",
     damping="below the tolerance",
 )
 PARAMETERS = {"numerics": {"tolerance": TOLERANCE, "most_steps": MOST_STEPS}}

@@ -12,8 +12,8 @@ rates over the first stage, against A step k1 = (k1 - f) / g. Where the part tha
 more than a quarter of the stage itself, stability is at risk: A is taken anew and the step repeated.
 
 It solves nothing to the end: a step across the sharp bend of regularised friction follows the tangent, where
-an implicit method would find the bend. From step d = 4.0 on, d = N mu / (m v_reg), 3 k1 + k2 = 0 has solutions
-beside rest, at which a mass slides on.
+an implicit method would find the bend. From step d = 4.0 on, d = N mu / (m v_reg), 3 k1 + k2 = 0 has
+solutions beside rest, at which a mass slides on.
 """
 
 from __future__ import annotations
