@@ -218,7 +218,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
     written = []
     if arguments.out is not None:
         written.append(f"history: {write_history(dataset, arguments.out)}")
-    if arguments.plot is not None and dataset.sizes["time"] > 1:
+    if arguments.plot is not None and dataset.sizes.get("time", 0) > 1:
         written.append(f"picture: {draw_history(dataset, arguments.plot)}")
     elif arguments.plot is not None:
         written.append("picture: none, the run has no history")

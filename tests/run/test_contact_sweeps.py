@@ -3,7 +3,7 @@
 import numpy as np
 
 from cvt_hpc.job import build_job
-from cvt_hpc.models.elastic_belt.record import lane_key
+from cvt_hpc.models.elastic_belt.grouping import lane_key
 from cvt_hpc.models.elastic_belt.transient import Batch
 
 COARSE = {"stations": 48, "duration": 0.04, "rise_time": 0.01, "load": 60.0, "step": 4e-6}
