@@ -82,7 +82,6 @@ def _history(job: Job, point: dict[str, Any], run: Any, record: dict[str, Any]) 
         value = record[variable.name]
         value = value if variable.dtype.startswith("S") else np.asarray(value, variable.dtype)
         variables[variable.name] = (variable.dims, value, _variable_attributes(variable))
-    histories = record_module(job).histories(run)
     attributes = {
         "Conventions": "CF-1.11",
         "title": job.description or job.name,
@@ -91,7 +90,10 @@ def _history(job: Job, point: dict[str, Any], run: Any, record: dict[str, Any]) 
         "point": json.dumps({key: repr(value) if value == np.inf else value for key, value in point.items()}),
     }
     dataset = xr.Dataset(variables, coordinates, attributes)
-    return dataset.merge(histories, combine_attrs="override")
+    model = record_module(job)
+    if not hasattr(model, "histories"):
+        return dataset
+    return dataset.merge(model.histories(run), combine_attrs="override")
 
 
 def _attributes(long_name: str, units: str) -> dict[str, str]:

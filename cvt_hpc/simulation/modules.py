@@ -4,10 +4,12 @@ The `record` module of a model offers VARIABLES, `coordinates(parameters)`, `cos
 `lanes(parameters, stepper)` and `lane_key(parameters)`; and
 
 - of a model with a transient, `judge(run)`: the values of VARIABLES and the verdict (status, vibrates,
-  reason) of a run that its `transient` module has made, and `histories(run)`;
-- of a model without, which takes no stepper, `solve(parameters)`, whose result `judge(solution)` and
-  `histories(solution)` read; `judge` may leave out what it does not know, such as all but status and
-  reason where nothing was found.
+  reason) of a run that its `transient` module has made;
+- of a model without, which takes no stepper, `solve(parameters)`, whose result `judge(solution)` reads. It
+  may leave out what is not known, such as all but status and reason where nothing was found.
+
+`histories(run)`, or of a solution, is the dataset of what `simulate` has beyond the record, where there is
+such.
 """
 
 from __future__ import annotations

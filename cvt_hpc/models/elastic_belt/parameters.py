@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.parameters import Parameter, not_negative, positive
-from cvt_hpc.physics.friction_problems import friction_problems
+from cvt_hpc.physics.friction_problems import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator
 
 
@@ -169,15 +169,11 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         By the name of the parameter, the setting that makes it so, e.g. "friction_law table".
     """
     p = parameters
-    of_formulas = ("friction_gradient", "kinetic_friction", "stribeck_velocity")
     of_elastic_sheaves = ("tilt_stiffness", "local_stiffness", "local_length")
     cases = (
-        (p["friction_law"] == "table", of_formulas, "friction_law table"),
-        (p["friction_law"] == "hyperbolic", ("stribeck_velocity",), "friction_law hyperbolic"),
-        (p["friction_gradient"] == 0.0, ("stribeck_velocity",), "friction_gradient 0"),
         (p["load_history"] == "constant", ("load_start",), "load_history constant"),
         (p["disturbance"] == 0.0, ("seed",), "disturbance 0"),
         (p["ring_friction"] == 0.0, ("ring_friction_speed",), "ring_friction 0"),
         (np.isinf(p["sheave_stiffness"]), of_elastic_sheaves, "sheave_stiffness inf"),
     )
-    return {key: setting for holds, keys, setting in cases if holds for key in keys}
+    return friction_inert(p) | {key: setting for holds, keys, setting in cases if holds for key in keys}
