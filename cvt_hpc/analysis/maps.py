@@ -31,6 +31,7 @@ from cvt_hpc.analysis.classes import (
     map_classes,
     occurrence_classes,
 )
+from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.figures import STYLE, WIDTH, check_format, headline, save_figure
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 
@@ -48,6 +49,7 @@ def draw_map(dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None
         Results of a study: `status` and `vibrates` over the job's axes; `amplitude` [m] and `frequency`
         [Hz], per strand, where known; `inferred_class` of a trace. The stronger strand is shown. Of a study
         of samples the axes lie along `run`: each run is a mark, and there is a panel for each pair of axes.
+        Results that hold `eigenfrequency` are drawn as lines over the axis that else runs along x.
     out : Path
         The picture: .png, .svg or .pdf.
     at : mapping, optional
@@ -69,6 +71,8 @@ def draw_map(dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None
     with matplotlib.rc_context(STYLE):
         if is_sampled(dataset):
             return save_figure(scatter_figure(dataset, at or {}), Path(out))
+        if "eigenfrequency" in dataset:
+            return save_figure(eigenfrequency_figure(dataset, at or {}), Path(out))
         return save_figure(map_figure(arrange(dataset, at or {})), Path(out))
 
 
