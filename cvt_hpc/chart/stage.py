@@ -43,11 +43,20 @@ class Stage:
         return max(q.until for q in self.scene.quantities) if self.scene.lead else math.inf
 
     def job(self, where: str, model: str = "", **values: Any) -> Job:
-        """Return the job of a run of this scene, or of another model, with further values set."""
+        """Return the job of a run of this scene, or of another model, with further values set.
+
+        Raises
+        ------
+        InputError
+            If a value is not legal, or the model has no transient that methods could march.
+        """
         # None: the model's own choice of a stepper
         values = {key: value for key, value in values.items() if value is not None}
         document = {**self.document, "model": model} if model else self.document
-        return build_job(document, where, {**self.values, **values}, "set")
+        job = build_job(document, where, {**self.values, **values}, "set")
+        if job.stepper is None:
+            raise mismatch(f"{where}: model", "one with a transient", job.model)
+        return job
 
 
 def read_stage(name: str, raw: Any, document: dict[str, Any], replaced: dict[str, Any], source: str) -> Stage:

@@ -108,6 +108,12 @@ def test_a_scene_may_be_of_another_model(write_chart):
     )  # its own default: the job's tables are for the job's model
 
 
+def test_a_scene_needs_a_transient(write_chart):
+    scene = A_SCENE_OF_ITS_OWN.replace("oscillator", "strand").replace("set = {", "# set = {")
+    with pytest.raises(InputError, match="model: expected one with a transient, found strand"):
+        load_chart(write_chart(("[chart.methods.soft]", f"{scene}\n[chart.methods.soft]")))
+
+
 def test_a_choice_may_be_of_another_model_and_of_fewer_starts(write_chart, monkeypatch):
     monkeypatch.setitem(sys.modules, "gong", sys.modules["bell"])
     monkeypatch.setitem(MODELS, "gong", "gong")
