@@ -101,7 +101,7 @@ def test_energy_of_a_cycle_is_that_of_all_forces():
 
     period = 2.0 * np.pi / w
     energy = quad(power, 0.0, period, epsabs=1e-12)[0]
-    # where the contact is stiffer under more friction, the creep v_0 takes part: a term of its own, in x mu'
+    # the friction under c_ele x changes with the rate: terms in x x' and x x'^2, which have no mean
     closed = -(2.0 * np.pi**2 / period) * x_hat**2 * (500.0 - 2.0 * p["contact_force"] * 0.02)
     assert energy == pytest.approx(closed, rel=1e-9)
     assert energy_per_cycle(f, np.array([x_hat]))[0] == pytest.approx(closed, rel=1e-9)

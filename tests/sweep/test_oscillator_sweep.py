@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cf import cf_findings
 
 from cvt_hpc.analysis.histories import draw_history
 from cvt_hpc.analysis.maps import draw_map
@@ -30,6 +31,7 @@ def few():
 def results(tmp_path_factory):
     report = run(few(), tmp_path_factory.mktemp("oscillator"), progress=False)
     assert report.exit_status == 0
+    assert cf_findings(report.results) == []
     with open_results(report.results) as dataset:
         yield dataset.load()
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["VARIABLES", "coordinates", "cost", "histories", "judge", "lane_key", "lanes"]
 
-STEP_COST = 1e-6  # core-seconds of a step; dearer ones are longer
+STEP_COST = 1e-6  # core-seconds of a step of moreau, and of a sample
 
 
 class Sticks(IntEnum):
