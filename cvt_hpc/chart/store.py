@@ -13,7 +13,7 @@ from cvt_hpc.chart.measuring import Measurement
 from cvt_hpc.chart.plan import Chart
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import naming_refusals, written_aside
-from cvt_hpc.study.folder import describe_difference
+from cvt_hpc.study.difference import describe_difference
 
 FORMAT = "cvt_hpc chart 1"
 _PLAIN = tuple(f.name for f in fields(Measurement) if f.name != "values")
