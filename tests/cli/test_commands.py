@@ -102,6 +102,19 @@ def test_a_stopped_sweep_ends_with_99(write_job, call, monkeypatch, tmp_path):
     ]
 
 
+def test_a_sweep_that_stopped_before_any_run_had_ended_needs_more_time(
+    write_job, call, monkeypatch, tmp_path
+):
+    write_job(GRID)
+    report = RunReport(tmp_path, tmp_path / "results.nc", 10, 4, (), 6, "time limit", 0)
+    monkeypatch.setattr("cvt_hpc.study.run", lambda job, out, **options: report)
+    status, _, err = call("run", "x.toml", "--time-limit", "1s")
+    assert (status, err) == (
+        98,
+        ["cvt-hpc: stopped early (time limit) before any run had ended; give it more time"],
+    )
+
+
 def test_limits_and_retries_reach_the_sweep(write_job, call, monkeypatch, tmp_path):
     write_job(GRID)
     given = {}
@@ -187,6 +200,26 @@ def test_check_prints_every_parameter_with_its_origin_the_axes_and_the_cost(writ
     assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--part", "9/3"],
+        ["--part", "1/3", "--fresh"],
+        ["--part", "1/3", *TRACED],
+        ["--time-limit", "foo"],
+        ["--run-limit", "foo"],
+        ["--out", "x.toml"],
+        ["--set", "load=x"],
+    ],
+)
+def test_a_dry_run_refuses_what_a_run_refuses(write_job, call, tmp_path, options):
+    write_job(GRID)
+    status, out, err = call("run", "x.toml", *options)
+    assert (status, out, len(err)) == (2, [], 1)
+    assert call("run", "x.toml", *options, "--dry-run") == (2, [], err)
+    assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
+
+
 @pytest.mark.parametrize("command", [["check"], ["run", "--dry-run"], ["run"]])
 def test_an_axis_that_the_dataset_could_not_hold_is_refused_by_all(
     write_job, call, tmp_path, monkeypatch, command
@@ -243,7 +276,8 @@ def test_check_forecasts_by_what_is_on_record(write_job, call):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--ranks", "4", "0"], "--ranks: expected numbers of ranks, 1 or more, found 0"),
+        (["--ranks", "4", "0"], "--ranks: expected numbers of ranks from 1 to 1000000, found 0"),
+        (["--ranks", "4", "1000001"], "--ranks: expected numbers of ranks from 1 to 1000000, found 1000001"),
         (["--ranks", "4", "--pilots", "-1"], "--pilots: expected a number of batches, found -1"),
         (["--pilots", "2"], "--pilots: expected --ranks beside it, found none"),
         (["--plot", "x.png"], "--plot: expected --ranks beside it, found none"),
@@ -331,11 +365,11 @@ def test_simulate_of_a_run_that_fails_ends_with_1(write_job, call):
         ),
         (
             ["simulate", "x.toml", "--out", "d.nc"],
-            "d.nc: expected a file that can be written, found d.nc in its way",
+            "d.nc: expected a file that can be written, found a folder of this name",
         ),
         (
             ["simulate", "x.toml", "--plot", "x.toml/new/h.png"],
-            "x.toml/new/h.png: expected a file that can be written, found HERE/x.toml in its way",
+            "x.toml/new/h.png: expected a file that can be written, found the file HERE/x.toml in the place of a folder",
         ),
         (
             ["simulate", "x.toml", "--out", "notes.nc"],
@@ -367,6 +401,17 @@ def test_bad_input_is_one_line_and_2(write_job, call, tmp_path, mechanics, argum
         assert [line.replace(str(tmp_path), "HERE") for line in err] == [f"cvt-hpc: {message}"]
     assert mechanics == {"written": [], "drawn": []}
     assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_closed_to_writing_is_named(write_job, call, monkeypatch, tmp_path, mechanics):
+    write_job(GRID)
+    monkeypatch.setattr("os.access", lambda path, mode: path != tmp_path)
+    assert call("simulate", "x.toml", "--out", "h.nc") == (
+        2,
+        [],
+        [f"cvt-hpc: h.nc: expected a file that can be written, found no permission to write to {tmp_path}"],
+    )
+    assert mechanics == {"written": [], "drawn": []}
 
 
 def test_map_says_what_it_cannot_fix(write_job, call):
