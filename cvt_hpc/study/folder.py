@@ -27,7 +27,7 @@ _logger = logging.getLogger(__name__)
 
 
 class DamagedJobError(InputError):
-    """A job.json that cannot be read; the logs tell whose the records are."""
+    """The file that says whose an output folder is cannot be read; what lies beside it may tell."""
 
 
 class StudyFolder:

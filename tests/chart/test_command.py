@@ -36,7 +36,7 @@ def test_a_chart_prints_its_tables_and_where_it_left_its_files(write_chart, call
     assert err[0] == "cvt-hpc: 1/13 ringing-exact: 0 core-s" and len(err) == 13
     assert call("c.toml") == (0, out, [])  # nothing is measured twice
     assert {path.name for path in (tmp_path / "out/bells").iterdir()} == {
-        "chart.csv", "chart.nc", "chart.json", "points",
+        "chart.csv", "chart.nc", "chart.json", "points", ".chart.lock",
     }  # fmt: skip
 
 
