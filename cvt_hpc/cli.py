@@ -192,7 +192,8 @@ def _map(arguments: argparse.Namespace) -> int:
         at = read_coordinates(arguments.at, units, str(arguments.path), "--at")
         from cvt_hpc.analysis.maps import draw_map
 
-        print(f"map: {draw_map(dataset, arguments.out or folder / 'map.png', at)}")
+        picture = arguments.out or folder / "map.png"
+        print(f"map: {draw_map(dataset, picture, at, str(arguments.path))}")
     return DONE
 
 

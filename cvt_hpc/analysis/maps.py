@@ -27,6 +27,7 @@ from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, val
 from cvt_hpc.analysis.classes import (
     OccurrenceClass,
     at_strongest_strand,
+    check_results,
     count_classes,
     map_classes,
     occurrence_classes,
@@ -39,7 +40,9 @@ TITLE_HEIGHT = 0.42  # [inch], of a panel with the space around it
 ONE_ROW = Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
 
 
-def draw_map(dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None) -> Path:
+def draw_map(
+    dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None, source: str = "results"
+) -> Path:
     """Draw where vibration occurs.
 
     Parameters
@@ -52,6 +55,8 @@ def draw_map(dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None
         The picture: .png, .svg or .pdf.
     at : mapping, optional
         Axes to fix: name -> value, as a number [SI] or a text.
+    source : str, optional
+        Where the results are from, for the errors.
 
     Returns
     -------
@@ -65,11 +70,11 @@ def draw_map(dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None
         are of samples, or the suffix is not a picture's.
     """
     check_format(Path(out))
-    occurrence_classes(dataset)
+    check_results(dataset, source)
     with matplotlib.rc_context(STYLE):
         if is_sampled(dataset):
-            return save_figure(scatter_figure(dataset, at or {}), Path(out))
-        return save_figure(map_figure(arrange(dataset, at or {})), Path(out))
+            return save_figure(scatter_figure(dataset, at or {}, source), Path(out))
+        return save_figure(map_figure(arrange(dataset, at or {}, source)), Path(out))
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, count_classes, occurrence_classes
 from cvt_hpc.analysis.figures import WIDTH, axis_label, display_unit, headline
-from cvt_hpc.errors import InputError
+from cvt_hpc.errors import mismatch
 
 MOST_AXES = 4  # six pairs; the first axes of the job
 _SIZE = 6.0  # [point], of the mark of a vibrating run
@@ -30,7 +30,7 @@ def is_sampled(dataset: xr.Dataset) -> bool:
     return dataset["status"].dims == ("run",)
 
 
-def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any]) -> Figure:
+def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> Figure:
     """Compose the map of a sampled study.
 
     Parameters
@@ -40,6 +40,8 @@ def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any]) -> Figure:
         [m], where known.
     at : mapping
         Has to be empty: no two samples lie at one value of an axis.
+    source : str
+        Where the results are from, for the error.
 
     Raises
     ------
@@ -47,7 +49,7 @@ def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any]) -> Figure:
         If `at` is not empty.
     """
     if at:
-        raise InputError(f"at {next(iter(at))}: expected results over a grid, found samples, all apart")
+        raise mismatch(f"{source}: at {next(iter(at))}", "results over a grid", "samples, all apart")
     names = [str(name) for name, coordinate in dataset.coords.items() if coordinate.dims == ("run",)]
     names.sort(key=lambda name: _FIRST.index(name) if name in _FIRST else len(_FIRST))
     pairs = list(combinations(names[:MOST_AXES], 2)) or [(names[0], None)]
