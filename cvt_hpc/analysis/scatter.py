@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.axis import XAxis, YAxis
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.markers import MarkerStyle
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
@@ -111,6 +113,19 @@ def _draw_runs(
     axes.set(xlabel=x_label, ylabel=y_label)
     if y is None:
         axes.set_yticks([])
+    for side, name in (("x", x), ("y", y)):
+        if name and dataset[name].attrs.get("spacing") == "log":
+            axes.set(**{f"{side}scale": "log"})
+            _tick_logarithmic(axes.xaxis if side == "x" else axes.yaxis)
+
+
+def _tick_logarithmic(axis: XAxis | YAxis) -> None:
+    """Label a logarithmic axis by plain numbers, the closer the shorter it is."""
+    low, high = axis.get_view_interval()
+    multiples = (1, 1.5, 2, 3, 5, 7) if high < 10 * low else (1, 2, 5) if high < 1e3 * low else (1,)
+    axis.set_major_locator(LogLocator(subs=multiples))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _along(coordinate: xr.DataArray) -> tuple[NDArray[np.float64], str]:

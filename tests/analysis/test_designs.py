@@ -115,6 +115,18 @@ def test_a_panel_for_each_pair_of_axes():
     assert (axes.get_xlabel(), axes.get_ylabel()) == (load, "")
 
 
+def test_axes_are_spread_as_their_samples_are():
+    dataset = sampled().isel(run=slice(0, 30))
+    dataset["sheave_stiffness"] = "run", np.geomspace(1.0, 3.0, 30), {"spacing": "log"}
+    figure = scatter_figure(dataset, {}, "out/x")
+    panels = [axes for axes in figure.axes if axes.axison and axes.get_label() != "<colorbar>"]
+    scales = {axes.get_ylabel(): (axes.get_xscale(), axes.get_yscale()) for axes in panels}
+    assert scales == {"friction gradient [s/m]": ("linear", "linear"), "sheave stiffness": ("linear", "log")}
+    figure.draw_without_rendering()
+    texts = [text.get_text() for text in panels[1].get_yticklabels()]
+    assert {"1", "1.5", "2", "3"} <= set(texts)
+
+
 def test_of_many_axes_the_first_are_drawn_and_that_is_said():
     dataset = sampled().assign_coords({name: ("run", np.arange(120.0)) for name in ("ratio", "thrust")})
     figure = scatter_figure(dataset, {}, "out/x")

@@ -58,6 +58,23 @@ def test_run_status_gather_and_map_of_one_study(write_job, call, tmp_path):
         assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
 
 
+def test_samples_keep_the_spacing_of_their_ranges(write_job, call, tmp_path):
+    write_job("""[scene]
+thrust = "20 kN"
+[design]
+kind = "sobol"
+runs = 8
+[axes]
+load = { from = 20, to = 100 }
+sheave_stiffness = { from = 1, to = 3, spacing = "log" }
+""")
+    assert call("run", "x.toml")[0] == 0
+    with netCDF4.Dataset("out/x/results.nc") as results:
+        spacings = {name: getattr(results[name], "spacing", None) for name in ("load", "sheave_stiffness")}
+    assert spacings == {"load": None, "sheave_stiffness": "log"}
+    assert call("map", "out/x") == (0, ["map: out/x/map.png"], [])
+
+
 def test_run_goes_on_unless_fresh(write_job, call, tmp_path, monkeypatch):
     write_job(GRID)
     call("run", "x.toml", "--out", "here")
