@@ -47,7 +47,7 @@ def test_the_table_holds_every_point_with_its_outcome(report):
         rows = list(csv.DictReader(file))
     assert str(report.table) == "out/bells/chart.csv"
     assert [row["method"] for row in rows] == [
-        "exact", *["soft hammer"] * 4, *["clever"] * 3, "brief", "louder", "step 1 us", "cracked",
+        "exact", *["soft hammer"] * 4, *["clever"] * 3, "hard", "louder", "step 1 us", "cracked",
     ]  # fmt: skip
     assert [row["role"] for row in rows[-3:]] == ["choice", "refinement", "choice"]
     failed = rows[1]
@@ -134,7 +134,7 @@ def test_a_chart_goes_on_where_it_was_broken_off(write_chart, undrawn, monkeypat
     report = made(job, tell=told.append)
     # the exact solution, the budget and the soft hammer had been measured
     assert [line.split()[1] for line in told] == [
-        "ringing-clever-1:", "ringing-clever-2:", "ringing-clever-3:", "ringing-brief-1:",
+        "ringing-clever-1:", "ringing-clever-2:", "ringing-clever-3:", "ringing-hard-1:",
     ]  # fmt: skip
     assert told[-1].startswith("13/13 ")
     before = report.table.read_bytes()
