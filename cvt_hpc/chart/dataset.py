@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,18 +13,16 @@ import xarray as xr
 from cvt_hpc.chart.comparing import Comparison, Result
 from cvt_hpc.chart.plan import Chart
 from cvt_hpc.chart.quantities import KINDS
-from cvt_hpc.files import written_aside
-from cvt_hpc.netcdf import write_netcdf
 from cvt_hpc.study.gather import merge_versions
 from cvt_hpc.study.provenance import command, history_line, versions
 
 _TIMED = "depends on the machine and the hour"
 
 
-def write_dataset(
-    chart: Chart, comparisons: Sequence[Comparison], makers: Sequence[dict[str, Any]], path: Path
-) -> Path:
-    """Write all results along the dimension `point`.
+def chart_dataset(
+    chart: Chart, comparisons: Sequence[Comparison], makers: Sequence[dict[str, Any]]
+) -> xr.Dataset:
+    """Return the results as a dataset: errors, values, cost and work of each point, and how it ended.
 
     Parameters
     ----------
@@ -35,24 +32,12 @@ def write_dataset(
         The results.
     makers : sequence of dict
         By what they were measured: versions, revision and machine, each of them once.
-    path : Path
-        The file.
 
     Returns
     -------
-    Path
-        `path`.
+    Dataset
+        Along the dimension `point`.
     """
-    dataset = chart_dataset(chart, comparisons, makers)
-    with written_aside(path, parents=True) as aside:
-        write_netcdf(dataset, aside)
-    return path
-
-
-def chart_dataset(
-    chart: Chart, comparisons: Sequence[Comparison], makers: Sequence[dict[str, Any]]
-) -> xr.Dataset:
-    """Return the results as a dataset: errors, values, cost and work of each point, and how it ended."""
     rows = [r for c in comparisons for r in (c.reference, *c.methods, *c.choices)]
     variables: dict[str, Any] = _descriptions(rows) | _costs(rows)
     for name in KINDS:

@@ -14,13 +14,15 @@ from threadpoolctl import threadpool_limits
 
 from cvt_hpc.chart.budget_drawing import draw_budget
 from cvt_hpc.chart.comparing import Comparison, compare
-from cvt_hpc.chart.dataset import write_dataset
+from cvt_hpc.chart.dataset import chart_dataset
 from cvt_hpc.chart.measuring import Measurement, measure
 from cvt_hpc.chart.plan import Chart, Point
 from cvt_hpc.chart.prospects import check_prospects
 from cvt_hpc.chart.scene_drawing import draw_scene
 from cvt_hpc.chart.store import ChartFolder
 from cvt_hpc.chart.table import write_table
+from cvt_hpc.files import written_aside
+from cvt_hpc.netcdf import write_netcdf
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,10 @@ def make_chart(
     with folder.occupied(fresh):
         measurements = _fill(chart, folder, processes or len(os.sched_getaffinity(0)), tell)
         comparisons = compare(chart, measurements)
-        write_table(comparisons, folder.table)
-        write_dataset(chart, comparisons, folder.makers, folder.dataset)
+        with written_aside(folder.table) as aside:
+            write_table(comparisons, aside)
+        with written_aside(folder.dataset) as aside:
+            write_netcdf(chart_dataset(chart, comparisons, folder.makers), aside)
         pictures = [draw_scene(c, folder.picture(c.scene.name)) for c in comparisons]
         pictures += [draw_budget(c, folder.picture("budget")) for c in comparisons if c.choices]
     return ChartReport(comparisons, folder.table, folder.dataset, tuple(pictures))
