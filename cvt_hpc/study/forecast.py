@@ -50,7 +50,6 @@ class ClaimTimes(NamedTuple):
 # Between processes that share no memory 0.05 to 0.08 ms were measured, 11 ms at most, which is taken for one
 # claim in 10^4, at 3.7 standard deviations. That a larger network does no worse is an assumption.
 NETWORK = ClaimTimes(2e-6, 65e-6, math.log(11e-3 / 65e-6) / 3.7)
-SHARED_MEMORY = ClaimTimes(2e-6, 0.0, 0.0)
 
 
 class Forecast(NamedTuple):
