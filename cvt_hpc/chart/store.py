@@ -164,7 +164,9 @@ class ChartFolder:
         except ValueError as error:
             raise DamagedJobError(f"{expected} ({error})") from error
         if not isinstance(entry, dict) or entry.get("format") != FORMAT:
-            raise InputError(f'{self.job_file}: expected format "{FORMAT}", found another')
+            raise InputError(
+                f'{self.job_file}: expected format "{FORMAT}", found another; choose another --out'
+            )
         if not {"fingerprint", "job"} <= entry.keys():
             raise DamagedJobError(f"{expected} (no job in it)")
         return entry

@@ -9,12 +9,11 @@ import platform
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import naming_refusals, written_aside
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.difference import describe_difference
+from cvt_hpc.study.difference import refuse_other
 from cvt_hpc.study.frames import MAGIC
 from cvt_hpc.study.lock import is_locked, locked
 from cvt_hpc.study.part import Part
@@ -106,7 +105,7 @@ class StudyFolder:
                 if found is None and unexplained is not None:
                     self._ask_logs(study, fresh, f"{expected} {unexplained.name} without a job.json")
                 if found is not None and not fresh:
-                    self._refuse_other(found, study)
+                    refuse_other(self.path, found, study)
             elif self.path.exists():
                 raise InputError(f"{self.path}: expected a folder for the results, found a file")
 
@@ -216,24 +215,3 @@ class StudyFolder:
             if path.is_file() or (path.is_dir() and any(p.name[0] != "." for p in path.iterdir())):
                 return path
         return None
-
-    def _refuse_other(self, found: Study, study: Study) -> None:
-        if found.fingerprint != study.fingerprint:
-            difference = describe_difference(found.job, study.job)
-            raise InputError(
-                f"{self.path}: expected the folder of this job, found that of another (job {found.name}: "
-                f"{difference}); choose another --out, or --fresh to throw its results away"
-            )
-        if _layout(found) != _layout(study):
-            raise InputError(
-                f"{self.path}: expected records with the quantities of this version, found others; choose "
-                "another --out, or --fresh to throw them away"
-            )
-
-
-def _layout(study: Study) -> dict[str, Any]:
-    """Return what records must agree in to be of one dataset."""
-    return {
-        "quantities": [(v.name, v.dims, v.dtype) for v in study.variables],
-        "coordinates": [(dimension.name, dimension.values) for dimension in study.coordinates],
-    }
