@@ -17,7 +17,7 @@ COLOUR = "#1f4e8c"
 HEIGHT = 3.6  # [inch]
 
 
-def eigenfrequency_figure(dataset: xr.Dataset, at: Mapping[str, Any]) -> Figure:
+def eigenfrequency_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> Figure:
     """Compose the picture: a panel for each strand, a line for each number of half waves.
 
     Parameters
@@ -26,13 +26,15 @@ def eigenfrequency_figure(dataset: xr.Dataset, at: Mapping[str, Any]) -> Figure:
         Results of a study with `eigenfrequency` [Hz] over its axes, `strand` and `half_waves`.
     at : mapping
         Axes to fix: name -> value, as a number [SI] or a text; further ones are fixed at their first value.
+    source : str
+        Where the results are from, for the errors.
 
     Returns
     -------
     Figure
         Where a strand holds no shape its lines have gaps.
     """
-    arrangement = arrange(dataset, at)
+    arrangement = arrange(dataset, at, source)
     shown, notes = _along_x(arrangement)
     along = ruler(shown[arrangement.x])
     figure = Figure((WIDTH, HEIGHT), layout="constrained")

@@ -24,7 +24,7 @@ def results(tmp_path_factory):
 
 def drawn(dataset, at):
     with matplotlib.rc_context(STYLE):
-        return eigenfrequency_figure(dataset, at)
+        return eigenfrequency_figure(dataset, at, "results")
 
 
 def test_lines_are_those_of_the_dataset(results):
@@ -55,6 +55,6 @@ def test_an_axis_can_be_fixed_and_a_strand_without_shape_leaves_a_gap(results):
 def test_the_map_of_strands_is_that_picture(results, tmp_path):
     at = {"driving_speed": 2000.0}
     with matplotlib.rc_context(STYLE):
-        save_figure(eigenfrequency_figure(results, at), tmp_path / "wanted.png")
+        save_figure(eigenfrequency_figure(results, at, "results"), tmp_path / "wanted.png")
     draw_map(results, tmp_path / "map.png", at)
     assert (tmp_path / "map.png").read_bytes() == (tmp_path / "wanted.png").read_bytes()
