@@ -23,8 +23,10 @@ class Job:
 
     Attributes
     ----------
-    name, model, stepper, description : str
+    name, model, description : str
         From the head of the file.
+    stepper : str or None
+        From there, or the model's choice; None for a model without a transient.
     source : str
         The path as it was given.
     parameters : dict
@@ -41,7 +43,7 @@ class Job:
 
     name: str
     model: str
-    stepper: str
+    stepper: str | None
     description: str
     source: str
     parameters: dict[str, Any]

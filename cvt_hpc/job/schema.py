@@ -1,4 +1,4 @@
-"""What a job may set: the tables of its model and of its stepper, and those that all jobs share."""
+"""What a job may set: the tables of its model and of its stepper, and those that all transients share."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers import STEPPERS
 from cvt_hpc.vibration import criterion
 
-SHARED = (recording, criterion)  # what every job may set, whatever its model and stepper
+SHARED = (recording, criterion)  # what every job with a transient may set, whatever its model and stepper
 
 Problem = tuple[str, str, str]
 Check = Callable[[dict[str, Any]], list[Problem]]
@@ -29,8 +29,10 @@ class Schema:
 
     Attributes
     ----------
-    model, stepper : str
-        Their names.
+    model : str
+        Its name.
+    stepper : str or None
+        Its name; None for a model without a transient.
     sections : dict
         Section -> key -> Parameter; keys are unique over all sections.
     checks : tuple of callable
@@ -40,7 +42,7 @@ class Schema:
     """
 
     model: str
-    stepper: str
+    stepper: str | None
     sections: dict[str, dict[str, Parameter]]
     checks: tuple[Check, ...]
     inert: Inert
@@ -115,14 +117,15 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     model : str
         A name in `cvt_hpc.models.MODELS`.
     stepper : str or None
-        A name in `cvt_hpc.steppers.STEPPERS`; None for the model's own choice.
+        A name in `cvt_hpc.steppers.STEPPERS`; None for the model's own choice, which is none of a model
+        without a transient.
     source : str
         The file, for the error.
 
     Returns
     -------
     Schema
-        Of both, and of what all jobs share.
+        Of both, and of what all transients share.
 
     Raises
     ------
@@ -131,10 +134,12 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     """
     model_module = import_module(_look_up(model, MODELS, "model", source))
     stepper = model_module.DEFAULT_STEPPER if stepper is None else stepper
-    stepper_module = import_module(_look_up(stepper, STEPPERS, "stepper", source))
-    _check_accepted(model, model_module, stepper, source)
+    modules = [model_module]
+    if stepper is not None:
+        stepper_module = import_module(_look_up(stepper, STEPPERS, "stepper", source))
+        _check_accepted(model, model_module, stepper, source)
+        modules += [stepper_module, *SHARED]
     sections: dict[str, dict[str, Parameter]] = {}
-    modules = (model_module, stepper_module, *SHARED)
     for module in modules:
         for section, table in module.PARAMETERS.items():
             sections.setdefault(section, {}).update(table)
@@ -149,6 +154,8 @@ def known_keys(model: str, stepper: str | None = None) -> tuple[str, ...]:
 
 
 def _check_accepted(model: str, module: ModuleType, stepper: str, source: str) -> None:
+    if not module.STEPPER_NAMES:
+        raise mismatch(f"{source}: stepper", f"none, since {model} has no transient", show(stepper))
     if stepper not in module.STEPPER_NAMES:
         reason = module.REFUSED.get(stepper, "the model does not take it")
         expected = f"one that {model} takes ({', '.join(module.STEPPER_NAMES)})"

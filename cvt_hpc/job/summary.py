@@ -29,7 +29,8 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
     str
         Lines of at most one parameter each.
     """
-    lines = [f"job {job.name} ({job.source}): model {job.model}, stepper {job.stepper}"]
+    stepper = "no transient" if job.stepper is None else f"stepper {job.stepper}"
+    lines = [f"job {job.name} ({job.source}): model {job.model}, {stepper}"]
     lines += [job.description] if job.description else []
     for section, rows in _tables(job).items():
         lines += ["", f"[{section}]", *_columns(rows)]

@@ -2,9 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from cvt_hpc.variables import Status
+
+
+def lanes(parameters: Mapping[str, Any], stepper: str | None) -> int:
+    """Most runs that a batch can take, whatever its parameters and its stepper."""
+    return 1
+
+
+def lane_key(parameters: Mapping[str, Any]) -> tuple:
+    """What runs in one batch have in common: nothing, where none has company."""
+    return ()
 
 
 class Alone:

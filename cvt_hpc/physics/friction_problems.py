@@ -1,4 +1,4 @@
-"""What is wrong with the parameters of a friction law, in the form of a model's check."""
+"""What is wrong with the parameters of a friction law, and which of them are idle, as models tell a job."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+
+_OF_FORMULAS = ("friction_gradient", "kinetic_friction", "stribeck_velocity")
 
 
 def friction_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
@@ -22,6 +24,23 @@ def friction_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str
     if p["friction_law"] == "coulomb" and p["friction_gradient"] != 0.0:
         return [("friction_gradient", "0 with friction_law coulomb", f"{p['friction_gradient']:g} s/m")]
     return []
+
+
+def friction_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+    """Parameters of a friction law without effect, each with the setting that makes it so.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Values by name [SI], of which those of the law count.
+    """
+    p = parameters
+    cases = (
+        (p["friction_law"] == "table", _OF_FORMULAS, "friction_law table"),
+        (p["friction_law"] == "hyperbolic", ("stribeck_velocity",), "friction_law hyperbolic"),
+        (p["friction_gradient"] == 0.0, ("stribeck_velocity",), "friction_gradient 0"),
+    )
+    return {key: setting for holds, keys, setting in cases if holds for key in keys}
 
 
 def _table_problems(force: tuple, speed: tuple, mu: tuple) -> list[tuple[str, str, str]]:

@@ -30,9 +30,7 @@ def run_costs(job: Job) -> np.ndarray:
     grids = values if job.is_sampled else np.meshgrid(*values, indexing="ij", sparse=True)
     p = {**job.parameters, **dict(zip((axis.name for axis in job.axes), grids, strict=True))}
     model = record_module(job)
-    # of general steppers, some of which choose their step, little is known beforehand
-    cost = model.STEP_COST.get(job.stepper, 1e-5) * p["stations"] * p["duration"] / p.get("step", 1e-6)
-    cost = cost / model.lanes(job.parameters, job.stepper)
+    cost = model.cost(p, job.stepper) / model.lanes(job.parameters, job.stepper)
     return np.broadcast_to(cost, job.shape).ravel()
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from cvt_hpc.simulation.modules import record_module
 from cvt_hpc.simulation.record import record_coordinates, record_variables
-from cvt_hpc.simulation.running import march
+from cvt_hpc.simulation.running import do
 from cvt_hpc.variables import Variable
 
 if TYPE_CHECKING:
@@ -32,8 +32,8 @@ def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
     Returns
     -------
     Dataset
-        The record's names as scalars of the run, `displacement` (time, probe), the model's histories over
-        `time`, and its means over the judged part by `position`.
+        The record's names as scalars of the run, and what the model has beyond: of a transient
+        `displacement` (time, probe), histories over `time`, and means over the judged part by `position`.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
         If a value is not fit for its key.
     """
     point = job.point_at(at or {})
-    ((run, record),) = march(job, [point], lambda: None)
+    ((run, record),) = do(job, [point], lambda: None)
     return _history(job, point, run, record)
 
 
@@ -64,13 +64,13 @@ def run_points_keeping(
     histories : dict
         Datasets as `simulate` returns them, by place.
     """
-    marched = march(job, points, interrupt)
-    histories = {place: _history(job, points[place], *marched[place]) for place in kept}
-    return [record for _, record in marched], histories
+    done = do(job, points, interrupt)
+    histories = {place: _history(job, points[place], *done[place]) for place in kept}
+    return [record for _, record in done], histories
 
 
 def _history(job: Job, point: dict[str, Any], run: Any, record: dict[str, Any]) -> xr.Dataset:
-    """A run that has ended, as a dataset."""
+    """A run that has ended, or what was found without one, as a dataset."""
     import xarray as xr
 
     coordinates = {
@@ -82,7 +82,6 @@ def _history(job: Job, point: dict[str, Any], run: Any, record: dict[str, Any]) 
         value = record[variable.name]
         value = value if variable.dtype.startswith("S") else np.asarray(value, variable.dtype)
         variables[variable.name] = (variable.dims, value, _variable_attributes(variable))
-    histories = record_module(job).histories(run)
     attributes = {
         "Conventions": "CF-1.11",
         "title": job.description or job.name,
@@ -91,7 +90,10 @@ def _history(job: Job, point: dict[str, Any], run: Any, record: dict[str, Any]) 
         "point": json.dumps({key: repr(value) if value == np.inf else value for key, value in point.items()}),
     }
     dataset = xr.Dataset(variables, coordinates, attributes)
-    return dataset.merge(histories, combine_attrs="override")
+    model = record_module(job)
+    if not hasattr(model, "histories"):
+        return dataset
+    return dataset.merge(model.histories(run), combine_attrs="override")
 
 
 def _attributes(long_name: str, units: str) -> dict[str, str]:

@@ -1,4 +1,16 @@
-"""The modules of a job's model that make its runs and say what is recorded of them."""
+"""The modules of a job's model that make its runs and say what is recorded of them.
+
+The `record` module of a model offers VARIABLES, `coordinates(parameters)`, `cost(parameters, stepper)`,
+`lanes(parameters, stepper)` and `lane_key(parameters)`; and
+
+- of a model with a transient, `judge(run)`: the values of VARIABLES and the verdict (status, vibrates,
+  reason) of a run that its `transient` module has made;
+- of a model without, which takes no stepper, `solve(parameters)`, whose result `judge(solution)` reads. It
+  may leave out what is not known, such as all but status and reason where nothing was found.
+
+`histories(run)`, or of a solution, is the dataset of what `simulate` has beyond the record, where there is
+such.
+"""
 
 from __future__ import annotations
 
@@ -28,12 +40,17 @@ def record_module(job: Job) -> ModuleType:
 
 def _check_recorded(job: Job) -> None:
     if not has_record(job):
+        known = ", ".join(model for model in MODELS if _is_recorded(model))
         raise InputError(
-            f"{job.source}: model: expected one whose runs are judged and recorded (elastic_belt), "
+            f"{job.source}: model: expected one whose runs are judged and recorded ({known}), "
             f"found {job.model}, which is there to compare steppers: `cvt-hpc chart`"
         )
 
 
 def has_record(job: Job) -> bool:
     """Whether runs of the job's model are judged and recorded."""
-    return find_spec(MODELS[job.model] + ".record") is not None
+    return _is_recorded(job.model)
+
+
+def _is_recorded(model: str) -> bool:
+    return find_spec(MODELS[model] + ".record") is not None

@@ -9,7 +9,6 @@ import numpy as np
 
 from cvt_hpc.simulation.modules import record_module
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
-from cvt_hpc.vibration.assessment import Occurrence, assess
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
@@ -21,12 +20,6 @@ _VERDICT = (
     ),
     Variable("reason", (), "S240", "", "why the run failed, or was found to vibrate or not"),
 )
-_OCCURRENCE = (
-    Variable("amplitude", ("strand",), "f8", "m", "band-limited peak amplitude at the strongest probe"),
-    Variable("frequency", ("strand",), "f8", "Hz", "dominant frequency at the strongest probe"),
-    Variable("growth_rate", ("strand",), "f8", "s-1", "growth rate of the amplitude over the judged part"),
-    Variable("growth_error", ("strand",), "f8", "s-1", "standard error of the growth rate"),
-)
 _COST = (
     Variable(
         "core_seconds",
@@ -36,6 +29,8 @@ _COST = (
         "processor time of the run; of runs that advance together, their time divided by their number",
         volatile=True,
     ),
+)
+_MARCH = (
     Variable("simulated_seconds", (), "f8", "s", "simulated time, less than asked where the run failed"),
     Variable("time_step", (), "f8", "s", "time step"),
     Variable("steps", (), "i8", "1", "time steps taken"),
@@ -51,7 +46,8 @@ def record_variables(job: Job) -> tuple[Variable, ...]:
     job : Job
         Of which only the model counts.
     """
-    return (*_VERDICT, *_OCCURRENCE, *record_module(job).VARIABLES, *_COST)
+    march = () if job.stepper is None else _MARCH
+    return (*_VERDICT, *record_module(job).VARIABLES, *_COST, *march)
 
 
 def record_coordinates(job: Job) -> dict[str, Coordinate]:
@@ -80,8 +76,9 @@ def record_of(job: Job, run: Any, marched: float) -> dict[str, Any]:
     started = time.process_time()
     record, failure = _blank(job), run.failure
     if failure is None:
-        record |= _judge(job, run, run.parameters)
-        failure = run.numerical_doubt(record)
+        record |= record_module(job).judge(run)
+        if hasattr(run, "numerical_doubt"):
+            failure = run.numerical_doubt(record)
     if failure is not None:
         status, why = failure
         record = _blank(job) | {"status": status, "reason": f"at {run.time * 1e3:.4g} ms: {why}"[:240]}
@@ -94,24 +91,21 @@ def record_of(job: Job, run: Any, marched: float) -> dict[str, Any]:
     }
 
 
-def _judge(job: Job, run: Any, point: dict[str, Any]) -> dict[str, Any]:
-    """The record of a run that has reached its end."""
-    regions = [probe.label.split()[0] for probe in run.probes]
-    on_strands = [k for k, region in enumerate(regions) if region in ("t1", "t2")]
-    found: Occurrence = assess(
-        run.displacement[:, on_strands], point["sampling_rate"], [regions[k] for k in on_strands], point
-    )
-    strongest = np.array(on_strands)[found.strongest_probe]
-    return {
-        "status": Status.DONE,
-        "vibrates": found.vibrates,
-        "reason": found.reason,
-        "amplitude": found.amplitude,
-        "frequency": found.frequency,
-        "growth_rate": found.growth_rate,
-        "growth_error": found.growth_error,
-        **record_module(job).evaluate(run, strongest),
-    }
+def record_of_solution(job: Job, solution: Any, solving: float) -> dict[str, Any]:
+    """The record of what a model without a transient has found.
+
+    Parameters
+    ----------
+    job : Job
+        For its model.
+    solution : object
+        As the model's `solve` returns it.
+    solving : float
+        Processor time that it has taken [s].
+    """
+    started = time.process_time()
+    record = _blank(job) | record_module(job).judge(solution)
+    return record | {"core_seconds": solving + time.process_time() - started}
 
 
 def _blank(job: Job) -> dict[str, Any]:

@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from cvt_hpc.simulation.modules import transient_module
-from cvt_hpc.simulation.record import record_of
+from cvt_hpc.simulation.modules import record_module, transient_module
+from cvt_hpc.simulation.record import record_of, record_of_solution
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
@@ -68,13 +68,33 @@ def run_points(
     Interrupted
         With the text of `interrupt`.
     """
-    return [record for _, record in march(job, points, interrupt)]
+    return [record for _, record in do(job, points, interrupt)]
 
 
-def march(
+def do(
     job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
 ) -> list[tuple[Any, dict[str, Any]]]:
-    """March a batch of runs, and make their records: as `run_points`, with each run beside its record."""
+    """Do a batch of runs, and make their records: as `run_points`, with each run beside its record."""
+    if job.stepper is None:
+        return [_solve(job, point, interrupt) for point in points]
+    return _march(job, points, interrupt)
+
+
+def _solve(
+    job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]
+) -> tuple[Any, dict[str, Any]]:
+    """A run of a model without a transient: its record follows from the parameters at once."""
+    if stop := interrupt():
+        raise Interrupted(stop)
+    started = time.process_time()
+    solution = record_module(job).solve(point)
+    return solution, record_of_solution(job, solution, time.process_time() - started)
+
+
+def _march(
+    job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+) -> list[tuple[Any, dict[str, Any]]]:
+    """Runs that a stepper marches together to their end."""
     batch = transient_module(job).batch(points, job.stepper)
     batch.advance(0)  # compiles or loads the kernels, which is no cost of these runs
     started = time.process_time()

@@ -75,9 +75,11 @@ def find_out(job: Job, simulator: Simulator, groups: Sequence[Batch], out: Path,
 
 def run_pilots(job: Job, simulator: Simulator, groups: Sequence[Batch], count: int) -> Knowledge:
     """Do batches from all over the grid for a quarter of their duration, and scale their times."""
-    short = replace(job, parameters={**job.parameters, "duration": SHARE * job.parameters["duration"]})
-    # Where the duration is an axis, its values count, and the runs are done in full.
-    scale = 1.0 if any(axis.name == "duration" for axis in job.axes) else 1 / SHARE
+    short, scale = job, 1.0
+    # Where the duration is an axis, its values count, and without a transient there is none: done in full.
+    if "duration" in job.parameters and all(axis.name != "duration" for axis in job.axes):
+        duration = SHARE * job.parameters["duration"]
+        short, scale = replace(job, parameters={**job.parameters, "duration": duration}), 1 / SHARE
     places = {int((k + 0.5) * len(groups) / count) for k in range(count)}
     chosen = [groups[place] for place in sorted(places)]
     if job.histories:

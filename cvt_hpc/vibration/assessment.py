@@ -9,10 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cvt_hpc.variables import Vibrates
+from cvt_hpc.variables import Status, Variable, Vibrates
 from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.criterion import fitting_window
 from cvt_hpc.vibration.occurrence import classify
+
+VARIABLES = (
+    Variable("amplitude", ("strand",), "f8", "m", "band-limited peak amplitude at the strongest probe"),
+    Variable("frequency", ("strand",), "f8", "Hz", "dominant frequency at the strongest probe"),
+    Variable("growth_rate", ("strand",), "f8", "s-1", "growth rate of the amplitude over the judged part"),
+    Variable("growth_error", ("strand",), "f8", "s-1", "standard error of the growth rate"),
+)
 
 
 @dataclass(frozen=True)
@@ -45,6 +52,11 @@ class Occurrence:
     growth_rate: NDArray[np.float64]
     growth_error: NDArray[np.float64]
     strongest_probe: NDArray[np.int64]
+
+    def record(self) -> dict[str, Any]:
+        """Return what a record holds of it: that the run is done, the verdict, and VARIABLES."""
+        verdict = {"status": Status.DONE, "vibrates": self.vibrates, "reason": self.reason}
+        return verdict | {variable.name: getattr(self, variable.name) for variable in VARIABLES}
 
 
 def assess(

@@ -12,6 +12,7 @@ from cvt_hpc.physics.sheaves import flexibility, sheaves
 
 STATIONS, ARC, RADIUS = 60, 0.27, 0.075
 DEPTH = 2e-5  # [m]
+LANES = 8  # all alike: kernels are compiled for full registers
 
 
 def wrap(tilt=4e5, elements=3e10):
@@ -24,13 +25,13 @@ def overlaps():
 
 
 def swept(sheave, gap, tolerance, most):
-    """Forces, and the sweeps after which they change by the tolerance; 0 where they do not."""
-    contact = lane_contact([sheave], np.float64, sweeps=1)
-    contact.stations.data[:, GAP, 0] = gap
+    """Forces by sweeps, and after how many of them they change by the tolerance; 0 where they do not."""
+    contact = lane_contact([sheave] * LANES, np.float64, sweeps=1)
+    contact.stations.data[:, GAP] = gap[:, np.newaxis]
+    force = contact.stations.data[:, PUSH, 0]
     for sweep in range(1, most + 1):
-        before = contact.stations.data[:, PUSH, 0].copy()
+        before = force.copy()
         sweep_lane_contact(contact)
-        force = contact.stations.data[:, PUSH, 0]
         if np.abs(force - before).max() <= tolerance * force.max():
             return force, sweep
     return force, 0

@@ -10,8 +10,8 @@ import pytest
 from small_systems import FACTS, begin, bisect, finished, scene
 from test_explicit_steps import LOAD, MASS, MU, RATE, STUCK, WIDTH
 
+from cvt_hpc.models.oscillator.constants import oscillator
 from cvt_hpc.models.oscillator.exact import exact
-from cvt_hpc.models.oscillator.motion import oscillator
 from cvt_hpc.models.oscillator.rest import peak, wrongly_held
 from cvt_hpc.variables import Status
 
@@ -93,25 +93,29 @@ def test_steps_that_leap_over_the_fall_of_friction_are_no_failure_by_themselves(
     assert whole >= 4
 
 
-def test_the_models_own_motion_is_held_and_let_go_rightly():
-    for p in (STICK_SLIP, WIDE):
-        o = oscillator(p)
-        assert wrongly_held(o, peak(o), converged(p["friction_speed"]), 5e-5) is None
+SCENES = {
+    "narrow": STICK_SLIP,
+    "wide": WIDE,
+    "loaded": STICK_SLIP | {"preload": 500.0, "normal_stiffness": 2e6},
+}
 
 
-@pytest.mark.parametrize(("shift", "reason"), [(-0.1, "let go while"), (0.1, "held against a pull")])
-def test_a_motion_at_another_pull_is_not(shift, reason):
+@pytest.mark.parametrize("which", SCENES)
+def test_the_models_own_motion_is_held_and_let_go_rightly(which):
+    o, p = oscillator(SCENES[which]), SCENES[which] | {"tolerance": 1e-9}
+    rows = finished("oscillator", "scipy_radau", p).rows
+    assert wrongly_held(o, peak(o), rows, 5e-5) is None
     # the same speeds, the spring shorter or longer by a tenth of what friction at rest holds
-    o, rows = oscillator(STICK_SLIP), converged(STICK_SLIP["friction_speed"]).copy()
-    rows[:, 0] += shift * o.normal_load / o.stiffness
-    assert f"the mass was {reason}" in wrongly_held(o, peak(o), rows, 5e-5)
+    for share, reason in ((-0.1, "let go while"), (0.1, "held against a pull")):
+        moved = rows + [share * o.normal_load / o.stiffness, 0.0]
+        assert f"the mass was {reason}" in wrongly_held(o, peak(o), moved, 5e-5)
 
 
 def test_the_peak_is_that_of_friction_at_rest():
     # the hump is 1 at six widths, where the tanh is 1 but for 1e-5
     o = oscillator(STICK_SLIP)
     assert peak(o).sliding == pytest.approx(6.0 * o.width, rel=0.01)
-    assert peak(o).force == pytest.approx(o.normal_load, rel=1e-4)
+    assert peak(o).mu == pytest.approx(STICK_SLIP["static_friction"], rel=1e-4)
     assert peak(oscillator(STICK_SLIP | {"static_friction": 0.6})) is None
 
 

@@ -4,6 +4,7 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import load_job
+from cvt_hpc.models import MODELS
 
 HEAD = 'name = "x"\nmodel = "toy"\n'
 THRUST = '[scene]\nthrust = "20 kN"\n'
@@ -87,12 +88,12 @@ def test_tables(write_job, text, message):
         ('name = 5\nmodel = "toy"', f"name: {A_WORD} 5"),
         (
             'name = "x"',
-            "model: expected one of elastic_belt, oscillator, moving_string, quasi_static_belt, toy, found nothing",
+            f"model: expected one of {', '.join(MODELS)}, toy, found nothing",
         ),
         ('name = "x"\nmodel = "toi"', 'model: unknown model "toi"; did you mean toy?'),
         (
             'name = "x"\nmodel = 5',
-            "model: expected one of elastic_belt, oscillator, moving_string, quasi_static_belt, toy, found 5",
+            f"model: expected one of {', '.join(MODELS)}, toy, found 5",
         ),
         (f'{HEAD}stepper = "hopp"', 'stepper: unknown stepper "hopp"; did you mean hop?'),
         (f"{HEAD}description = 5", "description: expected a text, found 5"),

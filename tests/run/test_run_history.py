@@ -137,7 +137,7 @@ def test_the_file_alone_is_enough_to_repeat_the_run():
 
 
 def test_a_value_that_is_not_fit_is_refused_before_anything_runs(monkeypatch):
-    monkeypatch.setattr("cvt_hpc.simulation.history.march", None)
+    monkeypatch.setattr("cvt_hpc.simulation.history.do", None)
     with pytest.raises(InputError, match="sheave_stifness.*did you mean sheave_stiffness"):
         simulate(job(**CHEAP), {"sheave_stifness": 1.0})
     with pytest.raises(InputError, match="ratio.*pulleys that do not overlap"):

@@ -9,8 +9,8 @@ from marched import CHEAP, job, never
 
 from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.models.elastic_belt.belt import DRIVEN_SPEED, N_RING, W, belt_constants, initial_state
+from cvt_hpc.models.elastic_belt.grouping import lane_key
 from cvt_hpc.models.elastic_belt.lane_belt import REPEATS
-from cvt_hpc.models.elastic_belt.record import lane_key
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.physics.lane_compliance import UNSOLVED
 from cvt_hpc.simulation import lane_groups, record_variables, run_point, run_points

@@ -6,7 +6,7 @@ from recorded import assert_same_numbers
 
 from cvt_hpc import simulation
 from cvt_hpc.job import build_job
-from cvt_hpc.models.elastic_belt import record
+from cvt_hpc.models.elastic_belt import grouping
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status
 
@@ -79,7 +79,7 @@ def test_every_run_is_in_one_group_and_groups_do_not_depend_on_the_hour():
 
 
 def test_groups_are_of_one_kind_and_no_larger_than_the_lanes(monkeypatch):
-    monkeypatch.setattr(record, "LANES", {"double": 3, "single": 3})
+    monkeypatch.setattr(grouping, "LANES", {"double": 3, "single": 3})
     asked = job(MIXED)
     groups = simulation.lane_groups(asked, range(asked.size))
     kinds = [

@@ -10,12 +10,12 @@ import numpy as np
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.elastic_belt.belt import W, belt_constants, initial_state, random_strands
 from cvt_hpc.models.elastic_belt.explicit import explicit_work
+from cvt_hpc.models.elastic_belt.grouping import lanes
 from cvt_hpc.models.elastic_belt.imex_work import imex_work
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
 from cvt_hpc.models.elastic_belt.lane_forces import derive
 from cvt_hpc.models.elastic_belt.lane_run import LaneRun
 from cvt_hpc.models.elastic_belt.march import march_explicit, march_imex
-from cvt_hpc.models.elastic_belt.record import lanes
 from cvt_hpc.models.elastic_belt.recorded_run import recording
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, ENDED_AT, PROFILES
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.parameters import Parameter, not_negative, positive
-from cvt_hpc.physics.friction_problems import friction_problems
-from cvt_hpc.physics.geometry import variator
+from cvt_hpc.physics.friction_problems import friction_inert, friction_problems
+from cvt_hpc.physics.geometry import variator, variator_problems
 
 
 def _stiffness(default: float, unit: str, description: str) -> Parameter:
@@ -132,20 +132,9 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         Empty where all is well.
     """
     p = parameters
-    problems = []
-    try:
+    problems = variator_problems(p)
+    if not problems:
         path = variator(p["ratio"], p["driven_radius"], p["centre_distance"]).path_length
-    except ValueError:
-        radius = p["driven_radius"] / p["ratio"]
-        problems.append(
-            (
-                "ratio",
-                "pulleys that do not overlap: driven_radius (1 + 1 / ratio) < centre_distance "
-                f"{p['centre_distance']:g} m",
-                f"ratio {p['ratio']:g}, radii {radius:g} m and {p['driven_radius']:g} m",
-            )
-        )
-    else:
         if abs(p["play"]) > 0.02 * path:
             problems.append(("play", f"within 2 % of the belt's length {path:.4g} m", f"{p['play']:g} m"))
     before = (1.0 - p["judged_fraction"]) * p["duration"]
@@ -169,15 +158,11 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         By the name of the parameter, the setting that makes it so, e.g. "friction_law table".
     """
     p = parameters
-    of_formulas = ("friction_gradient", "kinetic_friction", "stribeck_velocity")
     of_elastic_sheaves = ("tilt_stiffness", "local_stiffness", "local_length")
     cases = (
-        (p["friction_law"] == "table", of_formulas, "friction_law table"),
-        (p["friction_law"] == "hyperbolic", ("stribeck_velocity",), "friction_law hyperbolic"),
-        (p["friction_gradient"] == 0.0, ("stribeck_velocity",), "friction_gradient 0"),
         (p["load_history"] == "constant", ("load_start",), "load_history constant"),
         (p["disturbance"] == 0.0, ("seed",), "disturbance 0"),
         (p["ring_friction"] == 0.0, ("ring_friction_speed",), "ring_friction 0"),
         (np.isinf(p["sheave_stiffness"]), of_elastic_sheaves, "sheave_stiffness inf"),
     )
-    return {key: setting for holds, keys, setting in cases if holds for key in keys}
+    return friction_inert(p) | {key: setting for holds, keys, setting in cases if holds for key in keys}

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt import OWN_STEPPERS
+from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.variables import Coordinate, Variable
+from cvt_hpc.vibration import assessment
 from cvt_hpc.vibration.signals import amplitude_spectrum, band_amplitude
 
 if TYPE_CHECKING:
@@ -15,60 +16,11 @@ if TYPE_CHECKING:
 
     from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
 
+__all__ = ["VARIABLES", "coordinates", "cost", "evaluate", "histories", "judge", "lane_key", "lanes"]
+
 STRANDS = ("t1", "t2")
 PULLEYS = ("driving", "driven")
 MODES = 5  # half waves along a strand that are told apart
-
-# Core-seconds per station and time step of a batch, measured on one core of an EPYC (Zen 5) at 160 stations.
-STEP_COST = {"imex": 1.3e-7, "explicit": 6.2e-8}
-
-LANES = {"double": 8, "single": 16}  # what registers of 64 bytes hold
-# What the runs of a batch have in common: the mesh, the law's kind, and the course of time.
-SHARED = (
-    "ratio",
-    "driven_radius",
-    "centre_distance",
-    "stations",
-    "friction_law",
-    "table_force",
-    "table_speed",
-    "table_mu",
-    "rise_time",
-    "load_history",
-    "duration",
-    "judged_fraction",
-    "sampling_rate",
-    "strand_probes",
-    "arc_probes",
-    "step",
-    "precision",
-    "contact_sweeps",
-)
-
-
-def lanes(parameters: dict[str, Any], stepper: str) -> int:
-    """Most runs that a batch can take.
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of a run.
-    stepper : str
-        Name of a stepper; general ones take one.
-    """
-    return LANES[parameters["precision"]] if stepper in OWN_STEPPERS else 1
-
-
-def lane_key(parameters: dict[str, Any]) -> tuple:
-    """What two runs must have in common to be in one batch.
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of a run.
-    """
-    return (*(parameters[key] for key in SHARED if key in parameters), parameters["friction_memory"] > 0.0)
-
 
 LOSSES = (
     "driving_flank_loss",
@@ -81,6 +33,7 @@ LOSSES = (
 )
 
 VARIABLES = (
+    *assessment.VARIABLES,
     Variable(
         "mode", ("strand",), "i1", "1", "half waves of the strongest mode of the strand in the band; 0: none"
     ),
@@ -140,8 +93,27 @@ def coordinates(parameters: dict[str, Any]) -> dict[str, Coordinate]:
     }
 
 
+def judge(run: RecordedRun) -> dict[str, Any]:
+    """The record of a run that has reached its end, its cost apart.
+
+    Parameters
+    ----------
+    run : RecordedRun
+        With all samples recorded.
+    """
+    regions = [probe.label.split()[0] for probe in run.probes]
+    on_strands = [k for k, region in enumerate(regions) if region in STRANDS]
+    found = assessment.assess(
+        run.displacement[:, on_strands],
+        run.parameters["sampling_rate"],
+        [regions[k] for k in on_strands],
+        run.parameters,
+    )
+    return found.record() | evaluate(run, np.array(on_strands)[found.strongest_probe])
+
+
 def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
-    """Values of VARIABLES from a finished run.
+    """Values from a finished run of those VARIABLES that are the belt's own.
 
     Parameters
     ----------

@@ -8,8 +8,8 @@ from typing import Any
 from cvt_hpc.models.alone import Alone
 from cvt_hpc.models.elastic_belt import OWN_STEPPERS
 from cvt_hpc.models.elastic_belt.batch import Batch
+from cvt_hpc.models.elastic_belt.grouping import lanes
 from cvt_hpc.models.elastic_belt.lane_run import LaneRun
-from cvt_hpc.models.elastic_belt.record import lanes
 from cvt_hpc.variables import Status
 
 __all__ = ["Transient", "batch", "lanes"]

@@ -1,9 +1,10 @@
 """Whether a run has the model's friction at rest: what step and tolerance can find, and what was found.
 
-Smoothed friction F over the sliding speed s = v_belt - x' rises to a peak and falls beyond. With the pull P =
-k x + c x' of the spring, m s' = P - F(s): a mass that slides slower than at the peak passes it only while P
-exceeds F there, and has to once it does. That holds for the model's own motion whatever the stepper; a run
-that breaks it shows a stick-slip that friction does not make.
+Smoothed friction N mu over the sliding speed s = v_belt - x' rises to a peak and falls beyond. With the pull
+p = k x + c x' - P of the spring, m s' = p - N mu(s): a mass that slides slower than at the peak passes it
+only while the pull exceeds friction there, and has to once it does. With N = N_0 - n x that is p + n
+mu_peak x against N_0 mu_peak. It holds for the model's own motion whatever the stepper; a run that breaks
+it shows a stick-slip that friction does not make.
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cvt_hpc.models.oscillator.constants import Oscillator
 from cvt_hpc.models.oscillator.motion import (
     HUMP,
-    Oscillator,
     V,
     X,
     friction_at_rest,
@@ -27,10 +28,10 @@ REACH, POINTS = 2.0 * HUMP, 2401  # of the search for the peak, in units of v_re
 
 
 class Peak(NamedTuple):
-    """Largest friction: where over the sliding speed [m/s], and its force [N]."""
+    """Largest friction: where over the sliding speed [m/s], and its coefficient [1]."""
 
     sliding: float
-    force: float
+    mu: float
 
 
 def rest_missed(o: Oscillator, facts: Facts, step: float, allowed: float, rows: np.ndarray) -> str | None:
@@ -73,11 +74,13 @@ def rest_missed(o: Oscillator, facts: Facts, step: float, allowed: float, rows: 
 
 
 def peak(o: Oscillator) -> Peak | None:
-    """Find the peak of smoothed friction; None where friction does not fall beyond some widths."""
+    """Find the peak of smoothed friction; None where there is none or it moves with the load."""
+    if o.normal_stiffness != 0.0 and o.law.table_force.size > 1:
+        return None
     sliding = np.linspace(0.0, REACH * o.width, POINTS)
-    force = np.array([regularised_friction(o, s) for s in sliding])
-    top = int(force.argmax())
-    return Peak(float(sliding[top]), float(force[top])) if top < POINTS - 1 else None
+    mu = np.array([regularised_friction(o, s, o.normal_load) for s in sliding]) / o.normal_load
+    top = int(mu.argmax())
+    return Peak(float(sliding[top]), float(mu[top])) if top < POINTS - 1 else None
 
 
 def wrongly_held(o: Oscillator, peak: Peak | None, rows: np.ndarray, interval: float) -> str | None:
@@ -102,15 +105,16 @@ def wrongly_held(o: Oscillator, peak: Peak | None, rows: np.ndarray, interval: f
     if peak is None or len(rows) < 2:
         return None
     x, sliding = rows[:, X], o.belt_speed - rows[:, V]
-    pull = o.stiffness * x + o.damping * rows[:, V]
+    pull = o.stiffness * x + o.damping * rows[:, V] - o.preload
     slow = (sliding >= 0.0) & (sliding < peak.sliding) & (pull >= 0.0)
+    pull, holds = pull + o.normal_stiffness * peak.mu * x, o.normal_load * peak.mu
     # as long as it slides slowly it goes no faster than the belt, and so does the pull
-    rise = o.stiffness * o.belt_speed
+    rise = max(o.stiffness + o.normal_stiffness * peak.mu, 0.0) * o.belt_speed
     largest = pull[:-1] + o.damping * sliding[:-1] + rise * interval
-    if np.any(slow[:-1] & (sliding[1:] > peak.sliding) & (largest < peak.force)):
+    if np.any(slow[:-1] & (sliding[1:] > peak.sliding) & (largest < holds)):
         return "the mass was let go while friction at rest still holds it"
     # Pulled by more than the peak for so long, it has gained the difference in speed: over the peak
-    excess = np.maximum(pull[1:] - peak.force, 0.0)
+    excess = np.maximum(pull[1:] - holds, 0.0)
     since = np.minimum(excess / rise, interval) if rise > 0.0 else np.full(excess.size, interval)
     gained = (excess - 0.5 * rise * since) * since / o.mass
     if np.any(slow[:-1] & slow[1:] & (gained > peak.sliding)):

@@ -1,8 +1,8 @@
 """Whether a method silences what friction drives: small swings about steady sliding, by its own steps.
 
-At the belt's speed v the mass can slide steadily. There a friction that falls by F' < 0 drives small swings
-at the rate s = -(c + F') / (2 m). A method whose damping is stronger turns their growth into decay, whatever
-the order, and a run by it is silent where the model vibrates.
+At the belt's speed v the mass can slide steadily. There a friction that falls by (N mu)' < 0 drives small
+swings at the rate s = -(c + (N mu)') / (2 m). A method whose damping is stronger turns their growth into
+decay, whatever the order, and a run by it is silent where the model vibrates.
 """
 
 from __future__ import annotations
@@ -12,20 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.oscillator.motion import Oscillator, regularised_friction
+from cvt_hpc.models.oscillator.constants import Oscillator, normal_load
+from cvt_hpc.models.oscillator.motion import regularised_friction
+from cvt_hpc.models.oscillator.steady import steady_sliding
 from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.marching import Marching
 from cvt_hpc.steppers.system import SetValuedSystem, System
 
 SMALL = 1e-3  # of the belt's speed: the swing, within which friction is a straight line
-
-
-def growth_of_slide(o: Oscillator) -> float:
-    """Rate at which small swings about steady sliding grow [1/s]; negative: they decay."""
-    apart = SMALL * o.belt_speed
-    faster, slower = (regularised_friction(o, o.belt_speed + sign * apart) for sign in (1.0, -1.0))
-    slope = (faster - slower) / (2.0 * apart) if apart > 0.0 else np.inf
-    return -0.5 * (o.damping + slope) / o.mass
 
 
 def silenced(
@@ -55,10 +49,18 @@ def silenced(
     str or None
         The reason, where it does.
     """
-    true, frequency = growth_of_slide(o), np.sqrt(o.stiffness / o.mass)
+    if o.belt_speed == 0.0:
+        return None
+    load = normal_load(o, steady_sliding(o).displacement)
+    slower, mu, faster = (
+        regularised_friction(o, o.belt_speed * part, load) / load for part in (1.0 - SMALL, 1.0, 1.0 + SMALL)
+    )
+    true = -0.5 * (o.damping + load * (faster - slower) / (2.0 * SMALL * o.belt_speed)) / o.mass
+    stiffness = o.stiffness + o.normal_stiffness * mu
+    frequency = np.sqrt(max(stiffness, 0.0) / o.mass)
     if not 0.0 < true < frequency:
         return None
-    rest = regularised_friction(o, o.belt_speed) / o.stiffness
+    rest = (o.preload + o.normal_load * mu) / stiffness
     start = np.array([rest + SMALL * o.belt_speed / frequency, 0.0])
     rows = np.empty((int(np.ceil(2.0 * np.pi / frequency / interval)) + 1, 2))
     if Marching(stepper, parameters, system, start, interval).advance(rows) != Result.OK:

@@ -9,11 +9,22 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.models.marched import MarchedRun, Probe, batch_of_one
-from cvt_hpc.models.oscillator.motion import V, X, initial_state, oscillator, set_valued_system, system
+from cvt_hpc.models.oscillator.constants import normal_load, oscillator
+from cvt_hpc.models.oscillator.motion import (
+    HUMP,
+    V,
+    X,
+    initial_state,
+    regularised_frictions,
+    set_valued_system,
+    system,
+)
 from cvt_hpc.models.oscillator.rest import peak, rest_missed, wrongly_held
 from cvt_hpc.models.oscillator.slide import silenced
+from cvt_hpc.physics.friction import friction_coefficients
 
 CHANNELS = ("speed",)
+REST = 1e-9  # of the mass' largest speed: what rounding may leave of sliding while friction holds
 
 
 class Transient(MarchedRun):
@@ -30,11 +41,19 @@ class Transient(MarchedRun):
         Resolved parameters of the run [SI].
     stepper : str
         One of the model's STEPPER_NAMES.
+
+    Attributes
+    ----------
+    constants : Oscillator
+        Of the equations.
+    is_set_valued : bool
+        Whether friction jumps at rest; else the jump is smoothed, and sticking is creep.
     """
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
-        equations = (set_valued_system if stepper == "moreau" else system)(parameters)
-        self._constants = o = oscillator(parameters)
+        self.is_set_valued = stepper == "moreau"
+        equations = (set_valued_system if self.is_set_valued else system)(parameters)
+        self.constants = o = oscillator(parameters)
         self._peak = peak(o)
         probes = (Probe("mass", 0.0),)
         frequency = np.sqrt(o.stiffness / o.mass)
@@ -47,8 +66,37 @@ class Transient(MarchedRun):
 
     def _doubt(self, first: int) -> str | None:
         seen = self.rows[max(first - 1, 0) : self.done]
-        missed = rest_missed(self._constants, self.marching.facts, self.step, self._allowed, seen)
-        return missed or self._silenced or wrongly_held(self._constants, self._peak, seen, self.interval)
+        missed = rest_missed(self.constants, self.marching.facts, self.step, self._allowed, seen)
+        return missed or self._silenced or wrongly_held(self.constants, self._peak, seen, self.interval)
+
+    @property
+    def contact_solves(self) -> int:
+        """Solves of the contact with the belt so far; none where friction is smoothed."""
+        return self.counters()["solves"] if self.is_set_valued else 0
+
+    @property
+    def first_judged(self) -> int:
+        """Samples before the judged part."""
+        return self.samples - round(self.parameters["judged_fraction"] * self.samples)
+
+    @property
+    def is_stuck(self) -> np.ndarray:
+        """Whether the mass sticks, or with smoothed friction creeps, at each sample so far, (done,) bool."""
+        speed = self.channel("speed")
+        width = REST * np.abs(speed).max(initial=0.0)
+        if not self.is_set_valued:
+            width = HUMP * self.constants.width
+        return np.abs(self.constants.belt_speed - speed) <= width
+
+    def friction(self) -> np.ndarray:
+        """Friction force on the mass at each sample so far, (done,) [N]."""
+        o, x, v = self.constants, self.displacement[:, 0], self.channel("speed")
+        sliding, load = o.belt_speed - v, normal_load(o, x)
+        if not self.is_set_valued:
+            return regularised_frictions(o, sliding, load)
+        holding = o.stiffness * x + o.damping * v - o.preload
+        level = load * friction_coefficients(o.law, np.abs(sliding), load)
+        return np.where(self.is_stuck, holding, np.copysign(level, sliding))
 
     def channel(self, name: str) -> np.ndarray:
         """History of one of CHANNELS, (done,): speed of the mass [m/s]."""

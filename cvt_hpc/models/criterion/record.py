@@ -1,0 +1,142 @@
+"""What the criterion finds: whether small motions are fed, their growth, and energy over amplitude."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+
+from cvt_hpc.models.alone import lane_key, lanes
+from cvt_hpc.models.criterion.energy import Flank, energy_per_cycle, flank
+from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+
+__all__ = ["VARIABLES", "coordinates", "cost", "judge", "lane_key", "lanes", "solve"]
+
+# Speed of the vibration over that of sliding: above 1 radial sliding turns about, and at 2 friction takes
+# energy whatever the law, since each speed that feeds then has its opposite
+RELATIVE_AMPLITUDES = np.append(1e-3, np.arange(1, 41) / 20.0)
+HARMONIC = 0.1  # damping ratio: a motion that grows by more than half in a cycle is no harmonic one
+ROUNDING = 1e-12  # of the friction's work in a cycle: as little energy as that is none
+
+VARIABLES = (
+    Variable("amplitude", (), "f8", "m", "amplitude of the limit cycle in harmonic balance; none: nan"),
+    Variable("frequency", (), "f8", "Hz", "frequency of the radial vibration"),
+    Variable("growth_rate", (), "f8", "s-1", "growth rate of small motions, damping over twice the mass"),
+    Variable("damping", (), "f8", "N s m-2", "radial damping per length of belt; negative: fed by friction"),
+    Variable("damping_ratio", (), "f8", "1", "damping over its critical value"),
+    Variable("energy_balance", (), "f8", "1", "(fed - taken) / (fed + taken) of small motions"),
+    Variable(
+        "sliding_gradient", (), "f8", "s m-1", "slope of friction at the sliding speed, as far as in phase"
+    ),
+    Variable(
+        "critical_gradient", (), "f8", "s m-1", "slope below which small motions grow; -inf: none is enough"
+    ),
+    Variable(
+        "energy_per_cycle",
+        ("relative_amplitude",),
+        "f8",
+        "J m-1",
+        "energy that a cycle gains, per length of belt",
+    ),
+)
+
+
+class Solution(NamedTuple):
+    """Steady sliding, the energy over RELATIVE_AMPLITUDES [J/m], and the margin of the verdict."""
+
+    flank: Flank
+    energy: np.ndarray
+    margin: float
+
+
+def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+    """Coordinates of the record's dimensions, whatever the parameters."""
+    long_name = "amplitude of the vibration's speed over the sliding speed"
+    return {"relative_amplitude": Coordinate(RELATIVE_AMPLITUDES, "1", long_name)}
+
+
+def cost(parameters: Mapping[str, Any], stepper: None) -> float:
+    """Core-seconds of a run."""
+    return 1e-3
+
+
+def solve(parameters: Mapping[str, Any]) -> Solution:
+    """Apply the criterion to the parameters of a run [SI]."""
+    f = flank(parameters)
+    energy = np.full(RELATIVE_AMPLITUDES.size, np.nan)
+    if f.stiffness > 0.0:
+        energy = energy_per_cycle(f, RELATIVE_AMPLITUDES * f.speed / f.angular_frequency)
+    return Solution(f, energy, parameters["undecided_margin"])
+
+
+def judge(solution: Solution) -> dict[str, Any]:
+    """The record of a run, its cost apart.
+
+    Parameters
+    ----------
+    solution : Solution
+        As `solve` returns it.
+    """
+    f = solution.flank
+    if f.stiffness <= 0.0:
+        reason = "nothing brings the belt back: friction outweighs the wedge, and there is no frequency"
+        return {"status": Status.DONE, "vibrates": Vibrates.UNDECIDED, "reason": reason}
+    fed, taken = -f.damping[f.damping < 0.0].sum(), f.damping[f.damping > 0.0].sum()
+    balance = (fed - taken) / (fed + taken) if fed + taken > 0.0 else 0.0
+    is_fed = solution.energy > _rounding(f)
+    vibrates, reason = _verdict(balance, solution.margin, RELATIVE_AMPLITUDES[is_fed])
+    w, damping = f.angular_frequency, f.damping.sum()
+    ratio = damping / (2.0 * f.mass * w)
+    if ratio < -HARMONIC:
+        reason += f"; amplitude and frequency are rough at a damping ratio of {ratio:.2g}"
+    return {
+        "status": Status.DONE,
+        "vibrates": vibrates,
+        "reason": reason,
+        "amplitude": _limit_amplitude(f, is_fed),
+        "frequency": w / (2.0 * np.pi),
+        "growth_rate": -damping / (2.0 * f.mass),
+        "damping": damping,
+        "damping_ratio": ratio,
+        "energy_balance": balance,
+        "sliding_gradient": f.gradient,
+        "critical_gradient": _critical_gradient(f),
+        "energy_per_cycle": solution.energy,
+    }
+
+
+def _rounding(f: Flank) -> np.ndarray:
+    """Energies [J/m] at RELATIVE_AMPLITUDES that rounding may leave of none."""
+    level = 2.0 * f.contact_force * RELATIVE_AMPLITUDES * f.speed + f.damping[0] * f.speed**2
+    return ROUNDING * 2.0 * np.pi / f.angular_frequency * level
+
+
+def _verdict(balance: float, margin: float, fed: np.ndarray) -> tuple[Vibrates, str]:
+    """Verdict and reason by the energy balance of small motions, and the relative amplitudes that are fed."""
+    words = f"energy balance of small motions {balance:.3g}, margin {margin:.3g}"
+    if abs(balance) <= margin:
+        return Vibrates.UNDECIDED, words
+    if balance > 0.0:
+        return Vibrates.YES, words
+    if fed.size:
+        span = f"{fed[0]:.3g} to {fed[-1]:.3g} times the speed of sliding"
+        return Vibrates.UNDECIDED, f"{words}; but vibrations of {span} are fed, so the start decides"
+    return Vibrates.NO, f"{words}, and no larger vibration is fed"
+
+
+def _limit_amplitude(f: Flank, is_fed: np.ndarray) -> float:
+    """Largest amplitude [m] beyond which motions are no longer fed; nan where there is none."""
+    ends = np.flatnonzero(is_fed[:-1] & ~is_fed[1:])
+    if not ends.size:
+        return np.nan
+    low, high = RELATIVE_AMPLITUDES[ends[-1] : ends[-1] + 2] * f.speed / f.angular_frequency
+    return brentq(lambda x: energy_per_cycle(f, np.array([x]))[0], low, high, rtol=1e-9)
+
+
+def _critical_gradient(f: Flank) -> float:
+    """Slope of friction [s/m] at which small motions neither grow nor decay."""
+    others = f.damping[0] + f.damping[3]
+    with np.errstate(divide="ignore"):
+        return float(-others / np.float64(2.0 * f.contact_force * f.radial_share**2))
