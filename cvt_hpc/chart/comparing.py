@@ -121,7 +121,8 @@ def _judge(
     point: Point, measurement: Measurement, reference: Measurement, scene: Scene, own: Mapping[str, float]
 ) -> Result:
     errors = {q.name: error(q, measurement, reference) for q in scene.quantities}
-    below = frozenset(name for name, value in errors.items() if value <= own.get(name, -1.0))
+    # what the reference knows exactly, as a rule whether it vibrates, is below nothing
+    below = frozenset(name for name, value in errors.items() if 0.0 < own.get(name, 0.0) >= value)
     return Result(point, measurement, errors, _pooled_values(scene, measurement, reference), below)
 
 

@@ -50,6 +50,8 @@ def table_lines(comparison: Comparison) -> Iterator[str]:
     rows += [_line(result, names) for result in comparison.methods]
     yield comparison.scene.title
     yield from _columns(rows)
+    if any(result.below for result in comparison.methods):
+        yield "  *: no larger than the reference's own error"
     yield f"  chosen: {comparison.verdict}"
     if comparison.choices:
         shown = comparison.shown

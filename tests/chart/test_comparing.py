@@ -9,6 +9,7 @@ from cvt_hpc.chart import load_chart
 from cvt_hpc.chart.comparing import compare, error, scatter
 from cvt_hpc.chart.measuring import Measurement, measure
 from cvt_hpc.chart.quantities import Quantity
+from cvt_hpc.chart.table import table_lines
 
 
 def quantity(name, tolerance=math.inf, scale=0.0):
@@ -141,6 +142,9 @@ def test_a_computed_reference_knows_its_own_error(write_chart):
     assert by_name["ringing-soft-2"].errors["amplitude"] == pytest.approx(1e-4, rel=1e-2)
     assert "amplitude" in by_name["ringing-soft-2"].below
     assert "amplitude" not in by_name["ringing-soft-3"].below
+    assert by_name["ringing-soft-2"].errors["occurrence"] == 0.0  # whether it vibrates the reference knows
+    assert not any("occurrence" in result.below for result in found.methods)
+    assert "  *: no larger than the reference's own error" in list(table_lines(found))
 
 
 def test_the_scatter_of_few_starts_counts_as_error_of_the_reference(write_chart):
