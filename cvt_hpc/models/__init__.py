@@ -6,4 +6,5 @@ MODELS = {
     "oscillator": "cvt_hpc.models.oscillator",
     "moving_string": "cvt_hpc.models.moving_string",
     "quasi_static_belt": "cvt_hpc.models.quasi_static_belt",
+    "steady_variator": "cvt_hpc.models.steady_variator",
 }
