@@ -3,6 +3,7 @@
 MODELS = {
     "criterion": "cvt_hpc.models.criterion",
     "elastic_belt": "cvt_hpc.models.elastic_belt",
+    "linear_stability": "cvt_hpc.models.linear_stability",
     "oscillator": "cvt_hpc.models.oscillator",
     "moving_string": "cvt_hpc.models.moving_string",
     "quasi_static_belt": "cvt_hpc.models.quasi_static_belt",

@@ -55,10 +55,10 @@ def test_nothing_changes_in_it(values):
 def test_a_transient_stays_there():
     # constant friction, so that nothing grows; the sheaves' lag is 2 ms
     found = steady(friction_gradient=0.0)
-    run = FastRuns([one.belt for one in found], [one.state for one in found])
-    run.advance(2000, 4e-6)
-    for lane, one in enumerate(found):
-        state = run.state(lane)
+    for one in found:
+        run = FastRuns([one.belt], [one.state])
+        run.advance(2000, 4e-6)
+        state = run.state()
         # Where the explicit rule of parting and the step's differ, at most one cell, the step begins without its
         # push: 10 nm of the belt's 1 mm. Without that cell it is 1 pm.
         assert state.fields[W] == pytest.approx(one.state.fields[W], abs=2e-8)
@@ -119,6 +119,17 @@ def test_newton_gives_up_where_it_is_lost():
     parameters = DEFAULTS | {"load_start": 0.0}
     equations = Equations(parameters, belt_constants(parameters))
     assert newton(equations, equations.initial(), 1e-7) is None
+
+
+def test_friction_carries_what_bullinger_says():
+    # transmittable torque 2 mu / cos(d0) Q r of the driving pulley (Bullinger et al. 2005, eq. 2), if all sliding is along
+    # the belt and far beyond the regularisation speed
+    parameters = DEFAULTS | {"friction_gradient": 0.0, "sheave_stiffness": np.inf}
+    belt = SteadyBelt(parameters)
+    last = belt.carried(belt.at(150.0), 4.0)
+    axial = quantities(last, mesh(parameters))["axial_force"][0]
+    most = 2.0 * DEFAULTS["kinetic_friction"] / np.cos(DEFAULTS["half_wedge_angle"])
+    assert 0.9 < last.load / (most * axial * last.belt.driving_radius) < 1.0
 
 
 def test_a_load_beyond_what_friction_carries():

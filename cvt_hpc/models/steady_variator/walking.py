@@ -93,8 +93,7 @@ class SteadyBelt:
             except NoSteadyState as error:
                 missed = error
             else:
-                belt = self._equations.belt._replace(bridging_stiffness=np.inf)
-                return Steady(load, belt, self._equations.state(x), x)
+                return self._found(x, load)
         raise missed
 
     def along(self, loads: Sequence[float]) -> Iterator[Steady]:
@@ -103,6 +102,31 @@ class SteadyBelt:
         for load in loads:
             near = self.at(load, near)
             yield near
+
+    def carried(self, near: Steady, within: float = 1.0) -> Steady:
+        """State at the largest load that friction carries, as far as a walk upwards finds it.
+
+        Parameters
+        ----------
+        near : Steady
+            Where the walk begins.
+        within : float
+            Beyond a step as short as this no state was found [N m].
+        """
+        step = max(0.1 * abs(near.load), 10.0 * within)
+        while step >= within:
+            try:
+                load = near.load + step
+                x = self._walk(near.unknowns, near.load, load)
+            except NoSteadyState:
+                step *= 0.5
+            else:
+                near = self._found(x, load)
+        return near
+
+    def _found(self, x: np.ndarray, load: float) -> Steady:
+        belt = self._equations.belt._replace(bridging_stiffness=np.inf)
+        return Steady(load, belt, self._equations.state(x), x)
 
     def _first(self, load: float) -> np.ndarray:
         """Unknowns by widened friction: without load, under the load, then with the true friction."""
