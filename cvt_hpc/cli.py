@@ -83,7 +83,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="K/N",
         help="only the K-th of N parts of the runs; parts may be at work in one folder at the same time",
     )
-    run.add_argument("--dry-run", action="store_true", help="as `cvt-hpc check`; runs nothing")
+    run.add_argument("--dry-run", action="store_true", help="validate options, job and folder; runs nothing")
     run.add_argument("--fresh", action="store_true", help="throw earlier results of the folder away")
     limit = (
         "time after which no run computes, such as 2h30m (default: until the end of the Slurm job, if any)"
@@ -140,13 +140,10 @@ def _add_assignments(command: argparse.ArgumentParser, flag: str, text: str) -> 
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    if arguments.dry_run:
-        _show(arguments)
-        return DONE
     from cvt_hpc.job import load_job
     from cvt_hpc.job.durations import read_duration
     from cvt_hpc.printing import report_lines, trouble_lines
-    from cvt_hpc.study import run
+    from cvt_hpc.study import check_start, run
     from cvt_hpc.study.launch import end_process
     from cvt_hpc.variables import Status
 
@@ -157,6 +154,10 @@ def _run(arguments: argparse.Namespace) -> int:
     }
     retry = [Status[name.upper()] for name in arguments.retry]
     job = load_job(arguments.path, arguments.set)
+    if arguments.dry_run:
+        check_start(job, arguments.out, part=arguments.part, fresh=arguments.fresh)
+        _show(job, arguments.out)
+        return DONE
     report = run(job, arguments.out, part=arguments.part, fresh=arguments.fresh, retry=retry, **limits)
     _complain(*trouble_lines(report))
     if _speaks():
@@ -191,7 +192,8 @@ def _map(arguments: argparse.Namespace) -> int:
         at = read_coordinates(arguments.at, units, str(arguments.path), "--at")
         from cvt_hpc.analysis.maps import draw_map
 
-        print(f"map: {draw_map(dataset, arguments.out or folder / 'map.png', at)}")
+        picture = arguments.out or folder / "map.png"
+        print(f"map: {draw_map(dataset, picture, at, str(arguments.path))}")
     return DONE
 
 
@@ -247,14 +249,16 @@ def _chart(arguments: argparse.Namespace) -> int:
 
 
 def _check(arguments: argparse.Namespace) -> int:
-    if min(arguments.ranks, default=1) < 1:
-        raise mismatch("--ranks", "numbers of ranks, 1 or more", str(min(arguments.ranks)))
+    from cvt_hpc.job import load_job
+
+    _check_ranks(arguments.ranks)
     if arguments.pilots < 0:
         raise mismatch("--pilots", "a number of batches", str(arguments.pilots))
     if (arguments.pilots or arguments.plot) and not arguments.ranks:
         raise mismatch("--pilots" if arguments.pilots else "--plot", "--ranks beside it", "none")
     _check_output(arguments.plot, (".png", ".svg", ".pdf"))
-    job = _show(arguments)
+    job = load_job(arguments.path, arguments.set)
+    _show(job, None)
     if arguments.ranks and _speaks():
         from cvt_hpc.printing import disk_line, forecast_lines
         from cvt_hpc.study.forecast import CURVE
@@ -273,23 +277,27 @@ def _check(arguments: argparse.Namespace) -> int:
     return DONE
 
 
-def _show(arguments: argparse.Namespace) -> Job:
-    """Print what a job runs, and return it."""
-    from cvt_hpc.job import load_job
+def _show(job: Job, out: Path | None) -> None:
+    """Print what a job runs."""
     from cvt_hpc.job.summary import summarize
     from cvt_hpc.study.description import describe
     from cvt_hpc.study.simulator import default_simulator
 
-    job = load_job(arguments.path, arguments.set)
     describe(job, default_simulator())  # refuses axes that the dataset of a run could not hold
     if _speaks():
         from cvt_hpc.simulation import estimate_cost
         from cvt_hpc.study.status import read_machine_factor
 
-        out = getattr(arguments, "out", None) or Path("out") / job.name
-        factor, runs = read_machine_factor(out, job)
+        factor, runs = read_machine_factor(out or Path("out") / job.name, job)
         print(summarize(job, factor * estimate_cost(job), runs))
-    return job
+
+
+def _check_ranks(ranks: list[int]) -> None:
+    from cvt_hpc.study.forecast import MOST_RANKS
+
+    for number in ranks:
+        if not 1 <= number <= MOST_RANKS:
+            raise mismatch("--ranks", f"numbers of ranks from 1 to {MOST_RANKS}", str(number))
 
 
 def _check_output(path: Path | None, suffixes: tuple[str, ...]) -> None:
@@ -298,9 +306,16 @@ def _check_output(path: Path | None, suffixes: tuple[str, ...]) -> None:
         return
     if path.suffix.lower() not in suffixes:
         raise mismatch(str(path), f"a file name in {', '.join(suffixes)}", path.suffix or "no suffix")
-    nearest = path if path.is_dir() else next(parent for parent in path.absolute().parents if parent.exists())
-    if nearest == path or not nearest.is_dir() or not os.access(nearest, os.W_OK):
-        raise mismatch(str(path), "a file that can be written", f"{nearest} in its way")
+    nearest = next(parent for parent in path.absolute().parents if parent.exists())
+    if path.is_dir():
+        found = "a folder of this name"
+    elif not nearest.is_dir():
+        found = f"the file {nearest} in the place of a folder"
+    elif not os.access(nearest, os.W_OK):
+        found = f"no permission to write to {nearest}"
+    else:
+        return
+    raise mismatch(str(path), "a file that can be written", found)
 
 
 def _complain(*lines: str) -> None:

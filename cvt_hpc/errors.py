@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 CRASHED = 70  # exit status after a defect of this program; EX_SOFTWARE of sysexits.h
@@ -71,6 +71,13 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
     lowered = {name.lower(): name for name in known}
     near = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
     return lowered[near[0]] if near else None
+
+
+def few_of(texts: Sequence[str], most: int) -> str:
+    """Return texts in a row; of more than `most` the first ones and the last."""
+    if len(texts) > most:
+        texts = [*texts[: most - 1], "...", texts[-1]]
+    return ", ".join(texts)
 
 
 def show(value: Any) -> str:

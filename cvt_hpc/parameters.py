@@ -27,6 +27,8 @@ class Parameter:
         `inf` is a legal value (rigid sheaves).
     choices : tuple of str
         The legal texts of a str parameter.
+    compared_only : bool
+        Values other than the default are for `cvt-hpc chart` alone, which shows what is wrong with them.
     """
 
     default: Any
@@ -37,6 +39,7 @@ class Parameter:
     exclusive: bool = False
     allow_infinite: bool = False
     choices: tuple[str, ...] = ()
+    compared_only: bool = False
 
 
 def positive(default: float, unit: str, description: str) -> Parameter:

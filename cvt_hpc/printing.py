@@ -49,8 +49,10 @@ def trouble_lines(report: RunReport) -> Iterator[str]:
     if unnamed > 0:
         yield f"{unnamed} more runs failed; `status` and `reason` in the results tell which"
     if report.remaining:
-        gain = "" if report.gained else ", and no run has ended since the start"
-        yield f"stopped early ({report.stopped}){gain}; the same command goes on from here"
+        if report.gained:
+            yield f"stopped early ({report.stopped}); the same command goes on from here"
+        else:
+            yield f"stopped early ({report.stopped}) before any run had ended; give it more time"
 
 
 def status_lines(status: StudyStatus) -> Iterator[str]:
@@ -94,7 +96,7 @@ def disk_line(disk: Disk, histories: int) -> str:
     if not histories:
         return line
     size = "of unknown size (--pilots tells)" if math.isnan(disk.histories) else _in_megabytes(disk.histories)
-    return f"{line}, {histories} histories {size}"
+    return f"{line}, {histories} histor{'y' if histories == 1 else 'ies'} {size}"
 
 
 def _in_megabytes(size: float) -> str:

@@ -1,42 +1,64 @@
-"""Write the dataset of a study as a small table: python jobs/tabulate.py OUT/STUDY TABLE.csv."""
+"""Write the dataset of a study as a small table: tabulate.py OUT/STUDY TABLE.csv [QUANTITY ...]."""
 
 import sys
+from itertools import product
 
 import numpy as np
 
 from cvt_hpc import open_results
 
-COLUMNS = {
+OF_A_BELT = ("amplitude", "frequency", "mode", "power_residual")
+# unit, factor and digits of quantities that are not written in SI units, to six digits
+LAYOUTS = {
     "amplitude": ("um", 1e6, "{:.2f}"),
+    "half_stroke": ("um", 1e6, "{:.2f}"),
     "frequency": ("Hz", 1.0, "{:.1f}"),
+    "eigenfrequency": ("Hz", 1.0, "{:.1f}"),
     "mode": ("", 1, "{:d}"),
+    "power_residual": ("", 1.0, "{:.4f}"),
 }
 
 
-def rows(results):
-    """Yield the lines, one per run: axes, status, verdict, and per strand amplitude, frequency, mode."""
+def rows(results, quantities=OF_A_BELT):
+    """Yield the lines, one per run: axes, status, verdict, and the quantities, per strand and the like."""
     dims = results["status"].dims
     axes = [str(name) for name, values in results.coords.items() if set(values.dims) <= set(dims)]
-    strands = [str(strand) for strand in results["strand"].values]
-    units = {name: f" [{unit}]" if unit else "" for name, (unit, *_) in COLUMNS.items()}
-    heads = [f"{name}_{strand}{unit}" for name, unit in units.items() for strand in strands]
-    yield ",".join([*axes, "status", "vibrates", *heads, "power_residual", "core_seconds"])
+    columns = [column for name in quantities for column in _columns(results[name], dims)]
+    yield ",".join([*axes, "status", "vibrates", *(head for head, *_ in columns), "core_seconds"])
     words = {name: results[name].attrs["flag_meanings"].split() for name in ("status", "vibrates")}
     for place in np.ndindex(results["status"].shape):
         run = results.isel(dict(zip(dims, place, strict=True)))
         done = words["status"][int(run["status"])] == "done"
-        cells = [f"{run[axis].item():g}" for axis in axes]
+        cells = [_number(run[axis].item()) for axis in axes]
         cells += [
             words["status"][int(run["status"])],
             words["vibrates"][int(run["vibrates"])] if done else "",
         ]
-        for name, (_, scale, layout) in COLUMNS.items():
-            cells += [layout.format(run[name].values[k] * scale) if done else "" for k in range(len(strands))]
-        cells += [f"{float(run['power_residual']):.4f}" if done else "", f"{float(run['core_seconds']):.2f}"]
-        yield ",".join(cells)
+        cells += [layout(run[name].isel(at).item()) if done else "" for _, name, at, layout in columns]
+        yield ",".join([*cells, f"{float(run['core_seconds']):.2f}"])
+
+
+def _columns(array, dims):
+    """Yield head, name, place and layout of each column that a quantity takes."""
+    name = str(array.name)
+    unit, factor, digits = LAYOUTS.get(name, (array.attrs.get("units", ""), 1, "{:.6g}"))
+    words = array.attrs.get("flag_meanings", "").split()
+
+    def layout(value):
+        return words[value] if words else digits.format(value * factor)
+
+    extra = [dim for dim in array.dims if dim not in dims]
+    for place in product(*(range(array.sizes[dim]) for dim in extra)):
+        at = dict(zip(extra, place, strict=True))
+        labels = [str(array[dim].values[k]) for dim, k in at.items()]
+        yield "_".join([name, *labels]) + (f" [{unit}]" if unit not in ("", "1") else ""), name, at, layout
+
+
+def _number(value):
+    return value if isinstance(value, str) else f"{value:g}"
 
 
 if __name__ == "__main__":
-    folder, table = sys.argv[1:]
+    folder, table, *asked = sys.argv[1:]
     with open_results(folder) as results, open(table, "w", encoding="utf-8") as out:
-        out.writelines(f"{row}\n" for row in rows(results.load()))
+        out.writelines(f"{row}\n" for row in rows(results.load(), asked or OF_A_BELT))

@@ -11,6 +11,7 @@
 #     0  all runs done             1  some runs failed, their reasons are in the output             2  bad input
 #     99 runs remain, and some were done: back into the queue, to go on with what is not yet recorded
 #     98 runs remain, and none was done: the job ends, since it would go round in circles; it needs more time
+#     70 a defect of the program, described in crash.log in the output folder
 # A sweep that was cancelled or lost its node goes on when the same command is submitted again. A job that lost
 # its node is put back into the queue by Slurm. What is recorded is never computed twice.
 

@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.figures import axis_label, display_unit
-from cvt_hpc.errors import InputError, mismatch, unknown
+from cvt_hpc.errors import InputError, few_of, mismatch, unknown
 
 MOST_VALUES_NAMED = 12
 
@@ -39,7 +39,7 @@ class Arrangement:
     notes: tuple[str, ...]
 
 
-def arrange(dataset: xr.Dataset, at: Mapping[str, Any]) -> Arrangement:
+def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> Arrangement:
     """Choose what a map shows.
 
     `load` runs along x, else the last numeric axis; `friction_gradient` along y, `sheave_stiffness` over
@@ -51,6 +51,8 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any]) -> Arrangement:
         Results of a study.
     at : mapping
         Axes to fix: name -> value on the axis, as a number [SI] or a text.
+    source : str
+        Where the results are from, for the errors.
 
     Raises
     ------
@@ -61,14 +63,15 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any]) -> Arrangement:
     notes = []
     for name, value in at.items():
         if name not in axes:
-            raise unknown("at", "axis of the results", name, axes)
-        index = _index_of(dataset[name], value)
+            raise unknown(f"{source}: at {name}", "axis of the results", name, axes)
+        index = _index_of(dataset[name], value, f"{source}: at {name}")
         notes.append(f"{name.replace('_', ' ')} = {value_text(dataset[name], index)}")
         dataset = dataset.isel({name: index})
     free = [name for name in axes if name not in at]
     if not free:
         raise InputError(
-            "map: expected results over one axis or more, found a single run, which `cvt-hpc simulate` draws"
+            f"{source}: expected results over one axis or more to be drawn, found a single run; "
+            "`cvt-hpc simulate` draws one"
         )
     numeric = [name for name in free if dataset[name].dtype.kind in "iuf"]
     x = "load" if "load" in numeric else (numeric or free)[-1]
@@ -96,7 +99,7 @@ def _take(names: list[str], preferred: str, avoid: str = "") -> str | None:
     return name
 
 
-def _index_of(coordinate: xr.DataArray, value: Any) -> int:
+def _index_of(coordinate: xr.DataArray, value: Any, where: str) -> int:
     """Index of a value on an axis."""
     values = coordinate.values
     if values.dtype.kind in "iuf":
@@ -108,9 +111,7 @@ def _index_of(coordinate: xr.DataArray, value: Any) -> int:
     else:
         hits = np.flatnonzero(values.astype(str) == str(value))
     if hits.size == 0:
-        raise mismatch(
-            f"at {coordinate.name}", f"a value of that axis: {_known_values(coordinate)}", repr(value)
-        )
+        raise mismatch(where, f"a value of that axis: {_known_values(coordinate)}", repr(value))
     return int(hits[0])
 
 
@@ -118,10 +119,8 @@ def _known_values(coordinate: xr.DataArray) -> str:
     """The values of an axis [SI] in words, a few of them if there are many."""
     is_numeric = coordinate.dtype.kind in "iuf"
     texts = [f"{value:g}" if is_numeric else str(value) for value in coordinate.values.tolist()]
-    if len(texts) > MOST_VALUES_NAMED:
-        texts = [*texts[: MOST_VALUES_NAMED - 1], "...", texts[-1]]
     unit = coordinate.attrs.get("units", "1")
-    return ", ".join(texts) + ("" if unit in ("", "1") else f" [{unit}]")
+    return few_of(texts, MOST_VALUES_NAMED) + ("" if unit in ("", "1") else f" [{unit}]")
 
 
 def value_text(coordinate: xr.DataArray, index: int) -> str:

@@ -6,8 +6,18 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from cvt_hpc.errors import mismatch
+from cvt_hpc.errors import few_of, mismatch
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
+
+_MOST_NAMED = 6  # variables
+
+
+def check_results(dataset: xr.Dataset, source: str) -> None:
+    """Raise InputError unless a dataset holds results of a study; `source` says where it is from."""
+    for name in ("status", "vibrates"):
+        if name not in dataset:
+            found = few_of(list(map(str, dataset.data_vars)), _MOST_NAMED) or "no variables"
+            raise mismatch(source, f"results of a study, with the variable {name}", found)
 
 
 def occurrence_classes(dataset: xr.Dataset) -> xr.DataArray:
@@ -22,16 +32,7 @@ def occurrence_classes(dataset: xr.Dataset) -> xr.DataArray:
     -------
     DataArray of int8
         Values of `OccurrenceClass`, dimensions of `status`.
-
-    Raises
-    ------
-    InputError
-        The dataset has no `status` or no `vibrates`.
     """
-    for name in ("status", "vibrates"):
-        if name not in dataset:
-            found = ", ".join(map(str, dataset.data_vars)) or "no variables"
-            raise mismatch("the dataset", f"results of a study, with the variable {name}", found)
     status = dataset["status"]
     classes = classify_runs(status.values, dataset["vibrates"].transpose(*status.dims).values)
     attributes = {

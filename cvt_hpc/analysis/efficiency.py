@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, PercentFormatter
 
-from cvt_hpc.analysis.figures import STYLE, WIDTH, save_figure
+from cvt_hpc.analysis.figures import WIDTH, draw
 
 if TYPE_CHECKING:
     from cvt_hpc.study.forecast import Forecast
@@ -31,20 +30,9 @@ def draw_efficiency(forecasts: Sequence[Forecast], title: str, basis: str, out: 
     basis : str
         What the times of batches are known by.
     out : Path
-        The picture: .png, .svg or .pdf.
-
-    Returns
-    -------
-    Path
-        `out`.
-
-    Raises
-    ------
-    InputError
-        The suffix is none of these, or the system refuses.
+        As for `save_figure`, with what it returns and raises.
     """
-    with matplotlib.rc_context(STYLE):
-        return save_figure(efficiency_figure(forecasts, title, basis), out)
+    return draw(lambda: efficiency_figure(forecasts, title, basis), out)
 
 
 def efficiency_figure(forecasts: Sequence[Forecast], title: str, basis: str) -> Figure:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -61,6 +64,25 @@ def headline(attributes: Mapping[str, Any]) -> str:
     """First line above a map of a dataset with these attributes."""
     job = attributes.get("job_name", "")
     return f"Vibration occurrence: {job}" if job else "Vibration occurrence"
+
+
+def draw(compose: Callable[[], Figure], out: Path) -> Path:
+    """Compose a figure in the style of all pictures and write it as `save_figure` does, or refuse before."""
+    check_format(Path(out))
+    with matplotlib.rc_context(STYLE):
+        return save_figure(compose(), out)
+
+
+def balanced(line: str, width: int) -> str:
+    """Break a line into no more lines than it takes, of like length, `width` letters at most.
+
+    Numbers stay with their units.
+    """
+    line = re.sub(r"\b(\d[\d.]*) ", "\\1\u00a0", line)
+    lines = wrap(line, width)
+    while width > 1 and len(narrower := wrap(line, width - 1)) == len(lines):
+        lines, width = narrower, width - 1
+    return "\n".join(lines)
 
 
 def save_figure(figure: Figure, out: Path) -> Path:

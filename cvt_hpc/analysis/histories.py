@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from textwrap import fill
+from typing import Any
 
-import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis import history_panels as panels
-from cvt_hpc.analysis.figures import STYLE, WIDTH, check_format, save_figure
+from cvt_hpc.analysis.figures import WIDTH, balanced, draw
 from cvt_hpc.errors import InputError
+from cvt_hpc.job.schema import load_schema
+from cvt_hpc.job.values import in_words
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.criterion import PARAMETERS
 
@@ -29,21 +31,14 @@ def draw_history(dataset: xr.Dataset, out: Path) -> Path:
         `displacement` (time, probe) [m], `load` (time) [N m], `ring_tension` and `push_force` (position) [N],
         `contact_force` (position) [N/m], `region` (position), and the run's verdict.
     out : Path
-        The picture: .png, .svg or .pdf.
-
-    Returns
-    -------
-    Path
-        `out`.
+        As for `save_figure`, with what it returns.
 
     Raises
     ------
     InputError
-        There is nothing to draw, or the suffix is not a picture's.
+        There is nothing to draw, or as `save_figure`.
     """
-    check_format(Path(out))
-    with matplotlib.rc_context(STYLE):
-        return save_figure(history_figure(dataset), Path(out))
+    return draw(lambda: history_figure(dataset), out)
 
 
 def history_figure(dataset: xr.Dataset) -> Figure:
@@ -74,8 +69,8 @@ def history_figure(dataset: xr.Dataset) -> Figure:
     figure.suptitle(title)
     grid = figure.add_gridspec(len(rows), 3, height_ratios=heights)
     for i, (_, row) in enumerate(rows):
-        for columns, draw, what in row:
-            draw(figure.add_subplot(grid[i, columns]), what)
+        for columns, draw_panel, what in row:
+            draw_panel(figure.add_subplot(grid[i, columns]), what)
     return figure
 
 
@@ -96,8 +91,10 @@ def _vibration_settings(dataset: xr.Dataset) -> dict[str, float]:
 
 
 def _title(dataset: xr.Dataset) -> str:
-    """What run, and what became of it."""
+    """Which run, and what became of it."""
     lines = ["One run: " + dataset.attrs["job_name"] if "job_name" in dataset.attrs else "One run"]
+    if place := _place(dataset.attrs):
+        lines.append(place)
     status = Status(int(dataset["status"])) if "status" in dataset else None
     reason = dataset["reason"].item() if "reason" in dataset else ""
     reason = reason.decode() if isinstance(reason, bytes) else reason
@@ -106,4 +103,15 @@ def _title(dataset: xr.Dataset) -> str:
         lines.append(f"vibrates: {verdict.name.lower()}" + (f" ({reason})" if reason else ""))
     elif status is not None:
         lines.append(f"{status.name.lower().replace('_', ' ')}" + (f": {reason}" if reason else ""))
-    return "\n".join(fill(line, 76) for line in lines)
+    return "\n".join(balanced(line, 76) for line in lines)
+
+
+def _place(attributes: Mapping[str, Any]) -> str:
+    """Where a run stands: its values on the axes of the job, and where else it departs from the job."""
+    if not {"job", "point"} <= attributes.keys():
+        return ""
+    job, point = json.loads(attributes["job"]), json.loads(attributes["point"])
+    schema = load_schema(job["model"], job["stepper"], "history")
+    tables = {key: value for section in schema.sections for key, value in job.get(section, {}).items()}
+    keys = [*job["axes"], *(key for key in tables if point[key] != tables[key])]
+    return ", ".join(f"{key} {in_words(point[key], schema.parameters[key].unit)}" for key in keys)

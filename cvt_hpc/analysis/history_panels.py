@@ -22,6 +22,8 @@ MOST_PEAKS = 3
 COLOURS = {"t1": "#b5460f", "t2": "#1f4e8c"}  # of like lightness, so line styles tell them apart in grey
 LINES = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))  # one for each probe of a strand, by default
 _OTHER_COLOUR = "#333333"
+_MARGINS = (0.1, 0.9)  # share of the frequencies from which on labels are on the left: first strand, others
+_HEADROOM = 1.45  # for a legend of one line
 
 
 @dataclass(frozen=True)
@@ -170,20 +172,23 @@ def draw_spectra(axes: Axes, strands: list[Strand]) -> None:
         axes.plot(bins, spectrum, ls=LINES[i % len(LINES)], color=strand.colour, linewidth=1.2, label=label)
         for frequency, amplitude in _peaks(signal, strand, bins, spectrum):
             axes.plot(frequency, amplitude, "v", color=strand.colour, markersize=5)
+            # strands often vibrate at one frequency: the first is labelled on the left, others right
+            is_left = frequency > _MARGINS[i > 0] * strand.band[1]
             axes.annotate(
                 f"{frequency:.0f} Hz",
                 (frequency, amplitude),
-                xytext=(0, 5),
+                xytext=(-5 if is_left else 5, 0),
                 textcoords="offset points",
-                ha="center",
+                ha="right" if is_left else "left",
+                va="center",
                 fontsize=8,
                 color=strand.colour,
             )
         top = max(top, spectrum.max())
-    axes.set(xlim=(0, strands[0].band[1]), ylim=(0, 1.25 * top or 1.0))
+    axes.set(xlim=(0, strands[0].band[1]), ylim=(0, 1.1 * top or 1.0))
     axes.set(xlabel="frequency [Hz]", ylabel="amplitude [µm]")
     axes.set_title("spectrum of the judged part", loc="left", pad=3)
-    axes.legend(loc="upper right")
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=len(strands), frameon=False)
 
 
 def _peaks(signal: Array, strand: Strand, bins: Array, spectrum: Array) -> list[tuple[float, float]]:
@@ -212,8 +217,8 @@ def draw_forces(axes: Axes, dataset: xr.Dataset) -> None:
         if name in dataset:
             label = name.replace("_", " ")
             axes.plot(position, 1e-3 * dataset[name].values, line, color=colour, linewidth=1.4, label=label)
-    axes.set(ylabel="force [kN]", ylim=(0, None))
-    axes.legend(loc="best", framealpha=0.85)
+    axes.set(ylabel="force [kN]", ylim=(0, _HEADROOM * axes.dataLim.ymax))
+    axes.legend(loc="upper right", ncols=2, frameon=False)
     _lay_out_positions(axes, dataset)
 
 

@@ -14,7 +14,6 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any
 
-import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -27,11 +26,13 @@ from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, val
 from cvt_hpc.analysis.classes import (
     OccurrenceClass,
     at_strongest_strand,
+    check_results,
     count_classes,
     map_classes,
     occurrence_classes,
 )
-from cvt_hpc.analysis.figures import STYLE, WIDTH, check_format, headline, save_figure
+from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
+from cvt_hpc.analysis.figures import WIDTH, draw, headline
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 
 MOST_STACKED = 5  # panels in one column; more go into two
@@ -39,7 +40,9 @@ TITLE_HEIGHT = 0.42  # [inch], of a panel with the space around it
 ONE_ROW = Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
 
 
-def draw_map(dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None) -> Path:
+def draw_map(
+    dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None, source: str = "results"
+) -> Path:
     """Draw where vibration occurs.
 
     Parameters
@@ -48,28 +51,26 @@ def draw_map(dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None
         Results of a study: `status` and `vibrates` over the job's axes; `amplitude` [m] and `frequency`
         [Hz], per strand, where known; `inferred_class` of a trace. The stronger strand is shown. Of a study
         of samples the axes lie along `run`: each run is a mark, and there is a panel for each pair of axes.
+        Results that hold `eigenfrequency` are drawn as lines over the axis that else runs along x.
     out : Path
-        The picture: .png, .svg or .pdf.
+        As for `save_figure`, with what it returns.
     at : mapping, optional
         Axes to fix: name -> value, as a number [SI] or a text.
-
-    Returns
-    -------
-    Path
-        `out`.
+    source : str, optional
+        Where the results are from, for the errors.
 
     Raises
     ------
     InputError
         The dataset holds no results or a single run, `at` names no axis or no value on it or the results
-        are of samples, or the suffix is not a picture's.
+        are of samples, or as `save_figure`.
     """
-    check_format(Path(out))
-    occurrence_classes(dataset)
-    with matplotlib.rc_context(STYLE):
-        if is_sampled(dataset):
-            return save_figure(scatter_figure(dataset, at or {}), Path(out))
-        return save_figure(map_figure(arrange(dataset, at or {})), Path(out))
+    check_results(dataset, source)
+    if is_sampled(dataset):
+        return draw(lambda: scatter_figure(dataset, at or {}, source), out)
+    if "eigenfrequency" in dataset:
+        return draw(lambda: eigenfrequency_figure(dataset, at or {}, source), out)
+    return draw(lambda: map_figure(arrange(dataset, at or {}, source)), out)
 
 
 @dataclass(frozen=True)

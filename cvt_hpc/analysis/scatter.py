@@ -10,15 +10,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.axis import XAxis, YAxis
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.markers import MarkerStyle
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, count_classes, occurrence_classes
 from cvt_hpc.analysis.figures import WIDTH, axis_label, display_unit, headline
-from cvt_hpc.errors import InputError
+from cvt_hpc.errors import mismatch
 
 MOST_AXES = 4  # six pairs; the first axes of the job
 _SIZE = 6.0  # [point], of the mark of a vibrating run
@@ -30,7 +32,7 @@ def is_sampled(dataset: xr.Dataset) -> bool:
     return dataset["status"].dims == ("run",)
 
 
-def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any]) -> Figure:
+def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> Figure:
     """Compose the map of a sampled study.
 
     Parameters
@@ -40,6 +42,8 @@ def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any]) -> Figure:
         [m], where known.
     at : mapping
         Has to be empty: no two samples lie at one value of an axis.
+    source : str
+        Where the results are from, for the error.
 
     Raises
     ------
@@ -47,7 +51,7 @@ def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any]) -> Figure:
         If `at` is not empty.
     """
     if at:
-        raise InputError(f"at {next(iter(at))}: expected results over a grid, found samples, all apart")
+        raise mismatch(f"{source}: at {next(iter(at))}", "results over a grid", "samples, all apart")
     names = [str(name) for name, coordinate in dataset.coords.items() if coordinate.dims == ("run",)]
     names.sort(key=lambda name: _FIRST.index(name) if name in _FIRST else len(_FIRST))
     pairs = list(combinations(names[:MOST_AXES], 2)) or [(names[0], None)]
@@ -109,6 +113,19 @@ def _draw_runs(
     axes.set(xlabel=x_label, ylabel=y_label)
     if y is None:
         axes.set_yticks([])
+    for side, name in (("x", x), ("y", y)):
+        if name and dataset[name].attrs.get("spacing") == "log":
+            axes.set(**{f"{side}scale": "log"})
+            _tick_logarithmic(axes.xaxis if side == "x" else axes.yaxis)
+
+
+def _tick_logarithmic(axis: XAxis | YAxis) -> None:
+    """Label a logarithmic axis by plain numbers, the closer the shorter it is."""
+    low, high = axis.get_view_interval()
+    multiples = (1, 1.5, 2, 3, 5, 7) if high < 10 * low else (1, 2, 5) if high < 1e3 * low else (1,)
+    axis.set_major_locator(LogLocator(subs=multiples))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _along(coordinate: xr.DataArray) -> tuple[NDArray[np.float64], str]:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import platform
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,15 +13,16 @@ import xarray as xr
 from cvt_hpc.chart.comparing import Comparison, Result
 from cvt_hpc.chart.plan import Chart
 from cvt_hpc.chart.quantities import KINDS
-from cvt_hpc.files import written_aside
-from cvt_hpc.netcdf import write_netcdf
-from cvt_hpc.study.provenance import command, git_revision, history_line, versions
+from cvt_hpc.study.gather import merge_versions
+from cvt_hpc.study.provenance import command, history_line, versions
 
 _TIMED = "depends on the machine and the hour"
 
 
-def write_dataset(chart: Chart, comparisons: Sequence[Comparison], path: Path) -> Path:
-    """Write all results along the dimension `point`.
+def chart_dataset(
+    chart: Chart, comparisons: Sequence[Comparison], makers: Sequence[dict[str, Any]]
+) -> xr.Dataset:
+    """Return the results as a dataset: errors, values, cost and work of each point, and how it ended.
 
     Parameters
     ----------
@@ -31,22 +30,14 @@ def write_dataset(chart: Chart, comparisons: Sequence[Comparison], path: Path) -
         The job, which goes into the attributes.
     comparisons : sequence of Comparison
         The results.
-    path : Path
-        The file.
+    makers : sequence of dict
+        By what they were measured: versions, revision and machine, each of them once.
 
     Returns
     -------
-    Path
-        `path`.
+    Dataset
+        Along the dimension `point`.
     """
-    dataset = chart_dataset(chart, comparisons)
-    with written_aside(path, parents=True) as aside:
-        write_netcdf(dataset, aside)
-    return path
-
-
-def chart_dataset(chart: Chart, comparisons: Sequence[Comparison]) -> xr.Dataset:
-    """Return the results as a dataset: errors, values, cost and work of each point, and how it ended."""
     rows = [r for c in comparisons for r in (c.reference, *c.methods, *c.choices)]
     variables: dict[str, Any] = _descriptions(rows) | _costs(rows)
     for name in KINDS:
@@ -63,7 +54,7 @@ def chart_dataset(chart: Chart, comparisons: Sequence[Comparison]) -> xr.Dataset
             values = [row.values.get(name, np.nan) for row in rows]
             variables[name] = _along(values, KINDS[name].unit, f"{words}, pooled over the starts")
     points = ("point", np.array([row.point.name for row in rows], dtype=object), {"long_name": "point"})
-    return xr.Dataset(variables, {"point": points}, _attributes(chart, comparisons))
+    return xr.Dataset(variables, {"point": points}, _attributes(chart, comparisons, makers))
 
 
 def _descriptions(rows: Sequence[Result]) -> dict[str, Any]:
@@ -113,7 +104,9 @@ def _flag(values: Sequence[bool] | np.ndarray, long_name: str) -> tuple[str, np.
     return "point", np.array(values, "i1"), flags
 
 
-def _attributes(chart: Chart, comparisons: Sequence[Comparison]) -> dict[str, str]:
+def _attributes(
+    chart: Chart, comparisons: Sequence[Comparison], makers: Sequence[dict[str, Any]]
+) -> dict[str, str]:
     return {
         "Conventions": "CF-1.11",
         "title": chart.description or chart.name,
@@ -123,19 +116,7 @@ def _attributes(chart: Chart, comparisons: Sequence[Comparison]) -> dict[str, st
         "job": json.dumps(chart.resolved()),
         "job_fingerprint": chart.fingerprint(),
         "verdicts": json.dumps({c.scene.name: c.verdict for c in comparisons}),
-        "versions": json.dumps(versions()),
-        "machine": json.dumps(_machine()),
-        "git_revision": git_revision(),
+        "versions": json.dumps(merge_versions([maker["versions"] for maker in makers])),
+        "machine": json.dumps([*{str(m["machine"]): m["machine"] for m in makers}.values()]),
+        "git_revision": ", ".join(dict.fromkeys(maker["git_revision"] for maker in makers)),
     }
-
-
-def _machine() -> dict[str, Any]:
-    """Return what times depend on."""
-    processor = platform.processor()
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as file:
-            names = [line.partition(":")[2].strip() for line in file if line.startswith("model name")]
-            processor = names[0] if names else processor
-    except OSError:
-        pass  # not Linux
-    return {"processor": processor, "architecture": platform.machine(), "cores": os.cpu_count()}

@@ -42,14 +42,6 @@ METHOD = {
     "label": Parameter("", "", "name in tables and pictures"),
     "stepper": Parameter(None, "", "stepper"),
     "lanes": Parameter(1, "", "runs that advance together; costs are those of one", minimum=1, maximum=64),
-    "until": Parameter(
-        math.inf,
-        "s",
-        "how far runs are marched; shorter than the run, only the trajectory is judged",
-        minimum=0.0,
-        exclusive=True,
-        allow_infinite=True,
-    ),
 }
 BUDGET = {
     "label": Parameter("the base", "", "what the choices are compared with, for people"),

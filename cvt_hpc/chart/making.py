@@ -14,13 +14,15 @@ from threadpoolctl import threadpool_limits
 
 from cvt_hpc.chart.budget_drawing import draw_budget
 from cvt_hpc.chart.comparing import Comparison, compare
-from cvt_hpc.chart.dataset import write_dataset
+from cvt_hpc.chart.dataset import chart_dataset
 from cvt_hpc.chart.measuring import Measurement, measure
 from cvt_hpc.chart.plan import Chart, Point
 from cvt_hpc.chart.prospects import check_prospects
 from cvt_hpc.chart.scene_drawing import draw_scene
 from cvt_hpc.chart.store import ChartFolder
 from cvt_hpc.chart.table import write_table
+from cvt_hpc.files import written_aside
+from cvt_hpc.netcdf import write_netcdf
 
 
 @dataclass(frozen=True)
@@ -70,20 +72,31 @@ def make_chart(
     Raises
     ------
     InputError
-        If the folder holds another job, the models do not record what is asked, or the system refuses.
+        If the folder holds another job or is in use, the models do not record what is asked, or the system
+        refuses.
     """
-    folder = ChartFolder(Path(out) if out is not None else Path("out") / chart.name)
     check_prospects(chart)
-    folder.prepare(chart, fresh)
-    measurements = {}
-    missing = []
-    for point in chart.points:
-        found = folder.load(point.name)
-        if found is None:
-            missing.append(point)
-        else:
-            measurements[point.name] = found
-    processes = processes or len(os.sched_getaffinity(0))
+    folder = ChartFolder(Path(out) if out is not None else Path("out") / chart.name, chart)
+    with folder.occupied(fresh):
+        measurements = _fill(chart, folder, processes or len(os.sched_getaffinity(0)), tell)
+        comparisons = compare(chart, measurements)
+        with written_aside(folder.table) as aside:
+            write_table(comparisons, aside)
+        with written_aside(folder.dataset) as aside:
+            write_netcdf(chart_dataset(chart, comparisons, folder.makers), aside)
+        pictures = [draw_scene(c, folder.picture(c.scene.name)) for c in comparisons]
+        pictures += [draw_budget(c, folder.picture("budget")) for c in comparisons if c.choices]
+    return ChartReport(comparisons, folder.table, folder.dataset, tuple(pictures))
+
+
+def _fill(
+    chart: Chart, folder: ChartFolder, processes: int, tell: Callable[[str], None]
+) -> dict[str, Measurement]:
+    """Measure the points that the folder does not hold yet, and return all by name."""
+    loaded = {point.name: folder.load(point.name) for point in chart.points}
+    folder.warn_of_others()
+    measurements = {name: found for name, found in loaded.items() if found is not None}
+    missing = [point for point in chart.points if point.name not in measurements]
     for point, measurement in _measure_all(chart, missing, processes):
         folder.save(point.name, measurement)
         measurements[point.name] = measurement
@@ -93,12 +106,7 @@ def make_chart(
             else f"{measurement.core_seconds:.3g} core-s"
         )
         tell(f"{len(measurements)}/{len(chart.points)} {point.name}: {ended}")
-    comparisons = compare(chart, measurements)
-    write_table(comparisons, folder.table)
-    write_dataset(chart, comparisons, folder.dataset)
-    pictures = [draw_scene(comparison, folder.picture(comparison.scene.name)) for comparison in comparisons]
-    pictures += [draw_budget(c, folder.picture("budget")) for c in comparisons if c.choices]
-    return ChartReport(comparisons, folder.table, folder.dataset, tuple(pictures))
+    return measurements
 
 
 def _measure_all(chart: Chart, points: list[Point], processes: int) -> Iterator[tuple[Point, Measurement]]:

@@ -6,14 +6,13 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from cvt_hpc.analysis.figures import STYLE, WIDTH, save_figure
+from cvt_hpc.analysis.figures import WIDTH, draw
 from cvt_hpc.chart.comparing import Comparison, Result
 from cvt_hpc.chart.figure_parts import LEGEND, MARGIN, error_label, line_style, set_error_axis
 from cvt_hpc.chart.notes import LARGEST_ERROR, notes
@@ -34,15 +33,9 @@ def draw_scene(comparison: Comparison, out: Path) -> Path:
     comparison : Comparison
         Results of a scene.
     out : Path
-        The picture: .png, .svg or .pdf.
-
-    Returns
-    -------
-    Path
-        `out`.
+        As for `save_figure`, with what it returns and raises.
     """
-    with matplotlib.rc_context(STYLE):
-        return save_figure(scene_figure(comparison), out)
+    return draw(lambda: scene_figure(comparison), out)
 
 
 def scene_figure(comparison: Comparison) -> Figure:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from cvt_hpc.chart.declarations import BUDGET, CHOICE, METHOD, SETTINGS, read_set, read_table, read_tables
-from cvt_hpc.chart.plan import Point, Quantity, Role, Scene
+from cvt_hpc.chart.plan import Point, Role, Scene
 from cvt_hpc.chart.stage import Stage, check_word, in_words
 from cvt_hpc.errors import mismatch, show, unknown
 from cvt_hpc.job import Job
@@ -44,17 +44,20 @@ def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
         raise mismatch(where, '"exact", or a table with a stepper and its step or tolerance', show(raw))
     read_table({"stepper": METHOD["stepper"]}, raw, where, ("set", "coarser", *SETTINGS))
     key = _setting_key(raw, where)
-    fine = stage.job(where, stepper=raw["stepper"], **read_set(raw, where), **{key: raw[key]})
-    _check_starts(stage, fine)
-    _check_quantities(stage, fine)
-    coarse = raw.get("coarser", fine.parameters[key] * _COARSER[key])
-    coarser = stage.job(where, stepper=raw["stepper"], **read_set(raw, where), **{key: coarse})
-    if coarser.parameters[key] <= fine.parameters[key]:
-        raise mismatch(f"{where} coarser", f"more than {key} = {fine.parameters[key]:g}", f"{coarse}")
-    label = in_words(raw["stepper"])
+    stepper, others = raw["stepper"], read_set(raw, where)
+    fine = stage.setting(stepper, key, raw[key], where, f"{where} {key}")
+    job = stage.job(where, stepper=stepper, **others, **{key: fine})
+    _check_starts(stage, job)
+    _check_quantities(stage, job)
+    coarse = raw.get("coarser", fine * _COARSER[key])
+    coarser = stage.setting(stepper, key, coarse, where, f"{where} coarser")
+    if coarser <= fine:
+        raise mismatch(f"{where} coarser", f"more than {key} = {fine:g}", f"{coarse}")
+    coarser_job = stage.job(where, stepper=stepper, **others, **{key: coarser})
+    label = in_words(stepper)
     both = {"starts": starts, "until": stage.until}
-    yield Point(f"{name}-reference", name, Role.REFERENCE, raw["stepper"], label, key, fine, **both)
-    yield Point(f"{name}-coarser", name, Role.COARSER, raw["stepper"], label, key, coarser, **both)
+    yield Point(f"{name}-reference", name, Role.REFERENCE, stepper, label, key, job, **both)
+    yield Point(f"{name}-coarser", name, Role.COARSER, stepper, label, key, coarser_job, **both)
 
 
 def method_points(name: str, raw: Any, stages: list[Stage], where: str) -> Iterator[Point]:
@@ -82,9 +85,8 @@ def method_points(name: str, raw: Any, stages: list[Stage], where: str) -> Itera
         raise mismatch(f"{where} {key}", "a list of values", show(raw[key]))
     for stage in _chosen_stages(raw.get("scenes"), stages, where):
         for i, value in enumerate(raw[key], 1):
-            job = stage.job(where, stepper=own["stepper"], **read_set(raw, where), **{key: value})
-            until = own["until"] if own["until"] < job.parameters["duration"] else stage.until
-            _check_until(until, stage.scene.quantities, where)
+            setting = stage.setting(own["stepper"], key, value, where, f"{where} {key}, value {i}")
+            job = stage.job(where, stepper=own["stepper"], **read_set(raw, where), **{key: setting})
             yield Point(
                 f"{stage.scene.name}-{name}-{i}",
                 stage.scene.name,
@@ -95,7 +97,7 @@ def method_points(name: str, raw: Any, stages: list[Stage], where: str) -> Itera
                 job,
                 stage.scene.starts,
                 own["lanes"],
-                until,
+                stage.until,
             )
 
 
@@ -176,14 +178,3 @@ def _check_quantities(stage: Stage, job: Job) -> None:
         if duration < quantity.until < math.inf:
             where = f"{stage.where} quantities.{quantity.name}.until"
             raise mismatch(where, f"a time within the run of {duration:g} s", f"{quantity.until:g} s")
-
-
-def _check_until(until: float, quantities: tuple[Quantity, ...], where: str) -> None:
-    if math.isinf(until):
-        return
-    needed = [quantity.until for quantity in quantities if quantity.name == "trajectory"]
-    if not needed:
-        raise mismatch(f"{where} until", "runs to their end, because no trajectory is judged", f"{until:g} s")
-    if until < needed[0]:
-        expected = f"{needed[0]:g} s or more, the trajectory that is judged"
-        raise mismatch(f"{where} until", expected, f"{until:g} s")

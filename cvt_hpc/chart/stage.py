@@ -5,13 +5,18 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import Any
 
-from cvt_hpc.chart.declarations import LEAD, SCENE, read_set, read_table, read_tables
+from cvt_hpc.chart.declarations import LEAD, SCENE, SETTINGS, read_set, read_table, read_tables
 from cvt_hpc.chart.plan import Lead, Quantity, Scene
 from cvt_hpc.chart.quantities import read_quantity
-from cvt_hpc.errors import mismatch, show
+from cvt_hpc.errors import mismatch, show, unknown
 from cvt_hpc.job import Job, build_job
+from cvt_hpc.job.assignments import read_assignments
+from cvt_hpc.job.schema import load_schema
+from cvt_hpc.job.values import read_value
+from cvt_hpc.models import MODELS
 
 _WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9_]{0,59}")
 
@@ -43,11 +48,28 @@ class Stage:
         return max(q.until for q in self.scene.quantities) if self.scene.lead else math.inf
 
     def job(self, where: str, model: str = "", **values: Any) -> Job:
-        """Return the job of a run of this scene, or of another model, with further values set."""
+        """Return the job of a run of this scene, or of another model, with further values set.
+
+        Raises
+        ------
+        InputError
+            If a value is not legal, or the model has no transient that methods could march.
+        """
         # None: the model's own choice of a stepper
         values = {key: value for key, value in values.items() if value is not None}
         document = {**self.document, "model": model} if model else self.document
-        return build_job(document, where, {**self.values, **values}, "set")
+        job = build_job(document, where, {**self.values, **values}, "set")
+        if job.stepper is None:
+            raise mismatch(f"{where}: model", "one with a transient", job.model)
+        return job
+
+    def setting(self, stepper: str, key: str, raw: Any, where: str, place: str) -> float:
+        """Return a step or a tolerance [SI] of a stepper; where is its table, and place the value's in it."""
+        schema = load_schema(self.document.get("model"), stepper, where)
+        if key not in schema.parameters:
+            known = [name for name in SETTINGS if name in schema.parameters]
+            raise unknown(f"{where} {key}", f"key of stepper {stepper}", key, known)
+        return read_value(schema.parameters[key], raw, place)
 
 
 def read_stage(name: str, raw: Any, document: dict[str, Any], replaced: dict[str, Any], source: str) -> Stage:
@@ -78,6 +100,8 @@ def read_stage(name: str, raw: Any, document: dict[str, Any], replaced: dict[str
     if own["model"]:
         head = {key: document[key] for key in ("name", "description") if key in document}
         base = {**head, "model": own["model"]}
+    if replaced:
+        _check_replaced(replaced, base.get("model"), where, source)
     asked = read_tables(raw.get("quantities"), f"{where} quantities", "quantities")
     quantities = tuple(
         read_quantity(key, table, f"{source}: [chart.scenes.{name}.quantities] {key}")
@@ -90,6 +114,16 @@ def read_stage(name: str, raw: Any, document: dict[str, Any], replaced: dict[str
     if "lead" not in raw:
         return stage
     return replace(stage, scene=replace(scene, lead=_read_lead(stage, raw["lead"])))
+
+
+def _check_replaced(replaced: dict[str, Any], model: Any, where: str, source: str) -> None:
+    """Raise what is wrong with values of the command line, for all steppers of the scene's model."""
+    schemas = [load_schema(model, None, where)]
+    schemas += [load_schema(model, name, where) for name in import_module(MODELS[model]).STEPPER_NAMES]
+    for name, raw in replaced.items():
+        key = name.rpartition(".")[2]
+        schema = next((schema for schema in schemas if key in schema.parameters), schemas[0])
+        read_assignments({name: raw}, schema, source, "--set")
 
 
 def _read_lead(stage: Stage, raw: Any) -> Lead:

@@ -11,7 +11,6 @@ from textwrap import shorten
 from cvt_hpc.chart.comparing import Comparison, Result
 from cvt_hpc.chart.plan import Role
 from cvt_hpc.chart.quantities import KINDS
-from cvt_hpc.files import written_aside
 
 _HEAD = (
     "scene",
@@ -29,30 +28,16 @@ _HEAD = (
 _LONGEST_NOTE = 90  # letters; the whole reason is in the file
 
 
-def write_table(comparisons: Sequence[Comparison], path: Path) -> Path:
-    """Write all results as comma-separated values, a row for each point.
-
-    Parameters
-    ----------
-    comparisons : sequence of Comparison
-        The results.
-    path : Path
-        The file.
-
-    Returns
-    -------
-    Path
-        `path`.
-    """
+def write_table(comparisons: Sequence[Comparison], path: Path) -> None:
+    """Write all results as comma-separated values, a row for each point."""
     rows = [result for comparison in comparisons for result in _results(comparison)]
     names = [name for name in KINDS if any(name in row.errors for row in rows)]
     counters = list(dict.fromkeys(name for row in rows for name in row.measurement.counters))
-    with written_aside(path, parents=True) as aside, aside.open("w", encoding="utf-8", newline="") as file:
+    with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*_HEAD, *_quantity_heads(names), "below_reference", *counters])
         for row in rows:
             writer.writerow([*_head(row), *_quantities(row, names), *_tail(row, counters)])
-    return path
 
 
 def table_lines(comparison: Comparison) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Any
 
@@ -32,12 +32,15 @@ class Axis:
         SI unit; "" for dimensionless numbers and texts.
     description : str
         Of the parameter.
+    spacing : str
+        Of samples: whether they are spread evenly ("linear") or by their logarithm ("log"), for pictures.
     """
 
     name: str
     values: tuple
     unit: str
     description: str
+    spacing: str = field(default="linear", compare=False)
 
 
 def read_axis(name: str, parameter: Parameter, raw: Any, where: str) -> Axis:

@@ -70,7 +70,7 @@ def _index(
         raise mismatch(where, _FORMS, show(entry))
     values = {}
     for name, raw in entry.items():
-        key = schema.find(name, where)
+        key = schema.find(name, f"{where}, {name}")
         values[key] = read_value(schema.parameters[key], raw, f"{where}, {name}")
     index = 0
     for axis in axes:

@@ -44,7 +44,9 @@ def load_job(path: str | Path, overrides: Assignments = ()) -> Job:
     InputError
         If anything is wrong with the file or an override.
     """
-    return build_job(read_document(Path(path)), str(path), overrides)
+    job = build_job(read_document(Path(path)), str(path), overrides)
+    _refuse_what_is_compared_only(job)
+    return job
 
 
 def build_job(
@@ -95,6 +97,17 @@ def build_job(
     kept = read_histories(histories, schema, axes, replaced, source, design.get("runs"))
     given = frozenset(given)
     return Job(name, schema.model, schema.stepper, description, source, parameters, axes, given, design, kept)
+
+
+def _refuse_what_is_compared_only(job: Job) -> None:
+    values = {name: (value,) for name, value in job.parameters.items()}
+    values.update({axis.name: axis.values for axis in job.axes})
+    for key, parameter in job.schema.parameters.items():
+        others = [value for value in values[key] if value != parameter.default]
+        if parameter.compared_only and others:
+            where = f"{job.source}: [{job.schema.section_of[key]}] {key}"
+            expected = f"{show(parameter.default)} in a job of runs; `cvt-hpc chart` compares other values"
+            raise mismatch(where, expected, show(others[0]))
 
 
 def _read_name(head: Mapping[str, Any], source: str) -> str:

@@ -52,7 +52,7 @@ def sampled_axes(
     ranges = [_read_range(*entry) for entry in found.values()]
     shares = _draw(design, len(ranges)).T
     return tuple(
-        Axis(name, tuple(_between(*ends, share).tolist()), parameter.unit, parameter.description)
+        Axis(name, tuple(_between(*ends, share).tolist()), parameter.unit, parameter.description, ends[2])
         for (name, (parameter, _, _)), ends, share in zip(found.items(), ranges, shares, strict=True)
     )
 

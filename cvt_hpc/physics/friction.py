@@ -27,8 +27,9 @@ force.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -106,6 +107,19 @@ def friction_law(
     return FrictionLaw(int(Law[kind.upper()]), float(kinetic), float(gradient), float(speed), *tables)
 
 
+def given_law(parameters: Mapping[str, Any]) -> FrictionLaw:
+    """Return the law that flat parameters [SI] of a run declare, by the keys of its table [friction]."""
+    keys = (
+        "kinetic_friction",
+        "friction_gradient",
+        "stribeck_velocity",
+        "table_force",
+        "table_speed",
+        "table_mu",
+    )
+    return friction_law(parameters["friction_law"], *(parameters[key] for key in keys))
+
+
 @kernel
 def _bracket(grid: np.ndarray, value: float) -> tuple[int, float]:
     """Interval of an ascending grid and the position in it, 0..1; held at both ends."""
@@ -175,6 +189,15 @@ def friction_coefficient(law: FrictionLaw, speed: float, force: float) -> tuple[
     if law.kind == 5:
         return _table_lookup(law, speed, force)
     return formula_coefficient(law.kind, law.kinetic, law.gradient, law.speed, speed)
+
+
+@kernel
+def friction_coefficients(law: FrictionLaw, speeds: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """Coefficients of friction (n,) [1] at sliding speeds (n,) [m/s] under normal line forces (n,) [N/m]."""
+    found = np.empty_like(speeds)
+    for k in range(speeds.size):
+        found[k] = friction_coefficient(law, speeds[k], forces[k])[0]
+    return found
 
 
 @kernel

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -72,3 +74,25 @@ def variator(ratio: float, driven_radius: float, centre_distance: float) -> Vari
         np.pi + 2.0 * psi,
         centre_distance * np.cos(psi),
     )
+
+
+def variator_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems of a variator's geometry, in the form of a model's check: (key, expected, found).
+
+    Parameters
+    ----------
+    parameters : mapping
+        Values by name [SI], of which those that `variator` takes count.
+    """
+    p = parameters
+    try:
+        variator(p["ratio"], p["driven_radius"], p["centre_distance"])
+    except ValueError:
+        expected = (
+            "pulleys that do not overlap: driven_radius (1 + 1 / ratio) < centre_distance "
+            f"{p['centre_distance']:g} m"
+        )
+        radius = p["driven_radius"] / p["ratio"]
+        found = f"ratio {p['ratio']:g}, radii {radius:g} m and {p['driven_radius']:g} m"
+        return [("ratio", expected, found)]
+    return []

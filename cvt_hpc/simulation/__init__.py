@@ -1,4 +1,4 @@
-"""One run: a model marched by a stepper, recorded, judged, and turned into one record or a full history."""
+"""One run: a model marched by a stepper, or solved at once, judged, and turned into a record or a history."""
 
 from cvt_hpc.simulation.batches import estimate_cost, lane_groups, run_costs
 from cvt_hpc.simulation.history import run_points_keeping, simulate

@@ -45,6 +45,7 @@ PARAMETERS = {
             "sweeps of projected Gauss-Seidel in each step's contact, for comparison; 0: solved exactly",
             minimum=0,
             maximum=10_000,
+            compared_only=True,
         ),
     }
 }

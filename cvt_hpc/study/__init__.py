@@ -4,12 +4,13 @@ from cvt_hpc.study.gather import gather, open_results
 from cvt_hpc.study.launch import process_rank
 from cvt_hpc.study.report import FailedRun, RunReport
 from cvt_hpc.study.status import StudyStatus, read_status
-from cvt_hpc.study.sweep import run
+from cvt_hpc.study.sweep import check_start, run
 
 __all__ = [
     "FailedRun",
     "RunReport",
     "StudyStatus",
+    "check_start",
     "gather",
     "open_results",
     "process_rank",

@@ -33,12 +33,15 @@ class Dimension:
         CF unit; "" for texts.
     long_name : str
         CF long_name.
+    spacing : str
+        "log" for samples that are spread evenly by their logarithm.
     """
 
     name: str
     values: tuple
     units: str
     long_name: str
+    spacing: str = "linear"
 
     @property
     def holds_texts(self) -> bool:
@@ -56,7 +59,8 @@ class Dimension:
         values = entry["values"]
         if not entry["texts"]:
             values = [float(v) if isinstance(v, str) else v for v in values]
-        return cls(entry["name"], tuple(values), entry["units"], entry["long_name"])
+        spacing = entry.get("spacing", "linear")  # folders of earlier versions do not tell
+        return cls(entry["name"], tuple(values), entry["units"], entry["long_name"], spacing)
 
 
 @dataclass(frozen=True)
@@ -228,7 +232,7 @@ def fit_text(text: str, size: int) -> bytes:
 def _grid_dimension(axis: Any) -> Dimension:
     values = tuple(np.asarray(axis.values).tolist())
     units = "" if isinstance(values[0], str) else axis.unit or "1"
-    return Dimension(axis.name, values, units, axis.description)
+    return Dimension(axis.name, values, units, axis.description, axis.spacing)
 
 
 def _variable_to_json(variable: Variable) -> dict[str, Any]:

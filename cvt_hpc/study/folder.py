@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import platform
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import naming_refusals, written_aside
 from cvt_hpc.study.description import Study
+from cvt_hpc.study.difference import refuse_other
+from cvt_hpc.study.frames import MAGIC
 from cvt_hpc.study.lock import is_locked, locked
 from cvt_hpc.study.part import Part
+from cvt_hpc.study.recovery import read_records
 
 FORMAT = "cvt_hpc study 1"
+CHART_FILE = "chart.json"  # what the other kind of output folder is known by
 _PART_LOCKS = ".part-*.lock"
+_logger = logging.getLogger(__name__)
+
+
+class DamagedJobError(InputError):
+    """The file that says whose an output folder is cannot be read; what lies beside it may tell."""
 
 
 class StudyFolder:
@@ -55,9 +64,14 @@ class StudyFolder:
             if not self.path.is_dir():
                 found = "a file" if self.path.exists() else "nothing"
                 raise InputError(f"{self.path}: expected the output folder of a run, found {found}")
-            study = self._read_job()
+            advice = "; `cvt-hpc run` of its job goes on and writes it anew" if self._has_logs() else ""
+            try:
+                study = self._read_job()
+            except DamagedJobError as error:
+                raise InputError(f"{error}{advice}") from error
         if study is None:
-            raise InputError(f"{self.path}: expected the output folder of a run, found no job.json in it")
+            found = f"no job.json in it{advice}"
+            raise InputError(f"{self.path}: expected the output folder of a run, found {found}")
         return study
 
     def check_free_for(self, study: Study, fresh: bool) -> None:
@@ -73,20 +87,25 @@ class StudyFolder:
         Raises
         ------
         InputError
-            If the folder is a file, holds another job, or holds results that no job.json explains.
+            If the folder is a file or that of a chart, holds another job, or holds results that neither a
+            job.json nor the logs explain.
         """
         with naming_refusals(self.path, "a folder that can be read"):
             if self.path.is_dir():
+                expected = f"{self.path}: expected an empty folder or that of an earlier run, found"
+                if (self.path / CHART_FILE).exists():
+                    raise InputError(f"{expected} that of a chart; choose another --out")
                 # In this order: a run of another part writes its job.json before any records.
                 unexplained = self._results_or_records()
-                found = self._read_job()
+                try:
+                    found = self._read_job()
+                except DamagedJobError as error:
+                    self._ask_logs(study, fresh, str(error))
+                    return
                 if found is None and unexplained is not None:
-                    raise InputError(
-                        f"{self.path}: expected an empty folder or that of an earlier run, found "
-                        f"{unexplained.name} without a job.json; choose another --out"
-                    )
+                    self._ask_logs(study, fresh, f"{expected} {unexplained.name} without a job.json")
                 if found is not None and not fresh:
-                    self._refuse_other(found, study)
+                    refuse_other(self.path, found, study)
             elif self.path.exists():
                 raise InputError(f"{self.path}: expected a folder for the results, found a file")
 
@@ -105,11 +124,17 @@ class StudyFolder:
             probe.unlink()
 
     def save(self, study: Study) -> None:
-        """Write job.json, unless it is there."""
-        if not self.job_file.exists():
-            text = json.dumps({"format": FORMAT, **study.to_json()}, indent=1, allow_nan=False)
-            with written_aside(self.job_file) as aside:
-                aside.write_text(text)
+        """Write job.json, unless a sound one is there."""
+        with suppress(DamagedJobError):
+            if self._read_job() is not None:
+                return
+        if self._has_logs():
+            _logger.warning(
+                "%s: damaged or gone; written anew, since the records are of this job", self.job_file
+            )
+        text = json.dumps({"format": FORMAT, **study.to_json()}, indent=1, allow_nan=False)
+        with written_aside(self.job_file) as aside:
+            aside.write_text(text)
 
     def clear(self) -> None:
         """Remove what runs have written: results, records, and last the job.json that vouches for them."""
@@ -155,15 +180,34 @@ class StudyFolder:
             entry = json.loads(self.job_file.read_bytes())
         except FileNotFoundError:
             return None
-        except (OSError, ValueError) as error:
-            raise InputError(f"{self.job_file}: expected the job of a run, found: {error}") from error
+        except ValueError as error:
+            found = f"damage ({error})"
+            raise DamagedJobError(f"{self.job_file}: expected the job of a run, found {found}") from error
         found = entry.get("format") if isinstance(entry, dict) else None
         if found != FORMAT:
             raise InputError(f'{self.job_file}: expected format "{FORMAT}", found {json.dumps(found)}')
         try:
             return Study.from_json(entry)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise InputError(f"{self.job_file}: expected a job as runs write it, found: {error!r}") from error
+            found = f"damage ({error!r})"
+            raise DamagedJobError(f"{self.job_file}: expected the job of a run, found {found}") from error
+
+    def _has_logs(self) -> bool:
+        """Return whether runs have left logs here, of whatever job."""
+        logs = (path for path in self.records.glob("rank-*.log") if path.is_file())
+        for log in logs:
+            with log.open("rb") as file:
+                if file.read(len(MAGIC)) == MAGIC:
+                    return True
+        return False
+
+    def _ask_logs(self, study: Study, fresh: bool, complaint: str) -> None:
+        """Raise the complaint unless the logs make up for job.json: they are to go, or are of this study."""
+        has_logs = self._has_logs()
+        if has_logs and (fresh or read_records(self.records, study).recorded.any()):
+            return
+        advice = ", or --fresh to throw away its logs, which hold no record of this job" if has_logs else ""
+        raise InputError(f"{complaint}; choose another --out{advice}")
 
     def _results_or_records(self) -> Path | None:
         """Return what is here that only a job.json explains; hidden files are probes of another start."""
@@ -171,44 +215,3 @@ class StudyFolder:
             if path.is_file() or (path.is_dir() and any(p.name[0] != "." for p in path.iterdir())):
                 return path
         return None
-
-    def _refuse_other(self, found: Study, study: Study) -> None:
-        if found.fingerprint != study.fingerprint:
-            difference = describe_difference(found.job, study.job)
-            raise InputError(
-                f"{self.path}: expected the folder of this job, found that of another (job {found.name}: "
-                f"{difference}); choose another --out, or --fresh to throw its results away"
-            )
-        if _layout(found) != _layout(study):
-            raise InputError(
-                f"{self.path}: expected records with the quantities of this version, found others; choose "
-                "another --out, or --fresh to throw them away"
-            )
-
-
-def describe_difference(found: dict[str, Any], asked: dict[str, Any]) -> str:
-    """Return the first few entries in which two resolved jobs differ, as "key is 1 there, 2 here"."""
-    there, here = _flatten(found), _flatten(asked)
-    keys = [key for key in {**there, **here} if there.get(key) != here.get(key)]
-    shown = [f"{key} is {_short(there.get(key))} there, {_short(here.get(key))} here" for key in keys[:3]]
-    return "; ".join(shown) + ("; ..." if len(keys) > 3 else "")
-
-
-def _layout(study: Study) -> dict[str, Any]:
-    """Return what records must agree in to be of one dataset."""
-    return {
-        "quantities": [(v.name, v.dims, v.dtype) for v in study.variables],
-        "coordinates": [(dimension.name, dimension.values) for dimension in study.coordinates],
-    }
-
-
-def _flatten(entry: Any, prefix: str = "") -> dict[str, Any]:
-    if not isinstance(entry, dict):
-        return {prefix: entry}
-    parts = (_flatten(value, f"{prefix}.{key}" if prefix else key) for key, value in entry.items())
-    return {key: value for part in parts for key, value in part.items()}
-
-
-def _short(value: Any) -> str:
-    text = "not set" if value is None else json.dumps(value)
-    return text if len(text) <= 40 else text[:37] + "..."

@@ -19,6 +19,7 @@ from cvt_hpc.study.batches import Batch, share_out
 from cvt_hpc.study.cost_model import CostModel, Fit
 
 _EVENTS = 1_000_000  # claims to be simulated in all repeats, as far as their least number allows
+MOST_RANKS = 1_000_000  # each takes some us of every repeat
 _FEWEST_REPEATS, _MOST_REPEATS = 20, 200
 _INTERVAL = (0.025, 0.975)  # quantiles between which 95 % of the repeats lie
 CURVE = tuple(np.unique(np.logspace(0, 4, 25).round().astype(int)).tolist())  # ranks, for a picture
@@ -49,7 +50,6 @@ class ClaimTimes(NamedTuple):
 # Between processes that share no memory 0.05 to 0.08 ms were measured, 11 ms at most, which is taken for one
 # claim in 10^4, at 3.7 standard deviations. That a larger network does no worse is an assumption.
 NETWORK = ClaimTimes(2e-6, 65e-6, math.log(11e-3 / 65e-6) / 3.7)
-SHARED_MEMORY = ClaimTimes(2e-6, 0.0, 0.0)
 
 
 class Forecast(NamedTuple):

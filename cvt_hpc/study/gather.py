@@ -188,6 +188,8 @@ def _coordinate(dimension: Dimension, along: str | tuple[str, ...]) -> tuple[Any
     attributes = {"long_name": dimension.long_name}
     if dimension.units:
         attributes["units"] = dimension.units
+    if dimension.spacing == "log":
+        attributes["spacing"] = dimension.spacing
     values = np.array(dimension.values, dtype=object if dimension.holds_texts else None)
     return along, values, attributes
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import shlex
 import subprocess
@@ -57,6 +58,18 @@ def versions() -> dict[str, str]:
         except metadata.PackageNotFoundError:
             continue
     return found
+
+
+def machine() -> dict[str, Any]:
+    """Return what times depend on: the processor and how many cores there are, as JSON types."""
+    processor = platform.processor()
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            names = [line.partition(":")[2].strip() for line in file if line.startswith("model name")]
+            processor = names[0] if names else processor
+    except OSError:
+        pass  # not Linux
+    return {"processor": processor, "architecture": platform.machine(), "cores": os.cpu_count()}
 
 
 def git_revision() -> str:

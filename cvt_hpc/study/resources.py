@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
 _START_UP = 60.0  # [s] for MPI, Python and kernels; assumed, with room for slow file systems
-_WARNING = 180.0  # [s]: slurm/*.sbatch ask to be told 120 s before the end, and Slurm may be 60 s early
 _STEP = 300.0  # [s] to which a time limit is rounded up
 
 
@@ -72,7 +71,7 @@ def suggested_time(forecast: Forecast, runs: int) -> float:
     runs : int
         Number of runs of the study.
     """
-    needed = _START_UP + forecast.makespan[2] + max(_WARNING, gathering_margin(runs))
+    needed = _START_UP + forecast.makespan[2] + gathering_margin(runs)
     return _STEP * math.ceil(needed / _STEP)
 
 

@@ -17,7 +17,7 @@ from cvt_hpc.errors import mismatch
 from cvt_hpc.files import StorageError
 from cvt_hpc.study.cost_model import CostModel
 from cvt_hpc.study.deaths import outlive
-from cvt_hpc.study.description import describe
+from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.frames import RecordFormat
 from cvt_hpc.study.gather import gather_records
@@ -96,16 +96,9 @@ def run(
         there is no such part, or it is to start over: the other parts would lose their runs.
     """
     started = time.monotonic()
-    share = None if part is None else read_part(part)
-    if share is not None and fresh:
-        raise mismatch("fresh", "a run of the whole study", f"part {share}, and the others would lose theirs")
     simulator = simulator or default_simulator()
-    study = describe(job, simulator)
-    if share is not None and study.is_traced:
-        raise mismatch("part", "a whole study, since a trace goes by the runs of all parts", f"part {share}")
+    study, share, folder = _accept(job, out, part, fresh, simulator)
     task = Task(job, study, simulator, run_limit)
-
-    folder = StudyFolder(out if out is not None else Path("out") / job.name)
     first = True
 
     def sweep(team: Team) -> RunReport:
@@ -139,6 +132,27 @@ def run(
 
     with SignalWatch() as signals, assembled_team(folder.crash_log) as team:
         return outlive(team, sweep)
+
+
+def check_start(
+    job: Job, out: str | Path | None = None, *, part: str | None = None, fresh: bool = False
+) -> None:
+    """Raise the InputError that `run` would raise before it computes anything; touches nothing."""
+    study, _, folder = _accept(job, out, part, fresh, default_simulator())
+    folder.check_free_for(study, fresh)
+
+
+def _accept(
+    job: Job, out: str | Path | None, part: str | None, fresh: bool, simulator: Simulator
+) -> tuple[Study, Part | None, StudyFolder]:
+    """Return what is to be run and where, if it fits together."""
+    share = None if part is None else read_part(part)
+    if share is not None and fresh:
+        raise mismatch("fresh", "a run of the whole study", f"part {share}, and the others would lose theirs")
+    study = describe(job, simulator)
+    if share is not None and study.is_traced:
+        raise mismatch("part", "a whole study, since a trace goes by the runs of all parts", f"part {share}")
+    return study, share, StudyFolder(out if out is not None else Path("out") / job.name)
 
 
 def _compute(

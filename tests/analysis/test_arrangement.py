@@ -13,7 +13,7 @@ from cvt_hpc.variables import Status
 
 
 def test_load_runs_along_x_gradient_along_y_and_stiffness_over_panels():
-    chosen = arrange(study().transpose("load", "sheave_stiffness", ...), {})
+    chosen = arrange(study().transpose("load", "sheave_stiffness", ...), {}, "out/x")
     assert (chosen.x, chosen.y, chosen.panel, chosen.notes) == (
         "load",
         "friction_gradient",
@@ -55,18 +55,18 @@ def with_axes(**axes):
     ],
 )
 def test_other_axes_are_laid_out_sensibly(axes, at, expected):
-    chosen = arrange(with_axes(**{name: [1.0, 2.0] for name in axes}), at)
+    chosen = arrange(with_axes(**{name: [1.0, 2.0] for name in axes}), at, "out/x")
     assert (chosen.x, chosen.y, chosen.panel) == expected
     assert set(chosen.dataset["status"].dims) == {name for name in expected if name}
 
 
 def test_texts_are_no_x_axis_where_there_are_numbers():
     dataset = with_axes(load_history=["constant", "ramp"], ratio=[1.0, 2.0])
-    assert (arrange(dataset, {}).x, arrange(dataset, {}).y) == ("ratio", "load_history")
-    assert arrange(dataset, {"ratio": 1.0}).x == "load_history"
-    assert arrange(dataset, {"load_history": "ramp"}).notes == ("load history = ramp",)
+    assert (arrange(dataset, {}, "out/x").x, arrange(dataset, {}, "r").y) == ("ratio", "load_history")
+    assert arrange(dataset, {"ratio": 1.0}, "out/x").x == "load_history"
+    assert arrange(dataset, {"load_history": "ramp"}, "out/x").notes == ("load history = ramp",)
     flags_as_axis = with_axes(refined=[False, True], ratio=[1.0, 2.0])
-    assert arrange(flags_as_axis, {"refined": True}).notes == ("refined = True",)
+    assert arrange(flags_as_axis, {"refined": True}, "out/x").notes == ("refined = True",)
 
 
 def test_what_is_fixed_is_said():
@@ -75,13 +75,14 @@ def test_what_is_fixed_is_said():
     )
     dataset["thrust"].attrs["units"] = "N"
     dataset["status"][0, 1] = Status.TIMED_OUT
-    chosen = arrange(dataset, {"thrust": 3e4})
+    chosen = arrange(dataset, {"thrust": 3e4}, "out/x")
     assert chosen.notes == ("thrust = 30 kN", "ratio = 2.5 (first of 2)")
     assert chosen.dataset["status"].values.tolist() == [[[Status.TIMED_OUT]]]
 
 
 def test_panels_and_rows_are_sorted_with_their_values():
-    chosen = arrange(study(gradients=(-0.8, -2.4), stiffnesses=(np.inf, 1.0), loads=(200.0, 120.0, 20.0)), {})
+    turned = study(gradients=(-0.8, -2.4), stiffnesses=(np.inf, 1.0), loads=(200.0, 120.0, 20.0))
+    chosen = arrange(turned, {}, "out/x")
     assert chosen.dataset["sheave_stiffness"].values.tolist() == [1.0, np.inf]
     assert chosen.dataset["load"].values.tolist() == [20.0, 120.0, 200.0]
     classes = occurrence_classes(chosen.dataset)
@@ -91,28 +92,28 @@ def test_panels_and_rows_are_sorted_with_their_values():
 @pytest.mark.parametrize(
     ("at", "message"),
     [
-        ({"lod": 20.0}, "unknown axis of the results; did you mean load?"),
+        ({"lod": 20.0}, "at lod: unknown axis of the results; did you mean load?"),
         ({"load": 21.0}, "at load: expected a value of that axis: 20, 40, .* \\[N m\\], found 21.0"),
         ({"load": "much"}, "found 'much'"),
         (
             {"load": 20, "friction_gradient": -2.4, "sheave_stiffness": 1},
-            "one axis or more, found a single run",
+            "expected results over one axis or more to be drawn, found a single run",
         ),
     ],
 )
 def test_what_cannot_be_fixed_is_refused(at, message, tmp_path):
     out = tmp_path / "map.png"
-    with pytest.raises(InputError, match=message):
-        draw_map(study(), out, at)
+    with pytest.raises(InputError, match=f"^out/x: .*{message}"):
+        draw_map(study(), out, at, "out/x")
     assert not any(tmp_path.iterdir())
 
 
 def test_of_many_values_the_error_names_a_few():
     dataset = with_axes(load=np.arange(1.0, 101.0), refined=[False, True])
     with pytest.raises(InputError, match=r"axis: 1, 2, .* 11, [.]{3}, 100, found 0.5"):
-        arrange(dataset, {"load": 0.5})
+        arrange(dataset, {"load": 0.5}, "out/x")
     with pytest.raises(InputError, match="axis: False, True, found 'maybe'"):
-        arrange(dataset, {"refined": "maybe"})
+        arrange(dataset, {"refined": "maybe"}, "out/x")
 
 
 @pytest.mark.parametrize(
@@ -139,7 +140,7 @@ def test_a_value_is_found_by_number_or_text():
     dataset = with_axes(load=[1.0, 2.0], ratio=[0.1, third], sheave_stiffness=[1.0, np.inf])
     dataset["status"][:, 1, 1] = Status.TIMED_OUT
     for ratio, stiffness in ((0.3, np.inf), ("0.3", "inf")):
-        chosen = arrange(dataset, {"ratio": ratio, "sheave_stiffness": stiffness})
+        chosen = arrange(dataset, {"ratio": ratio, "sheave_stiffness": stiffness}, "out/x")
         assert (chosen.dataset["status"] == Status.TIMED_OUT).all()
         assert "sheave stiffness = rigid" in chosen.notes
 

@@ -22,7 +22,7 @@ SOFT = {"sheave_stiffness": 1.0}
 def trace_panel():
     """The figure of one panel of a trace, the panel, and the classes of its cells."""
     with matplotlib.rc_context(STYLE):
-        figure = map_figure(arrange(traced(), SOFT))
+        figure = map_figure(arrange(traced(), SOFT, "out/x"))
     return figure, figure.axes[0], occurrence_classes(study().sel(SOFT)).values
 
 
@@ -68,7 +68,7 @@ def test_runs_and_inferred_cells_are_counted_apart():
 
 def test_a_full_grid_says_nothing_of_inference():
     with matplotlib.rc_context(STYLE):
-        figure = map_figure(arrange(study(), SOFT))
+        figure = map_figure(arrange(study(), SOFT, "out/x"))
     assert "inferred" not in figure.get_suptitle()
     assert "inferred" not in [text.get_text() for text in figure.legends[0].get_texts()]
 
@@ -85,7 +85,9 @@ def test_samples_are_told_from_a_grid():
 def test_every_sample_is_marked_at_its_place_by_its_class():
     dataset = sampled().isel(run=slice(0, 40))
     dataset = dataset.drop_vars("sheave_stiffness")
-    (panel,) = [axes for axes in scatter_figure(dataset, {}).axes if axes.get_label() != "<colorbar>"]
+    (panel,) = [
+        axes for axes in scatter_figure(dataset, {}, "out/x").axes if axes.get_label() != "<colorbar>"
+    ]
     assert (panel.get_xlabel(), panel.get_ylabel()) == ("load [N m]", "friction gradient [s/m]")
     classes = occurrence_classes(dataset).values
     by_label = {marks.get_label(): marks.get_offsets() for marks in panel.collections}
@@ -102,18 +104,32 @@ def of(classes, kind):
 
 
 def test_a_panel_for_each_pair_of_axes():
-    panels = [axes for axes in scatter_figure(sampled(), {}).axes if axes.get_label() != "<colorbar>"]
+    panels = [
+        axes for axes in scatter_figure(sampled(), {}, "out/x").axes if axes.get_label() != "<colorbar>"
+    ]
     shown = [(axes.get_xlabel(), axes.get_ylabel()) for axes in panels if axes.axison]
     load, gradient, stiffness = "load [N m]", "friction gradient [s/m]", "sheave stiffness"
     assert shown == [(load, gradient), (load, stiffness), (gradient, stiffness)]
     alone = sampled().drop_vars(["sheave_stiffness", "friction_gradient"])
-    (axes,) = [axes for axes in scatter_figure(alone, {}).axes if axes.get_label() != "<colorbar>"]
+    (axes,) = [axes for axes in scatter_figure(alone, {}, "out/x").axes if axes.get_label() != "<colorbar>"]
     assert (axes.get_xlabel(), axes.get_ylabel()) == (load, "")
+
+
+def test_axes_are_spread_as_their_samples_are():
+    dataset = sampled().isel(run=slice(0, 30))
+    dataset["sheave_stiffness"] = "run", np.geomspace(1.0, 3.0, 30), {"spacing": "log"}
+    figure = scatter_figure(dataset, {}, "out/x")
+    panels = [axes for axes in figure.axes if axes.axison and axes.get_label() != "<colorbar>"]
+    scales = {axes.get_ylabel(): (axes.get_xscale(), axes.get_yscale()) for axes in panels}
+    assert scales == {"friction gradient [s/m]": ("linear", "linear"), "sheave stiffness": ("linear", "log")}
+    figure.draw_without_rendering()
+    texts = [text.get_text() for text in panels[1].get_yticklabels()]
+    assert {"1", "1.5", "2", "3"} <= set(texts)
 
 
 def test_of_many_axes_the_first_are_drawn_and_that_is_said():
     dataset = sampled().assign_coords({name: ("run", np.arange(120.0)) for name in ("ratio", "thrust")})
-    figure = scatter_figure(dataset, {})
+    figure = scatter_figure(dataset, {}, "out/x")
     assert len([axes for axes in figure.axes if axes.axison and axes.get_label() != "<colorbar>"]) == 6
     assert "the first 4 of 5 axes" in figure.get_suptitle()
 
@@ -122,6 +138,6 @@ def test_samples_are_drawn_by_the_same_call_as_grids(tmp_path):
     finite = sampled().where(np.isfinite(sampled()["sheave_stiffness"]), drop=True)
     with Image.open(draw_map(finite, tmp_path / "map.png")) as picture:
         assert len(picture.convert("RGB").getcolors(1 << 20)) > 20
-    with pytest.raises(InputError, match="at load: expected results over a grid, found samples"):
-        draw_map(finite, tmp_path / "other.png", {"load": 20.0})
+    with pytest.raises(InputError, match="^x.nc: at load: expected results over a grid, found samples"):
+        draw_map(finite, tmp_path / "other.png", {"load": 20.0}, "x.nc")
     assert not (tmp_path / "other.png").exists()

@@ -2,6 +2,8 @@
 
 import json
 import os
+from itertools import combinations
+from textwrap import wrap
 
 import matplotlib
 import numpy as np
@@ -9,11 +11,13 @@ import pytest
 import xarray as xr
 from runs import PROBES, RATE, run
 
-from cvt_hpc.analysis.figures import STYLE
+from cvt_hpc.analysis.figures import STYLE, balanced
 from cvt_hpc.analysis.histories import draw_history, history_figure
 from cvt_hpc.analysis.history_panels import read_strands
 from cvt_hpc.errors import InputError
 from cvt_hpc.history_files import is_history, write_history
+from cvt_hpc.job import load_job
+from cvt_hpc.printing import point_lines
 from cvt_hpc.variables import Status
 
 BAND = (100.0, 1500.0)
@@ -168,8 +172,72 @@ def test_the_title_says_what_became_of_the_run():
     assert figure_of(run()).get_suptitle().startswith("One run: ramp\nvibrates: yes (t1 vibrates")
     failed = run().assign(status=np.int8(Status.FAILED_NUMERICS), reason=b"not a number at 0.02 s")
     title = figure_of(failed).get_suptitle()
-    assert title.endswith("failed numerics: not a number at 0.02 s")
+    assert title.endswith("failed numerics: not a number at 0.02\u00a0s")
     assert "vibrates" not in title
+
+
+def test_the_title_says_which_run_it_is(write_job):
+    job = load_job(
+        write_job("""[scene]
+thrust = "20 kN"
+[axes]
+load = [0, 50, 120]
+sheave_stiffness = [1, inf]
+""")
+    )
+    point = job.point_at({"load": 50.0, "sheave_stiffness": np.inf, "ratio": 2.0})
+    told = {key: repr(value) if value == np.inf else value for key, value in point.items()}
+    attributes = {"job": json.dumps(job.resolved()), "point": json.dumps(told)}
+    lines = figure_of(run().assign_attrs(attributes)).get_suptitle().splitlines()
+    assert lines[1].replace("\u00a0", " ") == "load 50 N m, sheave_stiffness inf, ratio 2"
+    (printed,) = point_lines(job, {"load": 50.0, "sheave_stiffness": np.inf, "ratio": 2.0})
+    assert printed.endswith(lines[1].replace("\u00a0", " "))
+
+
+@pytest.mark.parametrize("width", [20, 30, 45, 76])
+def test_lines_of_a_title_are_of_like_length_and_keep_numbers_with_units(width):
+    line = "vibrates: yes (t1 vibrates for the last 0.2 s, 27.2 um at the end, growth 0.037 1/s)"
+    lines = balanced(line, width).split("\n")
+    assert " ".join(lines).replace("\u00a0", " ") == line
+    assert len(lines) == len(wrap(line.replace("0.2 s", "0.2_s").replace("27.2 u", "27.2_u"), width))
+    assert max(map(len, lines)) <= width and len(lines[-1]) > 0.5 * max(map(len, lines))
+    assert any("27.2\u00a0um" in part for part in lines)
+
+
+def boxes(figure, artists):
+    figure.draw_without_rendering()
+    return [artist.get_window_extent() for artist in artists]
+
+
+def test_labels_and_legends_cover_nothing():
+    level = run()
+    level["ring_tension"][:] = 9e3
+    figure = figure_of(level)
+    spectrum, forces = panel(figure, "amplitude [µm]"), panel(figure, "force [kN]")
+    labels = boxes(figure, spectrum.texts)
+    assert not any(a.overlaps(b) for a, b in combinations(labels, 2))
+    first, second = (line for line in spectrum.lines if line.get_label()[0] == "t")
+    for text, box in zip(spectrum.texts, labels, strict=True):
+        assert box.x0 > spectrum.bbox.x0 and box.x1 < spectrum.bbox.x1
+        other = second if text.get_color() == first.get_color() else first
+        assert not other.get_path().transformed(spectrum.transData).intersects_bbox(box, filled=False)
+    for axes in (spectrum, forces):
+        (legend,) = boxes(figure, [axes.get_legend()])
+        for line in axes.lines:
+            assert not line.get_path().transformed(axes.transData).intersects_bbox(legend, filled=False)
+
+
+@pytest.mark.parametrize("frequency", [120.0, 1480.0])
+def test_labels_stay_within_the_spectrum(frequency):
+    at_the_edge = run()
+    wave = 10e-6 * np.sin(2 * np.pi * frequency * at_the_edge["time"].values)
+    at_the_edge["displacement"][:] = wave[:, np.newaxis]
+    at_the_edge.attrs["job"] = json.dumps({"vibration": {"band_low": 100.0}})
+    figure = figure_of(at_the_edge)
+    spectrum = panel(figure, "amplitude [µm]")
+    assert len(spectrum.texts) == 2
+    for box in boxes(figure, spectrum.texts):
+        assert box.x0 > spectrum.bbox.x0 and box.x1 < spectrum.bbox.x1
 
 
 def test_a_failed_run_is_drawn_up_to_where_it_failed():

@@ -26,7 +26,7 @@ QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN = OccurrenceClass
 
 def figure_of(dataset, at=()):
     with matplotlib.rc_context(STYLE):
-        return map_figure(arrange(dataset, dict(at)))
+        return map_figure(arrange(dataset, dict(at), "out/x"))
 
 
 def panels_of(figure):
@@ -179,8 +179,15 @@ def test_the_file_is_as_wide_as_a_telephone_and_the_same_every_time(tmp_path):
 def test_a_picture_that_cannot_be_drawn_leaves_the_old_one(tmp_path):
     out = tmp_path / "map.png"
     out.write_text("old")
-    with pytest.raises(InputError, match="the variable status"):
-        draw_map(xr.Dataset({"load": ("x", [1.0])}), out)
+    many = xr.Dataset({f"v{i}": ("x", [1.0]) for i in range(30)})
+    for dataset, found in (
+        (many, "v0, v1, v2, v3, v4, ..., v29"),
+        (many[["v1"]], "v1"),
+        (many[[]], "no variables"),
+    ):
+        message = f"^x.nc: expected results of a study, with the variable status, found {found}$"
+        with pytest.raises(InputError, match=message):
+            draw_map(dataset, out, source="x.nc")
     with pytest.raises(InputError, match=r"[.]png, [.]svg, [.]pdf, found [.]jpg"):
         draw_map(study(), tmp_path / "map.jpg")
     (tmp_path / "file").write_text("")

@@ -23,9 +23,11 @@ from cvt_hpc.models.elastic_belt import imex, imex_stations, imex_system, lane_f
 from cvt_hpc.models.elastic_belt.batch import PRECISIONS, Batch
 from cvt_hpc.models.elastic_belt.lane_belt import REPEATS
 from cvt_hpc.physics import lane_compliance, lane_friction
+from cvt_hpc.steppers.imex import PARAMETERS
 
 CALLS = 15
 STATIONS = 160
+STEP = PARAMETERS["numerics"]["step"].default
 
 
 class Counted:
@@ -252,13 +254,12 @@ def step_time(precision: str, step: float, runs: int) -> float:
 
 def main() -> None:
     """Print the table."""
-    step = 5e-6
     for precision in ("single", "double"):
-        needs, gives = count(step, precision), ceilings(precision)
+        needs, gives = count(STEP, precision), ceilings(precision)
         vector = needs["sums and products"] + needs["fused"] + needs["comparisons"] + needs["other"]
         flops = needs["sums and products"] + 2 * needs["fused"] + needs["quotients and roots"]
         moved = needs["array read"] + needs["array written"]
-        took, alone = step_time(precision, step, gives.width), step_time(precision, step, 1)
+        took, alone = step_time(precision, STEP, gives.width), step_time(precision, STEP, 1)
         floors = {
             "arithmetic": vector / gives.fused,
             "quotients and roots": needs["quotients and roots"] / gives.quotients,

@@ -30,7 +30,7 @@ from cvt_hpc.study import process_rank, run  # noqa: E402
 from cvt_hpc.study.batches import share_out  # noqa: E402
 from cvt_hpc.study.cost_model import Fit  # noqa: E402
 from cvt_hpc.study.forecast import (  # noqa: E402
-    SHARED_MEMORY,
+    ClaimTimes,
     Forecast,
     forecast,
     least_makespan,
@@ -40,6 +40,7 @@ from cvt_hpc.study.launch import assembled_team  # noqa: E402
 from cvt_hpc.study.schedule import open_counter  # noqa: E402
 from cvt_hpc.study.status import find_records  # noqa: E402
 
+SHARED_MEMORY = ClaimTimes(2e-6, 0.0, 0.0)
 RANKS = (2, 4)
 ROWS, CLAIMS = 400, 50  # of each rank: rows of claims
 MEAN = 0.06  # [s] of a run's predicted duration

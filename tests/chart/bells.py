@@ -133,10 +133,9 @@ step = ["2 ms", "1 us", "10 us", "0.2 ms"]
 stepper = "clever"
 tolerance = [0.01, 0.1, 0.5]
 
-[chart.methods.brief]
+[chart.methods.hard]
 stepper = "hard"
 step = ["1 us"]
-until = "20 ms"
 
 [chart.budget]
 label = "the default"

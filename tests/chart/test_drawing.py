@@ -81,7 +81,7 @@ quantities = { amplitude = {} }
 [chart.methods.soft]
 scenes = ["ringing"]"""
     chart = load_chart(
-        write_chart(("[chart.methods.soft]", other), ('"20 ms"', '"20 ms"\nscenes = ["ringing"]'))
+        write_chart(("[chart.methods.soft]", other), ('"hard"', '"hard"\nscenes = ["ringing"]'))
     )
     found = {p.name: measure(p, chart.scene(p.scene), 1, 3600.0) for p in chart.points}
     looks = []
@@ -125,7 +125,7 @@ def test_what_failed_is_listed_under_the_panels(figure):
 def test_the_legend_explains_all_signs(figure, write_chart):
     names = [text.get_text() for text in figure.legends[0].texts]
     assert names == [
-        "soft hammer", "clever", "brief", "below the reference's error", "tolerance",
+        "soft hammer", "clever", "hard", "below the reference's error", "tolerance",
         "cheapest within all tolerances",
     ]  # fmt: skip
     exact = drawn(scene_figure, comparison_of(write_chart()))

@@ -23,7 +23,7 @@ def test_a_chart_holds_every_run_that_it_needs(write_chart):
         "ringing-exact",
         *(f"ringing-soft-{k}" for k in (1, 2, 3, 4)),
         *(f"ringing-clever-{k}" for k in (1, 2, 3)),
-        "ringing-brief-1",
+        "ringing-hard-1",
         "ringing-base",
         "ringing-choice-louder",
         "ringing-choice-fine",
@@ -36,7 +36,7 @@ def test_a_chart_holds_every_run_that_it_needs(write_chart):
     assert soft.setting_in_words == "1\u00a0µs"
     assert soft.job.parameters["loudness"] == 20e-6 and soft.job.stepper == "soft"
     assert by_name["ringing-clever-1"].setting_in_words == "0.01"
-    assert by_name["ringing-brief-1"].until == 0.02 and math.isinf(soft.until)
+    assert math.isinf(soft.until)
     assert by_name["ringing-choice-louder"].job.parameters["step"] == 1e-5  # what the base sets
     assert [p.refines for p in chart.points_of("ringing", Role.CHOICE)] == [False, True, False]
     assert chart.budgeted == ("amplitude", "frequency", "occurrence")
@@ -79,6 +79,21 @@ def test_values_from_the_command_line_count_more_than_those_of_scenes(write_char
     assert chart.fingerprint() != load_chart(write_chart()).fingerprint()
 
 
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("loudnes=1", "--set loudnes: unknown key; did you mean loudness in [scene]?"),
+        ("loudness=1 kg", '--set loudness: expected a value in m (such as "1 m" or a bare number in m), found "1 kg"'),
+        ("scene.pitch=0", '--set scene.pitch: expected > 0 Hz, found "0"'),
+        ("tolerance=-1", '--set tolerance: expected > 0, found "-1"'),  # of a stepper that is not the default
+    ],
+)  # fmt: skip
+def test_what_is_wrong_on_the_command_line_is_not_blamed_on_a_scene(write_chart, override, message):
+    with pytest.raises(InputError) as caught:
+        load_chart(write_chart(), [override])
+    assert str(caught.value) == f"c.toml: {message}"
+
+
 def test_names_do_not_make_another_chart(write_chart):
     plain = load_chart(write_chart()).fingerprint()
     assert load_chart(write_chart(("bells", "chimes"), ("Two ways", "Ways"))).fingerprint() == plain
@@ -99,13 +114,19 @@ def test_a_scene_may_be_of_another_model(write_chart):
     job = write_chart(
         ("[chart.methods.soft]", f'{A_SCENE_OF_ITS_OWN}\n[chart.methods.soft]\nscenes = ["ringing"]'),
         ("[chart.methods.clever]", '[chart.methods.clever]\nscenes = ["ringing"]'),
-        ("[chart.methods.brief]", '[chart.methods.brief]\nscenes = ["ringing"]'),
+        ("[chart.methods.hard]", '[chart.methods.hard]\nscenes = ["ringing"]'),
     )
     other = next(point for point in load_chart(job).points if point.scene == "other")
     assert (other.job.model, other.job.name) == ("oscillator", "bells")
     assert (
         other.job.parameters["duration"] == 0.3
     )  # its own default: the job's tables are for the job's model
+
+
+def test_a_scene_needs_a_transient(write_chart):
+    scene = A_SCENE_OF_ITS_OWN.replace("oscillator", "strand").replace("set = {", "# set = {")
+    with pytest.raises(InputError, match="model: expected one with a transient, found strand"):
+        load_chart(write_chart(("[chart.methods.soft]", f"{scene}\n[chart.methods.soft]")))
 
 
 def test_a_choice_may_be_of_another_model_and_of_fewer_starts(write_chart, monkeypatch):
@@ -125,16 +146,15 @@ OTHERS = 'amplitude = { tolerance = "1 %" }\nfrequency = { tolerance = "1 %" }\n
 
 
 def test_where_methods_take_over_all_runs_end_with_what_is_judged(write_chart):
-    chart = load_chart(
-        write_chart((REFERENCE[0], f"{REFERENCE[1]}\n{LEAD}"), PART, (OTHERS, ""), ('until = "20 ms"', ""))
-    )
+    chart = load_chart(write_chart((REFERENCE[0], f"{REFERENCE[1]}\n{LEAD}"), PART, (OTHERS, "")))
     (scene,) = chart.scenes
     assert scene.lead.until == 0.04 and scene.lead.job.stepper == "hard"
     assert scene.lead.job.parameters["step"] == 1e-6 and scene.lead.job.parameters["loudness"] == 20e-6
     measured = [p for p in chart.points if p.role in (Role.REFERENCE, Role.COARSER, Role.METHOD)]
     assert {point.until for point in measured} == {0.06}
-    later = load_chart(write_chart((REFERENCE[0], f"{REFERENCE[1]}\n{LEAD.replace('1 us', '2 us')}"), PART, (OTHERS, ""),
-                                   ('until = "20 ms"', "")))  # fmt: skip
+    later = load_chart(
+        write_chart((REFERENCE[0], f"{REFERENCE[1]}\n{LEAD.replace('1 us', '2 us')}"), PART, (OTHERS, ""))
+    )
     assert later.fingerprint() != chart.fingerprint()
 
 
@@ -183,6 +203,10 @@ WHERE = "c.toml: [chart.scenes.ringing"
          f"{WHERE}] reference: expected one of step and tolerance, found neither"),
         ('reference = "exact"', 'reference = { stepper = "hard", step = "2 us", coarser = "1 us" }',
          f"{WHERE}] reference coarser: expected more than step = 2e-06, found 1 us"),
+        ('reference = "exact"', 'reference = { stepper = "hard", step = "2 kg" }',
+         f'{WHERE}] reference step: expected a value in s (such as "1 s" or a bare number in s), found "2 kg"'),
+        ('reference = "exact"', 'reference = { stepper = "hard", step = "2 us", coarser = "x" }',
+         f'{WHERE}] reference coarser: expected a value in s (such as "1 s" or a bare number in s), found "x"'),
         ('reference = "exact"', 'reference = { stepper = "hart", step = "2 us" }',
          f'{WHERE}] reference: stepper: unknown stepper "hart"; did you mean hard?'),
         ("amplitude =", "amplitde =", f"{WHERE}.quantities] amplitde: unknown quantity; did you mean amplitude?"),
@@ -198,13 +222,14 @@ WHERE = "c.toml: [chart.scenes.ringing"
         ('step = ["2 ms", "1 us", "10 us", "0.2 ms"]', 'step = "1 us"',
          'c.toml: [chart.methods.soft] step: expected a list of values, found "1 us"'),
         ('"1 us", "10 us"', '"1 kg", "10 us"',
-         'c.toml: [chart.methods.soft]: set step: expected a value in s (such as "1 s" or a bare number in s), '
+         'c.toml: [chart.methods.soft] step, value 2: expected a value in s (such as "1 s" or a bare number in s), '
          'found "1 kg"'),
         ('stepper = "clever"', 'stepper = "clever"\nscenes = ["rining"]',
          'c.toml: [chart.methods.clever] scenes: unknown scene "rining"; did you mean ringing?'),
-        ('until = "20 ms"', 'until = "5 ms"',
-         "c.toml: [chart.methods.brief] until: expected 0.01 s or more, the trajectory that is judged, "
-         "found 0.005 s"),
+        ('stepper = "hard"', 'stepper = "hard"\nuntil = "20 ms"',
+         "c.toml: [chart.methods.hard] until: unknown key; known: label, stepper, lanes, set, scenes, step, tolerance"),
+        ('stepper = "hard"', 'stepper = "clever"',
+         "c.toml: [chart.methods.hard] step: unknown key of stepper clever; known: tolerance"),
         ('stepper = "soft"', 'stepper = "explicit"', None),
         ('scene = "ringing"', 'scene = "rining"',
          'c.toml: [chart.budget] scenes: unknown scene "rining"; did you mean ringing?'),

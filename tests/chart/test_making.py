@@ -2,6 +2,7 @@
 
 import csv
 import json
+from importlib import metadata
 
 import numpy as np
 import pytest
@@ -13,6 +14,16 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from cvt_hpc.chart import load_chart, make_chart
 from cvt_hpc.chart.table import table_lines
 from cvt_hpc.errors import InputError
+from cvt_hpc.study.provenance import git_revision, machine
+
+DAMAGE = {
+    "nothing left": lambda whole: b"",
+    "two bytes left": lambda whole: whole[:2],
+    "200 bytes left": lambda whole: whole[:200],
+    "the end is cut": lambda whole: whole[:-1],
+    "a byte within": lambda whole: whole[:100] + bytes([whole[100] ^ 1]) + whole[101:],
+    "foreign": lambda whole: b"not an archive",
+}
 
 
 def made(job, **options):
@@ -36,7 +47,7 @@ def test_the_table_holds_every_point_with_its_outcome(report):
         rows = list(csv.DictReader(file))
     assert str(report.table) == "out/bells/chart.csv"
     assert [row["method"] for row in rows] == [
-        "exact", *["soft hammer"] * 4, *["clever"] * 3, "brief", "louder", "step 1 us", "cracked",
+        "exact", *["soft hammer"] * 4, *["clever"] * 3, "hard", "louder", "step 1 us", "cracked",
     ]  # fmt: skip
     assert [row["role"] for row in rows[-3:]] == ["choice", "refinement", "choice"]
     failed = rows[1]
@@ -95,7 +106,7 @@ def test_the_dataset_repeats_the_study(report):
         job = json.loads(dataset.attrs["job"])
         assert job["points"]["ringing-soft-3"]["job"]["numerics"]["step"] == 1e-5
         assert {"python", "numpy"} <= set(json.loads(dataset.attrs["versions"]))
-        assert json.loads(dataset.attrs["machine"])["cores"] >= 1
+        assert json.loads(dataset.attrs["machine"])[0]["cores"] >= 1
         point = dataset.sel(point="ringing-soft-3")
         assert float(point["amplitude_error"]) == pytest.approx(1e-3, rel=1e-6)
         assert dataset["amplitude"].attrs["units"] == "m" and dataset["step"].attrs["units"] == "s"
@@ -123,7 +134,7 @@ def test_a_chart_goes_on_where_it_was_broken_off(write_chart, undrawn, monkeypat
     report = made(job, tell=told.append)
     # the exact solution, the budget and the soft hammer had been measured
     assert [line.split()[1] for line in told] == [
-        "ringing-clever-1:", "ringing-clever-2:", "ringing-clever-3:", "ringing-brief-1:",
+        "ringing-clever-1:", "ringing-clever-2:", "ringing-clever-3:", "ringing-hard-1:",
     ]  # fmt: skip
     assert told[-1].startswith("13/13 ")
     before = report.table.read_bytes()
@@ -176,9 +187,93 @@ def test_a_folder_of_something_else_is_left_alone(write_chart, undrawn, tmp_path
         made(write_chart(), out=tmp_path / "file", fresh=fresh)
 
 
-def test_a_damaged_point_is_named(write_chart, undrawn, tmp_path):
+@pytest.mark.parametrize("damage", [*DAMAGE.values()], ids=[*DAMAGE])
+def test_a_damaged_point_is_named_and_measured_again(write_chart, undrawn, tmp_path, caplog, damage):
     job = write_chart()
-    made(job)
-    (tmp_path / "out/bells/points/ringing-soft-3.npz").write_bytes(b"PK")
-    with pytest.raises(InputError, match="ringing-soft-3.npz: expected a point as charts write it"):
+    before = made(job).table.read_bytes()
+    point = tmp_path / "out/bells/points/ringing-soft-3.npz"
+    whole = point.read_bytes()
+    point.write_bytes(damage(whole))
+    told = []
+    assert made(job, tell=told.append).table.read_bytes() == before
+    assert [line.split()[1] for line in told] == ["ringing-soft-3:"]
+    assert "out/bells/points/ringing-soft-3.npz: damaged (" in caplog.text
+    assert point.read_bytes() == whole
+
+
+JOB_FILES = {
+    "empty": b"",
+    "cut": b'{"format": "cvt_hpc',
+    "bare": b'{"format": "cvt_hpc chart 2"}',
+    "gone": None,
+}
+
+
+@pytest.mark.parametrize("left", [*JOB_FILES.values()], ids=[*JOB_FILES])
+def test_without_its_job_file_a_chart_is_known_by_its_points(write_chart, undrawn, tmp_path, left):
+    before = made(write_chart()).table.read_bytes()
+    job_file = tmp_path / "out/bells/chart.json"
+    whole = job_file.read_bytes()
+
+    def damage():
+        job_file.unlink()
+        if left is not None:
+            job_file.write_bytes(left)
+
+    damage()
+    told = []
+    assert made("c.toml", tell=told.append).table.read_bytes() == before
+    assert (told, job_file.read_bytes()) == ([], whole)
+    damage()
+    changed = write_chart(("20 um", "21 um"))
+    with pytest.raises(InputError, match="or --fresh to throw away its points, which are of another job"):
+        made(changed)
+    assert made(changed, fresh=True, tell=told.append).table.read_bytes() != before
+    assert len(told) == 13
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "attribute"),
+    [
+        ("versions", {"cvt_hpc": "0.0", "python": "2.7"}, "versions"),
+        ("git_revision", "deadbeef", "git_revision"),
+        ("machine", {"processor": "abacus", "cores": 1}, "machine"),
+    ],
+)
+def test_points_by_other_versions_or_machines_are_named(
+    write_chart, undrawn, tmp_path, monkeypatch, caplog, name, value, attribute
+):
+    job = write_chart()
+    with monkeypatch.context() as earlier:
+        earlier.setattr(f"cvt_hpc.chart.store.{name}", lambda: value)
         made(job)
+    assert not caplog.records
+    (tmp_path / "out/bells/points/ringing-soft-3.npz").unlink()
+    report = made(job)
+    assert caplog.text.count("earlier points were measured with other versions or on another machine") == 1
+    with xr.open_dataset(report.dataset) as dataset:
+        found = dataset.attrs[attribute]
+    old, new = {
+        "versions": ("0.0, ", metadata.version("cvt_hpc")),
+        "git_revision": ("deadbeef, ", git_revision()),
+        "machine": ("abacus", machine()["processor"]),
+    }[name]
+    assert old in found and new in found
+    caplog.clear()
+    made(job, fresh=True)
+    assert not caplog.records
+
+
+def test_two_charts_in_one_folder_are_refused(write_chart, undrawn, tmp_path):
+    job = write_chart()
+
+    refusals = []
+
+    def second(line):
+        if not refusals:
+            with pytest.raises(InputError) as caught:
+                made(job, fresh=True)
+            refusals.append(str(caught.value))
+
+    assert made(job, tell=second).table.exists()
+    assert refusals[0].startswith("out/bells: expected a folder that no run is at work in, found process")

@@ -58,6 +58,23 @@ def test_run_status_gather_and_map_of_one_study(write_job, call, tmp_path):
         assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
 
 
+def test_samples_keep_the_spacing_of_their_ranges(write_job, call, tmp_path):
+    write_job("""[scene]
+thrust = "20 kN"
+[design]
+kind = "sobol"
+runs = 8
+[axes]
+load = { from = 20, to = 100 }
+sheave_stiffness = { from = 1, to = 3, spacing = "log" }
+""")
+    assert call("run", "x.toml")[0] == 0
+    with netCDF4.Dataset("out/x/results.nc") as results:
+        spacings = {name: getattr(results[name], "spacing", None) for name in ("load", "sheave_stiffness")}
+    assert spacings == {"load": None, "sheave_stiffness": "log"}
+    assert call("map", "out/x") == (0, ["map: out/x/map.png"], [])
+
+
 def test_run_goes_on_unless_fresh(write_job, call, tmp_path, monkeypatch):
     write_job(GRID)
     call("run", "x.toml", "--out", "here")
@@ -100,6 +117,19 @@ def test_a_stopped_sweep_ends_with_99(write_job, call, monkeypatch, tmp_path):
         "cvt-hpc: run 3 (load = 5, law = coulomb): failed_error: ValueError: x",
         "cvt-hpc: stopped early (SIGTERM); the same command goes on from here",
     ]
+
+
+def test_a_sweep_that_stopped_before_any_run_had_ended_needs_more_time(
+    write_job, call, monkeypatch, tmp_path
+):
+    write_job(GRID)
+    report = RunReport(tmp_path, tmp_path / "results.nc", 10, 4, (), 6, "time limit", 0)
+    monkeypatch.setattr("cvt_hpc.study.run", lambda job, out, **options: report)
+    status, _, err = call("run", "x.toml", "--time-limit", "1s")
+    assert (status, err) == (
+        98,
+        ["cvt-hpc: stopped early (time limit) before any run had ended; give it more time"],
+    )
 
 
 def test_limits_and_retries_reach_the_sweep(write_job, call, monkeypatch, tmp_path):
@@ -187,6 +217,26 @@ def test_check_prints_every_parameter_with_its_origin_the_axes_and_the_cost(writ
     assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--part", "9/3"],
+        ["--part", "1/3", "--fresh"],
+        ["--part", "1/3", *TRACED],
+        ["--time-limit", "foo"],
+        ["--run-limit", "foo"],
+        ["--out", "x.toml"],
+        ["--set", "load=x"],
+    ],
+)
+def test_a_dry_run_refuses_what_a_run_refuses(write_job, call, tmp_path, options):
+    write_job(GRID)
+    status, out, err = call("run", "x.toml", *options)
+    assert (status, out, len(err)) == (2, [], 1)
+    assert call("run", "x.toml", *options, "--dry-run") == (2, [], err)
+    assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
+
+
 @pytest.mark.parametrize("command", [["check"], ["run", "--dry-run"], ["run"]])
 def test_an_axis_that_the_dataset_could_not_hold_is_refused_by_all(
     write_job, call, tmp_path, monkeypatch, command
@@ -243,7 +293,8 @@ def test_check_forecasts_by_what_is_on_record(write_job, call):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--ranks", "4", "0"], "--ranks: expected numbers of ranks, 1 or more, found 0"),
+        (["--ranks", "4", "0"], "--ranks: expected numbers of ranks from 1 to 1000000, found 0"),
+        (["--ranks", "4", "1000001"], "--ranks: expected numbers of ranks from 1 to 1000000, found 1000001"),
         (["--ranks", "4", "--pilots", "-1"], "--pilots: expected a number of batches, found -1"),
         (["--pilots", "2"], "--pilots: expected --ranks beside it, found none"),
         (["--plot", "x.png"], "--plot: expected --ranks beside it, found none"),
@@ -331,11 +382,11 @@ def test_simulate_of_a_run_that_fails_ends_with_1(write_job, call):
         ),
         (
             ["simulate", "x.toml", "--out", "d.nc"],
-            "d.nc: expected a file that can be written, found d.nc in its way",
+            "d.nc: expected a file that can be written, found a folder of this name",
         ),
         (
             ["simulate", "x.toml", "--plot", "x.toml/new/h.png"],
-            "x.toml/new/h.png: expected a file that can be written, found HERE/x.toml in its way",
+            "x.toml/new/h.png: expected a file that can be written, found the file HERE/x.toml in the place of a folder",
         ),
         (
             ["simulate", "x.toml", "--out", "notes.nc"],
@@ -369,6 +420,17 @@ def test_bad_input_is_one_line_and_2(write_job, call, tmp_path, mechanics, argum
     assert not (tmp_path / "out").exists()
 
 
+def test_a_folder_closed_to_writing_is_named(write_job, call, monkeypatch, tmp_path, mechanics):
+    write_job(GRID)
+    monkeypatch.setattr("os.access", lambda path, mode: path != tmp_path)
+    assert call("simulate", "x.toml", "--out", "h.nc") == (
+        2,
+        [],
+        [f"cvt-hpc: h.nc: expected a file that can be written, found no permission to write to {tmp_path}"],
+    )
+    assert mechanics == {"written": [], "drawn": []}
+
+
 def test_map_says_what_it_cannot_fix(write_job, call):
     write_job(GRID)
     call("run", "x.toml")
@@ -386,7 +448,10 @@ def test_map_says_what_it_cannot_fix(write_job, call):
         'cvt-hpc: out/x: --at sheave_stiffness: expected a number, found "stiff"'
     ]
     assert call("map", "out/x", "--at", "load=0.025 kN m")[0] == 0
-    assert call("map", "out/x", "--at", "load=26 N m")[0] == 2
+    assert call("map", "out/x", "--at", "load=26 N m")[::2] == (
+        2,
+        ["cvt-hpc: out/x: at load: expected a value of that axis: 0, 25, 50, 75, 100 [N m], found 26.0"],
+    )
 
 
 @pytest.mark.parametrize(

@@ -101,7 +101,7 @@ def test_energy_of_a_cycle_is_that_of_all_forces():
 
     period = 2.0 * np.pi / w
     energy = quad(power, 0.0, period, epsabs=1e-12)[0]
-    # where the contact is stiffer under more friction, the creep v_0 takes part: a term of its own, in x mu'
+    # the friction under c_ele x changes with the rate: terms in x x' and x x'^2, which have no mean
     closed = -(2.0 * np.pi**2 / period) * x_hat**2 * (500.0 - 2.0 * p["contact_force"] * 0.02)
     assert energy == pytest.approx(closed, rel=1e-9)
     assert energy_per_cycle(f, np.array([x_hat]))[0] == pytest.approx(closed, rel=1e-9)
@@ -289,7 +289,7 @@ def test_a_flank_that_climbs_out_against_friction_has_no_frequency():
     assert np.isnan(record["frequency"]) and np.all(np.isnan(record["energy_per_cycle"]))
 
 
-@pytest.mark.parametrize(("gradient", "is_rough"), [(-0.1, False), (-2.0, True)])
+@pytest.mark.parametrize(("gradient", "is_rough"), [(-0.04, False), (-2.0, True)])
 def test_a_motion_that_is_not_harmonic_is_said_to_be_so(gradient, is_rough):
     record = found(friction_gradient=gradient)
     assert record["vibrates"] == Vibrates.YES

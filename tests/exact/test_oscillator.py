@@ -130,12 +130,12 @@ def test_smoothed_friction_has_its_levels_and_slope():
     p = STICK_SLIP | {"friction_speed": 1e-3}
     o = oscillator(p)
     sliding = np.linspace(0.0, 0.05, 50_001)
-    friction = np.array([regularised_friction(o, s) for s in sliding])
+    friction = np.array([regularised_friction(o, s, 1.0) for s in sliding])
     assert friction.max() == pytest.approx(1.0, abs=1e-4)
     assert friction[-1] == pytest.approx(0.6, abs=1e-12)
-    assert regularised_friction(o, -0.004) == -regularised_friction(o, 0.004)
+    assert regularised_friction(o, -0.004, 1.0) == -regularised_friction(o, 0.004, 1.0)
     tiny = 1e-9
-    assert largest_rate(o) == pytest.approx(regularised_friction(o, tiny) / tiny, rel=1e-6)
+    assert largest_rate(o) == pytest.approx(regularised_friction(o, tiny, 1.0) / tiny, rel=1e-6)
     rates = np.zeros(2)
     assert system(p).rates(o, 0.0, np.array([0.3, 0.1]), rates)
     assert rates == pytest.approx([0.1, 0.6 - 0.3])

@@ -6,7 +6,6 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import load_job
 from cvt_hpc.models import MODELS
 
-KNOWN = ", ".join(MODELS)
 HEAD = 'name = "x"\nmodel = "toy"\n'
 THRUST = '[scene]\nthrust = "20 kN"\n'
 IN_N = 'expected a value in N (such as "1 N" or a bare number in N), found'
@@ -89,12 +88,12 @@ def test_tables(write_job, text, message):
         ('name = 5\nmodel = "toy"', f"name: {A_WORD} 5"),
         (
             'name = "x"',
-            f"model: expected one of {KNOWN}, toy, found nothing",
+            f"model: expected one of {', '.join(MODELS)}, toy, found nothing",
         ),
         ('name = "x"\nmodel = "toi"', 'model: unknown model "toi"; did you mean toy?'),
         (
             'name = "x"\nmodel = 5',
-            f"model: expected one of {KNOWN}, toy, found 5",
+            f"model: expected one of {', '.join(MODELS)}, toy, found 5",
         ),
         (f'{HEAD}stepper = "hopp"', 'stepper: unknown stepper "hopp"; did you mean hop?'),
         (f"{HEAD}description = 5", "description: expected a text, found 5"),

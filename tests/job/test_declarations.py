@@ -123,7 +123,7 @@ def test_every_stepper_stands_in_the_table_of_methods():
         assert re.search(rf"^\|[^|]*`{stepper}`", table, re.MULTILINE), stepper
 
 
-@pytest.mark.parametrize("model", ["oscillator", "moving_string"])
+@pytest.mark.parametrize("model", ["moving_string"])
 def test_a_model_without_records_is_no_model_of_a_study(model, tmp_path):
     job = build_job({"name": "x", "model": model}, "x.toml")
     with pytest.raises(InputError, match=f"x.toml: model: expected one whose runs .*found {model}"):

@@ -55,6 +55,7 @@ def test_samples_are_those_of_scipy_between_the_ends_of_the_ranges(write_job, ki
     for share in ((found[:, 0] - 20) / 180, np.log10(found[:, 1]) / 2):
         assert sorted(np.floor(32 * share)) == list(range(32))
     assert {job.point(i)["thrust"] for i in range(32)} == {20e3}
+    assert [axis.spacing for axis in job.axes] == ["linear", "log"]
 
 
 def test_the_seed_tells_samples_apart(write_job):

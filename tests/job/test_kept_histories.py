@@ -71,7 +71,7 @@ def test_a_run_that_an_override_takes_off_the_grid_is_left_out(write):
             "run 2, load: expected a value of the axis, such as 50 N m or 75 N m, found 60 N m",
         ),
         ("[{load = 150, sheave_stiffness = 1}]", "such as 100 N m, found 150 N m"),
-        ("[{laod = 50, sheave_stiffness = 1}]", "unknown key; did you mean load"),
+        ("[{laod = 50, sheave_stiffness = 1}]", "run 1, laod: unknown key; did you mean load in [scene]?"),
         (
             "[{load = 50, sheave_stiffness = 1, ratio = 2}]",
             "expected axes of this job (load, sheave_stiffness), found ratio",

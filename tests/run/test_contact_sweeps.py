@@ -1,8 +1,10 @@
 """Runs whose contact is swept a few times in each step instead of solved."""
 
 import numpy as np
+import pytest
 
-from cvt_hpc.job import build_job
+from cvt_hpc.errors import InputError
+from cvt_hpc.job import build_job, load_job
 from cvt_hpc.models.elastic_belt.grouping import lane_key
 from cvt_hpc.models.elastic_belt.transient import Batch
 
@@ -34,3 +36,15 @@ def test_sweeps_come_near_the_exact_contact_the_more_there_are():
 
 def test_runs_of_other_sweeps_do_not_share_a_batch():
     assert lane_key(point(0)) != lane_key(point(5))
+
+
+@pytest.mark.parametrize("text", ["[numerics]\ncontact_sweeps = 5", "[axes]\ncontact_sweeps = [0, 5]"])
+def test_no_job_of_runs_may_sweep(tmp_path, text):
+    # one sweep a step lets the default belt vibrate at 350 Hz instead of 495 Hz, and its power balance closes
+    path = tmp_path / "x.toml"
+    path.write_text(f'name = "x"\nmodel = "elastic_belt"\n{text}\n')
+    with pytest.raises(
+        InputError, match=r"\[numerics\] contact_sweeps: expected 0 in a job of runs.*found 5"
+    ):
+        load_job(path)
+    assert load_job(path, {"contact_sweeps": 0}).parameters["contact_sweeps"] == 0

@@ -32,6 +32,7 @@ class Axis:
     values: tuple
     unit: str = "N m"
     description: str = "some axis"
+    spacing: str = "linear"
 
 
 @dataclass(frozen=True)

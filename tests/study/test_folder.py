@@ -88,7 +88,7 @@ def test_fresh_removes_only_what_runs_wrote(tmp_path):
         ("records/mine.csv", "mine", "found records without a job.json"),
         ("job.json", '{"title": "Head of Sales"}', "expected format"),
         ("job.json", "{", "expected the job of a run"),
-        ("job.json", '{"format": "cvt_hpc study 1"}', "expected a job as runs write it"),
+        ("job.json", '{"format": "cvt_hpc study 1"}', "expected the job of a run, found damage"),
     ],
 )
 def test_what_this_program_did_not_write_is_left(tmp_path, fresh, name, text, complaint):
@@ -97,6 +97,59 @@ def test_what_this_program_did_not_write_is_left(tmp_path, fresh, name, text, co
     with pytest.raises(InputError, match=complaint):
         sweep(JOB, tmp_path, fresh=fresh)
     assert content(tmp_path) == {tmp_path / name: text.encode()}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [b"", b"{", b"\xff\xfe", b'{"format": "cvt_hpc study 1"}', None],
+    ids=["", "{", "ff", "bare", "gone"],
+)
+class TestDamagedJobFile:
+    """What to do where job.json does not say whose the records are."""
+
+    @pytest.fixture(autouse=True)
+    def damaged(self, tmp_path, text):
+        sweep(JOB, tmp_path)
+        (tmp_path / "results.nc").unlink()
+        (tmp_path / "job.json").unlink()
+        if text is not None:
+            (tmp_path / "job.json").write_bytes(text)
+
+    def test_the_logs_tell_that_it_is_the_same_job(self, tmp_path, caplog):
+        assert sweep(JOB, tmp_path).gained == 0
+        assert f"{tmp_path / 'job.json'}: damaged or gone; written anew" in caplog.text
+        assert read_status(tmp_path).done == 12
+        caplog.clear()
+        assert sweep(JOB, tmp_path).gained == 0
+        assert not caplog.records
+
+    def test_another_job_is_refused(self, tmp_path):
+        before = content(tmp_path)
+        with pytest.raises(
+            InputError, match="or --fresh to throw away its logs, which hold no record of this job"
+        ):
+            sweep(OTHER, tmp_path)
+        assert content(tmp_path) == before
+
+    @pytest.mark.parametrize("job", [JOB, OTHER])
+    def test_fresh_starts_over(self, tmp_path, caplog, job):
+        assert sweep(job, tmp_path, fresh=True).gained == 12
+        assert not caplog.records
+
+    @pytest.mark.parametrize("use", [read_status, gather])
+    def test_who_reads_is_told_what_to_do(self, tmp_path, use):
+        with pytest.raises(InputError, match="`cvt-hpc run` of its job goes on and writes it anew"):
+            use(tmp_path)
+
+
+@pytest.mark.parametrize("fresh", [False, True])
+def test_a_folder_of_a_chart_is_refused(tmp_path, fresh):
+    (tmp_path / "chart.json").write_text("{}")
+    with pytest.raises(
+        InputError, match="expected an empty folder or that of an earlier run, found that of a chart"
+    ):
+        sweep(JOB, tmp_path, fresh=fresh)
+    assert content(tmp_path) == {tmp_path / "chart.json": b"{}"}
 
 
 def test_a_folder_with_other_files_may_be_used(tmp_path):

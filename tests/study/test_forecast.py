@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from study_double import Axis, Job, Simulator
 
+from cvt_hpc.printing import disk_line
 from cvt_hpc.study import run
 from cvt_hpc.study.cost_model import Fit
 from cvt_hpc.study.description import describe
@@ -25,7 +26,7 @@ from cvt_hpc.study.forecast import (
 )
 from cvt_hpc.study.frames import PREAMBLE
 from cvt_hpc.study.pilots import find_out
-from cvt_hpc.study.resources import disk_space, slurm_time, suggested_time
+from cvt_hpc.study.resources import Disk, disk_space, slurm_time, suggested_time
 
 AT_ONCE = ClaimTimes(0.0, 0.0, 0.0)
 MANY = 10**8
@@ -204,9 +205,14 @@ def test_the_space_on_the_disk_is_that_of_the_logs(tmp_path):
     assert disk_space(describe(job, simulator), 3, 0, math.nan).histories == 0.0
 
 
-def test_the_time_asked_for_covers_start_warning_and_gathering():
+@pytest.mark.parametrize(("histories", "words"), [(1, "1 history 0.002 MB"), (3, "3 histories 0.002 MB")])
+def test_histories_are_counted_in_words(histories, words):
+    assert disk_line(Disk(1e6, 1e6, 2e3), histories).endswith(f", {words}")
+
+
+def test_the_time_asked_for_covers_start_and_gathering():
     expected = Forecast(4, 10, (500.0, 400.0, 700.0), 450.0, (0.9, 0.8, 1.0))
-    assert suggested_time(expected, 100) == 1200.0  # 60 + 700 + 180
-    assert suggested_time(expected, 10**6) == 1800.0  # 60 + 700 + 1030
+    assert suggested_time(expected, 100) == 900.0  # 60 + 700 + 90
+    assert suggested_time(expected, 10**6) == 1200.0  # 60 + 700 + 290
     assert slurm_time(900.0) == "00:15:00"
     assert slurm_time(2 * 86400 + 3 * 3600 + 300) == "2-03:05:00"

@@ -124,7 +124,7 @@ def test_a_window_as_wide_as_the_first_spacing_gives_the_map_of_the_full_grid(fo
     assert (traced(truth, spacings)[1] == truth).all()
 
 
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(maps(), st.randoms(use_true_random=False))
 def test_what_is_run_does_not_depend_on_the_order(found, order):
     truth, spacings = found

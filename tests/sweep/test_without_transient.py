@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cf import cf_findings
 from rungs import rung_job
 
 from cvt_hpc.cli import main
@@ -19,6 +20,7 @@ AXES = {"tangential_speed": [0.0, 0.05, 0.2], "friction_gradient": [-1.6, 0.0]}
 def results(tmp_path_factory):
     report = run(rung_job("criterion", AXES), tmp_path_factory.mktemp("criterion"), progress=False)
     assert (report.done, report.exit_status) == (6, 0)
+    assert cf_findings(report.results) == []
     with open_results(report.results) as dataset:
         yield dataset.load()
 

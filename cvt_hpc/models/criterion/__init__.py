@@ -24,7 +24,7 @@ to zero from above is the amplitude of a limit cycle in harmonic balance.
 
 What it cannot answer: at which load or ratio a belt vibrates (that needs the sliding of each element: the
 elastic belt), in which mode and strand, or with which amplitude the strands move; motions that are not
-harmonic, which are those with a `damping_ratio` of -0.1 or below; and stick-slip.
+harmonic, which are those with a `damping_ratio` below -0.1; and stick-slip.
 """
 
 from cvt_hpc.models.criterion.parameters import PARAMETERS, check, inert

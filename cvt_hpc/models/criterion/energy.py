@@ -7,8 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.kernels import kernel
-from cvt_hpc.physics.friction import FrictionLaw, friction_coefficient, friction_law, saturation
+from cvt_hpc.physics.friction import (
+    FrictionLaw,
+    friction_coefficient,
+    friction_coefficients,
+    given_law,
+    saturation,
+)
 
 PHASES = 512  # of a cycle: errors of its square at a corner of the law, of 1/512 at a jump (v_reg -> 0)
 
@@ -63,10 +68,7 @@ class Flank(NamedTuple):
 def flank(parameters: Mapping[str, Any]) -> Flank:
     """Steady sliding, from flat parameters [SI]."""
     p = parameters
-    table = (p["table_force"], p["table_speed"], p["table_mu"]) if p["friction_law"] == "table" else ()
-    law = friction_law(
-        p["friction_law"], p["kinetic_friction"], p["friction_gradient"], p["stribeck_velocity"], *table
-    )
+    law = given_law(p)
     tangent = np.tan(p["half_wedge_angle"])
     force = p["contact_force"]
     normal_force = force / np.cos(p["half_wedge_angle"])
@@ -126,15 +128,7 @@ def _radial_friction(f: Flank, radial: np.ndarray, tangential: float) -> np.ndar
     filtered = np.fft.rfft(speed) / (1.0 + 1j * harmonics * f.angular_frequency * f.memory)
     # where sliding comes to rest, the cut-off harmonics of a speed that is 0 there may leave less
     remembered = np.maximum(np.fft.irfft(filtered, PHASES), 0.0)
-    mu = _coefficients(f.law, remembered.ravel(), f.normal_force).reshape(speed.shape)
+    forces = np.full(speed.size, f.normal_force)
+    mu = friction_coefficients(f.law, remembered.ravel(), forces).reshape(speed.shape)
     direction = np.divide(radial, speed, out=np.zeros_like(speed), where=speed > 0.0)
     return mu * np.tanh(speed / f.width) * direction
-
-
-@kernel
-def _coefficients(law: FrictionLaw, speeds: np.ndarray, force: float) -> np.ndarray:
-    """Coefficients of friction at several speeds, (n,)."""
-    found = np.empty_like(speeds)
-    for k in range(speeds.size):
-        found[k] = friction_coefficient(law, speeds[k], force)[0]
-    return found

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.physics.friction import FrictionLaw, friction_law
+from cvt_hpc.physics.friction import FrictionLaw, given_law
 from cvt_hpc.physics.geometry import Variator, variator
 from cvt_hpc.physics.sheaves import Sheaves, flexibility, sheaves
 
@@ -171,15 +171,7 @@ def belt_constants(parameters: dict[str, Any]) -> Belt:
         )
         for region, radius in ((0, path.driving_radius), (2, path.driven_radius))
     ]
-    law = friction_law(
-        p["friction_law"],
-        p["kinetic_friction"],
-        p["friction_gradient"],
-        p["stribeck_velocity"],
-        p["table_force"],
-        p["table_speed"],
-        p["table_mu"],
-    )
+    law = given_law(p)
     ramp = p["load_history"] == "ramp"
     return Belt(
         cell=cell,

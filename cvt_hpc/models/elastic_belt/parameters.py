@@ -12,7 +12,7 @@ import numpy as np
 
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_problems import friction_inert, friction_problems
-from cvt_hpc.physics.geometry import variator
+from cvt_hpc.physics.geometry import variator, variator_problems
 
 
 def _stiffness(default: float, unit: str, description: str) -> Parameter:
@@ -142,20 +142,10 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
 
 def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     """Problems between sizes: pulleys that overlap, play beyond reason. Result as of `check`."""
-    p, problems = parameters, []
-    try:
+    p = parameters
+    problems = variator_problems(p)
+    if not problems:
         path = variator(p["ratio"], p["driven_radius"], p["centre_distance"]).path_length
-    except ValueError:
-        radius = p["driven_radius"] / p["ratio"]
-        problems.append(
-            (
-                "ratio",
-                "pulleys that do not overlap: driven_radius (1 + 1 / ratio) < centre_distance "
-                f"{p['centre_distance']:g} m",
-                f"ratio {p['ratio']:g}, radii {radius:g} m and {p['driven_radius']:g} m",
-            )
-        )
-    else:
         if abs(p["play"]) > 0.02 * path:
             problems.append(("play", f"within 2 % of the belt's length {path:.4g} m", f"{p['play']:g} m"))
     return problems

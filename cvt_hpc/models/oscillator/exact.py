@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.errors import InputError
+from cvt_hpc.models.oscillator.motion import initial_state
 
 INSTANT = 1e-12  # of a period: as near as that an event counts as past
 
@@ -51,6 +52,11 @@ def exact(parameters: Mapping[str, Any], times: np.ndarray) -> np.ndarray:
         If these parameters have no closed form.
     """
     p = parameters
+    if p["normal_stiffness"] != 0.0 or p["preload"] != 0.0:
+        raise InputError(
+            "exact motion: expected normal_stiffness 0 and preload 0, found "
+            f"{p['normal_stiffness']:g} N/m and {p['preload']:g} N"
+        )
     times = np.asarray(times, dtype=np.float64)
     if p["friction_law"] == "linear":
         return _linear(p, times)[:, None]
@@ -86,7 +92,7 @@ def phases(parameters: Mapping[str, Any], end: float) -> list[Piece]:
         p["normal_load"] * p[key] / p["stiffness"] for key in ("kinetic_friction", "static_friction")
     )
     belt = p["belt_speed"]
-    pieces = [_phase(0.0, p["initial_displacement"], p["initial_speed"], belt, slide, stick)]
+    pieces = [_phase(0.0, *map(float, initial_state(p)), belt, slide, stick)]
     while True:
         last = pieces[-1]
         if np.isnan(last.centre):
@@ -150,7 +156,8 @@ def _linear(p: Mapping[str, Any], times: np.ndarray) -> np.ndarray:
     rate = complex(-0.5 * (p["damping"] + N * g) / m)
     root = rate + np.sqrt(rate * rate - p["stiffness"] / m)
     other = 2.0 * rate - root
-    away, v = p["initial_displacement"] - centre, p["initial_speed"]
+    x, v = initial_state(p)
+    away = x - centre
     first = (v - other * away) / (root - other)
     moving = first * np.exp(root * times), (away - first) * np.exp(other * times)
     speed = (root * moving[0] + other * moving[1]).real

@@ -8,67 +8,36 @@ largest friction is mu_s whatever the width, and the law without smoothing is it
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.physics.friction import FrictionLaw, friction_coefficient, friction_law, saturation
+from cvt_hpc.models.oscillator.constants import Oscillator, normal_load, oscillator
+from cvt_hpc.models.oscillator.steady import steady_sliding
+from cvt_hpc.physics.friction import friction_coefficient, saturation
 from cvt_hpc.steppers.system import SetValuedSystem, System
 
 X, V = range(2)
 HUMP = 6.0  # speed of the largest friction at rest, in units of v_reg
 
 
-class Oscillator(NamedTuple):
-    """Constants of the oscillator.
-
-    Attributes
-    ----------
-    mass, stiffness, damping : float
-        [kg], [N/m], [N s/m].
-    belt_speed, normal_load : float
-        [m/s], [N].
-    law : FrictionLaw
-        Friction in steady sliding.
-    excess : float
-        Level at rest above that of the law [1].
-    width : float
-        Regularisation speed [m/s].
-    """
-
-    mass: float
-    stiffness: float
-    damping: float
-    belt_speed: float
-    normal_load: float
-    law: FrictionLaw
-    excess: float
-    width: float
-
-
-def oscillator(parameters: Mapping[str, Any]) -> Oscillator:
-    """Constants from flat parameters [SI]."""
-    p = parameters
-    law = friction_law(
-        p["friction_law"],
-        p["kinetic_friction"],
-        p["friction_gradient"],
-        p["stribeck_velocity"],
-        *((p["table_force"], p["table_speed"], p["table_mu"]) if p["friction_law"] == "table" else ()),
-    )
-    at_rest = p["static_friction"] - p["kinetic_friction"] if p["friction_law"] == "coulomb" else 0.0
-    mechanics = (float(p[key]) for key in ("mass", "stiffness", "damping", "belt_speed", "normal_load"))
-    return Oscillator(*mechanics, law, float(at_rest), float(p["friction_speed"]))
+@kernel
+def regularised_friction(o: Oscillator, sliding: float, load: float) -> float:
+    """Friction force on the mass [N] at a sliding speed of the belt under it [m/s], the jump smoothed."""
+    mu = friction_coefficient(o.law, abs(sliding), load)[0]
+    hump = sliding / (HUMP * o.width)
+    at_rest = o.excess * hump * np.exp(0.5 * (1.0 - hump * hump))
+    return load * (mu * saturation(sliding, o.width)[0] + at_rest)
 
 
 @kernel
-def regularised_friction(o: Oscillator, sliding: float) -> float:
-    """Friction force on the mass [N] at a sliding speed of the belt under it [m/s], the jump smoothed."""
-    mu = friction_coefficient(o.law, abs(sliding), o.normal_load)[0]
-    hump = sliding / (HUMP * o.width)
-    at_rest = o.excess * hump * np.exp(0.5 * (1.0 - hump * hump))
-    return o.normal_load * (mu * saturation(sliding, o.width)[0] + at_rest)
+def regularised_frictions(o: Oscillator, sliding: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """As `regularised_friction`, of arrays (n,)."""
+    found = np.empty_like(sliding)
+    for k in range(sliding.size):
+        found[k] = regularised_friction(o, sliding[k], load[k])
+    return found
 
 
 def friction_at_rest(o: Oscillator) -> float:
@@ -86,17 +55,18 @@ def largest_rate(o: Oscillator) -> float:
 @kernel
 def smoothed_rates(o: Oscillator, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     """Rates of displacement and speed with smoothed friction; see `System`."""
-    friction = regularised_friction(o, o.belt_speed - y[V])
+    load = normal_load(o, y[X])
+    friction = regularised_friction(o, o.belt_speed - y[V], load)
     out[X] = y[V]
-    out[V] = (friction - o.stiffness * y[X] - o.damping * y[V]) / o.mass
-    return True
+    out[V] = (o.preload + friction - o.stiffness * y[X] - o.damping * y[V]) / o.mass
+    return load > 0.0
 
 
 @kernel
 def free_rates(o: Oscillator, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     """Rates without friction; see `SetValuedSystem`."""
     out[X] = y[V]
-    out[V] = -(o.stiffness * y[X] + o.damping * y[V]) / o.mass
+    out[V] = (o.preload - o.stiffness * y[X] - o.damping * y[V]) / o.mass
     return True
 
 
@@ -114,15 +84,16 @@ def friction_bounds(
     """Bounds of the friction force, larger while the mass sticks; see `SetValuedSystem`."""
     speed[0] = y[V] - o.belt_speed
     sliding = 0.0 if held[0] else abs(speed[0])
-    mu = friction_coefficient(o.law, sliding, o.normal_load)[0] + (o.excess if held[0] else 0.0)
-    high[0], low[0], restitution[0] = o.normal_load * mu, -o.normal_load * mu, 0.0
-    return True
+    load = normal_load(o, y[X])
+    mu = friction_coefficient(o.law, sliding, load)[0] + (o.excess if held[0] else 0.0)
+    high[0], low[0], restitution[0] = load * mu, -load * mu, 0.0
+    return load > 0.0
 
 
 def _unknowns(o: Oscillator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which unknowns are velocities, their positions, and typical sizes."""
     frequency = np.sqrt(o.stiffness / o.mass)
-    pull = friction_at_rest(o) / o.stiffness
+    pull = (friction_at_rest(o) + abs(o.preload)) / o.stiffness
     speed = o.belt_speed if o.belt_speed > 0.0 else frequency * pull
     return np.array([False, True]), np.array([-1, X]), np.array([pull + speed / frequency, speed])
 
@@ -148,4 +119,8 @@ def set_valued_system(parameters: Mapping[str, Any]) -> SetValuedSystem:
 
 def initial_state(parameters: Mapping[str, Any]) -> np.ndarray:
     """Displacement [m] and speed [m/s] at the start, from flat parameters."""
-    return np.array([parameters["initial_displacement"], parameters["initial_speed"]], dtype=np.float64)
+    p = parameters
+    if p["start"] == "given":
+        return np.array([p["initial_displacement"], p["initial_speed"]], dtype=np.float64)
+    displacement = steady_sliding(oscillator(p)).displacement + p["initial_displacement"]
+    return np.array([displacement, p["belt_speed"] if p["start"] == "sticking" else 0.0])

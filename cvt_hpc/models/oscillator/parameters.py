@@ -5,18 +5,26 @@ from __future__ import annotations
 from typing import Any
 
 from cvt_hpc.parameters import Parameter, not_negative, positive
-from cvt_hpc.physics.friction_problems import friction_problems
+from cvt_hpc.physics.friction_problems import friction_inert, friction_problems
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {
         "belt_speed": not_negative(0.2, "m/s", "speed of the belt under the mass"),
         "normal_load": positive(1.0, "N", "force that presses the mass on the belt"),
+        "preload": Parameter(0.0, "N", "constant force on the mass, in the belt's direction"),
+        "start": Parameter(
+            "given",
+            "",
+            "as given, or initial_displacement away from steady sliding: at rest, or carried by the belt",
+            choices=("given", "sliding", "sticking"),
+        ),
         "initial_displacement": Parameter(0.0, "m", "displacement of the mass at the start"),
         "initial_speed": Parameter(0.2, "m/s", "speed of the mass at the start; belt_speed: it sticks"),
     },
     "oscillator": {
         "mass": positive(1.0, "kg", "the mass"),
         "stiffness": positive(1.0, "N/m", "stiffness of its spring"),
+        "normal_stiffness": not_negative(0.0, "N/m", "fall of the normal load per displacement of the mass"),
         "damping": not_negative(0.0, "N s/m", "viscous damping of its spring"),
     },
     "friction": {
@@ -65,4 +73,18 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if p["friction_law"] == "coulomb" and p["static_friction"] < p["kinetic_friction"]:
         expected = f"kinetic_friction {p['kinetic_friction']:g} or more with friction_law coulomb"
         problems.append(("static_friction", expected, f"{p['static_friction']:g}"))
+    if p["normal_stiffness"] * p["preload"] >= p["normal_load"] * p["stiffness"]:
+        most = p["normal_load"] * p["stiffness"] / p["normal_stiffness"]
+        problems.append(("preload", f"less than {most:g} N, which lifts the mass off", f"{p['preload']:g} N"))
     return problems
+
+
+def inert(parameters: dict[str, Any]) -> dict[str, str]:
+    """Parameters without effect on a run, each with the setting that makes it so."""
+    p = parameters
+    law = p["friction_law"]
+    cases = (
+        (p["start"] != "given", "initial_speed", f"start {p['start']}"),
+        (law != "coulomb", "static_friction", f"friction_law {law}"),
+    )
+    return friction_inert(p) | {key: setting for holds, key, setting in cases if holds}

@@ -1,0 +1,84 @@
+"""What a job may set of the strands: quantities of the elastic belt, and how their forces are known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.models import elastic_belt
+from cvt_hpc.parameters import Parameter, not_negative
+from cvt_hpc.physics.geometry import variator_problems
+
+_BELT = elastic_belt.PARAMETERS
+_FORCES = ("ring_tension_t1", "push_force_t1", "ring_tension_t2", "push_force_t2")
+_OF_FORMULAS = ("thrust", "load", "half_wedge_angle", "kinetic_friction")
+
+PARAMETERS: dict[str, dict[str, Parameter]] = {
+    "scene": {
+        **{
+            key: _BELT["scene"][key]
+            for key in ("ratio", "driven_radius", "centre_distance", "driving_speed", "thrust", "load")
+        },
+        "strand_forces": Parameter(
+            "formulas",
+            "",
+            "by belt formulas from thrust and load, or as given in [strands]",
+            choices=("formulas", "given"),
+        ),
+    },
+    "strands": {
+        "ring_tension_t1": not_negative(
+            7000.0, "N", "ring tension of the strand that leaves the driving pulley"
+        ),
+        "push_force_t1": not_negative(0.0, "N", "push force between the elements of that strand"),
+        "ring_tension_t2": not_negative(
+            7000.0, "N", "ring tension of the strand that enters the driving pulley"
+        ),
+        "push_force_t2": not_negative(0.0, "N", "push force between the elements of that strand"),
+    },
+    "belt": {key: _BELT["belt"][key] for key in ("element_mass", "ring_mass", "bending_stiffness")},
+    "sheaves": {"half_wedge_angle": _BELT["sheaves"]["half_wedge_angle"]},
+    "friction": {"kinetic_friction": _BELT["friction"]["kinetic_friction"]},
+    "mesh": {
+        "ritz_functions": Parameter(
+            48, "", "half waves along the strand in the Ritz model", minimum=5, maximum=512
+        ),
+    },
+}
+
+
+def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems that lie between parameters.
+
+    Parameters
+    ----------
+    parameters : dict
+        Values by name, in SI units.
+
+    Returns
+    -------
+    list of (key, expected, found)
+        Empty where all is well.
+    """
+    p = parameters
+    problems = variator_problems(p)
+    if not problems and p["strand_forces"] == "formulas":
+        most = largest_load(p)
+        if abs(p["load"]) >= most:
+            expected = f"less than {most:.4g} N m, which friction carries on the driven pulley"
+            problems.append(("load", expected, f"{p['load']:g} N m"))
+    return problems
+
+
+def largest_load(parameters: dict[str, Any]) -> float:
+    """Torque at the driving pulley [N m] from which the driven one slips (Bullinger et al. 2005, eq. 2)."""
+    p = parameters
+    force = 2.0 * p["kinetic_friction"] * p["thrust"] / np.cos(p["half_wedge_angle"])
+    return force * p["driven_radius"] / p["ratio"]
+
+
+def inert(parameters: dict[str, Any]) -> dict[str, str]:
+    """Parameters without effect on a run, each with the setting that makes it so."""
+    keys = _FORCES if parameters["strand_forces"] == "formulas" else _OF_FORMULAS
+    return dict.fromkeys(keys, f"strand_forces {parameters['strand_forces']}")

@@ -1,0 +1,97 @@
+"""What the record of a run holds of the strands: eigenfrequencies, critical speed, and their force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cvt_hpc.models.alone import lane_key, lanes
+from cvt_hpc.models.strand.forces import net_forces
+from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies, resting_frequencies
+from cvt_hpc.physics.geometry import variator
+from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+
+__all__ = ["VARIABLES", "coordinates", "cost", "judge", "lane_key", "lanes", "solve"]
+
+STRANDS = ("t1", "t2")
+MODES = 5  # that are recorded
+
+VARIABLES = (
+    Variable("eigenfrequency", ("strand", "half_waves"), "f8", "Hz", "eigenfrequency of the running strand"),
+    Variable(
+        "resting_frequency",
+        ("strand", "half_waves"),
+        "f8",
+        "Hz",
+        "the same without the terms of the belt's speed",
+    ),
+    Variable(
+        "critical_speed", ("strand",), "f8", "m s-1", "speed from which the strand does not hold its shape"
+    ),
+    Variable("net_force", ("strand",), "f8", "N", "ring tension less push force"),
+    Variable("belt_speed", (), "f8", "m s-1", "speed of the belt"),
+    Variable("strand_length", (), "f8", "m", "length of a strand"),
+)
+
+
+class Solution(NamedTuple):
+    """Both strands, and the number of sines of their Ritz model."""
+
+    strands: tuple[Strand, Strand]
+    functions: int
+
+
+def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+    """Coordinates of the record's dimensions, whatever the parameters."""
+    return {
+        "strand": Coordinate(np.array(STRANDS), "", "strand: t1 leaves the driving pulley, t2 enters it"),
+        "half_waves": Coordinate(np.arange(1, MODES + 1), "1", "half waves along the strand"),
+    }
+
+
+def cost(parameters: Mapping[str, Any], stepper: None) -> Any:
+    """Core-seconds of a run; the number of sines may be an array."""
+    return 1e-3 + 3e-8 * np.asarray(parameters["ritz_functions"], float) ** 3
+
+
+def solve(parameters: Mapping[str, Any]) -> Solution:
+    """Return the strands of a run [SI]."""
+    p = parameters
+    path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
+    speed = p["driving_speed"] * path.driving_radius
+    mass = p["element_mass"] + p["ring_mass"]
+    first, second = (
+        Strand(path.strand_length, mass, speed, float(force), p["bending_stiffness"])
+        for force in net_forces(p)
+    )
+    return Solution((first, second), p["ritz_functions"])
+
+
+def judge(solution: Solution) -> dict[str, Any]:
+    """The record of a run, its cost apart.
+
+    Parameters
+    ----------
+    solution : Solution
+        As `solve` returns it.
+    """
+    strands, functions = solution
+    beyond = [
+        name for name, strand in zip(STRANDS, strands, strict=True) if strand.speed >= strand.critical_speed
+    ]
+    reason = "eigenfrequencies alone: a strand by itself has no source of energy"
+    if beyond:
+        reason = f"strand {' and '.join(beyond)} at or beyond the critical speed: no shape is held"
+    return {
+        "status": Status.DONE,
+        "vibrates": Vibrates.UNDECIDED,
+        "reason": reason,
+        "eigenfrequency": np.array([eigenfrequencies(strand, functions)[:MODES] for strand in strands]),
+        "resting_frequency": np.array([resting_frequencies(strand, MODES) for strand in strands]),
+        "critical_speed": np.array([strand.critical_speed for strand in strands]),
+        "net_force": np.array([strand.net_force for strand in strands]),
+        "belt_speed": strands[0].speed,
+        "strand_length": strands[0].length,
+    }

@@ -1,0 +1,53 @@
+"""In what the job of an output folder differs from the one that is asked for."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from cvt_hpc.errors import InputError
+from cvt_hpc.study.description import Study
+
+
+def refuse_other(path: Path, found: Study, asked: Study) -> None:
+    """Raise InputError unless the study that a folder holds is the one that is asked for."""
+    if found.fingerprint != asked.fingerprint:
+        difference = describe_difference(found.job, asked.job)
+        raise InputError(
+            f"{path}: expected the folder of this job, found that of another (job {found.name}: "
+            f"{difference}); choose another --out, or --fresh to throw its results away"
+        )
+    if _layout(found) != _layout(asked):
+        raise InputError(
+            f"{path}: expected records with the quantities of this version, found others; choose "
+            "another --out, or --fresh to throw them away"
+        )
+
+
+def describe_difference(found: dict[str, Any], asked: dict[str, Any]) -> str:
+    """Return the first few entries in which two resolved jobs differ, as "key is 1 there, 2 here"."""
+    there, here = _flatten(found), _flatten(asked)
+    keys = [key for key in {**there, **here} if there.get(key) != here.get(key)]
+    shown = [f"{key} is {_short(there.get(key))} there, {_short(here.get(key))} here" for key in keys[:3]]
+    return "; ".join(shown) + ("; ..." if len(keys) > 3 else "")
+
+
+def _layout(study: Study) -> dict[str, Any]:
+    """Return what records must agree in to be of one dataset."""
+    return {
+        "quantities": [(v.name, v.dims, v.dtype) for v in study.variables],
+        "coordinates": [(dimension.name, dimension.values) for dimension in study.coordinates],
+    }
+
+
+def _flatten(entry: Any, prefix: str = "") -> dict[str, Any]:
+    if not isinstance(entry, dict):
+        return {prefix: entry}
+    parts = (_flatten(value, f"{prefix}.{key}" if prefix else key) for key, value in entry.items())
+    return {key: value for part in parts for key, value in part.items()}
+
+
+def _short(value: Any) -> str:
+    text = "not set" if value is None else json.dumps(value)
+    return text if len(text) <= 40 else text[:37] + "..."

@@ -1,0 +1,62 @@
+"""What the README says of the rooms of the package, against the package itself."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import cvt_hpc
+
+PACKAGE = Path(cvt_hpc.__file__).parent
+BUILT = (PACKAGE.parent / "README.md").read_text().split("## How it is built")[1].split("\n## ")[0]
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+
+
+def room(path):
+    """The folder of a module, or its own name where it lies above all rooms."""
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def imported(path):
+    """Modules that a file names in its imports."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def test_the_tree_names_all_that_is_there():
+    tree = BUILT.split("    cvt_hpc/\n")[1].split("    slurm/")[0]
+    names = " ".join(re.split(r"\s{2,}", line.strip())[0] for line in tree.splitlines())
+    named = set(re.findall(r"[a-z_]+(?:/|[.]py)", names))
+    found = {
+        f"{path.name}/" if path.is_dir() else path.name for path in PACKAGE.iterdir() if path.name[0] != "_"
+    }
+    assert named == found
+
+
+def test_imports_run_downwards():
+    chain = re.search(r"downwards only: ([^.]*)[.]", BUILT)[1]
+    levels = [level.replace(",", " ").split() for level in chain.split("->")]
+    height = {name: -depth for depth, names in enumerate(levels) for name in names}
+    folders = {path.name for path in PACKAGE.iterdir() if path.is_dir() and path.name[0] != "_"}
+    assert folders | {"cli"} == set(height)
+    for path in SOURCES:
+        for module in imported(path):
+            below = module.split(".")[1] if module.startswith("cvt_hpc.") else ""
+            if below in height and room(path) in height and below != room(path):
+                assert height[below] < height[room(path)], f"{path}: {module}"
+
+
+@pytest.mark.parametrize(
+    ("modules", "rooms"),
+    [
+        ({"mpi4py"}, {"study"}),
+        ({"cvt_hpc.files.written_aside"}, {"study", "analysis", "chart", "history_files"}),
+    ],
+)
+def test_what_only_some_rooms_do(modules, rooms):
+    assert {room(path) for path in SOURCES if modules & set(imported(path))} == rooms

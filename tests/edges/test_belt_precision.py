@@ -1,0 +1,37 @@
+"""Single precision on the belt: the fast step's round-off shakes strands that nothing else moves, and how much."""
+
+import pytest
+from belts import point
+
+from cvt_hpc.models.elastic_belt.transient import Transient
+from cvt_hpc.vibration.signals import band_amplitude
+
+THRESHOLD, NEGLIGIBLE = 5e-6, 1e-8  # [m]: defaults of what vibrates, and of what is at rest
+
+
+def hum(precision, step):
+    """Amplitude [m] in the band of a belt without load, disturbance or vibration."""
+    values = {"stations": 64, "load": 0.0, "disturbance": 0.0, "duration": 0.1, "rise_time": 0.03}
+    run = Transient(point("imex", **values, precision=precision, step=step), "imex")
+    while run.batch.running:
+        assert run.advance(run.samples) is None
+    strands = [k for k, probe in enumerate(run.probes) if probe.label.startswith("t")]
+    return band_amplitude(run.displacement[run.judged][:, strands], 1.0 / run.interval, (300.0, 1500.0)).max()
+
+
+@pytest.fixture(scope="module")
+def exact():
+    """What the start-up leaves of motion, by double precision [m]: 0.08 nm."""
+    return hum("double", 4.6e-6)
+
+
+def test_round_off_is_what_moves_the_strands(exact):
+    # 2.3 nm: some thirty times what is left in double precision, and at rest for the verdict
+    assert 10.0 * exact < hum("single", 4.6e-6) < NEGLIGIBLE
+
+
+def test_shorter_steps_round_more_often_and_stay_far_below_a_vibration(exact):
+    short = hum("single", 1.15e-6)
+    assert short > 2.0 * hum("single", 4.6e-6)  # 14 nm
+    assert short < THRESHOLD / 100.0
+    assert hum("double", 1.15e-6) == pytest.approx(exact, rel=0.05)
