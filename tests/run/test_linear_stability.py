@@ -4,19 +4,17 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fast_runs import FastRuns
+from growing import at_rest, measured
 from rungs import rung_job, rung_record
 from scipy.sparse import csc_array
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt.belt import mesh
-from cvt_hpc.models.elastic_belt.flat import flat_belt, pack, rates, system, unpack
-from cvt_hpc.models.elastic_belt.linearised import Linearisation
+from cvt_hpc.models.elastic_belt.flat import rates, system
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.linear_stability.branch import branch, onsets
 from cvt_hpc.models.linear_stability.modes import DECAY, HIGH, LOW, modes
 from cvt_hpc.models.linear_stability.spectrum import eigenpairs
-from cvt_hpc.models.steady_variator.equations import LATE
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.variables import Vibrates
 
@@ -28,14 +26,6 @@ LOADS = (80.0, 105.0, 125.0, 140.0)
 def points(**values):
     parameters = DEFAULTS | values
     return branch(SteadyBelt(parameters), mesh(parameters), LOADS)
-
-
-def at_rest(steady):
-    """The belt as one system, at rest in a steady state; its unknowns; its Jacobian there."""
-    flat = flat_belt(steady.belt._replace(bridging_stiffness=steady.belt.element_stiffness), LATE)
-    y = pack(flat, steady.state)
-    assert rates(flat, 0.0, y, np.empty_like(y))
-    return flat, y, Linearisation(flat)(flat)
 
 
 @pytest.mark.parametrize("values", [{}, {"sheave_stiffness": np.inf, "stations": 98}])
@@ -52,7 +42,7 @@ def test_jacobian_is_that_of_central_differences_one_by_one(values):
             assert rates(flat, 0.0, moved, out)
         dense[:, j] = (sides[0] - sides[1]) / (2.0 * step)
     # both leave round-off of the same increments, 1e-9 of the steepest slopes of a row
-    error = np.abs(matrix.toarray() * sizes - dense) / np.abs(dense).max(axis=1, keepdims=True)
+    error = np.abs(matrix * sizes - dense) / np.abs(dense).max(axis=1, keepdims=True)
     assert error.max() < 1e-7
 
 
@@ -77,7 +67,7 @@ def test_spectrum_of_a_known_matrix(count):
 
 def test_spectrum_of_the_belt_is_that_of_the_full_matrix():
     found = points()[2]
-    matrix = at_rest(found.steady)[2].toarray()
+    matrix = at_rest(found.steady)[2]
     values = np.linalg.eigvals(matrix)
     wanted = (values.imag > 2e2 * np.pi) & (values.imag < 3e3 * np.pi) & (values.real > -DECAY)
     expected = values[wanted][np.argsort(-values[wanted].real)]
@@ -88,28 +78,12 @@ def test_spectrum_of_the_belt_is_that_of_the_full_matrix():
 
 @pytest.mark.parametrize("place", range(len(LOADS)))
 def test_growth_and_frequency_are_those_of_the_transient(place):
-    # From a disturbance of 0.1 nm by the mode itself, seen through the left eigenvector, in which no other mode
-    # shows. Beyond 1 nm elements part and touch in turn at the push's front, see the README.
-    size, step, together, samples = 1e-10, 1e-6, 40, 120
+    # from 0.1 nm: beyond 1 nm elements part and touch in turn at the push's front, see the README
     point = points()[place]
-    flat, y, matrix = at_rest(point.steady)
-    mode = point.modes[0]
-    value = mode.growth + 2j * np.pi * mode.frequency
-    left = np.linalg.solve((matrix.toarray() - value * (1 + 1e-9) * np.eye(y.size)).conj().T, mode.vector)
-    unpack(flat, 0.0, y + size * mode.vector.real)
-    run = FastRuns([point.steady.belt], [flat.state.copy()])
-    seen = np.empty(samples, complex)
-    for k in range(samples):
-        run.advance(together, step)
-        seen[k] = np.vdot(left, pack(flat, run.state()) - y)
-    # a step that begins beside a cell which rests on its damper alone needs a millisecond to find that rest
-    settled = slice(samples // 4, None)
-    time = np.arange(samples)[settled] * together * step
-    growth = np.polyfit(time, np.log(np.abs(seen[settled])), 1)[0]
-    pulse = np.polyfit(time, np.unwrap(np.angle(seen[settled])), 1)[0]
+    growth, frequency = measured(point)
     # the step of first order, 1 us, leaves 1 %
-    assert growth == pytest.approx(mode.growth, abs=0.02 * abs(mode.growth) + 1.0)
-    assert pulse / (2.0 * np.pi) == pytest.approx(mode.frequency, rel=2e-3)
+    assert growth == pytest.approx(point.growth, abs=0.02 * abs(point.growth) + 1.0)
+    assert frequency == pytest.approx(point.modes[0].frequency, rel=2e-3)
 
 
 def test_constant_friction_and_rigid_sheaves_are_stable():
