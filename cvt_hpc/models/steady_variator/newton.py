@@ -29,7 +29,7 @@ def newton(equations: Equations, x: np.ndarray, tolerance: float, damped: bool =
     x : (n,) array
         Where to begin; left as it is.
     tolerance : float
-        Root mean square of a last full step over the unknowns' sizes.
+        Root mean square of what a further step would be, over the unknowns' sizes.
     damped : bool
         Shorten steps that do not lead home.
 
@@ -51,22 +51,21 @@ def newton(equations: Equations, x: np.ndarray, tolerance: float, damped: bool =
             return None
         step = -factors.solve(residual)
         size = _size(equations, step)
-        if size < tolerance and share == 1.0:
-            return x + step
         if not size < FAR:
             return None
         share = min(1.0, 4.0 * share) if damped else 1.0
         while True:
             found = x + share * step
             residual = equations.residual(found)
-            if not damped:
+            # by the same factors, what the next step would be
+            ahead = np.inf if residual is None else _size(equations, factors.solve(residual))
+            if not damped or ahead <= (1.0 - 0.25 * share) * size:
                 break
-            if residual is not None:
-                if _size(equations, factors.solve(residual)) <= (1.0 - 0.25 * share) * size:
-                    break
             share *= 0.5
             if share < SHORTEST:
                 return None
+        if share == 1.0 and ahead < tolerance:
+            return found
         x = found
     return None
 
