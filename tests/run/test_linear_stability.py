@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from cf import cf_findings
 from growing import at_rest, measured
 from rungs import rung_job, rung_record
 from scipy.sparse import csc_array
@@ -16,6 +17,7 @@ from cvt_hpc.models.linear_stability.branch import branch, onsets
 from cvt_hpc.models.linear_stability.modes import DECAY, HIGH, LOW, modes
 from cvt_hpc.models.linear_stability.spectrum import eigenpairs
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
+from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Vibrates
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
@@ -124,6 +126,15 @@ def test_record():
     assert record["fed"].sum() == pytest.approx(mode.fed.sum(), rel=1e-4)
     assert (record["vibrating_strand"], record["mode"]) == (mode.strand + 1, mode.half_waves)
     assert rung_record("linear_stability", load=80.0)["vibrates"] == Vibrates.NO
+
+
+def test_a_sweep_of_it_keeps_the_conventions(tmp_path):
+    report = run(rung_job("linear_stability", {"load": [80.0, 125.0]}), tmp_path, progress=False)
+    assert (report.done, report.exit_status) == (2, 0)
+    assert cf_findings(report.results) == []
+    with open_results(report.results) as dataset:
+        assert dataset["vibrates"].values.tolist() == [Vibrates.NO, Vibrates.YES]
+        assert dataset["fed"].dims == ("load", "region") and dataset["thrust_ratio"].dims == ("load",)
 
 
 def test_falling_friction_without_memory_is_refused():
