@@ -25,7 +25,7 @@ from cvt_hpc.models.steady_variator.equations import LATE
 from cvt_hpc.models.steady_variator.walking import Steady
 
 LOW, HIGH = 100.0, 1500.0  # [Hz]: the band of strands
-DECAY = 400.0  # [1/s]: modes that decay faster are left out
+DECAY, GROWTH = 400.0, 5000.0  # [1/s]: modes that decay or grow faster are left out
 
 
 class Mode(NamedTuple):
@@ -86,7 +86,7 @@ def modes(
     whole = linearise(flat)
     # the same without flanks and saddles: the difference is what their friction, and their contact, does
     free = linearise(flat._replace(belt=belt._replace(arc_share=np.zeros_like(belt.arc_share))))
-    values, vectors = eigenpairs(whole, 2.0 * np.pi * band[0], 2.0 * np.pi * band[1], decay)
+    values, vectors = eigenpairs(whole, 2.0 * np.pi * band[0], 2.0 * np.pi * band[1], decay, GROWTH)
     n = belt.cell.size
     velocities = slice(n, 4 * n)
     friction = (whole - free).tocsr()[velocities]
