@@ -137,6 +137,8 @@ def test_a_sweep_of_it_keeps_the_conventions(tmp_path):
         assert dataset["fed"].dims == ("load", "region") and dataset["thrust_ratio"].dims == ("load",)
 
 
-def test_falling_friction_without_memory_is_refused():
-    with pytest.raises(InputError, match="friction_memory"):
-        rung_job("linear_stability", friction_memory=0.0)
+def test_falling_friction_with_little_memory_is_refused():
+    for memory in (0.0, 3e-5):
+        with pytest.raises(InputError, match="friction_memory"):
+            rung_job("linear_stability", friction_memory=memory)
+    assert rung_job("linear_stability", friction_memory=0.0, friction_gradient=0.0).size == 1

@@ -7,6 +7,8 @@ from typing import Any
 from cvt_hpc.models import steady_variator
 from cvt_hpc.parameters import Parameter, not_negative, positive
 
+LEAST_MEMORY = 1e-4  # [s]: what has been held against transients, see README.md
+
 PARAMETERS: dict[str, dict[str, Parameter]] = steady_variator.PARAMETERS | {
     "judgement": {
         "band_low": positive(300.0, "Hz", "lowest frequency of a mode that counts as vibration"),
@@ -25,9 +27,11 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if p["band_low"] >= p["band_high"]:
         expected = f"above band_low = {p['band_low']:g} Hz"
         problems.append(("band_high", expected, f"{p['band_high']:g} Hz"))
-    if p["friction_memory"] == 0.0 and p["friction_gradient"] < 0.0:
-        expected = "above 0 where friction falls: without memory single stations are unstable by themselves"
-        problems.append(("friction_memory", expected, "0 s"))
+    if p["friction_memory"] < LEAST_MEMORY and p["friction_gradient"] < 0.0:
+        expected = (
+            f"{LEAST_MEMORY:g} s or more where friction falls: below, single stations grow by themselves"
+        )
+        problems.append(("friction_memory", expected, f"{p['friction_memory']:g} s"))
     return problems
 
 
