@@ -3,8 +3,10 @@
 MODELS = {
     "criterion": "cvt_hpc.models.criterion",
     "elastic_belt": "cvt_hpc.models.elastic_belt",
+    "linear_stability": "cvt_hpc.models.linear_stability",
     "oscillator": "cvt_hpc.models.oscillator",
     "moving_string": "cvt_hpc.models.moving_string",
     "strand": "cvt_hpc.models.strand",
     "quasi_static_belt": "cvt_hpc.models.quasi_static_belt",
+    "steady_variator": "cvt_hpc.models.steady_variator",
 }

@@ -22,7 +22,7 @@ def linearise(belt, **forces):
             probed = fields.copy()
             probed[row, j] = 1.0
             strains(belt, probed, eps)
-            accelerations(belt, State(probed, scalars), np.zeros(n), eps, rate)
+            accelerations(belt, State(probed, scalars), np.zeros(n), eps, rate, np.empty(n))
             matrix[:, j] = rate[U]
     return matrices
 

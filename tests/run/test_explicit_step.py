@@ -84,13 +84,13 @@ def forces(belt, state):
 def plain_step(belt, before, step):
     """The state after a step of symplectic Euler: velocities by the old state, all else by the new velocities."""
     state = before.copy()
-    (fields, scalars), rate = state, np.zeros_like(before.fields)
+    (fields, scalars), rate, moments = state, np.zeros_like(before.fields), np.zeros(belt.cell.size)
     force, eps = forces(belt, state)
-    moment = accelerations(belt, state, force, eps, rate)
+    accelerations(belt, state, force, eps, rate, moments)
     for row in (U, V_ELEMENT, V_RING):
         fields[row] += step * rate[row]
     load = belt.ratio * load_at(belt, scalars[TIME])
-    scalars[DRIVEN_SPEED] += step * (moment - load) / belt.driven_inertia
+    scalars[DRIVEN_SPEED] += step * (moments.sum() - load) / belt.driven_inertia
     memory_rates(belt, state, rate)
     content_rates(belt, state, eps, rate)
     fields[W] += step * fields[U]

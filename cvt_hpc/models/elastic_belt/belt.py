@@ -33,7 +33,8 @@ class Belt(NamedTuple):
     Arrays of cells and stations have shape (N,), `per_...` being reciprocals, the span that of two cells;
     `bending` is (N, 5): force per length on station j from the displacements of stations j-2 .. j+2;
     `ring_relief` is the tension at which the rings' own weight bears them. `element_mass` and `ring_mass` are
-    the inertia along the path, `mass` that across it.
+    the inertia along the path, `mass` that across it. Across a gap the elements' damper may push against
+    `bridging_stiffness` times the gap's strain; inf, as in every run: elements that are apart have no damper.
     """
 
     cell: np.ndarray
@@ -54,6 +55,7 @@ class Belt(NamedTuple):
     element_stiffness: float
     ring_stiffness: float
     element_damping: float
+    bridging_stiffness: float
     ring_damping: float
     transverse_damping: float
     ring_offset: float
@@ -190,6 +192,7 @@ def belt_constants(parameters: dict[str, Any]) -> Belt:
         element_stiffness=p["element_stiffness"],
         ring_stiffness=p["ring_stiffness"],
         element_damping=p["element_damping"],
+        bridging_stiffness=np.inf,
         ring_damping=p["ring_damping"],
         transverse_damping=p["transverse_damping"],
         ring_offset=p["ring_offset"],

@@ -68,8 +68,10 @@ class FlatBelt(NamedTuple):
         What the unknowns are counted from.
     start : float
         Simulated time at t = 0 [s].
-    force, eps, rate : (N,), (2, N), (7, N) arrays
-        Work space: axial line forces, strains, rates.
+    rounding : float
+        Strain over which the corner of the push force, where elements part, is rounded off; 0 in every run.
+    force, eps, rate, moments : (N,), (2, N), (7, N), (N,) arrays
+        Work space: axial line forces, strains, rates, moments on the driven pulley.
     """
 
     belt: Belt
@@ -78,9 +80,11 @@ class FlatBelt(NamedTuple):
     remembering: np.ndarray
     origin: np.ndarray
     start: float
+    rounding: float
     force: np.ndarray
     eps: np.ndarray
     rate: np.ndarray
+    moments: np.ndarray
 
 
 def flat_belt(belt: Belt, start: float = 0.0) -> FlatBelt:
@@ -102,8 +106,8 @@ def flat_belt(belt: Belt, start: float = 0.0) -> FlatBelt:
     rows = np.repeat([origins.get(row, 0.0) for row in ROWS], n)
     origin = np.concatenate([rows, np.zeros(remembering.size), [belt.driving_speed / belt.ratio, 0.0]])
     state = State(np.zeros((len(FIELDS), n)), np.zeros(len(SCALARS)))
-    work = np.zeros(n), np.zeros((2, n)), np.zeros((len(FIELDS), n))
-    return FlatBelt(belt, state, contacts, remembering, origin, start, *work)
+    work = np.zeros(n), np.zeros((2, n)), np.zeros((len(FIELDS), n)), np.zeros(n)
+    return FlatBelt(belt, state, contacts, remembering, origin, start, 0.0, *work)
 
 
 def pack(flat: FlatBelt, state: State) -> np.ndarray:
@@ -146,6 +150,20 @@ def driven_thrust(belt: Belt, force: np.ndarray) -> float:
 
 
 @kernel
+def rates_under_forces(flat: FlatBelt) -> None:
+    """Rates of the fields and moments at the stations, of `flat.state` and of `flat.force` as it stands."""
+    belt, state, rate = flat.belt, flat.state, flat.rate
+    strains(belt, state.fields, flat.eps)
+    memory_rates(belt, state, rate)
+    content_rates(belt, state, flat.eps, rate)
+    if flat.rounding > 0.0:
+        for c in range(belt.cell.size):
+            eps = flat.eps[0, c]
+            flat.eps[0, c] = 0.5 * (eps - np.sqrt(eps * eps + flat.rounding * flat.rounding))
+    accelerations(belt, state, flat.force, flat.eps, rate, flat.moments)
+
+
+@kernel
 def rates(flat: FlatBelt, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     """Right-hand side.
 
@@ -169,10 +187,7 @@ def rates(flat: FlatBelt, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     unpack(flat, t, y)
     if contact_forces(belt, state, flat.contacts, flat.force) == 0:
         return False
-    strains(belt, state.fields, flat.eps)
-    memory_rates(belt, state, rate)
-    content_rates(belt, state, flat.eps, rate)
-    moment = accelerations(belt, state, flat.force, flat.eps, rate)
+    rates_under_forces(flat)
     n = belt.cell.size
     for j in range(n):
         out[j] = state.fields[U, j]
@@ -182,7 +197,7 @@ def rates(flat: FlatBelt, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     first = len(ROWS) * n
     for k in range(flat.remembering.size):
         out[first + k] = rate[V_FILTERED, flat.remembering[k]]
-    out[-2] = (moment - belt.ratio * load_at(belt, state.scalars[TIME])) / belt.driven_inertia
+    out[-2] = (flat.moments.sum() - belt.ratio * load_at(belt, state.scalars[TIME])) / belt.driven_inertia
     out[-1] = (driven_thrust(belt, flat.force) - belt.thrust) / belt.axial_damping
     return True
 

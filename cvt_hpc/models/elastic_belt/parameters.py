@@ -132,16 +132,23 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         Empty where all is well.
     """
     p = parameters
+    before = (1.0 - p["judged_fraction"]) * p["duration"]
+    problems = shape_problems(p)
+    if p["rise_time"] > before * (1.0 + 1e-9):
+        expected = f"a load that has risen before the run is judged, within {before:g} s"
+        problems.append(("rise_time", expected, f"{p['rise_time']:g} s"))
+    return problems + friction_problems(p)
+
+
+def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems between sizes: pulleys that overlap, play beyond reason. Result as of `check`."""
+    p = parameters
     problems = variator_problems(p)
     if not problems:
         path = variator(p["ratio"], p["driven_radius"], p["centre_distance"]).path_length
         if abs(p["play"]) > 0.02 * path:
             problems.append(("play", f"within 2 % of the belt's length {path:.4g} m", f"{p['play']:g} m"))
-    before = (1.0 - p["judged_fraction"]) * p["duration"]
-    if p["rise_time"] > before * (1.0 + 1e-9):
-        expected = f"a load that has risen before the run is judged, within {before:g} s"
-        problems.append(("rise_time", expected, f"{p['rise_time']:g} s"))
-    return problems + friction_problems(p)
+    return problems
 
 
 def inert(parameters: dict[str, Any]) -> dict[str, str]:

@@ -225,7 +225,7 @@ def rates(model: QuasiStatic, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     if contact_forces(belt, state, flat.contacts, flat.force) == 0:
         return False
     memory_rates(belt, state, rate)
-    moment = accelerations(belt, state, flat.force, flat.eps, rate)
+    accelerations(belt, state, flat.force, flat.eps, rate, flat.moments)
     n, count, slow = belt.cell.size, model.shapes.shape[1], model.slow_pull.shape[0]
     first = count + slow
     out[:slow] = y[count:first]
@@ -237,7 +237,7 @@ def rates(model: QuasiStatic, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     first += 2 + 2 * n
     for k in range(flat.remembering.size):
         out[first + k] = rate[V_FILTERED, flat.remembering[k]]
-    out[-2] = (moment - belt.ratio * load_at(belt, t)) / belt.driven_inertia
+    out[-2] = (flat.moments.sum() - belt.ratio * load_at(belt, t)) / belt.driven_inertia
     out[-1] = (driven_thrust(belt, flat.force) - belt.thrust) / belt.axial_damping
     return True
 

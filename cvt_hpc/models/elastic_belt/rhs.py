@@ -120,6 +120,15 @@ def ring_drag(
     return 0.5 * pressure / belt.dual[j] * belt.ring_friction * factor, sliding_speed
 
 
+@merged_kernel
+def damped_push(belt: Belt, eps: float, opening: float) -> float:
+    """Push force with its damper [N], never a pull, of a cell that is strained and opens by v_0,s [1/s]."""
+    if eps >= 0.0 and belt.bridging_stiffness == np.inf:
+        return 0.0
+    stiffness = belt.element_stiffness if eps < 0.0 else belt.bridging_stiffness
+    return max(-stiffness * eps - belt.element_damping * opening, 0.0)
+
+
 @kernel
 def accelerations(
     belt: Belt,
@@ -127,7 +136,8 @@ def accelerations(
     force: np.ndarray,
     eps: np.ndarray,
     rate: np.ndarray,
-) -> float:
+    moments: np.ndarray,
+) -> None:
     """Accelerations of u, v_element and v_ring.
 
     Parameters
@@ -140,11 +150,8 @@ def accelerations(
         Strains of the cells.
     rate : (7, N) array
         Rows U, V_ELEMENT and V_RING are set [m/s^2].
-
-    Returns
-    -------
-    float
-        Moment of the flanks on the driven pulley [N m].
+    moments : (N,) array
+        Result: moments of the stations' flanks on the driven pulley [N m].
     """
     n = belt.cell.size
     w, u = state.fields[W], state.fields[U]
@@ -152,7 +159,6 @@ def accelerations(
     sine, cosine = np.sin(belt.half_wedge_angle), np.cos(belt.half_wedge_angle)
     centrifugal = belt.mass * belt.belt_speed * belt.belt_speed
     damping = damping_at(belt, state.scalars[TIME])
-    moment = 0.0
     for j in range(n):
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
         left, right, dual = belt.cell[a], belt.cell[j], belt.dual[j]
@@ -176,13 +182,11 @@ def accelerations(
         stress_left = ring_left + belt.ring_damping * (v1[j] - v1[a]) / left
         stress_right = ring_right + belt.ring_damping * (v1[b] - v1[j]) / right
         along_ring = (stress_right - stress_left) / dual
-        if push_left > 0.0:
-            push_left = max(push_left - belt.element_damping * (v0[j] - v0[a]) / left, 0.0)
-        if push_right > 0.0:
-            push_right = max(push_right - belt.element_damping * (v0[b] - v0[j]) / right, 0.0)
+        push_left = damped_push(belt, eps[0, a], (v0[j] - v0[a]) / left)
+        push_right = damped_push(belt, eps[0, j], (v0[b] - v0[j]) / right)
         along_element = -(push_right - push_left) / dual
 
-        share = belt.arc_share[j]
+        share, moments[j] = belt.arc_share[j], 0.0
         if share > 0.0:
             driven = j >= belt.driven_start
             radius = (belt.driven_radius if driven else belt.driving_radius) + w[j]
@@ -195,7 +199,7 @@ def accelerations(
             )
             outward += share * radial
             along_element += share * tangential
-            moment -= driven * share * dual * tangential * radius
+            moments[j] = -driven * share * dual * tangential * radius
             drag, _ = ring_drag(belt, j, a, eps, v0[j], v1[j])
             along_ring += drag
             along_element -= (1.0 + belt.ring_offset * belt.arc_curvature[j]) * drag
@@ -203,7 +207,6 @@ def accelerations(
         rate[U, j] = (transverse + outward) / belt.mass
         rate[V_ELEMENT, j] = along_element / belt.element_mass - v0[j] * (v0[j] - v0[a]) / left
         rate[V_RING, j] = along_ring / belt.ring_mass[j] - v1[j] * (v1[j] - v1[a]) / left
-    return moment
 
 
 @kernel

@@ -1,0 +1,121 @@
+"""Small motions about a steady state: how fast they grow, how they look, and what feeds them.
+
+A mode's growth rate is shared out over the belt by the power of friction. With masses m_k of the velocities
+v_k (u, v_0 and v_1 of each station, complex amplitudes) and the amplitudes a_k of the accelerations that the
+flanks and the rings' saddles cause,
+
+    fed = Re(conj(v_k) m_k a_k) / (2 sum m_k |v_k|^2)
+
+is their power over twice the vibration's energy, which is twice its mean kinetic one; of a mass on a spring
+with the damping d it is -d / (2 m).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cvt_hpc.models.elastic_belt.belt import Mesh
+from cvt_hpc.models.elastic_belt.flat import flat_belt, pack, rates
+from cvt_hpc.models.elastic_belt.linearised import Linearisation
+from cvt_hpc.models.elastic_belt.record import MODES
+from cvt_hpc.models.linear_stability.spectrum import eigenpairs
+from cvt_hpc.models.steady_variator.equations import LATE
+from cvt_hpc.models.steady_variator.walking import Steady
+
+LOW, HIGH = 100.0, 1500.0  # [Hz]: the band of strands
+DECAY, GROWTH = 400.0, 5000.0  # [1/s]: modes that decay or grow faster are left out
+
+
+class Mode(NamedTuple):
+    """One mode.
+
+    Attributes
+    ----------
+    growth : float
+        Growth rate; negative: it decays [1/s].
+    frequency : float
+        [Hz]
+    amplitudes : (4,) array
+        Largest displacement of the regions in the order of REGIONS, over the largest of all.
+    strand : int
+        The one that moves most: 0 is t1, 1 is t2.
+    half_waves : int
+        Half waves of the strongest sine along that strand, measured from the chord between its ends.
+    fed : (N,) array
+        Share of the growth rate that friction of the flanks and saddles at each station feeds [1/s].
+    displacement : (N,) complex array
+        Amplitude of w, the largest 1.
+    vector : (n,) complex array
+        Of all unknowns of `flat`, in the same measure.
+    """
+
+    growth: float
+    frequency: float
+    amplitudes: np.ndarray
+    strand: int
+    half_waves: int
+    fed: np.ndarray
+    displacement: np.ndarray
+    vector: np.ndarray
+
+
+def modes(
+    steady: Steady, grid: Mesh, band: tuple[float, float] = (LOW, HIGH), decay: float = DECAY
+) -> list[Mode]:
+    """Modes of a steady state, the one that grows fastest first.
+
+    Parameters
+    ----------
+    steady : Steady
+        The state; dampers of the elements as in it.
+    grid : Mesh
+        Its mesh.
+    band : (float, float)
+        Frequencies [Hz].
+    decay : float
+        Modes that decay faster are left out [1/s].
+    """
+    belt = steady.belt._replace(bridging_stiffness=steady.belt.element_stiffness)
+    flat = flat_belt(belt, LATE)
+    y = pack(flat, steady.state)
+    if not rates(flat, 0.0, y, np.empty_like(y)):
+        raise ValueError("the contact of this state has no solution")
+    linearise = Linearisation(flat)
+    whole = linearise(flat)
+    # the same without flanks and saddles: the difference is what their friction, and their contact, does
+    free = linearise(flat._replace(belt=belt._replace(arc_share=np.zeros_like(belt.arc_share))))
+    values, vectors = eigenpairs(whole, 2.0 * np.pi * band[0], 2.0 * np.pi * band[1], decay, GROWTH)
+    n = belt.cell.size
+    velocities = slice(n, 4 * n)
+    friction = (whole - free).tocsr()[velocities]
+    masses = np.concatenate(
+        [belt.mass * belt.dual, belt.element_mass * belt.dual, belt.ring_mass * belt.dual]
+    )
+    found = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        vector = vector / vector[np.abs(vector[:n]).argmax()]
+        speeds = vector[velocities]
+        power = (speeds.conj() * masses * (friction @ vector)).real / (2.0 * masses @ np.abs(speeds) ** 2)
+        shape = _shape(vector[:n], grid)
+        frequency = float(value.imag / (2.0 * np.pi))
+        found.append(
+            Mode(float(value.real), frequency, *shape, power.reshape(3, n).sum(axis=0), vector[:n], vector)
+        )
+    return found
+
+
+def _shape(w: np.ndarray, grid: Mesh) -> tuple[np.ndarray, int, int]:
+    """Amplitudes of the regions, the strand that moves most and its half waves."""
+    largest, waves = np.empty(4), np.zeros(4, dtype=int)
+    for region in range(4):
+        first, count = grid.starts[region], grid.counts[region]
+        part = np.append(w[first : first + count], w[(first + count) % w.size])
+        largest[region] = np.abs(part).max()
+        along = np.linspace(0.0, 1.0, count + 1)
+        sines = np.sin(np.pi * np.outer(np.arange(1, MODES + 1), along))
+        chord = part[0] + along * (part[-1] - part[0])
+        waves[region] = 1 + np.abs(sines @ (part - chord)).argmax()
+    strand = int(largest[3] > largest[1])
+    return largest / largest.max(), strand, int(waves[2 * strand + 1])

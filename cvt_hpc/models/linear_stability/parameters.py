@@ -1,0 +1,40 @@
+"""What a job may set of linear stability: the steady belt's parameters, and what decides."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cvt_hpc.models import steady_variator
+from cvt_hpc.parameters import Parameter, not_negative, positive
+
+LEAST_MEMORY = 1e-4  # [s]: what has been held against transients, see README.md
+
+PARAMETERS: dict[str, dict[str, Parameter]] = steady_variator.PARAMETERS | {
+    "judgement": {
+        "band_low": positive(300.0, "Hz", "lowest frequency of a mode that counts as vibration"),
+        "band_high": positive(1500.0, "Hz", "highest such frequency"),
+        "undecided_growth": not_negative(
+            50.0, "1/s", "growth or decay of the fastest growing mode up to which nothing is decided"
+        ),
+    },
+}
+
+
+def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems that lie between parameters: as of `steady_variator`, and a band that is none."""
+    p = parameters
+    problems = steady_variator.check(p)
+    if p["band_low"] >= p["band_high"]:
+        expected = f"above band_low = {p['band_low']:g} Hz"
+        problems.append(("band_high", expected, f"{p['band_high']:g} Hz"))
+    if p["friction_memory"] < LEAST_MEMORY and p["friction_gradient"] < 0.0:
+        expected = (
+            f"{LEAST_MEMORY:g} s or more where friction falls: below, single stations grow by themselves"
+        )
+        problems.append(("friction_memory", expected, f"{p['friction_memory']:g} s"))
+    return problems
+
+
+def inert(parameters: dict[str, Any]) -> dict[str, str]:
+    """Parameters without effect: see `elastic_belt.inert`."""
+    return steady_variator.inert(parameters)

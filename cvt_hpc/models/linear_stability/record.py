@@ -1,0 +1,98 @@
+"""What the record of linear stability holds: the verdict, and the mode that grows fastest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cvt_hpc.models.alone import lane_key, lanes
+from cvt_hpc.models.steady_variator import record as steady_record
+from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+
+__all__ = ["VARIABLES", "coordinates", "cost", "judge", "lane_key", "lanes", "solve"]
+
+VARIABLES = (
+    Variable("growth_rate", (), "f8", "s-1", "growth rate of the mode that grows fastest; none found: nan"),
+    Variable("frequency", (), "f8", "Hz", "its frequency"),
+    Variable(
+        "vibrating_strand", (), "i1", "1", "strand in which it is largest: 1 is t1, 2 is t2; 0: no mode"
+    ),
+    Variable("mode", (), "i1", "1", "its half waves along that strand; 0: no mode"),
+    Variable("relative_amplitude", ("region",), "f8", "1", "its largest displacement by region"),
+    Variable("fed", ("region",), "f8", "s-1", "what friction in each region adds to its growth rate"),
+    *steady_record.VARIABLES,
+)
+
+
+class Solution(NamedTuple):
+    """What was found.
+
+    Attributes
+    ----------
+    steady : dict or ValueError
+        Numbers of the steady state, or why there is none.
+    modes : list of Mode
+        In the band, the one that grows fastest first.
+    starts : (4,) int array
+        First station of each region.
+    undecided : float
+        Growth up to which nothing is decided [1/s].
+    """
+
+    steady: dict[str, Any] | ValueError
+    modes: list
+    starts: np.ndarray
+    undecided: float
+
+
+def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+    """Coordinates of the record's dimensions, whatever the parameters."""
+    from cvt_hpc.models.elastic_belt.belt import REGIONS
+
+    regions = {"region": Coordinate(np.array(REGIONS), "", "region of the path")}
+    return steady_record.coordinates(parameters) | regions
+
+
+def cost(parameters: Mapping[str, Any], stepper: None) -> Any:
+    """Core-seconds of a run: of a first steady state, and a tenth for its spectrum."""
+    return 1.1 * steady_record.cost(parameters, stepper)
+
+
+def solve(parameters: dict[str, Any]) -> Solution:
+    """Steady state and its modes for the parameters of a run [SI]."""
+    from cvt_hpc.models.elastic_belt.belt import mesh
+    from cvt_hpc.models.linear_stability.modes import modes
+    from cvt_hpc.models.steady_variator.forces import quantities
+    from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
+
+    p, grid = parameters, mesh(parameters)
+    try:
+        steady = SteadyBelt(p).at(p["load"])
+    except NoSteadyState as error:
+        return Solution(error, [], np.array(grid.starts), p["undecided_growth"])
+    found = modes(steady, grid, (p["band_low"], p["band_high"]))
+    return Solution(quantities(steady, grid), found, np.array(grid.starts), p["undecided_growth"])
+
+
+def judge(solution: Solution) -> dict[str, Any]:
+    """The record of a run, its cost apart."""
+    if isinstance(solution.steady, ValueError):
+        return {"status": Status.FAILED_NUMERICS, "reason": str(solution.steady)}
+    found = {"status": Status.DONE, **solution.steady}
+    if not solution.modes:
+        return found | {"vibrates": Vibrates.NO, "reason": "every mode in the band decays fast"}
+    first, margin = solution.modes[0], solution.undecided
+    decided = Vibrates.YES if first.growth > 0.0 else Vibrates.NO
+    words = f"growth {first.growth:.3g}/s at {first.frequency:.4g} Hz, undecided up to {margin:g}/s"
+    return found | {
+        "vibrates": decided if abs(first.growth) > margin else Vibrates.UNDECIDED,
+        "reason": words,
+        "growth_rate": first.growth,
+        "frequency": first.frequency,
+        "vibrating_strand": first.strand + 1,
+        "mode": first.half_waves,
+        "relative_amplitude": first.amplitudes,
+        "fed": np.add.reduceat(first.fed, solution.starts),
+    }

@@ -1,0 +1,167 @@
+"""The steady equations of the elastic belt: its rates of change set to zero, in as few unknowns as they need.
+
+Nothing changes at any place: u = 0, and each layer's flux v_i / (1 + eps_i) = Q_i is the same everywhere,
+which makes its content balance exact. Unknown are, for N stations, w, the strains eps_0 and eps_1 of the
+cells (N each), the filtered sliding speeds, and Q_0, Q_1, the driven pulley's speed and its axial position;
+speeds and contents follow:
+
+    v_i = Q_i (1 + eps_i),   n_i = (1 + kappa (w + d_i)) / (1 + eps_i).
+
+As many equations: the rates of u, v_0, v_1 and v_f and of the driven pulley, each by `flat.rates`, so that
+the transient belt is at rest in what is found here; and the content of each layer, which no rate knows.
+
+Two complementarity problems are in them. The contact is solved exactly in every evaluation. Elements push or
+are apart, P = max(-EA_0 eps_0 - D v_0,s, 0): that corner is left to Newton's iteration. The damper D acts up
+to where its push has ended, as in the step `imex`: where the belt carries gaps into pressed elements the
+right-hand side jumps at eps_0 = 0, and a push between 0 and D |v_0,s| has no other state to rest in; its gap
+is 10 to 50 nm.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_array, csr_array, vstack
+
+from cvt_hpc.models.elastic_belt.belt import (
+    DRIVEN_POSITION,
+    DRIVEN_SPEED,
+    N_ELEMENT,
+    V_ELEMENT,
+    V_FILTERED,
+    Belt,
+    State,
+    W,
+    initial_state,
+)
+from cvt_hpc.models.elastic_belt.flat import ROWS, flat_belt, rates, unpack
+from cvt_hpc.models.elastic_belt.linearised import Linearisation
+from cvt_hpc.models.elastic_belt.rhs import strains
+
+LATE = 1e9  # [s]: load and damping are those after any start-up
+TYPICAL_SLIDING = 0.1  # [m/s]: filtered speed to begin with
+# what counts alike in each unknown: w, eps_0, eps_1, v_f; Q_0, Q_1, driven speed, position
+SIZES = (1e-4, 1e-3, 1e-4, 0.1)
+SIZES_OF_SCALARS = (0.1, 0.1, 1.0, 1e-4)
+
+
+class Equations:
+    """Residual and Jacobian of the steady equations of one belt.
+
+    Parameters
+    ----------
+    parameters : dict
+        Resolved parameters of the run [SI].
+    belt : Belt
+        Its constants.
+
+    Attributes
+    ----------
+    belt : Belt
+        With dampers that act up to where their push has ended.
+    sizes : (n,) array
+        Typical size of each unknown.
+    rounding : float
+        Strain over which the corner of the push force is rounded off [1]; 0: not.
+    """
+
+    def __init__(self, parameters: dict[str, Any], belt: Belt) -> None:
+        self.belt = belt._replace(bridging_stiffness=belt.element_stiffness)
+        self.rounding = 0.0
+        self._flat = flat_belt(self.belt, LATE)
+        self._linearise = Linearisation(self._flat)
+        first = initial_state(parameters, belt)
+        self._contents = first.fields[N_ELEMENT : N_ELEMENT + 2] @ belt.cell
+        n, self._memories = belt.cell.size, self._flat.remembering.size
+        self._initial = first
+        counts = (n, n, n, self._memories)
+        self.sizes = np.concatenate([np.repeat(SIZES, counts), SIZES_OF_SCALARS])
+        # of the rates: those of u, v_element and v_ring, of the filtered speeds and of the pulley
+        self._rates = np.r_[n : 4 * n, len(ROWS) * n : self._flat.origin.size]
+        self._out = np.empty(self._flat.origin.size)
+
+    def under(self, **changes: Any) -> None:
+        """Go on with other constants of the belt, of the same mesh and sheaves: load, friction."""
+        self.belt = self.belt._replace(**changes)
+        self._flat = self._flat._replace(belt=self.belt)
+
+    def initial(self) -> np.ndarray:
+        """Unknowns near the steady state without load: the belt in its grooves, strains uniform."""
+        x = self.unknowns(self._initial)
+        x[3 * self.belt.cell.size : -4] = TYPICAL_SLIDING
+        return x
+
+    def unknowns(self, state: State) -> np.ndarray:
+        """Unknowns nearest to a state."""
+        n = self.belt.cell.size
+        eps = np.empty((2, n))
+        strains(self.belt, state.fields, eps)
+        fluxes = (state.fields[V_ELEMENT : V_ELEMENT + 2] / (1.0 + np.roll(eps, 1, axis=1))).mean(axis=1)
+        filtered = state.fields[V_FILTERED, self._flat.remembering]
+        pulley = state.scalars[[DRIVEN_SPEED, DRIVEN_POSITION]]
+        return np.concatenate([state.fields[W], *eps, filtered, fluxes, pulley])
+
+    def state(self, x: np.ndarray) -> State:
+        """State of the belt; a copy, its time after any start-up."""
+        unpack(self._flat, 0.0, self._flat_unknowns(x))
+        return self._flat.state.copy()
+
+    def residual(self, x: np.ndarray) -> np.ndarray | None:
+        """What the equations leave, (n,); None where the contact has no solution.
+
+        Rates are in [m/s^2], [rad/s^2] and [m/s], contents in [m].
+        """
+        y = self._flat_unknowns(x)
+        flat = self._flat._replace(rounding=self.rounding)
+        if not rates(flat, 0.0, y, self._out):
+            return None
+        contents = flat.state.fields[N_ELEMENT : N_ELEMENT + 2] @ self.belt.cell
+        return np.concatenate([self._out[self._rates], contents - self._contents])
+
+    def jacobian(self, x: np.ndarray) -> csc_array:
+        """Slopes of the residual, (n, n), about the unknowns of its last call."""
+        slopes = self._linearise(self._flat._replace(rounding=self.rounding))
+        chain = self._chain(x)
+        n = self.belt.cell.size
+        contents = csr_array(np.kron(np.eye(2), self.belt.cell)) @ chain[4 * n : 6 * n]
+        return vstack([slopes.tocsr()[self._rates] @ chain, contents], format="csc")
+
+    def _lengths(self, w: np.ndarray) -> np.ndarray:
+        """Lengths 1 + kappa (w + d_i) of both layers' cells, (2, N)."""
+        belt = self.belt
+        mean = 0.5 * (w + np.roll(w, -1))
+        return 1.0 + belt.curvature * np.array([mean, mean + belt.ring_offset])
+
+    def _flat_unknowns(self, x: np.ndarray) -> np.ndarray:
+        """Unknowns of `flat` that belong to the steady ones."""
+        n = self.belt.cell.size
+        w, *eps = x[: 3 * n].reshape(3, n)
+        speeds = [flux * (1.0 + np.roll(strain, 1)) for flux, strain in zip(x[-4:-2], eps, strict=True)]
+        contents = self._lengths(w) / (1.0 + np.array(eps))
+        y = np.concatenate([w, np.zeros(n), *speeds, *contents, x[3 * n : -4], x[-2:]])
+        return y - self._flat.origin
+
+    def _chain(self, x: np.ndarray) -> csr_array:
+        """Slopes of `flat`'s unknowns with the steady ones."""
+        n, count, memories = self.belt.cell.size, x.size, self._memories
+        cells, ahead = np.arange(n), np.roll(np.arange(n), -1)
+        w, *eps = x[: 3 * n].reshape(3, n)
+        ones = np.ones(n)
+        entries = [(ones, cells, cells)]
+        for layer, length in enumerate(self._lengths(w)):
+            longer, flux = 1.0 + eps[layer], x[count - 4 + layer]
+            speed, content, strain = (2 + layer) * n, (4 + layer) * n, (1 + layer) * n
+            lifted = 0.5 * self.belt.curvature / longer
+            entries += [
+                (flux * ones, speed + ahead, strain + cells),
+                (longer, speed + ahead, np.full(n, count - 4 + layer)),
+                (-length / longer**2, content + cells, strain + cells),
+                (lifted, content + cells, cells),
+                (lifted, content + cells, ahead),
+            ]
+        rest = np.arange(memories)
+        entries.append((np.ones(memories), len(ROWS) * n + rest, 3 * n + rest))
+        entries.append((np.ones(2), self._flat.origin.size - 2 + np.arange(2), count - 2 + np.arange(2)))
+        values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
+        return csr_array((values, (rows, columns)), shape=(self._flat.origin.size, count))

@@ -1,0 +1,84 @@
+"""What a steady state means: forces and speeds around the belt, and what follows for strands and pulleys."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cvt_hpc.models.elastic_belt.belt import DRIVEN_POSITION, DRIVEN_SPEED, V_ELEMENT, V_RING, Mesh, W
+from cvt_hpc.models.elastic_belt.rhs import contact_forces, strains
+from cvt_hpc.models.steady_variator.walking import Steady
+from cvt_hpc.physics.compliance import contact_state
+
+
+class Distributions(NamedTuple):
+    """Around the belt, (N,) each: T and P in the cells, all else at the stations.
+
+    Attributes
+    ----------
+    ring_tension, push_force : (N,) arrays
+        [N]; the push force without its damper.
+    contact_force : (N,) array
+        Axial line force of one flank [N/m].
+    element_speed, ring_speed : (N,) arrays
+        Along the path [m/s].
+    tangential_sliding : (N,) array
+        Of the elements against the sheaves; 0 on the strands [m/s].
+    displacement : (N,) array
+        Off the reference path, outward [m].
+    """
+
+    ring_tension: np.ndarray
+    push_force: np.ndarray
+    contact_force: np.ndarray
+    element_speed: np.ndarray
+    ring_speed: np.ndarray
+    tangential_sliding: np.ndarray
+    displacement: np.ndarray
+
+
+def distributions(steady: Steady) -> Distributions:
+    """Forces and speeds around the belt."""
+    belt, fields = steady.belt, steady.state.fields
+    n = belt.cell.size
+    force, eps = np.empty(n), np.empty((2, n))
+    contacts = contact_state(belt.driving.weight.size), contact_state(belt.driven.weight.size)
+    contact_forces(belt, steady.state, contacts, force)
+    strains(belt, fields, eps)
+    driven = np.arange(n) >= belt.driven_start
+    radius = np.where(driven, belt.driven_radius, belt.driving_radius) + fields[W]
+    turning = np.where(driven, steady.state.scalars[DRIVEN_SPEED], belt.driving_speed)
+    sliding = np.where(belt.arc_share > 0.0, fields[V_ELEMENT] - turning * radius, 0.0)
+    return Distributions(
+        belt.ring_stiffness * eps[1],
+        np.maximum(-belt.element_stiffness * eps[0], 0.0),
+        force,
+        fields[V_ELEMENT].copy(),
+        fields[V_RING].copy(),
+        sliding,
+        fields[W].copy(),
+    )
+
+
+def quantities(steady: Steady, grid: Mesh) -> dict[str, Any]:
+    """Numbers of strands (t1, t2) and pulleys (driving, driven), named as in the elastic belt's record."""
+    belt, around = steady.belt, distributions(steady)
+    middles = [grid.starts[region] + grid.counts[region] // 2 for region in (1, 3)]
+    axial, slip, opened = np.empty(2), np.empty(2), np.empty(2)
+    for k, (first, sheave) in enumerate(((0, belt.driving), (belt.driven_start, belt.driven))):
+        arc = slice(first, first + sheave.weight.size)
+        pressing = sheave.weight * around.contact_force[arc]
+        axial[k] = pressing.sum()
+        slip[k] = pressing @ around.tangential_sliding[arc] / (axial[k] * belt.belt_speed)
+        opened[k] = sheave.weight[around.contact_force[arc] == 0.0].sum() / sheave.weight.sum()
+    return {
+        "mean_ring_tension": around.ring_tension[middles],
+        "mean_push_force": around.push_force[middles],
+        "axial_force": axial,
+        "slip": slip,
+        "open_share": opened,
+        "thrust_ratio": axial[0] / axial[1],
+        "speed_loss": 1.0 - belt.ratio * steady.state.scalars[DRIVEN_SPEED] / belt.driving_speed,
+        "driven_position": steady.state.scalars[DRIVEN_POSITION],
+    }

@@ -1,0 +1,58 @@
+"""What the record of a steady state holds; names are those of the elastic belt's transient."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.models.alone import lane_key, lanes
+from cvt_hpc.models.elastic_belt.record import PULLEYS, STRANDS
+from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+
+__all__ = ["VARIABLES", "coordinates", "cost", "judge", "lane_key", "lanes", "solve"]
+
+VARIABLES = (
+    Variable("mean_ring_tension", ("strand",), "f8", "N", "ring tension in the middle of the strand"),
+    Variable("mean_push_force", ("strand",), "f8", "N", "push force in the middle of the strand"),
+    Variable("axial_force", ("pulley",), "f8", "N", "axial force of the belt on a sheave"),
+    Variable("slip", ("pulley",), "f8", "1", "tangential sliding over belt speed, weighted by contact force"),
+    Variable("open_share", ("pulley",), "f8", "1", "share of the wrap that is out of contact"),
+    Variable("thrust_ratio", (), "f8", "1", "axial force of the driving over that of the driven pulley"),
+    Variable("speed_loss", (), "f8", "1", "1 - ratio x driven speed / driving speed"),
+    Variable("driven_position", (), "f8", "m", "axial opening of the driven pulley"),
+)
+
+
+def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+    """Coordinates of the record's dimensions, whatever the parameters."""
+    return {
+        "strand": Coordinate(np.array(STRANDS), "", "strand: t1 leaves the driving pulley, t2 enters it"),
+        "pulley": Coordinate(np.array(PULLEYS), "", "pulley"),
+    }
+
+
+def cost(parameters: Mapping[str, Any], stepper: None) -> Any:
+    """Core-seconds of a run: of a first state."""
+    return 6e-3 * parameters["stations"]
+
+
+def solve(parameters: dict[str, Any]) -> Any:
+    """Steady state of the parameters of a run [SI] with what it means; or why none was found."""
+    from cvt_hpc.models.elastic_belt.belt import mesh
+    from cvt_hpc.models.steady_variator.forces import quantities
+    from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
+
+    try:
+        return quantities(SteadyBelt(parameters).at(parameters["load"]), mesh(parameters))
+    except NoSteadyState as error:
+        return error
+
+
+def judge(solution: dict[str, Any] | ValueError) -> dict[str, Any]:
+    """The record of a run, its cost apart."""
+    if isinstance(solution, ValueError):
+        return {"status": Status.FAILED_NUMERICS, "reason": str(solution)}
+    reason = "a steady state, and whether it is stable is not asked here"
+    return {"status": Status.DONE, "vibrates": Vibrates.UNDECIDED, "reason": reason, **solution}

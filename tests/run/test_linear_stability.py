@@ -1,0 +1,144 @@
+"""Linear stability of the running belt: its Jacobian, completeness, and growth against the transient belt."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from cf import cf_findings
+from growing import at_rest, measured
+from rungs import rung_job, rung_record
+from scipy.sparse import csc_array
+
+from cvt_hpc.errors import InputError
+from cvt_hpc.models.elastic_belt.belt import mesh
+from cvt_hpc.models.elastic_belt.flat import rates, system
+from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
+from cvt_hpc.models.linear_stability.branch import branch, onsets
+from cvt_hpc.models.linear_stability.modes import DECAY, HIGH, LOW, modes
+from cvt_hpc.models.linear_stability.spectrum import eigenpairs
+from cvt_hpc.models.steady_variator.walking import SteadyBelt
+from cvt_hpc.study import open_results, run
+from cvt_hpc.variables import Vibrates
+
+DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
+LOADS = (80.0, 105.0, 125.0, 140.0)
+
+
+@cache
+def points(**values):
+    parameters = DEFAULTS | values
+    return branch(SteadyBelt(parameters), mesh(parameters), LOADS)
+
+
+@pytest.mark.parametrize("values", [{}, {"sheave_stiffness": np.inf, "stations": 98}])
+def test_jacobian_is_that_of_central_differences_one_by_one(values):
+    parameters = DEFAULTS | {"stations": 96} | values
+    flat, y, matrix = at_rest(SteadyBelt(parameters).at(80.0))
+    sizes, step = system(flat).scale, 1e-6
+    dense = np.empty((y.size, y.size))
+    for j in range(y.size):
+        sides = np.empty((2, y.size))
+        for out, sign in zip(sides, (1.0, -1.0), strict=True):
+            moved = y.copy()
+            moved[j] += sign * step * sizes[j]
+            assert rates(flat, 0.0, moved, out)
+        dense[:, j] = (sides[0] - sides[1]) / (2.0 * step)
+    # both leave round-off of the same increments, 1e-9 of the steepest slopes of a row
+    error = np.abs(matrix * sizes - dense) / np.abs(dense).max(axis=1, keepdims=True)
+    assert error.max() < 1e-7
+
+
+@pytest.mark.parametrize("count", [12, 60])
+def test_spectrum_of_a_known_matrix(count):
+    # pairs a +- i w on the diagonal, thinly and densely: all in the rectangle, and none beside it
+    growth, pulse = np.meshgrid([-900.0, -350.0, 20.0, 1700.0, 2300.0], np.linspace(50.0, 3000.0, count))
+    entries, n = [], growth.size
+    for k, (a, w) in enumerate(zip(growth.ravel(), pulse.ravel(), strict=True)):
+        i = 2 * k
+        entries += [(a, i, i), (w, i, i + 1), (-w, i + 1, i), (a, i + 1, i + 1)]
+    values, rows, columns = zip(*entries, strict=True)
+    matrix = csc_array((values, (rows, columns)), shape=(2 * n, 2 * n))
+    found, vectors = eigenpairs(matrix, 180.0, 2500.0, 400.0, 2000.0)
+    inside = (growth > -400.0) & (growth < 2000.0) & (pulse > 180.0) & (pulse < 2500.0)
+    expected = (growth + 1j * pulse)[inside]
+    assert found.size == expected.size and np.all(np.diff(found.real) < 1e-6)
+    by_place = [np.lexsort(np.round([each.real, each.imag])) for each in (found, expected)]
+    assert found[by_place[0]] == pytest.approx(expected[by_place[1]], rel=1e-8)
+    assert np.abs(matrix @ vectors - vectors * found).max() < 1e-6
+
+
+def test_spectrum_of_the_belt_is_that_of_the_full_matrix():
+    found = points()[2]
+    matrix = at_rest(found.steady)[2]
+    values = np.linalg.eigvals(matrix)
+    wanted = (values.imag > 2e2 * np.pi) & (values.imag < 3e3 * np.pi) & (values.real > -DECAY)
+    expected = values[wanted][np.argsort(-values[wanted].real)]
+    assert (LOW, HIGH) == (100.0, 1500.0)
+    assert [mode.growth for mode in found.modes] == pytest.approx(expected.real, abs=1e-3)
+    assert [mode.frequency for mode in found.modes] == pytest.approx(expected.imag / (2.0 * np.pi), rel=1e-6)
+
+
+@pytest.mark.parametrize("place", range(len(LOADS)))
+def test_growth_and_frequency_are_those_of_the_transient(place):
+    # from 0.1 nm: beyond 1 nm elements part and touch in turn at the push's front, see the README
+    point = points()[place]
+    growth, frequency = measured(point)
+    # the step of first order, 1 us, leaves 1 %
+    assert growth == pytest.approx(point.growth, abs=0.02 * abs(point.growth) + 1.0)
+    assert frequency == pytest.approx(point.modes[0].frequency, rel=2e-3)
+
+
+def test_constant_friction_and_rigid_sheaves_are_stable():
+    parameters = DEFAULTS | {"friction_gradient": 0.0}
+    for point in branch(SteadyBelt(parameters), mesh(parameters), (80.0, 125.0)):
+        assert point.growth < -50.0
+    parameters = DEFAULTS | {"sheave_stiffness": np.inf}
+    for point in branch(SteadyBelt(parameters), mesh(parameters), (80.0, 125.0)):
+        assert point.growth < -50.0
+
+
+def test_the_driven_arc_feeds_and_the_driving_arc_takes():
+    # loaded as the paper has it, radial creep is largest where the belt leaves the driven pulley
+    for point in points()[1:]:
+        mode, starts = point.modes[0], mesh(DEFAULTS).starts
+        driving, t1, driven, t2 = np.add.reduceat(mode.fed, starts)
+        assert driven > 500.0 and driving < -500.0
+        # of the strands only the stations at their ends touch a sheave
+        assert abs(t1) + abs(t2) < 0.15 * driven
+
+
+def test_onset():
+    parameters = DEFAULTS | {"stations": 96}
+    belt, grid = SteadyBelt(parameters), mesh(DEFAULTS | {"stations": 96})
+    found = branch(belt, grid, (90.0, 120.0))
+    (onset,) = onsets(belt, grid, found)
+    assert onset.rising and 90.0 < onset.load < 120.0
+    below, above = (modes(belt.at(onset.load + d, found[0].steady), grid)[0] for d in (-1.0, 1.0))
+    assert below.growth < 0.0 < above.growth
+    assert onset.frequency == pytest.approx(above.frequency, rel=0.05)
+
+
+def test_record():
+    record = rung_record("linear_stability", load=125.0)
+    mode = points()[2].modes[0]
+    assert record["vibrates"] == Vibrates.YES and "growth" in record["reason"]
+    assert record["growth_rate"] == pytest.approx(mode.growth, rel=1e-4)
+    assert record["fed"].sum() == pytest.approx(mode.fed.sum(), rel=1e-4)
+    assert (record["vibrating_strand"], record["mode"]) == (mode.strand + 1, mode.half_waves)
+    assert rung_record("linear_stability", load=80.0)["vibrates"] == Vibrates.NO
+
+
+def test_a_sweep_of_it_keeps_the_conventions(tmp_path):
+    report = run(rung_job("linear_stability", {"load": [80.0, 125.0]}), tmp_path, progress=False)
+    assert (report.done, report.exit_status) == (2, 0)
+    assert cf_findings(report.results) == []
+    with open_results(report.results) as dataset:
+        assert dataset["vibrates"].values.tolist() == [Vibrates.NO, Vibrates.YES]
+        assert dataset["fed"].dims == ("load", "region") and dataset["thrust_ratio"].dims == ("load",)
+
+
+def test_falling_friction_with_little_memory_is_refused():
+    for memory in (0.0, 3e-5):
+        with pytest.raises(InputError, match="friction_memory"):
+            rung_job("linear_stability", friction_memory=memory)
+    assert rung_job("linear_stability", friction_memory=0.0, friction_gradient=0.0).size == 1

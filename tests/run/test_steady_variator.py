@@ -1,0 +1,147 @@
+"""The steady belt: at rest under the transient's own right-hand side, in equilibrium, and where it has none."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from fast_runs import FastRuns
+from rungs import rung_record
+
+from cvt_hpc.models.elastic_belt.belt import (
+    DRIVEN_SPEED,
+    N_ELEMENT,
+    W,
+    belt_constants,
+    initial_state,
+    mesh,
+)
+from cvt_hpc.models.elastic_belt.flat import flat_belt, pack, rates
+from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
+from cvt_hpc.models.steady_variator.equations import Equations
+from cvt_hpc.models.steady_variator.forces import distributions, quantities
+from cvt_hpc.models.steady_variator.newton import newton
+from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
+from cvt_hpc.variables import Status
+
+DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
+DEFAULTS |= {"duration": 0.1, "stations": 96}
+LOADS = (60.0, 80.0, 100.0, 120.0)
+
+
+@cache
+def steady(**values):
+    return tuple(SteadyBelt(DEFAULTS | values).along(LOADS))
+
+
+def rates_of(found, belt):
+    flat = flat_belt(belt, 1e9)
+    out = np.empty(flat.origin.size)
+    assert rates(flat, 0.0, pack(flat, found.state), out)
+    return out
+
+
+@pytest.mark.parametrize("values", [{}, {"sheave_stiffness": np.inf}, {"friction_memory": 0.0}])
+def test_nothing_changes_in_it(values):
+    first = initial_state(DEFAULTS | values, belt_constants(DEFAULTS | values))
+    for found in steady(**values):
+        belt = found.belt._replace(bridging_stiffness=found.belt.element_stiffness)
+        # Newton's last step is 1e-7 of the sizes, so strains are left by 1e-10, and the elements' stiffness 4e7 N
+        # makes of that 0.6 m/s^2 in cells of 7 mm and 1 kg/m; forces of 1e5 N/m cancel
+        assert np.abs(rates_of(found, belt)).max() < 1.0
+        contents = found.state.fields[N_ELEMENT : N_ELEMENT + 2] @ belt.cell
+        assert contents == pytest.approx(first.fields[N_ELEMENT : N_ELEMENT + 2] @ belt.cell, rel=1e-12)
+
+
+def test_a_transient_stays_there():
+    # constant friction, so that nothing grows; the sheaves' lag is 2 ms
+    found = steady(friction_gradient=0.0)
+    for one in found:
+        run = FastRuns([one.belt], [one.state])
+        run.advance(2000, 4e-6)
+        state = run.state()
+        # Where the explicit rule of parting and the step's differ, at most one cell, the step begins without its
+        # push: 10 nm of the belt's 1 mm. Without that cell it is 1 pm.
+        assert state.fields[W] == pytest.approx(one.state.fields[W], abs=2e-8)
+        assert state.scalars[DRIVEN_SPEED] == pytest.approx(one.state.scalars[DRIVEN_SPEED], abs=2e-4)
+
+
+def test_pulleys_are_in_balance():
+    # moment about the driven shaft: strands pull where their lines pass it, the rings d_1 further out
+    grid = mesh(DEFAULTS)
+    for found in steady():
+        belt, around = found.belt, distributions(found)
+        numbers = quantities(found, grid)
+        assert numbers["axial_force"][1] == pytest.approx(DEFAULTS["thrust"], rel=1e-9)
+        moment = 0.0
+        for region, sign in ((1, -1.0), (3, 1.0)):
+            stations = grid.starts[region] + np.arange(grid.counts[region] // 4, 3 * grid.counts[region] // 4)
+            cell = belt.cell[stations[0]]
+            slope, w = np.polyfit((stations - grid.starts[region]) * cell, around.displacement[stations], 1)
+            arm = belt.driven_radius + w + (slope * grid.counts[region] * cell if region == 1 else 0.0)
+            tension, push = around.ring_tension[stations].mean(), around.push_force[stations].mean()
+            net = tension - push - belt.mass * belt.belt_speed**2
+            moment += sign * (net * arm + tension * belt.ring_offset)
+        # strands bend next to the arcs: 0.5 of 500 N m, as in tests/conservation
+        assert moment == pytest.approx(belt.ratio * found.load, abs=0.5)
+
+
+def test_load_moves_the_push_into_t1_and_slows_the_driven_pulley():
+    numbers = [quantities(found, mesh(DEFAULTS)) for found in steady()]
+    push = np.array([one["mean_push_force"] for one in numbers])
+    loss = [one["speed_loss"] for one in numbers]
+    assert np.all(np.diff(push[:, 0]) > 0.0) and np.all(push[:, 1] < 1.0)
+    assert np.all(np.diff(loss) > 0.0) and loss[0] > 0.0
+
+
+def test_the_way_does_not_matter():
+    # 80 N m along the load, and from a first state of its own: both within Newton's tolerance, 1e-7 of the sizes
+    alone = SteadyBelt(DEFAULTS).at(80.0)
+    sizes = Equations(DEFAULTS | {"load_start": 0.0}, alone.belt).sizes
+    assert np.abs((alone.unknowns - steady()[1].unknowns) / sizes).max() < 1e-7
+
+
+def test_jacobian():
+    parameters = DEFAULTS | {"load_start": 0.0}
+    equations = Equations(parameters, belt_constants(parameters))
+    for rounding in (0.0, 1e-4):
+        equations.rounding = rounding
+        x = steady()[0].unknowns.copy()
+        assert equations.residual(x) is not None
+        matrix = equations.jacobian(x).toarray()
+        random = np.random.default_rng(3).normal(size=x.size) * equations.sizes * 1e-6
+        # elements' strains apart, whose corners are somewhere between
+        random[96 : 2 * 96] = 0.0
+        change = equations.residual(x + random) - equations.residual(x - random)
+        assert matrix @ (2.0 * random) == pytest.approx(change, rel=1e-4, abs=3e-6 * np.abs(change).max())
+
+
+def test_newton_gives_up_where_it_is_lost():
+    parameters = DEFAULTS | {"load_start": 0.0}
+    equations = Equations(parameters, belt_constants(parameters))
+    assert newton(equations, equations.initial(), 1e-7) is None
+
+
+def test_friction_carries_what_bullinger_says():
+    # transmittable torque 2 mu / cos(d0) Q r of the driving pulley (Bullinger et al. 2005, eq. 2), if all sliding is along
+    # the belt and far beyond the regularisation speed
+    parameters = DEFAULTS | {"friction_gradient": 0.0, "sheave_stiffness": np.inf}
+    belt = SteadyBelt(parameters)
+    last = belt.carried(belt.at(150.0), 4.0)
+    axial = quantities(last, mesh(parameters))["axial_force"][0]
+    most = 2.0 * DEFAULTS["kinetic_friction"] / np.cos(DEFAULTS["half_wedge_angle"])
+    assert 0.9 < last.load / (most * axial * last.belt.driving_radius) < 1.0
+
+
+def test_a_load_beyond_what_friction_carries():
+    with pytest.raises(NoSteadyState, match="400 N m"):
+        SteadyBelt(DEFAULTS).at(400.0)
+    record = rung_record("steady_variator", load=400.0, stations=96)
+    assert record["status"] == Status.FAILED_NUMERICS and b"400 N m" in record["reason"].encode()
+
+
+def test_record_is_that_of_the_state():
+    record = rung_record("steady_variator", load=60.0, stations=96)
+    numbers = quantities(steady()[0], mesh(DEFAULTS))
+    assert record["status"] == Status.DONE
+    assert record["mean_push_force"] == pytest.approx(numbers["mean_push_force"], rel=1e-6)
+    assert record["thrust_ratio"] == pytest.approx(numbers["thrust_ratio"], rel=1e-9)
