@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Runs all tests from a fresh checkout; arguments go to pytest. Needs Python 3.11 or later and gcc.
+# Runs all tests from a fresh checkout, on two cores; arguments go to pytest (-n 0: on one). Needs Python 3.11 or later
+# and gcc.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . jobs/environment.sh
@@ -20,4 +21,4 @@ install_slurm() {
 
 prepare_environment mpich,test
 install_slurm
-exec .venv/bin/python -m pytest "$@"
+exec .venv/bin/python -m pytest -n 2 --dist loadfile "$@"
