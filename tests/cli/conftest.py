@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from cvt_hpc.cli import main
 from cvt_hpc.variables import Status, Variable, Vibrates
 
 FLAGS = {
@@ -80,3 +81,15 @@ def mechanics(monkeypatch):
     monkeypatch.setitem(sys.modules, "cvt_hpc.analysis.histories", histories)
     monkeypatch.setitem(sys.modules, "cvt_hpc.history_files", files)
     return calls
+
+
+@pytest.fixture
+def call(capsys):
+    """Return a function that runs a command line: exit status, lines on stdout, lines on stderr."""
+
+    def run(*arguments):
+        status = main(list(map(str, arguments)))
+        out, err = capsys.readouterr()
+        return status, out.splitlines(), err.splitlines()
+
+    return run

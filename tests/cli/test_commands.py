@@ -1,36 +1,14 @@
 """The commands within this process, on the toy model and runs without mechanics."""
 
-import sys
-
 import netCDF4
 import pytest
+from studies import GRID
 
 from cvt_hpc import cli
-from cvt_hpc.cli import main
 from cvt_hpc.study import FailedRun, RunReport, StudyStatus
-from cvt_hpc.variables import Status, Variable
+from cvt_hpc.variables import Status
 
 pytestmark = pytest.mark.usefixtures("mechanics")
-
-TRACED = ("--set", "design.kind=trace", "--set", "design.first_spacing=2")
-GRID = """[scene]
-thrust = "20 kN"
-[axes]
-load = { from = 0, to = 100, step = 25 }
-sheave_stiffness = [1, 3]
-"""
-
-
-@pytest.fixture
-def call(capsys):
-    """Return a function that runs a command line: exit status, lines on stdout, lines on stderr."""
-
-    def run(*arguments):
-        status = main(list(map(str, arguments)))
-        out, err = capsys.readouterr()
-        return status, out.splitlines(), err.splitlines()
-
-    return run
 
 
 def test_run_status_gather_and_map_of_one_study(write_job, call, tmp_path):
@@ -185,135 +163,6 @@ def test_another_job_in_the_folder_is_refused_and_kept(write_job, call, tmp_path
     status, out, err = call("run", "x.toml", "--set", "thrust=30 kN")
     assert (status, out, len(err)) == (2, [], 1)
     assert (tmp_path / "out/x/results.nc").read_bytes() == before
-
-
-def test_check_prints_every_parameter_with_its_origin_the_axes_and_the_cost(write_job, call, tmp_path):
-    write_job(GRID, head='name = "x"\nmodel = "toy"\ndescription = "a study"\n')
-    overrides = ("--set", "element_mass=1500 g/m", "--set", "table=[[1, 2.5], [3]]")
-    status, out, err = call("check", "x.toml", *overrides)
-    assert (status, err) == (0, [])
-    assert out[:8] == [
-        "job x (x.toml): model toy, stepper hop",
-        "a study",
-        "",
-        "[scene]",
-        "  ratio          2.5         default  speed ratio",
-        "  driving_speed  300 rad/s   default  speed of the driving pulley",
-        "  thrust         20000 N     given    axial force on the driven pulley",
-        "  load           see [axes]  axis     torque at the driving pulley",
-    ]
-    assert "  element_mass       1.5 kg/m             given    mass per length" in out
-    assert "  table              [[1, 2.5], [3]] N/m  given    rows of line forces" in out
-    assert "  refined   false  default  finer on the arcs" in out
-    assert out[-6:] == [
-        "[axes]",
-        "  load              0, 25, 50, 75, 100 N m  5 values",
-        "  sheave_stiffness  1, 3                    2 values",
-        "",
-        "runs: 10 = 5 x 2",
-        "estimated cost: 30 core-seconds per run, 300 core-seconds in all",
-    ]
-    assert call("run", "x.toml", *overrides, "--dry-run") == (0, out, [])
-    assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        ["--part", "9/3"],
-        ["--part", "1/3", "--fresh"],
-        ["--part", "1/3", *TRACED],
-        ["--time-limit", "foo"],
-        ["--run-limit", "foo"],
-        ["--out", "x.toml"],
-        ["--set", "load=x"],
-    ],
-)
-def test_a_dry_run_refuses_what_a_run_refuses(write_job, call, tmp_path, options):
-    write_job(GRID)
-    status, out, err = call("run", "x.toml", *options)
-    assert (status, out, len(err)) == (2, [], 1)
-    assert call("run", "x.toml", *options, "--dry-run") == (2, [], err)
-    assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
-
-
-@pytest.mark.parametrize("command", [["check"], ["run", "--dry-run"], ["run"]])
-def test_an_axis_that_the_dataset_could_not_hold_is_refused_by_all(
-    write_job, call, tmp_path, monkeypatch, command
-):
-    write_job(GRID)
-    recorded = (Variable("status", (), "i1", "", "how the run ended", Status),
-                Variable("load", (), "f8", "N m", "mean torque"))  # fmt: skip
-    monkeypatch.setattr(sys.modules["cvt_hpc.simulation"], "record_variables", lambda job: recorded)
-    status, out, err = call(command[0], "x.toml", *command[1:])
-    assert (status, out) == (2, [])
-    assert err == [
-        "cvt-hpc: x.toml: [axes] load: expected a parameter that is not also the name of a recorded quantity, found load"
-    ]
-    assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
-
-
-def test_check_forecasts_a_sweep_on_several_numbers_of_ranks(write_job, call, tmp_path):
-    write_job(GRID)
-    status, out, err = call("check", "x.toml", "--ranks", "1", "10", "--plot", "x.png")
-    assert (status, err) == (0, [])
-    head, names, *rows, disk, picture = out[-6:]
-    assert head == "forecast of all 10 runs by predicted costs, right within a factor of two:"
-    assert names.split() == [
-        "ranks",
-        "makespan",
-        "95",
-        "%",
-        "of",
-        "sweeps",
-        "efficiency",
-        "core-hours",
-        "--time",
-    ]
-    assert [row.split()[0] for row in rows] == ["1", "10"]
-    assert rows[0].split()[5] == "100%"
-    assert rows[0].endswith("  00:05:00")
-    assert disk == "disk: 0.00306 MB of records, at most 0.00242 MB of results.nc"
-    assert picture == "picture: x.png"
-    assert (tmp_path / "x.png").read_bytes().startswith(b"\x89PNG")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["x.png", "x.toml"]
-
-
-def test_check_forecasts_by_what_is_on_record(write_job, call):
-    write_job(GRID)
-    call("run", "x.toml")
-    assert "forecast of all 10 runs by batches on record (9):" in call("check", "x.toml", "--ranks", "2")[1]
-    rigid = call("check", "x.toml", "--ranks", "2", "--pilots", "1", "--set", "sheave_stiffness=inf")[1]
-    assert rigid[-4].endswith("within a factor of two; no pilot batch came to its end:")
-    # a trace is another job, and has no records
-    traced = call("check", "x.toml", "--ranks", "2", *TRACED)[1]
-    assert traced[-4].endswith("factor of two, if all cells of the grid are run:")
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--ranks", "4", "0"], "--ranks: expected numbers of ranks from 1 to 1000000, found 0"),
-        (["--ranks", "4", "1000001"], "--ranks: expected numbers of ranks from 1 to 1000000, found 1000001"),
-        (["--ranks", "4", "--pilots", "-1"], "--pilots: expected a number of batches, found -1"),
-        (["--pilots", "2"], "--pilots: expected --ranks beside it, found none"),
-        (["--plot", "x.png"], "--plot: expected --ranks beside it, found none"),
-        (["--ranks", "4", "--plot", "x.gif"], "x.gif: expected a file name in .png, .svg, .pdf, found .gif"),
-    ],
-)
-def test_a_forecast_that_makes_no_sense_is_refused(write_job, call, options, message):
-    write_job(GRID)
-    assert call("check", "x.toml", *options) == (2, [], [f"cvt-hpc: {message}"])
-
-
-def test_check_shortens_long_axes_and_long_times(write_job, call):
-    write_job("[scene]\nthrust = 2e4\n[axes]\nload = { from = 0, to = 120, step = 0.5 }\n")
-    assert call("check", "x.toml")[1][-4:] == [
-        "  load  0, 0.5, 1, ..., 120 N m  241 values",
-        "",
-        "runs: 241",
-        "estimated cost: 30 core-seconds per run, 2.01 core-hours in all",
-    ]
 
 
 def test_simulate_prints_the_outcome_and_keeps_the_history(write_job, call, mechanics):

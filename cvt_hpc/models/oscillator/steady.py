@@ -10,9 +10,8 @@ from cvt_hpc.models.oscillator.constants import Oscillator, normal_load
 from cvt_hpc.physics.friction import friction_coefficient
 
 MOST_ROUNDS = 200  # of a table of friction over the load, which the friction itself changes
-BESIDE = (
-    1e-3  # of the load: central differences are exact, N mu being of the second order in N even in a table
-)
+# Of the load: central differences are exact, N mu being of the second order in N even in a table.
+BESIDE = 1e-3
 
 
 class SteadySliding(NamedTuple):
