@@ -3,7 +3,7 @@
 import sys
 
 import pytest
-from studies import GRID, TRACED
+from toy_jobs import GRID, TRACED
 
 from cvt_hpc.variables import Status, Variable
 

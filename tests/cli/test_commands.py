@@ -2,7 +2,7 @@
 
 import netCDF4
 import pytest
-from studies import GRID
+from toy_jobs import GRID
 
 from cvt_hpc import cli
 from cvt_hpc.study import FailedRun, RunReport, StudyStatus

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -60,3 +61,9 @@ def test_imports_run_downwards():
 )
 def test_what_only_some_rooms_do(modules, rooms):
     assert {room(path) for path in SOURCES if modules & set(imported(path))} == rooms
+
+
+def test_no_two_modules_of_the_tests_share_a_name():
+    # pytest puts every folder of tests on one search path, where the first of two equal names hides the other.
+    names = Counter(path.name for path in Path(__file__).parents[1].rglob("*.py") if path.stem != "conftest")
+    assert [name for name, count in names.items() if count > 1] == []
