@@ -1,6 +1,7 @@
 """The ladder of models; each knows physics and nothing above, and declares what a job may set."""
 
 MODELS = {
+    "auto": "cvt_hpc.models.auto",
     "criterion": "cvt_hpc.models.criterion",
     "elastic_belt": "cvt_hpc.models.elastic_belt",
     "linear_stability": "cvt_hpc.models.linear_stability",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,7 +64,7 @@ def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
     Returns
     -------
     list of tuple of int
-        Each index once, in batches of as many as the processor's registers hold.
+        Each index once, in as few batches as can be, of nearly equal size.
     """
     model = record_module(job)
     groups: dict[Any, list[int]] = {}
@@ -72,5 +73,7 @@ def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
     batches = []
     for group in groups.values():
         most = model.lanes(job.point(group[0]), job.stepper)
-        batches += [tuple(group[first : first + most]) for first in range(0, len(group), most)]
+        parts = -(-len(group) // most)
+        bounds = [len(group) * part // parts for part in range(parts + 1)]
+        batches += [tuple(group[first:last]) for first, last in pairwise(bounds)]
     return batches

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from cvt_hpc.variables import Status, Variable, Vibrates
 from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.criterion import fitting_window
-from cvt_hpc.vibration.occurrence import classify
+from cvt_hpc.vibration.occurrence import classify, margin
 
 VARIABLES = (
     Variable("amplitude", ("strand",), "f8", "m", "band-limited peak amplitude at the strongest probe"),
@@ -42,6 +42,8 @@ class Occurrence:
         Growth rate over the judged part and its standard error [1/s]; nan where nothing moves.
     strongest_probe : array of int, shape (strand,)
         Column of the displacement with the largest amplitude.
+    margin : float
+        How far the amplitudes that decided lie from the threshold [e-folds]; 0 where nothing is decided.
     """
 
     vibrates: Vibrates
@@ -52,6 +54,7 @@ class Occurrence:
     growth_rate: NDArray[np.float64]
     growth_error: NDArray[np.float64]
     strongest_probe: NDArray[np.int64]
+    margin: float
 
     def record(self) -> dict[str, Any]:
         """Return what a record holds of it: that the run is done, the verdict, and VARIABLES."""
@@ -119,4 +122,5 @@ def assess(
         growth.rate,
         growth.standard_error,
         strongest,
+        margin(strand_windows, vibrates, parameters["amplitude_threshold"]),
     )

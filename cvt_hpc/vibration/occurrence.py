@@ -77,6 +77,33 @@ def classify(
     raise ValueError("expected one strand or more")
 
 
+def margin(amplitudes: ArrayLike, vibrates: Vibrates, threshold: float) -> float:
+    """How far the amplitudes that decided lie from the threshold [e-folds]; 0 where nothing is decided.
+
+    Parameters
+    ----------
+    amplitudes : array, shape (window, strand)
+        As `classify` takes them [m].
+    vibrates : Vibrates
+        Its verdict.
+    threshold : float
+        From which amplitude a strand vibrates [m].
+
+    Returns
+    -------
+    float
+        Of a vibration by how much the smallest window of the strand that keeps highest is above it, of
+        silence by how much the largest of the last half of the windows is below it; infinite at rest.
+    """
+    windows = np.asarray(amplitudes, dtype=float)
+    with np.errstate(divide="ignore"):
+        if vibrates is Vibrates.YES:
+            return float(np.log(windows.min(axis=0).max() / threshold))
+        if vibrates is Vibrates.NO:
+            return float(-np.log(windows[len(windows) // 2 :].max() / threshold))
+    return 0.0
+
+
 def _judge_strand(
     windows: NDArray[np.float64],
     rate: float,

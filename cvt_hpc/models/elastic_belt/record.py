@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,17 @@ if TYPE_CHECKING:
 
     from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
 
-__all__ = ["VARIABLES", "coordinates", "cost", "evaluate", "histories", "judge", "lane_key", "lanes"]
+__all__ = [
+    "VARIABLES",
+    "assess",
+    "coordinates",
+    "cost",
+    "evaluate",
+    "histories",
+    "judge",
+    "lane_key",
+    "lanes",
+]
 
 STRANDS = ("t1", "t2")
 PULLEYS = ("driving", "driven")
@@ -101,6 +112,12 @@ def judge(run: RecordedRun) -> dict[str, Any]:
     run : RecordedRun
         With all samples recorded.
     """
+    found = assess(run)
+    return found.record() | evaluate(run, found.strongest_probe)
+
+
+def assess(run: RecordedRun) -> assessment.Occurrence:
+    """Whether and how a run vibrates that has reached its end; its probes are columns of the displacement."""
     regions = [probe.label.split()[0] for probe in run.probes]
     on_strands = [k for k, region in enumerate(regions) if region in STRANDS]
     found = assessment.assess(
@@ -109,7 +126,7 @@ def judge(run: RecordedRun) -> dict[str, Any]:
         [regions[k] for k in on_strands],
         run.parameters,
     )
-    return found.record() | evaluate(run, np.array(on_strands)[found.strongest_probe])
+    return replace(found, strongest_probe=np.array(on_strands)[found.strongest_probe])
 
 
 def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:

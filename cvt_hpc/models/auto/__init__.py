@@ -1,0 +1,56 @@
+"""The cheapest rung of the elastic belt's ladder that answers the question asked, run by run.
+
+`rules.py` has the rules and their grounds, README.md what they cost and how often they err. Importing this
+package is cheap.
+"""
+
+from typing import Any
+
+from cvt_hpc.models import elastic_belt
+from cvt_hpc.models.elastic_belt import check
+from cvt_hpc.parameters import Parameter, not_negative
+
+# Questions that a rung answers which is a model of its own, and why that one
+ANSWERED_BY = {
+    "frequencies": ("strand", "at which frequencies a strand can vibrate needs only the strand"),
+    "growth": ("linear_stability", "whether small motions grow needs only the steady state's eigenvalues"),
+}
+PARAMETERS = elastic_belt.PARAMETERS | {
+    "auto": {
+        "question": Parameter(
+            "occurrence",
+            "",
+            "occurrence: does it vibrate; amplitude: how far, at which frequency, in which strand; "
+            "forces: mean forces and slip; frequencies: at which each strand can vibrate; "
+            "growth: do small motions grow",
+            choices=("occurrence", "amplitude", "forces", *ANSWERED_BY),
+        ),
+        "least_margin": not_negative(
+            0.7, "", "distance from amplitude_threshold, in e-folds, from which a coarse run decides"
+        ),
+    },
+}
+DEFAULT_STEPPER = "imex"
+OWN_STEPPERS = ("imex",)
+STEPPER_NAMES = OWN_STEPPERS
+REFUSED = elastic_belt.REFUSED | {
+    name: "its rules were measured with imex" for name in elastic_belt.STEPPER_NAMES if name != "imex"
+}
+
+
+def inert(parameters: dict[str, Any]) -> dict[str, str]:
+    """Parameters without effect on a run: as of the elastic belt, and the margin where none is asked for."""
+    idle = {"least_margin": "question forces"} if parameters["question"] == "forces" else {}
+    return elastic_belt.inert(parameters) | idle
+
+
+__all__ = [
+    "ANSWERED_BY",
+    "DEFAULT_STEPPER",
+    "OWN_STEPPERS",
+    "PARAMETERS",
+    "REFUSED",
+    "STEPPER_NAMES",
+    "check",
+    "inert",
+]

@@ -1,0 +1,87 @@
+"""Which rung answers a question, by rules with grounds that can be tested.
+
+The rungs, from the cheapest up:
+
+- PASSIVE, no run: friction that nowhere falls with speed feeds no vibration, and all else in the belt
+  dissipates; that its changing normal force does not either is found, not proved.
+- COARSE, a transient of 0.6 times the stations, a step 1/0.6 times as long, over 0.3 of the duration. Its
+  class is taken if the amplitudes lie a factor of two (`least_margin`) above or below the threshold: a
+  coarse mesh shifts the edges of a window by less than a step of the load, but it does shift them. Its mean
+  forces are taken always, since vibration hardly moves them.
+- FULL, the transient that the job describes: where the coarse one is undecided, near the threshold, not to
+  be trusted, or refused for a run so short; and for the amplitude of what vibrates.
+
+Eigenvalues of the steady state (`linear_stability`) are no rung here: a steady state and its spectrum cost
+more than the coarse transient that they could spare. Contact that never opens is no case of its own: to
+hold a force at zero or above is one operation beside the dozens of a sweep over the contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc import recording
+from cvt_hpc.models import elastic_belt
+from cvt_hpc.variables import Vibrates
+from cvt_hpc.vibration import criterion
+from cvt_hpc.vibration.assessment import Occurrence
+
+COARSENESS = 0.6  # stations of the coarse run over those of the full one, and its inverse for the step
+SHARE = 0.3  # of the duration
+
+
+class Rung(IntEnum):
+    """Which rung a record is of; the CF flags of `rung` in results.nc."""
+
+    NONE = 0
+    PASSIVE = 1
+    COARSE = 2
+    FULL = 3
+
+
+def is_passive(parameters: Mapping[str, Any]) -> bool:
+    """Whether friction nowhere falls with sliding speed, and only occurrence is asked for."""
+    p = parameters
+    if p["question"] == "forces":
+        return False
+    if p["friction_law"] == "table":
+        return bool(np.all(np.diff(p["table_mu"], axis=1) >= 0.0))
+    return p["friction_gradient"] == 0.0
+
+
+def coarse(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Parameters of the coarse run; None where it would tell nothing.
+
+    That is where the load rises all the time, and where so short a run could not be judged.
+    """
+    p = {
+        **parameters,
+        "stations": round(COARSENESS * parameters["stations"]),
+        "step": parameters["step"] / COARSENESS,
+        "duration": SHARE * parameters["duration"],
+    }
+    least = elastic_belt.PARAMETERS["mesh"]["stations"].minimum
+    problems = (check for module in (elastic_belt, criterion, recording) for check in module.check(p))
+    if p["load_history"] != "constant" or p["stations"] < least or any(problems):
+        return None
+    return p
+
+
+def is_settled(parameters: Mapping[str, Any], found: Occurrence) -> bool:
+    """Whether what a coarse run has found answers the question.
+
+    Parameters
+    ----------
+    parameters : mapping
+        With `question` and `least_margin`.
+    found : Occurrence
+        Of a coarse run that is to be trusted.
+    """
+    if parameters["question"] == "forces":
+        return True
+    decided = found.vibrates is not Vibrates.UNDECIDED and found.margin >= parameters["least_margin"]
+    return decided and not (parameters["question"] == "amplitude" and found.vibrates is Vibrates.YES)
