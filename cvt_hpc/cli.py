@@ -6,6 +6,7 @@ import argparse
 import logging
 import os
 import sys
+import time
 import traceback
 from collections.abc import Callable
 from pathlib import Path
@@ -97,6 +98,8 @@ def _parser() -> argparse.ArgumentParser:
         choices=RETRIED,
         help="do recorded runs that ended so again; may be repeated",
     )
+    audit = "do so large a part of the runs that lower rungs of model auto have answered in full, and compare"
+    run.add_argument("--audit", type=float, metavar="FRACTION", help=audit)
     _add(commands, "status", _status, "how far a study is", "DIR")
     _add(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
     picture = _add(commands, "map", _map, "draw where vibration occurs", "RESULTS")
@@ -154,15 +157,39 @@ def _run(arguments: argparse.Namespace) -> int:
     }
     retry = [Status[name.upper()] for name in arguments.retry]
     job = load_job(arguments.path, arguments.set)
+    if arguments.audit is not None:
+        from cvt_hpc.study.audit import check_fraction
+
+        check_fraction(job, arguments.audit, arguments.part)
     if arguments.dry_run:
         check_start(job, arguments.out, part=arguments.part, fresh=arguments.fresh)
         _show(job, arguments.out)
         return DONE
+    started = time.monotonic()
     report = run(job, arguments.out, part=arguments.part, fresh=arguments.fresh, retry=retry, **limits)
     _complain(*trouble_lines(report))
     if _speaks():
         print(*report_lines(report), sep="\n")
+    if arguments.audit is not None and not report.remaining:
+        return end_process(max(report.exit_status, _audit(job, report.out, arguments.audit, limits, started)))
     return end_process(report.exit_status)
+
+
+def _audit(job: Job, out: Path, fraction: float, limits: dict[str, float], started: float) -> int:
+    """Do the runs of an audit in the time that is left, and print what it has found."""
+    from cvt_hpc.printing import audit_lines, trouble_lines
+    from cvt_hpc.study.audit import report_audit, run_audit
+
+    if "time_limit" in limits:
+        left = limits["time_limit"] - (time.monotonic() - started)
+        limits = {**limits, "time_limit": max(left, 0.0)}
+    report = run_audit(job, out, fraction, **limits)
+    if report.remaining:
+        _complain(*trouble_lines(report))
+        return report.exit_status
+    if _speaks():
+        print(*audit_lines(report_audit(job, out, fraction)), sep="\n")
+    return DONE
 
 
 def _status(arguments: argparse.Namespace) -> int:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from cvt_hpc.job import Job
     from cvt_hpc.study import RunReport, StudyStatus
+    from cvt_hpc.study.audit import AuditReport
     from cvt_hpc.study.forecast import Forecast
     from cvt_hpc.study.resources import Disk
 
@@ -38,6 +39,20 @@ def report_lines(report: RunReport) -> Iterator[str]:
         cells = report.total + report.unneeded
         yield f"{report.unneeded} of {cells} cells of the grid not run: their class is inferred"
     yield f"results: {report.results or 'gathered by the part that ends last'}"
+
+
+def audit_lines(report: AuditReport) -> Iterator[str]:
+    """Yield the lines that say how often the lower rungs of a study erred."""
+    runs = sum(rung.runs for rung in report.rungs)
+    yield f"audit: {runs} of {report.answered} runs that lower rungs answered done again in full"
+    for rung in report.rungs:
+        low, high = rung.interval
+        line = f"  {rung.rung.name.lower()}: {rung.differing} of {rung.runs} runs of another class "
+        line += f"({rung.differing / rung.runs:.2%}, 95 % interval {low:.2%} to {high:.2%}), "
+        line += f"{rung.contrary} of them quiet against vibrating"
+        known = not math.isnan(rung.force_deviation)
+        yield line + (f"; mean forces within {rung.force_deviation:.2%} in 95 % of the runs" if known else "")
+    yield f"runs that differ: {report.table}"
 
 
 def trouble_lines(report: RunReport) -> Iterator[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +14,11 @@ from cvt_hpc.job.crosscheck import check_grid
 from cvt_hpc.job.definition import HEADER, Job
 from cvt_hpc.job.design import Design, read_design, resolve_spacing
 from cvt_hpc.job.document import read_document
+from cvt_hpc.job.handing import answering_model, handed_to
 from cvt_hpc.job.histories import KEY, read_histories
 from cvt_hpc.job.sampling import sampled_axes
-from cvt_hpc.job.schema import Schema, known_keys, load_schema
+from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.values import expectation, read_value
-from cvt_hpc.models import MODELS
 from cvt_hpc.parameters import Parameter
 
 _OF_DESIGN = "design."
@@ -99,31 +98,8 @@ def build_job(
     kept = read_histories(histories, schema, axes, replaced, source, design.get("runs"))
     given = frozenset(given)
     job = Job(name, schema.model, schema.stepper, description, source, parameters, axes, given, design, kept)
-    return _handed_on(job)
-
-
-def _handed_on(job: Job) -> Job:
-    """Return the job for the model that answers its question, of what that model knows."""
-    answered_by = getattr(import_module(MODELS[job.model]), "ANSWERED_BY", {})
-    if any(axis.name == "question" for axis in job.axes):
-        raise mismatch(f"{job.source}: [axes] question", "one question for all runs", "several")
-    if job.parameters.get("question") not in answered_by:
-        return job
-    model, why = answered_by[job.parameters["question"]]
-    document, known = job.resolved(), known_keys(model)
-    for axis in job.axes:
-        if axis.name not in known:
-            where = f"{job.source}: [axes] {axis.name}"
-            raise mismatch(where, f"a key of {model}, since {why}", "one without effect there")
-    tables = {
-        section: {key: value for key, value in table.items() if key in job.given and key in known}
-        for section, table in document.items()
-        if section in job.schema.sections
-    }
-    rest = {key: document[key] for key in ("axes", "design", "name") if key in document}
-    text = f"{job.description}{'; ' if job.description else ''}{model}: {why}"
-    head = {"model": model, "description": text}
-    return build_job({**rest, **head, **{name: table for name, table in tables.items() if table}}, job.source)
+    answering = answering_model(job)
+    return job if answering is None else build_job(handed_to(job, *answering), source)
 
 
 def _refuse_what_is_compared_only(job: Job) -> None:

@@ -88,6 +88,8 @@ def asked_runs(task: Task, records: Records, part: Part | None = None) -> np.nda
     """Return whether a run is one of this start, shape (runs,); a trace comes to ask for more."""
     if part is not None:
         return part.holds(np.arange(task.study.size))
+    if task.chosen is not None:
+        return task.chosen()
     asked = needed_runs(task.study, records)
     asked[list(task.job.histories)] = True
     return asked

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
@@ -53,6 +53,7 @@ def run(
     time_limit: float | None = None,
     run_limit: float = math.inf,
     retry: Collection[Status] = (),
+    chosen: Callable[[], np.ndarray] | None = None,
 ) -> RunReport:
     """Do all runs of a job that are not yet recorded, and gather the dataset.
 
@@ -83,6 +84,9 @@ def run(
     retry : collection of Status, optional
         Recorded runs that ended so are done again, from the beginning; their earlier records do not count any
         more.
+    chosen : callable, optional
+        Tells on rank 0 which runs are asked for, shape (runs,), always the same ones; by default those of the
+        job's design.
 
     Returns
     -------
@@ -98,7 +102,7 @@ def run(
     started = time.monotonic()
     simulator = simulator or default_simulator()
     study, share, folder = _accept(job, out, part, fresh, simulator)
-    task = Task(job, study, simulator, run_limit)
+    task = Task(job, study, simulator, run_limit, chosen)
     first = True
 
     def sweep(team: Team) -> RunReport:

@@ -78,12 +78,15 @@ class Task:
         What does the runs.
     run_limit : float
         Time [s] that a run may take; infinite for no limit.
+    chosen : callable, optional
+        Tells on rank 0 which runs are asked for, shape (runs,); by default those of the job's design.
     """
 
     job: Job
     study: Study
     simulator: Simulator
     run_limit: float = math.inf
+    chosen: Callable[[], np.ndarray] | None = None
 
     def do(self, batch: Batch, interrupt: Interrupt, begin: Begin) -> Iterator[Result]:
         """Do the runs of a batch, and yield their records as they come; none of runs that are broken off.

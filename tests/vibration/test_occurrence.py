@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from cvt_hpc.variables import Vibrates
 from cvt_hpc.vibration.assessment import assess
 from cvt_hpc.vibration.criterion import PARAMETERS, check
-from cvt_hpc.vibration.occurrence import classify
+from cvt_hpc.vibration.occurrence import classify, margin
 from cvt_hpc.vibration.signals import growth_fit
 
 RATE = 20_000.0
@@ -215,3 +215,17 @@ def test_what_moves_below_the_band_does_not_vibrate():
     assert assess(tones[330.0], RATE, STRANDS, settings).vibrates is YES
     found = assess(tones[288.0], RATE, STRANDS, settings)
     assert found.amplitude.max() < 5e-6 and found.vibrates is not YES
+
+
+@pytest.mark.parametrize(
+    ("windows", "expected"),
+    [
+        ([[2, 2, 3, 2], [9, 8, 8, 9]], np.log(8)),  # of the strand that keeps highest its lowest window
+        ([[5, 1, 0.1, 0.01], [0.3, 0.25, 0.2, 0.15]], np.log(1 / 0.2)),  # the highest of the last half
+        ([[5, 1, 0.2, 2], [0.3, 0.25, 0.2, 0.15]], 0.0),  # undecided
+        ([[3, 1, 0, 0], [0, 0, 0, 0]], np.inf),
+    ],
+)
+def test_the_margin_is_the_distance_from_the_threshold(windows, expected):
+    vibrates, _ = verdict(*windows)
+    assert margin(1e-6 * np.array(windows, float).T, vibrates, 1e-6) == pytest.approx(expected, abs=1e-12)

@@ -12,8 +12,8 @@ The rungs, from the cheapest up:
   be trusted, or refused for a run so short; and for the amplitude of what vibrates.
 
 Eigenvalues of the steady state (`linear_stability`) are no rung here: a steady state and its spectrum cost
-more than the coarse transient that they could spare. Contact that never opens is no case of its own: to
-hold a force at zero or above is one operation beside the dozens of a sweep over the contact.
+more than the coarse transient that they could spare. Contact that never opens needs no rule either: the
+search for the closed stations ends with its first guess, so that complementarity costs nothing then.
 """
 
 from __future__ import annotations

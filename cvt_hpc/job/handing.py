@@ -1,0 +1,58 @@
+"""The same runs for another model of the ladder, which knows fewer tables."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from cvt_hpc.errors import mismatch
+from cvt_hpc.job.definition import Job
+from cvt_hpc.job.schema import known_keys
+from cvt_hpc.models import MODELS
+
+
+def answering_model(job: Job) -> tuple[str, str] | None:
+    """Return the model that answers the question which a job asks, and why it does; None for its own model.
+
+    Raises
+    ------
+    InputError
+        If the runs ask different questions.
+    """
+    answered_by = getattr(import_module(MODELS[job.model]), "ANSWERED_BY", {})
+    if any(axis.name == "question" for axis in job.axes):
+        raise mismatch(f"{job.source}: [axes] question", "one question for all runs", "several")
+    return answered_by.get(job.parameters.get("question"))
+
+
+def handed_to(job: Job, model: str, why: str) -> dict[str, Any]:
+    """Return a document of the same runs for another model: what the job gives and that model knows.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    model : str
+        The other model.
+    why : str
+        What it is handed over for, for the description and the error.
+
+    Raises
+    ------
+    InputError
+        If an axis is nothing that the other model knows.
+    """
+    document, known = job.resolved(), known_keys(model)
+    for axis in job.axes:
+        if axis.name not in known:
+            where = f"{job.source}: [axes] {axis.name}"
+            raise mismatch(where, f"a key of {model}, since {why}", "one without effect there")
+    tables = {
+        section: {key: document[section][key] for key in table if key in job.given and key in known}
+        for section, table in document.items()
+        if section in job.schema.sections
+    }
+    text = f"{job.description}{'; ' if job.description else ''}{model}: {why}"
+    head = {"name": job.name, "model": model, "description": text}
+    rest = {key: document[key] for key in ("axes", "design") if key in document}
+    return head | {section: table for section, table in tables.items() if table} | rest

@@ -1,0 +1,202 @@
+"""How often a cheap rung errs: a sample of the runs that it answered, done again in full.
+
+The sample is drawn by the runs' indices: whoever goes on with a study, or asks for a larger share, goes on
+with the same sample. Its runs are a study of their own, in the folder `audit` of the other one.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from scipy.stats import binomtest
+
+from cvt_hpc.errors import mismatch, show
+from cvt_hpc.files import written_aside
+from cvt_hpc.job import build_job
+from cvt_hpc.job.handing import handed_to
+from cvt_hpc.models.auto.rules import Rung
+from cvt_hpc.study.description import Study, describe
+from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.records import Records
+from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.report import RunReport
+from cvt_hpc.study.simulator import default_simulator
+from cvt_hpc.study.sweep import run
+from cvt_hpc.variables import Status
+from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
+
+FOLDER, TABLE = "audit", "audit.csv"  # in the folder of the runs, and in that of the audit
+AUDITED = "auto"
+FULL_MODEL = "elastic_belt"
+LOWER = (Rung.PASSIVE, Rung.COARSE)
+CONFIDENCE = 0.95
+DECIDED = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
+FORCES = (("mean_ring_tension", "mean_push_force"), ("axial_force",))  # by what they are measured against
+
+
+class RungAudit(NamedTuple):
+    """What the audit of one rung has found.
+
+    Attributes
+    ----------
+    rung : Rung
+        The rung that had answered.
+    runs : int
+        Runs done again.
+    differing : int
+        Of these, those that are of another class in full.
+    contrary : int
+        Of these, those of which one says quiet and the other vibrating.
+    interval : (float, float)
+        The share of differing runs lies within it with CONFIDENCE (Clopper and Pearson 1934).
+    force_deviation : float
+        Deviation that the mean forces of strands and of sheaves, over the largest of either, keep in 95 % of
+        the runs; not a number where the rung knows no forces.
+    """
+
+    rung: Rung
+    runs: int
+    differing: int
+    contrary: int
+    interval: tuple[float, float]
+    force_deviation: float
+
+
+class AuditReport(NamedTuple):
+    """What an audit has found.
+
+    Attributes
+    ----------
+    answered : int
+        Runs that the lower rungs have answered, of which a sample was done again.
+    rungs : tuple of RungAudit
+        By rung.
+    table : Path
+        All runs that differ, one by one.
+    """
+
+    answered: int
+    rungs: tuple[RungAudit, ...]
+    table: Path
+
+
+def check_fraction(job: Job, fraction: float, part: str | None = None) -> None:
+    """Raise InputError where a job or a part of it has nothing to be audited, or the fraction is none."""
+    if job.model != AUDITED:
+        raise mismatch("--audit", f"a job of model {AUDITED}, whose rungs can err", f"model {job.model}")
+    if not 0.0 < fraction <= 1.0:
+        raise mismatch("--audit", "a fraction above 0, at most 1", show(fraction))
+    if part is not None:
+        raise mismatch("--audit", "a run of the whole study, once its parts have ended", f"part {part}")
+
+
+def run_audit(job: Job, out: Path, fraction: float, **options: Any) -> RunReport:
+    """Do a sample of the runs that lower rungs have answered in full; on all ranks.
+
+    Parameters
+    ----------
+    job : Job
+        Of model auto, all runs of which are done.
+    out : Path
+        Their folder.
+    fraction : float
+        Share of the runs to be done again.
+    options
+        As `run` takes them.
+    """
+    study = describe(job, default_simulator())
+
+    def chosen() -> np.ndarray:
+        return _sample(study, read_records(StudyFolder(out).records, study), fraction)
+
+    return run(_in_full(job), out / FOLDER, chosen=chosen, **options)
+
+
+def report_audit(job: Job, out: Path, fraction: float) -> AuditReport:
+    """Compare the runs of an audit with what the lower rungs said, and write the table; on one rank.
+
+    Parameters
+    ----------
+    job, out, fraction
+        As of `run_audit`, which has come to its end.
+    """
+    simulator = default_simulator()
+    study, full_study = describe(job, simulator), describe(_in_full(job), simulator)
+    low = read_records(StudyFolder(out).records, study)
+    full = read_records(StudyFolder(out / FOLDER).records, full_study)
+    audited = np.flatnonzero(_sample(study, low, fraction) & full.recorded)
+    rungs = low.read(audited, "rung")
+    classes = [classify_runs(r.status[audited], r.read(audited, "vibrates")) for r in (low, full)]
+    differs = classes[0] != classes[1]
+    contrary = differs & np.isin(classes, DECIDED).all(axis=0)
+    table = out / FOLDER / TABLE
+    _write(table, study, audited[differs], (low, full), [found[differs] for found in classes])
+    found = []
+    for rung in LOWER:
+        of_rung = rungs == rung
+        runs, differing = int(of_rung.sum()), int(differs[of_rung].sum())
+        if runs:
+            ends = binomtest(differing, runs).proportion_ci(CONFIDENCE, method="exact")
+            deviation = _force_deviation(low, full, audited[of_rung])
+            count = int(contrary[of_rung].sum())
+            found.append(RungAudit(rung, runs, differing, count, (ends.low, ends.high), deviation))
+    return AuditReport(int(_answered(low).sum()), tuple(found), table)
+
+
+def _in_full(job: Job) -> Job:
+    """The same runs as the job describes them, with no rung below; of the whole grid where it is traced."""
+    document = handed_to(job, FULL_MODEL, "done in full, to audit the rungs below")
+    if "first_spacing" in job.design:
+        del document["design"]
+    return build_job(document, job.source)
+
+
+def _answered(records: Records) -> np.ndarray:
+    """Whether a lower rung has answered a run, shape (runs,)."""
+    answered = records.recorded & (records.status == Status.DONE)
+    places = np.flatnonzero(answered)
+    answered[places] = np.isin(records.read(places, "rung"), LOWER)
+    return answered
+
+
+def _sample(study: Study, records: Records, fraction: float) -> np.ndarray:
+    """Which runs are audited, shape (runs,): each by a lot that is drawn for its index."""
+    lots = np.random.default_rng(int(study.fingerprint[:16], 16)).random(study.size)
+    return _answered(records) & (lots < fraction)
+
+
+def _force_deviation(low: Records, full: Records, runs: np.ndarray) -> float:
+    largest = np.zeros(runs.size)
+    for names in FORCES:
+        one, other = (np.hstack([records.read(runs, name) for name in names]) for records in (low, full))
+        deviation = np.abs(one - other).max(axis=1) / np.abs(other).max(axis=1)
+        largest = np.maximum(largest, deviation)  # not a number where either run has no forces
+    known = largest[np.isfinite(largest)]
+    return float(np.quantile(known, 0.95)) if known.size else math.nan
+
+
+def _write(
+    table: Path, study: Study, runs: np.ndarray, both: Sequence[Records], classes: Sequence[np.ndarray]
+) -> None:
+    """Write what either rung says of some runs."""
+    names = [axis.name for axis in study.axes]
+    low, full = (records.read(runs) for records in both)
+    with written_aside(table) as path, path.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(
+            ["run", *names, "rung", "class", "class in full", "margin", "reason", "reason in full"]
+        )
+        for k, index in enumerate(runs):
+            place = study.place(int(index))
+            words = [OccurrenceClass(int(found[k])).label for found in classes]
+            reasons = [rows[k]["reason"].decode(errors="replace") for rows in (low, full)]
+            rung, margin = Rung(int(low[k]["rung"])).name.lower(), f"{low[k]['margin']:.3g}"
+            writer.writerow([index, *(place[name] for name in names), rung, *words, margin, *reasons])

@@ -1,0 +1,225 @@
+"""Which rung answers, and that no rung says what it does not know."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from rungs import rung_job
+
+from cvt_hpc.models.auto import transient
+from cvt_hpc.models.auto.record import LANE_GROUPS
+from cvt_hpc.models.auto.rules import Rung, coarse, is_passive, is_settled
+from cvt_hpc.models.elastic_belt.lane_run import LaneRun
+from cvt_hpc.simulation import lane_groups, record_variables, run_points, simulate
+from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.vibration.assessment import Occurrence
+
+# cells of the reference map by what is known of them: the middle of a window, outside of all, push changing strands
+VIBRATING = {"load": 120.0, "friction_gradient": -1.0}
+QUIET = {"load": 60.0, "friction_gradient": -0.4}
+JUDDER = {"load": 40.0, "friction_gradient": -1.2, "sheave_stiffness": 1.2}
+CELLS = (VIBRATING, QUIET, JUDDER)
+SHARED = [variable.name for variable in record_variables(rung_job("elastic_belt"))]
+OF_COST = {"core_seconds", "steps", "contact_solves"}
+TABLE = {
+    "friction_law": "table",
+    "table_force": [1e3, 1e5],
+    "table_speed": [0.0, 0.1, 1.0],
+    "table_mu": [[0.08, 0.09, 0.09], [0.1, 0.1, 0.11]],
+}
+
+
+@cache
+def records(model, **values):
+    """Of all CELLS, together."""
+    job = rung_job(model, duration=0.4, **values)
+    points = [job.point(0) | cell for cell in CELLS]
+    return run_points(job, points, lambda: None)
+
+
+def same(record, other, names):
+    return all(
+        np.array_equal(record[name], other[name], equal_nan=_is_number(record[name])) for name in names
+    )
+
+
+def _is_number(value):
+    return not isinstance(value, str)
+
+
+@pytest.mark.parametrize(
+    ("values", "passive"),
+    [
+        ({"friction_gradient": 0.0}, True),
+        ({"friction_gradient": 0.0, "friction_law": "coulomb"}, True),
+        ({"friction_gradient": -0.01}, False),
+        (TABLE, True),
+        (TABLE | {"table_mu": [[0.08, 0.09, 0.09], [0.1, 0.11, 0.109]]}, False),
+        ({"friction_gradient": 0.0, "question": "amplitude"}, True),
+        ({"friction_gradient": 0.0, "question": "forces"}, False),
+    ],
+)
+def test_friction_that_never_falls_needs_no_run(values, passive):
+    job = rung_job("auto", **values)
+    assert is_passive(job.point(0)) is passive
+
+
+def test_what_needs_no_run_says_nothing_but_the_class():
+    job = rung_job("auto", friction_gradient=0.0)
+    (record,) = run_points(job, [job.point(0)], lambda: None)
+    assert (record["status"], record["vibrates"], record["rung"]) == (Status.DONE, Vibrates.NO, Rung.PASSIVE)
+    assert record["steps"] == 0 and record["simulated_seconds"] == 0.0
+    for variable in record_variables(job):
+        if variable.dtype == "f8" and variable.name not in ("core_seconds", "simulated_seconds"):
+            assert np.isnan(record[variable.name]).all(), variable.name
+    assert not simulate(job).sizes.get("time")
+
+
+def test_without_falling_friction_transients_do_not_vibrate():
+    loads, stiffnesses, disturbances = (60.0, 100.0, 140.0, 180.0), (1.0, 1.5), (1e-6, 3e-4)
+    grid = [
+        {"load": load, "sheave_stiffness": stiffness, "disturbance": disturbance}
+        for load in loads
+        for stiffness in stiffnesses
+        for disturbance in disturbances
+    ]
+    job = rung_job("elastic_belt", duration=0.3)
+    verdicts = {}
+    for gradient in (0.0, -1.0):
+        points = [job.point(0) | cell | {"friction_gradient": gradient} for cell in grid]
+        verdicts[gradient] = [record["vibrates"] for record in run_points(job, points, lambda: None)]
+    assert set(verdicts[0.0]) == {Vibrates.NO}
+    assert verdicts[-1.0].count(Vibrates.YES) >= 4  # the same cells, so that the first line says something
+
+
+def test_each_cell_is_answered_by_the_cheapest_rung_that_can():
+    found = records("auto")
+    assert [record["rung"] for record in found] == [Rung.COARSE, Rung.COARSE, Rung.FULL]
+    full = records("elastic_belt")
+    assert [record["vibrates"] for record in found] == [record["vibrates"] for record in full]
+    for record, other in zip(found[:2], full[:2], strict=True):
+        assert record["steps"] < 0.2 * other["steps"]
+        assert record["margin"] >= 0.7
+    assert found[2]["margin"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("question", "climbed"), [("occurrence", {2}), ("amplitude", {0, 2}), ("forces", set())]
+)
+def test_what_climbs_is_bit_by_bit_the_full_run(question, climbed):
+    found, full = records("auto", question=question), records("elastic_belt")
+    names = [name for name in SHARED if name not in OF_COST]
+    for k, (record, other) in enumerate(zip(found, full, strict=True)):
+        assert (record["rung"] == Rung.FULL) is (k in climbed)
+        assert same(record, other, names) is (k in climbed)
+        if k in climbed:  # the coarse run counts as well: 120 ms by 7.14 us
+            assert record["steps"] == other["steps"] + 16_800
+
+
+def test_coarse_forces_are_those_of_the_full_run():
+    for record, other in zip(records("auto", question="forces"), records("elastic_belt"), strict=True):
+        strands = other["mean_ring_tension"].max()
+        # 0.1 % in the middle of the map; 1 % where the push changes strands
+        assert record["mean_push_force"] == pytest.approx(other["mean_push_force"], abs=0.01 * strands)
+        assert record["mean_ring_tension"] == pytest.approx(other["mean_ring_tension"], abs=0.01 * strands)
+        # a vibration moves axial forces by up to 3 %, and its amplitude is not that of the full run
+        assert record["axial_force"] == pytest.approx(other["axial_force"], rel=0.03)
+
+
+def test_a_margin_beyond_reach_leaves_all_to_the_full_run():
+    found = records("auto", least_margin=50.0)
+    assert [record["rung"] for record in found] == [Rung.FULL] * 3
+
+
+def test_runs_in_company_are_what_they_are_alone():
+    job = rung_job("auto", duration=0.4)
+    (alone,) = run_points(job, [job.point(0) | QUIET], lambda: None)
+    names = [variable.name for variable in record_variables(job) if not variable.volatile]
+    assert same(records("auto")[1], alone, names)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"load_history": "ramp"},
+        {
+            "duration": 0.1
+        },  # three tenths of it are over before the load has risen and five periods have passed
+        {"stations": 36},  # 0.6 of them are below what a mesh may have
+    ],
+)
+def test_no_coarse_run_where_it_would_tell_nothing(values):
+    assert coarse(rung_job("auto", duration=0.4).point(0)) is not None
+    assert coarse(rung_job("auto", **{"duration": 0.4} | values).point(0)) is None
+
+
+def occurrence(vibrates, margin):
+    return Occurrence(vibrates, "", (), *[np.zeros(0)] * 5, margin=margin)
+
+
+@pytest.mark.parametrize(
+    ("question", "vibrates", "margin", "settled"),
+    [
+        ("occurrence", Vibrates.YES, 1.0, True),
+        ("occurrence", Vibrates.NO, 1.0, True),
+        ("occurrence", Vibrates.NO, 0.5, False),
+        ("occurrence", Vibrates.YES, 0.5, False),
+        ("occurrence", Vibrates.UNDECIDED, 0.0, False),
+        ("amplitude", Vibrates.NO, 1.0, True),
+        ("amplitude", Vibrates.YES, 9.0, False),
+        ("forces", Vibrates.UNDECIDED, 0.0, True),
+    ],
+)
+def test_what_settles_a_question(question, vibrates, margin, settled):
+    point = {"question": question, "least_margin": 0.7}
+    assert is_settled(point, occurrence(vibrates, margin)) is settled
+
+
+def test_nothing_is_settled_at_the_edge_of_what_undecided_means():
+    point = {"question": "occurrence", "least_margin": 0.0}
+    assert not is_settled(point, occurrence(Vibrates.UNDECIDED, 0.0))
+
+
+def test_a_coarse_run_that_is_not_to_be_trusted_decides_nothing(monkeypatch):
+    job = rung_job("auto", duration=0.4)
+    doubt = (Status.FAILED_NUMERICS, "the power balance is open")
+    own = LaneRun.numerical_doubt
+
+    def doubtful(run, record):
+        return doubt if run.parameters["stations"] < 160 else own(run, record)
+
+    monkeypatch.setattr(LaneRun, "numerical_doubt", doubtful)
+    (record,) = run_points(job, [job.point(0) | QUIET], lambda: None)
+    assert (record["rung"], record["vibrates"]) == (Rung.FULL, Vibrates.NO)
+
+
+def test_a_full_run_that_fails_is_recorded_as_failed():
+    job = rung_job("auto", duration=0.2)
+    (record,) = run_points(job, [job.point(0) | {"load": 500.0}], lambda: None)
+    assert (record["status"], record["rung"]) == (Status.FAILED_ERROR, Rung.NONE)
+    assert "slips through" in record["reason"]
+    assert np.isnan(record["amplitude"]).all() and record["core_seconds"] > 0.0
+
+
+def test_runs_left_open_share_the_lanes_of_the_next_rung(monkeypatch):
+    sizes = []
+    own = transient.Batch
+
+    def counted(points, stepper):
+        sizes.append((points[0]["stations"], len(points)))
+        return own(points, stepper)
+
+    monkeypatch.setattr(transient, "Batch", counted)
+    job = rung_job("auto", {"seed": list(range(1, 18))}, duration=0.2, **JUDDER)
+    (batch,) = lane_groups(job, range(17))
+    found = run_points(job, [job.point(index) for index in batch], lambda: None)
+    open_runs = sum(record["rung"] == Rung.FULL for record in found)
+    assert open_runs > 0
+    assert sizes == [(96, 16), (96, 1), (160, min(open_runs, 16)), *([(160, 1)] if open_runs > 16 else [])]
+
+
+def test_batches_hold_several_lanes_full():
+    job = rung_job("auto", {"seed": list(range(1, 131))})
+    lengths = [len(batch) for batch in lane_groups(job, range(130))]
+    assert sum(lengths) == 130 and max(lengths) <= 16 * LANE_GROUPS
+    assert max(lengths) - min(lengths) <= 1
