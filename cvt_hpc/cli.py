@@ -110,13 +110,16 @@ def _parser() -> argparse.ArgumentParser:
     chart = _add(commands, "chart", _chart, "measure speed against accuracy, and draw it", "JOB")
     chart.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: out/<job name>)")
     chart.add_argument("--fresh", action="store_true", help="throw earlier results of the folder away")
+    ladder = _add(commands, "ladder", _ladder, "do the runs of a job on every rung, and compare them", "JOB")
+    ladder.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: out/<job name>)")
+    ladder.add_argument("--fresh", action="store_true", help="throw earlier results of all rungs away")
     check = _add(commands, "check", _check, "validate a job, show its defaults and estimate its cost", "JOB")
     ranks = "forecast the sweep on so many ranks: makespan, efficiency, core-hours, disk and Slurm's --time"
     check.add_argument("--ranks", type=int, nargs="+", default=[], metavar="N", help=ranks)
     pilots = "forecast by K batches that are done for it, shortened (default: by records, else by prediction)"
     check.add_argument("--pilots", type=int, default=0, metavar="K", help=pilots)
     check.add_argument("--plot", type=Path, metavar="PNG", help="picture of the forecast, 1 to 10 000 ranks")
-    for command in (run, simulate, check):
+    for command in (run, simulate, ladder, check):
         _add_assignments(command, "--set", "replace a value of the job, or an axis by one value")
     _add_assignments(chart, "--set", "replace a value of the job and of all its scenes")
     _add_assignments(
@@ -273,6 +276,32 @@ def _chart(arguments: argparse.Namespace) -> int:
     print(f"table: {report.table}", f"dataset: {report.dataset}", sep="\n")
     print(*(f"picture: {picture}" for picture in report.pictures), sep="\n")
     return DONE
+
+
+def _ladder(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.chart.ladder import report_ladder, run_ladder
+    from cvt_hpc.chart.ladder_rungs import ladder
+    from cvt_hpc.chart.ladder_table import ladder_lines
+    from cvt_hpc.job import load_job
+    from cvt_hpc.printing import trouble_lines
+    from cvt_hpc.study.launch import end_process
+    from cvt_hpc.study.report import STALLED
+
+    job = load_job(arguments.path, arguments.set)
+    out = arguments.out or Path("out") / job.name
+    rungs, refusals = ladder(job)
+    _complain(*(f"{name} left out: {why}" for name, why in refusals.items()))
+    status = run_ladder(
+        rungs,
+        out,
+        fresh=arguments.fresh,
+        tell=lambda rung, report: _complain(*(f"{rung.name}: {line}" for line in trouble_lines(report))),
+    )
+    if status < STALLED and _speaks():
+        report = report_ladder(job, rungs, out)
+        print(*ladder_lines(report.findings), sep="\n")
+        print(f"table: {report.table}", f"dataset: {report.dataset}", f"picture: {report.picture}", sep="\n")
+    return end_process(status)
 
 
 def _check(arguments: argparse.Namespace) -> int:

@@ -44,12 +44,12 @@ def table_lines(comparison: Comparison) -> Iterator[str]:
     """Yield the lines that show the results of a scene to people."""
     names = [quantity.name for quantity in comparison.scene.quantities]
     heads = ["method", "", "core-s/s", *(f"{name.replace('_', ' ')} error" for name in names), ""]
-    own = [_short(comparison.reference.errors[name]) for name in names]
+    own = [short(comparison.reference.errors[name]) for name in names]
     label, setting = comparison.reference.point.label, comparison.reference.point.setting_in_words
     rows = [heads, [f"reference: {label}", setting, "", *own, comparison.reference.measurement.reason]]
     rows += [_line(result, names) for result in comparison.methods]
     yield comparison.scene.title
-    yield from _columns(rows)
+    yield from columns(rows)
     if any(result.below for result in comparison.methods):
         yield "  *: no larger than the reference's own error"
     yield f"  chosen: {comparison.verdict}"
@@ -58,7 +58,7 @@ def table_lines(comparison: Comparison) -> Iterator[str]:
         rows = [
             [f"error budget, against {comparison.base}", *(f"{name.replace('_', ' ')}" for name in shown), ""]
         ]
-        yield from _columns(
+        yield from columns(
             [*rows, *([r.point.label, *_errors(r, shown), _note(r)] for r in comparison.choices)]
         )
 
@@ -82,10 +82,10 @@ def _head(result: Result) -> list[str]:
         point.label,
         "" if point.series == "exact" else point.job.stepper,
         point.key,
-        _number(point.setting),
+        number(point.setting),
         "yes" if result.chosen else "",
         measurement.reason or "done",
-        _number(measurement.cost, 3),
+        number(measurement.cost, 3),
         str(point.starts),
     ]
 
@@ -93,23 +93,23 @@ def _head(result: Result) -> list[str]:
 def _quantities(result: Result, names: Sequence[str]) -> Iterator[str]:
     for name in names:
         if name not in ("trajectory", "occurrence"):
-            yield _number(result.values.get(name, math.nan), 6)
-        yield _number(result.errors.get(name, math.nan), 3)
+            yield number(result.values.get(name, math.nan), 6)
+        yield number(result.errors.get(name, math.nan), 3)
 
 
 def _tail(result: Result, counters: Sequence[str]) -> list[str]:
     counts = result.measurement.counters
-    return [" ".join(sorted(result.below)), *(_number(counts.get(name, math.nan), 8) for name in counters)]
+    return [" ".join(sorted(result.below)), *(number(counts.get(name, math.nan), 8) for name in counters)]
 
 
 def _line(result: Result, names: Sequence[str]) -> list[str]:
     point = result.point
-    cost = _short(result.measurement.cost)
+    cost = short(result.measurement.cost)
     return [point.label, point.setting_in_words, cost, *_errors(result, names), _note(result)]
 
 
 def _errors(result: Result, names: Sequence[str]) -> list[str]:
-    return [_short(result.errors[name]) + ("*" if name in result.below else "") for name in names]
+    return [short(result.errors[name]) + ("*" if name in result.below else "") for name in names]
 
 
 def _note(result: Result) -> str:
@@ -121,16 +121,19 @@ def _note(result: Result) -> str:
     return "<- chosen" if result.chosen else ""
 
 
-def _columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+def columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yield rows as lines, their cells below each other; the last one is not padded."""
     widths = [max(map(len, column)) for column in zip(*(row[:-1] for row in rows), strict=True)]
     for row in rows:
         cells = [cell.ljust(width) for cell, width in zip(row[:-1], widths, strict=True)]
         yield f"  {'  '.join([*cells, row[-1]])}".rstrip()
 
 
-def _short(value: float) -> str:
+def short(value: float) -> str:
+    """Return a number to two digits, "" where it is none."""
     return "" if math.isnan(value) else f"{value:.2g}"
 
 
-def _number(value: float, digits: int = 10) -> str:
+def number(value: float, digits: int = 10) -> str:
+    """Return a number to so many digits, "" where it is none."""
     return "" if math.isnan(value) else f"{value:.{digits}g}"

@@ -1,0 +1,108 @@
+"""A ladder chart made: the same runs done on every rung, compared, written and drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from threadpoolctl import threadpool_limits
+
+from cvt_hpc.chart.ladder_comparing import Finding, compare
+from cvt_hpc.chart.ladder_drawing import draw_ladder
+from cvt_hpc.chart.ladder_rungs import Rung
+from cvt_hpc.chart.ladder_table import ladder_dataset, write_ladder
+from cvt_hpc.files import written_aside
+from cvt_hpc.job import Job
+from cvt_hpc.netcdf import write_netcdf
+from cvt_hpc.simulation import simulate
+from cvt_hpc.study import RunReport, check_start, open_results, run
+
+
+class LadderReport(NamedTuple):
+    """What a ladder chart left.
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+        Each rung's answer to each question, compared.
+    table, dataset, picture : Path
+        The files that hold them.
+    """
+
+    findings: tuple[Finding, ...]
+    table: Path
+    dataset: Path
+    picture: Path
+
+
+def run_ladder(
+    rungs: Sequence[Rung], out: Path, *, fresh: bool = False, tell: Callable[[Rung, RunReport], None]
+) -> int:
+    """Do the runs of each rung, a study in a folder of its own; on all ranks.
+
+    Parameters
+    ----------
+    rungs : sequence of Rung
+        The ladder of a job.
+    out : Path
+        The folder of these folders.
+    fresh : bool
+        Throw earlier results away.
+    tell : callable
+        Given each rung whose runs have ended, and how.
+
+    Returns
+    -------
+    int
+        The largest exit status of a rung; later ones are not begun after one that stopped early.
+
+    Raises
+    ------
+    InputError
+        If the folder of a rung holds another job or cannot be written to; before anything is computed.
+    """
+    status = 0
+    begins = {rung.name: fresh or not (out / rung.name).exists() for rung in rungs}
+    for rung in rungs:
+        check_start(rung.job, out / rung.name, fresh=fresh)
+    for rung in rungs:
+        # threads of the linear algebra wait for each other in loops, which would count as a rung's own time
+        with threadpool_limits(1):
+            if rung.job.stepper is None and begins[rung.name]:
+                simulate(rung.job)  # libraries loaded and kernels compiled would count as time of a first run
+            report = run(rung.job, out / rung.name, fresh=fresh)
+        tell(rung, report)
+        status = max(status, report.exit_status)
+        if report.remaining:
+            break
+    return status
+
+
+def report_ladder(job: Job, rungs: Sequence[Rung], out: Path) -> LadderReport:
+    """Compare what the rungs have found, and write table, dataset and picture; on one rank.
+
+    Parameters
+    ----------
+    job : Job
+        Whose ladder it is.
+    rungs, out
+        As of `run_ladder`, which has come to its end.
+
+    Raises
+    ------
+    InputError
+        If the system refuses to read or write a file.
+    """
+    results = {}
+    for rung in rungs:
+        with open_results(out / rung.name) as dataset:
+            results[rung.name] = dataset.load()
+    findings = tuple(compare(rungs, results))
+    report = LadderReport(findings, *(out / f"ladder.{suffix}" for suffix in ("csv", "nc", "png")))
+    with written_aside(report.table) as aside:
+        write_ladder(findings, aside)
+    with written_aside(report.dataset) as aside:
+        write_netcdf(ladder_dataset(job, rungs, findings), aside)
+    draw_ladder(findings, job.name, report.picture)
+    return report

@@ -1,0 +1,213 @@
+"""What each rung of the ladder makes of a question, against the reference.
+
+Asked is for what the reference decides, or for the cells that vibrate there. A rung that says nothing of a
+cell is not in error there: such cells are counted by themselves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from cvt_hpc.analysis.classes import at_strongest_strand, occurrence_classes
+from cvt_hpc.chart.ladder_onsets import onsets, paired_errors
+from cvt_hpc.chart.ladder_rungs import MODEL, REFERENCE, Rung
+from cvt_hpc.models.linear_stability.modes import DECAY
+from cvt_hpc.study.audit import FORCES
+from cvt_hpc.variables import Status
+from cvt_hpc.vibration.classes import OccurrenceClass
+
+Array = NDArray[np.float64]
+
+LEVELS = {OccurrenceClass.QUIET: -1.0, OccurrenceClass.VIBRATING: 1.0}  # of an onset: the sign decides
+
+
+class Score(NamedTuple):
+    """How well a rung answers a question.
+
+    Attributes
+    ----------
+    cells : int
+        Cells behind the errors; of onsets, pairs of them.
+    median, high : float
+        Median of the errors and what 95 % of them keep: of onsets [N m], of all else relative. Not a number
+        of occurrence, and where there is nothing to compare.
+    wrong : float
+        Of occurrence, the share of cells that are quiet here and vibrate there, or the other way round.
+    undecided : float
+        Share of the reference's cells that the rung leaves undecided, fails at or does not speak of; of
+        onsets the share of those that it misses.
+    additional : int
+        Onsets that the reference does not have.
+    """
+
+    cells: int
+    median: float = math.nan
+    high: float = math.nan
+    wrong: float = math.nan
+    undecided: float = math.nan
+    additional: int = 0
+
+
+class Finding(NamedTuple):
+    """A row of the table.
+
+    Attributes
+    ----------
+    question, rung : str
+        What was asked, and who answered.
+    score : Score
+        How well.
+    own : float
+        Estimated error of the reference itself, in the measure of the score.
+    core_seconds : float
+        Of a run of the rung, mean [s].
+    """
+
+    question: str
+    rung: str
+    score: Score
+    own: float
+    core_seconds: float
+
+
+def compare(rungs: Sequence[Rung], results: Mapping[str, xr.Dataset]) -> Iterator[Finding]:
+    """Yield what each rung makes of each question that it answers.
+
+    The reference's own error is taken as large as the distance of the full run from it: that would be 0.8 of
+    it if all errors were of second order in mesh and step, and twice that much if of the first. No onset is
+    known more closely than half a step of the load.
+
+    Parameters
+    ----------
+    rungs : sequence of Rung
+        With the full run and the reference among them.
+    results : mapping
+        Results of each rung, by its name.
+    """
+    reference = results[REFERENCE]
+    loads = np.sort(reference["load"].values)
+    spacing = float(np.diff(loads).max(initial=0.0))
+    for question, score in SCORES.items():
+        full = score(_beside(results[MODEL], reference), reference)
+        own = full.wrong if question == "occurrence" else full.median
+        if question == "onset":
+            own = float(np.fmax(own, 0.5 * spacing))
+        for rung in rungs:
+            if question in rung.answers:
+                dataset = results[rung.name]
+                cost = float(dataset["core_seconds"].mean())
+                yield Finding(question, rung.name, score(_beside(dataset, reference), reference), own, cost)
+
+
+def _beside(dataset: xr.Dataset, reference: xr.Dataset) -> xr.Dataset:
+    """A rung's results over all axes of the reference: the same along those that it does not know."""
+    order = reference["status"].dims
+    missing = {name: reference[name] for name in order if name not in dataset["status"].dims}
+    return dataset.expand_dims(missing).transpose(*order, ...)
+
+
+def _occurrence(found: xr.Dataset, true: xr.Dataset) -> Score:
+    one, other = _levels(found), _levels(true)
+    decided = np.isfinite(other)
+    cells = int(decided.sum())
+    if not cells:
+        return Score(0)
+    wrong = (one * other < 0.0).sum() / cells
+    return Score(cells, wrong=float(wrong), undecided=float(np.isnan(one[decided]).mean()))
+
+
+def _onset(found: xr.Dataset, true: xr.Dataset) -> Score:
+    loads, axis = true["load"].values, true["status"].dims.index("load")
+    is_linear = "growth_rate" in found and found["growth_rate"].dims == found["status"].dims
+    level = _growth(found) if is_linear else _levels(found)
+    lines = [np.moveaxis(values, axis, -1).reshape(-1, loads.size) for values in (level, _levels(true))]
+    errors: list[float] = []
+    missed = additional = 0
+    for one, other in zip(*lines, strict=True):
+        pairs, less, more = paired_errors(onsets(loads, one), onsets(loads, other))
+        errors, missed, additional = errors + pairs, missed + less, additional + more
+    number = len(errors) + missed
+    score = _score(np.array(errors), number)
+    return score._replace(additional=additional)
+
+
+def _levels(dataset: xr.Dataset) -> Array:
+    """1 where a run vibrates, -1 where it is quiet, nan elsewhere."""
+    classes = occurrence_classes(dataset).values
+    level = np.full(classes.shape, np.nan)
+    for kind, value in LEVELS.items():
+        level[classes == kind] = value
+    return level
+
+
+def _growth(dataset: xr.Dataset) -> Array:
+    """Growth rate of the fastest mode [1/s]; where all decay faster than is looked for, that limit."""
+    rate = dataset["growth_rate"].values
+    return np.where(dataset["status"] == Status.DONE, np.where(np.isnan(rate), -DECAY, rate), np.nan)
+
+
+def _frequency(found: xr.Dataset, true: xr.Dataset) -> Score:
+    own = at_strongest_strand(true, "frequency")
+    if "eigenfrequency" in found:  # a strand alone has no strongest mode: the nearest one of the same strand
+        known = found["eigenfrequency"]
+        nearest = known.isel(half_waves=np.abs(known - own).fillna(np.inf).argmin("half_waves"))
+        said = at_strongest_strand(true.assign(nearest=nearest.reset_coords(drop=True)), "nearest").values
+    elif "amplitude" in found:
+        said = _where_vibrating(found, at_strongest_strand(found, "frequency"))
+    else:
+        said = _where_vibrating(found, found["frequency"])
+    return _relative(said, _where_vibrating(true, own))
+
+
+def _amplitude(found: xr.Dataset, true: xr.Dataset) -> Score:
+    said, own = (_where_vibrating(each, at_strongest_strand(each, "amplitude")) for each in (found, true))
+    return _relative(said, own)
+
+
+def _where_vibrating(dataset: xr.Dataset, values: xr.DataArray) -> Array:
+    return np.where(_levels(dataset) > 0.0, values.values, np.nan)
+
+
+def _relative(said: Array, own: Array) -> Score:
+    asked = np.isfinite(own)
+    return _score(np.abs(said[asked] / own[asked] - 1.0), int(asked.sum()))
+
+
+def _forces(found: xr.Dataset, true: xr.Dataset) -> Score:
+    """Of each cell the larger of two deviations: of strand forces and of axial forces, over the largest."""
+    largest = np.zeros(true["status"].shape)
+    for names in FORCES:
+        one, other = (
+            np.concatenate([_where_done(each, name) for name in names], axis=-1) for each in (found, true)
+        )
+        largest = np.maximum(largest, np.abs(one - other).max(axis=-1) / np.abs(other).max(axis=-1))
+    return _score(largest, int((true["status"] == Status.DONE).sum()))
+
+
+def _where_done(dataset: xr.Dataset, name: str) -> Array:
+    status = dataset["status"]
+    return dataset[name].where(status == Status.DONE).transpose(*status.dims, ...).values
+
+
+def _score(errors: Array, asked: int) -> Score:
+    """Score of errors, nan where the rung says nothing, of so many cells that were asked for."""
+    known = errors[np.isfinite(errors)]
+    undecided = 1.0 - known.size / asked if asked else math.nan
+    if not known.size:
+        return Score(0, undecided=undecided)
+    return Score(known.size, *(float(np.quantile(known, q)) for q in (0.5, 0.95)), undecided=undecided)
+
+
+SCORES: dict[str, Callable[[xr.Dataset, xr.Dataset], Score]] = {
+    "occurrence": _occurrence,
+    "onset": _onset,
+    "frequency": _frequency,
+    "amplitude": _amplitude,
+    "forces": _forces,
+}

@@ -1,0 +1,113 @@
+"""The rungs of the elastic belt's ladder that a job of it can be done on, from the cheapest up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.job import Job, build_job, known_keys
+from cvt_hpc.job.handing import handed_to
+
+QUESTIONS = ("occurrence", "onset", "frequency", "amplitude", "forces")
+MODEL, STEPPER = "elastic_belt", "imex"
+REFERENCE = "reference"
+# In the reference mesh, step and transient shrink together: by 1.5 each error of first order falls by a third
+# and of second order by more than half, while a run costs 4.5 times as much, which keeps it below a second.
+FINER = 1.5
+LONGER = 2.0  # times as long: what grows slowly has its time, and the judged half begins a whole run later
+
+
+class Rung(NamedTuple):
+    """One rung.
+
+    Attributes
+    ----------
+    name : str
+        Of its folder and in the table.
+    answers : tuple of str
+        Those of QUESTIONS that it answers.
+    job : Job
+        The same runs on it, without the axes that it does not know.
+    """
+
+    name: str
+    answers: tuple[str, ...]
+    job: Job
+
+
+# Model and question by rung. Of auto, question forces takes every answer of the coarse transient as it is.
+_LOWER: dict[str, tuple[str, str, tuple[str, ...]]] = {
+    "criterion": ("criterion", "", ("occurrence",)),
+    "strand": ("strand", "", ("frequency",)),
+    "steady_variator": ("steady_variator", "", ("forces",)),
+    "linear_stability": ("linear_stability", "", ("occurrence", "onset", "frequency", "forces")),
+    "coarse": ("auto", "forces", QUESTIONS),
+    "auto": ("auto", "occurrence", ("occurrence", "onset")),
+}
+
+
+def ladder(job: Job) -> tuple[tuple[Rung, ...], dict[str, str]]:
+    """Return the rungs of a job, and why others refuse it.
+
+    Parameters
+    ----------
+    job : Job
+        Of the elastic belt, a grid with `load` among its axes.
+
+    Returns
+    -------
+    rungs : tuple of Rung
+        The job itself last but one, the reference last.
+    refusals : dict
+        What was wrong, by the name of the rung.
+
+    Raises
+    ------
+    InputError
+        If it is another job, or one that cannot be refined.
+    """
+    _check(job)
+    rungs, refusals = [], {}
+    for name, (model, question, answers) in _LOWER.items():
+        try:
+            rungs.append(Rung(name, answers, _handed(job, model, question)))
+        except InputError as error:
+            refusals[name] = str(error)
+    reference = build_job(_refined(job), job.source)
+    return (*rungs, Rung(MODEL, QUESTIONS, job), Rung(REFERENCE, (), reference)), refusals
+
+
+def _check(job: Job) -> None:
+    where, axes = job.source, [axis.name for axis in job.axes]
+    if job.model != MODEL:
+        raise mismatch(f"{where}: model", f"{MODEL}, the top of the ladder", job.model)
+    if job.stepper != STEPPER:
+        raise mismatch(f"{where}: stepper", f"{STEPPER}, as all transients below have it", job.stepper)
+    if job.design:
+        raise mismatch(f"{where}: [design]", "none: a ladder goes over the whole grid", job.design["kind"])
+    if "load" not in axes:
+        raise mismatch(f"{where}: [axes]", "load among the axes, for its onsets", ", ".join(axes) or "none")
+    if (course := job.parameters["load_history"]) != "constant":
+        raise mismatch(f"{where}: [scene] load_history", "constant, as the lower rungs have it", course)
+    for name in ("stations", "step", "duration"):
+        if name in axes:
+            raise mismatch(f"{where}: [axes] {name}", "one value, which the reference refines", "an axis")
+
+
+def _handed(job: Job, model: str, question: str) -> Job:
+    """The same runs on another model, without the axes that it does not know."""
+    known = known_keys(model)
+    fewer = replace(job, axes=tuple(axis for axis in job.axes if axis.name in known))
+    document = handed_to(fewer, model, "a rung of its ladder")
+    if question:
+        document[model] = {"question": question}
+    return build_job(document, job.source)
+
+
+def _refined(job: Job) -> dict[str, Any]:
+    document = job.resolved()
+    document["mesh"]["stations"] = round(FINER * job.parameters["stations"])
+    document["numerics"]["step"] = job.parameters["step"] / FINER
+    document["run"]["duration"] = LONGER * job.parameters["duration"]
+    return document

@@ -1,0 +1,105 @@
+"""The results of a ladder chart as a table, for people and as files that can be kept."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from cvt_hpc.chart.ladder_comparing import Finding
+from cvt_hpc.chart.ladder_rungs import QUESTIONS, Rung
+from cvt_hpc.chart.table import columns, number, short
+from cvt_hpc.job import Job
+from cvt_hpc.study.provenance import command, git_revision, history_line, machine, versions
+
+UNITS = dict.fromkeys(QUESTIONS, "1") | {"onset": "N m"}
+# Column -> what it is; `error_unit` tells the unit of those of errors
+NUMBERS = {
+    "cells": "cells behind the errors; of onsets, pairs of them",
+    "error_median": "median error",
+    "error_95": "error that 95 % of the cells keep",
+    "wrong_share": "share of cells that are quiet here and vibrate in the reference, or the other way round",
+    "undecided_share": "share of cells, or of the reference's onsets, of which the rung says nothing",
+    "additional": "onsets that the reference does not have",
+    "reference_error": "estimated error of the reference",
+    "core_seconds": "processor time of a run, mean",
+}
+
+
+def write_ladder(findings: Sequence[Finding], path: Path) -> None:
+    """Write the findings as comma-separated values, a row for each rung and question."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["question", "rung", "error_unit", *NUMBERS])
+        for finding in findings:
+            values = (number(value, 3) if isinstance(value, float) else value for value in _numbers(finding))
+            writer.writerow([finding.question, finding.rung, UNITS[finding.question], *values])
+
+
+def ladder_lines(findings: Sequence[Finding]) -> Iterator[str]:
+    """Yield the lines that show the findings to people."""
+    heads = ["", "cells", "median", "95 %", "wrong", "silent", "more", "core-s/run", ""]
+    for question in QUESTIONS:
+        found = [finding for finding in findings if finding.question == question]
+        unit = "" if UNITS[question] == "1" else f" [{UNITS[question]}]"
+        yield f"{question}: error{unit}; of the reference {short(found[0].own) or 'not known'}"
+        yield from columns([heads, *([f.rung, *_cells(f), ""] for f in found)])
+
+
+def ladder_dataset(job: Job, rungs: Sequence[Rung], findings: Sequence[Finding]) -> xr.Dataset:
+    """Return the findings as a dataset over `question` and `rung`, with all that is needed to repeat it.
+
+    Parameters
+    ----------
+    job : Job
+        Whose ladder it is.
+    rungs : sequence of Rung
+        Its rungs.
+    findings : sequence of Finding
+        The results.
+    """
+    names = list(dict.fromkeys(finding.rung for finding in findings))
+    values = np.full((len(NUMBERS), len(QUESTIONS), len(names)), np.nan)
+    for finding in findings:
+        values[:, QUESTIONS.index(finding.question), names.index(finding.rung)] = _numbers(finding)
+    variables = {
+        name: (("question", "rung"), array, {"long_name": text, **_units(name)})
+        for (name, text), array in zip(NUMBERS.items(), values, strict=True)
+    }
+    texts = {"question": np.array(QUESTIONS, object), "rung": np.array(names, object)}
+    coordinates = {name: (name, labels, {"long_name": name}) for name, labels in texts.items()}
+    units = ("question", np.array(list(UNITS.values()), object), {"long_name": "unit of errors"})
+    attributes = {
+        "Conventions": "CF-1.11",
+        "title": job.description or job.name,
+        "source": f"cvt_hpc {versions()['cvt_hpc']}, accuracy against cost of the ladder of models",
+        "history": history_line(command()),
+        "job_name": job.name,
+        "job": json.dumps(job.resolved()),
+        "rungs": json.dumps({rung.name: rung.job.resolved() for rung in rungs}),
+        "versions": json.dumps(versions()),
+        "machine": json.dumps(machine()),
+        "git_revision": git_revision(),
+    }
+    return xr.Dataset({"error_unit": units, **variables}, coordinates, attributes)
+
+
+def _numbers(finding: Finding) -> tuple[float, ...]:
+    """Values of NUMBERS, in their order."""
+    return (*finding.score, finding.own, finding.core_seconds)
+
+
+def _units(name: str) -> dict[str, str]:
+    if name in ("error_median", "error_95", "reference_error"):
+        return {"comment": "in the unit error_unit"}
+    return {"units": "s" if name == "core_seconds" else "1"}
+
+
+def _cells(finding: Finding) -> list[str]:
+    s = finding.score
+    more = str(s.additional) if finding.question == "onset" else ""
+    return [str(s.cells), *map(short, s[1:5]), more, short(finding.core_seconds)]

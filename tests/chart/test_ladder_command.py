@@ -1,0 +1,125 @@
+"""The ladder of a small job, from the command line: its rungs, their runs, the files it leaves, and its errors."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from cvt_hpc.chart.ladder_rungs import ladder
+from cvt_hpc.cli import main
+from cvt_hpc.job import load_job
+
+JOB = """name = "small"
+model = "elastic_belt"
+[axes]
+friction_gradient = [-1.0]
+load = [100, 110]
+[mesh]
+stations = 48
+[run]
+duration = "0.1 s"
+"""
+
+
+@pytest.fixture
+def job(tmp_path):
+    path = tmp_path / "job.toml"
+    path.write_text(JOB)
+    return path
+
+
+def test_each_rung_does_the_same_runs_as_far_as_it_knows_them(job):
+    rungs, refusals = ladder(load_job(job))
+    jobs = {rung.name: rung.job for rung in rungs}
+    assert refusals == {}
+    assert list(jobs) == [
+        "criterion", "strand", "steady_variator", "linear_stability", "coarse", "auto", "elastic_belt", "reference",
+    ]  # fmt: skip
+    axes = {name: [axis.name for axis in each.axes] for name, each in jobs.items()}
+    assert axes.pop("criterion") == ["friction_gradient"] and axes.pop("strand") == ["load"]
+    assert all(names == ["friction_gradient", "load"] for names in axes.values())
+    assert [jobs[name].parameters["question"] for name in ("coarse", "auto")] == ["forces", "occurrence"]
+    assert jobs["linear_stability"].parameters["stations"] == 48
+    own, reference = jobs["elastic_belt"].parameters, jobs["reference"].parameters
+    changed = {key: reference[key] / own[key] for key in own if reference[key] != own[key]}
+    assert changed == pytest.approx({"stations": 1.5, "step": 1 / 1.5, "duration": 2.0})
+
+
+def test_a_rung_that_refuses_the_job_is_named(job):
+    rungs, refusals = ladder(load_job(job, ["friction_memory=0"]))
+    assert "linear_stability" not in [rung.name for rung in rungs]
+    assert list(refusals) == ["linear_stability"] and "friction_memory" in refusals["linear_stability"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["load=100"], "[axes]: expected load among the axes, for its onsets, found friction_gradient"),
+        (["model=auto"], "model: expected elastic_belt, the top of the ladder, found auto"),
+        (["stepper=explicit"], "stepper: expected imex, as all transients below have it, found explicit"),
+        (
+            ["load_history=ramp"],
+            "[scene] load_history: expected constant, as the lower rungs have it, found ramp",
+        ),
+    ],
+)
+def test_jobs_without_a_ladder_are_refused(job, options, message, capsys):
+    out = job.parent / "out"
+    settings = [word for option in options for word in ("--set", option)]
+    assert main(["ladder", str(job), "--out", str(out), *settings]) == 2
+    assert capsys.readouterr().err == f"cvt-hpc: {job}: {message}\n"
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        (
+            "[mesh]\nstations = 48",
+            "stations = [48, 64]",
+            "[axes] stations: expected one value, which the reference refines, found an axis",
+        ),
+        (
+            "load = [100, 110]",
+            'load = { from = 100, to = 110, step = 1 }\n[design]\nkind = "trace"',
+            "[design]: expected none: a ladder goes over the whole grid, found trace",
+        ),
+    ],
+)
+def test_what_a_ladder_cannot_go_over_is_refused(job, before, after, message, capsys):
+    job.write_text(JOB.replace(before, after))
+    assert main(["ladder", str(job), "--out", str(job.parent / "out")]) == 2
+    assert capsys.readouterr().err == f"cvt-hpc: {job}: {message}\n"
+
+
+def test_a_ladder_leaves_its_studies_and_what_they_say(job, capsys):
+    out = job.parent / "out"
+    assert main(["ladder", str(job), "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert printed.splitlines()[-3:] == [
+        f"table: {out / 'ladder.csv'}",
+        f"dataset: {out / 'ladder.nc'}",
+        f"picture: {out / 'ladder.png'}",
+    ]
+    rows = list(csv.DictReader((out / "ladder.csv").open()))
+    answers = {(row["question"], row["rung"]): row for row in rows}
+    assert len(answers) == len(rows) == 5 + 4 + 4 + 2 + 4
+    assert {rung for question, rung in answers if question == "amplitude"} == {"coarse", "elastic_belt"}
+    forces = [answers["forces", rung]["error_median"] for rung in ("steady_variator", "linear_stability")]
+    assert forces[0] == forces[1] != ""  # of one steady state
+    assert (out / "ladder.png").stat().st_size > 10_000
+    with xr.open_dataset(out / "ladder.nc", decode_times=False) as dataset:
+        cost = dataset["core_seconds"].sel(question="forces", rung="coarse").item()
+        assert cost == pytest.approx(float(answers["forces", "coarse"]["core_seconds"]), rel=5e-3)  # 3 digits
+        assert np.isnan(dataset["cells"].sel(question="amplitude", rung="strand"))
+        assert json.loads(dataset.attrs["rungs"])["reference"]["mesh"]["stations"] == 72
+    with xr.open_dataset(out / "strand" / "results.nc", decode_times=False) as dataset:
+        assert dataset["status"].dims == ("load",)
+    records = sum(path.stat().st_size for path in out.glob("*/records/*"))
+    assert main(["ladder", str(job), "--out", str(out)]) == 0  # nothing is done twice
+    assert capsys.readouterr().out == printed
+    assert sum(path.stat().st_size for path in out.glob("*/records/*")) == records
+    assert main(["ladder", str(job), "--out", str(out), "--set", "thrust=45 kN"]) == 2
+    assert "expected the folder of this job" in capsys.readouterr().err

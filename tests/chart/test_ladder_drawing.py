@@ -1,0 +1,57 @@
+"""The picture of a ladder: every answer at its error and its cost."""
+
+import math
+
+import matplotlib
+import pytest
+
+from cvt_hpc.analysis.figures import STYLE
+from cvt_hpc.chart.ladder_comparing import Finding, Score
+from cvt_hpc.chart.ladder_drawing import ladder_figure
+
+FINDINGS = [
+    Finding("occurrence", "cheap", Score(10, wrong=0.3, undecided=0.2), 0.1, 0.01),
+    Finding("occurrence", "dear", Score(10, wrong=0.0, undecided=0.0), 0.1, 1.0),
+    Finding("onset", "dear", Score(4, 5.0, 10.0, undecided=0.0), 5.0, 1.0),
+    Finding("frequency", "cheap", Score(0, undecided=1.0), math.nan, 0.01),
+    Finding("amplitude", "dear", Score(5, 0.0, 0.05, undecided=0.0), 0.0, 1.0),
+    Finding("forces", "cheap", Score(10, 0.01, 0.02, undecided=0.0), 0.002, 0.01),
+]
+
+
+@pytest.fixture(scope="module")
+def panels():
+    with matplotlib.rc_context(STYLE):
+        return ladder_figure(FINDINGS, "x").axes
+
+
+def drawn(axes, gid):
+    return [tuple(zip(*line.get_data(), strict=True)) for line in axes.lines if line.get_gid() == gid]
+
+
+def test_answers_stand_at_their_error_and_their_cost(panels):
+    assert drawn(panels[0], "cheap") == [((30.0, 0.01),)] and drawn(panels[0], "dear") == [((0.0, 1.0),)]
+    assert drawn(panels[0], "span")[0] == ((30.0, 0.01), (50.0, 0.01))  # with what is undecided
+    assert drawn(panels[1], "dear") == [((5.0, 1.0),)] and drawn(panels[1], "cheap") == []
+    assert drawn(panels[1], "span") == [((5.0, 1.0), (10.0, 1.0))]
+    assert drawn(panels[4], "cheap") == [((1.0, 0.01),)]
+
+
+def test_errors_of_zero_are_seen(panels):
+    left, _ = panels[0].get_xlim()
+    assert panels[0].get_xscale() == "linear" and left < 0.0
+    ((error, _),) = drawn(panels[3], "dear")[0]
+    assert panels[3].get_xscale() == "log" and error == panels[3].get_xlim()[0]
+
+
+def test_the_reference_is_hatched_as_far_as_it_is_not_known(panels):
+    ends = [
+        [p.get_x() + p.get_width() for p in axes.patches if p.get_gid() == "reference"] for axes in panels
+    ]
+    assert ends[0] == [pytest.approx(10.0)] and ends[1] == [5.0] and ends[4] == [pytest.approx(0.2)]
+    assert ends[2] == ends[3] == []
+
+
+def test_every_rung_is_in_the_legend_once(panels):
+    texts = [text.get_text() for text in panels[-1].get_legend().get_texts()]
+    assert texts[:2] == ["cheap", "dear"] and len(texts) == 4
