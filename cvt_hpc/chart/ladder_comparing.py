@@ -62,9 +62,7 @@ class Finding(NamedTuple):
     question, rung : str
         What was asked, and who answered.
     score : Score
-        How well.
-    own : float
-        Estimated error of the reference itself, in the measure of the score.
+        How well; of the reference its estimated error.
     core_seconds : float
         Of a run of the rung, mean [s].
     """
@@ -72,15 +70,14 @@ class Finding(NamedTuple):
     question: str
     rung: str
     score: Score
-    own: float
     core_seconds: float
 
 
 def compare(rungs: Sequence[Rung], results: Mapping[str, xr.Dataset]) -> Iterator[Finding]:
-    """Yield what each rung makes of each question that it answers.
+    """Yield what each rung makes of each question that it answers, the reference last.
 
-    The reference's own error is taken as large as the distance of the full run from it: that would be 0.8 of
-    it if all errors were of second order in mesh and step, and twice that much if of the first. No onset is
+    The reference's own error is taken as large as the distance of the full run from it: it would be 0.8 of
+    that if all errors were of second order in mesh and step, and twice as much if of the first. No onset is
     known more closely than half a step of the load.
 
     Parameters
@@ -91,18 +88,22 @@ def compare(rungs: Sequence[Rung], results: Mapping[str, xr.Dataset]) -> Iterato
         Results of each rung, by its name.
     """
     reference = results[REFERENCE]
-    loads = np.sort(reference["load"].values)
-    spacing = float(np.diff(loads).max(initial=0.0))
+    costs = {name: float(dataset["core_seconds"].mean()) for name, dataset in results.items()}
     for question, score in SCORES.items():
-        full = score(_beside(results[MODEL], reference), reference)
-        own = full.wrong if question == "occurrence" else full.median
-        if question == "onset":
-            own = float(np.fmax(own, 0.5 * spacing))
         for rung in rungs:
             if question in rung.answers:
-                dataset = results[rung.name]
-                cost = float(dataset["core_seconds"].mean())
-                yield Finding(question, rung.name, score(_beside(dataset, reference), reference), own, cost)
+                found = score(_beside(results[rung.name], reference), reference)
+                yield Finding(question, rung.name, found, costs[rung.name])
+        full = score(_beside(results[MODEL], reference), reference)
+        yield Finding(question, REFERENCE, _own(question, full, reference), costs[REFERENCE])
+
+
+def _own(question: str, full: Score, reference: xr.Dataset) -> Score:
+    """Estimated error of the reference, by the score of the full run."""
+    if question == "onset":
+        spacing = np.diff(np.sort(reference["load"].values)).max(initial=0.0)
+        return Score(full.cells, median=float(np.fmax(full.median, 0.5 * spacing)))
+    return Score(full.cells, median=full.median, wrong=full.wrong)
 
 
 def _beside(dataset: xr.Dataset, reference: xr.Dataset) -> xr.Dataset:

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 from cvt_hpc.analysis.figures import WIDTH, draw
 from cvt_hpc.chart.figure_parts import line_style, set_error_axis
 from cvt_hpc.chart.ladder_comparing import Finding
-from cvt_hpc.chart.ladder_rungs import QUESTIONS
+from cvt_hpc.chart.ladder_rungs import QUESTIONS, REFERENCE
 
 HEIGHT = 7.2  # [inch]
 ROOM = 1.15  # length of a linear axis over its largest error
@@ -66,15 +66,16 @@ def ladder_figure(findings: Sequence[Finding], name: str) -> Figure:
 def _draw_panel(axes: Axes, question: str, findings: Sequence[Finding], styles: dict[str, dict]) -> None:
     title, label, factor = PANELS[question]
     spans = {finding: [factor * error for error in _span(finding)] for finding in findings}
-    errors = [error for span in (*spans.values(), [factor * findings[0].own]) for error in span]
-    left = _scale(axes, question, [error for error in errors if math.isfinite(error)])
+    left = _scale(
+        axes, question, [error for span in spans.values() for error in span if math.isfinite(error)]
+    )
     for finding, (low, high) in spans.items():
         style = styles[finding.rung]
         low = max(low, left)  # on a logarithmic axis an error of 0 stands at its end
         axes.plot([low, high], [finding.core_seconds] * 2, color=style["color"], lw=1.0, gid="span")
         axes.plot(low, finding.core_seconds, **style, gid=finding.rung, clip_on=False)
-    if factor * findings[0].own > left:
-        axes.axvspan(left, factor * findings[0].own, **HATCHED, zorder=0, gid="reference")
+        if finding.rung == REFERENCE and low > left:
+            axes.axvspan(left, low, **HATCHED, zorder=0, gid="hatched")
     axes.set_title(f"{question}: {title}", loc="left", pad=3)
     axes.set_xlabel(label)
     axes.grid(which="major", color="#e4e4e4", lw=0.6)

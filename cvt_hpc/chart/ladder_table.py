@@ -25,7 +25,6 @@ NUMBERS = {
     "wrong_share": "share of cells that are quiet here and vibrate in the reference, or the other way round",
     "undecided_share": "share of cells, or of the reference's onsets, of which the rung says nothing",
     "additional": "onsets that the reference does not have",
-    "reference_error": "estimated error of the reference",
     "core_seconds": "processor time of a run, mean",
 }
 
@@ -46,7 +45,7 @@ def ladder_lines(findings: Sequence[Finding]) -> Iterator[str]:
     for question in QUESTIONS:
         found = [finding for finding in findings if finding.question == question]
         unit = "" if UNITS[question] == "1" else f" [{UNITS[question]}]"
-        yield f"{question}: error{unit}; of the reference {short(found[0].own) or 'not known'}"
+        yield f"{question}: error{unit}; that of the reference is estimated"
         yield from columns([heads, *([f.rung, *_cells(f), ""] for f in found)])
 
 
@@ -90,11 +89,11 @@ def ladder_dataset(job: Job, rungs: Sequence[Rung], findings: Sequence[Finding])
 
 def _numbers(finding: Finding) -> tuple[float, ...]:
     """Values of NUMBERS, in their order."""
-    return (*finding.score, finding.own, finding.core_seconds)
+    return (*finding.score, finding.core_seconds)
 
 
 def _units(name: str) -> dict[str, str]:
-    if name in ("error_median", "error_95", "reference_error"):
+    if name in ("error_median", "error_95"):
         return {"comment": "in the unit error_unit"}
     return {"units": "s" if name == "core_seconds" else "1"}
 

@@ -105,8 +105,10 @@ def test_a_ladder_leaves_its_studies_and_what_they_say(job, capsys):
     ]
     rows = list(csv.DictReader((out / "ladder.csv").open()))
     answers = {(row["question"], row["rung"]): row for row in rows}
-    assert len(answers) == len(rows) == 5 + 4 + 4 + 2 + 4
-    assert {rung for question, rung in answers if question == "amplitude"} == {"coarse", "elastic_belt"}
+    assert len(answers) == len(rows) == 6 + 5 + 5 + 3 + 5
+    assert {rung for question, rung in answers if question == "amplitude"} == {
+        "coarse", "elastic_belt", "reference",
+    }  # fmt: skip
     forces = [answers["forces", rung]["error_median"] for rung in ("steady_variator", "linear_stability")]
     assert forces[0] == forces[1] != ""  # of one steady state
     assert (out / "ladder.png").stat().st_size > 10_000

@@ -1,7 +1,5 @@
 """The picture of a ladder: every answer at its error and its cost."""
 
-import math
-
 import matplotlib
 import pytest
 
@@ -10,12 +8,17 @@ from cvt_hpc.chart.ladder_comparing import Finding, Score
 from cvt_hpc.chart.ladder_drawing import ladder_figure
 
 FINDINGS = [
-    Finding("occurrence", "cheap", Score(10, wrong=0.3, undecided=0.2), 0.1, 0.01),
-    Finding("occurrence", "dear", Score(10, wrong=0.0, undecided=0.0), 0.1, 1.0),
-    Finding("onset", "dear", Score(4, 5.0, 10.0, undecided=0.0), 5.0, 1.0),
-    Finding("frequency", "cheap", Score(0, undecided=1.0), math.nan, 0.01),
-    Finding("amplitude", "dear", Score(5, 0.0, 0.05, undecided=0.0), 0.0, 1.0),
-    Finding("forces", "cheap", Score(10, 0.01, 0.02, undecided=0.0), 0.002, 0.01),
+    Finding("occurrence", "cheap", Score(10, wrong=0.3, undecided=0.2), 0.01),
+    Finding("occurrence", "dear", Score(10, wrong=0.0, undecided=0.0), 1.0),
+    Finding("occurrence", "reference", Score(10, wrong=0.1), 2.0),
+    Finding("onset", "dear", Score(4, 5.0, 10.0, undecided=0.0), 1.0),
+    Finding("onset", "reference", Score(4, 5.0), 2.0),
+    Finding("frequency", "cheap", Score(0, undecided=1.0), 0.01),
+    Finding("frequency", "reference", Score(0), 2.0),
+    Finding("amplitude", "dear", Score(5, 0.0, 0.05, undecided=0.0), 1.0),
+    Finding("amplitude", "reference", Score(5, 0.0), 2.0),
+    Finding("forces", "cheap", Score(10, 0.01, 0.02, undecided=0.0), 0.01),
+    Finding("forces", "reference", Score(10, 0.002), 2.0),
 ]
 
 
@@ -32,8 +35,9 @@ def drawn(axes, gid):
 def test_answers_stand_at_their_error_and_their_cost(panels):
     assert drawn(panels[0], "cheap") == [((30.0, 0.01),)] and drawn(panels[0], "dear") == [((0.0, 1.0),)]
     assert drawn(panels[0], "span")[0] == ((30.0, 0.01), (50.0, 0.01))  # with what is undecided
+    assert drawn(panels[0], "reference") == [((10.0, 2.0),)]
     assert drawn(panels[1], "dear") == [((5.0, 1.0),)] and drawn(panels[1], "cheap") == []
-    assert drawn(panels[1], "span") == [((5.0, 1.0), (10.0, 1.0))]
+    assert drawn(panels[1], "span")[0] == ((5.0, 1.0), (10.0, 1.0))
     assert drawn(panels[4], "cheap") == [((1.0, 0.01),)]
 
 
@@ -45,13 +49,11 @@ def test_errors_of_zero_are_seen(panels):
 
 
 def test_the_reference_is_hatched_as_far_as_it_is_not_known(panels):
-    ends = [
-        [p.get_x() + p.get_width() for p in axes.patches if p.get_gid() == "reference"] for axes in panels
-    ]
+    ends = [[p.get_x() + p.get_width() for p in axes.patches if p.get_gid() == "hatched"] for axes in panels]
     assert ends[0] == [pytest.approx(10.0)] and ends[1] == [5.0] and ends[4] == [pytest.approx(0.2)]
     assert ends[2] == ends[3] == []
 
 
 def test_every_rung_is_in_the_legend_once(panels):
     texts = [text.get_text() for text in panels[-1].get_legend().get_texts()]
-    assert texts[:2] == ["cheap", "dear"] and len(texts) == 4
+    assert texts[:3] == ["cheap", "dear", "reference"] and len(texts) == 5
