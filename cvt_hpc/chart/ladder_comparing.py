@@ -43,7 +43,7 @@ class Score(NamedTuple):
         Share of the reference's cells that the rung leaves undecided, fails at or does not speak of; of
         onsets the share of those that it misses.
     additional : int
-        Onsets that the reference does not have.
+        Onsets that the reference does not have, though it decides below and above them.
     """
 
     cells: int
@@ -131,7 +131,9 @@ def _onset(found: xr.Dataset, true: xr.Dataset) -> Score:
     errors: list[float] = []
     missed = additional = 0
     for one, other in zip(*lines, strict=True):
-        pairs, less, more = paired_errors(onsets(loads, one), onsets(loads, other))
+        decided = loads[np.isfinite(other)]
+        known = (decided.min(initial=np.inf), decided.max(initial=-np.inf))
+        pairs, less, more = paired_errors(onsets(loads, one), onsets(loads, other), known)
         errors, missed, additional = errors + pairs, missed + less, additional + more
     number = len(errors) + missed
     score = _score(np.array(errors), number)

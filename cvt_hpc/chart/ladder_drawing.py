@@ -47,8 +47,11 @@ def draw_ladder(findings: Sequence[Finding], name: str, out: Path) -> Path:
 
 def ladder_figure(findings: Sequence[Finding], name: str) -> Figure:
     """Compose the picture of `draw_ladder`; to be called within STYLE."""
-    rungs = sorted({f.rung: f.core_seconds for f in findings}.items(), key=lambda rung: rung[1])
-    styles = {rung: {**line_style(k), "ls": "", "ms": 6.5} for k, (rung, _) in enumerate(rungs)}
+    costs = {f.rung: f.core_seconds for f in findings if f.rung != REFERENCE}
+    styles = {
+        rung: {**line_style(k), "ls": "", "ms": 6.5} for k, rung in enumerate(sorted(costs, key=costs.get))
+    }
+    styles[REFERENCE] = {"color": "black", "marker": "*", "ls": "", "ms": 8}
     figure = Figure((WIDTH, HEIGHT), layout="constrained")
     figure.suptitle(f"{name}: error of each rung against its cost, lower left is better")
     panels = figure.subplots(3, 2, sharey=True).flat

@@ -39,19 +39,31 @@ def onsets(loads: Array, level: Array) -> list[Onset]:
     ]
 
 
-def paired_errors(found: Sequence[Onset], true: Sequence[Onset]) -> tuple[list[float], int, int]:
+def paired_errors(
+    found: Sequence[Onset], true: Sequence[Onset], known: tuple[float, float]
+) -> tuple[list[float], int, int]:
     """Pair the onsets of a line with the true ones of the same direction, at the least distance in all.
+
+    Parameters
+    ----------
+    found, true : sequence of Onset
+        Of one line.
+    known : (float, float)
+        Between which loads [N m] the truth is known: beyond, nobody can tell whether there is an onset.
 
     Returns
     -------
     errors : list of float
         Distances of the pairs [N m].
     missed, additional : int
-        True ones without a partner, and found ones.
+        True ones without a partner, and found ones between the known loads.
     """
     errors: list[float] = []
+    additional = 0
     for rising in (False, True):
         one, other = ([o.load for o in each if o.rising is rising] for each in (found, true))
         distance = np.abs(np.subtract.outer(one, other))
-        errors += distance[linear_sum_assignment(distance)].tolist() if distance.size else []
-    return errors, len(true) - len(errors), len(found) - len(errors)
+        rows, columns = linear_sum_assignment(distance)
+        errors += distance[rows, columns].tolist()
+        additional += sum(known[0] < load < known[1] for load in np.delete(one, rows))
+    return errors, len(true) - len(errors), additional

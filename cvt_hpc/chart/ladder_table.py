@@ -24,7 +24,7 @@ NUMBERS = {
     "error_95": "error that 95 % of the cells keep",
     "wrong_share": "share of cells that are quiet here and vibrate in the reference, or the other way round",
     "undecided_share": "share of cells, or of the reference's onsets, of which the rung says nothing",
-    "additional": "onsets that the reference does not have",
+    "additional": "onsets that the reference does not have, though it decides below and above them",
     "core_seconds": "processor time of a run, mean",
 }
 

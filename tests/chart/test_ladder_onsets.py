@@ -28,12 +28,22 @@ def test_onsets_lie_where_the_level_changes_its_sign(level, expected):
 
 
 def test_onsets_are_paired_by_direction_at_the_least_distance_in_all():
+    known = (20.0, 200.0)
     true = [Onset(40.0, True), Onset(90.0, False), Onset(120.0, True), Onset(150.0, False)]
     found = [Onset(50.0, True), Onset(145.0, False)]
-    errors, missed, additional = paired_errors(found, true)
+    errors, missed, additional = paired_errors(found, true, known)
     assert sorted(errors) == [5.0, 10.0] and (missed, additional) == (2, 0)
-    assert paired_errors(true, found)[1:] == (0, 2)
-    # the pair at 35 and 45 leaves 80 over, though 80 is nearer to 45 than nothing
-    errors, missed, additional = paired_errors([Onset(35.0, True), Onset(80.0, True)], [Onset(45.0, True)])
+    assert paired_errors(true, found, known)[1:] == (0, 2)
+    errors, missed, additional = paired_errors(
+        [Onset(80.0, True), Onset(35.0, True)], [Onset(45.0, True)], known
+    )
     assert (errors, missed, additional) == ([10.0], 0, 1)
-    assert paired_errors([Onset(40.0, False)], [Onset(40.0, True)]) == ([], 1, 1)
+    assert paired_errors([Onset(40.0, False)], [Onset(40.0, True)], known) == ([], 1, 1)
+
+
+def test_an_onset_where_the_truth_is_not_known_is_not_additional():
+    found, true = [Onset(85.0, True), Onset(185.0, False)], [Onset(80.0, True)]
+    assert paired_errors(found, true, (20.0, 185.0)) == ([5.0], 0, 0)  # at the end it may lie beyond
+    assert paired_errors(found, true, (20.0, 190.0)) == ([5.0], 0, 1)
+    # but it is a partner, if there is one
+    assert paired_errors([Onset(95.0, True)], true, (20.0, 90.0)) == ([15.0], 0, 0)
