@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
+from cf import cf_findings
 
 from cvt_hpc.chart.ladder_rungs import ladder
 from cvt_hpc.cli import main
@@ -111,6 +112,7 @@ def test_a_ladder_leaves_its_studies_and_what_they_say(job, capsys):
     }  # fmt: skip
     forces = [answers["forces", rung]["error_median"] for rung in ("steady_variator", "linear_stability")]
     assert forces[0] == forces[1] != ""  # of one steady state
+    assert cf_findings(out / "ladder.nc") == []
     assert (out / "ladder.png").stat().st_size > 10_000
     with xr.open_dataset(out / "ladder.nc", decode_times=False) as dataset:
         cost = dataset["core_seconds"].sel(question="forces", rung="coarse").item()
