@@ -119,6 +119,8 @@ def test_a_ladder_leaves_its_studies_and_what_they_say(job, capsys):
         assert cost == pytest.approx(float(answers["forces", "coarse"]["core_seconds"]), rel=5e-3)  # 3 digits
         assert np.isnan(dataset["cells"].sel(question="amplitude", rung="strand"))
         assert json.loads(dataset.attrs["rungs"])["reference"]["mesh"]["stations"] == 72
+    with xr.open_dataset(out / "coarse" / "results.nc", decode_times=False) as dataset:
+        assert cost == dataset["core_seconds"].mean()
     with xr.open_dataset(out / "strand" / "results.nc", decode_times=False) as dataset:
         assert dataset["status"].dims == ("load",)
     records = sum(path.stat().st_size for path in out.glob("*/records/*"))
