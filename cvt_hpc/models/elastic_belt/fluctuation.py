@@ -20,10 +20,13 @@ each equation of motion (`rhs.py`) times the fluctuation of its own speed, u = w
 Stresses within a belt whose elements touch throughout hand power on, and sum up to 0. Where gaps open and
 close they feed: the mean push works in the mean opening, and elements that the mean motion has drawn apart
 close with a blow. What is carried goes to the mean motion: its speed V works against the force along the path
-<h' w_s'> that the vibration exerts, the pulleys against the changing moment of <f_t' w'>.
+<h' w_s'> that the vibration exerts, the pulleys against the changing moment of <f_t' w'>. Flanks less carried
+is what friction does to u and v_0 at a fixed place, as `linear_stability` counts it; an error in the flanks'
+part alone would not open the sum.
 
 The remainder is what the numerics do (upwinding, backward Euler, work of dampers that samples do not meet),
-what the vibration gains while it grows, and bending. A trend of the mean state would count as fluctuation.
+what the vibration gains while it grows, and bending. Fluctuations of all frequencies count, judder and
+hum of gaps too, and a trend of the mean state would: under a ramp of load nothing is known.
 """
 
 from __future__ import annotations
@@ -111,17 +114,21 @@ def fluctuation(means: dict[str, np.ndarray], grid: Mesh, parameters: dict[str, 
     own = own + m["element_power"] - m["element_force"] * m["element_speed"]
     opening, stretching = _step(m["element_speed"]), _step(m["ring_speed"])
     mean_stresses = m["push_force"] * opening - m["ring_tension"] * stretching - _lifting(m, grid, p)
-    if p["load_history"] == "ramp":
-        flanks = np.full_like(flanks, np.nan)
     mean_rings = p["ring_damping"] * (stretching**2 / grid.cell).sum()
-    return Fluctuation(
+    powers = (
         dual * flanks,
         dual * belt,
         m["saddle_friction"] * m["saddle_speed"] - m["saddle_power"],
         dual * (own - flanks - belt),
         m["stress_power"] - mean_stresses,
-        float(mean_rings - m["push_damping"] @ opening),
+        mean_rings - m["push_damping"] @ opening,
     )
+    return Fluctuation(*(_steadiness(p) * power for power in powers))
+
+
+def _steadiness(parameters: dict[str, Any]) -> float:
+    """1, or not a number under a ramp of load: its trend would count as a fluctuation."""
+    return np.nan if parameters["load_history"] == "ramp" else 1.0
 
 
 def _lifting(m: dict[str, np.ndarray], grid: Mesh, p: dict[str, Any]) -> np.ndarray:
@@ -171,11 +178,12 @@ def record(run: RecordedRun) -> dict[str, Any]:
     p, judged, found = run.parameters, run.judged, run.fluctuation
     shares, dual = part_shares(run.mesh), 0.5 * (run.mesh.cell + np.roll(run.mesh.cell, 1))
     fed = {"flank_fed": shares @ found.flanks, "stress_fed": found.stresses.sum()}
+    lag = run.channel("axial_force driven")[judged].var() / (p["sheave_lag"] * p["lag_stiffness"])
     taken = {
         "belt_taken": -found.belt.sum(),
         "ring_taken": -found.rings.sum(),
         "layer_taken": run.channel("layer_loss")[judged].mean() - found.mean_layers,
-        "lag_taken": run.channel("axial_force driven")[judged].var() / (p["sheave_lag"] * p["lag_stiffness"]),
+        "lag_taken": _steadiness(p) * lag,
         "carried_power": -found.carried.sum(),
     }
     remainder = fed["flank_fed"].sum() + fed["stress_fed"] - sum(taken.values())
