@@ -195,9 +195,12 @@ def _map(arguments: argparse.Namespace) -> int:
         units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
         at = read_coordinates(arguments.at, units, str(arguments.path), "--at")
         from cvt_hpc.analysis.maps import draw_map
+        from cvt_hpc.analysis.starts import has_starts, join_starts, start_line
 
-        picture = arguments.out or folder / "map.png"
-        print(f"map: {draw_map(dataset, picture, at, str(arguments.path))}")
+        picture = draw_map(dataset, arguments.out or folder / "map.png", at, str(arguments.path))
+        if has_starts(dataset, at):
+            print(start_line(join_starts(dataset)))
+        print(f"map: {picture}")
     return DONE
 
 

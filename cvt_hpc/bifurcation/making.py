@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from cvt_hpc.bifurcation.asking import Asked, Diagram
 from cvt_hpc.bifurcation.attractors import Attractor, Start, attractors
@@ -95,7 +96,9 @@ def make_diagram(
     """
     followed = []
     for number, asked in enumerate(diagram.branches, 1):
-        followed.append(_follow(diagram, asked))
+        # matrices are small: threads of the linear algebra would wait for each other in loops
+        with threadpool_limits(1):
+            followed.append(_follow(diagram, asked))
         tell(f"branch {number}/{len(diagram.branches)}: {len(followed[-1].onsets)} Hopf points")
     with written_aside(out / "branch.nc", parents=True) as aside:
         write_netcdf(diagram_dataset(diagram, followed), aside)
