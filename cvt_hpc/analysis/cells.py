@@ -157,7 +157,7 @@ def write_values(
 
 
 def class_legend(figure: Figure, *, with_inferred: bool = False, with_starts: bool = False) -> None:
-    """Legend of all classes below the panels: fill, hatching and mark; of two starts, and of inferred cells."""
+    """Legend of all classes below the panels: fill, hatching, mark; of two starts, and of inferred cells."""
     handles, labels = [], []
     for kind, style in (STYLES | OF_STARTS if with_starts else STYLES).items():
         outline = style.ink if style.hatch else "#606060"
@@ -174,7 +174,7 @@ def class_legend(figure: Figure, *, with_inferred: bool = False, with_starts: bo
         handles,
         labels,
         loc="outside lower center",
-        ncols=len(OccurrenceClass),
+        ncols=3 if with_starts else len(OccurrenceClass),  # as wide as the page with the longest label
         frameon=False,
         handler_map={tuple: HandlerTuple(ndivide=1, pad=0)},
         handlelength=2.2,
