@@ -19,9 +19,10 @@ from matplotlib.patches import Patch
 from cvt_hpc.analysis.figures import WIDTH, balanced, draw
 from cvt_hpc.bifurcation.asking import Diagram
 from cvt_hpc.bifurcation.dataset import mode_lines
-from cvt_hpc.bifurcation.table import gap_lines, onset_lines, place_text
+from cvt_hpc.bifurcation.table import gap_lines, place_text
 from cvt_hpc.models.linear_stability.branch import Onset, Point
 from cvt_hpc.vibration.classes import OccurrenceClass
+from cvt_hpc.vibration.criticality import Kind
 
 if TYPE_CHECKING:
     from cvt_hpc.bifurcation.making import Followed
@@ -30,6 +31,11 @@ STRANDS = ("#0072b2", "#d55e00")  # t1 and t2
 HOPF, GAP = "#c00000", "#e6e6e6"
 STARTS = (("o", "#000000", "from the steady state"), ("D", "#009e73", "from the large start"))
 MARK = 4.5  # [point]
+KINDS = {
+    Kind.SUPERCRITICAL: {"marker": "s", "markersize": 7},
+    Kind.SUBCRITICAL: {"marker": "s", "markersize": 7, "markerfacecolor": "white", "markeredgewidth": 1.5},
+    Kind.UNDECIDED: {"marker": "x", "markersize": 7, "markeredgewidth": 1.5},
+}
 
 
 def draw_branch(diagram: Diagram, followed: Followed, out: Path) -> Path:
@@ -52,8 +58,8 @@ def branch_figure(diagram: Diagram, followed: Followed) -> Figure:
         axes.set_xlim(loads[0], loads[-1])
     lower.set_xlabel("load [N m]")
     lines = [f"Steady states along the load: {diagram.job.name}", place_text(diagram, followed.asked.place)]
-    lines += [*onset_lines(followed), *gap_lines(followed)]
-    figure.suptitle("\n".join(balanced(line, 90) for line in lines if line), fontsize=9)
+    lines += gap_lines(followed)
+    figure.suptitle("\n".join(balanced(line, 90) for line in lines if line), fontsize=10)
     figure.legend(handles=_legend(followed), loc="outside lower center", ncols=3, frameon=False)
     return figure
 
@@ -100,8 +106,8 @@ def _draw_attractors(axes: Axes, followed: Followed) -> None:
                 markerfacecolor=fill,
                 zorder=3 + start,
             )
-    places = [onset.load for onset in followed.onsets]
-    axes.plot(places, np.zeros(len(places)), "s", color=HOPF, markersize=7, clip_on=False, zorder=5)
+    for onset, kind in zip(followed.onsets, followed.kinds, strict=True):
+        axes.plot(onset.load, 0.0, color=HOPF, clip_on=False, zorder=6, **KINDS[kind.kind])
     axes.set_ylabel("amplitude [µm]")
     axes.set_ylim(bottom=0.0)
 
@@ -143,7 +149,10 @@ def _legend(followed: Followed) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [
         Line2D([], [], color="black", linewidth=1.8, label="steady state, stable"),
         Line2D([], [], color="black", linewidth=1.8, linestyle=(0, (4, 3)), label="unstable"),
-        Line2D([], [], color=HOPF, marker="s", linestyle="", label="Hopf point"),
+    ]
+    handles += [
+        Line2D([], [], color=HOPF, linestyle="", label=f"Hopf point, {kind.name.lower()}", **KINDS[kind])
+        for kind in sorted({one.kind for one in followed.kinds})
     ]
     if followed.runs:
         handles += [

@@ -24,6 +24,7 @@ from cvt_hpc.netcdf import write_netcdf
 from cvt_hpc.vibration.criticality import Criticality, Kind, criticality
 
 AGREEMENT = 5.0  # [N m]: how far runs from near the steady state may turn quiet from the Hopf point
+SEEN = 2.0 / 3.0  # of the lowest frequency that is judged: limit cycles settle at up to half as much again
 
 
 class Followed(NamedTuple):
@@ -123,7 +124,7 @@ def _follow(diagram: Diagram, asked: Asked) -> Followed:
         starts = (Start(small, partial(_steady_state, belt, found)), Start(large))
         places = [onset.load for onset in hopf]
         runs = attractors(asked.runs, "load", starts, diagram.loads, places, diagram.resolution)
-    kinds = [_kind(hopf, k, runs) for k in range(len(hopf))]
+    kinds = [_kind(onset, hopf, runs, SEEN * p["band_low"]) for onset in hopf]
     return Followed(asked, grid, found, hopf, hidden, runs, kinds)
 
 
@@ -147,15 +148,15 @@ def _beside_gap(found: Branch, load: float) -> bool:
     return any(float(one) in found.missed for one in beside)
 
 
-def _kind(hopf: list[Onset], place: int, runs: list[Attractor]) -> Criticality:
-    """Whether a Hopf point is super- or subcritical."""
+def _kind(onset: Onset, hopf: list[Onset], runs: list[Attractor], lowest: float) -> Criticality:
+    """Whether a Hopf point is super- or subcritical, of one whose mode is within what runs are judged by."""
     if not runs:
         return Criticality(Kind.UNDECIDED, np.nan, np.nan, "no runs were asked for")
+    if onset.mode.frequency < lowest:
+        return Criticality(Kind.UNDECIDED, np.nan, np.nan, "its mode lies below the band of runs")
     loads = sorted({run.value for run in runs})
-    small, large = ([int(run.occurrence) for run in sorted(runs) if run.start == start] for start in (0, 1))
-    neighbours = [onset.load for onset in hopf]
-    ends = [-np.inf, *neighbours, np.inf]
-    onset = hopf[place]
+    small, large = ([int(run.occurrence) for run in runs if run.start == start] for start in (0, 1))
+    others = [one.load for one in hopf if one.mode.frequency >= lowest and one is not onset]
     return criticality(
         onset.load,
         not onset.rising,
@@ -163,5 +164,8 @@ def _kind(hopf: list[Onset], place: int, runs: list[Attractor]) -> Criticality:
         small,
         large,
         agreement=AGREEMENT,
-        limits=(ends[place], ends[place + 2]),
+        limits=(
+            max((load for load in others if load <= onset.load), default=-np.inf),
+            min((load for load in others if load > onset.load), default=np.inf),
+        ),
     )

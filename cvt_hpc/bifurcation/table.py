@@ -58,7 +58,7 @@ def kind_text(kind: Criticality) -> str:
         return f"subcritical, hysteresis {size}"
     if kind.kind is Kind.SUPERCRITICAL:
         return f"supercritical within {abs(kind.width) + kind.error:.1f} N m"
-    return f"super- or subcritical undecided: {kind.reason}"
+    return f"undecided whether subcritical, {kind.reason}"
 
 
 def gap_lines(followed: Followed) -> Iterator[str]:
