@@ -118,13 +118,14 @@ def _follow(diagram: Diagram, asked: Asked) -> Followed:
     found = branch(belt, grid, diagram.loads, band)
     hopf, hidden = onsets(belt, grid, found, band)
     runs: list[Attractor] = []
+    lowest = SEEN * p["band_low"]
     if diagram.disturbance:
         small, large = ({"disturbance": size} for size in diagram.disturbance)
         # the load that rises within tens of milliseconds is itself a large disturbance
         starts = (Start(small, partial(_steady_state, belt, found)), Start(large))
-        places = [onset.load for onset in hopf]
+        places = [onset.load for onset in hopf if onset.mode.frequency >= lowest]
         runs = attractors(asked.runs, "load", starts, diagram.loads, places, diagram.resolution)
-    kinds = [_kind(onset, hopf, runs, SEEN * p["band_low"]) for onset in hopf]
+    kinds = [_kind(onset, hopf, runs, lowest) for onset in hopf]
     return Followed(asked, grid, found, hopf, hidden, runs, kinds)
 
 

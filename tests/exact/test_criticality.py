@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from rungs import rung_job, rung_record
+from small_systems import VERASZTO_STEPAN
 
 from cvt_hpc.bifurcation.attractors import Attractor, Start, attractors, close_values
 from cvt_hpc.models.oscillator.constants import oscillator
@@ -22,17 +23,7 @@ OF_RUNS = {
     "window_length": 0.4,
     "amplitude_threshold": 5e-5,
 }
-# Veraszto and Stepan 2017, see jobs/bistable_oscillator.toml
-EXPONENTIAL = OF_RUNS | {
-    "friction_law": "stribeck",
-    "friction_gradient": -40.0,
-    "kinetic_friction": 2.0,
-    "stribeck_velocity": 0.1,
-    "mass": 0.538,
-    "stiffness": 6957.0,
-    "damping": 5.946,
-    "step": 2e-4,
-}
+EXPONENTIAL = OF_RUNS | VERASZTO_STEPAN | {"step": 2e-4}
 # 16 Hz; steady sliding loses stability where N mu'(v) = -c: v^2 = v_s^2 (1 - c / (N |g|))
 CUBIC = OF_RUNS | {
     "friction_law": "cubic",
