@@ -6,8 +6,11 @@ import xarray as xr
 from cf import cf_findings
 
 from cvt_hpc.bifurcation.asking import load_diagram
+from cvt_hpc.bifurcation.attractors import Start, attractors
 from cvt_hpc.bifurcation.dataset import Direction, Stability
 from cvt_hpc.cli import main
+from cvt_hpc.job import build_job
+from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.vibration.classes import OccurrenceClass
 
 JOB = """
@@ -77,10 +80,24 @@ def test_the_picture_is_there(made):
 
 def test_another_file_in_its_place_is_left_alone(tmp_path, capsys):
     (tmp_path / "x.toml").write_text(JOB)
-    (tmp_path / "branch.nc").write_text("mine")
+    xr.Dataset({"mine": 1.0}).to_netcdf(tmp_path / "branch.nc")
+    before = (tmp_path / "branch.nc").read_bytes()
     assert main(["branch", str(tmp_path / "x.toml"), "--out", str(tmp_path)]) == 2
     assert "expected a new file, or a bifurcation diagram" in capsys.readouterr().err
-    assert (tmp_path / "branch.nc").read_text() == "mine"
+    assert (tmp_path / "branch.nc").read_bytes() == before
+
+
+def test_a_run_begins_in_the_steady_state(tmp_path):
+    (tmp_path / "x.toml").write_text(JOB)
+    (asked,) = load_diagram(tmp_path / "x.toml").branches
+    job = build_job(asked.runs.resolved(), "x", {"duration": 0.1})
+    state = SteadyBelt(asked.parameters).at(90.0).state
+    push = {"disturbance": 1e-9}
+    at_rest, started = attractors(
+        job, "load", (Start(push, lambda load: state), Start(push)), [90.0], [], 1.0
+    )
+    # what single precision hums, some nm, is left of 1 nm; a load that has risen within 30 ms leaves more
+    assert at_rest.amplitude < 1e-8 < 1e-7 < started.amplitude
 
 
 @pytest.mark.parametrize(
