@@ -10,7 +10,8 @@ from cvt_hpc.job import load_job
 from cvt_hpc.study.description import describe
 
 FOLDER = Path(__file__).parents[2] / "jobs"
-JOBS = [path for path in sorted(FOLDER.glob("*.toml")) if not path.stem.startswith("chart_")]
+OF_COMMANDS = ("branch", "chart_")  # jobs that `run` and `check` do not take
+JOBS = [path for path in sorted(FOLDER.glob("*.toml")) if not path.stem.startswith(OF_COMMANDS)]
 
 
 def test_there_are_jobs():
