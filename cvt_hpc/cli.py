@@ -113,13 +113,17 @@ def _parser() -> argparse.ArgumentParser:
     ladder = _add(commands, "ladder", _ladder, "do the runs of a job on every rung, and compare them", "JOB")
     ladder.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: out/<job name>)")
     ladder.add_argument("--fresh", action="store_true", help="throw earlier results of all rungs away")
+    branch = _add(
+        commands, "branch", _branch, "follow steady states along the load, to their Hopf points", "JOB"
+    )
+    branch.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: out/<job name>)")
     check = _add(commands, "check", _check, "validate a job, show its defaults and estimate its cost", "JOB")
     ranks = "forecast the sweep on so many ranks: makespan, efficiency, core-hours, disk and Slurm's --time"
     check.add_argument("--ranks", type=int, nargs="+", default=[], metavar="N", help=ranks)
     pilots = "forecast by K batches that are done for it, shortened (default: by records, else by prediction)"
     check.add_argument("--pilots", type=int, default=0, metavar="K", help=pilots)
     check.add_argument("--plot", type=Path, metavar="PNG", help="picture of the forecast, 1 to 10 000 ranks")
-    for command in (run, simulate, ladder, check):
+    for command in (run, simulate, ladder, branch, check):
         _add_assignments(command, "--set", "replace a value of the job, or an axis by one value")
     _add_assignments(chart, "--set", "replace a value of the job and of all its scenes")
     _add_assignments(
@@ -221,9 +225,12 @@ def _map(arguments: argparse.Namespace) -> int:
         units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
         at = read_coordinates(arguments.at, units, str(arguments.path), "--at")
         from cvt_hpc.analysis.maps import draw_map
+        from cvt_hpc.analysis.starts import has_starts, join_starts, start_line
 
-        picture = arguments.out or folder / "map.png"
-        print(f"map: {draw_map(dataset, picture, at, str(arguments.path))}")
+        picture = draw_map(dataset, arguments.out or folder / "map.png", at, str(arguments.path))
+        if has_starts(dataset, at):
+            print(start_line(join_starts(dataset)))
+        print(f"map: {picture}")
     return DONE
 
 
@@ -302,6 +309,28 @@ def _ladder(arguments: argparse.Namespace) -> int:
         print(*ladder_lines(report.findings), sep="\n")
         print(f"table: {report.table}", f"dataset: {report.dataset}", f"picture: {report.picture}", sep="\n")
     return end_process(status)
+
+
+def _branch(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.bifurcation import load_diagram, make_diagram
+    from cvt_hpc.bifurcation.table import branch_lines
+    from cvt_hpc.history_files import DIAGRAM, holds
+    from cvt_hpc.study.launch import detect_launch
+
+    if detect_launch().size > 1:
+        started = f"{detect_launch().size} started"
+        raise mismatch("branch", "one process, because it walks along the load", started)
+    diagram = load_diagram(arguments.path, arguments.set)
+    folder = arguments.out or Path("out") / diagram.job.name
+    dataset = folder / "branch.nc"
+    _check_output(dataset, (".nc",))
+    if dataset.exists() and not holds(dataset, DIAGRAM):
+        raise mismatch(str(dataset), "a new file, or a bifurcation diagram of cvt_hpc", "another file")
+    report = make_diagram(diagram, folder, tell=_complain)
+    for followed in report.followed:
+        print(*branch_lines(diagram, followed), "", sep="\n")
+    print(f"dataset: {report.dataset}", *(f"picture: {picture}" for picture in report.pictures), sep="\n")
+    return DONE
 
 
 def _check(arguments: argparse.Namespace) -> int:

@@ -12,6 +12,7 @@ from cvt_hpc.netcdf import write_netcdf
 
 CONTENT = "cvt_hpc_content"  # global attribute by which this program knows its own files
 HISTORY = "history of one run"
+DIAGRAM = "bifurcation diagram"
 
 
 def write_history(dataset: xr.Dataset, path: Path) -> Path:
@@ -58,8 +59,13 @@ def store_history(dataset: xr.Dataset, path: Path) -> None:
 
 def is_history(path: Path) -> bool:
     """Whether a file is a history that this program wrote."""
+    return holds(path, HISTORY)
+
+
+def holds(path: Path, content: str) -> bool:
+    """Whether a file is a dataset of this program with such content: HISTORY or DIAGRAM."""
     try:
         with xr.open_dataset(path, engine="netcdf4", decode_cf=False) as dataset:
-            return dataset.attrs.get(CONTENT) == HISTORY
+            return dataset.attrs.get(CONTENT) == content
     except (OSError, ValueError):
         return False

@@ -130,12 +130,12 @@ def point_lines(job: Job, at: Mapping[str, Any]) -> Iterator[str]:
 def outcome_lines(dataset: xr.Dataset) -> Iterator[str]:
     """Yield the lines that say what one run gave: its scalars, and what is per strand or pulley.
 
-    Of a run that failed only what is known: no verdict, and no number that is none.
+    No number that is none; of a run that failed only what is known, without a verdict.
     """
     names = [
         str(name)
         for name, array in dataset.data_vars.items()
-        if array.ndim <= 1 and 0 < array.size <= _LARGEST_LINE
+        if array.ndim <= 1 and 0 < array.size <= _LARGEST_LINE and array.notnull().any()
     ]
     if int(dataset["status"]) != Status.DONE:
         names = [name for name in names if name in _KNOWN_OF_FAILURES]

@@ -74,6 +74,10 @@ class FastRuns:
         state.scalars[LAYER_WORK] = self._layer_work[lane]
         return state
 
+    def profiles(self) -> dict[str, np.ndarray]:
+        """PROFILES by name, summed over the samples, (N, lanes) each."""
+        return dict(zip(PROFILES, self._profiles.data.transpose(1, 0, 2), strict=True))
+
     def channels(self, lane: int = 0) -> dict[str, float]:
         """CHANNELS by name, of the last sample."""
         return dict(zip(CHANNELS, self._rows.data[0, :, lane].tolist(), strict=True))

@@ -14,6 +14,16 @@ FACTS = {name: import_module(STEPPERS[name]).FACTS for name in METHODS}
 FIXED = [name for name in METHODS if not FACTS[name].adaptive]
 ADAPTIVE = [name for name in METHODS if FACTS[name].adaptive]
 IMPLICIT = [name for name in FIXED if FACTS[name].implicit]
+# Of the oscillator, Veraszto and Stepan 2017: m .538, b0 5.746, k 6957, C 2, C0 6, c_v 10, b_s .2; 18 Hz
+VERASZTO_STEPAN = {
+    "friction_law": "stribeck",
+    "friction_gradient": -40.0,
+    "kinetic_friction": 2.0,
+    "stribeck_velocity": 0.1,
+    "mass": 0.538,
+    "stiffness": 6957.0,
+    "damping": 5.946,
+}
 
 
 def defaults(*modules):

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis.arrangement import Ruler
 from cvt_hpc.analysis.classes import OccurrenceClass
+from cvt_hpc.vibration.hysteresis import StartClass
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -44,6 +45,8 @@ STYLES = {
     OccurrenceClass.NOT_RUN: ClassStyle("#ffffff", "#8a8a8a", "#8a8a8a", "", "_", 1.4),
 }
 
+# Of maps from two starts: lighter than any vibration, and hatched the other way than what is undecided.
+OF_STARTS = {StartClass.LARGE_START_ONLY: ClassStyle("#d8c5ea", "#5b2a86", "#ffffff", "\\\\\\", "D", 1.0)}
 
 # Inferred cells: level lines, no mark. Of vibrating ones the amplitude is not known: a colour of no scale.
 LINES = {"facecolor": "none", "edgecolor": "#8a8a8a", "linewidth": 0, "hatch": "---"}
@@ -90,7 +93,7 @@ def draw_cells(
     x, y : Ruler
         Places of the columns and rows.
     classes : array, shape (row, column)
-        `OccurrenceClass` of each run.
+        `OccurrenceClass` of each run, or `StartClass` of each cell.
     inferred : array of bool, shape (row, column)
         Whether a cell's class is not that of a run.
     values : array, shape (row, column)
@@ -98,7 +101,7 @@ def draw_cells(
     scale : Scale
         How it colours them.
     """
-    for kind, style in STYLES.items():
+    for kind, style in (STYLES | OF_STARTS).items():
         inside = classes == kind
         cells = [_cell(x, y, row, column) for row, column in np.argwhere(inside)]
         fills = fills_of(kind, values[inside], scale)
@@ -119,7 +122,7 @@ def draw_cells(
 
 def draw_marks(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], marked: Mask, size: float) -> None:
     """Mark grid points by class; arguments as for `draw_cells`, which ones, and the size of a dot [point]."""
-    for kind, style in STYLES.items():
+    for kind, style in (STYLES | OF_STARTS).items():
         rows, columns = np.nonzero((classes == kind) & marked)
         axes.plot(
             x.centres[columns],
@@ -153,10 +156,10 @@ def write_values(
         )
 
 
-def class_legend(figure: Figure, *, with_inferred: bool = False) -> None:
-    """Legend of all classes below the panels: fill, hatching and mark; and of cells that are inferred."""
+def class_legend(figure: Figure, *, with_inferred: bool = False, with_starts: bool = False) -> None:
+    """Legend of all classes below the panels: fill, hatching, mark; of two starts, and of inferred cells."""
     handles, labels = [], []
-    for kind, style in STYLES.items():
+    for kind, style in (STYLES | OF_STARTS if with_starts else STYLES).items():
         outline = style.ink if style.hatch else "#606060"
         cell = Patch(facecolor=style.fill, edgecolor=outline, hatch=style.hatch, linewidth=0.8)
         size = 4.0 * style.mark_size
@@ -171,7 +174,7 @@ def class_legend(figure: Figure, *, with_inferred: bool = False) -> None:
         handles,
         labels,
         loc="outside lower center",
-        ncols=len(OccurrenceClass),
+        ncols=3 if with_starts else len(OccurrenceClass),  # as wide as the page with the longest label
         frameon=False,
         handler_map={tuple: HandlerTuple(ndivide=1, pad=0)},
         handlelength=2.2,
@@ -185,9 +188,9 @@ def _cell(x: Ruler, y: Ruler, row: int, column: int) -> Rectangle:
     return Rectangle(corner, x.edges[column + 1] - corner[0], y.edges[row + 1] - corner[1])
 
 
-def fills_of(kind: OccurrenceClass, values: Array, scale: Scale) -> Array:
+def fills_of(kind: OccurrenceClass | StartClass, values: Array, scale: Scale) -> Array:
     """Colours (cell, rgba) of cells of one class."""
-    fills = np.tile(to_rgba(STYLES[kind].fill), (len(values), 1))
+    fills = np.tile(to_rgba((STYLES | OF_STARTS)[kind].fill), (len(values), 1))
     if kind is OccurrenceClass.VIBRATING:
         known = np.isfinite(values)
         fills[known] = scale.colours(scale.norm(values[known]))

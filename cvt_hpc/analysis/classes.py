@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.errors import few_of, mismatch
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
+from cvt_hpc.vibration.hysteresis import StartClass
 
 _MOST_NAMED = 6  # variables
 
@@ -26,13 +27,16 @@ def occurrence_classes(dataset: xr.Dataset) -> xr.DataArray:
     Parameters
     ----------
     dataset : Dataset
-        With the flag variables `status` and `vibrates`, same dimensions.
+        With the flag variables `status` and `vibrates`, same dimensions; with `occurrence_class` where it
+        is of several runs for a cell.
 
     Returns
     -------
     DataArray of int8
-        Values of `OccurrenceClass`, dimensions of `status`.
+        Values of `OccurrenceClass`, or as they are given; dimensions of `status`.
     """
+    if "occurrence_class" in dataset:
+        return dataset["occurrence_class"]
     status = dataset["status"]
     classes = classify_runs(status.values, dataset["vibrates"].transpose(*status.dims).values)
     attributes = {
@@ -58,8 +62,8 @@ def map_classes(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def count_classes(classes: NDArray[np.int8]) -> str:
-    """Number of runs of each class that occurs, in words."""
-    counts = {c: int(np.count_nonzero(classes == c)) for c in OccurrenceClass}
+    """Number of runs, or of cells, of each class that occurs, in words."""
+    counts = {c: int(np.count_nonzero(classes == c)) for c in StartClass}
     return ", ".join(f"{count} {kind.label}" for kind, count in counts.items() if count)
 
 

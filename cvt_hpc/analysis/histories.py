@@ -29,7 +29,8 @@ def draw_history(dataset: xr.Dataset, out: Path) -> Path:
     ----------
     dataset : Dataset
         `displacement` (time, probe) [m], `load` (time) [N m], `ring_tension` and `push_force` (position) [N],
-        `contact_force` (position) [N/m], `region` (position), and the run's verdict.
+        `contact_force` and what feeds the fluctuations (position) [N/m, W/m], `region` (position), and the
+        run's verdict.
     out : Path
         As for `save_figure`, with what it returns.
 
@@ -61,6 +62,8 @@ def history_figure(dataset: xr.Dataset) -> Figure:
         rows.append((2.0, [(WHOLE, panels.draw_forces, dataset)]))
     if _is_known(dataset, "contact_force"):
         rows.append((1.5, [(WHOLE, panels.draw_contact, dataset)]))
+    if _is_known(dataset, "flank_feed"):
+        rows.append((1.7, [(WHOLE, panels.draw_feed, dataset)]))
     if not rows:
         raise InputError("history: expected displacement, load or forces of a run, found none of them")
     title = _title(dataset)

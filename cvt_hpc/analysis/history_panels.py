@@ -21,8 +21,14 @@ CLOSE_UP = 0.01  # [s]: six periods at 600 Hz
 MOST_PEAKS = 3
 COLOURS = {"t1": "#b5460f", "t2": "#1f4e8c"}  # of like lightness, so line styles tell them apart in grey
 LINES = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))  # one for each probe of a strand, by default
+FEEDS = {
+    "flank_feed": ("friction of the flanks", "#b5460f", "-"),
+    "stress_feed": ("push and tension", "#1f4e8c", "--"),
+    "damping_feed": ("damping, rings' friction", "#333333", ":"),
+}
 _OTHER_COLOUR = "#333333"
 _MARGINS = (0.1, 0.9)  # share of the frequencies from which on labels are on the left: first strand, others
+_LINEAR = 0.01  # of the largest feed: below it the axis is linear
 _HEADROOM = 1.45  # for a legend of one line
 
 
@@ -227,6 +233,27 @@ def draw_contact(axes: Axes, dataset: xr.Dataset) -> None:
     position = 1e3 * dataset["position"].values
     axes.plot(position, 1e-3 * dataset["contact_force"].values, color=_OTHER_COLOUR, linewidth=1.2)
     axes.set(ylabel="contact [kN/m]", ylim=(0, None))
+    _lay_out_positions(axes, dataset)
+
+
+def draw_feed(axes: Axes, dataset: xr.Dataset) -> None:
+    """Power that feeds the fluctuations along the belt, above zero, and what is taken from them, below.
+
+    Linear near zero and logarithmic beyond: gaps that open and close at the front of the push trade ten times
+    what friction feeds into the strands' vibration.
+    """
+    position = 1e3 * dataset["position"].values
+    feeds = {name: dataset[name].values for name in FEEDS if name in dataset}
+    largest = max(np.abs(feed).max() for feed in feeds.values()) or 1.0
+    axes.set_yscale("symlog", linthresh=_LINEAR * largest)
+    for name, feed in feeds.items():
+        label, colour, line = FEEDS[name]
+        axes.fill_between(position, feed, color=colour, alpha=0.25, linewidth=0)
+        axes.plot(position, feed, line, color=colour, linewidth=1.2, label=label)
+    axes.axhline(0.0, color=_OTHER_COLOUR, linewidth=0.6)
+    decades = 10.0 ** (np.floor(np.log10(largest)) + np.array([-1.0, 0.0]))
+    axes.set(ylabel="fed [W/m]", ylim=(-3.0 * largest, 80.0 * largest), yticks=[*-decades, 0.0, *decades])
+    axes.legend(loc="upper right", ncols=len(FEEDS), frameon=False)
     _lay_out_positions(axes, dataset)
 
 

@@ -34,6 +34,7 @@ from cvt_hpc.analysis.classes import (
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.figures import WIDTH, draw, headline
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
+from cvt_hpc.analysis.starts import has_starts, join_starts
 
 MOST_STACKED = 5  # panels in one column; more go into two
 TITLE_HEIGHT = 0.42  # [inch], of a panel with the space around it
@@ -51,7 +52,8 @@ def draw_map(
         Results of a study: `status` and `vibrates` over the job's axes; `amplitude` [m] and `frequency`
         [Hz], per strand, where known; `inferred_class` of a trace. The stronger strand is shown. Of a study
         of samples the axes lie along `run`: each run is a mark, and there is a panel for each pair of axes.
-        Results that hold `eigenfrequency` are drawn as lines over the axis that else runs along x.
+        Results that hold `eigenfrequency` are drawn as lines over the axis that else runs along x. Of a study
+        with the axis `disturbance` the runs from the smallest and the largest value make one cell.
     out : Path
         As for `save_figure`, with what it returns.
     at : mapping, optional
@@ -70,6 +72,8 @@ def draw_map(
         return draw(lambda: scatter_figure(dataset, at or {}, source), out)
     if "eigenfrequency" in dataset:
         return draw(lambda: eigenfrequency_figure(dataset, at or {}, source), out)
+    if has_starts(dataset, at or {}):
+        dataset = join_starts(dataset)
     return draw(lambda: map_figure(arrange(dataset, at or {}, source)), out)
 
 
@@ -137,7 +141,8 @@ def map_figure(arrangement: Arrangement) -> Figure:
         _draw_block(figure, axes[sheet.rows :], sheet, sheet.frequency, frequency)
     figure.suptitle(_title(sheet, written))
     figure.supylabel(sheet.y.label, fontsize=10)
-    cells.class_legend(figure, with_inferred=bool(sheet.inferred.any()))
+    starts = "starts" in arrangement.dataset.attrs
+    cells.class_legend(figure, with_inferred=bool(sheet.inferred.any()), with_starts=starts)
     return figure
 
 
@@ -202,7 +207,11 @@ def _label_panel(ax: Axes, sheet: _Sheet, panel: int) -> None:
 def _title(sheet: _Sheet, written: bool) -> str:
     """What, of which job, how many runs of each class, and what is fixed."""
     runs, inferred = sheet.classes[~sheet.inferred], sheet.classes[sheet.inferred]
-    lines = [headline(sheet.arrangement.dataset.attrs), f"{runs.size} runs: {count_classes(runs)}"]
+    attributes = sheet.arrangement.dataset.attrs
+    lines = [headline(attributes), f"{runs.size} {'cells' if 'starts' in attributes else 'runs'}: "]
+    lines[1] += count_classes(runs)
+    if "starts" in attributes:
+        lines.append(f"each from a small and a large start: disturbance {attributes['starts']}")
     if inferred.size:
         lines.append(f"{inferred.size} cells inferred: {count_classes(inferred)}")
     lines.extend(sheet.arrangement.notes)

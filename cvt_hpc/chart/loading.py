@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.chart.declarations import CHART, read_table, read_tables
+from cvt_hpc.chart.declarations import CHART
 from cvt_hpc.chart.plan import Chart, Point
 from cvt_hpc.chart.series import budget_points, method_points, reference_points
 from cvt_hpc.chart.stage import Stage, read_stage
@@ -14,6 +14,7 @@ from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.job.assignments import Assignments, split_assignments
 from cvt_hpc.job.definition import HEADER
 from cvt_hpc.job.document import read_document
+from cvt_hpc.job.tables import read_table, read_tables
 
 
 def load_chart(path: str | Path, overrides: Assignments = ()) -> Chart:

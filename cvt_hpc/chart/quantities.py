@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.chart.declarations import read_table
 from cvt_hpc.chart.plan import Quantity
 from cvt_hpc.errors import mismatch, unknown
+from cvt_hpc.job.tables import read_table
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.assessment import assess

@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
 
-from cvt_hpc.chart.declarations import LEAD, SCENE, SETTINGS, read_set, read_table, read_tables
+from cvt_hpc.chart.declarations import LEAD, SCENE, SETTINGS
 from cvt_hpc.chart.plan import Lead, Quantity, Scene
 from cvt_hpc.chart.quantities import read_quantity
 from cvt_hpc.errors import mismatch, show, unknown
 from cvt_hpc.job import Job, build_job
 from cvt_hpc.job.assignments import read_assignments
 from cvt_hpc.job.schema import load_schema
+from cvt_hpc.job.tables import read_set, read_table, read_tables
 from cvt_hpc.job.values import read_value
 from cvt_hpc.models import MODELS
 

@@ -21,6 +21,7 @@ from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.values import expectation, read_value
 from cvt_hpc.parameters import Parameter
 
+OF_COMMANDS = ("branch", "chart")  # tables that a command of the same name reads
 _OF_DESIGN = "design."
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
@@ -136,8 +137,8 @@ def _check_top_level(document: Mapping[str, Any], schema: Schema, source: str) -
         if key in tables:
             if not isinstance(value, Mapping):
                 raise mismatch(f"{source}: {key}", f"a table [{key}]", show(value))
-        elif key == "chart":
-            raise InputError(f"{source}: [chart]: expected a job of runs, found one for `cvt-hpc chart`")
+        elif key in OF_COMMANDS:
+            raise InputError(f"{source}: [{key}]: expected a job of runs, found one for `cvt-hpc {key}`")
         elif isinstance(value, Mapping):
             hint = did_you_mean(key, tables) or f"; known: {', '.join(tables)}"
             raise InputError(f"{source}: [{key}]: unknown table{hint}")

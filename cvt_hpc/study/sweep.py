@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import StorageError
@@ -172,7 +173,9 @@ def _compute(
     layout = RecordFormat(task.study.fingerprint, task.study.record_dtype)
     model = CostModel(costs, plan.fit)
     try:
-        with RecordLog(folder.records, layout, plan.session, rank, plan.attempts) as log:
+        # Every core has a rank of its own: threads of linear algebra would only wait for each other.
+        log = RecordLog(folder.records, layout, plan.session, rank, plan.attempts)
+        with threadpool_limits(1), log:
             for runs, alone in claimed_batches(
                 plan.assignments, counter, stop.may_claim, lambda batch: stop.fits(model.upper(batch))
             ):

@@ -38,6 +38,9 @@ def run(duration=0.3, ramp=True):
             "ring_tension": (("position",), tension, {"units": "N"}),
             "push_force": (("position",), push, {"units": "N"}),
             "contact_force": (("position",), contact, {"units": "N m-1"}),
+            "flank_feed": (("position",), np.where(borders == 2, 100.0, np.where(borders == 0, -800.0, 0.0))),
+            "stress_feed": (("position",), np.where(borders == 0, 1500.0, 0.0)),
+            "damping_feed": (("position",), np.full(160, -1.0)),
         },
         {
             "time": ("time", time, {"units": "s"}),

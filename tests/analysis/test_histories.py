@@ -126,6 +126,18 @@ def test_forces_lie_over_shaded_arcs():
     assert np.array(spans) == pytest.approx(np.array([[0, 100], [248, 504]]), abs=4.1)
 
 
+def test_what_feeds_lies_above_zero_and_what_takes_below():
+    fed = panel(figure_of(run()), "fed [W/m]")
+    flanks, stresses, damping, zero = (np.asarray(line.get_ydata()) for line in fed.lines)
+    assert (flanks.min(), flanks.max(), stresses.max()) == (-800.0, 100.0, 1500.0)
+    assert np.all(damping == -1.0) and np.all(zero == 0.0)
+    assert fed.get_ylim()[0] < -800.0 and fed.get_ylim()[1] > 1500.0
+    assert len(fed.get_legend().get_texts()) == 3
+    # what friction feeds on the driven arc is seen beside what gaps trade: a sixth of the panel and more above zero
+    height = np.diff(fed.transData.transform([(0.0, 0.0), (0.0, 100.0)])[:, 1])
+    assert height > fed.bbox.height / 6
+
+
 def test_the_end_shows_all_probes_of_a_strand():
     figure = figure_of(run())
     close = [axes for axes in figure.axes if axes.get_legend() and len(axes.lines) == 3]
@@ -143,6 +155,8 @@ def test_the_end_shows_all_probes_of_a_strand():
         (["ring_tension", "push_force"], {"force [kN]"}),
         (["ring_tension"], set()),
         (["contact_force"], {"contact [kN/m]"}),
+        (["flank_feed"], {"fed [W/m]"}),
+        (["stress_feed", "damping_feed"], set()),
         (["region"], set()),
         (["status", "vibrates", "reason"], set()),
     ],

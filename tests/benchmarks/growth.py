@@ -30,7 +30,7 @@ def main() -> None:
     for key, value in (assignment.split("=") for assignment in arguments.set):
         p[key] = type(p[key])(float(value))
     print("load [N m]  linear [1/s] [Hz]   transient [1/s] [Hz]")
-    for point in branch(SteadyBelt(p), mesh(p), arguments.loads):
+    for point in branch(SteadyBelt(p), mesh(p), arguments.loads).points:
         mode, (growth, frequency) = point.modes[0], measured(point, arguments.size, arguments.step)
         expected = f"{mode.growth:9.1f} {mode.frequency:8.1f}"
         print(f"{point.steady.load:10.6g}  {expected}   {growth:9.1f} {frequency:8.1f}", flush=True)

@@ -43,11 +43,10 @@ def test_more_than_friction_carries_has_no_equilibrium():
         elastic_band(RADII, SPEED, 10 * MOMENT, THRUST, 3.7, STIFFNESS, 1.46, FRICTION, ANGLE)
 
 
-@cache
-def band_of_the_belt(stations):
-    """The belt with elements that never press and hold on to the rings, on rigid sheaves without creep."""
+def band_parameters(stations):
+    """Of the belt with elements that never press and hold on to the rings, on rigid sheaves without creep."""
     defaults = {key: parameter.default for table in PARAMETERS.values() for key, parameter in table.items()}
-    parameters = defaults | {
+    return defaults | {
         "stations": stations,
         "ratio": RADII[1] / RADII[0],
         "driven_radius": RADII[1],
@@ -73,6 +72,12 @@ def band_of_the_belt(stations):
         "friction_speed": 1e-4,
         "friction_memory": 0.0,
     }
+
+
+@cache
+def band_of_the_belt(stations):
+    """Its mesh and its steady state in the published case."""
+    parameters = band_parameters(stations)
     belt = SteadyBelt(parameters)
     return mesh(parameters), belt.at(MOMENT * RADII[0] / RADII[1], belt.at(0.0))
 
@@ -115,3 +120,40 @@ def test_the_belt_slips_at_the_exits():
         # the regularisation blurs the arc's beginning, by 1 % at 0.2 rad from it
         assert rise[slipping] == pytest.approx(FRICTION / np.sin(ANGLE), rel=0.012)
         assert np.abs(rise[sticking][2:]).max() < 0.05 * FRICTION / np.sin(ANGLE)
+
+
+def most_moment(driven_wrap):
+    """Moment on the driven pulley at which the band slips over the whole of the driving one, and it is found.
+
+    Then F_2 - K = (F_1 - K) exp(mu phi / sin d_0) over its wrap phi, and the driven pulley's thrust, linear in both
+    forces, gives F_1: with slip = phi in the formulas of `elastic_band`.
+    """
+    wrap, wedged, flow = 2.0 * np.pi - driven_wrap, FRICTION / np.sin(ANGLE), RADII[0] * SPEED
+    for _ in range(20):  # the flow's momentum, 5 % of the forces, follows from the driving force
+        pull = (ELEMENT_MASS + RING_MASS) * flow**2
+        bent = pull * STIFFNESS / (STIFFNESS - pull)
+        rise = np.expm1(wedged * wrap)
+        slipping = (1.0 - pull / STIFFNESS) * rise / wedged
+        keeping = (1.0 - pull / STIFFNESS) * (driven_wrap - wrap)
+        thrust = 2.0 * np.tan(ANGLE) * THRUST
+        small = (thrust + slipping * bent + pull * (driven_wrap - wrap)) / (keeping + slipping)
+        step = rise * (small - bent)
+        flow = RADII[0] * SPEED / (1.0 + (small + step) / STIFFNESS)
+    return step * RADII[1], small
+
+
+def test_the_most_that_the_band_carries():
+    wrap = band_of_the_belt(96)[0].path.driven_wrap
+    moment, _ = most_moment(wrap)
+    # the closed equilibrium comes there: slip arcs of smaller moments, extrapolated by their curvature
+    moments = np.array([255.0, 261.0, 267.0, 273.0])
+    arcs = [elastic_band(RADII, SPEED, m, THRUST, wrap, STIFFNESS, ELEMENT_MASS + RING_MASS, FRICTION, ANGLE).slip_arc
+            for m in moments]  # fmt: skip
+    assert np.polyval(np.polyfit(moments, arcs, 3), moment) == pytest.approx(2.0 * np.pi - wrap, rel=1e-3)
+    most = moment * RADII[0] / RADII[1]
+    errors = []
+    for stations in (96, 192):
+        last = SteadyBelt(band_parameters(stations)).carried(band_of_the_belt(stations)[1])
+        errors.append(1.0 - last.load / most)
+    # regularised friction and the force that is brought in on half a cell: both let it carry less
+    assert 0.0 < errors[1] < errors[0] < 0.01

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rungs import rung_job, rung_record
 from scipy.integrate import solve_ivp
-from small_systems import begin, scene
+from small_systems import VERASZTO_STEPAN, begin, scene
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.oscillator.constants import oscillator
@@ -17,15 +17,7 @@ from cvt_hpc.variables import Status, Vibrates
 # 8 s periods, of unit mass and stiffness: the band of what vibrates lies around them
 STICK_SLIP = {"band_low": 0.05, "band_high": 2.0, "window_length": 40.0, "spectrum_step": 1.0}
 STICK_SLIP |= {"duration": 240.0, "sampling_rate": 25.0, "step": 5e-3}
-# Veraszto and Stepan 2017: m .538, b0 5.746, k 6957, C 2, C0 6, c_v 10, b_s .2; 18 Hz
-PUBLISHED = {
-    "friction_law": "stribeck",
-    "friction_gradient": -40.0,
-    "kinetic_friction": 2.0,
-    "stribeck_velocity": 0.1,
-    "mass": 0.538,
-    "stiffness": 6957.0,
-    "damping": 5.946,
+PUBLISHED = VERASZTO_STEPAN | {
     "initial_displacement": 1e-5,
     "step": 1e-4,
     "duration": 4.0,

@@ -10,6 +10,7 @@ from cvt_hpc.models.auto import transient
 from cvt_hpc.models.auto.record import LANE_GROUPS
 from cvt_hpc.models.auto.rules import Rung, coarse, is_passive, is_settled
 from cvt_hpc.models.elastic_belt.lane_run import LaneRun
+from cvt_hpc.printing import outcome_lines
 from cvt_hpc.simulation import lane_groups, record_variables, run_points, simulate
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.assessment import Occurrence
@@ -72,7 +73,10 @@ def test_what_needs_no_run_says_nothing_but_the_class():
     for variable in record_variables(job):
         if variable.dtype == "f8" and variable.name not in ("core_seconds", "simulated_seconds"):
             assert np.isnan(record[variable.name]).all(), variable.name
-    assert not simulate(job).sizes.get("time")
+    alone = simulate(job)
+    assert not alone.sizes.get("time")
+    lines = list(outcome_lines(alone))
+    assert "rung               passive" in lines and not any("nan" in line for line in lines)
 
 
 def test_without_falling_friction_transients_do_not_vibrate():

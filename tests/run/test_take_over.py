@@ -59,6 +59,17 @@ def test_lanes_take_over_each_its_own_run():
 
 
 @pytest.mark.parametrize("stepper", ["imex", "symplectic_euler"])
+def test_means_of_which_a_part_is_missing_are_unknown(stepper):
+    judged = 400
+    for before in (judged, judged + 1):
+        taken = runs(stepper)
+        taken.take_over(marched(runs("imex"), before).runs)
+        (run,) = marched(taken, judged + 3).runs
+        known = np.isfinite(run.means["contact_force"])
+        assert known.all() if before == judged else not known.any()
+
+
+@pytest.mark.parametrize("stepper", ["imex", "symplectic_euler"])
 def test_the_disturbance_comes_once(stepper):
     kick = 80
     whole = marched(runs("explicit"), kick + 2).runs[0].displacement

@@ -29,7 +29,7 @@ VARIABLES = (
     ),
     *belt_record.VARIABLES,
 )
-LANE_GROUPS = 4  # batches of coarse runs in one: what they leave open fills the lanes of full runs again
+LANE_GROUPS = 16  # batches of coarse runs in one: what they leave open fills the lanes of full runs again
 REFINED = 0.2  # of the runs are done in full, more of them in a trace
 
 

@@ -121,7 +121,7 @@ class Batch:
         self.done = last
 
     def take_over(self, runs: Sequence[Any]) -> None:
-        """Go on from where runs by another stepper stand, their history included but for the mean profiles.
+        """Go on from where runs by another stepper stand, their history included, but for means begun before.
 
         Parameters
         ----------
@@ -137,6 +137,8 @@ class Batch:
         self.begun = self.ended.data[0, ENDED_AT] = runs[0].time
         for lane, run in enumerate(runs):
             self.rows.data[: self.done, :, lane] = run.rows
+        if self.done > self.plan.first_judged:
+            self.profiles[1].data[:] = np.nan  # what the other has summed up is not known
 
     def history(self, lane: int) -> np.ndarray:
         """Rows of a run, (samples, S + C); put in order of lanes and channels once all are there.

@@ -127,7 +127,7 @@ class GeneralTransient(Marched, RecordedRun):
         return self._rows.data[: self.done, :, 0]
 
     def take_over(self, runs: Sequence[Any]) -> None:
-        """Go on from where a run by another stepper stands, its history included but for the mean profiles.
+        """Go on from where a run by another stepper stands, its history included, but for means begun before.
 
         Parameters
         ----------
@@ -137,6 +137,8 @@ class GeneralTransient(Marched, RecordedRun):
         (run,) = runs
         self.done, self._disturbed = run.done, run.done > self._plan.kick
         self._rows.data[: self.done, :, 0] = run.rows
+        if self.done > self._plan.first_judged:
+            self._profiles[1].data[:] = np.nan  # what the other has summed up is not known
         self.marching.begin(run.time, self._form.pack(run.state))
 
     def advance(self, samples: int) -> tuple[Status, str] | None:

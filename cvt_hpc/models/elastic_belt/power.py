@@ -19,7 +19,7 @@ distance of two stations alone.
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, sqrt
+from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, sqrt, with_sign_of
 from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_FILTERED, V_RING, U, W
 from cvt_hpc.models.elastic_belt.lane_belt import (
     AXIAL_DAMPING,
@@ -31,6 +31,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     DRIVING_POSITION,
     DRIVING_RADIUS,
     DRIVING_SPEED,
+    ELEMENT_DAMPING,
     ELEMENT_MASS,
     ELEMENT_STIFFNESS,
     FRICTION_GRADIENT,
@@ -62,6 +63,13 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     LEAST_SHARE_OF_WIDTH,
     lane_load,
     start_damping,
+)
+from cvt_hpc.models.elastic_belt.moments import (
+    add_flanks,
+    add_forces,
+    add_saddles,
+    add_speeds,
+    add_stresses,
 )
 from cvt_hpc.physics.lane_friction import lane_coefficient, lane_law, lane_saturation, lane_table
 
@@ -103,6 +111,7 @@ def audit(
     rows: LaneArray,
     k: int,
     first: int,
+    profiles: LaneArray,
 ) -> None:
     """Powers [W] and stored energy [J] of a state.
 
@@ -118,6 +127,8 @@ def audit(
         Time since the last audit [s].
     rows, k, first
         Results go into row k from field `first` on, in the order of POWERS.
+    profiles : (N, M) LaneArray of doubles
+        MOMENTS of this state are added to its first fields.
     """
     n, fields, c, scalars = belt.cell.size, state.fields, belt.constants, state.scalars
     speed = scalars[0, SPEED]
@@ -135,6 +146,7 @@ def audit(
     damping = c[0, TRANSVERSE_DAMPING] + start_damping(belt, state.time[0])
     element_mass, ring_mass, mass, offset = c[0, ELEMENT_MASS], c[0, RING_MASS], c[0, MASS], c[0, RING_OFFSET]
     ring_stiffness, element_stiffness = c[0, RING_STIFFNESS], c[0, ELEMENT_STIFFNESS]
+    element_damping, centrifugal = c[0, ELEMENT_DAMPING], mass * belt_speed * belt_speed
     driven_base = like(speed * like(c[0, DRIVEN_RADIUS], speed) - like(belt_speed, speed), zero)
     omega, radius, opening_0 = c[0, DRIVING_SPEED], c[0, DRIVING_RADIUS], c[0, DRIVING_POSITION]
     surface = omega * radius - belt_speed
@@ -150,7 +162,8 @@ def audit(
         right, dual = belt.cell[j], belt.dual[j]
         w, u = fields[j, W], fields[j, U]
         v0, v1 = belt_speed + fields[j, V_ELEMENT], belt_speed + fields[j, V_RING]
-        v_radial = fma(v0, (fields[b, W] - fields[a, W]) * belt.per_span[j], u)
+        slope = (fields[b, W] - fields[a, W]) * belt.per_span[j]
+        v_radial = fma(v0, slope, u)
         belt_loss += dual * damping * v_radial * v_radial
         bent = belt.bending[j, 0] * fields[aa, W] + belt.bending[j, 1] * fields[a, W]
         bent += (
@@ -163,12 +176,23 @@ def audit(
         pressed, stretched = minimum(stations[j, EPS_0], 0.0), stations[j, EPS_1]
         rings = fields[j, N_ELEMENT + 1] + 1.0 + belt.curvature[j] * offset
         elastic = (fields[j, N_ELEMENT] + 1.0) * element_stiffness * pressed * pressed
+        tension, push = ring_stiffness * stretched, -element_stiffness * pressed
+        opening = fields[b, V_ELEMENT] - fields[j, V_ELEMENT]
+        lifting = 0.5 * right * belt.curvature[j] * (u + fields[b, U])
+        lifting += (fields[b, W] - w) * (fields[b, U] - u) * belt.per_cell[j]
+        working = push * opening - tension * (fields[b, V_RING] - fields[j, V_RING])
+        working -= (tension - push - centrifugal) * lifting
+        damped = -element_stiffness * stations[j, EPS_0] - element_damping * belt.per_cell[j] * opening
+        add_stresses(profiles, j, working, tension, push, maximum(damped, zero) - push)
         stored += (0.5 * right) * (elastic + rings * ring_stiffness * stretched * stretched)
+        v_element, across = fields[j, V_ELEMENT], -damping * v_radial
+        add_speeds(profiles, j, v_radial, u, v_element, fields[j, V_RING])
         share = belt.arc_share[j]
         if share == 0.0:
+            add_forces(profiles, j, across, u, across * slope, v_element)
             continue
         force = stations[j, FORCE]
-        v_tangential = fields[j, V_ELEMENT] - fma(omega, w, surface)
+        v_tangential = v_element - fma(omega, w, surface)
         meridian = v_radial * per_cosine
         sliding = maximum(sqrt(fma(meridian, meridian, v_tangential * v_tangential)), least)
         v_law = fields[j, V_FILTERED] if belt.memory else sliding
@@ -179,13 +203,17 @@ def audit(
         mu *= lane_saturation(sliding, per_width)
         upward = mu * meridian / sliding
         twice_normal = 2.0 * force / fma(upward, sine, cosine)
-        radial = twice_normal * (sine - upward * cosine)
-        tangential = -twice_normal * mu * v_tangential / sliding
-        length = share * dual
-        seating -= length * wedge * force * (v_radial - u)
-        rub -= length * (tangential * v_tangential + (radial - wedge * force) * v_radial)
+        elastic_radial = share * wedge * force
+        radial = share * twice_normal * (sine - upward * cosine) - elastic_radial
+        tangential = -share * twice_normal * mu * v_tangential / sliding
+        seating -= dual * elastic_radial * (v_radial - u)
+        rub -= dual * fma(radial, v_radial, tangential * v_tangential)
         if j < belt.driven_start:
-            driving += length * tangential * (radius + w) * omega
+            driving += dual * tangential * (radius + w) * omega
+        across += radial
+        along = fma(across + elastic_radial, slope, tangential)
+        add_forces(profiles, j, across, u, along, v_element)
+        add_flanks(profiles, j, radial, tangential, v_radial, v_tangential)
         lever = fma(offset, belt.arc_curvature[j], 1.0)
         saddle = fma(lever, v0, -v1)
         relief = c[0, RING_RELIEF] * longer
@@ -194,8 +222,10 @@ def audit(
             belt.cell[a] * belt.curvature[a]
         )
         grip = c[0, RING_FRICTION] * 0.5 * pressure
-        ring_loss += grip * lane_saturation(absolute(saddle), per_ring_width) * absolute(saddle)
-        stored -= 0.5 * length * force * fma(wedge, w, opening_0)
+        drag = with_sign_of(grip * lane_saturation(absolute(saddle), per_ring_width), saddle)
+        ring_loss += drag * saddle
+        add_saddles(profiles, j, drag, saddle)
+        stored -= 0.5 * share * dual * force * fma(wedge, w, opening_0)
     thrust = c[0, THRUST]
     axial_speed = (axial - thrust) / c[0, AXIAL_DAMPING]
     rows[k, first + DRIVING_POWER] = driving

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt import fluctuation
 from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
+from cvt_hpc.models.elastic_belt.history import histories
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.vibration import assessment
 from cvt_hpc.vibration.signals import amplitude_spectrum, band_amplitude
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
 
 __all__ = [
@@ -82,6 +82,7 @@ VARIABLES = (
         "1",
         "what the power balance leaves open, over the larger of drive and losses",
     ),
+    *fluctuation.VARIABLES,
     Variable("least_strand_force", (), "f8", "N", "smallest T - P - m v^2 in a strand: below 0 it is slack"),
 )
 
@@ -99,6 +100,9 @@ def coordinates(parameters: dict[str, Any]) -> dict[str, Coordinate]:
     return {
         "strand": Coordinate(np.array(STRANDS), "", "strand: t1 leaves the driving pulley, t2 enters it"),
         "pulley": Coordinate(np.array(PULLEYS), "", "pulley"),
+        "arc_part": Coordinate(
+            np.arange(1, fluctuation.ARC_PARTS + 1), "1", "part of the wrap, from its inlet to its outlet"
+        ),
         "half_waves": Coordinate(np.arange(1, MODES + 1), "1", "half waves along the strand"),
         "frequency_bin": Coordinate(bins, "Hz", "frequency"),
     }
@@ -181,63 +185,6 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
         **{name: mean(name) for name in LOSSES if "flank" not in name},
         "loss": loss,
         "power_residual": open_power / max(abs(mean("driving_power")), loss),
+        **fluctuation.record(run),
         "least_strand_force": run.channel("least_strand_force")[judged].min(),
     }
-
-
-def histories(run: RecordedRun) -> xr.Dataset:
-    """Histories over `time` and means by `position` of a run, finished or failed.
-
-    Parameters
-    ----------
-    run : RecordedRun
-        With the samples that it has.
-
-    Returns
-    -------
-    Dataset
-        `displacement` (time, probe) [m], scalars over time, and the profiles of the judged part by
-        `position`.
-    """
-    import xarray as xr
-
-    time = (1 + np.arange(run.done)) * run.interval
-    profiles = run.profiles
-    over_time = {
-        "load": ("N m", "torque at the driving pulley"),
-        "driven_speed": ("rad s-1", "speed of the driven pulley"),
-        "driven_position": ("m", "axial opening of the driven pulley"),
-    }
-    by_position = {
-        "ring_tension": ("N", "mean ring tension"),
-        "push_force": ("N", "mean push force between elements"),
-        "contact_force": ("N m-1", "mean axial line force of one flank"),
-        "mean_displacement": ("m", "mean displacement off the reference path, outward"),
-    }
-    variables: dict[str, Any] = {
-        "displacement": (
-            ("time", "probe"),
-            run.displacement,
-            {"units": "m", "long_name": "transverse displacement, outward"},
-        )
-    }
-    for name, (units, long_name) in over_time.items():
-        variables[name] = ("time", run.channel(name), {"units": units, "long_name": long_name})
-    for name, (units, long_name) in by_position.items():
-        variables[name] = ("position", profiles[name], {"units": units, "long_name": long_name})
-    coordinates = {
-        "time": ("time", time, {"units": "s", "long_name": "simulated time"}),
-        "probe": ("probe", np.array([probe.label for probe in run.probes], object), {"long_name": "probe"}),
-        "probe_position": (
-            "probe",
-            np.array([probe.position for probe in run.probes]),
-            {"units": "m", "long_name": "path coordinate of the probe"},
-        ),
-        "position": (
-            "position",
-            run.mesh.position,
-            {"units": "m", "long_name": "path coordinate, from the inlet of the driving arc"},
-        ),
-        "region": ("position", np.array(run.regions, object), {"long_name": "region of the path"}),
-    }
-    return xr.Dataset(variables, coordinates)

@@ -8,6 +8,7 @@ import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import REGIONS, Mesh, mesh
 from cvt_hpc.models.elastic_belt.doubts import doubt
+from cvt_hpc.models.elastic_belt.fluctuation import Fluctuation, fluctuation
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, PROFILES, Probe, Sensors, probes, sensors
 from cvt_hpc.variables import Status
 
@@ -77,7 +78,7 @@ class RecordedRun:
         Resolved parameters of the run [SI].
     plan : Recording
         What is recorded.
-    sums : (N, 4) array
+    sums : (N, 21) array
         PROFILES, summed over the judged part's samples; it may be filled later.
 
     Attributes
@@ -125,13 +126,18 @@ class RecordedRun:
         return slice(self._plan.first_judged, self.samples)
 
     @property
-    def profiles(self) -> dict[str, np.ndarray]:
-        """PROFILES around the belt, (N,) each: mean over the judged part at the stations.
+    def means(self) -> dict[str, np.ndarray]:
+        """PROFILES around the belt, (N,) each: mean over the judged part.
 
         Not a number before that part, and where the run has failed.
         """
         count = self.done - self._plan.first_judged if self.failure is None else 0
         return dict(zip(PROFILES, self._sums.T / (count if count > 0 else np.nan), strict=True))
+
+    @property
+    def fluctuation(self) -> Fluctuation:
+        """What feeds the fluctuations of the judged part, and what takes from them."""
+        return fluctuation(self.means, self.mesh, self.parameters)
 
     @property
     def regions(self) -> np.ndarray:

@@ -32,6 +32,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     FORCE,
     lane_load,
 )
+from cvt_hpc.models.elastic_belt.moments import MOMENTS
 from cvt_hpc.models.elastic_belt.power import POWERS, audit
 from cvt_hpc.models.elastic_belt.record import MODES
 from cvt_hpc.physics.lane_compliance import SOLVES, UNSOLVED
@@ -53,7 +54,7 @@ SCALARS = (
     "least_strand_force",
 )
 CHANNELS = SCALARS + POWERS
-PROFILES = ("ring_tension", "push_force", "contact_force", "mean_displacement")
+PROFILES = (*MOMENTS, "contact_force", "mean_displacement")
 
 LARGEST_DISPLACEMENT = 10e-3  # [m]: the belt has left its grooves
 LARGEST_STRAIN = 0.05  # of the rings, which break at 1 %
@@ -179,8 +180,8 @@ def sample(
         Row k is set: the sensors, then CHANNELS.
     k : int
         Which row.
-    profiles : (N, 4) LaneArray of doubles
-        PROFILES of this state are added to it; those of cells are averaged onto stations.
+    profiles : (N, 21) LaneArray of doubles
+        PROFILES of this state are added to it.
     ended : (1, 4) LaneArray of doubles
         ENDED of each lane.
     """
@@ -230,15 +231,11 @@ def sample(
         rows[k, sensed + 7 + wrap] = axial
         rows[k, sensed + 9 + wrap] = sliding / (maximum(axial, 1e-9) * c[0, BELT_SPEED])
         rows[k, sensed + 11 + wrap] = open_length / length
-    audit(belt, state, stations, axial, sensing.interval, rows, k, sensed + 14)
+    audit(belt, state, stations, axial, sensing.interval, rows, k, sensed + 14, profiles)
+    column = len(MOMENTS)
     for j in range(n):
-        a = j - 1 if j > 0 else n - 1
-        tension = 0.5 * ring_stiffness * (stations[a, EPS_1] + stations[j, EPS_1])
-        pressed = minimum(stations[a, EPS_0], 0.0) + minimum(stations[j, EPS_0], 0.0)
-        profiles[j, 0] = profiles[j, 0] + like(tension, speed)
-        profiles[j, 1] = profiles[j, 1] - like(0.5 * element_stiffness * pressed, speed)
-        profiles[j, 2] = profiles[j, 2] + like(stations[j, FORCE], speed)
-        profiles[j, 3] = profiles[j, 3] + like(fields[j, W], speed)
+        profiles[j, column] = profiles[j, column] + like(stations[j, FORCE], speed)
+        profiles[j, column + 1] = profiles[j, column + 1] + like(fields[j, W], speed)
 
 
 @kernel

@@ -1,22 +1,27 @@
 """Stability of the steady states along the load, and where it is lost or regained: Hopf points.
 
-Between two loads of which one is stable the growth rate of the mode that grows fastest is brought to zero by
-the secant and bisection (Brent's method); every state on the way is solved for, and none is interpolated.
+Modes at neighbouring loads are one where their shapes are, by the modal assurance criterion (Allemang and
+Brown 1982). Where one of them crosses the imaginary axis the loads are halved until they are close; every
+state on the way is solved for, and none is interpolated. The band of frequencies must not end among the modes
+that matter: one that enters it looks as if it had crossed the axis. A load at which no steady state is found
+is a gap: nothing is joined across it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import linear_sum_assignment
 
 from cvt_hpc.models.elastic_belt.belt import Mesh
-from cvt_hpc.models.linear_stability.modes import Mode, modes
-from cvt_hpc.models.steady_variator.walking import Steady, SteadyBelt
+from cvt_hpc.models.linear_stability.modes import HIGH, LOW, Mode, modes
+from cvt_hpc.models.steady_variator.walking import NoSteadyState, Steady, SteadyBelt
 
-CLOSE = 0.05  # [N m]: how closely an onset is found
+CLOSE = 0.1  # [N m]: between the loads that bracket an onset
+ALIKE = 0.5  # of 1: modes whose shapes have more than half in common are one
 
 
 class Point(NamedTuple):
@@ -31,6 +36,29 @@ class Point(NamedTuple):
         return self.modes[0].growth if self.modes else -np.inf
 
 
+class Branch(NamedTuple):
+    """Steady states along the load.
+
+    Attributes
+    ----------
+    points : list of Point
+        Those that were found, in the order of their loads.
+    missed : dict
+        Why there is none, by load [N m].
+    """
+
+    points: list[Point]
+    missed: dict[float, str]
+
+    def pieces(self) -> Iterator[list[Point]]:
+        """Yield the points between two gaps."""
+        gaps = sorted(self.missed)
+        for low, high in zip([-np.inf, *gaps], [*gaps, np.inf], strict=True):
+            piece = [point for point in self.points if low < point.steady.load < high]
+            if piece:
+                yield piece
+
+
 class Onset(NamedTuple):
     """A Hopf point.
 
@@ -38,43 +66,138 @@ class Onset(NamedTuple):
     ----------
     load : float
         [N m]
-    frequency : float
-        Of the mode that neither grows nor decays there [Hz].
+    mode : Mode
+        The one that neither grows nor decays there.
     rising : bool
-        Whether the steady state is unstable above that load.
+        Whether it grows above that load, or else below.
+    others : int
+        Number of other modes that grow there: where there are none, stability is lost or regained.
     """
 
     load: float
-    frequency: float
+    mode: Mode
     rising: bool
+    others: int
 
 
-def branch(belt: SteadyBelt, grid: Mesh, loads: Sequence[float]) -> list[Point]:
-    """Steady states with their modes under several loads, each from the one before."""
-    return [Point(steady, modes(steady, grid)) for steady in belt.along(loads)]
+def branch(
+    belt: SteadyBelt, grid: Mesh, loads: Sequence[float], band: tuple[float, float] = (LOW, HIGH)
+) -> Branch:
+    """Steady states with their modes under several loads, each from the one before.
+
+    Parameters
+    ----------
+    belt : SteadyBelt
+        The belt.
+    grid : Mesh
+        Its mesh.
+    loads : sequence of float
+        Ascending [N m].
+    band : (float, float)
+        Frequencies of the modes [Hz].
+    """
+    points: list[Point] = []
+    missed: dict[float, str] = {}
+    for load in loads:
+        try:
+            steady = belt.at(load, points[-1].steady if points else None)
+        except NoSteadyState as error:
+            missed[load] = str(error)
+        else:
+            points.append(Point(steady, modes(steady, grid, band)))
+    return Branch(points, missed)
 
 
-def onsets(belt: SteadyBelt, grid: Mesh, points: Sequence[Point]) -> list[Onset]:
-    """Hopf points between points that follow each other along the load."""
-    found = []
-    for before, after in zip(points, points[1:], strict=False):
-        if (before.growth > 0.0) != (after.growth > 0.0):
-            found.append(_onset(belt, grid, before, after))
-    return found
+def onsets(
+    belt: SteadyBelt, grid: Mesh, found: Branch, band: tuple[float, float] = (LOW, HIGH)
+) -> tuple[list[Onset], list[tuple[float, float]]]:
+    """Hopf points of a branch.
+
+    Parameters
+    ----------
+    belt, grid, band
+        As `branch` takes them.
+    found : Branch
+        The branch.
+
+    Returns
+    -------
+    onsets : list of Onset
+        In the order of their loads.
+    hidden : list of (float, float)
+        Loads between which stability changes in a gap, or where a state on the way is not found [N m].
+    """
+    known, hidden = [], []
+    for before, after in pairwise(found.points):
+        ends = before.steady.load, after.steady.load
+        if any(ends[0] < load < ends[1] for load in found.missed):
+            if (before.growth > 0.0) != (after.growth > 0.0):
+                hidden.append(ends)
+            continue
+        try:
+            known += _onsets(belt, grid, before, after, band)
+        except NoSteadyState:
+            hidden.append(ends)
+    return known, hidden
 
 
-def _onset(belt: SteadyBelt, grid: Mesh, before: Point, after: Point) -> Onset:
-    found = {point.steady.load: point for point in (before, after)}
+def tracks(piece: Sequence[Point]) -> list[dict[int, Mode]]:
+    """Modes of points without a gap between them, each followed along the load.
 
-    def growth(load: float) -> float:
-        if load not in found:
-            near = min(found, key=lambda known: abs(known - load))
-            steady = belt.at(load, found[near].steady)
-            found[load] = Point(steady, modes(steady, grid))
-        # where all modes decay fast there is no rate to interpolate with
-        return max(found[load].growth, -1e3)
+    Parameters
+    ----------
+    piece : sequence of Point
+        In the order of their loads.
 
-    load = brentq(growth, before.steady.load, after.steady.load, xtol=CLOSE)
-    near = min(found, key=lambda known: abs(known - load))
-    unstable = found[near] if found[near].modes else max(before, after, key=lambda point: point.growth)
-    return Onset(float(load), unstable.modes[0].frequency, after.growth > 0.0)
+    Returns
+    -------
+    list of dict
+        Mode by place in `piece`, for each that is followed.
+    """
+    followed = [{0: mode} for mode in piece[0].modes]
+    for place, (before, after) in enumerate(pairwise(piece), 1):
+        last = {id(track[place - 1]): track for track in followed if place - 1 in track}
+        for one, other in _pairs(before, after, ALIKE):
+            if one is not None and other is not None:
+                last[id(one)][place] = other
+            elif other is not None:
+                followed.append({place: other})
+    return followed
+
+
+def _pairs(before: Point, after: Point, alike: float) -> list[tuple[Mode | None, Mode | None]]:
+    """Modes of two points that are one, by more than `alike`, and those that have no partner."""
+    criterion = np.array([[_alike(one, other) for other in after.modes] for one in before.modes])
+    criterion = criterion.reshape(len(before.modes), len(after.modes))
+    matched = zip(*linear_sum_assignment(-criterion), strict=True)
+    joined = {a: b for a, b in matched if criterion[a, b] > alike}
+    pairs = [(mode, after.modes[joined[a]] if a in joined else None) for a, mode in enumerate(before.modes)]
+    taken = set(joined.values())
+    return pairs + [(None, mode) for b, mode in enumerate(after.modes) if b not in taken]
+
+
+def _alike(one: Mode, other: Mode) -> float:
+    """Modal assurance criterion of two shapes: 1 where they are one, 0 where they have nothing in common."""
+    a, b = one.displacement, other.displacement
+    return float(np.abs(np.vdot(a, b)) ** 2 / (np.vdot(a, a) * np.vdot(b, b)).real)
+
+
+def _onsets(
+    belt: SteadyBelt, grid: Mesh, before: Point, after: Point, band: tuple[float, float]
+) -> list[Onset]:
+    """Hopf points between two points, by halves."""
+    low, high = before.steady.load, after.steady.load
+    is_close = high - low <= CLOSE
+    # of states so close none is left without a partner, however much a cell that opens changes its shape
+    pairs = _pairs(before, after, 0.0 if is_close else ALIKE)
+    grows = [tuple(mode is not None and mode.growth > 0.0 for mode in pair) for pair in pairs]
+    crossing = [k for k, (one, other) in enumerate(grows) if one != other]
+    if not crossing:
+        return []
+    load = 0.5 * (low + high)
+    if is_close:
+        others = sum(one and other for one, other in grows)
+        return [Onset(load, pairs[k][grows[k].index(True)], grows[k][1], others) for k in crossing]
+    steady = belt.at(load, before.steady)
+    middle = Point(steady, modes(steady, grid, band))
+    return [*_onsets(belt, grid, before, middle, band), *_onsets(belt, grid, middle, after, band)]

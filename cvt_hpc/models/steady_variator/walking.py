@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants
+from cvt_hpc.models.steady_variator.arclength import largest_load
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.newton import newton
 from cvt_hpc.models.steady_variator.parameters import OF_THE_COURSE
@@ -26,6 +27,7 @@ ON_THE_WAY, AT_HOME = 1e-4, 1e-7  # of the unknowns' sizes: 10 nm and 10 pm of w
 SHORTEST = 1e-3  # of a path: shorter steps are not tried
 
 NARROWING, LOADING = 0.3, 0.5  # first steps, of the whole path
+NEAR_FOLD = 1.0  # [N m]: where so short a step along the load fails, a fold is near
 
 
 class NoSteadyState(ValueError):
@@ -103,18 +105,26 @@ class SteadyBelt:
             near = self.at(load, near)
             yield near
 
-    def carried(self, near: Steady, within: float = 1.0) -> Steady:
+    def carried(self, near: Steady, within: float = 0.1) -> Steady:
         """State at the largest load that friction carries, as far as a walk upwards finds it.
+
+        A walk along the load goes past most of the small folds at which single cells open; from where it ends
+        the curve of states is followed round its fold.
 
         Parameters
         ----------
         near : Steady
             Where the walk begins.
         within : float
-            Beyond a step as short as this no state was found [N m].
+            How closely the load is found [N m].
+
+        Raises
+        ------
+        NoSteadyState
+            Where the curve of states cannot be followed to a fold.
         """
-        step = max(0.1 * abs(near.load), 10.0 * within)
-        while step >= within:
+        step = max(0.1 * abs(near.load), NEAR_FOLD)
+        while step >= NEAR_FOLD:
             try:
                 load = near.load + step
                 x = self._walk(near.unknowns, near.load, load)
@@ -122,7 +132,12 @@ class SteadyBelt:
                 step *= 0.5
             else:
                 near = self._found(x, load)
-        return near
+        self._load(near.load)
+        found = largest_load(self._equations, self._load, near.unknowns, near.load, AT_HOME, within)
+        if found is None:
+            raise NoSteadyState(f"no largest load found above {near.load:g} N m")
+        self._load(found[1])
+        return self._found(*found)
 
     def _found(self, x: np.ndarray, load: float) -> Steady:
         belt = self._equations.belt._replace(bridging_stiffness=np.inf)

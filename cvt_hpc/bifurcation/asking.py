@@ -1,0 +1,125 @@
+"""What a job asks of a bifurcation diagram: branches along the load, and the runs beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from cvt_hpc.errors import mismatch
+from cvt_hpc.job import Job, build_job
+from cvt_hpc.job.assignments import Assignments
+from cvt_hpc.job.axes import Axis
+from cvt_hpc.job.document import read_document
+from cvt_hpc.job.tables import read_set, read_table
+from cvt_hpc.parameters import Parameter, positive
+
+STEADY, TRANSIENT = "linear_stability", "elastic_belt"
+BRANCH = {
+    "disturbance": Parameter(
+        (1e-6, 3e-4), "m", "of the runs from the steady state and from the large start; []: no runs"
+    ),
+    "resolution": positive(1.0, "N m", "spacing of the runs where vibration begins or ends"),
+}
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One branch that is asked for.
+
+    Attributes
+    ----------
+    place : dict
+        Values of the axes other than the load [SI].
+    parameters : dict
+        Resolved parameters of the steady belt [SI].
+    runs : Job
+        Of its transients, without axes.
+    """
+
+    place: dict[str, Any]
+    parameters: dict[str, Any]
+    runs: Job
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """What a job asks for.
+
+    Attributes
+    ----------
+    job : Job
+        Of linear stability, with the load among its axes.
+    axes : tuple of Axis
+        Those other than the load.
+    loads : tuple of float
+        Ascending [N m].
+    branches : tuple of Asked
+        One for each combination of the other axes' values, the last axis fastest.
+    disturbance : tuple of float
+        Of the runs from near the steady state and from the large start [m]; () for no runs.
+    resolution : float
+        Spacing of the runs where vibration begins or ends [N m].
+    """
+
+    job: Job
+    axes: tuple[Axis, ...]
+    loads: tuple[float, ...]
+    branches: tuple[Asked, ...]
+    disturbance: tuple[float, ...]
+    resolution: float
+
+
+def load_diagram(path: str | Path, overrides: Assignments = ()) -> Diagram:
+    """Read and validate a job of bifurcation diagrams.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file: a job of `linear_stability` with an axis `load`, and with a table [branch] or without.
+    overrides : mapping, or sequence of "KEY=VALUE"
+        As `load_job` takes them.
+
+    Raises
+    ------
+    InputError
+        If anything is wrong with the file or an override.
+    """
+    source = str(path)
+    document = read_document(Path(path))
+    table = document.pop("branch", {})
+    own = read_table(BRANCH, table, f"{source}: [branch]", ("set",))
+    _check_disturbance(own["disturbance"], f"{source}: [branch] disturbance")
+    job = build_job(document, source, overrides)
+    if job.model != STEADY:
+        raise mismatch(f"{source}: model", STEADY, job.model)
+    if job.design:
+        raise mismatch(f"{source}: [design]", "the full grid of the axes", job.design["kind"])
+    along = [axis for axis in job.axes if axis.name == "load"]
+    if not along or len(along[0].values) < 2:
+        raise mismatch(f"{source}: [axes] load", "two values or more, along which to go", "fewer")
+    axes = tuple(axis for axis in job.axes if axis.name != "load")
+    settings = read_set(table, f"{source}: [branch]")
+    branches = []
+    for values in product(*(axis.values for axis in axes)):
+        place = dict(zip((axis.name for axis in axes), values, strict=True))
+        runs = _runs(job, place, settings, f"{source}: [branch]")
+        branches.append(Asked(place, job.parameters | place, runs))
+    loads = tuple(sorted(along[0].values))
+    return Diagram(job, axes, loads, tuple(branches), own["disturbance"], own["resolution"])
+
+
+def _check_disturbance(values: tuple[float, ...], where: str) -> None:
+    if values and not (len(values) == 2 and 0.0 < values[0] < values[1]):
+        raise mismatch(where, "a small and a larger displacement above 0, or []", str(list(values)))
+
+
+def _runs(job: Job, place: dict[str, Any], settings: dict[str, Any], where: str) -> Job:
+    """The job of the transients beside a branch: the same scene, judged in the same band."""
+    tables = {section: table for section, table in job.resolved().items() if isinstance(table, dict)}
+    band = tables.pop("judgement")
+    del tables["axes"]
+    document = {"name": job.name, "model": TRANSIENT, **tables}
+    kept = {key: band[key] for key in ("band_low", "band_high") if key in band}
+    return build_job(document, where, {**kept, **place, **settings}, "set")

@@ -1,0 +1,176 @@
+"""What runs come to from several starts along a parameter: quiet, or a limit cycle of some amplitude.
+
+A start is a few settings of the job, such as a disturbance. Where a steady state is known a run may begin in
+it, which a belt that is loaded within tens of milliseconds does not come near. Values lie more closely
+where vibration begins or ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cvt_hpc.job import Job
+from cvt_hpc.models.elastic_belt.batch import Batch
+from cvt_hpc.models.elastic_belt.belt import TIME, State
+from cvt_hpc.simulation.modules import record_module, transient_module
+from cvt_hpc.simulation.record import record_of
+from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
+
+SAID = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
+
+
+class Attractor(NamedTuple):
+    """What a run came to.
+
+    Attributes
+    ----------
+    value : float
+        Of the parameter [SI].
+    start : int
+        Place among the starts.
+    occurrence : OccurrenceClass
+        Its class.
+    amplitude : float
+        Of the strand that moves most, or of the mass, in the band and over the judged part [m]; nan where
+        the run failed.
+    frequency : float
+        Of the same [Hz].
+    """
+
+    value: float
+    start: int
+    occurrence: OccurrenceClass
+    amplitude: float
+    frequency: float
+
+
+class Start(NamedTuple):
+    """Where runs begin.
+
+    Attributes
+    ----------
+    settings : mapping
+        Keys of the job with values [SI].
+    state : callable or None
+        The belt's state at a value of the parameter, or None where there is none: there the run begins as any
+        other.
+    """
+
+    settings: Mapping[str, Any]
+    state: Callable[[float], State | None] | None = None
+
+
+def attractors(
+    job: Job,
+    parameter: str,
+    starts: Sequence[Start],
+    values: Sequence[float],
+    bifurcations: Collection[float],
+    resolution: float,
+) -> list[Attractor]:
+    """Run from all starts at all values, and more closely where vibration begins or ends.
+
+    Parameters
+    ----------
+    job : Job
+        Of a model with a transient, without axes.
+    parameter : str
+        Key of the job.
+    starts : sequence of Start
+        Where runs begin.
+    values : sequence of float
+        Of the parameter, ascending [SI].
+    bifurcations : collection of float
+        Values beside which there are to be close ones.
+    resolution : float
+        How close.
+
+    Returns
+    -------
+    list of Attractor
+        In the order of values, then of starts.
+    """
+    found = _run_all(job, parameter, starts, values)
+    between = close_values(values, found, bifurcations, resolution)
+    found += _run_all(job, parameter, starts, between)
+    return sorted(found, key=lambda one: (one.value, one.start))
+
+
+def close_values(
+    values: Sequence[float], found: Sequence[Attractor], bifurcations: Collection[float], resolution: float
+) -> list[float]:
+    """Values in the intervals where runs of one start turn from quiet to vibrating, or with a bifurcation."""
+    split = {pair for pair in pairwise(values) if any(pair[0] < place < pair[1] for place in bifurcations)}
+    for start in {one.start for one in found}:
+        said = [one for one in found if one.start == start and one.occurrence in SAID]
+        for one, other in pairwise(sorted(said)):
+            if one.occurrence != other.occurrence:
+                split |= {pair for pair in pairwise(values) if one.value <= pair[0] < other.value}
+    between: list[float] = []
+    for low, high in sorted(split):
+        count = int(np.ceil((high - low) / resolution - 1e-9))
+        between += np.linspace(low, high, count + 1)[1:-1].tolist()
+    return between
+
+
+def _run_all(job: Job, parameter: str, starts: Sequence[Start], values: Sequence[float]) -> list[Attractor]:
+    """Run from all starts, as many runs together as can advance so."""
+    groups: dict[Any, list[tuple[float, int, Any, dict[str, Any]]]] = {}
+    for k, start in enumerate(starts):
+        for value in values:
+            point = job.point_at({**start.settings, parameter: value})
+            state = start.state(value) if start.state else None
+            key = record_module(job).lane_key(point), state is None
+            groups.setdefault(key, []).append((value, k, state, point))
+    found = []
+    for group in groups.values():
+        most = record_module(job).lanes(group[0][3], job.stepper)
+        for first in range(0, len(group), most):
+            found += _run_batch(job, group[first : first + most])
+    return found
+
+
+class _AtRest(NamedTuple):
+    """A run that stands in a state, as a batch takes it over: without a history."""
+
+    done: int
+    time: float
+    state: State
+    rows: float = 0.0
+
+
+def _at_rest(batch: Batch, state: State) -> _AtRest:
+    """In a state when the strands are to be disturbed, and the load has risen."""
+    done = batch.plan.kick
+    state = state.copy()
+    state.scalars[TIME] = done * batch.interval
+    return _AtRest(done, state.scalars[TIME], state)
+
+
+def _run_batch(job: Job, group: list[tuple[float, int, Any, dict[str, Any]]]) -> list[Attractor]:
+    """Do runs that advance together; those with a state begin in it when strands are disturbed."""
+    batch = transient_module(job).batch([point for *_, point in group], job.stepper)
+    if group[0][2] is not None:
+        batch.take_over([_at_rest(batch, state) for _, _, state, _ in group])
+    while batch.running:
+        batch.advance(batch.samples)
+    found = []
+    for (value, start, _, _), run in zip(group, batch.runs, strict=True):
+        record = record_of(job, run, 0.0)
+        (kind,) = classify_runs(np.array([record["status"]]), np.array([record["vibrates"]]))
+        amplitude, frequency = (np.atleast_1d(record[name]) for name in ("amplitude", "frequency"))
+        largest = 0 if np.isnan(amplitude).all() else int(np.nanargmax(amplitude))
+        found.append(
+            Attractor(
+                value,
+                start,
+                OccurrenceClass(int(kind)),
+                float(amplitude[largest]),
+                float(frequency[largest]),
+            )
+        )
+    return found

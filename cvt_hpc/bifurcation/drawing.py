@@ -1,0 +1,170 @@
+"""The picture of a branch, by the usual conventions of bifurcation diagrams.
+
+Above the steady state, solid where it is stable and dashed where it is not, its Hopf points and the
+amplitudes of limit cycles as dots; below growth rates and frequencies of its modes. Between loads without a
+steady state nothing is drawn.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from cvt_hpc.analysis.figures import WIDTH, balanced, draw
+from cvt_hpc.bifurcation.asking import Diagram
+from cvt_hpc.bifurcation.dataset import mode_lines
+from cvt_hpc.bifurcation.table import gap_lines, place_text
+from cvt_hpc.models.linear_stability.branch import Onset, Point
+from cvt_hpc.vibration.classes import OccurrenceClass
+from cvt_hpc.vibration.criticality import Kind
+
+if TYPE_CHECKING:
+    from cvt_hpc.bifurcation.making import Followed
+
+STRANDS = ("#0072b2", "#d55e00")  # t1 and t2
+HOPF, GAP = "#c00000", "#e6e6e6"
+STARTS = (("o", "#000000", "from the steady state"), ("D", "#009e73", "from the large start"))
+MARK = 4.5  # [point]
+KINDS = {
+    Kind.SUPERCRITICAL: {"marker": "s", "markersize": 7},
+    Kind.SUBCRITICAL: {"marker": "s", "markersize": 7, "markerfacecolor": "white", "markeredgewidth": 1.5},
+    Kind.UNDECIDED: {"marker": "x", "markersize": 7, "markeredgewidth": 1.5},
+}
+
+
+def draw_branch(diagram: Diagram, followed: Followed, out: Path) -> Path:
+    """Draw one branch; `out` is as for `save_figure`, with what it returns and raises."""
+    return draw(lambda: branch_figure(diagram, followed), out)
+
+
+def branch_figure(diagram: Diagram, followed: Followed) -> Figure:
+    """Compose the picture of `draw_branch`; to be called within STYLE."""
+    figure = Figure((WIDTH, 8.2), layout="constrained")
+    upper, middle, lower = figure.subplots(3, 1, sharex=True, height_ratios=(1.2, 1.1, 1.0))
+    _draw_attractors(upper, followed)
+    _draw_modes(middle, lower, followed)
+    loads = np.array(diagram.loads)
+    for axes in (upper, middle, lower):
+        for low, high in _gaps(loads, followed):
+            axes.axvspan(low, high, color=GAP, linewidth=0, zorder=0)
+        for onset in followed.onsets:
+            axes.axvline(onset.load, color=HOPF, linewidth=0.8, linestyle=":", zorder=1)
+        axes.set_xlim(loads[0], loads[-1])
+    lower.set_xlabel("load [N m]")
+    lines = [f"Steady states along the load: {diagram.job.name}", place_text(diagram, followed.asked.place)]
+    lines += gap_lines(followed)
+    figure.suptitle("\n".join(balanced(line, 90) for line in lines if line), fontsize=10)
+    figure.legend(handles=_legend(followed), loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def stable_parts(piece: list[Point], onsets: list[Onset]) -> list[tuple[float, float, bool]]:
+    """Loads between which the states of a piece are stable, or not.
+
+    Parameters
+    ----------
+    piece : list of Point
+        Without a gap between them.
+    onsets : list of Onset
+        Hopf points of the branch; those of states that are unstable anyway do not count.
+
+    Returns
+    -------
+    list of (float, float, bool)
+        From one load to another [N m], and whether states are stable there.
+    """
+    first, last = piece[0].steady.load, piece[-1].steady.load
+    turns = [onset for onset in onsets if first < onset.load < last and not onset.others]
+    ends = [first, *(onset.load for onset in turns), last]
+    stable = [turns[0].rising if turns else piece[0].growth <= 0.0]
+    stable += [not onset.rising for onset in turns]
+    return list(zip(ends[:-1], ends[1:], stable, strict=True))
+
+
+def _draw_attractors(axes: Axes, followed: Followed) -> None:
+    """The steady state, its Hopf points, and what runs came to."""
+    for piece in followed.branch.pieces():
+        for low, high, stable in stable_parts(piece, followed.onsets):
+            style = "-" if stable else (0, (4, 3))
+            axes.plot([low, high], [0.0, 0.0], color="black", linewidth=1.8, linestyle=style, clip_on=False)
+    for start, (mark, colour, _) in enumerate(STARTS):
+        for kind, fill in ((OccurrenceClass.VIBRATING, colour), (OccurrenceClass.UNDECIDED, "none")):
+            shown = [run for run in followed.runs if (run.start, run.occurrence) == (start, kind)]
+            axes.plot(
+                [run.value for run in shown],
+                [run.amplitude * 1e6 for run in shown],
+                linestyle="",
+                marker=mark,
+                markersize=MARK - 1.5 * start,
+                markeredgecolor=colour,
+                markerfacecolor=fill,
+                zorder=3 + start,
+            )
+    for onset, kind in zip(followed.onsets, followed.kinds, strict=True):
+        axes.plot(onset.load, 0.0, color=HOPF, clip_on=False, zorder=6, **KINDS[kind.kind])
+    axes.set_ylabel("amplitude [µm]")
+    axes.set_ylim(bottom=0.0)
+
+
+def _draw_modes(growth: Axes, frequency: Axes, followed: Followed) -> None:
+    """Growth rate and frequency of the modes, those that become unstable drawn thick."""
+    growth.axhline(0.0, color="black", linewidth=0.8)
+    for line in mode_lines(followed.branch):
+        loads, modes = list(line), list(line.values())
+        leading = max(modes, key=lambda mode: mode.growth)
+        style = {"color": STRANDS[leading.strand], "marker": ".", "markersize": 4.0}
+        style["linewidth"] = 1.8 if leading.growth > 0.0 else 0.8
+        growth.plot(loads, [mode.growth for mode in modes], **style)
+        frequency.plot(loads, [mode.frequency for mode in modes], **style)
+        if leading.growth > 0.0:
+            at = loads[modes.index(leading)], leading.frequency
+            frequency.annotate(_waves(leading.half_waves), at, (0, 5), textcoords="offset points", fontsize=8)
+    growth.set_ylabel("growth rate [1/s]")
+    frequency.set_ylabel("frequency [Hz]")
+
+
+def _waves(count: int) -> str:
+    return f"{count} half wave{'s' if count > 1 else ''}"
+
+
+def _gaps(loads: np.ndarray, followed: Followed) -> list[tuple[float, float]]:
+    """Loads between which there is no steady state: from the last one that has some to the next."""
+    found = np.array([point.steady.load for point in followed.branch.points])
+    gaps = []
+    for load in sorted(followed.branch.missed):
+        low, high = found[found < load].max(initial=loads[0]), found[found > load].min(initial=loads[-1])
+        if (low, high) not in gaps:
+            gaps.append((float(low), float(high)))
+    return gaps
+
+
+def _legend(followed: Followed) -> list[Line2D | Patch]:
+    """What is on the sheet, in words."""
+    handles: list[Line2D | Patch] = [
+        Line2D([], [], color="black", linewidth=1.8, label="steady state, stable"),
+        Line2D([], [], color="black", linewidth=1.8, linestyle=(0, (4, 3)), label="unstable"),
+    ]
+    handles += [
+        Line2D([], [], color=HOPF, linestyle="", label=f"Hopf point, {kind.name.lower()}", **KINDS[kind])
+        for kind in sorted({one.kind for one in followed.kinds})
+    ]
+    if followed.runs:
+        handles += [
+            Line2D([], [], color=colour, marker=mark, markersize=MARK, ls="", label=f"limit cycle {text}")
+            for mark, colour, text in STARTS
+        ]
+        open_mark = {"marker": "o", "markerfacecolor": "none", "markeredgecolor": "black", "linestyle": ""}
+        handles.append(Line2D([], [], markersize=MARK, label="undecided", **open_mark))
+    handles += [
+        Line2D([], [], color=colour, marker=".", label=f"mode of strand t{k}")
+        for k, colour in enumerate(STRANDS, 1)
+    ]
+    if followed.branch.missed:
+        handles.append(Patch(color=GAP, label="no steady state found"))
+    return handles

@@ -1,0 +1,191 @@
+"""What feeds a vibration and what takes from it: the audit of the fluctuations about the mean motion.
+
+A force f that works at the speed v has the mean power <f v> = <f> <v> + <f' v'>: what the mean force does in
+the mean motion, and what it feeds into the fluctuation. Friction of the flanks takes power on the whole, and
+yet feeds where it falls as sliding gets faster (Lebrecht et al. 2004, eqs 15-19). While the mean state stays,
+each equation of motion (`rhs.py`) times the fluctuation of its own speed, u = w_t, v_0 or v_1, has the mean
+0. Summed over the belt,
+
+    flanks + stresses = belt + rings + layers + lag + carried + remainder,
+
+    flanks     sum of <p' v_r'> + <f_t' v_t'>, fed where positive; p, f_t their radial and tangential friction
+    stresses   sum of <P' v_0,s'> - <T' v_1,s'> - <F' kappa u'> - <(F w_s)' u_s'>
+    belt       sum of d_b <v_r'^2>
+    rings      sum of <q' v_q'>, v_q the speed of the saddles against the rings
+    layers     work of the layers' dampers, less that of their mean forces in the mean motion
+    lag        T_1 k <z_dn'^2>, which is what the contact's elastic forces take from the belt
+    carried    sum of <h' v_r'> + <f_t' v_t'> - <h' u'> - <g' v_0'>, with h = p - d_b v_r and
+               g = f_t + (h + e) w_s, e the contact's elastic radial force
+
+Stresses within a belt whose elements touch throughout hand power on, and sum up to 0. Where gaps open and
+close they feed: the mean push works in the mean opening, and elements that the mean motion has drawn apart
+close with a blow. What is carried goes to the mean motion: its speed V works against the force along the path
+<h' w_s'> that the vibration exerts, the pulleys against the changing moment of <f_t' w'>. Flanks less carried
+is what friction does to u and v_0 at a fixed place, as `linear_stability` counts it; an error in the flanks'
+part alone would not open the sum.
+
+The remainder is what the numerics do (upwinding, backward Euler, work of dampers that samples do not meet),
+what the vibration gains while it grows, and bending. Fluctuations of all frequencies count, judder and
+hum of gaps too, and a trend of the mean state would: under a ramp of load nothing is known.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cvt_hpc.models.elastic_belt.belt import Mesh
+from cvt_hpc.variables import Variable
+
+if TYPE_CHECKING:
+    from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
+
+ARC_PARTS = 4  # of each wrap, of equal length, from its inlet to its outlet
+
+VARIABLES = (
+    Variable(
+        "part_flank_loss", ("pulley", "arc_part"), "f8", "W", "mean friction power of the flanks by arc part"
+    ),
+    Variable(
+        "flank_fed",
+        ("pulley", "arc_part"),
+        "f8",
+        "W",
+        "power that friction of the flanks feeds into the fluctuation by arc part; negative: takes",
+    ),
+    Variable(
+        "stress_fed", (), "f8", "W", "power that push and tension feed into it, where gaps open and close"
+    ),
+    Variable("belt_taken", (), "f8", "W", "power that the belt's transverse damping takes from it"),
+    Variable("ring_taken", (), "f8", "W", "power that friction between rings and elements takes from it"),
+    Variable("layer_taken", (), "f8", "W", "power that the layers' longitudinal dampers take from it"),
+    Variable("lag_taken", (), "f8", "W", "power that the driven sheave's lag takes from it"),
+    Variable("carried_power", (), "f8", "W", "power that goes from it to the mean motion"),
+    Variable(
+        "fluctuation_remainder",
+        (),
+        "f8",
+        "W",
+        "what is fed less what is taken and carried",
+    ),
+)
+
+
+class Fluctuation(NamedTuple):
+    """Mean power that each part of the belt feeds into the fluctuation; negative: takes.
+
+    Attributes
+    ----------
+    flanks, belt, rings, carried : (N,) arrays
+        Of the stations [W].
+    stresses : (N,) array
+        Of the cells [W].
+    mean_layers : float
+        What the layers' dampers take from the mean motion, which is no fluctuation [W].
+    """
+
+    flanks: np.ndarray
+    belt: np.ndarray
+    rings: np.ndarray
+    carried: np.ndarray
+    stresses: np.ndarray
+    mean_layers: float
+
+
+def fluctuation(means: dict[str, np.ndarray], grid: Mesh, parameters: dict[str, Any]) -> Fluctuation:
+    """Power of the fluctuations around the belt.
+
+    Parameters
+    ----------
+    means : dict
+        MOMENTS over the number of samples, and `mean_displacement` [m], (N,) each.
+    grid : Mesh
+        The belt's mesh.
+    parameters : dict
+        Resolved parameters of the run [SI].
+    """
+    m, p = means, parameters
+    dual = 0.5 * (grid.cell + np.roll(grid.cell, 1))
+    damping, radial, v_radial = p["transverse_damping"], m["radial_friction"], m["radial_speed"]
+    flanks = m["flank_power"] - radial * v_radial - m["tangential_friction"] * m["sliding_speed"]
+    belt = -damping * (m["radial_speed_squared"] - v_radial**2)
+    own = m["transverse_power"] - (radial - damping * v_radial) * m["transverse_speed"]
+    own = own + m["element_power"] - m["element_force"] * m["element_speed"]
+    opening, stretching = _step(m["element_speed"]), _step(m["ring_speed"])
+    mean_stresses = m["push_force"] * opening - m["ring_tension"] * stretching - _lifting(m, grid, p)
+    mean_rings = p["ring_damping"] * (stretching**2 / grid.cell).sum()
+    powers = (
+        dual * flanks,
+        dual * belt,
+        m["saddle_friction"] * m["saddle_speed"] - m["saddle_power"],
+        dual * (own - flanks - belt),
+        m["stress_power"] - mean_stresses,
+        mean_rings - m["push_damping"] @ opening,
+    )
+    return Fluctuation(*(_steadiness(p) * power for power in powers))
+
+
+def _steadiness(parameters: dict[str, Any]) -> float:
+    """1, or not a number under a ramp of load: its trend would count as a fluctuation."""
+    return np.nan if parameters["load_history"] == "ramp" else 1.0
+
+
+def _lifting(m: dict[str, np.ndarray], grid: Mesh, p: dict[str, Any]) -> np.ndarray:
+    """Power of the cells' mean stresses in the mean transverse motion [W], (N,)."""
+    path, speed = grid.path, p["driving_speed"] * grid.path.driving_radius
+    curvature = np.array([1.0 / path.driving_radius, 0.0, 1.0 / path.driven_radius, 0.0])[grid.region]
+    net = m["ring_tension"] - m["push_force"] - (p["element_mass"] + p["ring_mass"]) * speed**2
+    u = m["transverse_speed"]
+    turning = _step(m["mean_displacement"]) * _step(u) / grid.cell
+    return net * (grid.cell * curvature * (u + 0.5 * _step(u)) + turning)
+
+
+def _step(values: np.ndarray) -> np.ndarray:
+    """Difference of a stations' quantity over each cell."""
+    return np.roll(values, -1) - values
+
+
+def part_shares(grid: Mesh) -> np.ndarray:
+    """Share of each station's contact that lies in each part of the arcs, (2, ARC_PARTS, N).
+
+    On an arc they add up to 1: a station's contact reaches over half of both cells beside it, as far as the
+    arc goes.
+
+    Parameters
+    ----------
+    grid : Mesh
+        The belt's mesh.
+    """
+    shares = np.zeros((2, ARC_PARTS, grid.cell.size))
+    borders = np.linspace(0.0, 1.0, ARC_PARTS + 1)
+    for pulley, region in enumerate((0, 2)):
+        first, count = grid.starts[region], grid.counts[region]
+        edges = np.clip((np.arange(count + 2) - 0.5) / count, 0.0, 1.0)
+        inside = np.diff(np.clip(edges, borders[:-1, None], borders[1:, None]), axis=1)
+        shares[pulley, :, first : first + count + 1] = inside / np.diff(edges)
+    return shares
+
+
+def record(run: RecordedRun) -> dict[str, Any]:
+    """Values of VARIABLES from a finished run.
+
+    Parameters
+    ----------
+    run : RecordedRun
+        With all samples recorded.
+    """
+    p, judged, found = run.parameters, run.judged, run.fluctuation
+    shares, dual = part_shares(run.mesh), 0.5 * (run.mesh.cell + np.roll(run.mesh.cell, 1))
+    fed = {"flank_fed": shares @ found.flanks, "stress_fed": found.stresses.sum()}
+    lag = run.channel("axial_force driven")[judged].var() / (p["sheave_lag"] * p["lag_stiffness"])
+    taken = {
+        "belt_taken": -found.belt.sum(),
+        "ring_taken": -found.rings.sum(),
+        "layer_taken": run.channel("layer_loss")[judged].mean() - found.mean_layers,
+        "lag_taken": _steadiness(p) * lag,
+        "carried_power": -found.carried.sum(),
+    }
+    remainder = fed["flank_fed"].sum() + fed["stress_fed"] - sum(taken.values())
+    values = fed | taken | {"fluctuation_remainder": remainder}
+    return {"part_flank_loss": -(shares * dual) @ run.means["flank_power"], **values}

@@ -1,0 +1,103 @@
+"""Sums of forces, speeds and their products at each station: of what the fluctuations' audit is made."""
+
+from __future__ import annotations
+
+from cvt_hpc.kernels import merged_kernel
+from cvt_hpc.lanes import LaneArray, fma, like
+
+# Line forces at stations [N/m] are those on their whole length, also at an arc's end, where half of it is in
+# contact. Of stations but for the stresses, which are the cells' behind them [N]; `saddle_friction` is [N],
+# and powers are per length [W/m] but for `saddle_power` and `stress_power` [W]. Layers' speeds are less the
+# belt's nominal one.
+MOMENTS = (
+    "flank_power",
+    "radial_friction",
+    "tangential_friction",
+    "radial_speed",
+    "radial_speed_squared",
+    "sliding_speed",
+    "saddle_power",
+    "saddle_friction",
+    "saddle_speed",
+    "transverse_power",
+    "transverse_speed",
+    "element_power",
+    "element_force",
+    "element_speed",
+    "ring_speed",
+    "stress_power",
+    "ring_tension",
+    "push_force",
+    "push_damping",
+)
+(
+    FLANK_POWER,
+    RADIAL_FRICTION,
+    TANGENTIAL_FRICTION,
+    RADIAL_SPEED,
+    RADIAL_SPEED_SQUARED,
+    SLIDING_SPEED,
+    SADDLE_POWER,
+    SADDLE_FRICTION,
+    SADDLE_SPEED,
+    TRANSVERSE_POWER,
+    TRANSVERSE_SPEED,
+    ELEMENT_POWER,
+    ELEMENT_FORCE,
+    ELEMENT_SPEED,
+    RING_SPEED,
+    STRESS_POWER,
+    RING_TENSION,
+    PUSH_FORCE,
+    PUSH_DAMPING,
+) = range(len(MOMENTS))
+
+
+@merged_kernel
+def add(profiles: LaneArray, j: int, k: int, value) -> None:
+    """Add lanes of any precision to field k of station j."""
+    profiles[j, k] = profiles[j, k] + like(value, profiles[j, k])
+
+
+@merged_kernel
+def add_flanks(profiles: LaneArray, j: int, radial, tangential, v_radial, v_tangential) -> None:
+    """Friction of the flanks on the belt [N/m], and the speeds at which it works [m/s]."""
+    add(profiles, j, FLANK_POWER, fma(radial, v_radial, tangential * v_tangential))
+    add(profiles, j, RADIAL_FRICTION, radial)
+    add(profiles, j, TANGENTIAL_FRICTION, tangential)
+    add(profiles, j, SLIDING_SPEED, v_tangential)
+
+
+@merged_kernel
+def add_saddles(profiles: LaneArray, j: int, drag, sliding) -> None:
+    """Friction of the elements' saddles on the rings [N], and the saddles' speed against them [m/s]."""
+    add(profiles, j, SADDLE_POWER, drag * sliding)
+    add(profiles, j, SADDLE_FRICTION, drag)
+    add(profiles, j, SADDLE_SPEED, sliding)
+
+
+@merged_kernel
+def add_speeds(profiles: LaneArray, j: int, v_radial, u, v_element, v_ring) -> None:
+    """Speeds of a station [m/s]."""
+    add(profiles, j, RADIAL_SPEED, v_radial)
+    add(profiles, j, RADIAL_SPEED_SQUARED, v_radial * v_radial)
+    add(profiles, j, TRANSVERSE_SPEED, u)
+    add(profiles, j, ELEMENT_SPEED, v_element)
+    add(profiles, j, RING_SPEED, v_ring)
+
+
+@merged_kernel
+def add_forces(profiles: LaneArray, j: int, across, u, along, v_element) -> None:
+    """Line forces that are no stresses: across the belt but for the contact's own, and along the elements."""
+    add(profiles, j, TRANSVERSE_POWER, across * u)
+    add(profiles, j, ELEMENT_POWER, along * v_element)
+    add(profiles, j, ELEMENT_FORCE, along)
+
+
+@merged_kernel
+def add_stresses(profiles: LaneArray, j: int, power, tension, push, damped) -> None:
+    """Power of the stresses [W], tension, push without its damper, and what that adds [N]."""
+    add(profiles, j, STRESS_POWER, power)
+    add(profiles, j, RING_TENSION, tension)
+    add(profiles, j, PUSH_FORCE, push)
+    add(profiles, j, PUSH_DAMPING, damped)

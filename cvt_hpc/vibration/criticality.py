@@ -1,0 +1,132 @@
+"""Whether a Hopf point is super- or subcritical, by runs from two starts on both sides of it.
+
+On the unstable side every start vibrates. Where the limit cycle is born at the Hopf point and grows away
+from it (supercritical), vibration ends there whatever the start. Where an unstable limit cycle bends back
+over the stable side (subcritical), runs from near the steady state turn quiet at the Hopf point, those from
+a large start only at the fold of limit cycles: in between both attractors exist, which is the hysteresis.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cvt_hpc.vibration.classes import OccurrenceClass
+
+QUIET, VIBRATING = OccurrenceClass.QUIET, OccurrenceClass.VIBRATING
+
+
+class Kind(IntEnum):
+    """What becomes of the steady state at a Hopf point."""
+
+    SUPERCRITICAL = 0
+    SUBCRITICAL = 1
+    UNDECIDED = 2
+
+
+class Criticality(NamedTuple):
+    """What runs say of a Hopf point.
+
+    Attributes
+    ----------
+    kind : Kind
+        The verdict.
+    width : float
+        Between where the vibration ends from the small and from the large start, in the parameter's unit:
+        of the hysteresis, or what is left of it within the runs' spacing; nan if undecided.
+    error : float
+        Half of the spacing of the runs at both ends, likewise; inf where runs from the large start vibrate
+        as far as there are any.
+    reason : str
+        One line.
+    """
+
+    kind: Kind
+    width: float
+    error: float
+    reason: str
+
+
+def criticality(
+    hopf: float,
+    stable_above: bool,
+    values: ArrayLike,
+    small: ArrayLike,
+    large: ArrayLike,
+    *,
+    agreement: float,
+    limits: tuple[float, float] = (-np.inf, np.inf),
+) -> Criticality:
+    """Say whether a Hopf point is super- or subcritical.
+
+    Parameters
+    ----------
+    hopf : float
+        The parameter at the Hopf point.
+    stable_above : bool
+        Whether the steady state is stable above it, or else below.
+    values : array, shape (n,)
+        Where there are runs, distinct; in the unit of `hopf`, as all that follows.
+    small, large : arrays, shape (n,)
+        `OccurrenceClass` of the runs from near the steady state and from the large start.
+    agreement : float
+        How far from the Hopf point the runs from the small start may turn quiet.
+    limits : (float, float)
+        Neighbouring Hopf points, beyond which other branches begin.
+    """
+    values = np.asarray(values, dtype=float)
+    sign = 1.0 if stable_above else -1.0
+    inside = (values > limits[0]) & (values < limits[1])
+    away = sign * (values[inside] - hopf)  # ascends into the stable side
+    order = np.argsort(away)
+    away = away[order]
+    small, large = (np.asarray(classes)[inside][order] for classes in (small, large))
+    turns = _turns(small)
+    if not turns:
+        return _undecided("no run from the small start turns from vibrating to quiet near it")
+    first, last = min(turns, key=lambda turn: abs(away[turn[0]] + away[turn[1]]))
+    turned, spread = _middle(away, first, last)
+    if abs(turned) > agreement + spread:
+        place = hopf + sign * turned
+        return _undecided(f"runs from the small start turn quiet at {place:.4g}, not there")
+    both = (small == QUIET) & (large == VIBRATING)
+    ends = [turn for turn in _turns(large) if turn[1] > first]
+    if not ends and both[last:].any():
+        reason = "both attractors as far as there are runs on that side"
+        return Criticality(Kind.SUBCRITICAL, float(away[-1]) - turned, np.inf, reason)
+    if not ends or (large[first : ends[0][0]] == QUIET).any():
+        return _undecided("runs from the large start do not vibrate up to it")
+    start, end = ends[0]
+    ended, doubt = _middle(away, start, end)
+    width, error = ended - turned, spread + doubt
+    coexist = first + np.flatnonzero(both[first:end])
+    if coexist.size and width > error:
+        low, high = sorted(hopf + sign * away[coexist[[0, -1]]])
+        reason = f"both attractors from {low:.4g} to {high:.4g}"
+        return Criticality(Kind.SUBCRITICAL, width, error, reason)
+    if coexist.size:
+        place = hopf + sign * away[coexist[0]]
+        return _undecided(f"both attractors at {place:.4g} alone, closer runs would tell")
+    if end > last + 1:
+        place = hopf + sign * away[last + 1]
+        return _undecided(f"the run from the large start at {place:.4g} is undecided")
+    return Criticality(Kind.SUPERCRITICAL, width, error, "vibration ends at one place from either start")
+
+
+def _turns(classes: np.ndarray) -> list[tuple[int, int]]:
+    """Places of the last vibrating and the first quiet run of each turn, whatever is undecided in between."""
+    said = np.flatnonzero(np.isin(classes, (QUIET, VIBRATING)))
+    pairs = zip(said[:-1], said[1:], strict=True)
+    return [(int(a), int(b)) for a, b in pairs if classes[a] == VIBRATING and classes[b] == QUIET]
+
+
+def _middle(away: np.ndarray, first: int, last: int) -> tuple[float, float]:
+    """Middle of two places, and half of their distance."""
+    return float(0.5 * (away[first] + away[last])), float(0.5 * (away[last] - away[first]))
+
+
+def _undecided(reason: str) -> Criticality:
+    return Criticality(Kind.UNDECIDED, np.nan, np.nan, reason)

@@ -1,0 +1,57 @@
+"""What two starts say together: where a vibration needs a large start, the steady state has company."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cvt_hpc.vibration.classes import OccurrenceClass
+
+
+class StartClass(IntEnum):
+    """What a map says of a cell whose runs began from a small and from a large disturbance.
+
+    The values of `OccurrenceClass`, and one more.
+    """
+
+    QUIET = OccurrenceClass.QUIET
+    VIBRATING = OccurrenceClass.VIBRATING
+    UNDECIDED = OccurrenceClass.UNDECIDED
+    FAILED = OccurrenceClass.FAILED
+    NOT_RUN = OccurrenceClass.NOT_RUN
+    LARGE_START_ONLY = 5
+
+    @property
+    def label(self) -> str:
+        """Name for people."""
+        if self is StartClass.LARGE_START_ONLY:
+            return "vibrates from a large start only"
+        return self.name.lower().replace("_", " ")
+
+
+def classify_starts(small: NDArray, large: NDArray) -> NDArray[np.int8]:
+    """Class of each cell by its runs from two starts.
+
+    What vibrates from the small start vibrates; a cell is quiet only if it is so from both. Of a cell that
+    is quiet from the small start the other run decides, and where one run says nothing the cell does not.
+
+    Parameters
+    ----------
+    small, large : arrays of one shape
+        Values of `OccurrenceClass` of the runs from the smaller and from the larger disturbance.
+
+    Returns
+    -------
+    array of int8
+        Values of `StartClass`.
+    """
+    classes = np.where(small == OccurrenceClass.QUIET, large, small).astype(np.int8)
+    unsaid = (OccurrenceClass.FAILED, OccurrenceClass.NOT_RUN)
+    # a vibration from the small start needs no second run, a doubtful one cannot do without
+    doubtful = (small == OccurrenceClass.UNDECIDED) & np.isin(large, unsaid)
+    classes[doubtful] = large[doubtful]
+    found = (small == OccurrenceClass.QUIET) & (large == OccurrenceClass.VIBRATING)
+    classes[found] = StartClass.LARGE_START_ONLY
+    return classes

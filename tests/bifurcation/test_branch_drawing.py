@@ -1,0 +1,169 @@
+"""The picture of a branch, and branches with gaps, made up."""
+
+from types import SimpleNamespace
+
+import matplotlib
+import numpy as np
+import pytest
+
+from cvt_hpc.analysis.figures import STYLE
+from cvt_hpc.bifurcation.attractors import Attractor
+from cvt_hpc.bifurcation.drawing import GAP, HOPF, branch_figure, stable_parts
+from cvt_hpc.bifurcation.table import branch_lines
+from cvt_hpc.models.linear_stability.branch import Branch, Onset, Point, branch, onsets, tracks
+from cvt_hpc.models.linear_stability.modes import Mode
+from cvt_hpc.models.steady_variator.walking import NoSteadyState
+from cvt_hpc.vibration.classes import OccurrenceClass
+from cvt_hpc.vibration.criticality import Criticality, Kind
+
+ALONG = np.linspace(0.0, np.pi, 33)
+SHAPES = [np.sin(k * ALONG) + 0j for k in (1, 2, 3)]
+V, Q, U = OccurrenceClass.VIBRATING, OccurrenceClass.QUIET, OccurrenceClass.UNDECIDED
+
+
+def mode(growth, frequency, shape=0):
+    return Mode(
+        growth, frequency, np.ones(4), shape % 2, shape + 1, np.zeros(33), SHAPES[shape], SHAPES[shape]
+    )
+
+
+def point(load, *growths):
+    """A state with the modes 0, 1, ... of such growth, the fastest first; None: it is not there."""
+    modes = [mode(g, 400.0 + 100.0 * k + load, k) for k, g in enumerate(growths) if g is not None]
+    return Point(SimpleNamespace(load=load), sorted(modes, key=lambda one: -one.growth))
+
+
+POINTS = [point(10.0, -50.0, -90.0), point(20.0, 30.0, -60.0), point(30.0, 60.0, -20.0), point(50.0, -70.0, -80.0),
+          point(60.0, -75.0, -60.0)]  # fmt: skip
+FOUND = Branch(POINTS, {40.0: "no steady state found"})
+
+
+def diagram():
+    return SimpleNamespace(loads=(10.0, 20.0, 30.0, 40.0, 50.0, 60.0), axes=(), job=SimpleNamespace(name="x"))
+
+
+def followed():
+    runs = [Attractor(20.0, 0, V, 9e-6, 450.0), Attractor(30.0, 0, V, 12e-6, 450.0), Attractor(10.0, 0, Q, 1e-9, 1.0),
+            Attractor(10.0, 1, V, 6e-6, 450.0), Attractor(50.0, 1, U, 3e-6, 450.0)]  # fmt: skip
+    onset = Onset(16.0, POINTS[1].modes[0], True, 0)
+    kind = Criticality(Kind.SUBCRITICAL, 6.0, 1.0, "both attractors")
+    asked = SimpleNamespace(place={})
+    return SimpleNamespace(
+        asked=asked, branch=FOUND, onsets=[onset], hidden=[(30.0, 50.0)], runs=runs, kinds=[kind]
+    )
+
+
+@pytest.fixture(scope="module")
+def panels():
+    with matplotlib.rc_context(STYLE):
+        figure = branch_figure(diagram(), followed())
+    return figure, *figure.axes
+
+
+def test_the_steady_state_is_solid_where_stable_dashed_where_not_and_has_gaps(panels):
+    lines = [line for line in panels[1].lines if line.get_color() == "black" and line.get_linewidth() == 1.8]
+    drawn = [(*line.get_xdata(), line.get_linestyle()) for line in lines]
+    assert drawn == [(10.0, 16.0, "-"), (16.0, 30.0, "--"), (50.0, 60.0, "-")]
+    for axes in panels[1:]:
+        (gap,) = [patch for patch in axes.patches if patch.get_facecolor() == matplotlib.colors.to_rgba(GAP)]
+        assert (gap.get_x(), gap.get_x() + gap.get_width()) == (30.0, 50.0)
+
+
+def test_limit_cycles_are_filled_dots_and_quiet_runs_are_not_drawn(panels):
+    dots = {}
+    for line in panels[1].lines:
+        if line.get_marker() in ("o", "D") and len(line.get_xdata()):
+            filled = line.get_markerfacecolor() != "none"
+            dots[line.get_marker(), filled] = list(zip(line.get_xdata(), line.get_ydata(), strict=True))
+    assert dots == {
+        ("o", True): [(20.0, pytest.approx(9.0)), (30.0, pytest.approx(12.0))],
+        ("D", True): [(10.0, pytest.approx(6.0))],
+        ("D", False): [(50.0, pytest.approx(3.0))],
+    }
+    (hopf,) = [line for line in panels[1].lines if line.get_marker() == "s"]
+    assert (list(hopf.get_xdata()), hopf.get_color()) == ([16.0], HOPF)
+    assert hopf.get_markerfacecolor() == "white"  # subcritical
+    (legend,) = panels[0].legends
+    assert "Hopf point, subcritical" in [text.get_text() for text in legend.get_texts()]
+
+
+def test_modes_are_lines_that_end_at_the_gap(panels):
+    growth = [line for line in panels[2].lines if line.get_marker() == "."]
+    drawn = sorted(
+        (tuple(line.get_xdata()), tuple(line.get_ydata()), line.get_linewidth()) for line in growth
+    )
+    assert drawn == [
+        ((10.0, 20.0, 30.0), (-90.0, -60.0, -20.0), 0.8),
+        ((10.0, 20.0, 30.0), (-50.0, 30.0, 60.0), 1.8),
+        ((50.0, 60.0), (-80.0, -60.0), 0.8),
+        ((50.0, 60.0), (-70.0, -75.0), 0.8),
+    ]
+    frequency = [line.get_ydata() for line in panels[3].lines if line.get_marker() == "."]
+    assert sorted(map(tuple, frequency))[0] == (410.0, 420.0, 430.0)
+
+
+def test_words_name_hopf_points_and_gaps(panels):
+    assert list(branch_lines(diagram(), followed())) == [
+        "Hopf point at 16.0 N m, 420 Hz, 1 half wave in t1: stability lost; subcritical, hysteresis 6.0 +- 1.0 N m",
+        "no steady state found at 40 N m",
+        "stability changes between 30 and 50 N m, where a steady state is not found",
+    ]
+    title = panels[0].get_suptitle().replace("\n", " ").replace("\u00a0", " ")
+    assert all(line in title for line in list(branch_lines(diagram(), followed()))[1:])
+
+
+def test_a_hopf_point_of_an_unstable_state_does_not_make_it_stable():
+    both = [Onset(12.0, POINTS[1].modes[0], True, 0), Onset(25.0, POINTS[1].modes[1], True, 1)]
+    assert stable_parts(POINTS[:3], both) == [(10.0, 12.0, True), (12.0, 30.0, False)]
+
+
+def test_modes_are_followed_by_shape_where_their_order_changes():
+    piece = [point(1.0, -10.0, -20.0), point(2.0, -15.0, -12.0), point(3.0, None, -5.0, -9.0)]
+    lines = [{place: one.half_waves for place, one in track.items()} for track in tracks(piece)]
+    assert sorted(lines, key=str) == [{0: 1, 1: 1}, {0: 2, 1: 2, 2: 2}, {2: 3}]
+
+
+class OnALine:
+    """Steady states whose modes grow linearly with the load: -1.5 + 0.1 load and -2.5 + 0.1 load."""
+
+    missed: tuple[float, ...] = ()
+    fails_between = False
+
+    def at(self, load, near=None):
+        if load in self.missed or self.fails_between and load not in (10.0, 20.0, 30.0):
+            raise NoSteadyState(f"not at {load:g}")
+        return SimpleNamespace(load=load)
+
+
+@pytest.fixture
+def on_a_line(monkeypatch):
+    def at(steady, grid, band):
+        assert band == (100.0, 1500.0)
+        return point(steady.load, -1.5 + 0.1 * steady.load, -2.5 + 0.1 * steady.load).modes
+
+    monkeypatch.setattr("cvt_hpc.models.linear_stability.branch.modes", at)
+    return OnALine()
+
+
+def test_every_mode_that_crosses_the_axis_has_its_hopf_point(on_a_line):
+    for loads in ((10.0, 20.0, 30.0), (10.0, 30.0)):
+        found, hidden = onsets(on_a_line, None, branch(on_a_line, None, loads))
+        assert [(one.rising, one.others, one.mode.half_waves) for one in found] == [
+            (True, 0, 1),
+            (True, 1, 2),
+        ]
+        assert [one.load for one in found] == pytest.approx([15.0, 25.0], abs=0.05) and hidden == []
+
+
+def test_nothing_is_joined_across_a_load_without_a_steady_state(on_a_line):
+    on_a_line.missed = (18.0,)
+    found = branch(on_a_line, None, (10.0, 18.0, 30.0))
+    assert found.missed == {18.0: "not at 18"}
+    assert [[one.steady.load for one in piece] for piece in found.pieces()] == [[10.0], [30.0]]
+    assert onsets(on_a_line, None, found) == ([], [(10.0, 30.0)])
+
+
+def test_a_state_that_is_not_found_on_the_way_is_no_hopf_point(on_a_line):
+    on_a_line.fails_between = True
+    found = branch(on_a_line, None, (10.0, 20.0))
+    assert onsets(on_a_line, None, found) == ([], [(10.0, 20.0)])
