@@ -5,7 +5,8 @@
 #     CVT_HPC_LAUNCHER=srun|mpirun    what starts the ranks: Slurm itself, or the mpirun of the MPI library
 #     CVT_HPC_SRUN_MPI=pmi2|pmix|...  how srun connects them: pmi2 for MPICH and its kin, pmix for Open MPI; `srun
 #                                     --mpi=list` shows what there is. A wrong one is refused before anything is
-#                                     computed
+#                                     computed. Ranks that print "mpi/pmi2: request not begin with" and then nothing
+#                                     wait for ever: on a busy node Slurm has misread MPICH. Requeue, or take mpirun
 #
 # Exit statuses of `cvt-hpc run`, and what becomes of the job:
 #     0  all runs done             1  some runs failed, their reasons are in the output             2  bad input

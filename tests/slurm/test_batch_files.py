@@ -1,6 +1,8 @@
 """The batch files as they are, submitted to a real Slurm: whatever happens to a job, its results are those of a
 serial run and nothing is done twice."""
 
+import getpass
+
 import pytest
 from cluster import wait_until
 from recorded import assert_same_numbers, frames_written, recorded_runs, records
@@ -20,6 +22,9 @@ load = ["0 N m", "60 N m"]
 [run]
 duration = "0.1 s"
 """
+# Slurm's PMI takes a request of MPICH that arrives in two pieces, as on a busy machine, for two: the ranks then wait for
+# each other for ever, before the program begins.
+pytestmark = pytest.mark.flaky(reruns=2, only_rerun="mpi/pmi2: request not begin with")
 RUNS = 12
 TWO_NODES = ("--nodes=2", "--ntasks=2")
 
@@ -39,6 +44,14 @@ def serial(job_file):
     assert report.exit_status == 0
     with open_results(report.out) as dataset:
         return dataset.load()
+
+
+@pytest.fixture(autouse=True)
+def free_nodes(cluster):
+    """After each test no job is left, whatever became of it."""
+    yield
+    cluster.ask("scancel", f"--user={getpass.getuser()}")
+    wait_until(lambda: not cluster.ask("squeue", "--noheader"), "the end of all jobs", cluster.logs)
 
 
 def wait_for_records(cluster, job, out, count=1):
