@@ -165,38 +165,39 @@ def _run(arguments: argparse.Namespace) -> int:
     retry = [Status[name.upper()] for name in arguments.retry]
     job = load_job(arguments.path, arguments.set)
     if arguments.audit is not None:
-        from cvt_hpc.study.audit import check_fraction
+        from cvt_hpc.study.audit import check_audit, check_fraction
 
         check_fraction(job, arguments.audit, arguments.part)
+        check_audit(job, arguments.out or Path("out") / job.name, arguments.fresh)
     if arguments.dry_run:
         check_start(job, arguments.out, part=arguments.part, fresh=arguments.fresh)
         _show(job, arguments.out)
         return DONE
     started = time.monotonic()
-    report = run(job, arguments.out, part=arguments.part, fresh=arguments.fresh, retry=retry, **limits)
+    options = {"fresh": arguments.fresh, "retry": retry, **limits}
+    report = run(job, arguments.out, part=arguments.part, **options)
     _complain(*trouble_lines(report))
     if _speaks():
         print(*report_lines(report), sep="\n")
     if arguments.audit is not None and not report.remaining:
-        return end_process(max(report.exit_status, _audit(job, report.out, arguments.audit, limits, started)))
+        status = _audit(job, report.out, arguments.audit, options, started)
+        return end_process(max(report.exit_status, status))
     return end_process(report.exit_status)
 
 
-def _audit(job: Job, out: Path, fraction: float, limits: dict[str, float], started: float) -> int:
+def _audit(job: Job, out: Path, fraction: float, options: dict[str, Any], started: float) -> int:
     """Do the runs of an audit in the time that is left, and print what it has found."""
     from cvt_hpc.printing import audit_lines, trouble_lines
     from cvt_hpc.study.audit import report_audit, run_audit
 
-    if "time_limit" in limits:
-        left = limits["time_limit"] - (time.monotonic() - started)
-        limits = {**limits, "time_limit": max(left, 0.0)}
-    report = run_audit(job, out, fraction, **limits)
-    if report.remaining:
-        _complain(*trouble_lines(report))
-        return report.exit_status
-    if _speaks():
+    if "time_limit" in options:
+        left = options["time_limit"] - (time.monotonic() - started)
+        options = {**options, "time_limit": max(left, 0.0)}
+    report = run_audit(job, out, fraction, **options)
+    _complain(*(f"audit: {line}" for line in trouble_lines(report)))
+    if _speaks() and not report.remaining:
         print(*audit_lines(report_audit(job, out, fraction)), sep="\n")
-    return DONE
+    return report.exit_status
 
 
 def _status(arguments: argparse.Namespace) -> int:

@@ -43,15 +43,17 @@ def report_lines(report: RunReport) -> Iterator[str]:
 
 def audit_lines(report: AuditReport) -> Iterator[str]:
     """Yield the lines that say how often the lower rungs of a study erred."""
-    runs = sum(rung.runs for rung in report.rungs)
+    runs = sum(rung.runs + rung.failed for rung in report.rungs)
     yield f"audit: {runs} of {report.answered} runs that lower rungs answered done again in full"
     for rung in report.rungs:
         low, high = rung.interval
+        share = f"{rung.differing / rung.runs:.2%}, " if rung.runs else ""
         line = f"  {rung.rung.name.lower()}: {rung.differing} of {rung.runs} runs of another class "
-        line += f"({rung.differing / rung.runs:.2%}, 95 % interval {low:.2%} to {high:.2%}), "
+        line += f"({share}95 % interval {low:.2%} to {high:.2%}), "
         line += f"{rung.contrary} of them quiet against vibrating"
-        known = not math.isnan(rung.force_deviation)
-        yield line + (f"; mean forces within {rung.force_deviation:.2%} in 95 % of the runs" if known else "")
+        if not math.isnan(rung.force_deviation):
+            line += f"; mean forces within {rung.force_deviation:.2%} in 95 % of the runs"
+        yield line + (f"; {rung.failed} more failed in full" if rung.failed else "")
     yield f"runs that differ: {report.table}"
 
 

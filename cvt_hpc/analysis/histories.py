@@ -16,6 +16,7 @@ from cvt_hpc.analysis.figures import WIDTH, balanced, draw
 from cvt_hpc.errors import InputError
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.values import in_words
+from cvt_hpc.models.auto.rules import Rung
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.criterion import PARAMETERS
 
@@ -98,6 +99,9 @@ def _title(dataset: xr.Dataset) -> str:
     lines = ["One run: " + dataset.attrs["job_name"] if "job_name" in dataset.attrs else "One run"]
     if place := _place(dataset.attrs):
         lines.append(place)
+    if "rung" in dataset:
+        rung = Rung(int(dataset["rung"])).name.lower()
+        lines.append(f"answered by the {rung} run, of {float(dataset['simulated_seconds']):.3g} s")
     status = Status(int(dataset["status"])) if "status" in dataset else None
     reason = dataset["reason"].item() if "reason" in dataset else ""
     reason = reason.decode() if isinstance(reason, bytes) else reason

@@ -13,6 +13,8 @@ from cvt_hpc.simulation.modules import has_record, record_module
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
+PILOT_SHARE = 0.25
+
 
 def run_costs(job: Job) -> np.ndarray:
     """Core-seconds of each run: within a factor of two on processors of the last years.
@@ -77,3 +79,23 @@ def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
         bounds = [len(group) * part // parts for part in range(parts + 1)]
         batches += [tuple(group[first:last]) for first, last in pairwise(bounds)]
     return batches
+
+
+def turns(job: Job, runs: int) -> int:
+    """How many groups of lanes a batch does one after the other.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    runs : int
+        Runs of the batch.
+    """
+    model = record_module(job)
+    at_once = model.lanes(job.parameters, job.stepper) // getattr(model, "LANE_GROUPS", 1)
+    return -(-runs // at_once)
+
+
+def pilot_share(job: Job) -> float:
+    """Share of a run's simulated time that tells what the whole run costs."""
+    return getattr(record_module(job), "PILOT_SHARE", PILOT_SHARE)

@@ -8,6 +8,9 @@ The `record` module of a model offers VARIABLES, `coordinates(parameters)`, `cos
 - of a model without, which takes no stepper, `solve(parameters)`, whose result `judge(solution)` reads. It
   may leave out what is not known, such as all but status and reason where nothing was found.
 
+A model whose batches do several groups of lanes one after the other says how many by LANE_GROUPS, and one
+whose runs cannot be shortened for a forecast by PILOT_SHARE.
+
 `histories(run)`, or of a solution, is the dataset of what `simulate` has beyond the record, where there is
 such.
 """

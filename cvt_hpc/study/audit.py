@@ -26,7 +26,7 @@ from cvt_hpc.study.records import Records
 from cvt_hpc.study.recovery import read_records
 from cvt_hpc.study.report import RunReport
 from cvt_hpc.study.simulator import default_simulator
-from cvt_hpc.study.sweep import run
+from cvt_hpc.study.sweep import check_start, run
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 
@@ -50,9 +50,11 @@ class RungAudit(NamedTuple):
     rung : Rung
         The rung that had answered.
     runs : int
-        Runs done again.
+        Runs done again, to their end.
+    failed : int
+        Further runs, which failed in full or took too long.
     differing : int
-        Of these, those that are of another class in full.
+        Of `runs`, those of which the rung gave another class.
     contrary : int
         Of these, those of which one says quiet and the other vibrating.
     interval : (float, float)
@@ -64,6 +66,7 @@ class RungAudit(NamedTuple):
 
     rung: Rung
     runs: int
+    failed: int
     differing: int
     contrary: int
     interval: tuple[float, float]
@@ -80,7 +83,7 @@ class AuditReport(NamedTuple):
     rungs : tuple of RungAudit
         By rung.
     table : Path
-        All runs that differ, one by one.
+        All runs that differ or failed, one by one.
     """
 
     answered: int
@@ -96,6 +99,11 @@ def check_fraction(job: Job, fraction: float, part: str | None = None) -> None:
         raise mismatch("--audit", "a fraction above 0, at most 1", show(fraction))
     if part is not None:
         raise mismatch("--audit", "a run of the whole study, once its parts have ended", f"part {part}")
+
+
+def check_audit(job: Job, out: Path, fresh: bool) -> None:
+    """Raise the InputError that `run_audit` would raise before it computes anything; touches nothing."""
+    check_start(_in_full(job), out / FOLDER, fresh=fresh)
 
 
 def run_audit(job: Job, out: Path, fraction: float, **options: Any) -> RunReport:
@@ -133,21 +141,21 @@ def report_audit(job: Job, out: Path, fraction: float) -> AuditReport:
     low = read_records(StudyFolder(out).records, study)
     full = read_records(StudyFolder(out / FOLDER).records, full_study)
     audited = np.flatnonzero(_sample(study, low, fraction) & full.recorded)
-    rungs = low.read(audited, "rung")
+    rungs, ended = low.read(audited, "rung"), full.status[audited] == Status.DONE
     classes = [classify_runs(r.status[audited], r.read(audited, "vibrates")) for r in (low, full)]
-    differs = classes[0] != classes[1]
-    contrary = differs & np.isin(classes, DECIDED).all(axis=0)
+    differs = ended & (classes[0] != classes[1]) & np.isin(classes[0], DECIDED)
+    contrary = differs & np.isin(classes[1], DECIDED)
     table = out / FOLDER / TABLE
-    _write(table, study, audited[differs], (low, full), [found[differs] for found in classes])
+    shown = differs | ~ended
+    _write(table, study, audited[shown], (low, full), [found[shown] for found in classes])
     found = []
     for rung in LOWER:
         of_rung = rungs == rung
-        runs, differing = int(of_rung.sum()), int(differs[of_rung].sum())
-        if runs:
-            ends = binomtest(differing, runs).proportion_ci(CONFIDENCE, method="exact")
-            deviation = _force_deviation(low, full, audited[of_rung])
-            count = int(contrary[of_rung].sum())
-            found.append(RungAudit(rung, runs, differing, count, (ends.low, ends.high), deviation))
+        runs, differing = int((of_rung & ended).sum()), int(differs[of_rung].sum())
+        if of_rung.any():
+            deviation = _force_deviation(low, full, audited[of_rung & ended])
+            counts = runs, int((of_rung & ~ended).sum()), differing, int(contrary[of_rung].sum())
+            found.append(RungAudit(rung, *counts, _interval(differing, runs), deviation))
     return AuditReport(int(_answered(low).sum()), tuple(found), table)
 
 
@@ -161,7 +169,7 @@ def _in_full(job: Job) -> Job:
 
 def _answered(records: Records) -> np.ndarray:
     """Whether a lower rung has answered a run, shape (runs,)."""
-    answered = records.recorded & (records.status == Status.DONE)
+    answered = records.recorded.copy()
     places = np.flatnonzero(answered)
     answered[places] = np.isin(records.read(places, "rung"), LOWER)
     return answered
@@ -171,6 +179,13 @@ def _sample(study: Study, records: Records, fraction: float) -> np.ndarray:
     """Which runs are audited, shape (runs,): each by a lot that is drawn for its index."""
     lots = np.random.default_rng(int(study.fingerprint[:16], 16)).random(study.size)
     return _answered(records) & (lots < fraction)
+
+
+def _interval(differing: int, runs: int) -> tuple[float, float]:
+    if runs == 0:
+        return 0.0, 1.0
+    ends = binomtest(differing, runs).proportion_ci(CONFIDENCE, method="exact")
+    return ends.low, ends.high
 
 
 def _force_deviation(low: Records, full: Records, runs: np.ndarray) -> float:

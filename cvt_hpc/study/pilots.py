@@ -19,8 +19,6 @@ from cvt_hpc.variables import Status
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
-SHARE = 0.25  # of the simulated time of a run that a pilot does
-
 
 class Knowledge(NamedTuple):
     """What is known of the times of a job's batches.
@@ -74,12 +72,12 @@ def find_out(job: Job, simulator: Simulator, groups: Sequence[Batch], out: Path,
 
 
 def run_pilots(job: Job, simulator: Simulator, groups: Sequence[Batch], count: int) -> Knowledge:
-    """Do batches from all over the grid for a quarter of their duration, and scale their times."""
-    short, scale = job, 1.0
+    """Do batches from all over the grid for a part of their duration, and scale their times."""
+    short, scale, share = job, 1.0, simulator.pilot_share(job)
     # Where the duration is an axis, its values count, and without a transient there is none: done in full.
     if "duration" in job.parameters and all(axis.name != "duration" for axis in job.axes):
-        duration = SHARE * job.parameters["duration"]
-        short, scale = replace(job, parameters={**job.parameters, "duration": duration}), 1 / SHARE
+        duration = share * job.parameters["duration"]
+        short, scale = replace(job, parameters={**job.parameters, "duration": duration}), 1 / share
     places = {int((k + 0.5) * len(groups) / count) for k in range(count)}
     chosen = [groups[place] for place in sorted(places)]
     if job.histories:

@@ -80,7 +80,8 @@ class Progress:
             self._bar.update(finished - self._bar.n)
             self._bar.refresh()
             return
-        line = f"{finished}/{self._total} runs ({finished / self._total:.1%}), {failed} failed"
+        share = finished / self._total if self._total else 1.0
+        line = f"{finished}/{self._total} runs ({share:.1%}), {failed} failed"
         if tally.finished and elapsed > 0:
             rate = tally.finished / elapsed
             # The longest come first: by their number alone, too long a time would be left.

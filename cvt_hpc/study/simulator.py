@@ -33,6 +33,12 @@ class Simulator(Protocol):
     def lane_groups(self, job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
         """Split run indices into batches of runs that can advance together, as large as there are lanes."""
 
+    def turns(self, job: Job, runs: int) -> int:
+        """Return how many groups of lanes a batch of so many runs does one after the other."""
+
+    def pilot_share(self, job: Job) -> float:
+        """Return the share of a run's simulated time that tells what the whole run costs."""
+
     def run_points(
         self, job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
     ) -> Sequence[Mapping[str, Any]]:

@@ -122,7 +122,7 @@ class Task:
     def _attempt(self, batch: Batch, interrupt: Interrupt, begin: Begin) -> tuple[Result, _Trouble | None]:
         """Return the records of all runs, or none and what ended the batch."""
         begin(batch)
-        watch = _Watch(interrupt, self.run_limit)
+        watch = _Watch(interrupt, self.run_limit * self.simulator.turns(self.job, len(batch)))
         try:
             points = [self.job.point(index) for index in batch]
             kept = [place for place, index in enumerate(batch) if index in self.job.histories]

@@ -121,6 +121,12 @@ class Simulator:
     def lane_groups(self, job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
         return [tuple(indices[i : i + self.lanes]) for i in range(0, len(indices), self.lanes)]
 
+    def turns(self, job: Job, runs: int) -> int:
+        return 1
+
+    def pilot_share(self, job: Job) -> float:
+        return 0.25
+
     def run_points(
         self, job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
     ) -> list[dict[str, Any]]:

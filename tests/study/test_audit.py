@@ -7,9 +7,10 @@ import pytest
 import xarray as xr
 
 from cvt_hpc.cli import main
+from cvt_hpc.errors import InputError
 from cvt_hpc.models.auto import transient
 from cvt_hpc.study.audit import FULL_MODEL
-from cvt_hpc.variables import Vibrates
+from cvt_hpc.variables import Status, Vibrates
 
 # the middle of a window of the reference map and cells outside
 JOB = """name = "audited"
@@ -63,6 +64,78 @@ def test_a_rung_that_errs_is_found_out(job, capsys, monkeypatch):
     assert [(row["load"], row["rung"], row["class"], row["class in full"]) for row in rows] == [
         ("120.0", "passive", "quiet", "vibrating")
     ] * 2
+
+
+def test_forces_are_compared(job, capsys):
+    _, printed, out = audited(job, capsys)
+    with xr.open_dataset(out / "results.nc") as low, xr.open_dataset(out / "audit" / "results.nc") as full:
+        strands = ("mean_ring_tension", "mean_push_force")
+        off = [
+            max(
+                max(abs(low[name] - full[name]).values[cell].max() for name in names)
+                / max(abs(full[name]).values[cell].max() for name in names)
+                for names in (strands, ("axial_force",))
+            )
+            for cell in np.ndindex(2, 2)
+        ]
+    assert f"mean forces within {np.quantile(off, 0.95):.2%} in 95 % of the runs" in printed
+
+
+def test_a_sample_without_runs_is_no_error(job, capsys):
+    status, printed, _ = audited(job, capsys, "1e-9")
+    assert status == 0
+    assert "audit: 0 of 4 runs that lower rungs answered done again in full" in printed
+
+
+def test_a_fresh_study_has_a_fresh_audit(job, capsys):
+    audited(job, capsys)
+    job.write_text(JOB.replace("120]", "130]"))
+    status, printed, _ = audited(job, capsys, "1", "--fresh")
+    assert status == 0 and "audit: 4 of 4 runs" in printed
+    job.write_text(JOB)
+    out = job.parent / "out"
+    assert main(["run", str(job), "--out", str(out), "--audit", "1"]) == 2  # before anything is computed
+    assert "expected the folder of this job" in capsys.readouterr().err
+
+
+def test_what_fails_in_full_is_no_error_of_the_rung(job, capsys):
+    out = job.parent / "out"
+    assert main(["run", str(job), "--out", str(out)]) == 0
+    status, printed, _ = audited(job, capsys, "1", "--run-limit", "1us")
+    assert status == 1
+    assert "coarse: 0 of 0 runs of another class (95 % interval 0.00% to 100.00%)" in printed
+    assert "; 4 more failed in full" in printed
+    rows = list(csv.DictReader((out / "audit" / "audit.csv").open()))
+    assert [row["class in full"] for row in rows] == ["failed"] * 4
+    status, printed, _ = audited(job, capsys, "1", "--retry", "timed_out")
+    assert status == 0
+    assert "coarse: 0 of 4 runs of another class" in printed and "failed in full" not in printed
+
+
+def test_audits_end_with_the_time(job, capsys, monkeypatch):
+    asked = {}
+
+    def stopped(job, out, fraction, **options):
+        asked.update(options)
+        raise InputError("stopped")
+
+    monkeypatch.setattr("cvt_hpc.study.audit.run_audit", stopped)
+    out = str(job.parent / "out")
+    arguments = [
+        "run",
+        str(job),
+        "--out",
+        out,
+        "--audit",
+        "1",
+        "--time-limit",
+        "600s",
+        "--retry",
+        "timed_out",
+    ]
+    assert main(arguments) == 2
+    assert 0.0 < asked["time_limit"] < 600.0
+    assert asked["retry"] == [Status.TIMED_OUT] and asked["fresh"] is False
 
 
 def test_a_larger_share_goes_on_with_the_same_sample(job, capsys):

@@ -4,10 +4,8 @@
 package is cheap.
 """
 
-from typing import Any
-
 from cvt_hpc.models import elastic_belt
-from cvt_hpc.models.elastic_belt import check
+from cvt_hpc.models.elastic_belt import check, inert
 from cvt_hpc.parameters import Parameter, not_negative
 
 # Questions that a rung answers which is a model of its own, and why that one
@@ -36,13 +34,6 @@ STEPPER_NAMES = OWN_STEPPERS
 REFUSED = elastic_belt.REFUSED | {
     name: "its rules were measured with imex" for name in elastic_belt.STEPPER_NAMES if name != "imex"
 }
-
-
-def inert(parameters: dict[str, Any]) -> dict[str, str]:
-    """Parameters without effect on a run: as of the elastic belt, and the margin where none is asked for."""
-    idle = {"least_margin": "question forces"} if parameters["question"] == "forces" else {}
-    return elastic_belt.inert(parameters) | idle
-
 
 __all__ = [
     "ANSWERED_BY",

@@ -30,6 +30,7 @@ VARIABLES = (
     *belt_record.VARIABLES,
 )
 LANE_GROUPS = 16  # batches of coarse runs in one: what they leave open fills the lanes of full runs again
+PILOT_SHARE = 1.0  # of a run's time that a pilot does: a shorter run would take another rung
 REFINED = 0.2  # of the runs are done in full, more of them in a trace
 
 

@@ -3,7 +3,8 @@
 The rungs, from the cheapest up:
 
 - PASSIVE, no run: friction that nowhere falls with speed feeds no vibration, and all else in the belt
-  dissipates; that its changing normal force does not either is found, not proved.
+  dissipates; that its changing normal force does not either is found, not proved. Up to half of the torque
+  that rigid pulleys would carry, 2 mu thrust R / cos(half wedge angle): beyond, the belt may slip through.
 - COARSE, a transient of 0.6 times the stations, a step 1/0.6 times as long, over 0.3 of the duration. Its
   class is taken if the amplitudes lie a factor of two (`least_margin`) above or below the threshold: a
   coarse mesh shifts the edges of a window by less than a step of the load, but it does shift them. Its mean
@@ -32,6 +33,9 @@ from cvt_hpc.vibration.assessment import Occurrence
 
 COARSENESS = 0.6  # stations of the coarse run over those of the full one, and its inverse for the step
 SHARE = 0.3  # of the duration
+CARRIED_SHARE = (
+    0.5  # of the torque that rigid pulleys carry; on such the belt judders from 0.65 on, slips at 0.7
+)
 
 
 class Rung(IntEnum):
@@ -44,13 +48,15 @@ class Rung(IntEnum):
 
 
 def is_passive(parameters: Mapping[str, Any]) -> bool:
-    """Whether friction nowhere falls with sliding speed, and only occurrence is asked for."""
+    """Whether friction nowhere falls with speed and carries the load by far, and no force is asked for."""
     p = parameters
-    if p["question"] == "forces":
-        return False
-    if p["friction_law"] == "table":
-        return bool(np.all(np.diff(p["table_mu"], axis=1) >= 0.0))
-    return p["friction_gradient"] == 0.0
+    table = np.array(p["table_mu"]) if p["friction_law"] == "table" else np.array([[p["kinetic_friction"]]])
+    falls = bool(np.any(np.diff(table) < 0.0)) if table.size > 1 else p["friction_gradient"] != 0.0
+    loads = [p["load"]] if p["load_history"] == "constant" else [p["load"], p["load_start"]]
+    radius = p["driven_radius"] / p["ratio"]
+    carried = 2.0 * table.min() * p["thrust"] * radius / np.cos(p["half_wedge_angle"])
+    is_carried = max(map(abs, loads)) <= CARRIED_SHARE * carried
+    return bool(p["question"] != "forces" and not falls and is_carried)
 
 
 def coarse(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -71,6 +77,11 @@ def coarse(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
     return p
 
 
+def is_clear(parameters: Mapping[str, Any], found: Occurrence) -> bool:
+    """Whether the class that a coarse run has found is far enough from the other one."""
+    return found.vibrates is not Vibrates.UNDECIDED and found.margin >= parameters["least_margin"]
+
+
 def is_settled(parameters: Mapping[str, Any], found: Occurrence) -> bool:
     """Whether what a coarse run has found answers the question.
 
@@ -83,5 +94,5 @@ def is_settled(parameters: Mapping[str, Any], found: Occurrence) -> bool:
     """
     if parameters["question"] == "forces":
         return True
-    decided = found.vibrates is not Vibrates.UNDECIDED and found.margin >= parameters["least_margin"]
-    return decided and not (parameters["question"] == "amplitude" and found.vibrates is Vibrates.YES)
+    is_larger_asked = parameters["question"] == "amplitude" and found.vibrates is Vibrates.YES
+    return is_clear(parameters, found) and not is_larger_asked

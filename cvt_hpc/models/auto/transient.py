@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from cvt_hpc.models.auto.rules import Rung, coarse, is_passive, is_settled
+from cvt_hpc.models.auto.rules import Rung, coarse, is_clear, is_passive, is_settled
 from cvt_hpc.models.elastic_belt import record as belt_record
 from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.models.elastic_belt.grouping import lane_key, lanes
@@ -86,6 +86,9 @@ class ClimbingRun:
             found = belt_record.assess(run)
             if rung is Rung.FULL or is_settled(self.parameters, found):
                 values = found.record() | belt_record.evaluate(run, found.strongest_probe)
+                if rung is Rung.COARSE and not is_clear(self.parameters, found):
+                    reason = f"too close for a coarse run: {found.reason}"[:240]
+                    values |= {"vibrates": Vibrates.UNDECIDED, "reason": reason}
                 if rung is Rung.FULL or run.numerical_doubt(values) is None:
                     self.answering = run
                     self.found = values | {"rung": rung, "margin": found.margin}
