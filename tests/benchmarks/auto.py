@@ -3,7 +3,7 @@
 python tests/benchmarks/auto.py out/against
 python tests/benchmarks/auto.py out/against --table jobs/results/auto.csv
 
-Does jobs/auto.toml three times: each run in full, each by auto, and by auto along the boundaries alone. Runs of
+Does jobs/auto.toml four times: in full and by auto, each on the whole grid and along the boundaries alone. Runs of
 which the classes differ are done once more, for four times as long, to see who is right. Takes four minutes of
 an idle core, and goes on where it was broken off.
 """
@@ -27,13 +27,14 @@ QUIET, VIBRATING, UNDECIDED, FAILED, _ = OccurrenceClass
 
 
 def jobs() -> dict[str, Job]:
-    """The three, and the longer one, by name."""
+    """The four, and the longer one, by name."""
     traced = load_job(JOB)
     grid = load_job(JOB, ["design.kind=grid"])
-    document = handed_to(grid, "elastic_belt", "each run in full")
-    longer = {"run.duration": LONGER * grid.parameters["duration"]}
+    why, longer = "each run in full", {"run.duration": LONGER * grid.parameters["duration"]}
+    document = handed_to(grid, "elastic_belt", why)
     full, long = build_job(document, str(JOB)), build_job(document, str(JOB), longer)
-    return {"full": full, "auto": grid, "traced": traced, "longer": long}
+    full_traced = build_job(handed_to(traced, "elastic_belt", why), str(JOB))
+    return {"full": full, "full traced": full_traced, "auto": grid, "traced": traced, "longer": long}
 
 
 def classes(dataset: xr.Dataset) -> np.ndarray:
@@ -46,8 +47,9 @@ def classes(dataset: xr.Dataset) -> np.ndarray:
 def compare(name: str, full: xr.Dataset, other: xr.Dataset) -> np.ndarray:
     """Print costs and how many cells of each class are of which class; return where the classes differ."""
     costs = [float(dataset["core_seconds"].sum()) for dataset in (full, other)]
-    rungs = {rung.name.lower(): int((other["rung"] == rung).sum()) for rung in Rung if rung}
-    print(f"{name}: {costs[1]:.3g} against {costs[0]:.4g} core-s, {costs[1] / costs[0]:.1%}; rungs {rungs}")
+    print(f"{name}: {costs[1]:.3g} against {costs[0]:.4g} core-s, {costs[1] / costs[0]:.1%}")
+    if "rung" in other:
+        print("  rungs:", {rung.name.lower(): int((other["rung"] == rung).sum()) for rung in Rung if rung})
     one, two = classes(full), classes(other)
     for asked in (QUIET, VIBRATING, UNDECIDED, FAILED):
         found = {kind.label: int((two[one == asked] == kind).sum()) for kind in OccurrenceClass}
@@ -66,9 +68,11 @@ def main() -> None:
     parser.add_argument("--table", type=Path, help="where to write the cells that differ")
     arguments = parser.parse_args()
     asked = jobs()
-    for name in ("full", "auto", "traced"):
+    names = [name for name in asked if name != "longer"]
+    for name in names:
         run(asked[name], arguments.out / name)
-    found = {name: open_results(arguments.out / name).load() for name in ("full", "auto", "traced")}
+    found = {name: open_results(arguments.out / name).load() for name in names}
+    compare("full, traced", found["full"], found.pop("full traced"))
     differs = compare("auto", found["full"], found["auto"])
     differs |= compare("auto, traced", found["full"], found["traced"])
     run(asked["longer"], arguments.out / "longer", chosen=lambda: differs)

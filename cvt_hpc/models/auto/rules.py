@@ -33,9 +33,7 @@ from cvt_hpc.vibration.assessment import Occurrence
 
 COARSENESS = 0.6  # stations of the coarse run over those of the full one, and its inverse for the step
 SHARE = 0.3  # of the duration
-CARRIED_SHARE = (
-    0.5  # of the torque that rigid pulleys carry; on such the belt judders from 0.65 on, slips at 0.7
-)
+CARRIED_SHARE = 0.5  # of what rigid pulleys carry; on such the belt judders from 0.65 on, and slips at 0.7
 
 
 class Rung(IntEnum):
