@@ -55,3 +55,11 @@ def test_axes_that_the_other_model_does_not_know_are_refused(question, axes, mes
 def test_a_key_that_nobody_knows_is_still_an_error():
     with pytest.raises(InputError, match="did you mean thrust"):
         asking("frequencies", scene={"trust": "40 kN"})
+
+
+def test_samples_stay_the_same_samples():
+    axes = {"load": {"from": 20, "to": 200}, "thrust": {"from": 30e3, "to": 60e3}}
+    design = {"kind": "sobol", "runs": 8, "seed": 3}
+    job, own = asking("frequencies", axes, design=design), asking("forces", axes, design=design)
+    assert job.design == own.design and len(job) == 8
+    assert [axis.values for axis in job.axes] == [axis.values for axis in own.axes]
