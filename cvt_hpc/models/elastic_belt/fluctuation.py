@@ -106,7 +106,7 @@ def fluctuation(means: dict[str, np.ndarray], grid: Mesh, parameters: dict[str, 
         Resolved parameters of the run [SI].
     """
     m, p = means, parameters
-    dual = 0.5 * (grid.cell + np.roll(grid.cell, 1))
+    dual = at_stations(grid.cell)
     damping, radial, v_radial = p["transverse_damping"], m["radial_friction"], m["radial_speed"]
     flanks = m["flank_power"] - radial * v_radial - m["tangential_friction"] * m["sliding_speed"]
     belt = -damping * (m["radial_speed_squared"] - v_radial**2)
@@ -139,6 +139,11 @@ def _lifting(m: dict[str, np.ndarray], grid: Mesh, p: dict[str, Any]) -> np.ndar
     u = m["transverse_speed"]
     turning = _step(m["mean_displacement"]) * _step(u) / grid.cell
     return net * (grid.cell * curvature * (u + 0.5 * _step(u)) + turning)
+
+
+def at_stations(values: np.ndarray) -> np.ndarray:
+    """Mean of a quantity of the cells, (N,), in the two beside each station."""
+    return 0.5 * (values + np.roll(values, 1))
 
 
 def _step(values: np.ndarray) -> np.ndarray:
@@ -176,7 +181,7 @@ def record(run: RecordedRun) -> dict[str, Any]:
         With all samples recorded.
     """
     p, judged, found = run.parameters, run.judged, run.fluctuation
-    shares, dual = part_shares(run.mesh), 0.5 * (run.mesh.cell + np.roll(run.mesh.cell, 1))
+    shares, dual = part_shares(run.mesh), at_stations(run.mesh.cell)
     fed = {"flank_fed": shares @ found.flanks, "stress_fed": found.stresses.sum()}
     lag = run.channel("axial_force driven")[judged].var() / (p["sheave_lag"] * p["lag_stiffness"])
     taken = {

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.fluctuation import at_stations
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -66,11 +68,11 @@ def histories(run: RecordedRun) -> xr.Dataset:
 def _profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str]]:
     """Means of the judged part at the stations, (N,), units and long name; of a cell, half at either end."""
     means, fed = run.means, run.fluctuation
-    dual = _at_stations(run.mesh.cell)
+    dual = at_stations(run.mesh.cell)
     damping = (fed.belt + fed.rings) / dual
     return {
-        "ring_tension": (_at_stations(means["ring_tension"]), "N", "mean ring tension"),
-        "push_force": (_at_stations(means["push_force"]), "N", "mean push force between elements"),
+        "ring_tension": (at_stations(means["ring_tension"]), "N", "mean ring tension"),
+        "push_force": (at_stations(means["push_force"]), "N", "mean push force between elements"),
         "contact_force": (means["contact_force"], "N m-1", "mean axial line force of one flank"),
         "mean_displacement": (
             means["mean_displacement"],
@@ -79,14 +81,9 @@ def _profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str]]:
         ),
         "flank_feed": (fed.flanks / dual, "W m-1", "power that flank friction feeds into the fluctuation"),
         "stress_feed": (
-            _at_stations(fed.stresses) / dual,
+            at_stations(fed.stresses) / dual,
             "W m-1",
             "power that push and tension feed into the fluctuation",
         ),
         "damping_feed": (damping, "W m-1", "power of the belt's damping and of ring friction in it"),
     }
-
-
-def _at_stations(values: np.ndarray) -> np.ndarray:
-    """Mean of a cell quantity in the two cells of each station."""
-    return 0.5 * (values + np.roll(values, 1))
