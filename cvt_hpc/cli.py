@@ -226,11 +226,11 @@ def _map(arguments: argparse.Namespace) -> int:
         units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
         at = read_coordinates(arguments.at, units, str(arguments.path), "--at")
         from cvt_hpc.analysis.maps import draw_map
-        from cvt_hpc.analysis.starts import has_starts, join_starts, start_line
+        from cvt_hpc.analysis.starts import has_starts, start_line
 
         picture = draw_map(dataset, arguments.out or folder / "map.png", at, str(arguments.path))
         if has_starts(dataset, at):
-            print(start_line(join_starts(dataset)))
+            print(start_line(dataset, at, str(arguments.path)))
         print(f"map: {picture}")
     return DONE
 

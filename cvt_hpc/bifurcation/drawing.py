@@ -178,7 +178,7 @@ def _legend(followed: Followed) -> list[Line2D | Patch]:
         handles.append(Line2D([], [], markersize=MARK, label="undecided", **open_mark))
     for start in sorted({run.start for run in failed_runs(followed)}):
         style = {"color": STARTS[start][1], "marker": FAILED[0], "markersize": MARK + 2.0, "linestyle": ""}
-        handles.append(Line2D([], [], label=f"failed {FROM[start]}", **style))
+        handles.append(Line2D([], [], label=f"failed {FROM[start]} (no amplitude)", **style))
     handles += [
         Line2D([], [], color=colour, marker=".", label=f"mode of strand t{k}")
         for k, colour in enumerate(STRANDS, 1)

@@ -136,7 +136,9 @@ def test_runs_beyond_the_next_hopf_point_do_not_count():
 
 
 def test_values_are_close_where_a_start_turns_and_at_bifurcations():
-    found = [Attractor(v, 0, Q if v > 3 else U if v == 3 else V, 0.0, 0.0) for v in (1.0, 2.0, 3.0, 4.0, 5.0)]
+    found = [
+        Attractor(v, 0, Q if v > 3 else U if v == 3 else V, 0.0, 0.0, "") for v in (1.0, 2.0, 3.0, 4.0, 5.0)
+    ]
     values = [1.0, 2.0, 3.0, 4.0, 5.0]
     assert close_values(values, found, [], 0.5) == [2.5, 3.5]
     assert close_values(values, found, [4.1], 0.4) == pytest.approx(
