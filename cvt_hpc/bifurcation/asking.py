@@ -96,7 +96,7 @@ def load_diagram(path: str | Path, overrides: Assignments = ()) -> Diagram:
     Raises
     ------
     InputError
-        If anything is wrong with the file or an override.
+        If anything is wrong with the file or an override, or it sets a key of [branch].
     """
     source = str(path)
     document = read_document(Path(path))

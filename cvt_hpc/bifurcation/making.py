@@ -25,7 +25,7 @@ from cvt_hpc.netcdf import write_netcdf
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Criticality, Kind, criticality
 
-# [N m]: how far runs from near the steady state may turn quiet from the Hopf point. They do so up to 4.3 N m
+# [N m]: how far runs from near the steady state may turn quiet from the Hopf point. They do so up to 5.3 N m
 # off, since linear rates hold below 1 nm alone (README of linear_stability), and windows are 15 N m wide or
 # more. On jobs/branch.toml 2.5 and 10 N m give the same verdicts
 AGREEMENT = 5.0
