@@ -117,6 +117,7 @@ def _parser() -> argparse.ArgumentParser:
         commands, "branch", _branch, "follow steady states along the load, to their Hopf points", "JOB"
     )
     branch.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: out/<job name>)")
+    branch.add_argument("--fresh", action="store_true", help="throw an earlier diagram of the folder away")
     check = _add(commands, "check", _check, "validate a job, show its defaults and estimate its cost", "JOB")
     ranks = "forecast the sweep on so many ranks: makespan, efficiency, core-hours, disk and Slurm's --time"
     check.add_argument("--ranks", type=int, nargs="+", default=[], metavar="N", help=ranks)
@@ -226,11 +227,11 @@ def _map(arguments: argparse.Namespace) -> int:
         units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
         at = read_coordinates(arguments.at, units, str(arguments.path), "--at")
         from cvt_hpc.analysis.maps import draw_map
-        from cvt_hpc.analysis.starts import has_starts, join_starts, start_line
+        from cvt_hpc.analysis.starts import has_starts, start_line
 
         picture = draw_map(dataset, arguments.out or folder / "map.png", at, str(arguments.path))
         if has_starts(dataset, at):
-            print(start_line(join_starts(dataset)))
+            print(start_line(dataset, at, str(arguments.path)))
         print(f"map: {picture}")
     return DONE
 
@@ -314,8 +315,8 @@ def _ladder(arguments: argparse.Namespace) -> int:
 
 def _branch(arguments: argparse.Namespace) -> int:
     from cvt_hpc.bifurcation import load_diagram, make_diagram
-    from cvt_hpc.bifurcation.table import branch_lines
-    from cvt_hpc.history_files import DIAGRAM, holds
+    from cvt_hpc.bifurcation.folder import DATASET
+    from cvt_hpc.bifurcation.table import branch_lines, failure_lines
     from cvt_hpc.study.launch import detect_launch
 
     if detect_launch().size > 1:
@@ -323,15 +324,14 @@ def _branch(arguments: argparse.Namespace) -> int:
         raise mismatch("branch", "one process, because it walks along the load", started)
     diagram = load_diagram(arguments.path, arguments.set)
     folder = arguments.out or Path("out") / diagram.job.name
-    dataset = folder / "branch.nc"
-    _check_output(dataset, (".nc",))
-    if dataset.exists() and not holds(dataset, DIAGRAM):
-        raise mismatch(str(dataset), "a new file, or a bifurcation diagram of cvt_hpc", "another file")
-    report = make_diagram(diagram, folder, tell=_complain)
+    _check_output(folder / DATASET, (".nc",))
+    report = make_diagram(diagram, folder, fresh=arguments.fresh, tell=_complain)
+    failures = [line for followed in report.followed for line in failure_lines(diagram, followed)]
+    _complain(*failures)
     for followed in report.followed:
         print(*branch_lines(diagram, followed), "", sep="\n")
     print(f"dataset: {report.dataset}", *(f"picture: {picture}" for picture in report.pictures), sep="\n")
-    return DONE
+    return SOME_FAILED if failures else DONE
 
 
 def _check(arguments: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from cvt_hpc.analysis.arrangement import value_text
+from cvt_hpc.analysis.arrangement import arrange, value_text
 from cvt_hpc.analysis.classes import map_classes, occurrence_classes
 from cvt_hpc.vibration.hysteresis import StartClass, classify_starts
 
@@ -44,11 +44,12 @@ def join_starts(dataset: xr.Dataset) -> xr.Dataset:
     return small.assign(joined).assign_attrs(starts=words)
 
 
-def start_line(joined: xr.Dataset) -> str:
-    """How many cells of results that are joined vibrate from the large start only, in words."""
-    classes = map_classes(joined)
+def start_line(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> str:
+    """How many cells of a map vibrate from the large start only, in words; as `draw_map` takes results."""
+    drawn = arrange(join_starts(dataset), at, source).dataset
+    classes = map_classes(drawn)
     found = int(np.count_nonzero(classes == StartClass.LARGE_START_ONLY))
-    return f"{found} of {classes.size} cells: vibration from the large start only ({joined.attrs['starts']})"
+    return f"{found} of {classes.size} cells: vibration from the large start only ({drawn.attrs['starts']})"
 
 
 def _joined(small: xr.DataArray, large: xr.DataArray) -> xr.DataArray:

@@ -9,7 +9,7 @@ from typing import Any
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job import Job, build_job
-from cvt_hpc.job.assignments import Assignments
+from cvt_hpc.job.assignments import Assignments, split_assignments
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.document import read_document
 from cvt_hpc.job.tables import read_set, read_table
@@ -61,6 +61,8 @@ class Diagram:
         Of the runs from near the steady state and from the large start [m]; () for no runs.
     resolution : float
         Spacing of the runs where vibration begins or ends [N m].
+    settings : dict
+        What else the runs have, as the job gives it.
     """
 
     job: Job
@@ -69,6 +71,16 @@ class Diagram:
     branches: tuple[Asked, ...]
     disturbance: tuple[float, ...]
     resolution: float
+    settings: dict[str, Any]
+
+    def resolved(self) -> dict[str, Any]:
+        """Return all that determines the numbers, as a job file is laid out, in JSON types."""
+        table = {
+            "disturbance": list(self.disturbance),
+            "resolution": self.resolution,
+            "set": self.settings,
+        }
+        return {**self.job.resolved(), "branch": table}
 
 
 def load_diagram(path: str | Path, overrides: Assignments = ()) -> Diagram:
@@ -84,14 +96,22 @@ def load_diagram(path: str | Path, overrides: Assignments = ()) -> Diagram:
     Raises
     ------
     InputError
-        If anything is wrong with the file or an override.
+        If anything is wrong with the file or an override, or it sets a key of [branch].
     """
     source = str(path)
     document = read_document(Path(path))
     table = document.pop("branch", {})
     own = read_table(BRANCH, table, f"{source}: [branch]", ("set",))
     _check_disturbance(own["disturbance"], f"{source}: [branch] disturbance")
-    job = build_job(document, source, overrides)
+    replaced = split_assignments(overrides, source, "--set")
+    for key in replaced:
+        if key.removeprefix("branch.") in (*BRANCH, "set"):
+            raise mismatch(
+                f"{source}: --set {key}",
+                "a parameter or an axis",
+                "a key of [branch], read from the file alone",
+            )
+    job = build_job(document, source, replaced)
     if job.model != STEADY:
         raise mismatch(f"{source}: model", STEADY, job.model)
     if job.design:
@@ -107,7 +127,7 @@ def load_diagram(path: str | Path, overrides: Assignments = ()) -> Diagram:
         runs = _runs(job, place, settings, f"{source}: [branch]")
         branches.append(Asked(place, job.parameters | place, runs))
     loads = tuple(sorted(along[0].values))
-    return Diagram(job, axes, loads, tuple(branches), own["disturbance"], own["resolution"])
+    return Diagram(job, axes, loads, tuple(branches), own["disturbance"], own["resolution"], settings)
 
 
 def _check_disturbance(values: tuple[float, ...], where: str) -> None:

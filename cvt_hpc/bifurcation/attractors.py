@@ -20,6 +20,7 @@ from cvt_hpc.simulation.modules import record_module, transient_module
 from cvt_hpc.simulation.record import record_of
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 
+FROM = ("from the steady state", "from the large start")  # the starts of a branch, in words
 SAID = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
 
 
@@ -39,6 +40,8 @@ class Attractor(NamedTuple):
         the run failed.
     frequency : float
         Of the same [Hz].
+    reason : str
+        Why the run failed, or was found to vibrate or not.
     """
 
     value: float
@@ -46,6 +49,7 @@ class Attractor(NamedTuple):
     occurrence: OccurrenceClass
     amplitude: float
     frequency: float
+    reason: str
 
 
 class Start(NamedTuple):
@@ -56,8 +60,8 @@ class Start(NamedTuple):
     settings : mapping
         Keys of the job with values [SI].
     state : callable or None
-        The belt's state at a value of the parameter, or None where there is none: there the run begins as any
-        other.
+        The belt's state at a value of the parameter, or None where there is none: that run is left out.
+        Without such a function runs begin as any other.
     """
 
     settings: Mapping[str, Any]
@@ -124,6 +128,8 @@ def _run_all(job: Job, parameter: str, starts: Sequence[Start], values: Sequence
         for value in values:
             point = job.point_at({**start.settings, parameter: value})
             state = start.state(value) if start.state else None
+            if start.state and state is None:
+                continue
             key = record_module(job).lane_key(point), state is None
             groups.setdefault(key, []).append((value, k, state, point))
     found = []
@@ -171,6 +177,7 @@ def _run_batch(job: Job, group: list[tuple[float, int, Any, dict[str, Any]]]) ->
                 OccurrenceClass(int(kind)),
                 float(amplitude[largest]),
                 float(frequency[largest]),
+                record["reason"],
             )
         )
     return found

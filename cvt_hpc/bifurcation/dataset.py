@@ -41,6 +41,7 @@ class Stability(IntEnum):
     STABLE = 0
     UNSTABLE = 1
     NOT_FOUND = 2
+    NOT_COMPUTED = 3
 
 
 class Direction(IntEnum):
@@ -58,7 +59,7 @@ def diagram_dataset(diagram: Diagram, followed: Sequence[Followed]) -> xr.Datase
     diagram : Diagram
         What was asked for.
     followed : sequence of Followed
-        Its branches, in the order of `diagram.branches`.
+        Its first branches, in the order of `diagram.branches`: all, or those that are done.
 
     Returns
     -------
@@ -80,7 +81,7 @@ def diagram_dataset(diagram: Diagram, followed: Sequence[Followed]) -> xr.Datase
         "Conventions": "CF-1.11",
         "title": diagram.job.description or diagram.job.name,
         "job_name": diagram.job.name,
-        "job": json.dumps(diagram.job.resolved()),
+        "job": json.dumps(diagram.resolved()),
         "history": history_line(command()),
         CONTENT: DIAGRAM,
     }
@@ -92,7 +93,8 @@ def _steady(diagram: Diagram, followed: Sequence[Followed]) -> dict[str, Any]:
     """Numbers of the steady states over axes and load, and whether they are stable."""
     sizes = {name: c.values.size for name, c in coordinates(diagram.job.parameters).items()}
     grid, dims = _grid(diagram)
-    stability = np.full((len(followed), len(diagram.loads)), Stability.NOT_FOUND, np.int8)
+    stability = np.full((len(diagram.branches), len(diagram.loads)), Stability.NOT_COMPUTED, np.int8)
+    stability[: len(followed)] = Stability.NOT_FOUND
     values = {v.name: np.full((*stability.shape, *(sizes[d] for d in v.dims)), np.nan) for v in VARIABLES}
     for row, one in enumerate(followed):
         for point in one.branch.points:
@@ -116,7 +118,7 @@ def _modes(diagram: Diagram, followed: Sequence[Followed]) -> dict[str, Any]:
     most = max((len(of_one) for of_one in lines), default=0)
     told = {}
     for name, (value, unit, long_name) in OF_MODES.items():
-        array = np.full((len(followed), len(diagram.loads), most), np.nan)
+        array = np.full((len(diagram.branches), len(diagram.loads), most), np.nan)
         for row, of_one in enumerate(lines):
             for column, line in enumerate(of_one):
                 for load, mode in line.items():
@@ -150,9 +152,10 @@ def _onsets(followed: Sequence[Followed]) -> dict[str, Any]:
         "onset_half_waves": ([o.mode.half_waves for _, o, _ in rows], np.int8, "1", "half waves there"),
         "onset_others": ([o.others for _, o, _ in rows], np.int8, "1", "other modes that grow there; 0: "
                          "stability is lost or regained"),
-        "hysteresis_width": ([k.width for *_, k in rows], float, "N m", "between the ends of vibration from "
-                             "the small and from the large start"),
-        "hysteresis_error": ([k.error for *_, k in rows], float, "N m", "half the spacing of runs at both"),
+        "hysteresis_width": ([k.width for *_, k in rows], float, "N m", "from the Hopf point to where "
+                             "vibration from the large start ends"),
+        "hysteresis_error": ([k.error for *_, k in rows], float, "N m", "half the spacing of runs there, "
+                             "and the Hopf point's own error"),
     }  # fmt: skip
     told = {
         name: ("onset", np.array(values, dtype), _attributes(unit, long_name))
@@ -177,7 +180,12 @@ def _runs(followed: Sequence[Followed]) -> dict[str, Any]:
     columns = {
         "run_branch": ([n for n, _ in rows], np.int32, "1", "its branch in the grid of the axes"),
         "run_load": ([run.value for _, run in rows], float, "N m", "load"),
-        "run_start": ([run.start for _, run in rows], np.int8, "1", "0: the small start; 1: the large one"),
+        "run_start": (
+            [run.start for _, run in rows],
+            np.int8,
+            "1",
+            "0: the steady state; 1: the large one",
+        ),
         "run_amplitude": ([run.amplitude for _, run in rows], float, "m", "amplitude in the band"),
         "run_frequency": ([run.frequency for _, run in rows], float, "Hz", "dominant frequency"),
     }
@@ -187,6 +195,8 @@ def _runs(followed: Sequence[Followed]) -> dict[str, Any]:
     }
     classes = np.array([run.occurrence for _, run in rows], np.int8)
     told["run_occurrence"] = "run", classes, _flags(OccurrenceClass, "vibration occurrence")
+    reasons = np.array([run.reason for _, run in rows], object)
+    told["run_reason"] = "run", reasons, {"long_name": "why the run failed, or was found to vibrate or not"}
     return told
 
 

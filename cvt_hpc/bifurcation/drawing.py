@@ -2,7 +2,7 @@
 
 Above the steady state, solid where it is stable and dashed where it is not, its Hopf points and the
 amplitudes of limit cycles as dots; below growth rates and frequencies of its modes. Between loads without a
-steady state nothing is drawn.
+steady state nothing is drawn. Runs that failed have no amplitude: they stand at the upper edge.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from matplotlib.patches import Patch
 
 from cvt_hpc.analysis.figures import WIDTH, balanced, draw
 from cvt_hpc.bifurcation.asking import Diagram
+from cvt_hpc.bifurcation.attractors import FROM
 from cvt_hpc.bifurcation.dataset import mode_lines
-from cvt_hpc.bifurcation.table import gap_lines, place_text
+from cvt_hpc.bifurcation.table import failed_runs, gap_lines, place_text
 from cvt_hpc.models.linear_stability.branch import Onset, Point
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Kind
@@ -29,7 +30,8 @@ if TYPE_CHECKING:
 
 STRANDS = ("#0072b2", "#d55e00")  # t1 and t2
 HOPF, GAP = "#c00000", "#e6e6e6"
-STARTS = (("o", "#000000", "from the steady state"), ("D", "#009e73", "from the large start"))
+STARTS = (("o", "#000000"), ("D", "#009e73"))  # of runs from the steady state and from the large start
+FAILED = ("X", (0.96, 0.90))  # the mark, and how high up the sheet it stands for either start
 MARK = 4.5  # [point]
 KINDS = {
     Kind.SUPERCRITICAL: {"marker": "s", "markersize": 7},
@@ -57,10 +59,10 @@ def branch_figure(diagram: Diagram, followed: Followed) -> Figure:
             axes.axvline(onset.load, color=HOPF, linewidth=0.8, linestyle=":", zorder=1)
         axes.set_xlim(loads[0], loads[-1])
     lower.set_xlabel("load [N m]")
-    lines = [f"Steady states along the load: {diagram.job.name}", place_text(diagram, followed.asked.place)]
+    lines = [f"Steady states along the load: {diagram.job.name}", place_text(diagram, followed.asked)]
     lines += gap_lines(followed)
     figure.suptitle("\n".join(balanced(line, 90) for line in lines if line), fontsize=10)
-    figure.legend(handles=_legend(followed), loc="outside lower center", ncols=3, frameon=False)
+    figure.legend(handles=_legend(followed), loc="outside lower center", ncols=2, frameon=False)
     return figure
 
 
@@ -93,7 +95,7 @@ def _draw_attractors(axes: Axes, followed: Followed) -> None:
         for low, high, stable in stable_parts(piece, followed.onsets):
             style = "-" if stable else (0, (4, 3))
             axes.plot([low, high], [0.0, 0.0], color="black", linewidth=1.8, linestyle=style, clip_on=False)
-    for start, (mark, colour, _) in enumerate(STARTS):
+    for start, (mark, colour) in enumerate(STARTS):
         for kind, fill in ((OccurrenceClass.VIBRATING, colour), (OccurrenceClass.UNDECIDED, "none")):
             shown = [run for run in followed.runs if (run.start, run.occurrence) == (start, kind)]
             axes.plot(
@@ -106,6 +108,19 @@ def _draw_attractors(axes: Axes, followed: Followed) -> None:
                 markerfacecolor=fill,
                 zorder=3 + start,
             )
+    for run in failed_runs(followed):
+        mark, heights = FAILED
+        axes.plot(
+            run.value,
+            heights[run.start],
+            transform=axes.get_xaxis_transform(),  # they have no amplitude
+            marker=mark,
+            markersize=MARK + 2.0,
+            color=STARTS[run.start][1],
+            linestyle="",
+            clip_on=False,
+            zorder=6,
+        )
     for onset, kind in zip(followed.onsets, followed.kinds, strict=True):
         axes.plot(onset.load, 0.0, color=HOPF, clip_on=False, zorder=6, **KINDS[kind.kind])
     axes.set_ylabel("amplitude [µm]")
@@ -157,10 +172,13 @@ def _legend(followed: Followed) -> list[Line2D | Patch]:
     if followed.runs:
         handles += [
             Line2D([], [], color=colour, marker=mark, markersize=MARK, ls="", label=f"limit cycle {text}")
-            for mark, colour, text in STARTS
+            for (mark, colour), text in zip(STARTS, FROM, strict=True)
         ]
         open_mark = {"marker": "o", "markerfacecolor": "none", "markeredgecolor": "black", "linestyle": ""}
         handles.append(Line2D([], [], markersize=MARK, label="undecided", **open_mark))
+    for start in sorted({run.start for run in failed_runs(followed)}):
+        style = {"color": STARTS[start][1], "marker": FAILED[0], "markersize": MARK + 2.0, "linestyle": ""}
+        handles.append(Line2D([], [], label=f"failed {FROM[start]} (no amplitude)", **style))
     handles += [
         Line2D([], [], color=colour, marker=".", label=f"mode of strand t{k}")
         for k, colour in enumerate(STRANDS, 1)

@@ -15,16 +15,24 @@ from cvt_hpc.bifurcation.asking import Asked, Diagram
 from cvt_hpc.bifurcation.attractors import Attractor, Start, attractors
 from cvt_hpc.bifurcation.dataset import diagram_dataset
 from cvt_hpc.bifurcation.drawing import draw_branch
+from cvt_hpc.bifurcation.folder import DATASET, claim_folder, picture_names
 from cvt_hpc.files import written_aside
 from cvt_hpc.models.elastic_belt.belt import Mesh, State, mesh
-from cvt_hpc.models.linear_stability.branch import Branch, Onset, branch, onsets
+from cvt_hpc.models.linear_stability.branch import CLOSE, Branch, Onset, branch, onsets
 from cvt_hpc.models.linear_stability.modes import LOW
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 from cvt_hpc.netcdf import write_netcdf
+from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Criticality, Kind, criticality
 
-AGREEMENT = 5.0  # [N m]: how far runs from near the steady state may turn quiet from the Hopf point
-SEEN = 2.0 / 3.0  # of the lowest frequency that is judged: limit cycles settle at up to half as much again
+# [N m]: how far runs from near the steady state may turn quiet from the Hopf point. They do so up to 5.3 N m
+# off, since linear rates hold below 1 nm alone (README of linear_stability), and windows are 15 N m wide or
+# more. On jobs/branch.toml 2.5 and 10 N m give the same verdicts
+AGREEMENT = 5.0
+# of the lowest frequency that is judged: vibrations that a mode below the band begins may lie in it, as those
+# of 583 Hz beside a mode of 277. On jobs/branch.toml a third gives the same verdicts, since beside slow modes
+# (185 Hz and less) no run begins to vibrate; at four thirds modes of 277-346 Hz are left undecided
+SEEN = 2.0 / 3.0
 
 
 class Followed(NamedTuple):
@@ -77,9 +85,11 @@ class DiagramReport:
 
 
 def make_diagram(
-    diagram: Diagram, out: Path, *, tell: Callable[[str], None] = lambda line: None
+    diagram: Diagram, out: Path, *, fresh: bool = False, tell: Callable[[str], None] = lambda line: None
 ) -> DiagramReport:
-    """Follow all branches, run beside them, and write dataset and pictures.
+    """Follow all branches, run beside them, and write dataset and pictures after each.
+
+    A dataset of the same job that holds more branches, by an earlier start, is left until there are as many.
 
     Parameters
     ----------
@@ -87,28 +97,29 @@ def make_diagram(
         What is asked for.
     out : Path
         Output folder; made if needed.
+    fresh : bool
+        Throw an earlier diagram of the folder away.
     tell : callable
         Given a line when a branch is done.
 
     Raises
     ------
     InputError
-        If the system refuses to write.
+        If the folder holds the diagram of another job, or the system refuses.
     """
-    followed = []
+    held = claim_folder(diagram, out, fresh)
+    dataset, pictures = out / DATASET, picture_names(len(diagram.branches))
+    followed: list[Followed] = []
     for number, asked in enumerate(diagram.branches, 1):
         # matrices are small: threads of the linear algebra would wait for each other in loops
         with threadpool_limits(1):
             followed.append(_follow(diagram, asked))
+        if number >= held:
+            with written_aside(dataset, parents=True) as aside:
+                write_netcdf(diagram_dataset(diagram, followed), aside)
+        draw_branch(diagram, followed[-1], out / pictures[number - 1])
         tell(f"branch {number}/{len(diagram.branches)}: {len(followed[-1].onsets)} Hopf points")
-    with written_aside(out / "branch.nc", parents=True) as aside:
-        write_netcdf(diagram_dataset(diagram, followed), aside)
-    several = len(followed) > 1
-    pictures = [
-        draw_branch(diagram, one, out / (f"branch_{number}.png" if several else "branch.png"))
-        for number, one in enumerate(followed, 1)
-    ]
-    return DiagramReport(tuple(followed), out / "branch.nc", tuple(pictures))
+    return DiagramReport(tuple(followed), dataset, tuple(out / name for name in pictures))
 
 
 def _follow(diagram: Diagram, asked: Asked) -> Followed:
@@ -125,7 +136,7 @@ def _follow(diagram: Diagram, asked: Asked) -> Followed:
         starts = (Start(small, partial(_steady_state, belt, found)), Start(large))
         places = [onset.load for onset in hopf if onset.mode.frequency >= lowest]
         runs = attractors(asked.runs, "load", starts, diagram.loads, places, diagram.resolution)
-    kinds = [_kind(onset, hopf, runs, lowest) for onset in hopf]
+    kinds = [judged(onset, hopf, hidden, runs, lowest) for onset in hopf]
     return Followed(asked, grid, found, hopf, hidden, runs, kinds)
 
 
@@ -149,15 +160,42 @@ def _beside_gap(found: Branch, load: float) -> bool:
     return any(float(one) in found.missed for one in beside)
 
 
-def _kind(onset: Onset, hopf: list[Onset], runs: list[Attractor], lowest: float) -> Criticality:
-    """Whether a Hopf point is super- or subcritical, of one whose mode is within what runs are judged by."""
+def judged(
+    onset: Onset,
+    hopf: list[Onset],
+    hidden: list[tuple[float, float]],
+    runs: list[Attractor],
+    lowest: float,
+) -> Criticality:
+    """Whether a Hopf point is super- or subcritical, of one whose mode is within what runs are judged by.
+
+    Parameters
+    ----------
+    onset : Onset
+        The Hopf point.
+    hopf, hidden
+        All of the branch, and where stability changes unseen, as `onsets` returns them.
+    runs : list of Attractor
+        From near the steady state (start 0) and from the large start (1).
+    lowest : float
+        Lowest frequency of a mode that runs are judged by [Hz].
+    """
     if not runs:
         return Criticality(Kind.UNDECIDED, np.nan, np.nan, "no runs were asked for")
     if onset.mode.frequency < lowest:
         return Criticality(Kind.UNDECIDED, np.nan, np.nan, "its mode lies below the band of runs")
+    if onset.others:
+        return Criticality(Kind.UNDECIDED, np.nan, np.nan, "the steady state is unstable on both sides")
     loads = sorted({run.value for run in runs})
-    small, large = ([int(run.occurrence) for run in runs if run.start == start] for start in (0, 1))
-    others = [one.load for one in hopf if one.mode.frequency >= lowest and one is not onset]
+    classes = {(run.start, run.value): int(run.occurrence) for run in runs}
+    small, large = ([classes.get((k, load), OccurrenceClass.NOT_RUN) for load in loads] for k in (0, 1))
+    # on the stable side the steady state ends to be stable at the next mode, whatever its frequency
+    ends = [load for ends in hidden for load in ends if (load < onset.load) == onset.rising]
+    for other in hopf:
+        if other is not onset and (
+            other.mode.frequency >= lowest or (other.load < onset.load) == onset.rising
+        ):
+            ends.append(other.load)
     return criticality(
         onset.load,
         not onset.rising,
@@ -165,8 +203,9 @@ def _kind(onset: Onset, hopf: list[Onset], runs: list[Attractor], lowest: float)
         small,
         large,
         agreement=AGREEMENT,
+        bracket=0.5 * CLOSE,
         limits=(
-            max((load for load in others if load <= onset.load), default=-np.inf),
-            min((load for load in others if load > onset.load), default=np.inf),
+            max((load for load in ends if load <= onset.load), default=-np.inf),
+            min((load for load in ends if load > onset.load), default=np.inf),
         ),
     )

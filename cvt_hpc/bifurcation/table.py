@@ -2,34 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cvt_hpc.bifurcation.asking import Diagram
+from cvt_hpc.bifurcation.asking import Asked, Diagram
+from cvt_hpc.bifurcation.attractors import FROM, Attractor
+from cvt_hpc.errors import few_of
 from cvt_hpc.job.values import in_words
 from cvt_hpc.models.linear_stability.branch import Onset
+from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Criticality, Kind
 
 if TYPE_CHECKING:
     from cvt_hpc.bifurcation.making import Followed
 
+NAMED = ("friction_gradient", "sheave_stiffness")  # of every branch, axis or not
+MOST_NAMED = 12  # loads in a row
+
 
 def branch_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
     """Yield the lines that tell of one branch."""
-    if followed.asked.place:
-        yield f"{place_text(diagram, followed.asked.place)}:"
+    yield f"{place_text(diagram, followed.asked)}:"
     yield from onset_lines(followed)
     if not followed.onsets:
         yield "no Hopf point between the loads that have a steady state"
     yield from gap_lines(followed)
+    yield from left_out_lines(followed)
 
 
-def place_text(diagram: Diagram, place: Mapping[str, Any]) -> str:
-    """Values of the axes other than the load."""
-    units = {axis.name: axis.unit for axis in diagram.axes}
-    return ", ".join(f"{name.replace('_', ' ')} {in_words(v, units[name])}" for name, v in place.items())
+def place_text(diagram: Diagram, asked: Asked) -> str:
+    """Values of the axes other than the load, and of what a branch depends on most."""
+    declared = diagram.job.schema.parameters
+    values = {name: asked.parameters[name] for name in NAMED} | asked.place
+    return ", ".join(
+        f"{name.replace('_', ' ')} {in_words(value, declared[name].unit)}" for name, value in values.items()
+    )
 
 
 def onset_lines(followed: Followed) -> Iterator[str]:
@@ -68,3 +77,23 @@ def gap_lines(followed: Followed) -> Iterator[str]:
         yield f"no steady state found at {loads} N m"
     for low, high in followed.hidden:
         yield f"stability changes between {low:g} and {high:g} N m, where a steady state is not found"
+
+
+def left_out_lines(followed: Followed) -> Iterator[str]:
+    """Yield the line that says where there is no run from the steady state, because none is found."""
+    begun = {run.value for run in followed.runs if run.start == 0}
+    loads = [f"{run.value:g}" for run in followed.runs if run.start == 1 and run.value not in begun]
+    if loads:
+        yield f"no run {FROM[0]} at {few_of(loads, MOST_NAMED)} N m, where none is found"
+
+
+def failure_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
+    """Yield a line for each run that failed."""
+    place = place_text(diagram, followed.asked)
+    for run in failed_runs(followed):
+        yield f"{place}: the run {FROM[run.start]} at {run.value:g} N m failed: {run.reason}"
+
+
+def failed_runs(followed: Followed) -> list[Attractor]:
+    """Runs of a branch that ended without results."""
+    return [run for run in followed.runs if run.occurrence == OccurrenceClass.FAILED]

@@ -4,6 +4,10 @@ On the unstable side every start vibrates. Where the limit cycle is born at the 
 from it (supercritical), vibration ends there whatever the start. Where an unstable limit cycle bends back
 over the stable side (subcritical), runs from near the steady state turn quiet at the Hopf point, those from
 a large start only at the fold of limit cycles: in between both attractors exist, which is the hysteresis.
+What lies on the unstable side is none of it: a run that is quiet there is quiet by its amplitude alone.
+
+One run where both attractors are found proves nothing: beside a Hopf point a vibration may fade more slowly
+than a run tells. Two are asked for.
 """
 
 from __future__ import annotations
@@ -35,11 +39,11 @@ class Criticality(NamedTuple):
     kind : Kind
         The verdict.
     width : float
-        Between where the vibration ends from the small and from the large start, in the parameter's unit:
-        of the hysteresis, or what is left of it within the runs' spacing; nan if undecided.
+        From the Hopf point, into the stable side, to where the vibration ends from the large start, in the
+        parameter's unit: of the hysteresis, or what is left of it within the runs' spacing; nan if undecided.
     error : float
-        Half of the spacing of the runs at both ends, likewise; inf where runs from the large start vibrate
-        as far as there are any.
+        Half of the spacing of the runs at that end, and the Hopf point's own error; inf where runs from the
+        large start vibrate as far as there are any.
     reason : str
         One line.
     """
@@ -58,6 +62,7 @@ def criticality(
     large: ArrayLike,
     *,
     agreement: float,
+    bracket: float = 0.0,
     limits: tuple[float, float] = (-np.inf, np.inf),
 ) -> Criticality:
     """Say whether a Hopf point is super- or subcritical.
@@ -74,8 +79,10 @@ def criticality(
         `OccurrenceClass` of the runs from near the steady state and from the large start.
     agreement : float
         How far from the Hopf point the runs from the small start may turn quiet.
+    bracket : float
+        How far from `hopf` the Hopf point may lie.
     limits : (float, float)
-        Neighbouring Hopf points, beyond which other branches begin.
+        Neighbouring Hopf points, beyond which other branches begin or the steady state is not stable.
     """
     values = np.asarray(values, dtype=float)
     sign = 1.0 if stable_above else -1.0
@@ -92,28 +99,36 @@ def criticality(
     if abs(turned) > agreement + spread:
         place = hopf + sign * turned
         return _undecided(f"runs from the small start turn quiet at {place:.4g}, not there")
-    both = (small == QUIET) & (large == VIBRATING)
     ends = [turn for turn in _turns(large) if turn[1] > first]
-    if not ends and both[last:].any():
-        reason = "both attractors as far as there are runs on that side"
-        return Criticality(Kind.SUBCRITICAL, float(away[-1]) - turned, np.inf, reason)
-    if not ends or (large[first : ends[0][0]] == QUIET).any():
+    start, end = ends[0] if ends else (len(large) - 1, len(large))
+    along = np.arange(len(away))
+    both = (small == QUIET) & (large == VIBRATING) & (along > first) & (along < end)
+    if (large[first:start] == QUIET).any() or not (ends or both.any()):
         return _undecided("runs from the large start do not vibrate up to it")
-    start, end = ends[0]
-    ended, doubt = _middle(away, start, end)
-    width, error = ended - turned, spread + doubt
-    coexist = first + np.flatnonzero(both[first:end])
-    if coexist.size and width > error:
-        low, high = sorted(hopf + sign * away[coexist[[0, -1]]])
-        reason = f"both attractors from {low:.4g} to {high:.4g}"
-        return Criticality(Kind.SUBCRITICAL, width, error, reason)
-    if coexist.size:
-        place = hopf + sign * away[coexist[0]]
-        return _undecided(f"both attractors at {place:.4g} alone, closer runs would tell")
+    coexist = both & (away > bracket)
+    places = hopf + sign * away
+    if coexist.sum() > 1 and not ends:
+        reason = "both attractors as far as there are runs on that side"
+        return Criticality(Kind.SUBCRITICAL, float(away[coexist][-1]) - bracket, np.inf, reason)
+    if both.any() and coexist.sum() < 2:
+        if coexist.any():
+            return _undecided(f"both attractors {_range(places[coexist])} alone, closer runs would tell")
+        return _undecided(f"both attractors {_range(places[both])}, not where the steady state is stable")
+    width, spacing = _middle(away, start, end)
+    if coexist.any():
+        reason = f"both attractors {_range(places[coexist])}"
+        return Criticality(Kind.SUBCRITICAL, width, spacing + bracket, reason)
     if end > last + 1:
-        place = hopf + sign * away[last + 1]
-        return _undecided(f"the run from the large start at {place:.4g} is undecided")
-    return Criticality(Kind.SUPERCRITICAL, width, error, "vibration ends at one place from either start")
+        label = OccurrenceClass(int(large[last + 1])).label
+        return _undecided(f"the run from the large start at {places[last + 1]:.4g} is {label}")
+    reason = "vibration ends at one place from either start"
+    return Criticality(Kind.SUPERCRITICAL, width, spacing + bracket, reason)
+
+
+def _range(places: np.ndarray) -> str:
+    """Where runs are, in words."""
+    low, high = places.min(), places.max()
+    return f"at {low:.4g}" if low == high else f"from {low:.4g} to {high:.4g}"
 
 
 def _turns(classes: np.ndarray) -> list[tuple[int, int]]:

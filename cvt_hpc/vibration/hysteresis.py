@@ -34,8 +34,9 @@ class StartClass(IntEnum):
 def classify_starts(small: NDArray, large: NDArray) -> NDArray[np.int8]:
     """Class of each cell by its runs from two starts.
 
-    What vibrates from the small start vibrates; a cell is quiet only if it is so from both. Of a cell that
-    is quiet from the small start the other run decides, and where one run says nothing the cell does not.
+    Where a run failed the cell failed, whatever the other says, so that no failure is hidden. Else what
+    vibrates from the small start vibrates; a cell is quiet only if it is so from both. Of a cell that is
+    quiet from the small start the other run decides, and where one run says nothing the cell does not.
 
     Parameters
     ----------
@@ -48,10 +49,9 @@ def classify_starts(small: NDArray, large: NDArray) -> NDArray[np.int8]:
         Values of `StartClass`.
     """
     classes = np.where(small == OccurrenceClass.QUIET, large, small).astype(np.int8)
-    unsaid = (OccurrenceClass.FAILED, OccurrenceClass.NOT_RUN)
     # a vibration from the small start needs no second run, a doubtful one cannot do without
-    doubtful = (small == OccurrenceClass.UNDECIDED) & np.isin(large, unsaid)
-    classes[doubtful] = large[doubtful]
+    classes[(small == OccurrenceClass.UNDECIDED) & (large == OccurrenceClass.NOT_RUN)] = StartClass.NOT_RUN
+    classes[large == OccurrenceClass.FAILED] = StartClass.FAILED
     found = (small == OccurrenceClass.QUIET) & (large == OccurrenceClass.VIBRATING)
     classes[found] = StartClass.LARGE_START_ONLY
     return classes

@@ -21,10 +21,10 @@ Q, V, U, F, N = (OccurrenceClass[name] for name in ("QUIET", "VIBRATING", "UNDEC
 ONLY = StartClass.LARGE_START_ONLY
 TABLE = {  # by the class from the small start, then from the large one
     Q: {Q: Q, V: ONLY, U: U, F: F, N: N},
-    V: {Q: V, V: V, U: V, F: V, N: V},
+    V: {Q: V, V: V, U: V, F: F, N: V},
     U: {Q: U, V: U, U: U, F: F, N: N},
     F: {Q: F, V: F, U: F, F: F, N: F},
-    N: {Q: N, V: N, U: N, F: N, N: N},
+    N: {Q: N, V: N, U: N, F: F, N: N},
 }
 
 
@@ -64,8 +64,29 @@ def test_cells_are_joined_by_size_of_the_start_in_whatever_order():
     assert np.array_equal(occurrence_classes(joined), expected)
     only = int((expected == ONLY).sum())
     assert only > 5
-    assert start_line(joined).startswith(f"{only} of {expected.size} cells: ")
+    assert start_line(dataset, {}, "x").startswith(f"{only} of {expected.size} cells: ")
     assert joined.attrs["starts"] == "0.001 mm and 0.3 mm"
+
+
+def test_of_several_starts_the_smallest_and_the_largest_count():
+    dataset, large, small = two_starts()
+    between = large.copy(deep=True)
+    between["vibrates"][:] = Vibrates.UNDECIDED
+    axis = xr.DataArray([1e-5, 3e-4, 1e-6], dims="disturbance", name="disturbance", attrs={"units": "m"})
+    three = xr.concat([between, large, small], axis, combine_attrs="override")
+    joined = join_starts(three)
+    assert np.array_equal(joined["occurrence_class"], join_starts(dataset)["occurrence_class"])
+    assert joined.attrs["starts"] == "0.001 mm and 0.3 mm"
+
+
+def test_cells_are_counted_that_the_map_shows():
+    dataset, *_ = two_starts()
+    at = {"sheave_stiffness": 1.0}
+    shown = dataset.sel(at)
+    only = int((join_starts(shown)["occurrence_class"] == ONLY).sum())
+    cells = shown["status"][0].size
+    assert only > 0 and cells == dataset["status"][0].size / 2
+    assert start_line(dataset, at, "x").startswith(f"{only} of {cells} cells: ")
 
 
 def test_the_map_has_one_panel_for_both_starts_and_counts_cells():

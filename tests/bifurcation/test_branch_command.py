@@ -96,6 +96,7 @@ def test_a_run_begins_in_the_steady_state(tmp_path):
     at_rest, started = attractors(
         job, "load", (Start(push, lambda load: state), Start(push)), [90.0], [], 1.0
     )
+    assert attractors(job, "load", (Start(push, lambda load: None),), [90.0], [], 1.0) == []
     # what single precision hums, some nm, is left of 1 nm; a load that has risen within 30 ms leaves more
     assert at_rest.amplitude < 1e-8 < 1e-7 < started.amplitude
 

@@ -9,7 +9,8 @@ import pytest
 from cvt_hpc.analysis.figures import STYLE
 from cvt_hpc.bifurcation.attractors import Attractor
 from cvt_hpc.bifurcation.drawing import GAP, HOPF, branch_figure, stable_parts
-from cvt_hpc.bifurcation.table import branch_lines
+from cvt_hpc.bifurcation.table import branch_lines, failure_lines, gap_lines
+from cvt_hpc.job.schema import load_schema
 from cvt_hpc.models.linear_stability.branch import Branch, Onset, Point, branch, onsets, tracks
 from cvt_hpc.models.linear_stability.modes import Mode
 from cvt_hpc.models.steady_variator.walking import NoSteadyState
@@ -18,7 +19,7 @@ from cvt_hpc.vibration.criticality import Criticality, Kind
 
 ALONG = np.linspace(0.0, np.pi, 33)
 SHAPES = [np.sin(k * ALONG) + 0j for k in (1, 2, 3)]
-V, Q, U = OccurrenceClass.VIBRATING, OccurrenceClass.QUIET, OccurrenceClass.UNDECIDED
+Q, V, U, F, NOT_RUN = OccurrenceClass
 
 
 def mode(growth, frequency, shape=0):
@@ -35,21 +36,26 @@ def point(load, *growths):
 
 POINTS = [point(10.0, -50.0, -90.0), point(20.0, 30.0, -60.0), point(30.0, 60.0, -20.0), point(50.0, -70.0, -80.0),
           point(60.0, -75.0, -60.0)]  # fmt: skip
+ONSET = Onset(16.0, POINTS[1].modes[0], True, 0)
 FOUND = Branch(POINTS, {40.0: "no steady state found"})
 
 
 def diagram():
-    return SimpleNamespace(loads=(10.0, 20.0, 30.0, 40.0, 50.0, 60.0), axes=(), job=SimpleNamespace(name="x"))
+    job = SimpleNamespace(name="x", schema=load_schema("linear_stability", None, "x"))
+    return SimpleNamespace(loads=(10.0, 20.0, 30.0, 40.0, 50.0, 60.0), axes=(), job=job)
 
 
-def followed():
-    runs = [Attractor(20.0, 0, V, 9e-6, 450.0), Attractor(30.0, 0, V, 12e-6, 450.0), Attractor(10.0, 0, Q, 1e-9, 1.0),
-            Attractor(10.0, 1, V, 6e-6, 450.0), Attractor(50.0, 1, U, 3e-6, 450.0)]  # fmt: skip
-    onset = Onset(16.0, POINTS[1].modes[0], True, 0)
-    kind = Criticality(Kind.SUBCRITICAL, 6.0, 1.0, "both attractors")
-    asked = SimpleNamespace(place={})
+def run(load, start, occurrence, amplitude=np.nan, reason=""):
+    return Attractor(load, start, occurrence, amplitude, 450.0, reason)
+
+
+def followed(onsets=(ONSET,)):
+    runs = [run(20.0, 0, V, 9e-6), run(30.0, 0, V, 12e-6), run(10.0, 0, Q, 1e-9), run(10.0, 1, V, 6e-6),
+            run(50.0, 1, U, 3e-6), run(60.0, 0, F, reason="slips"), run(60.0, 1, F, reason="slips through")]  # fmt: skip
+    kinds = [Criticality(Kind.SUBCRITICAL, 6.0, 1.0, "both attractors")] * len(onsets)
+    asked = SimpleNamespace(place={}, parameters={"friction_gradient": -0.8, "sheave_stiffness": np.inf})
     return SimpleNamespace(
-        asked=asked, branch=FOUND, onsets=[onset], hidden=[(30.0, 50.0)], runs=runs, kinds=[kind]
+        asked=asked, branch=FOUND, onsets=list(onsets), hidden=[(30.0, 50.0)], runs=runs, kinds=kinds
     )
 
 
@@ -87,6 +93,29 @@ def test_limit_cycles_are_filled_dots_and_quiet_runs_are_not_drawn(panels):
     assert "Hopf point, subcritical" in [text.get_text() for text in legend.get_texts()]
 
 
+def test_failed_runs_stand_at_the_upper_edge_and_in_the_legend(panels):
+    marks = {line.get_color(): line for line in panels[1].lines if line.get_marker() == "X"}
+    assert [list(line.get_xdata()) for line in marks.values()] == [[60.0], [60.0]] and len(marks) == 2
+    for line in marks.values():
+        assert line.get_transform() == panels[1].get_xaxis_transform()
+        assert 0.8 < line.get_ydata()[0] < 1.0
+    (legend,) = panels[0].legends
+    words = [text.get_text() for text in legend.get_texts()]
+    assert {f"failed from the {start} (no amplitude)" for start in ("steady state", "large start")} <= {
+        *words
+    }
+
+
+@pytest.mark.parametrize("onsets", [(), (ONSET,)])
+def test_the_legend_is_on_the_sheet(onsets):
+    with matplotlib.rc_context(STYLE):
+        figure = branch_figure(diagram(), followed(onsets))
+        figure.draw_without_rendering()
+    (legend,) = figure.legends
+    extent = legend.get_window_extent()
+    assert 0.0 <= extent.x0 < extent.x1 <= figure.bbox.width and extent.y0 >= 0.0
+
+
 def test_modes_are_lines_that_end_at_the_gap(panels):
     growth = [line for line in panels[2].lines if line.get_marker() == "."]
     drawn = sorted(
@@ -104,12 +133,20 @@ def test_modes_are_lines_that_end_at_the_gap(panels):
 
 def test_words_name_hopf_points_and_gaps(panels):
     assert list(branch_lines(diagram(), followed())) == [
+        "friction gradient -0.8 s/m, sheave stiffness inf:",
         "Hopf point at 16.0 N m, 420 Hz, 1 half wave in t1: stability lost; subcritical, hysteresis 6.0 +- 1.0 N m",
         "no steady state found at 40 N m",
         "stability changes between 30 and 50 N m, where a steady state is not found",
+        "no run from the steady state at 50 N m, where none is found",
     ]
     title = panels[0].get_suptitle().replace("\n", " ").replace("\u00a0", " ")
-    assert all(line in title for line in list(branch_lines(diagram(), followed()))[1:])
+    assert all(line.rstrip(":") in title for line in (*branch_lines(diagram(), followed()),)[:4:2])
+    assert list(gap_lines(followed()))[1] in title
+    assert list(failure_lines(diagram(), followed())) == [
+        "friction gradient -0.8 s/m, sheave stiffness inf: the run from the steady state at 60 N m failed: slips",
+        "friction gradient -0.8 s/m, sheave stiffness inf: the run from the large start at 60 N m failed: "
+        "slips through",
+    ]
 
 
 def test_a_hopf_point_of_an_unstable_state_does_not_make_it_stable():

@@ -55,10 +55,9 @@ def test_exponential_friction_is_subcritical_with_the_published_hysteresis():
     values, resolution = np.arange(0.17, 0.30, 0.02), 5e-3
     found = of_mass(EXPONENTIAL, hopf, values, resolution, agreement=resolution)
     assert found.kind is Kind.SUBCRITICAL
-    # stick-slip survives to 0.2718 m/s; next to the Hopf point runs from near it grow too slowly to be told
-    # within 8 s, which adds one spacing
-    assert found.width == pytest.approx(0.2718 - hopf, abs=found.error + resolution)
-    assert found.error <= 1.5 * resolution
+    # stick-slip survives to 0.2718 m/s
+    assert found.width == pytest.approx(0.2718 - hopf, abs=found.error)
+    assert found.error <= 0.51 * resolution  # of the runs' spacing, half
 
 
 def test_cubic_friction_is_supercritical_with_the_amplitude_of_averaging():
@@ -76,27 +75,32 @@ def test_cubic_friction_is_supercritical_with_the_amplitude_of_averaging():
 
 
 LOADS = np.arange(1.0, 11.0)
-V, Q, U = VIBRATING, QUIET, UNDECIDED
+V, Q, U, F = VIBRATING, QUIET, UNDECIDED, FAILED
 
 
 def judged(small, large, hopf=5.3, stable_above=True, **changes):
-    classes = ([{"V": V, "q": Q, "?": U}[letter] for letter in letters] for letters in (small, large))
-    return criticality(hopf, stable_above, LOADS, *classes, **({"agreement": 2.0} | changes))
+    classes = ([{"V": V, "q": Q, "?": U, "!": F}[letter] for letter in letters] for letters in (small, large))
+    return criticality(hopf, stable_above, LOADS, *classes, **({"agreement": 2.0, "bracket": 0.1} | changes))
 
 
 @pytest.mark.parametrize(
     ("small", "large", "kind", "width", "error"),
-    [
-        ("VVVVVqqqqq", "VVVVVqqqqq", Kind.SUPERCRITICAL, 0.0, 1.0),
-        ("VVVVVqqqqq", "VVVVVVVVqq", Kind.SUBCRITICAL, 3.0, 1.0),
-        ("VVVVVqqqqq", "VVVVVVV?qq", Kind.SUBCRITICAL, 2.5, 1.5),
-        ("VVVV?qqqqq", "VVVVVqqqqq", Kind.SUPERCRITICAL, 0.5, 1.5),
-        ("VVVVVqqqqq", "VVVVV?qqqq", Kind.SUPERCRITICAL, 0.5, 1.5),
-        ("VVVVVqqqqq", "VVVVVVVVVV", Kind.SUBCRITICAL, 4.5, np.inf),
+    [  # the Hopf point lies 0.3 beyond the fifth run, and is known to 0.1
+        ("VVVVVqqqqq", "VVVVVqqqqq", Kind.SUPERCRITICAL, 0.2, 0.6),
+        ("VVVVVqqqqq", "VVVVVVVVqq", Kind.SUBCRITICAL, 3.2, 0.6),
+        ("VVVVVqqqqq", "VVVVVVV?qq", Kind.SUBCRITICAL, 2.7, 1.1),
+        ("VVVV?qqqqq", "VVVVVqqqqq", Kind.SUPERCRITICAL, 0.2, 0.6),
+        ("VVVVVqqqqq", "VVVVV?qqqq", Kind.SUPERCRITICAL, 0.7, 1.1),
+        ("VVVVVqqqqq", "VVVVVVVVVV", Kind.SUBCRITICAL, 4.6, np.inf),
+        ("VVVVVqqqqq", "VVVVVVVV??", Kind.SUBCRITICAL, 2.6, np.inf),
+        ("VVVqqqqqqq", "VVVVVqqqqq", Kind.UNDECIDED, np.nan, np.nan),
+        ("VVVqqqqqqq", "VVVVVVqqqq", Kind.UNDECIDED, np.nan, np.nan),
+        ("VVVqqqqqqq", "VVVVVVVqqq", Kind.SUBCRITICAL, 2.2, 0.6),
+        ("VVVqqqqqqq", "VVVqqqqqqq", Kind.SUPERCRITICAL, -1.8, 0.6),
         ("VVVVVqqqqq", "VVVVV??qqq", Kind.UNDECIDED, np.nan, np.nan),
         ("VVVVVqqqqq", "VVVVVVqqqq", Kind.UNDECIDED, np.nan, np.nan),
         ("VVVVVqqqqq", "VVVVV?????", Kind.UNDECIDED, np.nan, np.nan),
-        ("VVVVVqqqqq", "VVVV??qqqq", Kind.SUPERCRITICAL, 0.0, 2.0),
+        ("VVVVVqqqqq", "VVVV??qqqq", Kind.SUPERCRITICAL, 0.2, 1.6),
         ("VVVVVqqqqq", "VVVVqqqqqq", Kind.UNDECIDED, np.nan, np.nan),
         ("VVVVVqqqqq", "VVVVqqqVVq", Kind.UNDECIDED, np.nan, np.nan),
         ("VVVVVVVVqq", "VVVVVVVVqq", Kind.UNDECIDED, np.nan, np.nan),
@@ -112,14 +116,29 @@ def test_verdict_on_made_up_classes_either_way_round(small, large, kind, width, 
     assert (mirrored.width, mirrored.error) == pytest.approx((width, error), nan_ok=True)
 
 
+def test_both_attractors_count_where_the_steady_state_is_stable_alone():
+    found = judged("VVVqqqqqqq", "VVVVVqqqqq")
+    assert found.reason == "both attractors from 4 to 5, not where the steady state is stable"
+    # a run as far from the Hopf point as that is known may lie on either side of it
+    assert judged("VVVVVqqqqq", "VVVVVVVqqq", hopf=5.95).reason.endswith("closer runs would tell")
+    assert judged("VVVVVqqqqq", "VVVVVVVqqq", hopf=5.85).kind is Kind.SUBCRITICAL
+
+
+def test_the_run_that_says_nothing_is_named_by_its_class():
+    assert judged("VVVVVqqqqq", "VVVVV!?qqq").reason == "the run from the large start at 7 is undecided"
+    assert judged("VVVVVqqqqq", "VVVVV?!qqq").reason == "the run from the large start at 7 is failed"
+
+
 def test_runs_beyond_the_next_hopf_point_do_not_count():
     small, large = "VVVVVqqqVV", "VVVVVVVVVV"
     found = judged(small, large, limits=(0.0, 8.5))
-    assert (found.kind, found.width, found.error) == (Kind.SUBCRITICAL, 2.5, np.inf)
+    assert (found.kind, found.width, found.error) == (Kind.SUBCRITICAL, pytest.approx(2.6), np.inf)
 
 
 def test_values_are_close_where_a_start_turns_and_at_bifurcations():
-    found = [Attractor(v, 0, Q if v > 3 else U if v == 3 else V, 0.0, 0.0) for v in (1.0, 2.0, 3.0, 4.0, 5.0)]
+    found = [
+        Attractor(v, 0, Q if v > 3 else U if v == 3 else V, 0.0, 0.0, "") for v in (1.0, 2.0, 3.0, 4.0, 5.0)
+    ]
     values = [1.0, 2.0, 3.0, 4.0, 5.0]
     assert close_values(values, found, [], 0.5) == [2.5, 3.5]
     assert close_values(values, found, [4.1], 0.4) == pytest.approx(

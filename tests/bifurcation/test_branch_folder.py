@@ -1,0 +1,105 @@
+"""The folder of a diagram: whose it is, what an interruption leaves, and how failed runs are told of. Branches are made up."""
+
+import pytest
+import xarray as xr
+
+from cvt_hpc.bifurcation import making
+from cvt_hpc.bifurcation.attractors import Attractor
+from cvt_hpc.bifurcation.dataset import Stability
+from cvt_hpc.cli import main
+from cvt_hpc.models.linear_stability.branch import Branch
+from cvt_hpc.vibration.classes import OccurrenceClass
+
+JOB = """
+name = "x"
+model = "linear_stability"
+[axes]
+friction_gradient = ["-1.0 s/m", "-0.8 s/m"]
+load = ["90 N m", "105 N m"]
+"""
+
+
+@pytest.fixture
+def branch(tmp_path, monkeypatch):
+    """The command, on branches without any steady state, whose runs end as `classes` says."""
+    (tmp_path / "x.toml").write_text(JOB)
+
+    def command(*options, classes=(OccurrenceClass.QUIET,) * 2, interrupted=False):
+        left = iter(classes)
+
+        def follow(diagram, asked):
+            kind = next(left)
+            run = Attractor(90.0, 1, kind, 0.0, 0.0, "slips")
+            if interrupted and asked is not diagram.branches[0]:
+                raise KeyboardInterrupt
+            return making.Followed(
+                asked, None, Branch([], dict.fromkeys(diagram.loads, "none")), [], [], [run], []
+            )
+
+        monkeypatch.setattr(making, "_follow", follow)
+        return main(["branch", str(tmp_path / "x.toml"), "--out", str(tmp_path / "out"), *options])
+
+    return command
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def stability(folder):
+    with xr.open_dataset(folder / "branch.nc") as dataset:
+        return dataset["stability"].values.tolist()
+
+
+def test_another_job_is_refused_and_fresh_leaves_none_of_its_pictures(branch, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert branch() == 0
+    (out / "branch_notes.png").write_text("mine")
+    assert names(out) == ["branch.nc", "branch_1.png", "branch_2.png", "branch_notes.png"]
+    before = (out / "branch.nc").read_bytes()
+    assert branch("--set", "friction_gradient=-0.6") == 2
+    error = capsys.readouterr().err
+    assert (
+        "expected the folder of this job, found that of another (" in error
+        and "friction_gradient is" in error
+        and "--fresh" in error
+    )
+    assert (out / "branch.nc").read_bytes() == before
+    assert branch("--set", "friction_gradient=-0.6", "--fresh") == 0
+    assert names(out) == ["branch.nc", "branch.png", "branch_notes.png"]
+    (tmp_path / "x.toml").write_text(JOB + "[branch]\nresolution = 2\n")
+    assert branch("--set", "friction_gradient=-0.6") == 2
+    assert "branch.resolution is 1.0 there, 2.0 here" in capsys.readouterr().err
+    (tmp_path / "x.toml").write_text(JOB.replace('"x"', '"y"'))
+    assert branch("--set", "friction_gradient=-0.6") == 0  # the name is without effect on any number
+
+
+def test_an_interruption_keeps_the_branches_that_are_done(branch, tmp_path):
+    not_found, not_computed = [Stability.NOT_FOUND] * 2, [Stability.NOT_COMPUTED] * 2
+    assert branch(interrupted=True) == 130
+    assert stability(tmp_path / "out") == [not_found, not_computed]
+    assert branch() == 0
+    assert stability(tmp_path / "out") == [not_found, not_found]
+    assert branch(interrupted=True) == 130
+    assert stability(tmp_path / "out") == [not_found, not_found]
+    assert branch("--fresh", interrupted=True) == 130
+    assert stability(tmp_path / "out") == [not_found, not_computed]
+
+
+def test_failed_runs_are_named_and_make_the_exit_status(branch, tmp_path, capsys):
+    assert branch(classes=(OccurrenceClass.QUIET, OccurrenceClass.FAILED)) == 1
+    told = capsys.readouterr()
+    place = "friction gradient -0.8 s/m, sheave stiffness 1"
+    assert f"{place}: the run from the large start at 90 N m failed: slips" in told.err
+    assert "friction gradient -1 s/m: the run" not in told.err
+    assert "branch_2.png" in told.out
+    with xr.open_dataset(tmp_path / "out" / "branch.nc") as dataset:
+        assert dataset["run_reason"].values.tolist() == ["slips", "slips"]
+        assert dataset["run_occurrence"].values.tolist() == [OccurrenceClass.QUIET, OccurrenceClass.FAILED]
+
+
+@pytest.mark.parametrize("key", ["disturbance", "resolution", "branch.resolution", "set"])
+def test_keys_of_the_table_branch_are_not_set_on_the_command_line(key, branch, tmp_path, capsys):
+    assert branch("--set", f"{key}=-1") == 2
+    told = f"--set {key}: expected a parameter or an axis, found a key of [branch]"
+    assert told in capsys.readouterr().err and not (tmp_path / "out").exists()
