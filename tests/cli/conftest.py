@@ -67,6 +67,8 @@ def mechanics(monkeypatch):
         record_coordinates=lambda job: {},
         run_costs=lambda job: np.ones(job.size),
         lane_groups=lambda job, indices: [(index,) for index in indices],
+        turns=lambda job, runs: 1,
+        pilot_share=lambda job: 0.25,
         run_points=run_points,
         simulate=simulate,
         estimate_cost=lambda job: 30.0,

@@ -184,6 +184,31 @@ def test_compiling_kernels_is_no_part_of_a_run(tmp_path, monkeypatch):
         assert (report.done, len(report.failed)) == (done, RUNS - done)
 
 
+def test_groups_that_a_batch_does_one_after_the_other_have_the_limit_each(tmp_path, monkeypatch, caplog):
+    class InTurn(Simulator):
+        """Two seconds for each pair of runs."""
+
+        now = 0.0
+
+        def turns(self, job, runs):
+            return -(-runs // 2)
+
+        def run_points(self, job, points, interrupt):
+            for _ in range(-(-len(points) // 2)):
+                interrupt()
+                self.now += 2.0
+                if reason := interrupt():
+                    raise self.Interrupted(reason)
+            return super().run_points(job, points, interrupt)
+
+    simulator = InTurn(lanes=RUNS)
+    monkeypatch.setattr(time, "monotonic", lambda: simulator.now)
+    for out, limit, done in (("ample", 2.1, RUNS), ("scarce", 1.9, 0)):
+        report = run(JOB, tmp_path / out, simulator=simulator, progress=False, run_limit=limit)
+        assert report.done == done
+        assert not caplog.records
+
+
 def test_a_batch_beyond_the_limit_whose_runs_are_not_is_pointed_out(tmp_path, caplog):
     class Crowded(Simulator):
         def run_points(self, job, points, interrupt):
