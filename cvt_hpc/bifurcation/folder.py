@@ -11,10 +11,10 @@ import xarray as xr
 
 from cvt_hpc.bifurcation.asking import Diagram
 from cvt_hpc.bifurcation.dataset import Stability
-from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.errors import mismatch
 from cvt_hpc.files import naming_refusals
 from cvt_hpc.history_files import DIAGRAM, holds
-from cvt_hpc.study.difference import describe_difference
+from cvt_hpc.study.difference import another_job
 
 DATASET = "branch.nc"
 LABELS = ("name", "description")  # of a job, without effect on any number
@@ -66,9 +66,5 @@ def claim_folder(diagram: Diagram, out: Path, fresh: bool) -> int:
         {key: value for key, value in job.items() if key not in LABELS} for job in (found, diagram.resolved())
     )
     if there != here:
-        raise InputError(
-            f"{out}: expected the folder of this job, found that of another "
-            f"({describe_difference(there, here)}); "
-            "choose another --out, or --fresh to throw its results away"
-        )
+        raise another_job(out, there, here)
     return held

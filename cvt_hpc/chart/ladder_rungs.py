@@ -36,14 +36,15 @@ class Rung(NamedTuple):
     job: Job
 
 
-# Model and question by rung. Of auto, question forces takes every answer of the coarse transient as it is.
-_LOWER: dict[str, tuple[str, str, tuple[str, ...]]] = {
-    "criterion": ("criterion", "", ("occurrence",)),
-    "strand": ("strand", "", ("frequency",)),
-    "steady_variator": ("steady_variator", "", ("forces",)),
-    "linear_stability": ("linear_stability", "", ("occurrence", "onset", "frequency", "forces")),
-    "coarse": ("auto", "forces", QUESTIONS),
-    "auto": ("auto", "occurrence", ("occurrence", "onset")),
+# By rung its model, what a table of that name says, and the questions that it answers. Of auto, question
+# forces without a margin takes every answer of the coarse transient as it is.
+_LOWER: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
+    "criterion": ("criterion", {}, ("occurrence",)),
+    "strand": ("strand", {}, ("frequency",)),
+    "steady_variator": ("steady_variator", {}, ("forces",)),
+    "linear_stability": ("linear_stability", {}, ("occurrence", "onset", "frequency", "forces")),
+    "coarse": ("auto", {"question": "forces", "least_margin": 0.0}, QUESTIONS),
+    "auto": ("auto", {"question": "occurrence"}, ("occurrence", "onset")),
 }
 
 
@@ -69,9 +70,9 @@ def ladder(job: Job) -> tuple[tuple[Rung, ...], dict[str, str]]:
     """
     _check(job)
     rungs, refusals = [], {}
-    for name, (model, question, answers) in _LOWER.items():
+    for name, (model, table, answers) in _LOWER.items():
         try:
-            rungs.append(Rung(name, answers, _handed(job, model, question)))
+            rungs.append(Rung(name, answers, _handed(job, model, table)))
         except InputError as error:
             refusals[name] = str(error)
     reference = build_job(_refined(job), job.source)
@@ -95,13 +96,13 @@ def _check(job: Job) -> None:
             raise mismatch(f"{where}: [axes] {name}", "one value, which the reference refines", "an axis")
 
 
-def _handed(job: Job, model: str, question: str) -> Job:
+def _handed(job: Job, model: str, table: dict[str, Any]) -> Job:
     """The same runs on another model, without the axes that it does not know."""
     known = known_keys(model)
     fewer = replace(job, axes=tuple(axis for axis in job.axes if axis.name in known))
     document = handed_to(fewer, model, "a rung of its ladder")
-    if question:
-        document[model] = {"question": question}
+    if table:
+        document[model] = table
     return build_job(document, job.source)
 
 

@@ -19,7 +19,7 @@ from cvt_hpc.chart.measuring import Measurement
 from cvt_hpc.chart.plan import Chart
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import naming_refusals, written_aside
-from cvt_hpc.study.difference import describe_difference
+from cvt_hpc.study.difference import another_job
 from cvt_hpc.study.folder import CHART_FILE, DamagedJobError
 from cvt_hpc.study.lock import locked
 from cvt_hpc.study.provenance import git_revision, machine, versions
@@ -147,11 +147,7 @@ class ChartFolder:
                 fresh, f"{self.path}: expected {expected}, found one without a {self.job_file.name}"
             )
         if found is not None and not fresh and found["fingerprint"] != self._fingerprint:
-            difference = describe_difference(found["job"], self._chart.resolved())
-            raise InputError(
-                f"{self.path}: expected the folder of this job, found that of another ({difference}); "
-                "choose another --out, or --fresh to throw its results away"
-            )
+            raise another_job(self.path, found["job"], self._chart.resolved())
         return found
 
     def _read_job(self) -> dict[str, Any] | None:

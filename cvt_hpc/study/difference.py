@@ -13,11 +13,7 @@ from cvt_hpc.study.description import Study
 def refuse_other(path: Path, found: Study, asked: Study) -> None:
     """Raise InputError unless the study that a folder holds is the one that is asked for."""
     if found.fingerprint != asked.fingerprint:
-        difference = describe_difference(found.job, asked.job)
-        raise InputError(
-            f"{path}: expected the folder of this job, found that of another (job {found.name}: "
-            f"{difference}); choose another --out, or --fresh to throw its results away"
-        )
+        raise another_job(path, found.job, asked.job, f"job {found.name}: ")
     if _layout(found) != _layout(asked):
         raise InputError(
             f"{path}: expected records with the quantities of this version, found others; choose "
@@ -25,8 +21,17 @@ def refuse_other(path: Path, found: Study, asked: Study) -> None:
         )
 
 
-def describe_difference(found: dict[str, Any], asked: dict[str, Any]) -> str:
-    """Return the first few entries in which two resolved jobs differ, as "key is 1 there, 2 here"."""
+def another_job(path: Path, found: dict[str, Any], asked: dict[str, Any], name: str = "") -> InputError:
+    """Return the error that a folder holds the results of another resolved job."""
+    difference = f"{name}{_difference(found, asked)}"
+    return InputError(
+        f"{path}: expected the folder of this job, found that of another ({difference}); choose another "
+        "--out, or --fresh to throw its results away"
+    )
+
+
+def _difference(found: dict[str, Any], asked: dict[str, Any]) -> str:
+    """The first few entries in which two resolved jobs differ, as "key is 1 there, 2 here"."""
     there, here = _flatten(found), _flatten(asked)
     keys = [key for key in {**there, **here} if there.get(key) != here.get(key)]
     shown = [f"{key} is {_short(there.get(key))} there, {_short(here.get(key))} here" for key in keys[:3]]

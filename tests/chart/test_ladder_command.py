@@ -42,6 +42,7 @@ def test_each_rung_does_the_same_runs_as_far_as_it_knows_them(job):
     assert axes.pop("criterion") == ["friction_gradient"] and axes.pop("strand") == ["load"]
     assert all(names == ["friction_gradient", "load"] for names in axes.values())
     assert [jobs[name].parameters["question"] for name in ("coarse", "auto")] == ["forces", "occurrence"]
+    assert jobs["coarse"].parameters["least_margin"] == 0.0  # every answer as it is, near a threshold or not
     assert jobs["linear_stability"].parameters["stations"] == 48
     own, reference = jobs["elastic_belt"].parameters, jobs["reference"].parameters
     changed = {key: reference[key] / own[key] for key in own if reference[key] != own[key]}
