@@ -2,8 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
+
+
+@dataclass(frozen=True)
+class Substitute:
+    """How a parameter follows from another one that a job gives in its place.
+
+    Attributes
+    ----------
+    key : str
+        The parameter that follows.
+    needs : tuple of str
+        Parameters that decide its value; a model may know only some of them.
+    value : callable
+        Flat values [SI] -> the value [SI]. It raises ValueError where there is none; the text says what is
+        expected of the parameter that the job gives.
+    """
+
+    key: str
+    needs: tuple[str, ...]
+    value: Callable[[Mapping[str, Any]], float]
 
 
 @dataclass(frozen=True)
@@ -13,8 +34,8 @@ class Parameter:
     Attributes
     ----------
     default : Any
-        Value in SI units; None where a job must give it. Its type is the parameter's type:
-        float, int, bool, str, or a (nested) tuple of floats for tables.
+        Value in SI units; None where a job must give it, or may (see `gives`). Its type is the parameter's
+        type: float, int, bool, str, or a (nested) tuple of floats for tables.
     unit : str
         SI unit as pint reads it ("N m", "rad/s"); "" for dimensionless numbers and texts.
     description : str
@@ -29,6 +50,9 @@ class Parameter:
         The legal texts of a str parameter.
     compared_only : bool
         Values other than the default are for `cvt-hpc chart` alone, which shows what is wrong with them.
+    gives : Substitute or None
+        Another parameter, in whose place a job may give this one. Such a parameter has no default: runs know
+        it only if the job gives it.
     """
 
     default: Any
@@ -40,6 +64,7 @@ class Parameter:
     allow_infinite: bool = False
     choices: tuple[str, ...] = ()
     compared_only: bool = False
+    gives: Substitute | None = None
 
 
 def positive(default: float, unit: str, description: str) -> Parameter:

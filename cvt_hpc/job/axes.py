@@ -67,6 +67,13 @@ def read_axis(name: str, parameter: Parameter, raw: Any, where: str) -> Axis:
     InputError
         If the list or the range is not legal.
     """
+    read = read_values(parameter, raw, where)
+    _check_distinct(read, raw, where)
+    return Axis(name, read, parameter.unit, parameter.description)
+
+
+def read_values(parameter: Parameter, raw: Any, where: str) -> tuple:
+    """Return the values [parameter.unit] of a list or a range; arguments and errors as of `read_axis`."""
     if kind_of(parameter) is tuple:
         raise mismatch(where, "a parameter with a single value", "one that takes a list")
     if isinstance(raw, dict):
@@ -79,12 +86,11 @@ def read_axis(name: str, parameter: Parameter, raw: Any, where: str) -> Axis:
         raise mismatch(where, "at least one value", show(raw))
     if len(values) > LARGEST_AXIS:
         raise mismatch(where, f"at most {LARGEST_AXIS} values", f"{len(values)}")
-    read = tuple(read_value(parameter, value, f"{where}, value {i}") for i, value in enumerate(values, 1))
-    _check_distinct(read, values, where)
-    return Axis(name, read, parameter.unit, parameter.description)
+    return tuple(read_value(parameter, value, f"{where}, value {i}") for i, value in enumerate(values, 1))
 
 
-def _check_distinct(read: tuple, values: Any, where: str) -> None:
+def _check_distinct(read: tuple, raw: Any, where: str) -> None:
+    values = read if isinstance(raw, dict) else raw
     first: dict[Any, int] = {}
     for i, value in enumerate(read):
         if value in first:

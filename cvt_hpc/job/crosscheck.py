@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from cvt_hpc.errors import mismatch
+from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.job.axes import Axis
+from cvt_hpc.job.rules import Rule, follow, needed_rules, places, varied_by
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.values import in_words
 
@@ -16,9 +17,17 @@ MOST_CHECKED_POINTS = 20_000
 
 
 def check_grid(
-    schema: Schema, parameters: dict[str, Any], axes: tuple[Axis, ...], source: str, *, sampled: bool = False
+    schema: Schema,
+    parameters: dict[str, Any],
+    axes: tuple[Axis, ...],
+    source: str,
+    *,
+    rules: Sequence[Rule] = (),
+    sampled: bool = False,
 ) -> None:
     """Check the base scene and every run, and that axes are of effect; of a huge grid, the axes' extremes.
+
+    Parameters that follow from others are checked at all values of the axes along which they vary.
 
     Parameters
     ----------
@@ -30,6 +39,8 @@ def check_grid(
         The grid.
     source : str
         The job file, for the error.
+    rules : sequence of Rule
+        How parameters follow from others.
     sampled : bool
         Whether the values of the axes at one place make a run, instead of all their combinations.
 
@@ -39,13 +50,14 @@ def check_grid(
         With the first problem found, and the run that has it; or with an axis that changes no run.
     """
     check_point(schema, parameters, source)
+    _check_rules(schema, parameters, axes, rules, sampled)
     sizes = {axis.name: len(axis.values) for axis in axes}
     idle = {name: "" for name, size in sizes.items() if size > 1}
     for values in zip(*(axis.values for axis in axes), strict=True) if sampled else _points_to_check(axes):
         varied = dict(zip(sizes, values, strict=True))
-        point = {**parameters, **varied}
+        point = follow(rules, {**parameters, **varied})
         check_point(schema, point, source, varied)
-        inert = schema.inert(point) if idle else {}
+        inert = _inert(schema, rules, point) if idle else {}
         idle = {name: inert[name] for name in idle if name in inert}
     for name, setting in idle.items():
         expected = f"one value, since it has no effect with {setting}"
@@ -74,15 +86,51 @@ def check_point(
         With the first problem found.
     """
     for key, expected, found in schema.problems(parameters):
-        place = ", ".join(
-            f"{name} = {in_words(value, schema.parameters[name].unit)}"
-            for name, value in (varied or {}).items()
-        )
         raise mismatch(
-            f"{source}: [{schema.section_of[key]}] {key}",
-            expected,
-            found + (f" (at {place})" if place else ""),
+            f"{source}: [{schema.section_of[key]}] {key}", expected, found + _place(schema, varied or {})
         )
+
+
+def complete_point(
+    schema: Schema, rules: Iterable[Rule], parameters: Mapping[str, Any], varied: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return the parameters [SI] of a run with those that follow from them.
+
+    Raises
+    ------
+    InputError
+        If one of these has no legal value; the error names the run by its values `varied`.
+    """
+    try:
+        return follow(rules, {**parameters, **varied})
+    except InputError as error:
+        raise InputError(f"{error}{_place(schema, varied)}") from None
+
+
+def _place(schema: Schema, varied: Mapping[str, Any]) -> str:
+    words = (f"{key} = {in_words(value, schema.parameters[key].unit)}" for key, value in varied.items())
+    return f" (at {', '.join(words)})" if varied else ""
+
+
+def _check_rules(
+    schema: Schema, parameters: dict[str, Any], axes: tuple[Axis, ...], rules: Sequence[Rule], sampled: bool
+) -> None:
+    for key, along in varied_by(rules, [axis.name for axis in axes]).items():
+        needed = needed_rules(rules, key)
+        for varied in places(axes, along, sampled=sampled):
+            complete_point(schema, needed, parameters, varied)
+
+
+def _inert(schema: Schema, rules: Sequence[Rule], point: dict[str, Any]) -> dict[str, str]:
+    """Return the parameters without effect: what others follow from is of effect as far as these are."""
+    inert = dict(schema.inert(point))
+    for rule in reversed(rules):
+        if rule.is_substituted and rule.key in inert:
+            inert[rule.needs[0]] = inert[rule.key]
+    for rule in reversed(rules):
+        if rule.key not in inert:
+            inert = {key: setting for key, setting in inert.items() if key not in rule.needs}
+    return inert
 
 
 def _points_to_check(axes: tuple[Axis, ...]) -> Iterable[tuple]:

@@ -5,16 +5,47 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from cvt_hpc.job.assignments import Assignments, read_assignments
 from cvt_hpc.job.axes import Axis
-from cvt_hpc.job.crosscheck import check_point
+from cvt_hpc.job.crosscheck import check_point, complete_point
+from cvt_hpc.job.derivation import ordered_rules, overridden
 from cvt_hpc.job.design import Design
+from cvt_hpc.job.formula import Formula
+from cvt_hpc.job.rules import Link, Rule, follow, needed_rules, places, varied_by
 from cvt_hpc.job.schema import Schema, load_schema
 
 HEADER = ("name", "model", "stepper", "description")
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A parameter whose value follows from axes.
+
+    Attributes
+    ----------
+    name : str
+        Of the parameter.
+    axes : tuple of str
+        Those along which it varies, in the job's order.
+    values : tuple
+        Its values [unit] at their combinations in C order; of a sampled job those of all samples.
+    unit, description : str
+        Of the parameter.
+    words : str
+        How it follows: a formula, or what it is linked to or given by.
+    """
+
+    name: str
+    axes: tuple[str, ...]
+    values: tuple
+    unit: str
+    description: str
+    words: str
 
 
 @dataclass(frozen=True)
@@ -30,7 +61,8 @@ class Job:
     source : str
         The path as it was given.
     parameters : dict
-        Value by key. A key that is also an axis has the value of its table, or else the axis' first one.
+        Value by key. A key that is also an axis has the value of its table, or else the axis' first one. What
+        follows from others does so here, too.
     axes : tuple of Axis
         What the study varies, the last axis fastest; empty for a single run.
     given : frozenset of str
@@ -39,6 +71,8 @@ class Job:
         The table [design], resolved; empty for the full grid of the axes.
     histories : tuple of int
         Indices of the runs whose history a sweep keeps; without effect on any number.
+    rules : tuple of Rule
+        How parameters follow from others, in an order in which each finds what it needs.
     """
 
     name: str
@@ -51,6 +85,7 @@ class Job:
     given: frozenset[str] = field(default=frozenset(), compare=False)
     design: Design = field(default_factory=dict)
     histories: tuple[int, ...] = field(default=(), compare=False)
+    rules: tuple[Rule, ...] = ()
 
     @property
     def is_sampled(self) -> bool:
@@ -78,6 +113,25 @@ class Job:
         """What the model and the stepper declare."""
         return load_schema(self.model, self.stepper, self.source)
 
+    @cached_property
+    def derived(self) -> tuple[Derived, ...]:
+        """The parameters that follow from axes, with their values over these."""
+        varied = varied_by(self.rules, [axis.name for axis in self.axes])
+        return tuple(self._derived(rule, varied[rule.key]) for rule in self.rules if varied[rule.key])
+
+    def _derived(self, rule: Rule, along: tuple[str, ...]) -> Derived:
+        needed = needed_rules(self.rules, rule.key)
+        values = tuple(
+            follow(needed, {**self.parameters, **place})[rule.key]
+            for place in places(self.axes, along, sampled=self.is_sampled)
+        )
+        parameter = rule.parameter
+        return Derived(rule.key, along, values, parameter.unit, parameter.description, rule.words)
+
+    def complete(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the parameters of a run at values [SI] of axes: those of the base scene, and what follows."""
+        return follow(self.rules, {**self.parameters, **values})
+
     def point(self, index: int) -> dict[str, Any]:
         """Return the parameters of run `index`, counted in C order over the grid, or over the samples.
 
@@ -89,12 +143,12 @@ class Job:
         if not 0 <= index < self.size:
             raise IndexError(f"run {index} of {self.size}")
         if self.is_sampled:
-            return {**self.parameters, **{axis.name: axis.values[index] for axis in self.axes}}
+            return self.complete({axis.name: axis.values[index] for axis in self.axes})
         values = {}
         for axis in reversed(self.axes):
             index, place = divmod(index, len(axis.values))
             values[axis.name] = axis.values[place]
-        return {**self.parameters, **values}
+        return self.complete(values)
 
     def point_at(self, at: Assignments, label: str = "at") -> dict[str, Any]:
         """Return the parameters of a run at chosen values, whether they lie on the axes or not.
@@ -102,7 +156,8 @@ class Job:
         Parameters
         ----------
         at : mapping, or sequence of "KEY=VALUE"
-            Numbers [SI] or texts with units, by key.
+            Numbers [SI] or texts with units, by key. A parameter that follows from others has this value
+            instead; what gives it otherwise, as `load_share` gives `load`, is then without value.
         label : str
             What to call `at` in an error.
 
@@ -113,9 +168,22 @@ class Job:
         """
         schema = self.schema
         values = read_assignments(at, schema, self.source, label)
-        point = {**self.parameters, **values}
+        if not self.rules and not overridden(values, schema):
+            point = {**self.parameters, **values}
+        else:
+            point = self._derive_anew(values, schema)
         check_point(schema, point, self.source, varied=values)
         return point
+
+    def _derive_anew(self, values: Mapping[str, Any], schema: Schema) -> dict[str, Any]:
+        """Return the base scene with other values, and with what then follows."""
+        gone = {*values, *overridden(values, schema)}
+        stated = [rule for rule in self.rules if not rule.is_substituted and rule.key not in gone]
+        follows = {rule.key for rule in self.rules}
+        scene = {key: value for key, value in self.parameters.items() if key not in gone | follows}
+        given = {*scene} & {*self.given, *(axis.name for axis in self.axes)} | {*values}
+        rules = ordered_rules(stated, given, schema, self.source)
+        return complete_point(schema, rules, scene, values)
 
     def resolved(self) -> dict[str, Any]:
         """Return all that determines the numbers, as a document that `build_job` takes.
@@ -125,17 +193,31 @@ class Job:
         dict
             As a job file is laid out, in JSON types; SI units, and the text "inf" for infinity.
         """
-        swept = {axis.name for axis in self.axes}
-        tables = {
-            section: {key: _to_json(self.parameters[key]) for key in table if key not in swept}
-            for section, table in self.schema.sections.items()
-        }
         return {
             **{key: getattr(self, key) for key in HEADER},
-            **tables,
+            **self.tables(self.parameters, {axis.name for axis in self.axes} | {rule.key for rule in self.rules}),
             **({"design": self.design} if self.design else {}),
+            **self._stated_rules(),
             "axes": {axis.name: [_to_json(value) for value in axis.values] for axis in self.axes},
         }
+
+    def tables(self, point: Mapping[str, Any], left_out: Collection[str] = ()) -> dict[str, dict[str, Any]]:
+        """Return flat parameters [SI] as the tables of a job file, in JSON types."""
+        return {
+            section: {
+                key: _to_json(point[key]) for key in table if key in point and key not in left_out
+            }
+            for section, table in self.schema.sections.items()
+        }
+
+    def _stated_rules(self) -> dict[str, Any]:
+        """Return the tables [derived] and [linked], where there are any, in JSON types."""
+        derived = {rule.key: rule.words for rule in self.rules if isinstance(rule.source, Formula)}
+        linked: dict[str, dict[str, Any]] = {}
+        for rule in self.rules:
+            if isinstance(link := rule.source, Link):
+                linked.setdefault(link.axis, {})[rule.key] = [_to_json(value) for value in link.values]
+        return {name: table for name, table in (("derived", derived), ("linked", linked)) if table}
 
     def fingerprint(self) -> str:
         """Return the SHA-256 [hex] of what determines the numbers; name and description do not count."""

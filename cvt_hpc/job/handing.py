@@ -40,7 +40,7 @@ def handed_to(job: Job, model: str, why: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If an axis is nothing that the other model knows.
+        If an axis is nothing that the other model knows. A formula may still name what it does not know.
     """
     document, known = job.resolved(), known_keys(model)
     for axis in job.axes:
@@ -52,7 +52,13 @@ def handed_to(job: Job, model: str, why: str) -> dict[str, Any]:
         for section, table in document.items()
         if section in job.schema.sections
     }
+    derived = {key: text for key, text in document.get("derived", {}).items() if key in known}
+    linked = {
+        axis: {key: values for key, values in table.items() if key in known}
+        for axis, table in document.get("linked", {}).items()
+    }
     text = f"{job.description}{'; ' if job.description else ''}{model}: {why}"
     head = {"name": job.name, "model": model, "description": text}
     rest = {key: document[key] for key in ("axes", "design") if key in document}
+    tables |= {"derived": derived, "linked": {axis: table for axis, table in linked.items() if table}}
     return head | {section: table for section, table in tables.items() if table} | rest

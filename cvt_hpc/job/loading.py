@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,12 @@ from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignm
 from cvt_hpc.job.axes import Axis, read_axis
 from cvt_hpc.job.crosscheck import check_grid
 from cvt_hpc.job.definition import HEADER, Job
+from cvt_hpc.job.derivation import ordered_rules, overridden, read_derived, read_linked
 from cvt_hpc.job.design import Design, read_design, resolve_spacing
 from cvt_hpc.job.document import read_document
 from cvt_hpc.job.handing import answering_model, handed_to
 from cvt_hpc.job.histories import KEY, read_histories
+from cvt_hpc.job.rules import Link, Rule, follow
 from cvt_hpc.job.sampling import sampled_axes
 from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.values import expectation, read_value
@@ -89,25 +91,72 @@ def build_job(
     replaced = read_assignments(others, schema, source, label)
     changed = {key.removeprefix(_OF_DESIGN): value for key, value in of_design.items()}
     design = read_design({**document.get("design", {}), **changed}, source)
-    axes = _read_axes(document.get("axes", {}), design, replaced, schema, source)
+    gone = {*replaced, *overridden(replaced, schema)}
+    given = {key: value for key, value in tables.items() if key not in gone} | replaced
+    axes, rules = _read_axes_and_rules(document, design, gone, given, schema, source)
     if "first_spacing" in design:
         design = resolve_spacing(design, axes, source)
-    given = {**tables, **replaced}
-    parameters = _resolve({**{axis.name: axis.values[0] for axis in axes}, **given}, schema, source)
-    check_grid(schema, parameters, axes, source, sampled="runs" in design)
+    parameters = _resolve({**{axis.name: axis.values[0] for axis in axes}, **given}, rules, schema, source)
+    check_grid(schema, parameters, axes, source, rules=rules, sampled="runs" in design)
+    settled = _settled(rules, axes)
     histories = document.get(KEY[0], {}).get(KEY[1], [])
-    kept = read_histories(histories, schema, axes, replaced, source, design.get("runs"))
-    given = frozenset(given)
-    job = Job(name, schema.model, schema.stepper, description, source, parameters, axes, given, design, kept)
+    replacing = {key: replaced.get(key) for key in gone}
+    job = Job(
+        name,
+        schema.model,
+        schema.stepper,
+        description,
+        source,
+        parameters,
+        axes,
+        frozenset({*given, *settled}),
+        design,
+        read_histories(histories, schema, axes, replacing, source, design.get("runs")),
+        tuple(rule for rule in rules if rule.key not in settled),
+    )
     answering = answering_model(job)
     return job if answering is None else build_job(handed_to(job, *answering), source)
 
 
+def _read_axes_and_rules(
+    document: Mapping[str, Any],
+    design: Design,
+    gone: Collection[str],
+    given: Collection[str],
+    schema: Schema,
+    source: str,
+) -> tuple[tuple[Axis, ...], list[Rule]]:
+    """Return the axes and the rules in their order, without those that overrides have put out of force."""
+    axes = _read_axes(document.get("axes", {}), design, gone, schema, source)
+    stated = _read_rules(document, axes, design, schema, source)
+    axes = tuple(axis for axis in axes if axis.name not in gone)
+    stated = [rule for rule in stated if rule.key not in gone]
+    return axes, ordered_rules(stated, {*given, *(axis.name for axis in axes)}, schema, source)
+
+
+def _read_rules(
+    document: Mapping[str, Any], axes: tuple[Axis, ...], design: Design, schema: Schema, source: str
+) -> list[Rule]:
+    """Return the rules that the tables [derived] and [linked.AXIS] state."""
+    linked = document.get("linked", {})
+    if linked and "runs" in design:
+        expected = "a grid, since samples have no values to be linked to; a formula in [derived] follows them"
+        raise mismatch(f"{source}: [linked]", expected, f"a design of kind {show(design['kind'])}")
+    derived = read_derived(document.get("derived", {}), schema, source)
+    return derived + read_linked(linked, axes, schema, source)
+
+
+def _settled(rules: Sequence[Rule], axes: tuple[Axis, ...]) -> set[str]:
+    """Return the keys linked to what is no axis by an override: each has one value, which is then given."""
+    swept = {axis.name for axis in axes}
+    return {rule.key for rule in rules if isinstance(rule.source, Link) and rule.source.axis not in swept}
+
+
 def _refuse_what_is_compared_only(job: Job) -> None:
     values = {name: (value,) for name, value in job.parameters.items()}
-    values.update({axis.name: axis.values for axis in job.axes})
+    values.update({axis.name: axis.values for axis in (*job.axes, *job.derived)})
     for key, parameter in job.schema.parameters.items():
-        others = [value for value in values[key] if value != parameter.default]
+        others = [value for value in values.get(key, ()) if value != parameter.default]
         if parameter.compared_only and others:
             where = f"{job.source}: [{job.schema.section_of[key]}] {key}"
             expected = f"{show(parameter.default)} in a job of runs; `cvt-hpc chart` compares other values"
@@ -130,7 +179,7 @@ def _read_description(head: Mapping[str, Any], source: str) -> str:
 
 
 def _check_top_level(document: Mapping[str, Any], schema: Schema, source: str) -> None:
-    tables = [*schema.sections, "axes", "design"]
+    tables = [*schema.sections, "axes", "design", "derived", "linked"]
     for key, value in document.items():
         if key in HEADER:
             continue
@@ -164,38 +213,36 @@ def _read_tables(document: Mapping[str, Any], schema: Schema, source: str) -> di
 
 
 def _read_axes(
-    table: Mapping[str, Any], design: Design, replaced: Mapping[str, Any], schema: Schema, source: str
+    table: Mapping[str, Any], design: Design, gone: Collection[str], schema: Schema, source: str
 ) -> tuple[Axis, ...]:
-    """Return the axes, but those that are replaced by one value."""
+    """Return the axes of the file, of samples but those that are replaced by one value."""
     found: dict[str, tuple[Parameter, Any, str]] = {}
-    for name, raw in _flatten(table, schema):
+    for name, raw in schema.flatten(table):
         where = f"{source}: [axes] {name}"
         key = schema.find(name, where)
         if key in found:
             raise mismatch(where, "one axis for a parameter", f"a second one for {key}")
         found[key] = (schema.parameters[key], raw, where)
     if "runs" in design:
-        left = {key: entry for key, entry in found.items() if key not in replaced}
+        left = {key: entry for key, entry in found.items() if key not in gone}
         return sampled_axes(left, design, source)
-    axes = tuple(read_axis(key, *entry) for key, entry in found.items())
-    return tuple(axis for axis in axes if axis.name not in replaced)
+    return tuple(read_axis(key, *entry) for key, entry in found.items())
 
 
-def _flatten(table: Mapping[str, Any], schema: Schema) -> Iterator[tuple[str, Any]]:
-    """Yield name and value; TOML reads the line `scene.load = [...]` as a table "scene" with a key "load"."""
-    for name, raw in table.items():
-        if name in schema.sections and isinstance(raw, Mapping):
-            yield from ((f"{name}.{key}", value) for key, value in raw.items())
-        else:
-            yield name, raw
-
-
-def _resolve(values: Mapping[str, Any], schema: Schema, source: str) -> dict[str, Any]:
-    """Return the value of every key, in the order of declaration."""
+def _resolve(
+    values: Mapping[str, Any], rules: Sequence[Rule], schema: Schema, source: str
+) -> dict[str, Any]:
+    """Return the value of every key that has one, in the order of declaration."""
+    follows = {rule.key for rule in rules}
     resolved = {}
     for key, parameter in schema.parameters.items():
-        where = f"{source}: [{schema.section_of[key]}] {key}"
-        if key not in values and parameter.default is None:
+        if key in values:
+            resolved[key] = values[key]
+        elif key not in follows and parameter.default is not None:
+            where = f"{source}: [{schema.section_of[key]}] {key}"
+            resolved[key] = read_value(parameter, parameter.default, where)
+        elif key not in follows and parameter.gives is None:
+            where = f"{source}: [{schema.section_of[key]}] {key}"
             raise mismatch(where, expectation(parameter), "nothing")
-        resolved[key] = values[key] if key in values else read_value(parameter, parameter.default, where)
-    return resolved
+    resolved = follow(rules, resolved)
+    return {key: resolved[key] for key in schema.parameters if key in resolved}

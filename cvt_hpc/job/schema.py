@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
@@ -92,6 +92,14 @@ class Schema:
         if home is not None:
             raise InputError(f"{where}: belongs in [{home}], found in [{section}]")
         raise self._unknown_key(name, where, section)
+
+    def flatten(self, table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+        """Yield name and value; TOML reads the line `scene.load = [...]` as a table "scene" with a key "load"."""
+        for name, raw in table.items():
+            if name in self.sections and isinstance(raw, Mapping):
+                yield from ((f"{name}.{key}", value) for key, value in raw.items())
+            else:
+                yield name, raw
 
     def nearest(self, name: str, section: str | None = None) -> str:
         """Return "; did you mean KEY?" for the nearest key, with its table where that is another one."""

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from cvt_hpc.job.axes import Axis
-from cvt_hpc.job.definition import Job
+from cvt_hpc.job.definition import Derived, Job
 from cvt_hpc.job.values import in_words
 
 _FEW = 8
@@ -39,6 +39,8 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
         in_short = _range_in_words if job.is_sampled else _values_in_words
         axes = [(axis.name, in_short(axis), f"{len(axis.values)} {noun}") for axis in job.axes]
         lines += ["", "[axes]", *_columns(axes)]
+    if job.rules:
+        lines += ["", "[derived]", *_columns(_rules(job))]
     if job.design:
         design = [(key, _setting_in_words(value)) for key, value in job.design.items()]
         lines += ["", "[design]", *_columns(design)]
@@ -53,19 +55,35 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
 
 
 def _tables(job: Job) -> dict[str, list[tuple[str, ...]]]:
-    swept = {axis.name for axis in job.axes}
+    kinds = {
+        **dict.fromkeys(job.given, "given"),
+        **{axis.name: "axis" for axis in job.axes},
+        **{rule.key: "derived" for rule in job.rules},
+    }
+    elsewhere = {"axis": "see [axes]", "derived": "see [derived]"}
     tables: dict[str, list[tuple[str, ...]]] = {}
     for section, table in job.schema.sections.items():
-        tables[section] = [
-            (
-                key,
-                "see [axes]" if key in swept else in_words(job.parameters[key], parameter.unit),
-                "axis" if key in swept else "given" if key in job.given else "default",
-                parameter.description,
-            )
-            for key, parameter in table.items()
-        ]
+        rows = []
+        for key, parameter in table.items():
+            kind = kinds.get(key, "default")
+            value = in_words(job.parameters[key], parameter.unit) if key in job.parameters else "none"
+            rows.append((key, elsewhere.get(kind, value), kind, parameter.description))
+        tables[section] = rows
     return tables
+
+
+def _rules(job: Job) -> list[tuple[str, ...]]:
+    """Return for each parameter that follows from others its values, how it follows, and along which axes."""
+    varied = {derived.name: derived for derived in job.derived}
+    rows = []
+    for rule in job.rules:
+        if rule.key in varied:
+            values = _range_in_words(varied[rule.key])
+            along = f"varies with {', '.join(varied[rule.key].axes)}"
+        else:
+            values, along = in_words(job.parameters[rule.key], rule.parameter.unit), "the same in all runs"
+        rows.append((rule.key, values, rule.words, along))
+    return rows
 
 
 def _columns(rows: list[tuple[str, ...]]) -> list[str]:
@@ -84,7 +102,9 @@ def _values_in_words(axis: Axis) -> str:
     return f"{', '.join(words)} {axis.unit}".rstrip()
 
 
-def _range_in_words(axis: Axis) -> str:
+def _range_in_words(axis: Axis | Derived) -> str:
+    if isinstance(axis.values[0], str):
+        return ", ".join(dict.fromkeys(axis.values))
     return f"{in_words(min(axis.values), '')} to {in_words(max(axis.values), '')} {axis.unit}".rstrip()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -74,6 +75,55 @@ def variator(ratio: float, driven_radius: float, centre_distance: float) -> Vari
         np.pi + 2.0 * psi,
         centre_distance * np.cos(psi),
     )
+
+
+def driven_radius(ratio: float, belt_length: float, centre_distance: float) -> float:
+    """Pitch radius on the driven pulley at which a belt of given length closes.
+
+    The length of the closed path grows with the driving radius r, i being the ratio and a the centre distance:
+
+        L(r) = r (pi - 2 psi) + i r (pi + 2 psi) + 2 a cos(psi),    sin(psi) = (i - 1) r / a,
+        dL/dr = (pi - 2 psi) + i (pi + 2 psi) > 0.
+
+    L is convex, too. Newton's iteration from the largest radius, at which the pitch circles touch, therefore
+    comes down to the root without overshooting it, and ends where rounding lets it descend no further.
+
+    Parameters
+    ----------
+    ratio : float
+        Speed ratio i = driven radius / driving radius [1].
+    belt_length : float
+        Length of the closed pitch line [m].
+    centre_distance : float
+        Distance of the shafts [m].
+
+    Returns
+    -------
+    float
+        [m]
+
+    Raises
+    ------
+    ValueError
+        If no pulleys fit; the text says which lengths there are.
+    """
+
+    def residual_and_slope(radius: float) -> tuple[float, float]:
+        psi = math.asin((ratio - 1.0) * radius / centre_distance)
+        slope = (math.pi - 2.0 * psi) + ratio * (math.pi + 2.0 * psi)
+        return radius * slope + 2.0 * centre_distance * math.cos(psi) - belt_length, slope
+
+    radius = centre_distance / (1.0 + ratio)
+    residual, slope = residual_and_slope(radius)
+    if not (residual > 0.0 and belt_length > 2.0 * centre_distance):
+        raise ValueError(
+            f"more than {2.0 * centre_distance:g} m, twice the centre distance, and less than "
+            f"{belt_length + residual:.6g} m, where the pulleys touch"
+        )
+    while (lower := radius - residual / slope) < radius:
+        radius = lower
+        residual, slope = residual_and_slope(radius)
+    return ratio * radius
 
 
 def variator_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:

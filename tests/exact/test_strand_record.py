@@ -7,9 +7,9 @@ from scipy.integrate import quad, solve_ivp
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.strand.forces import net_forces
-from cvt_hpc.models.strand.parameters import largest_load
 from cvt_hpc.models.strand.record import MODES
 from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies, ritz_matrices
+from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.variables import Status, Vibrates
 
 # A strand of unit length, mass and tension: shafts 1 m apart, radii of 1/4 m; wave speed 1 m/s
@@ -155,7 +155,7 @@ def test_load_beyond_friction_is_refused():
     p = rung_job("strand").parameters
     # Bullinger et al. 2005, eq. 2: M / r = 2 mu / cos(d) thrust; there the whole wrap slides
     most = 2.0 * 0.1 / np.cos(p["half_wedge_angle"]) * 50e3 * 0.075 / 2.52
-    assert largest_load(p) == pytest.approx(most)
+    assert carried_torque(p) == pytest.approx(most)
     for load in (0.9999 * most, -0.9999 * most):
         forces = net_forces(rung_job("strand", load=load).parameters)
         assert np.all(forces > 0.0)

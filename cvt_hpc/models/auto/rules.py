@@ -27,6 +27,7 @@ import numpy as np
 
 from cvt_hpc import recording
 from cvt_hpc.models import elastic_belt
+from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.variables import Vibrates
 from cvt_hpc.vibration import criterion
 from cvt_hpc.vibration.assessment import Occurrence
@@ -48,12 +49,10 @@ class Rung(IntEnum):
 def is_passive(parameters: Mapping[str, Any]) -> bool:
     """Whether friction nowhere falls with speed and carries the load by far, and no force is asked for."""
     p = parameters
-    table = np.array(p["table_mu"]) if p["friction_law"] == "table" else np.array([[p["kinetic_friction"]]])
-    falls = bool(np.any(np.diff(table) < 0.0)) if table.size > 1 else p["friction_gradient"] != 0.0
+    is_table = p["friction_law"] == "table"
+    falls = bool(np.any(np.diff(p["table_mu"]) < 0.0)) if is_table else p["friction_gradient"] != 0.0
     loads = [p["load"]] if p["load_history"] == "constant" else [p["load"], p["load_start"]]
-    radius = p["driven_radius"] / p["ratio"]
-    carried = 2.0 * table.min() * p["thrust"] * radius / np.cos(p["half_wedge_angle"])
-    is_carried = max(map(abs, loads)) <= CARRIED_SHARE * carried
+    is_carried = max(map(abs, loads)) <= CARRIED_SHARE * carried_torque(p)
     return bool(p["question"] != "forces" and not falls and is_carried)
 
 

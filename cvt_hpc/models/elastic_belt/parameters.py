@@ -6,28 +6,48 @@ are those of a common passenger-car belt; every other default is an assumption, 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from cvt_hpc.parameters import Parameter, not_negative, positive
+from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
+from cvt_hpc.physics import capacity
 from cvt_hpc.physics.friction_problems import friction_inert, friction_problems
-from cvt_hpc.physics.geometry import variator, variator_problems
+from cvt_hpc.physics.geometry import driven_radius, variator, variator_problems
 
 
 def _stiffness(default: float, unit: str, description: str) -> Parameter:
     return Parameter(default, unit, description, minimum=0.0, exclusive=True, allow_infinite=True)
 
 
+def _closing_radius(parameters: Mapping[str, Any]) -> float:
+    return driven_radius(*(parameters[key] for key in ("ratio", "belt_length", "centre_distance")))
+
+
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {
         "ratio": positive(2.52, "", "speed ratio, driven radius / driving radius (Lebrecht 2004: LOW stop)"),
         "driven_radius": positive(0.075, "m", "pitch radius on the driven pulley"),
+        "belt_length": Parameter(
+            None,
+            "m",
+            "length of the closed pitch line, in the place of driven_radius, which follows at each ratio",
+            minimum=0.0,
+            exclusive=True,
+            gives=Substitute("driven_radius", ("ratio", "centre_distance"), _closing_radius),
+        ),
         "centre_distance": positive(0.155, "m", "distance of the shafts"),
         "driving_speed": positive(3000.0 * np.pi / 30.0, "rad/s", "speed of the driving pulley, prescribed"),
         "thrust": positive(50e3, "N", "axial force on the driven pulley"),
         "load": Parameter(
             0.0, "N m", "torque at the driving pulley; the driven one is loaded by ratio x load"
+        ),
+        "load_share": Parameter(
+            None,
+            "",
+            "torque ratio, load over the torque that friction carries, in the place of load, which follows",
+            gives=Substitute("load", capacity.NEEDS, capacity.shared_load),
         ),
         "load_history": Parameter(
             "constant",

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from cvt_hpc.models import elastic_belt
 from cvt_hpc.parameters import Parameter, not_negative
+from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.physics.geometry import variator_problems
 
 _BELT = elastic_belt.PARAMETERS
@@ -18,7 +17,16 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {
         **{
             key: _BELT["scene"][key]
-            for key in ("ratio", "driven_radius", "centre_distance", "driving_speed", "thrust", "load")
+            for key in (
+                "ratio",
+                "driven_radius",
+                "belt_length",
+                "centre_distance",
+                "driving_speed",
+                "thrust",
+                "load",
+                "load_share",
+            )
         },
         "strand_forces": Parameter(
             "formulas",
@@ -64,18 +72,11 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     p = parameters
     problems = variator_problems(p)
     if not problems and p["strand_forces"] == "formulas":
-        most = largest_load(p)
+        most = carried_torque(p)  # from there on the driven pulley slips
         if abs(p["load"]) >= most:
             expected = f"less than {most:.4g} N m, which friction carries on the driven pulley"
             problems.append(("load", expected, f"{p['load']:g} N m"))
     return problems
-
-
-def largest_load(parameters: dict[str, Any]) -> float:
-    """Torque at the driving pulley [N m] from which the driven one slips (Bullinger et al. 2005, eq. 2)."""
-    p = parameters
-    force = 2.0 * p["kinetic_friction"] * p["thrust"] / np.cos(p["half_wedge_angle"])
-    return force * p["driven_radius"] / p["ratio"]
 
 
 def inert(parameters: dict[str, Any]) -> dict[str, str]:

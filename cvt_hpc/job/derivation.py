@@ -1,0 +1,140 @@
+"""Which parameters of a job follow from others: its tables [derived] and [linked.AXIS], and substitutes.
+
+[derived] has formulas, [linked.AXIS] the parameters that follow an axis value by value. Substitutes are the model's:
+`belt_length` gives `driven_radius`. Rules are brought into an order in which each finds what it needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from graphlib import CycleError, TopologicalSorter
+from typing import Any
+
+from cvt_hpc.errors import mismatch, show, unknown
+from cvt_hpc.job.axes import Axis, read_values
+from cvt_hpc.job.formula import read_formula
+from cvt_hpc.job.rules import Link, Rule, Substituted
+from cvt_hpc.job.schema import Schema
+from cvt_hpc.job.values import kind_of
+
+
+def read_derived(table: Mapping[str, Any], schema: Schema, source: str) -> list[Rule]:
+    """Return the rules of a job file's table [derived].
+
+    Raises
+    ------
+    InputError
+        If a key is unknown, no number, or has no legal formula.
+    """
+    rules = []
+    for name, raw in schema.flatten(table):
+        where = f"{source}: [derived] {name}"
+        key = schema.find(name, where)
+        parameter = schema.parameters[key]
+        if kind_of(parameter) not in (int, float):
+            raise mismatch(where, "a parameter that is a number", key)
+        rules.append(Rule(key, read_formula(raw, schema.parameters, where), where, parameter))
+    return rules
+
+
+def read_linked(tables: Mapping[str, Any], axes: Iterable[Axis], schema: Schema, source: str) -> list[Rule]:
+    """Return the rules of a job file's tables [linked.AXIS].
+
+    Parameters
+    ----------
+    tables : mapping
+        By the name of an axis a table of keys, each with as many values as the axis has.
+    axes : iterable of Axis
+        The grid, as the file gives it.
+    schema : Schema
+        What may be linked.
+    source : str
+        The job file, for the error.
+
+    Raises
+    ------
+    InputError
+        If an axis or a key is unknown, or there are more or fewer values.
+    """
+    known = {axis.name: axis for axis in axes}
+    rules = []
+    for axis_name, table in tables.items():
+        where = f"{source}: [linked.{axis_name}]"
+        if not isinstance(table, Mapping):
+            raise mismatch(f"{source}: [linked] {axis_name}", f"a table [linked.{axis_name}]", show(table))
+        if axis_name not in known:
+            raise unknown(where, "axis", axis_name, known)
+        rules += [_read_link(name, raw, known[axis_name], schema, where) for name, raw in table.items()]
+    return rules
+
+
+def _read_link(name: str, raw: Any, axis: Axis, schema: Schema, where: str) -> Rule:
+    where = f"{where} {name}"
+    key = schema.find(name, where)
+    values = read_values(schema.parameters[key], raw, where)
+    if len(values) != len(axis.values):
+        raise mismatch(where, f"{len(axis.values)} values, one for each of {axis.name}", f"{len(values)}")
+    return Rule(key, Link(axis.name, axis.values, values, axis.unit), where, schema.parameters[key])
+
+
+def overridden(keys: Collection[str], schema: Schema) -> set[str]:
+    """Return what values of these keys put out of force: what they give, and what else would give them."""
+    given = {schema.parameters[key].gives.key for key in keys if schema.parameters[key].gives}
+    return given | {key for key, p in schema.parameters.items() if p.gives and p.gives.key in keys}
+
+
+def ordered_rules(rules: Iterable[Rule], given: Collection[str], schema: Schema, source: str) -> list[Rule]:
+    """Return the rules of a job, substitutes included, in an order in which each finds what it needs.
+
+    Parameters
+    ----------
+    rules : iterable of Rule
+        Of the tables [derived] and [linked].
+    given : collection of str
+        The keys that have a value of their own, or several on an axis; defaults excluded.
+    schema : Schema
+        Of the job.
+    source : str
+        The job file, for the error.
+
+    Raises
+    ------
+    InputError
+        If a parameter is given twice, a rule needs one that has no value, or rules need each other in a circle.
+    """
+    found: dict[str, Rule] = {}
+    for rule in rules:
+        if rule.key in given or rule.key in found:
+            raise mismatch(rule.where, "one source of its values", f"a second one of {rule.key}")
+        found[rule.key] = rule
+    found |= _substituted({*given, *found}, schema, source)
+    for rule in found.values():
+        _check_known(rule, {*given, *found}, schema)
+    try:
+        order = TopologicalSorter({key: rule.needs for key, rule in found.items()}).static_order()
+        return [found[key] for key in order if key in found]
+    except CycleError as error:
+        circle = error.args[1]
+        rule = next(found[key] for key in circle if not isinstance(found[key].source, Substituted))
+        raise mismatch(rule.where, "formulas without a circle", " -> ".join(circle)) from None
+
+
+def _substituted(known: set[str], schema: Schema, source: str) -> dict[str, Rule]:
+    rules = {}
+    for key, parameter in schema.parameters.items():
+        if parameter.gives is None or key not in known:
+            continue
+        target = parameter.gives.key
+        where = f"{source}: [{schema.section_of[key]}] {key}"
+        if target in known or target in rules:
+            raise mismatch(where, f"either {key} or {target}", "both")
+        names = (key, *(need for need in parameter.gives.needs if need in schema.parameters))
+        source_of = Substituted(key, names, parameter.unit, parameter.gives)
+        rules[target] = Rule(target, source_of, where, schema.parameters[target])
+    return rules
+
+
+def _check_known(rule: Rule, known: set[str], schema: Schema) -> None:
+    for need in rule.needs:
+        if need not in known and schema.parameters[need].gives is not None:
+            raise mismatch(rule.where, "parameters that the job gives", f"{need}, which it does not")

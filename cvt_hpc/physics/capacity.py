@@ -1,0 +1,55 @@
+"""The torque that friction carries, by which loads of different ratios and thrusts are compared."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+NEEDS = (
+    "ratio",
+    "driven_radius",
+    "thrust",
+    "half_wedge_angle",
+    "friction_law",
+    "kinetic_friction",
+    "table_mu",
+)
+
+
+def carried_torque(parameters: Mapping[str, Any]) -> float:
+    """Torque at the driving pulley [N m] that friction carries on rigid sheaves.
+
+    Bullinger et al. 2005, eq. 2: M* = 2 mu / cos(delta_0) r_dr Q. Here Q is the thrust on the driven pulley,
+    which is the one that a job prescribes, and mu is the level of `friction_level`.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat values [SI] by the names in NEEDS; a model without a choice of friction laws has the last one and
+        `friction_law` not.
+
+    Raises
+    ------
+    ValueError
+        If the friction table has no coefficients.
+    """
+    p = parameters
+    radius = p["driven_radius"] / p["ratio"]
+    return 2.0 * friction_level(p) * p["thrust"] * radius / math.cos(p["half_wedge_angle"])
+
+
+def friction_level(parameters: Mapping[str, Any]) -> float:
+    """Coefficient of friction [1] that does not change with the friction gradient; of a table the least one."""
+    if parameters.get("friction_law") != "table":
+        return parameters["kinetic_friction"]
+    rows = (row if isinstance(row, tuple) else (row,) for row in parameters["table_mu"])
+    coefficients = [mu for row in rows for mu in row]
+    if not coefficients:
+        raise ValueError("a friction table with coefficients in table_mu")
+    return min(coefficients)
+
+
+def shared_load(parameters: Mapping[str, Any]) -> float:
+    """Torque at the driving pulley [N m] that is the share `load_share` of what friction carries."""
+    return parameters["load_share"] * carried_torque(parameters)
