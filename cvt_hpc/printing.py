@@ -123,9 +123,10 @@ def _in_megabytes(size: float) -> str:
 def point_lines(job: Job, at: Mapping[str, Any]) -> Iterator[str]:
     """Yield the line that says where on the axes of its job a run stands."""
     point = job.point_at(at)
-    keys = dict.fromkeys([*(axis.name for axis in job.axes), *at])
-    if keys:
-        words = (f"{key} {in_words(point[key], job.schema.parameters[key].unit)}" for key in keys)
+    # a load that is given leaves no share of which it would follow
+    keys = dict.fromkeys([*(varied.name for varied in (*job.axes, *job.derived)), *at])
+    words = [f"{key} {in_words(point[key], job.schema.parameters[key].unit)}" for key in keys if key in point]
+    if words:
         yield f"at      {', '.join(words)}"
 
 

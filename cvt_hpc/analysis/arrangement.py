@@ -42,8 +42,9 @@ class Arrangement:
 def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> Arrangement:
     """Choose what a map shows.
 
-    `load` runs along x, else the last numeric axis; `friction_gradient` along y, `sheave_stiffness` over
-    the panels, else the first axes that are left. Further axes are fixed at their first value.
+    `load` runs along x, or `load_share`, else the last numeric axis; `friction_gradient` along y,
+    `sheave_stiffness` over the panels, else the first axes that are left. Further axes are fixed at their
+    first value.
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> Arrangem
             "`cvt-hpc simulate` draws one"
         )
     numeric = [name for name in free if dataset[name].dtype.kind in "iuf"]
-    x = "load" if "load" in numeric else (numeric or free)[-1]
+    x = next((name for name in ("load", "load_share") if name in numeric), (numeric or free)[-1])
     rest = [name for name in free if name != x]
     # The panels' axis must not be taken for y where there is another one to take.
     y = _take(rest, "friction_gradient", avoid="sheave_stiffness")

@@ -120,5 +120,8 @@ def _place(attributes: Mapping[str, Any]) -> str:
     job, point = json.loads(attributes["job"]), json.loads(attributes["point"])
     schema = load_schema(job["model"], job["stepper"], "history")
     tables = {key: value for section in schema.sections for key, value in job.get(section, {}).items()}
-    keys = [*job["axes"], *(key for key in tables if point[key] != tables[key])]
-    return ", ".join(f"{key} {in_words(point[key], schema.parameters[key].unit)}" for key in keys)
+    others = [key for key in point if key not in job["axes"] and point[key] != tables.get(key)]
+    keys = [*job["axes"], *others]  # those that follow from others stand in no table
+    return ", ".join(
+        f"{key} {in_words(point[key], schema.parameters[key].unit)}" for key in keys if key in point
+    )

@@ -52,7 +52,8 @@ def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> F
     """
     if at:
         raise mismatch(f"{source}: at {next(iter(at))}", "results over a grid", "samples, all apart")
-    names = [str(name) for name, coordinate in dataset.coords.items() if coordinate.dims == ("run",)]
+    along = {str(name): array for name, array in dataset.coords.items() if array.dims == ("run",)}
+    names = [name for name, array in along.items() if "derived" not in array.attrs]
     names.sort(key=lambda name: _FIRST.index(name) if name in _FIRST else len(_FIRST))
     pairs = list(combinations(names[:MOST_AXES], 2)) or [(names[0], None)]
     columns = min(len(pairs), 2)

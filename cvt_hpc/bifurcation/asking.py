@@ -12,6 +12,7 @@ from cvt_hpc.job import Job, build_job
 from cvt_hpc.job.assignments import Assignments, split_assignments
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.document import read_document
+from cvt_hpc.job.rules import varied_by
 from cvt_hpc.job.tables import read_set, read_table
 from cvt_hpc.parameters import Parameter, positive
 
@@ -119,15 +120,25 @@ def load_diagram(path: str | Path, overrides: Assignments = ()) -> Diagram:
     along = [axis for axis in job.axes if axis.name == "load"]
     if not along or len(along[0].values) < 2:
         raise mismatch(f"{source}: [axes] load", "two values or more, along which to go", "fewer")
+    _check_beside_load(job)
     axes = tuple(axis for axis in job.axes if axis.name != "load")
     settings = read_set(table, f"{source}: [branch]")
     branches = []
     for values in product(*(axis.values for axis in axes)):
         place = dict(zip((axis.name for axis in axes), values, strict=True))
         runs = _runs(job, place, settings, f"{source}: [branch]")
-        branches.append(Asked(place, job.parameters | place, runs))
+        branches.append(Asked(place, job.complete(place), runs))
     loads = tuple(sorted(along[0].values))
     return Diagram(job, axes, loads, tuple(branches), own["disturbance"], own["resolution"], settings)
+
+
+def _check_beside_load(job: Job) -> None:
+    """Refuse parameters that follow from the load: a branch has one value of each."""
+    for rule in job.rules:
+        if "load" in varied_by(job.rules, ("load",))[rule.key]:
+            raise mismatch(
+                rule.where, "a value that does not follow from the load along a branch", rule.words
+            )
 
 
 def _check_disturbance(values: tuple[float, ...], where: str) -> None:
@@ -137,9 +148,9 @@ def _check_disturbance(values: tuple[float, ...], where: str) -> None:
 
 def _runs(job: Job, place: dict[str, Any], settings: dict[str, Any], where: str) -> Job:
     """The job of the transients beside a branch: the same scene, judged in the same band."""
-    tables = {section: table for section, table in job.resolved().items() if isinstance(table, dict)}
+    alternatives = {key for key, parameter in job.schema.parameters.items() if parameter.gives}
+    tables = job.tables(job.complete(place), {"load", *alternatives})
     band = tables.pop("judgement")
-    del tables["axes"]
     document = {"name": job.name, "model": TRANSIENT, **tables}
     kept = {key: band[key] for key in ("band_low", "band_high") if key in band}
     return build_job(document, where, {**kept, **place, **settings}, "set")

@@ -91,9 +91,12 @@ def _check(job: Job) -> None:
         raise mismatch(f"{where}: [axes]", "load among the axes, for its onsets", ", ".join(axes) or "none")
     if (course := job.parameters["load_history"]) != "constant":
         raise mismatch(f"{where}: [scene] load_history", "constant, as the lower rungs have it", course)
+    follows = [rule.key for rule in job.rules]
     for name in ("stations", "step", "duration"):
-        if name in axes:
-            raise mismatch(f"{where}: [axes] {name}", "one value, which the reference refines", "an axis")
+        for table, varied in (("axes", axes), ("derived", follows)):
+            if name in varied:
+                expected = "one value in its table, which the reference refines"
+                raise mismatch(f"{where}: [{table}] {name}", expected, "another source of it")
 
 
 def _handed(job: Job, model: str, table: dict[str, Any]) -> Job:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from cvt_hpc.errors import mismatch
 from cvt_hpc.job.assignments import Assignments, read_assignments
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.crosscheck import check_point, complete_point
@@ -176,7 +177,21 @@ class Job:
         return point
 
     def _derive_anew(self, values: Mapping[str, Any], schema: Schema) -> dict[str, Any]:
-        """Return the base scene with other values, and with what then follows."""
+        """Return the base scene with other values, and with what then follows.
+
+        The values may be those of a whole run, with a parameter and what it gives, if these agree.
+        """
+        gives = {key: schema.parameters[key].gives for key in values}
+        told = {by.key: key for key, by in gives.items() if by and by.key in values}
+        stated = {key: value for key, value in values.items() if key not in told}
+        point = self._with_rules(stated, schema)
+        for key, by in told.items():
+            if point[key] != values[key]:
+                where = f"{self.source}: [{schema.section_of[by]}] {by}"
+                raise mismatch(where, f"either {by} or {key}", "both, which do not agree")
+        return point
+
+    def _with_rules(self, values: Mapping[str, Any], schema: Schema) -> dict[str, Any]:
         gone = {*values, *overridden(values, schema)}
         stated = [rule for rule in self.rules if not rule.is_substituted and rule.key not in gone]
         follows = {rule.key for rule in self.rules}
@@ -195,7 +210,9 @@ class Job:
         """
         return {
             **{key: getattr(self, key) for key in HEADER},
-            **self.tables(self.parameters, {axis.name for axis in self.axes} | {rule.key for rule in self.rules}),
+            **self.tables(
+                self.parameters, {axis.name for axis in self.axes} | {rule.key for rule in self.rules}
+            ),
             **({"design": self.design} if self.design else {}),
             **self._stated_rules(),
             "axes": {axis.name: [_to_json(value) for value in axis.values] for axis in self.axes},
@@ -204,9 +221,7 @@ class Job:
     def tables(self, point: Mapping[str, Any], left_out: Collection[str] = ()) -> dict[str, dict[str, Any]]:
         """Return flat parameters [SI] as the tables of a job file, in JSON types."""
         return {
-            section: {
-                key: _to_json(point[key]) for key in table if key in point and key not in left_out
-            }
+            section: {key: _to_json(point[key]) for key in table if key in point and key not in left_out}
             for section, table in self.schema.sections.items()
         }
 

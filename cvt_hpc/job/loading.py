@@ -229,9 +229,7 @@ def _read_axes(
     return tuple(read_axis(key, *entry) for key, entry in found.items())
 
 
-def _resolve(
-    values: Mapping[str, Any], rules: Sequence[Rule], schema: Schema, source: str
-) -> dict[str, Any]:
+def _resolve(values: Mapping[str, Any], rules: Sequence[Rule], schema: Schema, source: str) -> dict[str, Any]:
     """Return the value of every key that has one, in the order of declaration."""
     follows = {rule.key for rule in rules}
     resolved = {}

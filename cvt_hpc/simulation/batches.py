@@ -12,6 +12,7 @@ from cvt_hpc.simulation.modules import has_record, record_module
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
+    from cvt_hpc.job.definition import Derived
 
 PILOT_SHARE = 0.25
 
@@ -32,9 +33,18 @@ def run_costs(job: Job) -> np.ndarray:
     values = [np.asarray(axis.values) for axis in job.axes]
     grids = values if job.is_sampled else np.meshgrid(*values, indexing="ij", sparse=True)
     p = {**job.parameters, **dict(zip((axis.name for axis in job.axes), grids, strict=True))}
+    p |= {derived.name: _over_the_grid(job, derived) for derived in job.derived}
     model = record_module(job)
     cost = model.cost(p, job.stepper) / model.lanes(job.parameters, job.stepper)
     return np.broadcast_to(cost, job.shape).ravel()
+
+
+def _over_the_grid(job: Job, derived: Derived) -> np.ndarray:
+    """Values of a parameter that follows from axes, of a shape that broadcasts with that of the job."""
+    values = np.asarray(derived.values)
+    if job.is_sampled:
+        return values
+    return values.reshape([len(axis.values) if axis.name in derived.axes else 1 for axis in job.axes])
 
 
 def estimate_cost(job: Job) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from cvt_hpc.variables import Status, Variable
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
+    from cvt_hpc.job.definition import Derived
 
 
 @dataclass(frozen=True)
@@ -54,13 +55,35 @@ class Dimension:
         return {**asdict(self), "values": values, "texts": self.holds_texts}
 
     @classmethod
-    def from_json(cls, entry: Mapping[str, Any]) -> Dimension:
+    def from_json(cls, entry: Mapping[str, Any]) -> Self:
         """Return the dimension that `to_json` wrote."""
-        values = entry["values"]
-        if not entry["texts"]:
-            values = [float(v) if isinstance(v, str) else v for v in values]
-        spacing = entry.get("spacing", "linear")  # folders of earlier versions do not tell
-        return cls(entry["name"], tuple(values), entry["units"], entry["long_name"], spacing)
+        entry = dict(entry)
+        if not entry.pop("texts"):
+            entry["values"] = [float(v) if isinstance(v, str) else v for v in entry["values"]]
+        # folders of earlier versions have fewer keys, and those that are left out have defaults
+        return cls(
+            **{key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
+        )
+
+
+@dataclass(frozen=True)
+class DerivedCoordinate(Dimension):
+    """A parameter that follows from axes: a coordinate of the runs which is no dimension.
+
+    Attributes
+    ----------
+    name, units, long_name
+        As of a dimension.
+    values : tuple
+        In C order over `dims`.
+    dims : tuple of str
+        Names of the axes along which it varies, or `run`.
+    follows : str
+        How it follows, for people.
+    """
+
+    dims: tuple[str, ...] = ()
+    follows: str = ""
 
 
 @dataclass(frozen=True)
@@ -80,6 +103,8 @@ class Study:
         The quantities of a record, `status` first.
     coordinates : tuple of Dimension
         Dimensions of the variables beside the grid.
+    derived : tuple of DerivedCoordinate
+        Parameters that follow from the axes.
     """
 
     name: str
@@ -89,6 +114,7 @@ class Study:
     axes: tuple[Dimension, ...]
     variables: tuple[Variable, ...]
     coordinates: tuple[Dimension, ...]
+    derived: tuple[DerivedCoordinate, ...] = ()
 
     @property
     def design(self) -> dict[str, Any]:
@@ -184,6 +210,7 @@ class Study:
             "axes": [axis.to_json() for axis in self.axes],
             "variables": [_variable_to_json(variable) for variable in self.variables],
             "coordinates": [dimension.to_json() for dimension in self.coordinates],
+            "derived": [coordinate.to_json() for coordinate in self.derived],
         }
 
     @classmethod
@@ -197,6 +224,7 @@ class Study:
             tuple(Dimension.from_json(axis) for axis in entry["axes"]),
             tuple(_variable_from_json(variable) for variable in entry["variables"]),
             tuple(Dimension.from_json(dimension) for dimension in entry["coordinates"]),
+            tuple(DerivedCoordinate.from_json(derived) for derived in entry.get("derived", ())),
         )
 
 
@@ -206,7 +234,8 @@ def describe(job: Job, simulator: Simulator) -> Study:
     Raises
     ------
     InputError
-        If an axis has the name of a recorded quantity, so that the dataset could not hold both.
+        If an axis, or a parameter that follows from one, has the name of a recorded quantity, so that the
+        dataset could not hold both.
     """
     variables = tuple(simulator.record_variables(job))
     coordinates = tuple(
@@ -214,14 +243,18 @@ def describe(job: Job, simulator: Simulator) -> Study:
         for name, c in simulator.record_coordinates(job).items()
     )
     taken = {variable.name for variable in variables} | {dimension.name for dimension in coordinates}
-    for axis in job.axes:
-        if axis.name in taken:
+    for table, name in [("axes", axis.name) for axis in job.axes] + [
+        ("derived", d.name) for d in job.derived
+    ]:
+        if name in taken:
             raise InputError(
-                f"{job.source}: [axes] {axis.name}: expected a parameter that is not also the name of a "
-                f"recorded quantity, found {axis.name}"
+                f"{job.source}: [{table}] {name}: expected a parameter that is not also the name of a "
+                f"recorded quantity, found {name}"
             )
     axes = tuple(_grid_dimension(axis) for axis in job.axes)
-    return Study(job.name, job.description, job.fingerprint(), job.resolved(), axes, variables, coordinates)
+    derived = tuple(_derived_coordinate(job, one) for one in job.derived)
+    head = job.name, job.description, job.fingerprint(), job.resolved()
+    return Study(*head, axes, variables, coordinates, derived)
 
 
 def fit_text(text: str, size: int) -> bytes:
@@ -230,9 +263,21 @@ def fit_text(text: str, size: int) -> bytes:
 
 
 def _grid_dimension(axis: Any) -> Dimension:
-    values = tuple(np.asarray(axis.values).tolist())
-    units = "" if isinstance(values[0], str) else axis.unit or "1"
-    return Dimension(axis.name, values, units, axis.description, axis.spacing)
+    return Dimension(axis.name, *_values_and_units(axis), axis.description, axis.spacing)
+
+
+def _derived_coordinate(job: Job, derived: Derived) -> DerivedCoordinate:
+    dims = ("run",) if job.is_sampled else derived.axes
+    values, units = _values_and_units(derived)
+    return DerivedCoordinate(
+        derived.name, values, units, derived.description, dims=dims, follows=derived.words
+    )
+
+
+def _values_and_units(varied: Any) -> tuple[tuple, str]:
+    """Return the values of an axis, or of what follows from axes, and their CF unit."""
+    values = tuple(np.asarray(varied.values).tolist())
+    return values, "" if isinstance(values[0], str) else varied.unit or "1"
 
 
 def _variable_to_json(variable: Variable) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.files import discard, naming_refusals, written_aside
 from cvt_hpc.netcdf import write_netcdf
 from cvt_hpc.study.chunks import chunk_shape, fill
-from cvt_hpc.study.description import Dimension, Study
+from cvt_hpc.study.description import DerivedCoordinate, Dimension, Study
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.lock import locked
 from cvt_hpc.study.provenance import command, git_revision, history_line, versions
@@ -36,6 +36,7 @@ _INFERRED = Variable(
     "class of the run; where status is not_run, the class of the runs around it, which is inferred",
     OccurrenceClass,
 )
+_Coordinate = tuple[tuple[str, ...], np.ndarray, dict[str, str]]
 _logger = logging.getLogger(__name__)
 
 
@@ -125,9 +126,10 @@ def write_results(folder: StudyFolder, study: Study, records: Records) -> Path:
     import xarray as xr
 
     coordinates = {
-        axis.name: _coordinate(axis, study.dims if study.is_sampled else axis.name) for axis in study.axes
+        axis.name: _coordinate(axis, study.dims if study.is_sampled else (axis.name,)) for axis in study.axes
     }
-    coordinates |= {dimension.name: _coordinate(dimension, dimension.name) for dimension in study.coordinates}
+    coordinates |= {d.name: _coordinate(d, (d.name,)) for d in study.coordinates}
+    coordinates |= {derived.name: _derived_coordinate(derived, study) for derived in study.derived}
     frame = xr.Dataset(coords=coordinates, attrs=_global_attributes(study, records))
     with written_aside(folder.results, advice=KEPT) as aside:
         write_netcdf(frame, aside)
@@ -184,7 +186,14 @@ def _attributes(variable: Variable) -> dict[str, Any]:
     return attributes
 
 
-def _coordinate(dimension: Dimension, along: str | tuple[str, ...]) -> tuple[Any, np.ndarray, dict[str, str]]:
+def _derived_coordinate(derived: DerivedCoordinate, study: Study) -> _Coordinate:
+    along, values, attributes = _coordinate(derived, derived.dims)
+    lengths = dict(zip(study.dims, study.shape, strict=True))
+    shape = tuple(lengths[name] for name in derived.dims)
+    return along, values.reshape(shape), attributes | {"derived": derived.follows}
+
+
+def _coordinate(dimension: Dimension, along: tuple[str, ...]) -> _Coordinate:
     attributes = {"long_name": dimension.long_name}
     if dimension.units:
         attributes["units"] = dimension.units

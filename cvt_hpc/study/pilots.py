@@ -74,8 +74,10 @@ def find_out(job: Job, simulator: Simulator, groups: Sequence[Batch], out: Path,
 def run_pilots(job: Job, simulator: Simulator, groups: Sequence[Batch], count: int) -> Knowledge:
     """Do batches from all over the grid for a part of their duration, and scale their times."""
     short, scale, share = job, 1.0, simulator.pilot_share(job)
-    # Where the duration is an axis, its values count, and without a transient there is none: done in full.
-    if "duration" in job.parameters and all(axis.name != "duration" for axis in job.axes):
+    # Where the duration is an axis or follows from others, its values count, and without a transient there is
+    # none: done in full.
+    fixed = {axis.name for axis in job.axes} | {rule.key for rule in job.rules}
+    if "duration" in job.parameters and "duration" not in fixed:
         duration = share * job.parameters["duration"]
         short, scale = replace(job, parameters={**job.parameters, "duration": duration}), 1 / share
     places = {int((k + 0.5) * len(groups) / count) for k in range(count)}

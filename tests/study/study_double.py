@@ -53,6 +53,8 @@ class Job:
     source: str = "double.toml"
     design: dict[str, Any] = field(default_factory=dict)
     histories: tuple[int, ...] = ()
+    rules: tuple = ()
+    derived: tuple = ()
 
     def point(self, index: int) -> dict[str, Any]:
         shape = tuple(len(axis.values) for axis in self.axes)
