@@ -121,7 +121,6 @@ def _place(attributes: Mapping[str, Any]) -> str:
     schema = load_schema(job["model"], job["stepper"], "history")
     tables = {key: value for section in schema.sections for key, value in job.get(section, {}).items()}
     others = [key for key in point if key not in job["axes"] and point[key] != tables.get(key)]
-    keys = [*job["axes"], *others]  # those that follow from others stand in no table
-    return ", ".join(
-        f"{key} {in_words(point[key], schema.parameters[key].unit)}" for key in keys if key in point
-    )
+    # a parameter that follows from others stands in no table; where a load was given there is no `load_share`
+    keys = [key for key in (*job["axes"], *others) if key in point]
+    return ", ".join(f"{key} {in_words(point[key], schema.parameters[key].unit)}" for key in keys)

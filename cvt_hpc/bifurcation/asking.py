@@ -134,11 +134,11 @@ def load_diagram(path: str | Path, overrides: Assignments = ()) -> Diagram:
 
 def _check_beside_load(job: Job) -> None:
     """Refuse parameters that follow from the load: a branch has one value of each."""
+    varied = varied_by(job.rules, ("load",))
     for rule in job.rules:
-        if "load" in varied_by(job.rules, ("load",))[rule.key]:
-            raise mismatch(
-                rule.where, "a value that does not follow from the load along a branch", rule.words
-            )
+        if varied[rule.key]:
+            expected = "a value that does not follow from the load, along which branches go"
+            raise mismatch(rule.where, expected, rule.words)
 
 
 def _check_disturbance(values: tuple[float, ...], where: str) -> None:

@@ -91,12 +91,12 @@ def _check(job: Job) -> None:
         raise mismatch(f"{where}: [axes]", "load among the axes, for its onsets", ", ".join(axes) or "none")
     if (course := job.parameters["load_history"]) != "constant":
         raise mismatch(f"{where}: [scene] load_history", "constant, as the lower rungs have it", course)
-    follows = [rule.key for rule in job.rules]
+    varied = dict.fromkeys([rule.key for rule in job.rules], ("derived", "a formula"))
+    varied |= dict.fromkeys(axes, ("axes", "an axis"))
     for name in ("stations", "step", "duration"):
-        for table, varied in (("axes", axes), ("derived", follows)):
-            if name in varied:
-                expected = "one value in its table, which the reference refines"
-                raise mismatch(f"{where}: [{table}] {name}", expected, "another source of it")
+        if name in varied:
+            table, found = varied[name]
+            raise mismatch(f"{where}: [{table}] {name}", "one value, which the reference refines", found)
 
 
 def _handed(job: Job, model: str, table: dict[str, Any]) -> Job:

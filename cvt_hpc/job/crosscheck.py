@@ -27,8 +27,6 @@ def check_grid(
 ) -> None:
     """Check the base scene and every run, and that axes are of effect; of a huge grid, the axes' extremes.
 
-    Parameters that follow from others are checked at all values of the axes along which they vary.
-
     Parameters
     ----------
     schema : Schema
@@ -50,7 +48,6 @@ def check_grid(
         With the first problem found, and the run that has it; or with an axis that changes no run.
     """
     check_point(schema, parameters, source)
-    _check_rules(schema, parameters, axes, rules, sampled)
     sizes = {axis.name: len(axis.values) for axis in axes}
     idle = {name: "" for name, size in sizes.items() if size > 1}
     for values in zip(*(axis.values for axis in axes), strict=True) if sampled else _points_to_check(axes):
@@ -112,9 +109,23 @@ def _place(schema: Schema, varied: Mapping[str, Any]) -> str:
     return f" (at {', '.join(words)})" if varied else ""
 
 
-def _check_rules(
-    schema: Schema, parameters: dict[str, Any], axes: tuple[Axis, ...], rules: Sequence[Rule], sampled: bool
+def check_rules(
+    schema: Schema,
+    parameters: Mapping[str, Any],
+    axes: tuple[Axis, ...],
+    rules: Sequence[Rule],
+    *,
+    sampled: bool = False,
 ) -> None:
+    """Check parameters that follow from others, at all values of the axes along which they vary.
+
+    Arguments as of `check_grid`; the base scene is without these parameters.
+
+    Raises
+    ------
+    InputError
+        With the first one that has no legal value, and where.
+    """
     for key, along in varied_by(rules, [axis.name for axis in axes]).items():
         needed = needed_rules(rules, key)
         for varied in places(axes, along, sampled=sampled):

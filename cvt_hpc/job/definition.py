@@ -130,7 +130,7 @@ class Job:
         return Derived(rule.key, along, values, parameter.unit, parameter.description, rule.words)
 
     def complete(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the parameters of a run at values [SI] of axes: those of the base scene, and what follows."""
+        """Return the base scene with values [SI] of axes, and with what follows from them."""
         return follow(self.rules, {**self.parameters, **values})
 
     def point(self, index: int) -> dict[str, Any]:
@@ -208,11 +208,10 @@ class Job:
         dict
             As a job file is laid out, in JSON types; SI units, and the text "inf" for infinity.
         """
+        elsewhere = {axis.name for axis in self.axes} | {rule.key for rule in self.rules}
         return {
             **{key: getattr(self, key) for key in HEADER},
-            **self.tables(
-                self.parameters, {axis.name for axis in self.axes} | {rule.key for rule in self.rules}
-            ),
+            **self.tables(self.parameters, elsewhere),
             **({"design": self.design} if self.design else {}),
             **self._stated_rules(),
             "axes": {axis.name: [_to_json(value) for value in axis.values] for axis in self.axes},

@@ -1,7 +1,7 @@
 """Which parameters of a job follow from others: its tables [derived] and [linked.AXIS], and substitutes.
 
-[derived] has formulas, [linked.AXIS] the parameters that follow an axis value by value. Substitutes are the model's:
-`belt_length` gives `driven_radius`. Rules are brought into an order in which each finds what it needs.
+[derived] has formulas, [linked.AXIS] the parameters that follow an axis value by value. Substitutes are the
+model's: `belt_length` gives `driven_radius`. Rules are brought into an order in which each finds what it needs.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def ordered_rules(rules: Iterable[Rule], given: Collection[str], schema: Schema,
     Raises
     ------
     InputError
-        If a parameter is given twice, a rule needs one that has no value, or rules need each other in a circle.
+        If a parameter is given twice, or a rule needs one that has no value, or rules run in a circle.
     """
     found: dict[str, Rule] = {}
     for rule in rules:

@@ -10,7 +10,7 @@ from typing import Any
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
 from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignments
 from cvt_hpc.job.axes import Axis, read_axis
-from cvt_hpc.job.crosscheck import check_grid
+from cvt_hpc.job.crosscheck import check_grid, check_rules
 from cvt_hpc.job.definition import HEADER, Job
 from cvt_hpc.job.derivation import ordered_rules, overridden, read_derived, read_linked
 from cvt_hpc.job.design import Design, read_design, resolve_spacing
@@ -96,8 +96,12 @@ def build_job(
     axes, rules = _read_axes_and_rules(document, design, gone, given, schema, source)
     if "first_spacing" in design:
         design = resolve_spacing(design, axes, source)
-    parameters = _resolve({**{axis.name: axis.values[0] for axis in axes}, **given}, rules, schema, source)
-    check_grid(schema, parameters, axes, source, rules=rules, sampled="runs" in design)
+    scene = _resolve({**{axis.name: axis.values[0] for axis in axes}, **given}, rules, schema, source)
+    sampled = "runs" in design
+    check_rules(schema, scene, axes, rules, sampled=sampled)
+    scene = follow(rules, scene)
+    parameters = {key: scene[key] for key in schema.parameters if key in scene}
+    check_grid(schema, parameters, axes, source, rules=rules, sampled=sampled)
     settled = _settled(rules, axes)
     histories = document.get(KEY[0], {}).get(KEY[1], [])
     replacing = {key: replaced.get(key) for key in gone}
@@ -230,7 +234,7 @@ def _read_axes(
 
 
 def _resolve(values: Mapping[str, Any], rules: Sequence[Rule], schema: Schema, source: str) -> dict[str, Any]:
-    """Return the value of every key that has one, in the order of declaration."""
+    """Return the value of every key that has one and does not follow from others."""
     follows = {rule.key for rule in rules}
     resolved = {}
     for key, parameter in schema.parameters.items():
@@ -242,5 +246,4 @@ def _resolve(values: Mapping[str, Any], rules: Sequence[Rule], schema: Schema, s
         elif key not in follows and parameter.gives is None:
             where = f"{source}: [{schema.section_of[key]}] {key}"
             raise mismatch(where, expectation(parameter), "nothing")
-    resolved = follow(rules, resolved)
-    return {key: resolved[key] for key in schema.parameters if key in resolved}
+    return resolved

@@ -94,7 +94,7 @@ class Schema:
         raise self._unknown_key(name, where, section)
 
     def flatten(self, table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-        """Yield name and value; TOML reads the line `scene.load = [...]` as a table "scene" with a key "load"."""
+        """Yield name and value; TOML reads a line `scene.load = ...` as a table "scene" with a key "load"."""
         for name, raw in table.items():
             if name in self.sections and isinstance(raw, Mapping):
                 yield from ((f"{name}.{key}", value) for key, value in raw.items())

@@ -40,7 +40,7 @@ def carried_torque(parameters: Mapping[str, Any]) -> float:
 
 
 def friction_level(parameters: Mapping[str, Any]) -> float:
-    """Coefficient of friction [1] that does not change with the friction gradient; of a table the least one."""
+    """Coefficient of friction [1] that stays as the friction gradient varies; of a table the least one."""
     if parameters.get("friction_law") != "table":
         return parameters["kinetic_friction"]
     rows = (row if isinstance(row, tuple) else (row,) for row in parameters["table_mu"])

@@ -80,7 +80,7 @@ def variator(ratio: float, driven_radius: float, centre_distance: float) -> Vari
 def driven_radius(ratio: float, belt_length: float, centre_distance: float) -> float:
     """Pitch radius on the driven pulley at which a belt of given length closes.
 
-    The length of the closed path grows with the driving radius r, i being the ratio and a the centre distance:
+    The length of the closed path grows with the driving radius r; i is the ratio, a the centre distance:
 
         L(r) = r (pi - 2 psi) + i r (pi + 2 psi) + 2 a cos(psi),    sin(psi) = (i - 1) r / a,
         dL/dr = (pi - 2 psi) + i (pi + 2 psi) > 0.
