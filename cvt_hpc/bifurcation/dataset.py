@@ -72,6 +72,10 @@ def diagram_dataset(diagram: Diagram, followed: Sequence[Followed]) -> xr.Datase
         axis.name: (axis.name, list(axis.values), _attributes(axis.unit, axis.description))
         for axis in diagram.axes
     }
+    lengths = {axis.name: len(axis.values) for axis in diagram.axes}
+    for derived in diagram.job.derived:  # none of them along the load
+        values = np.array(derived.values).reshape([lengths[name] for name in derived.axes])
+        axes[derived.name] = derived.axes, values, _attributes(derived.unit, derived.description)
     axes["load"] = ("load", list(diagram.loads), _attributes("N m", "torque at the driving pulley"))
     labels = {
         name: (name, c.values.astype(object), _attributes(c.units, c.long_name))

@@ -1,7 +1,7 @@
 """Which parameters of a job follow from others: its tables [derived] and [linked.AXIS], and substitutes.
 
 [derived] has formulas, [linked.AXIS] the parameters that follow an axis value by value. Substitutes are the
-model's: `belt_length` gives `driven_radius`. Rules are brought into an order in which each finds what it needs.
+model's: `belt_length` gives `driven_radius`. Each rule comes after those that give what it needs.
 """
 
 from __future__ import annotations
@@ -110,8 +110,10 @@ def ordered_rules(rules: Iterable[Rule], given: Collection[str], schema: Schema,
     found |= _substituted({*given, *found}, schema, source)
     for rule in found.values():
         _check_known(rule, {*given, *found}, schema)
+    # in the order of declaration where they are free of each other: a job's rules do not depend on its layout
+    needs = {key: found[key].needs for key in schema.parameters if key in found}
     try:
-        order = TopologicalSorter({key: rule.needs for key, rule in found.items()}).static_order()
+        order = TopologicalSorter(needs).static_order()
         return [found[key] for key in order if key in found]
     except CycleError as error:
         circle = error.args[1]

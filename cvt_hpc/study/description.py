@@ -267,7 +267,7 @@ def _grid_dimension(axis: Any) -> Dimension:
 
 
 def _derived_coordinate(job: Job, derived: Derived) -> DerivedCoordinate:
-    dims = ("run",) if job.is_sampled else derived.axes
+    dims = ("run",) if "runs" in job.design else derived.axes
     values, units = _values_and_units(derived)
     return DerivedCoordinate(
         derived.name, values, units, derived.description, dims=dims, follows=derived.words

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cvt_hpc.physics.geometry import variator
+from cvt_hpc.physics.geometry import driven_radius, variator
 
 # A public pushbelt set (github wangzhanrock/CVT_VelocityInit): centre distance, belt length at mid pack
 CENTRES = 0.155
@@ -55,6 +55,49 @@ def test_one_belt_fits_every_published_ratio(driving, driven):
     assert variator(driven / driving, driven, CENTRES).path_length == pytest.approx(
         BELT, abs=2.0 * np.pi * 5e-6
     )
+
+
+@pytest.mark.parametrize(
+    ("ratio", "driving", "driven"),
+    [
+        (0.5, 72.71e-3, 36.35e-3),
+        (1.0, 55.89e-3, 55.89e-3),
+        (2.0, 36.35e-3, 72.71e-3),
+        (2.5, 30.687e-3, 76.718e-3),
+    ],
+)
+def test_the_belt_gives_the_published_radii(ratio, driving, driven):
+    found = driven_radius(ratio, BELT, CENTRES)
+    printed = 5e-6 if ratio < 2.5 else 5e-7  # [m]: half of the last digit
+    assert (found / ratio, found) == pytest.approx((driving, driven), abs=1.01 * printed)
+
+
+@given(ratios, radii)
+def test_the_radius_closes_the_belt(ratio, radius):
+    length = variator(ratio, radius, 0.2).path_length
+    # lengths are known to some 1e-16 of 0.5 m, and a radius moves them by its wrap, which is above 1.5 rad here
+    assert driven_radius(ratio, length, 0.2) == pytest.approx(radius, abs=1e-15 * (1.0 + ratio))
+
+
+@pytest.mark.parametrize("ratio", [0.01, 0.3, 1.0, 3.0, 100.0])
+def test_belts_from_the_shortest_to_the_longest_close(ratio):
+    shortest, longest = 2.0 * CENTRES, longest_belt(ratio)
+    for share in (1e-12, 1e-3, 0.5, 0.999999):
+        length = shortest + share * (longest - shortest)
+        path = variator(ratio, driven_radius(ratio, length, CENTRES), CENTRES)
+        assert path.path_length == pytest.approx(length, rel=1e-14)
+
+
+@pytest.mark.parametrize("ratio", [0.3, 1.0, 2.5])
+def test_belts_that_close_nowhere_are_refused(ratio):
+    for length in (0.0, 2.0 * CENTRES, 1.000001 * longest_belt(ratio), np.inf, np.nan):
+        with pytest.raises(ValueError, match="more than 0.31 m, twice the centre distance, and less than"):
+            driven_radius(ratio, length, CENTRES)
+
+
+def longest_belt(ratio):
+    """Length of a belt on pulleys that all but touch [m]."""
+    return variator(ratio, (1.0 - 1e-12) * CENTRES * ratio / (1.0 + ratio), CENTRES).path_length
 
 
 def test_published_wrap():

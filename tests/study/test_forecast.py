@@ -170,6 +170,15 @@ def test_a_duration_that_is_an_axis_is_not_shortened(tmp_path, clock):
     assert known.basis == "1 pilot batch of 100% of the simulated time"
 
 
+def test_a_duration_that_follows_from_others_is_not_shortened(tmp_path, clock):
+    job = Job(
+        (Axis("load", tuple(range(RUNS))),), {"duration": 8.0}, rules=(SimpleNamespace(key="duration"),)
+    )
+    simulator = Timed(clock)
+    known = find_out(job, simulator, simulator.lane_groups(job, range(RUNS)), tmp_path, 1)
+    assert known.basis == "1 pilot batch of 100% of the simulated time"
+
+
 def test_a_pilot_tells_the_size_of_a_history(tmp_path, clock):
     known = knowledge(tmp_path, Timed(clock), 1, histories=(0, 3))
     assert known.history_bytes == 4 * 24 * 8  # the double's history has 24 numbers

@@ -95,6 +95,27 @@ def test_groups_are_of_one_kind_and_no_larger_than_the_lanes(monkeypatch):
     assert simulation.lane_groups(general, [0, 1]) == [(0,), (1,)]
 
 
+def test_runs_of_one_belt_advance_together_at_one_ratio_only():
+    document = job({}).resolved()
+    for key in ("ratio", "driven_radius", "load"):
+        del document["scene"][key]
+    of_one_belt = {"belt_length": [0.661195], "ratio": [0.5, 1.0, 2.0], "load_share": [0.2, 0.4]}
+    asked = build_job(document | {"axes": of_one_belt}, "batches.toml")
+    assert simulation.lane_groups(asked, range(asked.size)) == [(0, 1), (2, 3), (4, 5)]
+    # two belts at one ratio have two geometries
+    of_two_belts = {"belt_length": [0.66, 0.67], "ratio": [1.0], "load_share": [0.2, 0.4]}
+    asked = build_job(document | {"axes": of_two_belts}, "batches.toml")
+    assert simulation.lane_groups(asked, range(asked.size)) == [(0, 1), (2, 3)]
+
+
+def test_a_cost_that_follows_from_an_axis_is_that_of_each_run():
+    document = job({"ratio": [1.0, 1.25, 1.5], "load": [0.0, 60.0]}).resolved()
+    del document["mesh"]["stations"]
+    asked = build_job(document | {"derived": {"stations": "48 * ratio"}}, "batches.toml")
+    costs = simulation.run_costs(asked)
+    assert costs.reshape(3, 2) / costs[0] == pytest.approx(np.array([[1.0] * 2, [1.25] * 2, [1.5] * 2]))
+
+
 def test_the_cost_of_each_run_is_that_of_a_job_of_its_own():
     asked = job({"sheave_stiffness": [1.0, np.inf], **MIXED, "load_history": ["constant", "ramp"]})
     costs = simulation.run_costs(asked)
