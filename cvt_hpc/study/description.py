@@ -7,83 +7,17 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cvt_hpc.errors import InputError
+from cvt_hpc.study.dimensions import DerivedCoordinate, Dimension, axis_dimension, derived_coordinate
 from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.variables import Status, Variable
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
-    from cvt_hpc.job.definition import Derived
-
-
-@dataclass(frozen=True)
-class Dimension:
-    """A dimension of the dataset with its coordinate: an axis of the job, or an extra one of the record.
-
-    Attributes
-    ----------
-    name : str
-        Name of the dimension and of its coordinate.
-    values : tuple
-        Coordinate values in SI units, or texts.
-    units : str
-        CF unit; "" for texts.
-    long_name : str
-        CF long_name.
-    spacing : str
-        "log" for samples that are spread evenly by their logarithm.
-    """
-
-    name: str
-    values: tuple
-    units: str
-    long_name: str
-    spacing: str = "linear"
-
-    @property
-    def holds_texts(self) -> bool:
-        """Whether the values are texts."""
-        return isinstance(self.values[0], str)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the dimension as JSON types; infinities, which JSON lacks, as texts."""
-        values = [v if isinstance(v, str) or math.isfinite(v) else str(v) for v in self.values]
-        return {**asdict(self), "values": values, "texts": self.holds_texts}
-
-    @classmethod
-    def from_json(cls, entry: Mapping[str, Any]) -> Self:
-        """Return the dimension that `to_json` wrote."""
-        entry = dict(entry)
-        if not entry.pop("texts"):
-            entry["values"] = [float(v) if isinstance(v, str) else v for v in entry["values"]]
-        # folders of earlier versions have fewer keys, and those that are left out have defaults
-        return cls(
-            **{key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
-        )
-
-
-@dataclass(frozen=True)
-class DerivedCoordinate(Dimension):
-    """A parameter that follows from axes: a coordinate of the runs which is no dimension.
-
-    Attributes
-    ----------
-    name, units, long_name
-        As of a dimension.
-    values : tuple
-        In C order over `dims`.
-    dims : tuple of str
-        Names of the axes along which it varies, or `run`.
-    follows : str
-        How it follows, for people.
-    """
-
-    dims: tuple[str, ...] = ()
-    follows: str = ""
 
 
 @dataclass(frozen=True)
@@ -251,8 +185,8 @@ def describe(job: Job, simulator: Simulator) -> Study:
                 f"{job.source}: [{table}] {name}: expected a parameter that is not also the name of a "
                 f"recorded quantity, found {name}"
             )
-    axes = tuple(_grid_dimension(axis) for axis in job.axes)
-    derived = tuple(_derived_coordinate(job, one) for one in job.derived)
+    axes = tuple(axis_dimension(axis) for axis in job.axes)
+    derived = tuple(derived_coordinate(one, sampled="runs" in job.design) for one in job.derived)
     head = job.name, job.description, job.fingerprint(), job.resolved()
     return Study(*head, axes, variables, coordinates, derived)
 
@@ -260,24 +194,6 @@ def describe(job: Job, simulator: Simulator) -> Study:
 def fit_text(text: str, size: int) -> bytes:
     """Return a text as one line of UTF-8 of at most `size` bytes, cut between characters."""
     return " ".join(text.split()).encode()[:size].decode(errors="ignore").encode()
-
-
-def _grid_dimension(axis: Any) -> Dimension:
-    return Dimension(axis.name, *_values_and_units(axis), axis.description, axis.spacing)
-
-
-def _derived_coordinate(job: Job, derived: Derived) -> DerivedCoordinate:
-    dims = ("run",) if "runs" in job.design else derived.axes
-    values, units = _values_and_units(derived)
-    return DerivedCoordinate(
-        derived.name, values, units, derived.description, dims=dims, follows=derived.words
-    )
-
-
-def _values_and_units(varied: Any) -> tuple[tuple, str]:
-    """Return the values of an axis, or of what follows from axes, and their CF unit."""
-    values = tuple(np.asarray(varied.values).tolist())
-    return values, "" if isinstance(values[0], str) else varied.unit or "1"
 
 
 def _variable_to_json(variable: Variable) -> dict[str, Any]:

@@ -13,7 +13,8 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.files import discard, naming_refusals, written_aside
 from cvt_hpc.netcdf import write_netcdf
 from cvt_hpc.study.chunks import chunk_shape, fill
-from cvt_hpc.study.description import DerivedCoordinate, Dimension, Study
+from cvt_hpc.study.description import Study
+from cvt_hpc.study.dimensions import DerivedCoordinate, Dimension
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.lock import locked
 from cvt_hpc.study.provenance import command, git_revision, history_line, versions
@@ -168,6 +169,9 @@ def _create(file: netCDF4.Dataset, study: Study, variable: Variable, chunk: tupl
         fill_value=np.nan if dtype.kind == "f" else None,  # flags and counts have none
     )
     stored.setncatts(_attributes(variable))
+    auxiliary = [d.name for d in (*(study.axes if study.is_sampled else ()), *study.derived)]
+    if auxiliary:
+        stored.coordinates = " ".join(auxiliary)  # by CF: these have no dimension of their own
     return stored
 
 

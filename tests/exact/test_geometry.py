@@ -5,6 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cvt_hpc.job import build_job
+from cvt_hpc.models.elastic_belt.belt import belt_constants, mesh
 from cvt_hpc.physics.geometry import driven_radius, variator
 
 # A public pushbelt set (github wangzhanrock/CVT_VelocityInit): centre distance, belt length at mid pack
@@ -98,6 +100,22 @@ def test_belts_that_close_nowhere_are_refused(ratio):
 def longest_belt(ratio):
     """Length of a belt on pulleys that all but touch [m]."""
     return variator(ratio, (1.0 - 1e-12) * CENTRES * ratio / (1.0 + ratio), CENTRES).path_length
+
+
+def test_one_belt_has_the_same_rings_and_elements_at_each_ratio():
+    document = {
+        "name": "x",
+        "model": "steady_variator",
+        "scene": {"belt_length": BELT, "centre_distance": CENTRES},
+    }
+    job = build_job(document | {"axes": {"ratio": [0.5, 1.0, 2.5]}}, "x.toml")
+    for index in range(job.size):
+        p = job.point(index)
+        grid, curvature = mesh(p), belt_constants(p).curvature
+        # the elements fill the path but for `play`; rings lie above it by `ring_offset`, once around
+        assert grid.cell.sum() == pytest.approx(BELT, rel=1e-14)
+        rings = grid.cell @ (1.0 + curvature * p["ring_offset"])
+        assert rings == pytest.approx(BELT + 2.0 * np.pi * p["ring_offset"], rel=1e-14)
 
 
 def test_published_wrap():

@@ -64,6 +64,7 @@ def test_results_have_what_follows_as_coordinates_of_the_axes_along_which_it_var
     assert results["load"].attrs["units"] == "N m"
     assert results["load"].attrs["derived"] == "by load_share"
     assert results["driving_speed"].attrs["derived"] == "314 / sqrt(ratio)"
+    assert results["status"].encoding["coordinates"] == "driving_speed driven_radius load"
     assert json.loads(results.attrs["job"])["derived"] == {"driving_speed": "314 / sqrt(ratio)"}
     # the longer the strands the lower their frequencies: runs have their own geometry
     assert len(np.unique(results["eigenfrequency"].values[..., 0].round(3))) > 3

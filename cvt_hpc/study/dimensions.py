@@ -1,0 +1,100 @@
+"""The coordinates of a study's dataset: axes, parameters that follow from them, and extra ones of the record."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Axis
+    from cvt_hpc.job.definition import Derived
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A dimension of the dataset with its coordinate: an axis of the job, or an extra one of the record.
+
+    Attributes
+    ----------
+    name : str
+        Name of the dimension and of its coordinate.
+    values : tuple
+        Coordinate values in SI units, or texts.
+    units : str
+        CF unit; "" for texts.
+    long_name : str
+        CF long_name.
+    spacing : str
+        "log" for samples that are spread evenly by their logarithm.
+    """
+
+    name: str
+    values: tuple
+    units: str
+    long_name: str
+    spacing: str = "linear"
+
+    @property
+    def holds_texts(self) -> bool:
+        """Whether the values are texts."""
+        return isinstance(self.values[0], str)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the dimension as JSON types; infinities, which JSON lacks, as texts."""
+        values = [v if isinstance(v, str) or math.isfinite(v) else str(v) for v in self.values]
+        return {**asdict(self), "values": values, "texts": self.holds_texts}
+
+    @classmethod
+    def from_json(cls, entry: Mapping[str, Any]) -> Self:
+        """Return the dimension that `to_json` wrote."""
+        entry = dict(entry)
+        if not entry.pop("texts"):
+            entry["values"] = [float(v) if isinstance(v, str) else v for v in entry["values"]]
+        # folders of earlier versions have fewer keys, and those that are left out have defaults
+        return cls(
+            **{key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
+        )
+
+
+@dataclass(frozen=True)
+class DerivedCoordinate(Dimension):
+    """A parameter that follows from axes: a coordinate of the runs which is no dimension.
+
+    Attributes
+    ----------
+    name, units, long_name
+        As of a dimension.
+    values : tuple
+        In C order over `dims`.
+    dims : tuple of str
+        Names of the axes along which it varies, or `run`.
+    follows : str
+        How it follows, for people.
+    """
+
+    dims: tuple[str, ...] = ()
+    follows: str = ""
+
+
+def axis_dimension(axis: Axis) -> Dimension:
+    """Return the dimension of an axis of a job."""
+    return Dimension(axis.name, *_values_and_units(axis), axis.description, axis.spacing)
+
+
+def derived_coordinate(derived: Derived, *, sampled: bool) -> DerivedCoordinate:
+    """Return the coordinate of a parameter that follows from axes; of samples it lies along `run`."""
+    dims = ("run",) if sampled else derived.axes
+    values, units = _values_and_units(derived)
+    return DerivedCoordinate(
+        derived.name, values, units, derived.description, dims=dims, follows=derived.words
+    )
+
+
+def _values_and_units(varied: Axis | Derived) -> tuple[tuple, str]:
+    """Return the values and their CF unit."""
+    values = tuple(np.asarray(varied.values).tolist())
+    return values, "" if isinstance(values[0], str) else varied.unit or "1"
