@@ -1,4 +1,4 @@
-"""The coordinates of a study's dataset: axes, parameters that follow from them, and extra ones of the record."""
+"""The coordinates of a dataset: axes, parameters that follow from them, and extra ones of the record."""
 
 from __future__ import annotations
 
