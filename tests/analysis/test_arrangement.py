@@ -41,6 +41,7 @@ def with_axes(**axes):
         (("ratio", "thrust"), {}, ("thrust", "ratio", None)),
         (("ratio", "load", "sheave_stiffness"), {}, ("load", "ratio", "sheave_stiffness")),
         (("sheave_stiffness", "load", "ratio"), {}, ("load", "ratio", "sheave_stiffness")),
+        (("load_share", "ratio"), {}, ("load_share", "ratio", None)),
         (("friction_gradient", "load", "thrust"), {}, ("load", "friction_gradient", "thrust")),
         (
             ("friction_gradient", "sheave_stiffness", "load"),

@@ -160,6 +160,8 @@ def test_another_model_is_handed_what_follows():
 
 def test_a_value_for_comparisons_alone_is_refused_from_a_formula(tmp_path):
     path = tmp_path / "x.toml"
-    path.write_text('name = "x"\nmodel = "elastic_belt"\n[derived]\ncontact_sweeps = "2 * 4"\n')
-    with pytest.raises(InputError, match="contact_sweeps: expected 0 in a job of runs; .* found 8"):
-        load_job(path)
+    head = 'name = "x"\nmodel = "elastic_belt"\n[axes]\nseed = [0, 4]\n[derived]\n'
+    for formula in ("2 * 4", "2 * seed"):
+        path.write_text(f'{head}contact_sweeps = "{formula}"\n')
+        with pytest.raises(InputError, match="contact_sweeps: expected 0 in a job of runs; .* found 8"):
+            load_job(path)
