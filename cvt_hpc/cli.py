@@ -16,9 +16,11 @@ from cvt_hpc import __version__
 from cvt_hpc.errors import CRASHED, InputError, mismatch
 
 if TYPE_CHECKING:
+    from cvt_hpc.analysis.comparison import Comparison
     from cvt_hpc.job import Job
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+CONTRADICTING = 1  # of `compare`: some cells are quiet in one study and vibrate in the other
 RETRIED = ("timed_out", "failed_error", "failed_numerics")
 _SUBJECTS = {
     "JOB": "job file (TOML)",
@@ -104,6 +106,10 @@ def _parser() -> argparse.ArgumentParser:
     _add(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
     picture = _add(commands, "map", _map, "draw where vibration occurs", "RESULTS")
     picture.add_argument("--out", type=Path, metavar="PNG", help="default: map.png beside the dataset")
+    compare = _add(commands, "compare", _compare, "compare two studies of one grid, cell by cell", "RESULTS")
+    compare.add_argument("other", type=Path, metavar="RESULTS", help="the one to compare with it")
+    folder = "folder of compare.csv and compare.png (default: that of the second study)"
+    compare.add_argument("--out", type=Path, metavar="DIR", help=folder)
     simulate = _add(commands, "simulate", _simulate, "one run with its full history", "JOB")
     simulate.add_argument("--out", type=Path, metavar="FILE.nc", help="dataset of the history")
     simulate.add_argument("--plot", type=Path, metavar="PNG", help="picture of the history")
@@ -234,6 +240,31 @@ def _map(arguments: argparse.Namespace) -> int:
             print(start_line(dataset, at, str(arguments.path)))
         print(f"map: {picture}")
     return DONE
+
+
+def _compare(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.comparison import compare
+    from cvt_hpc.printing import comparison_lines
+    from cvt_hpc.study import open_results
+
+    sources = str(arguments.path), str(arguments.other)
+    with open_results(arguments.path) as a, open_results(arguments.other) as b:
+        found = compare(a, b, sources)
+    folder = arguments.other if arguments.other.is_dir() else arguments.other.parent
+    written = _write_comparison(found, arguments.out or folder, sources)
+    print(*comparison_lines(found, sources), *written, sep="\n")
+    return CONTRADICTING if found.contradicts.any() else DONE
+
+
+def _write_comparison(found: Comparison, folder: Path, sources: tuple[str, str]) -> list[str]:
+    """Leave table and picture of a comparison, and return the lines that say where."""
+    from cvt_hpc.analysis.comparison import write_comparison
+    from cvt_hpc.analysis.comparison_drawing import draw_comparison
+
+    return [
+        f"picture: {draw_comparison(found, folder / 'compare.png', sources)}",
+        f"table: {write_comparison(found, folder / 'compare.csv')}",
+    ]
 
 
 def _simulate(arguments: argparse.Namespace) -> int:

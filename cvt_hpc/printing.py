@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.job.values import in_words
 from cvt_hpc.variables import Status
+from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS
+from cvt_hpc.vibration.classes import OccurrenceClass
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from cvt_hpc.analysis.comparison import Cell, Comparison
     from cvt_hpc.job import Job
     from cvt_hpc.study import RunReport, StudyStatus
     from cvt_hpc.study.audit import AuditReport
@@ -19,6 +23,7 @@ if TYPE_CHECKING:
     from cvt_hpc.study.resources import Disk
 
 MOST_FAILURES_NAMED = 10
+MOST_CONTRADICTIONS_NAMED = 20
 _KNOWN_OF_FAILURES = (
     "status",
     "reason",
@@ -55,6 +60,58 @@ def audit_lines(report: AuditReport) -> Iterator[str]:
             line += f"; mean forces within {rung.force_deviation:.2%} in 95 % of the runs"
         yield line + (f"; {rung.failed} more failed in full" if rung.failed else "")
     yield f"runs that differ: {report.table}"
+
+
+def comparison_lines(found: Comparison, sources: tuple[str, str]) -> Iterator[str]:
+    """Yield the lines that say in what two studies agree: A, B, their jobs, classes, and amplitudes."""
+    for label, source, left_out in zip("AB", sources, found.left_out, strict=True):
+        yield f"{label}: {source}" + (f"; {left_out} of its runs left out, unknown there" if left_out else "")
+    yield from found.notes
+    yield from (f"differs: {line}" for line in found.differences or ("nothing that the datasets tell",))
+    yield f"{found.pairs.size} cells, by class in A (rows) and in B (columns):"
+    yield from _class_table(found)
+    contradicting = int(found.contradicts.sum())
+    beyond = int(found.contradicts_beyond.sum())
+    yield (
+        f"{contradicting} of {int(found.answered.sum())} cells contradict (quiet against vibrating), "
+        f"{beyond} of them beyond the threshold (larger amplitude not within {NEAR:.0%} of it)"
+    )
+    yield from map(_cell_line, islice(found.rows(found.contradicts), MOST_CONTRADICTIONS_NAMED))
+    if contradicting > MOST_CONTRADICTIONS_NAMED:
+        yield f"  {contradicting - MOST_CONTRADICTIONS_NAMED} more in the table"
+    yield from _deviation_lines(found)
+
+
+def _class_table(found: Comparison) -> Iterator[str]:
+    counts = found.counts()
+    rows = {kind for (kind, _), count in counts.items() if count}
+    columns = sorted({kind for (_, kind), count in counts.items() if count})
+    yield "".join([f"  {'':<10}", *(f"{kind.label:>11}" for kind in columns)])
+    for row in sorted(rows):
+        yield "".join([f"  {row.label:<10}", *(f"{counts[row, column]:>11}" for column in columns)])
+
+
+def _cell_line(cell: Cell) -> str:
+    place = ", ".join(f"{name} = {in_words(value, '')}" for name, value in cell.at.items())
+    words = (
+        kind.label
+        + ("" if math.isnan(size) else f" {size * 1e6:.3g} um")
+        + ("" if math.isnan(frequency) else f" {frequency:.4g} Hz")
+        for kind, size, frequency in zip(cell.classes, cell.amplitude, cell.frequency, strict=True)
+    )
+    near = ", near the threshold" if cell.pair in NEAR_CONTRADICTIONS else ""
+    return f"  {place}: {' | '.join(words)}{near}"
+
+
+def _deviation_lines(found: Comparison) -> Iterator[str]:
+    both = int((found.pairs == OccurrenceClass.VIBRATING).sum())
+    for name in ("amplitude", "frequency"):
+        deviation = found.deviation(name)
+        if not math.isnan(deviation.median):
+            yield (
+                f"{name} where both vibrate ({both} cells): B deviates by {deviation.median:.2%} (median), "
+                f"{deviation.high:.2%} (95 %), {deviation.largest:.2%} (largest)"
+            )
 
 
 def trouble_lines(report: RunReport) -> Iterator[str]:
