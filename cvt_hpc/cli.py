@@ -100,6 +100,12 @@ def _parser() -> argparse.ArgumentParser:
         choices=RETRIED,
         help="do recorded runs that ended so again; may be repeated",
     )
+    run.add_argument(
+        "--refine",
+        type=float,
+        metavar="FACTOR",
+        help="with --retry failed_numerics: at a time step shorter by this factor",
+    )
     audit = "do so large a part of the runs that lower rungs of model auto have answered in full, and compare"
     run.add_argument("--audit", type=float, metavar="FRACTION", help=audit)
     _add(commands, "status", _status, "how far a study is", "DIR")
@@ -162,6 +168,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from cvt_hpc.printing import report_lines, trouble_lines
     from cvt_hpc.study import check_start, run
     from cvt_hpc.study.launch import end_process
+    from cvt_hpc.study.steps import check_refinement
     from cvt_hpc.variables import Status
 
     limits = {
@@ -171,6 +178,10 @@ def _run(arguments: argparse.Namespace) -> int:
     }
     retry = [Status[name.upper()] for name in arguments.retry]
     job = load_job(arguments.path, arguments.set)
+    options = {"fresh": arguments.fresh, "retry": retry, **limits}
+    if arguments.refine is not None:
+        check_refinement(job, arguments.refine, retry)
+        options["refine"] = arguments.refine
     if arguments.audit is not None:
         from cvt_hpc.study.audit import check_audit, check_fraction
 
@@ -181,7 +192,6 @@ def _run(arguments: argparse.Namespace) -> int:
         _show(job, arguments.out)
         return DONE
     started = time.monotonic()
-    options = {"fresh": arguments.fresh, "retry": retry, **limits}
     report = run(job, arguments.out, part=arguments.part, **options)
     _complain(*trouble_lines(report))
     if _speaks():
