@@ -18,6 +18,7 @@ from cvt_hpc.errors import CRASHED, InputError, mismatch
 if TYPE_CHECKING:
     from cvt_hpc.analysis.comparison import Comparison
     from cvt_hpc.job import Job
+    from cvt_hpc.study.repeats import Repeat
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 CONTRADICTING = 1  # of `compare`: some cells are quiet in one study and vibrate in the other
@@ -108,6 +109,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     audit = "do so large a part of the runs that lower rungs of model auto have answered in full, and compare"
     run.add_argument("--audit", type=float, metavar="FRACTION", help=audit)
+    check_step = "do so large a part of the runs again at half their time step, and compare"
+    run.add_argument("--check-step", type=float, metavar="FRACTION", help=check_step)
+    check_by = "how --check-step does them: at half the step (default), or by the stepper explicit"
+    run.add_argument("--check-step-by", choices=("half", "explicit"), help=check_by)
     _add(commands, "status", _status, "how far a study is", "DIR")
     _add(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
     picture = _add(commands, "map", _map, "draw where vibration occurs", "RESULTS")
@@ -182,11 +187,7 @@ def _run(arguments: argparse.Namespace) -> int:
     if arguments.refine is not None:
         check_refinement(job, arguments.refine, retry)
         options["refine"] = arguments.refine
-    if arguments.audit is not None:
-        from cvt_hpc.study.audit import check_audit, check_fraction
-
-        check_fraction(job, arguments.audit, arguments.part)
-        check_audit(job, arguments.out or Path("out") / job.name, arguments.fresh)
+    repeats = _repeats(job, arguments)
     if arguments.dry_run:
         check_start(job, arguments.out, part=arguments.part, fresh=arguments.fresh)
         _show(job, arguments.out)
@@ -196,25 +197,65 @@ def _run(arguments: argparse.Namespace) -> int:
     _complain(*trouble_lines(report))
     if _speaks():
         print(*report_lines(report), sep="\n")
-    if arguments.audit is not None and not report.remaining:
-        status = _audit(job, report.out, arguments.audit, options, started)
-        return end_process(max(report.exit_status, status))
-    return end_process(report.exit_status)
+    statuses = [report.exit_status]
+    for repeat, show in repeats:
+        if not report.remaining:
+            statuses.append(_repeat(repeat, show, options, started))
+    return end_process(max(statuses))
 
 
-def _audit(job: Job, out: Path, fraction: float, options: dict[str, Any], started: float) -> int:
-    """Do the runs of an audit in the time that is left, and print what it has found."""
-    from cvt_hpc.printing import audit_lines, trouble_lines
-    from cvt_hpc.study.audit import report_audit, run_audit
+def _repeats(job: Job, arguments: argparse.Namespace) -> list[tuple[Repeat, Callable[[Repeat], None]]]:
+    """Return which samples are to be done again, each with what prints what came of it."""
+    from cvt_hpc.study.audit import audit_of
+    from cvt_hpc.study.repeats import check_fraction
+    from cvt_hpc.study.step_check import step_check
+
+    if arguments.check_step_by and arguments.check_step is None:
+        raise mismatch("--check-step-by", "--check-step FRACTION beside it", "none")
+    out, repeats = arguments.out or Path("out") / job.name, []
+    if arguments.audit is not None:
+        check_fraction("--audit", arguments.audit, arguments.part)
+        repeats.append((audit_of(job, out, arguments.audit), _show_audit))
+    if arguments.check_step is not None:
+        check_fraction("--check-step", arguments.check_step, arguments.part)
+        way = arguments.check_step_by or "half"
+        repeats.append((step_check(job, out, arguments.check_step, way), _show_step_check))
+    for repeat, _ in repeats:
+        repeat.check(arguments.fresh)
+    return repeats
+
+
+def _repeat(repeat: Repeat, show: Callable[[Repeat], None], options: dict[str, Any], started: float) -> int:
+    """Do the runs of a sample again in the time that is left, and print what was found."""
+    from cvt_hpc.printing import trouble_lines
 
     if "time_limit" in options:
         left = options["time_limit"] - (time.monotonic() - started)
         options = {**options, "time_limit": max(left, 0.0)}
-    report = run_audit(job, out, fraction, **options)
-    _complain(*(f"audit: {line}" for line in trouble_lines(report)))
+    report = repeat.run(**options)
+    _complain(*(f"{repeat.label}: {line}" for line in trouble_lines(report)))
     if _speaks() and not report.remaining:
-        print(*audit_lines(report_audit(job, out, fraction)), sep="\n")
+        show(repeat)
     return report.exit_status
+
+
+def _show_audit(audit: Repeat) -> None:
+    from cvt_hpc.printing import audit_lines
+    from cvt_hpc.study.audit import report_audit
+
+    print(*audit_lines(report_audit(audit)), sep="\n")
+
+
+def _show_step_check(check: Repeat) -> None:
+    from cvt_hpc.analysis.comparison import compare, only
+    from cvt_hpc.printing import step_check_lines
+    from cvt_hpc.study import open_results
+
+    sources = str(check.out), str(check.place)
+    with open_results(check.out) as a, open_results(check.place) as b:
+        found = compare(a, only(b, check.sample), sources)
+    written = _write_comparison(found, check.place, sources)
+    print(*step_check_lines(check, found), *written, sep="\n")
 
 
 def _status(arguments: argparse.Namespace) -> int:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.job.values import in_words
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS
+from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS, PairClass
 from cvt_hpc.vibration.classes import OccurrenceClass
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cvt_hpc.study import RunReport, StudyStatus
     from cvt_hpc.study.audit import AuditReport
     from cvt_hpc.study.forecast import Forecast
+    from cvt_hpc.study.repeats import Repeat
     from cvt_hpc.study.resources import Disk
 
 MOST_FAILURES_NAMED = 10
@@ -60,6 +61,29 @@ def audit_lines(report: AuditReport) -> Iterator[str]:
             line += f"; mean forces within {rung.force_deviation:.2%} in 95 % of the runs"
         yield line + (f"; {rung.failed} more failed in full" if rung.failed else "")
     yield f"runs that differ: {report.table}"
+
+
+def step_check_lines(check: Repeat, found: Comparison) -> Iterator[str]:
+    """Yield the lines that say how far a sample of runs depends on the time step."""
+    from cvt_hpc.study.repeats import interval
+
+    drawn, eligible = int(check.sample.sum()), int(check.may_be_drawn.sum())
+    yield f"step check: {drawn} of {eligible} runs that took steps done again {check.way}"
+    runs, contradicting = int(found.answered.sum()), int(found.contradicts.sum())
+    low, high = interval(contradicting, runs)
+    share = f"{contradicting / runs:.2%}, " if runs else ""
+    line = (
+        f"  {contradicting} of {runs} contradict (quiet against vibrating; {share}95 % interval {low:.2%} to "
+    )
+    line += f"{high:.2%}), {int(found.contradicts_beyond.sum())} of them beyond the threshold; "
+    others = int((found.answered & (found.pairs == PairClass.OTHERWISE)).sum())
+    line += f"{others} more of another class"
+    failed = sum(
+        count for kinds, count in found.counts().items() if kinds[1] == OccurrenceClass.FAILED != kinds[0]
+    )
+    yield line + (f"; {failed} more failed {check.way}" if failed else "")
+    yield from islice(map(_cell_line, found.rows(found.contradicts)), MOST_CONTRADICTIONS_NAMED)
+    yield from (f"  {line}" for line in _deviation_lines(found))
 
 
 def comparison_lines(found: Comparison, sources: tuple[str, str]) -> Iterator[str]:

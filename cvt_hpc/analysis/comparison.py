@@ -19,6 +19,7 @@ from cvt_hpc.analysis.alignment import align, axes_of, job_of
 from cvt_hpc.analysis.classes import at_strongest_strand, occurrence_classes
 from cvt_hpc.files import written_aside
 from cvt_hpc.study.difference import differences, short
+from cvt_hpc.variables import Status
 from cvt_hpc.vibration.agreement import (
     CONTRADICTIONS,
     NEAR_CONTRADICTIONS,
@@ -178,6 +179,12 @@ def compare(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str] = ("A", "B"))
     values |= {"occurrence_class": classify_pairs(values["class_a"], values["class_b"], near)}
     cells = xr.Dataset({name: frame.copy(data=array) for name, array in values.items()})
     return Comparison(cells, thresholds, aligned.left_out, aligned.notes, tuple(_differences(a, b)))
+
+
+def only(dataset: xr.Dataset, chosen: NDArray[np.bool_]) -> xr.Dataset:
+    """Return results without the runs that are not chosen, shape (runs,): these count as not run."""
+    status = dataset["status"]
+    return dataset.assign(status=status.where(chosen.reshape(status.shape), Status.NOT_RUN))
 
 
 def _known(dataset: xr.Dataset) -> dict[str, NDArray]:
