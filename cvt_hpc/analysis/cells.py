@@ -54,7 +54,7 @@ OF_STARTS = {StartClass.LARGE_START_ONLY: ClassStyle("#d8c5ea", "#5b2a86", "#fff
 # Of comparisons: contradictions are blue, which nobody takes for the orange of vibration, dark beyond the
 # threshold and light near it; the mark points up where B alone vibrates.
 OF_PAIRS = {
-    PairClass.INCOMPLETE: ClassStyle("#ffffff", "#a01010", "#a01010", "++", "+", 1.4),
+    PairClass.FAILED_IN_ONE: ClassStyle("#ffffff", "#a01010", "#a01010", "++", "+", 1.4),
     PairClass.OTHERWISE: ClassStyle("#f6f0c4", "#6b6420", "#6b6420", "...", "d", 1.0),
     PairClass.A_ONLY_NEAR: ClassStyle("#7fb0dc", "#123a6b", "#ffffff", "", "v", 1.4),
     PairClass.B_ONLY_NEAR: ClassStyle("#7fb0dc", "#123a6b", "#ffffff", "", "^", 1.4),

@@ -82,8 +82,8 @@ class Comparison:
     Attributes
     ----------
     cells : Dataset
-        Over the axes of A: `class_a`, `class_b`, values of `OccurrenceClass`; `occurrence_class`, the value
-        that both have or one of `PairClass`; `amplitude_a`, `amplitude_b` [m] and `frequency_a`,
+        Over the axes of A: `class_a`, `class_b`, values of `OccurrenceClass`; `occurrence_class`, as
+        `classify_pairs` has it; `amplitude_a`, `amplitude_b` [m] and `frequency_a`,
         `frequency_b` [Hz] at the strand with the largest amplitude, not a number where unknown.
     thresholds : (float, float)
         Amplitude from which a strand of A and of B vibrates [m]; not a number where a job has none.

@@ -6,9 +6,9 @@ from pathlib import Path
 from textwrap import fill
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
+from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.arrangement import Arrangement, arrange
@@ -30,53 +30,69 @@ def draw_comparison(found: Comparison, out: Path, sources: tuple[str, str]) -> P
     Parameters
     ----------
     found : Comparison
-        Over one axis or more.
+        What is drawn; of a single run there is no map.
     out : Path
         As for `save_figure`, with what it returns.
     sources : (str, str)
-        What A and B are, for the title and the errors.
+        What A and B are, for the title.
 
     Raises
     ------
     InputError
-        The studies are of a single run, or as `save_figure`.
+        As of `save_figure`.
     """
-    sampled = is_sampled(found.cells)
-    arrangement = None if sampled else arrange(found.cells, {}, sources[0])
-    return draw(lambda: _figure(found, arrangement, sources), out)
+    return draw(lambda: _figure(found, sources), out)
 
 
-def _figure(found: Comparison, arrangement: Arrangement | None, sources: tuple[str, str]) -> Figure:
-    if arrangement is None:
-        height, shown, notes = scatter_height(found.cells), found.cells, ()
-    else:
-        sheet = sheet_of(arrangement)
-        height = sheet.rows * sheet.panel_height + TITLE_HEIGHT
-        shown, notes = arrangement.dataset, arrangement.notes
-    pairs = shown["occurrence_class"].values
+def _figure(found: Comparison, sources: tuple[str, str]) -> Figure:
+    arrangement = _arrangement(found)
+    pairs = arrangement.dataset["occurrence_class"].values
     kinds = {kind: style for kind, style in cells.ALL_STYLES.items() if np.any(pairs == kind)}
-    legend = 0.3 * -(-len(kinds) // 3)
-    figure = Figure((WIDTH, height + legend + SCATTER_HEIGHT + 1.0), layout="constrained")
-    above, below = figure.subfigures(2, 1, height_ratios=(height + legend, SCATTER_HEIGHT))
-    if arrangement is None:
-        draw_samples(above, found.cells, pairs, np.full(pairs.shape, np.nan), _NO_SCALE)
-    else:
-        axes = above.subplots(sheet.rows, sheet.columns, sharex=True, sharey=True, squeeze=False)
-        draw_block(above, axes, sheet, np.full(sheet.classes.shape, np.nan), _NO_SCALE)
-        above.supylabel(sheet.y.label, fontsize=10)
+    height = _map_height(arrangement) + 0.3 * -(-len(kinds) // 3)
+    figure = Figure((WIDTH, height + SCATTER_HEIGHT + 1.0), layout="constrained")
+    above, below = figure.subfigures(2, 1, height_ratios=(height, SCATTER_HEIGHT))
+    _draw_map(above, arrangement)
     cells.class_legend(above, kinds, 3)
     _draw_amplitudes(below, found)
-    figure.suptitle(_title(found, shown, notes, sources))
+    lines = _title(found, pairs, sources) + list(arrangement.notes)
+    figure.suptitle("\n".join(fill(line, 72) for line in lines))
     return figure
 
 
-def _title(found: Comparison, shown: xr.Dataset, notes: tuple[str, ...], sources: tuple[str, str]) -> str:
+def _arrangement(found: Comparison) -> Arrangement:
+    """Lay out the cells of a grid; samples, and a single run, stay as they are."""
+    if is_sampled(found.cells) or found.pairs.ndim == 0:
+        return Arrangement(found.cells, "", None, None, ())
+    return arrange(found.cells, {}, "")
+
+
+def _map_height(arrangement: Arrangement) -> float:
+    """Height [inch] of the map."""
+    if is_sampled(arrangement.dataset):
+        return scatter_height(arrangement.dataset)
+    if not arrangement.x:
+        return 0.0
+    sheet = sheet_of(arrangement)
+    return sheet.rows * sheet.panel_height + TITLE_HEIGHT
+
+
+def _draw_map(figure: SubFigure, arrangement: Arrangement) -> None:
+    if is_sampled(arrangement.dataset):
+        pairs = arrangement.dataset["occurrence_class"].values
+        draw_samples(figure, arrangement.dataset, pairs, np.full(pairs.shape, np.nan), _NO_SCALE)
+    elif arrangement.x:
+        sheet = sheet_of(arrangement)
+        axes = figure.subplots(sheet.rows, sheet.columns, sharex=True, sharey=True, squeeze=False)
+        draw_block(figure, axes, sheet, np.full(sheet.classes.shape, np.nan), _NO_SCALE)
+        figure.supylabel(sheet.y.label, fontsize=10)
+
+
+def _title(found: Comparison, shown: NDArray[np.int8], sources: tuple[str, str]) -> list[str]:
     total, beyond = int(found.contradicts.sum()), int(found.contradicts_beyond.sum())
     lines = [f"A: {sources[0]}; B: {sources[1]}"]
     lines.append(f"{found.pairs.size} cells, {total} contradict, {beyond} of these beyond the threshold")
-    hidden = total - int(np.isin(shown["occurrence_class"], CONTRADICTIONS).sum())
-    lines += [*notes, *([f"{hidden} contradicting cells are not on this map"] if hidden else [])]
-    return "\n".join(fill(line, 72) for line in lines)
+    hidden = total - int(np.isin(shown, CONTRADICTIONS).sum())
+    return lines + ([f"{hidden} contradicting cells are not on this map"] if hidden else [])
 
 
 def _draw_amplitudes(figure: SubFigure, found: Comparison) -> None:

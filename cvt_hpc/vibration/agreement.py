@@ -22,7 +22,7 @@ class PairClass(IntEnum):
     """Class of a cell whose two runs, A and B, are of different classes.
 
     All values are negative, so that they stand beside those of `OccurrenceClass`, which say that both runs
-    are of that class.
+    are of that class; NOT_RUN says it of either one.
     """
 
     A_ONLY = -1
@@ -30,7 +30,7 @@ class PairClass(IntEnum):
     A_ONLY_NEAR = -3
     B_ONLY_NEAR = -4
     OTHERWISE = -5
-    INCOMPLETE = -6
+    FAILED_IN_ONE = -6
 
     @property
     def label(self) -> str:
@@ -44,7 +44,7 @@ _LABELS = {
     PairClass.A_ONLY_NEAR: "in A only, near the threshold",
     PairClass.B_ONLY_NEAR: "in B only, near the threshold",
     PairClass.OTHERWISE: "other classes",
-    PairClass.INCOMPLETE: "failed or not run in one",
+    PairClass.FAILED_IN_ONE: "failed in one",
 }
 CONTRADICTIONS = (
     PairClass.A_ONLY,
@@ -68,10 +68,12 @@ def classify_pairs(a: NDArray, b: NDArray, near: NDArray[np.bool_]) -> NDArray[n
     Returns
     -------
     array of int8
-        The value of `OccurrenceClass` where both agree, else one of `PairClass`.
+        The value of `OccurrenceClass` where both agree, and NOT_RUN where either was not run; else one of
+        `PairClass`.
     """
     pairs = np.where(a == b, a, PairClass.OTHERWISE).astype(np.int8)
-    pairs[(a != b) & (np.isin(a, WITHOUT_RESULTS) | np.isin(b, WITHOUT_RESULTS))] = PairClass.INCOMPLETE
+    pairs[(a == OccurrenceClass.FAILED) != (b == OccurrenceClass.FAILED)] = PairClass.FAILED_IN_ONE
+    pairs[(a == OccurrenceClass.NOT_RUN) | (b == OccurrenceClass.NOT_RUN)] = OccurrenceClass.NOT_RUN
     for vibrating, quiet, far, close in (
         (a, b, PairClass.A_ONLY, PairClass.A_ONLY_NEAR),
         (b, a, PairClass.B_ONLY, PairClass.B_ONLY_NEAR),
