@@ -90,7 +90,8 @@ def _draw_map(figure: SubFigure, arrangement: Arrangement) -> None:
 def _title(found: Comparison, shown: NDArray[np.int8], sources: tuple[str, str]) -> list[str]:
     total, beyond = int(found.contradicts.sum()), int(found.contradicts_beyond.sum())
     lines = [f"A: {sources[0]}; B: {sources[1]}"]
-    lines.append(f"{found.pairs.size} cells, {total} contradict, {beyond} of these beyond the threshold")
+    lines.append(f"{int(found.answered.sum())} of {found.pairs.size} cells have results in both")
+    lines.append(f"{total} contradict, {beyond} of these beyond the threshold")
     hidden = total - int(np.isin(shown, CONTRADICTIONS).sum())
     return lines + ([f"{hidden} contradicting cells are not on this map"] if hidden else [])
 
