@@ -117,7 +117,13 @@ def _parser() -> argparse.ArgumentParser:
     _add(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
     picture = _add(commands, "map", _map, "draw where vibration occurs", "RESULTS")
     picture.add_argument("--out", type=Path, metavar="PNG", help="default: map.png beside the dataset")
-    compare = _add(commands, "compare", _compare, "compare two studies of one grid, cell by cell", "RESULTS")
+    compare = _add(
+        commands,
+        "compare",
+        _compare,
+        "compare two studies, cell by cell; exit status 1: some contradict",
+        "RESULTS",
+    )
     compare.add_argument("other", type=Path, metavar="RESULTS", help="the one to compare with it")
     folder = "folder of compare.csv and compare.png (default: that of the second study)"
     compare.add_argument("--out", type=Path, metavar="DIR", help=folder)
@@ -206,12 +212,14 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def _repeats(job: Job, arguments: argparse.Namespace) -> list[tuple[Repeat, Callable[[Repeat], None]]]:
     """Return which samples are to be done again, each with what prints what came of it."""
+    if arguments.check_step_by and arguments.check_step is None:
+        raise mismatch("--check-step-by", "--check-step FRACTION beside it", "none")
+    if arguments.audit is None and arguments.check_step is None:
+        return []
     from cvt_hpc.study.audit import audit_of
     from cvt_hpc.study.repeats import check_fraction
     from cvt_hpc.study.step_check import step_check
 
-    if arguments.check_step_by and arguments.check_step is None:
-        raise mismatch("--check-step-by", "--check-step FRACTION beside it", "none")
     out, repeats = arguments.out or Path("out") / job.name, []
     if arguments.audit is not None:
         check_fraction("--audit", arguments.audit, arguments.part)

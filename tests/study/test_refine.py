@@ -22,11 +22,7 @@ AGAIN = {"retry": [Status.FAILED_NUMERICS], "refine": 2.0}
 
 
 class Diverging(Simulator):
-    """Runs that diverge where their step is too long for them; asserts that those of a batch have one step."""
-
-    def run_points(self, job, points, interrupt):
-        assert len({point["step"] for point in points}) == 1
-        return super().run_points(job, points, interrupt)
+    """Runs that diverge where their step is too long for them."""
 
     def run_point(self, job, point, interrupt):
         stable = STABLE.get(point["load"], STEP)
@@ -129,6 +125,20 @@ def test_a_shortened_run_is_expected_to_take_longer(tmp_path):
     sweep(tmp_path, time_limit=0.0, **AGAIN)  # 3, 7, 8 are asked for again at half the step, none is done
     sweep(tmp_path, Timed())
     assert asked == [3, 7, 8, 11, 10]
+
+
+def test_runs_of_different_steps_share_no_batch(tmp_path):
+    batches = []
+
+    class Watched(Diverging):
+        def run_points(self, job, points, interrupt):
+            batches.append([(point["load"], point["step"]) for point in points])
+            return super().run_points(job, points, interrupt)
+
+    sweep(tmp_path, Stopped(9))  # 10 and 11 are left
+    sweep(tmp_path, time_limit=0.0, **AGAIN)
+    sweep(tmp_path, Watched(lanes=8))
+    assert sorted(batches) == [[(3, STEP / 2), (7, STEP / 2), (8, STEP / 2)], [(10, STEP), (11, STEP)]]
 
 
 @pytest.mark.parametrize(
