@@ -16,9 +16,12 @@ from cvt_hpc import __version__
 from cvt_hpc.errors import CRASHED, InputError, mismatch
 
 if TYPE_CHECKING:
+    from cvt_hpc.analysis.comparison import Comparison
     from cvt_hpc.job import Job
+    from cvt_hpc.study.repeats import Repeat
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+CONTRADICTING = 1  # of `compare`: some cells are quiet in one study and vibrate in the other
 RETRIED = ("timed_out", "failed_error", "failed_numerics")
 _SUBJECTS = {
     "JOB": "job file (TOML)",
@@ -98,12 +101,32 @@ def _parser() -> argparse.ArgumentParser:
         choices=RETRIED,
         help="do recorded runs that ended so again; may be repeated",
     )
+    run.add_argument(
+        "--refine",
+        type=float,
+        metavar="FACTOR",
+        help="with --retry failed_numerics: at a time step shorter by this factor",
+    )
     audit = "do so large a part of the runs that lower rungs of model auto have answered in full, and compare"
     run.add_argument("--audit", type=float, metavar="FRACTION", help=audit)
+    check_step = "do so large a part of the runs again at half their time step, and compare"
+    run.add_argument("--check-step", type=float, metavar="FRACTION", help=check_step)
+    check_by = "how --check-step does them: at half the step (default), or by the stepper explicit"
+    run.add_argument("--check-step-by", choices=("half", "explicit"), help=check_by)
     _add(commands, "status", _status, "how far a study is", "DIR")
     _add(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
     picture = _add(commands, "map", _map, "draw where vibration occurs", "RESULTS")
     picture.add_argument("--out", type=Path, metavar="PNG", help="default: map.png beside the dataset")
+    compare = _add(
+        commands,
+        "compare",
+        _compare,
+        "compare two studies, cell by cell; exit status 1: some contradict",
+        "RESULTS",
+    )
+    compare.add_argument("other", type=Path, metavar="RESULTS", help="the one to compare with it")
+    folder = "folder of compare.csv and compare.png (default: that of the second study)"
+    compare.add_argument("--out", type=Path, metavar="DIR", help=folder)
     simulate = _add(commands, "simulate", _simulate, "one run with its full history", "JOB")
     simulate.add_argument("--out", type=Path, metavar="FILE.nc", help="dataset of the history")
     simulate.add_argument("--plot", type=Path, metavar="PNG", help="picture of the history")
@@ -156,6 +179,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from cvt_hpc.printing import report_lines, trouble_lines
     from cvt_hpc.study import check_start, run
     from cvt_hpc.study.launch import end_process
+    from cvt_hpc.study.steps import check_refinement
     from cvt_hpc.variables import Status
 
     limits = {
@@ -165,40 +189,81 @@ def _run(arguments: argparse.Namespace) -> int:
     }
     retry = [Status[name.upper()] for name in arguments.retry]
     job = load_job(arguments.path, arguments.set)
-    if arguments.audit is not None:
-        from cvt_hpc.study.audit import check_audit, check_fraction
-
-        check_fraction(job, arguments.audit, arguments.part)
-        check_audit(job, arguments.out or Path("out") / job.name, arguments.fresh)
+    options = {"fresh": arguments.fresh, "retry": retry, **limits}
+    if arguments.refine is not None:
+        check_refinement(job, arguments.refine, retry)
+        options["refine"] = arguments.refine
+    repeats = _repeats(job, arguments)
     if arguments.dry_run:
         check_start(job, arguments.out, part=arguments.part, fresh=arguments.fresh)
         _show(job, arguments.out)
         return DONE
     started = time.monotonic()
-    options = {"fresh": arguments.fresh, "retry": retry, **limits}
     report = run(job, arguments.out, part=arguments.part, **options)
     _complain(*trouble_lines(report))
     if _speaks():
         print(*report_lines(report), sep="\n")
-    if arguments.audit is not None and not report.remaining:
-        status = _audit(job, report.out, arguments.audit, options, started)
-        return end_process(max(report.exit_status, status))
-    return end_process(report.exit_status)
+    statuses = [report.exit_status]
+    for repeat, show in repeats:
+        if not report.remaining:
+            statuses.append(_repeat(repeat, show, options, started))
+    return end_process(max(statuses))
 
 
-def _audit(job: Job, out: Path, fraction: float, options: dict[str, Any], started: float) -> int:
-    """Do the runs of an audit in the time that is left, and print what it has found."""
-    from cvt_hpc.printing import audit_lines, trouble_lines
-    from cvt_hpc.study.audit import report_audit, run_audit
+def _repeats(job: Job, arguments: argparse.Namespace) -> list[tuple[Repeat, Callable[[Repeat], None]]]:
+    """Return which samples are to be done again, each with what prints what came of it."""
+    if arguments.check_step_by and arguments.check_step is None:
+        raise mismatch("--check-step-by", "--check-step FRACTION beside it", "none")
+    if arguments.audit is None and arguments.check_step is None:
+        return []
+    from cvt_hpc.study.audit import audit_of
+    from cvt_hpc.study.repeats import check_fraction
+    from cvt_hpc.study.step_check import step_check
+
+    out, repeats = arguments.out or Path("out") / job.name, []
+    if arguments.audit is not None:
+        check_fraction("--audit", arguments.audit, arguments.part)
+        repeats.append((audit_of(job, out, arguments.audit), _show_audit))
+    if arguments.check_step is not None:
+        check_fraction("--check-step", arguments.check_step, arguments.part)
+        way = arguments.check_step_by or "half"
+        repeats.append((step_check(job, out, arguments.check_step, way), _show_step_check))
+    for repeat, _ in repeats:
+        repeat.check(arguments.fresh)
+    return repeats
+
+
+def _repeat(repeat: Repeat, show: Callable[[Repeat], None], options: dict[str, Any], started: float) -> int:
+    """Do the runs of a sample again in the time that is left, and print what was found."""
+    from cvt_hpc.printing import trouble_lines
 
     if "time_limit" in options:
         left = options["time_limit"] - (time.monotonic() - started)
         options = {**options, "time_limit": max(left, 0.0)}
-    report = run_audit(job, out, fraction, **options)
-    _complain(*(f"audit: {line}" for line in trouble_lines(report)))
+    report = repeat.run(**options)
+    _complain(*(f"{repeat.label}: {line}" for line in trouble_lines(report)))
     if _speaks() and not report.remaining:
-        print(*audit_lines(report_audit(job, out, fraction)), sep="\n")
+        show(repeat)
     return report.exit_status
+
+
+def _show_audit(audit: Repeat) -> None:
+    from cvt_hpc.printing import audit_lines
+    from cvt_hpc.study.audit import report_audit
+
+    print(*audit_lines(report_audit(audit)), sep="\n")
+
+
+def _show_step_check(check: Repeat) -> None:
+    from cvt_hpc.analysis.comparison import compare, only
+    from cvt_hpc.printing import step_check_lines
+    from cvt_hpc.study import open_results
+
+    sources = str(check.out), str(check.place)
+    with open_results(check.out) as a, open_results(check.place) as b:
+        found = compare(a, only(b, check.sample), sources)
+    written = _write_comparison(found, check.place, sources)
+    print(*step_check_lines(check, found), *written, sep="\n")
 
 
 def _status(arguments: argparse.Namespace) -> int:
@@ -234,6 +299,31 @@ def _map(arguments: argparse.Namespace) -> int:
             print(start_line(dataset, at, str(arguments.path)))
         print(f"map: {picture}")
     return DONE
+
+
+def _compare(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.comparison import compare
+    from cvt_hpc.printing import comparison_lines
+    from cvt_hpc.study import open_results
+
+    sources = str(arguments.path), str(arguments.other)
+    with open_results(arguments.path) as a, open_results(arguments.other) as b:
+        found = compare(a, b, sources)
+    folder = arguments.other if arguments.other.is_dir() else arguments.other.parent
+    written = _write_comparison(found, arguments.out or folder, sources)
+    print(*comparison_lines(found, sources), *written, sep="\n")
+    return CONTRADICTING if found.contradicts.any() else DONE
+
+
+def _write_comparison(found: Comparison, folder: Path, sources: tuple[str, str]) -> list[str]:
+    """Leave table and picture of a comparison, and return the lines that say where."""
+    from cvt_hpc.analysis.comparison import write_comparison
+    from cvt_hpc.analysis.comparison_drawing import draw_comparison
+
+    return [
+        f"picture: {draw_comparison(found, folder / 'compare.png', sources)}",
+        f"table: {write_comparison(found, folder / 'compare.csv')}",
+    ]
 
 
 def _simulate(arguments: argparse.Namespace) -> int:

@@ -4,21 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.job.values import in_words
 from cvt_hpc.variables import Status
+from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS, PairClass
+from cvt_hpc.vibration.classes import OccurrenceClass
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from cvt_hpc.analysis.comparison import Cell, Comparison
     from cvt_hpc.job import Job
     from cvt_hpc.study import RunReport, StudyStatus
     from cvt_hpc.study.audit import AuditReport
     from cvt_hpc.study.forecast import Forecast
+    from cvt_hpc.study.repeats import Repeat
     from cvt_hpc.study.resources import Disk
 
 MOST_FAILURES_NAMED = 10
+MOST_CONTRADICTIONS_NAMED = 20
 _KNOWN_OF_FAILURES = (
     "status",
     "reason",
@@ -55,6 +61,81 @@ def audit_lines(report: AuditReport) -> Iterator[str]:
             line += f"; mean forces within {rung.force_deviation:.2%} in 95 % of the runs"
         yield line + (f"; {rung.failed} more failed in full" if rung.failed else "")
     yield f"runs that differ: {report.table}"
+
+
+def step_check_lines(check: Repeat, found: Comparison) -> Iterator[str]:
+    """Yield the lines that say how far a sample of runs depends on the time step."""
+    from cvt_hpc.study.repeats import interval
+
+    drawn, eligible = int(check.sample.sum()), int(check.may_be_drawn.sum())
+    yield f"step check: {drawn} of {eligible} runs that took steps done again {check.way}"
+    runs, contradicting = int(found.answered.sum()), int(found.contradicts.sum())
+    low, high = interval(contradicting, runs)
+    share = f"{contradicting / runs:.2%}, " if runs else ""
+    line = (
+        f"  {contradicting} of {runs} contradict (quiet against vibrating; {share}95 % interval {low:.2%} to "
+    )
+    line += f"{high:.2%}), {int(found.contradicts_beyond.sum())} of them beyond the threshold; "
+    others = int((found.answered & (found.pairs == PairClass.OTHERWISE)).sum())
+    line += f"{others} more of another class"
+    failed = sum(
+        count for kinds, count in found.counts().items() if kinds[1] == OccurrenceClass.FAILED != kinds[0]
+    )
+    yield line + (f"; {failed} more failed {check.way}" if failed else "")
+    yield from islice(map(_cell_line, found.rows(found.contradicts)), MOST_CONTRADICTIONS_NAMED)
+    yield from (f"  {line}" for line in _deviation_lines(found))
+
+
+def comparison_lines(found: Comparison, sources: tuple[str, str]) -> Iterator[str]:
+    """Yield the lines that say in what two studies agree: A, B, their jobs, classes, and amplitudes."""
+    for label, source, left_out in zip("AB", sources, found.left_out, strict=True):
+        yield f"{label}: {source}" + (f"; {left_out} of its runs left out, unknown there" if left_out else "")
+    yield from found.notes
+    yield from (f"differs: {line}" for line in found.differences or ("nothing that the datasets tell",))
+    yield f"{found.pairs.size} cells, by class in A (rows) and in B (columns):"
+    yield from _class_table(found)
+    contradicting = int(found.contradicts.sum())
+    beyond = int(found.contradicts_beyond.sum())
+    yield (
+        f"{contradicting} of {int(found.answered.sum())} cells contradict (quiet against vibrating), "
+        f"{beyond} of them beyond the threshold (larger amplitude not within {NEAR:.0%} of it)"
+    )
+    yield from map(_cell_line, islice(found.rows(found.contradicts), MOST_CONTRADICTIONS_NAMED))
+    if contradicting > MOST_CONTRADICTIONS_NAMED:
+        yield f"  {contradicting - MOST_CONTRADICTIONS_NAMED} more in the table"
+    yield from _deviation_lines(found)
+
+
+def _class_table(found: Comparison) -> Iterator[str]:
+    counts = found.counts()
+    rows = {kind for (kind, _), count in counts.items() if count}
+    columns = sorted({kind for (_, kind), count in counts.items() if count})
+    yield "".join([f"  {'':<10}", *(f"{kind.label:>11}" for kind in columns)])
+    for row in sorted(rows):
+        yield "".join([f"  {row.label:<10}", *(f"{counts[row, column]:>11}" for column in columns)])
+
+
+def _cell_line(cell: Cell) -> str:
+    place = ", ".join(f"{name} = {in_words(value, '')}" for name, value in cell.at.items())
+    words = (
+        kind.label
+        + ("" if math.isnan(size) else f" {size * 1e6:.3g} um")
+        + ("" if math.isnan(frequency) else f" {frequency:.4g} Hz")
+        for kind, size, frequency in zip(cell.classes, cell.amplitude, cell.frequency, strict=True)
+    )
+    near = ", near the threshold" if cell.pair in NEAR_CONTRADICTIONS else ""
+    return f"  {place}: {' | '.join(words)}{near}"
+
+
+def _deviation_lines(found: Comparison) -> Iterator[str]:
+    both = int((found.pairs == OccurrenceClass.VIBRATING).sum())
+    for name in ("amplitude", "frequency"):
+        deviation = found.deviation(name)
+        if not math.isnan(deviation.median):
+            yield (
+                f"{name} where both vibrate ({both} cells): B deviates by {deviation.median:.2%} (median), "
+                f"{deviation.high:.2%} (95 %), {deviation.largest:.2%} (largest)"
+            )
 
 
 def trouble_lines(report: RunReport) -> Iterator[str]:

@@ -112,11 +112,11 @@ def _index_of(coordinate: xr.DataArray, value: Any, where: str) -> int:
     else:
         hits = np.flatnonzero(values.astype(str) == str(value))
     if hits.size == 0:
-        raise mismatch(where, f"a value of that axis: {_known_values(coordinate)}", repr(value))
+        raise mismatch(where, f"a value of that axis: {known_values(coordinate)}", repr(value))
     return int(hits[0])
 
 
-def _known_values(coordinate: xr.DataArray) -> str:
+def known_values(coordinate: xr.DataArray) -> str:
     """The values of an axis [SI] in words, a few of them if there are many."""
     is_numeric = coordinate.dtype.kind in "iuf"
     texts = [f"{value:g}" if is_numeric else str(value) for value in coordinate.values.tolist()]

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PatchCollection
 from matplotlib.colors import Colormap, ListedColormap, Normalize, to_rgba
-from matplotlib.figure import Figure
+from matplotlib.figure import FigureBase
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis.arrangement import Ruler
 from cvt_hpc.analysis.classes import OccurrenceClass
+from cvt_hpc.vibration.agreement import PairClass
 from cvt_hpc.vibration.hysteresis import StartClass
 
 Array = NDArray[np.float64]
@@ -47,6 +50,18 @@ STYLES = {
 
 # Of maps from two starts: lighter than any vibration, and hatched the other way than what is undecided.
 OF_STARTS = {StartClass.LARGE_START_ONLY: ClassStyle("#d8c5ea", "#5b2a86", "#ffffff", "\\\\\\", "D", 1.0)}
+
+# Of comparisons: contradictions are blue, which nobody takes for the orange of vibration, dark beyond the
+# threshold and light near it; the mark points up where B alone vibrates.
+OF_PAIRS = {
+    PairClass.FAILED_IN_ONE: ClassStyle("#ffffff", "#a01010", "#a01010", "++", "+", 1.4),
+    PairClass.OTHERWISE: ClassStyle("#f6f0c4", "#6b6420", "#6b6420", "...", "d", 1.0),
+    PairClass.A_ONLY_NEAR: ClassStyle("#7fb0dc", "#123a6b", "#ffffff", "", "v", 1.4),
+    PairClass.B_ONLY_NEAR: ClassStyle("#7fb0dc", "#123a6b", "#ffffff", "", "^", 1.4),
+    PairClass.A_ONLY: ClassStyle("#123a6b", "#ffffff", "#000000", "", "v", 1.8),
+    PairClass.B_ONLY: ClassStyle("#123a6b", "#ffffff", "#000000", "", "^", 1.8),
+}
+ALL_STYLES: dict[IntEnum, ClassStyle] = STYLES | OF_STARTS | OF_PAIRS
 
 # Inferred cells: level lines, no mark. Of vibrating ones the amplitude is not known: a colour of no scale.
 LINES = {"facecolor": "none", "edgecolor": "#8a8a8a", "linewidth": 0, "hatch": "---"}
@@ -93,7 +108,7 @@ def draw_cells(
     x, y : Ruler
         Places of the columns and rows.
     classes : array, shape (row, column)
-        `OccurrenceClass` of each run, or `StartClass` of each cell.
+        `OccurrenceClass` of each run, or `StartClass` or `PairClass` of each cell.
     inferred : array of bool, shape (row, column)
         Whether a cell's class is not that of a run.
     values : array, shape (row, column)
@@ -101,7 +116,7 @@ def draw_cells(
     scale : Scale
         How it colours them.
     """
-    for kind, style in (STYLES | OF_STARTS).items():
+    for kind, style in ALL_STYLES.items():
         inside = classes == kind
         cells = [_cell(x, y, row, column) for row, column in np.argwhere(inside)]
         fills = fills_of(kind, values[inside], scale)
@@ -122,7 +137,7 @@ def draw_cells(
 
 def draw_marks(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], marked: Mask, size: float) -> None:
     """Mark grid points by class; arguments as for `draw_cells`, which ones, and the size of a dot [point]."""
-    for kind, style in (STYLES | OF_STARTS).items():
+    for kind, style in ALL_STYLES.items():
         rows, columns = np.nonzero((classes == kind) & marked)
         axes.plot(
             x.centres[columns],
@@ -156,10 +171,12 @@ def write_values(
         )
 
 
-def class_legend(figure: Figure, *, with_inferred: bool = False, with_starts: bool = False) -> None:
-    """Legend of all classes below the panels: fill, hatching, mark; of two starts, and of inferred cells."""
+def class_legend(
+    figure: FigureBase, styles: Mapping[IntEnum, ClassStyle], columns: int, *, with_inferred: bool = False
+) -> None:
+    """Legend of some classes below the panels: fill, hatching, mark; and of inferred cells."""
     handles, labels = [], []
-    for kind, style in (STYLES | OF_STARTS if with_starts else STYLES).items():
+    for kind, style in styles.items():
         outline = style.ink if style.hatch else "#606060"
         cell = Patch(facecolor=style.fill, edgecolor=outline, hatch=style.hatch, linewidth=0.8)
         size = 4.0 * style.mark_size
@@ -174,7 +191,7 @@ def class_legend(figure: Figure, *, with_inferred: bool = False, with_starts: bo
         handles,
         labels,
         loc="outside lower center",
-        ncols=3 if with_starts else len(OccurrenceClass),  # as wide as the page with the longest label
+        ncols=columns,
         frameon=False,
         handler_map={tuple: HandlerTuple(ndivide=1, pad=0)},
         handlelength=2.2,
@@ -188,9 +205,9 @@ def _cell(x: Ruler, y: Ruler, row: int, column: int) -> Rectangle:
     return Rectangle(corner, x.edges[column + 1] - corner[0], y.edges[row + 1] - corner[1])
 
 
-def fills_of(kind: OccurrenceClass | StartClass, values: Array, scale: Scale) -> Array:
+def fills_of(kind: IntEnum, values: Array, scale: Scale) -> Array:
     """Colours (cell, rgba) of cells of one class."""
-    fills = np.tile(to_rgba((STYLES | OF_STARTS)[kind].fill), (len(values), 1))
+    fills = np.tile(to_rgba(ALL_STYLES[kind].fill), (len(values), 1))
     if kind is OccurrenceClass.VIBRATING:
         known = np.isfinite(values)
         fills[known] = scale.colours(scale.norm(values[known]))

@@ -78,7 +78,7 @@ def draw_map(
 
 
 @dataclass(frozen=True)
-class _Sheet:
+class Sheet:
     """What the panels show, arrays of shape (panel, row, column), and where."""
 
     arrangement: Arrangement
@@ -91,14 +91,17 @@ class _Sheet:
 
     @property
     def panels(self) -> int:
+        """Number of panels."""
         return len(self.classes)
 
     @property
     def columns(self) -> int:
+        """Panels side by side."""
         return 1 if self.panels <= MOST_STACKED else 2
 
     @property
     def rows(self) -> int:
+        """Panels above each other."""
         return -(-self.panels // self.columns)
 
     @property
@@ -122,7 +125,7 @@ class _Sheet:
 
 def map_figure(arrangement: Arrangement) -> Figure:
     """Compose the picture of `draw_map`; to be called within STYLE."""
-    sheet = _sheet(arrangement)
+    sheet = sheet_of(arrangement)
     has_frequency = bool(np.isfinite(sheet.frequency).any())
     width, height = sheet.smallest_cell
     written = has_frequency and width >= 22 and height >= 22  # [point]: three digits above a dot
@@ -130,7 +133,7 @@ def map_figure(arrangement: Arrangement) -> Figure:
     figure = Figure((WIDTH, blocks * sheet.rows * sheet.panel_height + 1.9), layout="constrained")
     axes = figure.subplots(blocks * sheet.rows, sheet.columns, sharex=True, sharey=True, squeeze=False)
     amplitude = cells.Scale(cells.AMPLITUDE_COLOURS, cells.norm_over(sheet.amplitude, 0.0), "amplitude [µm]")
-    _draw_block(figure, axes[: sheet.rows], sheet, sheet.amplitude, amplitude)
+    draw_block(figure, axes[: sheet.rows], sheet, sheet.amplitude, amplitude)
     if written:
         for ax, *shown in zip(axes.flat, sheet.classes, sheet.frequency, sheet.amplitude, strict=False):
             cells.write_values(ax, sheet.x, sheet.y, *shown, amplitude)
@@ -138,15 +141,18 @@ def map_figure(arrangement: Arrangement) -> Figure:
         frequency = cells.Scale(
             cells.FREQUENCY_COLOURS, cells.norm_over(sheet.frequency), "dominant frequency [Hz]"
         )
-        _draw_block(figure, axes[sheet.rows :], sheet, sheet.frequency, frequency)
+        draw_block(figure, axes[sheet.rows :], sheet, sheet.frequency, frequency)
     figure.suptitle(_title(sheet, written))
     figure.supylabel(sheet.y.label, fontsize=10)
-    starts = "starts" in arrangement.dataset.attrs
-    cells.class_legend(figure, with_inferred=bool(sheet.inferred.any()), with_starts=starts)
+    # as wide as the page with the longest label
+    styles, columns = cells.STYLES, len(cells.STYLES)
+    if "starts" in arrangement.dataset.attrs:
+        styles, columns = cells.STYLES | cells.OF_STARTS, 3
+    cells.class_legend(figure, styles, columns, with_inferred=bool(sheet.inferred.any()))
     return figure
 
 
-def _sheet(arrangement: Arrangement) -> _Sheet:
+def sheet_of(arrangement: Arrangement) -> Sheet:
     """The arranged variables with all three dimensions, missing ones of length one."""
     dataset = arrangement.dataset
     names = [arrangement.panel, arrangement.y, arrangement.x]
@@ -157,7 +163,7 @@ def _sheet(arrangement: Arrangement) -> _Sheet:
 
     runs, classes = grid(occurrence_classes(dataset)), grid(map_classes(dataset))
     vibrating = runs == OccurrenceClass.VIBRATING
-    return _Sheet(
+    return Sheet(
         arrangement,
         ruler(dataset[arrangement.x]),
         ruler(dataset[arrangement.y]) if arrangement.y else ONE_ROW,
@@ -168,8 +174,8 @@ def _sheet(arrangement: Arrangement) -> _Sheet:
     )
 
 
-def _draw_block(
-    figure: Figure, axes: NDArray[Any], sheet: _Sheet, values: NDArray[np.float64], scale: cells.Scale
+def draw_block(
+    figure: Figure, axes: NDArray[Any], sheet: Sheet, values: NDArray[np.float64], scale: cells.Scale
 ) -> None:
     """One set of panels, their vibrating cells coloured by `values`, and the colour bar."""
     mark = float(np.clip(0.35 * min(sheet.smallest_cell), 1.5, 5.0))
@@ -188,7 +194,7 @@ def _draw_block(
         bar.set_label(scale.label)
 
 
-def _label_panel(ax: Axes, sheet: _Sheet, panel: int) -> None:
+def _label_panel(ax: Axes, sheet: Sheet, panel: int) -> None:
     """Title and ticks of a panel."""
     name = sheet.arrangement.panel
     if name:
@@ -204,7 +210,7 @@ def _label_panel(ax: Axes, sheet: _Sheet, panel: int) -> None:
         ax.set_xlabel(sheet.x.label)
 
 
-def _title(sheet: _Sheet, written: bool) -> str:
+def _title(sheet: Sheet, written: bool) -> str:
     """What, of which job, how many runs of each class, and what is fixed."""
     runs, inferred = sheet.classes[~sheet.inferred], sheet.classes[sheet.inferred]
     attributes = sheet.arrangement.dataset.attrs

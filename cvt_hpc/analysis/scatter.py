@@ -12,7 +12,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.axis import XAxis, YAxis
 from matplotlib.cm import ScalarMappable
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.markers import MarkerStyle
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
@@ -52,26 +52,17 @@ def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> F
     """
     if at:
         raise mismatch(f"{source}: at {next(iter(at))}", "results over a grid", "samples, all apart")
-    along = {str(name): array for name, array in dataset.coords.items() if array.dims == ("run",)}
-    names = [name for name, array in along.items() if "derived" not in array.attrs]
-    names.sort(key=lambda name: _FIRST.index(name) if name in _FIRST else len(_FIRST))
-    pairs = list(combinations(names[:MOST_AXES], 2)) or [(names[0], None)]
-    columns = min(len(pairs), 2)
-    rows = -(-len(pairs) // columns)
-    figure = Figure((WIDTH, 3.6 if len(pairs) == 1 else 2.6 * rows + 1.2), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False)
+    figure = Figure((WIDTH, scatter_height(dataset)), layout="constrained")
     classes = occurrence_classes(dataset).values
     amplitude = np.where(
         classes == OccurrenceClass.VIBRATING, at_strongest_strand(dataset, "amplitude") * 1e6, np.nan
     )
     scale = cells.Scale(cells.AMPLITUDE_COLOURS, cells.norm_over(amplitude, 0.0), "amplitude [µm]")
-    for axes, (x, y) in zip(panels.flat, pairs, strict=False):
-        _draw_runs(axes, dataset, x, y, classes, amplitude, scale)
-    for axes in panels.flat[len(pairs) :]:
-        axes.set_axis_off()
+    panels = draw_samples(figure, dataset, classes, amplitude, scale)
     if np.isfinite(amplitude).any():
         figure.colorbar(ScalarMappable(scale.norm, scale.colours), ax=panels, pad=0.02).set_label(scale.label)
     title = [headline(dataset.attrs), f"{classes.size} samples: {count_classes(classes)}"]
+    names = _axes(dataset)
     if len(names) > MOST_AXES:
         title.append(f"the first {MOST_AXES} of {len(names)} axes")
     figure.suptitle("\n".join(fill(line, 72) for line in title))
@@ -82,6 +73,55 @@ def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> F
         frameon=False,
     )
     return figure
+
+
+def scatter_height(dataset: xr.Dataset) -> float:
+    """Height [inch] of the map of a sampled study."""
+    pairs = len(_pairs(dataset))
+    return 3.6 if pairs == 1 else 2.6 * -(-pairs // 2) + 1.2
+
+
+def draw_samples(
+    figure: FigureBase,
+    dataset: xr.Dataset,
+    classes: NDArray[np.int8],
+    amplitude: NDArray[np.float64],
+    scale: cells.Scale,
+) -> NDArray[Any]:
+    """Draw the runs of a sampled study by class, in a panel for each pair of axes, and return the panels.
+
+    Parameters
+    ----------
+    figure : FigureBase
+        Where to draw.
+    dataset : Dataset
+        With the values of the axes along `run`.
+    classes : array, shape (run,)
+        Keys of `cells.ALL_STYLES`.
+    amplitude : array, shape (run,)
+        What colours the vibrating runs; not a number leaves the colour of the class.
+    scale : Scale
+        How it colours them.
+    """
+    pairs = _pairs(dataset)
+    columns = min(len(pairs), 2)
+    panels = figure.subplots(-(-len(pairs) // columns), columns, squeeze=False)
+    for axes, (x, y) in zip(panels.flat, pairs, strict=False):
+        _draw_runs(axes, dataset, x, y, classes, amplitude, scale)
+    for axes in panels.flat[len(pairs) :]:
+        axes.set_axis_off()
+    return panels
+
+
+def _axes(dataset: xr.Dataset) -> list[str]:
+    along = {str(name): array for name, array in dataset.coords.items() if array.dims == ("run",)}
+    names = [name for name, array in along.items() if "derived" not in array.attrs]
+    return sorted(names, key=lambda name: _FIRST.index(name) if name in _FIRST else len(_FIRST))
+
+
+def _pairs(dataset: xr.Dataset) -> list[tuple[str, str | None]]:
+    names = _axes(dataset)[:MOST_AXES]
+    return list(combinations(names, 2)) or [(names[0], None)]
 
 
 def _draw_runs(
@@ -96,21 +136,23 @@ def _draw_runs(
     """Mark the runs of one panel; without a second axis all at one height."""
     across, x_label = _along(dataset[x])
     up, y_label = _along(dataset[y]) if y else (np.zeros(across.size), "")
-    for kind, style in cells.STYLES.items():
+    for kind, style in cells.ALL_STYLES.items():
         of_kind = classes == kind
         if not of_kind.any():
             continue
+        is_filled = MarkerStyle(style.mark).is_filled()
         marks = axes.scatter(
             across[of_kind],
             up[of_kind],
             s=(_SIZE * min(style.mark_size, 1.5)) ** 2,
             marker=style.mark,
-            edgecolors=style.rim if MarkerStyle(style.mark).is_filled() else None,
+            edgecolors=style.rim if is_filled else None,
             linewidths=0.6,
             label=kind.label,
         )
-        is_vibrating = kind is OccurrenceClass.VIBRATING
-        marks.set_facecolor(cells.fills_of(kind, amplitude[of_kind], scale) if is_vibrating else style.ink)
+        # a mark that stands alone has the colour of the cell in which it would stand on a grid
+        alike = is_filled and (kind is OccurrenceClass.VIBRATING or kind in cells.OF_PAIRS)
+        marks.set_facecolor(cells.fills_of(kind, amplitude[of_kind], scale) if alike else style.ink)
     axes.set(xlabel=x_label, ylabel=y_label)
     if y is None:
         axes.set_yticks([])

@@ -9,7 +9,7 @@ of these deaths the run is given up.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,7 +32,12 @@ DEATHS_ALONE = 2  # while it was done alone, until it is given up
 
 
 def plan_runs(
-    job: Job, simulator: Simulator, records: Records, asked: np.ndarray, ranks: int
+    job: Job,
+    simulator: Simulator,
+    records: Records,
+    asked: np.ndarray,
+    ranks: int,
+    steps: Mapping[int, float] | None = None,
 ) -> list[Assignment]:
     """Return the runs to be done, as assignments in the order in which to start them.
 
@@ -48,14 +53,18 @@ def plan_runs(
         Which runs are to be on record in the end.
     ranks : int
         Number of processes that compute.
+    steps : mapping, optional
+        Time steps [s] of the runs that do not take that of the job, by run index: only runs of one step can
+        advance together.
     """
-    costs = simulator.run_costs(job)
+    costs = predicted_costs(job, simulator, records)
     pending = asked & ~records.recorded
     suspect = pending & (records.died >= DEATHS)
     groups = []
     for struck in (False, True):
         chosen = pending & ~suspect & ((records.died > 0) == struck)
-        groups += simulator.lane_groups(job, np.flatnonzero(chosen).tolist())
+        for together in _by_step(np.flatnonzero(chosen).tolist(), steps or {}):
+            groups += simulator.lane_groups(job, together)
     batches = share_out(groups, costs, ranks)
     batches.sort(key=lambda batch: bool(records.died[batch[0]]))
     suspects = sorted(np.flatnonzero(suspect).tolist(), key=lambda i: (-costs[i], i))
@@ -65,6 +74,18 @@ def plan_runs(
         *(Assignment((index,), alone=True) for index in suspects if index not in lethal),
         *([Assignment(lethal, alone=True)] if lethal else []),
     ]
+
+
+def predicted_costs(job: Job, simulator: Simulator, records: Records) -> np.ndarray:
+    """Return the predicted duration of each run, in any unit: longer where its step is shortened."""
+    return simulator.run_costs(job) * records.refinements
+
+
+def _by_step(runs: list[int], steps: Mapping[int, float]) -> Iterable[list[int]]:
+    groups: dict[float | None, list[int]] = {}
+    for index in runs:
+        groups.setdefault(steps.get(index), []).append(index)
+    return groups.values()
 
 
 def given_up(records: Records, asked: np.ndarray) -> dict[int, str]:
@@ -105,17 +126,19 @@ def enter_attempts(
     asked: np.ndarray,
     retry: Collection[Status],
     session: dict[str, Any],
+    refine: float = 1.0,
 ) -> Records:
     """Record which runs are given up and which are begun again, and return the records as they are then.
 
-    Only of those that `asked`, shape (runs,), marks: others may be at work just now.
+    Only of those that `asked`, shape (runs,), marks: others may be at work just now. The factor `refine`, by
+    which the retries shorten their time step, is kept with them, so that whoever goes on does the same.
     """
     lost, again = given_up(records, asked), runs_to_repeat(records, asked, retry)
     if not lost and not len(again):
         return records
     records.attempts[again] += 1
     layout = RecordFormat(study.fingerprint, study.record_dtype)
-    with RecordLog(folder.records, layout, session, 0, later_attempts(records)) as log:
+    with RecordLog(folder.records, layout, {**session, "refine": refine}, 0, later_attempts(records)) as log:
         if lost:
             log.append([(index, study.pack_failure(reason)) for index, reason in lost.items()])
         if len(again):

@@ -1,8 +1,4 @@
-"""How often a cheap rung errs: a sample of the runs that it answered, done again in full.
-
-The sample is drawn by the runs' indices: whoever goes on with a study, or asks for a larger share, goes on
-with the same sample. Its runs are a study of their own, in the folder `audit` of the other one.
-"""
+"""How often a cheap rung errs: a sample of the runs that it answered, done again in full."""
 
 from __future__ import annotations
 
@@ -10,23 +6,20 @@ import csv
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.stats import binomtest
 
-from cvt_hpc.errors import mismatch, show
+from cvt_hpc.errors import mismatch
 from cvt_hpc.files import written_aside
-from cvt_hpc.job import build_job
 from cvt_hpc.job.handing import handed_to
 from cvt_hpc.models.auto.rules import Rung
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.records import Records
 from cvt_hpc.study.recovery import read_records
-from cvt_hpc.study.report import RunReport
+from cvt_hpc.study.repeats import Repeat, built, interval
 from cvt_hpc.study.simulator import default_simulator
-from cvt_hpc.study.sweep import check_start, run
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 
@@ -37,7 +30,6 @@ FOLDER, TABLE = "audit", "audit.csv"  # in the folder of the runs, and in that o
 AUDITED = "auto"
 FULL_MODEL = "elastic_belt"
 LOWER = (Rung.PASSIVE, Rung.COARSE)
-CONFIDENCE = 0.95
 DECIDED = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
 FORCES = (("mean_ring_tension", "mean_push_force"), ("axial_force",))  # by what they are measured against
 
@@ -58,7 +50,7 @@ class RungAudit(NamedTuple):
     contrary : int
         Of these, those of which one says quiet and the other vibrating.
     interval : (float, float)
-        The share of differing runs lies within it with CONFIDENCE (Clopper and Pearson 1934).
+        The share of differing runs lies within it, see `interval`.
     force_deviation : float
         Deviation that the mean forces of strands and of sheaves, over the largest of either, keep in 95 % of
         the runs; not a number where the rung knows no forces.
@@ -91,63 +83,47 @@ class AuditReport(NamedTuple):
     table: Path
 
 
-def check_fraction(job: Job, fraction: float, part: str | None = None) -> None:
-    """Raise InputError where a job or a part of it has nothing to be audited, or the fraction is none."""
-    if job.model != AUDITED:
-        raise mismatch("--audit", f"a job of model {AUDITED}, whose rungs can err", f"model {job.model}")
-    if not 0.0 < fraction <= 1.0:
-        raise mismatch("--audit", "a fraction above 0, at most 1", show(fraction))
-    if part is not None:
-        raise mismatch("--audit", "a run of the whole study, once its parts have ended", f"part {part}")
-
-
-def check_audit(job: Job, out: Path, fresh: bool) -> None:
-    """Raise the InputError that `run_audit` would raise before it computes anything; touches nothing."""
-    check_start(_in_full(job), out / FOLDER, fresh=fresh)
-
-
-def run_audit(job: Job, out: Path, fraction: float, **options: Any) -> RunReport:
-    """Do a sample of the runs that lower rungs have answered in full; on all ranks.
+def audit_of(job: Job, out: Path, fraction: float) -> Repeat:
+    """Return the audit of a study: a sample of the runs that lower rungs have answered, in full.
 
     Parameters
     ----------
     job : Job
-        Of model auto, all runs of which are done.
+        Of model auto.
     out : Path
-        Their folder.
+        Its folder.
     fraction : float
-        Share of the runs to be done again.
-    options
-        As `run` takes them.
+        Share of the runs that is done again.
+
+    Raises
+    ------
+    InputError
+        If the job has no rungs.
     """
-    study = describe(job, default_simulator())
-
-    def chosen() -> np.ndarray:
-        return _sample(study, read_records(StudyFolder(out).records, study), fraction)
-
-    return run(_in_full(job), out / FOLDER, chosen=chosen, **options)
+    if job.model != AUDITED:
+        raise mismatch("--audit", f"a job of model {AUDITED}, whose rungs can err", f"model {job.model}")
+    full = built(job, handed_to(job, FULL_MODEL, "done in full, to audit the rungs below"))
+    return Repeat("audit", "in full", job, out, FOLDER, full, fraction, _answered)
 
 
-def report_audit(job: Job, out: Path, fraction: float) -> AuditReport:
+def report_audit(audit: Repeat) -> AuditReport:
     """Compare the runs of an audit with what the lower rungs said, and write the table; on one rank.
 
     Parameters
     ----------
-    job, out, fraction
-        As of `run_audit`, which has come to its end.
+    audit : Repeat
+        As `audit_of` returns it, all runs of which are done.
     """
-    simulator = default_simulator()
-    study, full_study = describe(job, simulator), describe(_in_full(job), simulator)
-    low = read_records(StudyFolder(out).records, study)
-    full = read_records(StudyFolder(out / FOLDER).records, full_study)
-    audited = np.flatnonzero(_sample(study, low, fraction) & full.recorded)
+    low = audit.records
+    full = read_records(StudyFolder(audit.place).records, describe(audit.job, default_simulator()))
+    audited = np.flatnonzero(audit.sample & full.recorded)
     rungs, ended = low.read(audited, "rung"), full.status[audited] == Status.DONE
     classes = [classify_runs(r.status[audited], r.read(audited, "vibrates")) for r in (low, full)]
     differs = ended & (classes[0] != classes[1]) & np.isin(classes[0], DECIDED)
     contrary = differs & np.isin(classes[1], DECIDED)
-    table = out / FOLDER / TABLE
+    table = audit.place / TABLE
     shown = differs | ~ended
-    _write(table, study, audited[shown], (low, full), [found[shown] for found in classes])
+    _write(table, audit.study, audited[shown], (low, full), [found[shown] for found in classes])
     found = []
     for rung in LOWER:
         of_rung = rungs == rung
@@ -155,16 +131,8 @@ def report_audit(job: Job, out: Path, fraction: float) -> AuditReport:
         if of_rung.any():
             deviation = _force_deviation(low, full, audited[of_rung & ended])
             counts = runs, int((of_rung & ~ended).sum()), differing, int(contrary[of_rung].sum())
-            found.append(RungAudit(rung, *counts, _interval(differing, runs), deviation))
-    return AuditReport(int(_answered(low).sum()), tuple(found), table)
-
-
-def _in_full(job: Job) -> Job:
-    """The same runs as the job describes them, with no rung below; of the whole grid where it is traced."""
-    document = handed_to(job, FULL_MODEL, "done in full, to audit the rungs below")
-    if "first_spacing" in job.design:
-        del document["design"]
-    return build_job(document, job.source)
+            found.append(RungAudit(rung, *counts, interval(differing, runs), deviation))
+    return AuditReport(int(audit.may_be_drawn.sum()), tuple(found), table)
 
 
 def _answered(records: Records) -> np.ndarray:
@@ -173,19 +141,6 @@ def _answered(records: Records) -> np.ndarray:
     places = np.flatnonzero(answered)
     answered[places] = np.isin(records.read(places, "rung"), LOWER)
     return answered
-
-
-def _sample(study: Study, records: Records, fraction: float) -> np.ndarray:
-    """Which runs are audited, shape (runs,): each by a lot that is drawn for its index."""
-    lots = np.random.default_rng(int(study.fingerprint[:16], 16)).random(study.size)
-    return _answered(records) & (lots < fraction)
-
-
-def _interval(differing: int, runs: int) -> tuple[float, float]:
-    if runs == 0:
-        return 0.0, 1.0
-    ends = binomtest(differing, runs).proportion_ci(CONFIDENCE, method="exact")
-    return ends.low, ends.high
 
 
 def _force_deviation(low: Records, full: Records, runs: np.ndarray) -> float:

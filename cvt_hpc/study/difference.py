@@ -32,10 +32,18 @@ def another_job(path: Path, found: dict[str, Any], asked: dict[str, Any], name: 
 
 def _difference(found: dict[str, Any], asked: dict[str, Any]) -> str:
     """The first few entries in which two resolved jobs differ, as "key is 1 there, 2 here"."""
-    there, here = _flatten(found), _flatten(asked)
-    keys = [key for key in {**there, **here} if there.get(key) != here.get(key)]
-    shown = [f"{key} is {_short(there.get(key))} there, {_short(here.get(key))} here" for key in keys[:3]]
-    return "; ".join(shown) + ("; ..." if len(keys) > 3 else "")
+    entries = [
+        f"{key} is {short(there)} there, {short(here)} here"
+        for key, (there, here) in differences(found, asked).items()
+    ]
+    return "; ".join(entries[:3]) + ("; ..." if len(entries) > 3 else "")
+
+
+def differences(one: dict[str, Any], other: dict[str, Any]) -> dict[str, tuple[Any, Any]]:
+    """Return the values, None where there is none, of each key "section.key" in which documents differ."""
+    here, there = flatten(one), flatten(other)
+    pairs = {key: (here.get(key), there.get(key)) for key in {**here, **there}}
+    return {key: pair for key, pair in pairs.items() if pair[0] != pair[1]}
 
 
 def _layout(study: Study) -> dict[str, Any]:
@@ -46,13 +54,15 @@ def _layout(study: Study) -> dict[str, Any]:
     }
 
 
-def _flatten(entry: Any, prefix: str = "") -> dict[str, Any]:
+def flatten(entry: Any, prefix: str = "") -> dict[str, Any]:
+    """Return the values of nested tables by "section.key"."""
     if not isinstance(entry, dict):
         return {prefix: entry}
-    parts = (_flatten(value, f"{prefix}.{key}" if prefix else key) for key, value in entry.items())
+    parts = (flatten(value, f"{prefix}.{key}" if prefix else key) for key, value in entry.items())
     return {key: value for part in parts for key, value in part.items()}
 
 
-def _short(value: Any) -> str:
+def short(value: Any) -> str:
+    """Return a value of a resolved job in 40 letters at most."""
     text = "not set" if value is None else json.dumps(value)
     return text if len(text) <= 40 else text[:37] + "..."

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.files import discard
-from cvt_hpc.study.attempts import enter_attempts, later_attempts, plan_runs
+from cvt_hpc.study.attempts import enter_attempts, later_attempts, plan_runs, predicted_costs
 from cvt_hpc.study.batches import Assignment
 from cvt_hpc.study.cost_model import Fit, fit_recorded
 from cvt_hpc.study.folder import StudyFolder
@@ -21,6 +21,7 @@ from cvt_hpc.study.provenance import new_session
 from cvt_hpc.study.records import Records
 from cvt_hpc.study.recovery import read_records
 from cvt_hpc.study.schedule import Counter
+from cvt_hpc.study.steps import refined_steps
 from cvt_hpc.study.task import Task
 from cvt_hpc.study.time_limit import TimeLimit
 from cvt_hpc.study.tracing import needed_runs
@@ -34,6 +35,8 @@ class Plan(NamedTuple):
 
     assignments: list[Assignment]
     attempts: dict[int, int]  # of runs that were begun again
+    steps: dict[int, float]  # [s], of runs that do not take the time step of the job
+    costs: np.ndarray  # shape (runs,), as they are predicted
     fit: Fit
     total: int
     recorded: int
@@ -50,6 +53,7 @@ def prepare(
     retry: Collection[Status],
     ranks: int,
     held: ExitStack,
+    refine: float = 1.0,
 ) -> Plan:
     """Take the folder into possession and find what is left to do; on rank 0 alone."""
     study = task.study
@@ -68,14 +72,18 @@ def prepare(
     for warning in records.warnings + _other_versions(records, session):
         _logger.warning(warning)
     asked = asked_runs(task, records, part)
-    records = enter_attempts(folder, study, records, asked, retry, session)
+    records = enter_attempts(folder, study, records, asked, retry, session, refine)
     records.written[missing_histories(task.job, folder, records)] = np.nan  # done again; the record stays
     done = records.status == Status.DONE
     recorded = int((records.recorded & asked).sum())
+    costs = predicted_costs(task.job, task.simulator, records)
+    steps = refined_steps(task.job, records, task.asked_steps() if task.asked_steps else {})
     return Plan(
-        assignments=plan_runs(task.job, task.simulator, records, asked, ranks),
+        assignments=plan_runs(task.job, task.simulator, records, asked, ranks, steps),
         attempts=later_attempts(records),
-        fit=fit_recorded(task.simulator.run_costs(task.job), records.timings, done).inherited(),
+        steps=steps,
+        costs=costs,
+        fit=fit_recorded(costs, records.timings, done).inherited(),
         total=int(asked.sum()),
         recorded=recorded,
         failed=recorded - int((done & asked).sum()),
@@ -111,8 +119,8 @@ def next_round(
     ]
     if lost:
         raise RuntimeError(f"a round of the trace has ended without records of its runs {lost}")
-    costs = task.simulator.run_costs(task.job)
-    assignments = plan_runs(task.job, task.simulator, records, asked_runs(task, records), ranks)
+    asked, costs = asked_runs(task, records), plan.costs
+    assignments = plan_runs(task.job, task.simulator, records, asked, ranks, plan.steps)
     counter.rewind()
     display.expect(costs[[index for assignment in assignments for index in assignment.runs]])
     fit = fit_recorded(costs, records.timings, records.status == Status.DONE)

@@ -47,6 +47,9 @@ class Records:
     died, died_alone : numpy.ndarray of int, shape (runs,)
         How often, in that attempt, a process was at work at the run when it died: in all, and while it did
         that run alone because of earlier deaths. Runs that a living process is at count as well.
+    refinements : numpy.ndarray of float, shape (runs,)
+        The factor by which the attempt that counts shortens the time step that is else asked of a run; 1 for
+        most.
     timings : list of Timing
         Of the batches that were done as a whole, the first of each log excepted: it has loaded kernels.
     sessions : list of dict
@@ -61,6 +64,7 @@ class Records:
     attempts: np.ndarray
     died: np.ndarray
     died_alone: np.ndarray
+    refinements: np.ndarray
     timings: list[Timing] = field(default_factory=list)
     sessions: list[dict[str, Any]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -145,7 +149,8 @@ def choose(study: Study, logs: Sequence[Path], found: np.ndarray, marked: np.nda
     entries = np.full(study.size, blank)
     entries[found["run"][first]] = found[first]
     attempts = np.maximum(marked, entries["attempt"])
-    records = Records(study, logs, entries, attempts, np.zeros_like(attempts), np.zeros_like(attempts))
+    unharmed = np.zeros_like(attempts)
+    records = Records(study, logs, entries, attempts, unharmed, unharmed.copy(), np.ones(study.size))
     later = found[~first]
     records.warnings = _contradictions(records, later[later["attempt"] == entries["attempt"][later["run"]]])
     entries[entries["attempt"] < attempts] = blank  # to be done again, and not done yet

@@ -22,6 +22,7 @@ from cvt_hpc.study.frames import (
     RECORD,
     ForeignLog,
     Frame,
+    Place,
     RecordFormat,
     read_preamble,
 )
@@ -79,6 +80,7 @@ class _Reader:
         self._attempts = np.ones(study.size, np.int64)
         self._status = study.record_dtype.fields["status"][1]  # where it is in a record [byte]
         self._deaths: set[_Death] = set()
+        self._refinements: dict[Place, float] = {}
         self._timings: list[Timing] = []
         self._sessions: dict[str, dict[str, Any]] = {}
 
@@ -95,7 +97,7 @@ class _Reader:
             return
         session, start = read_preamble(head, self._layout)
         flaws: list[str] = []
-        trace = _Trace()
+        trace = _Trace((session or {}).get("refine", 1.0))
         frames = self._sound_frames(file, start, flaws)
         found = np.fromiter(self._entries(frames, number, trace), ENTRY)
         if session is None and not trace.followed:
@@ -109,6 +111,7 @@ class _Reader:
         self._found.append(found)
         self._timings += trace.timings[1:]
         self._deaths |= trace.deaths()
+        self._refinements |= trace.refinements
 
     def result(self, logs: list[Path]) -> Records:
         """Return what all logs hold."""
@@ -117,6 +120,9 @@ class _Reader:
             if death.attempt == records.attempts[death.index] and not records.recorded[death.index]:
                 records.died[death.index] += 1
                 records.died_alone[death.index] += death.alone
+        for (index, attempt), factor in self._refinements.items():
+            if attempt == records.attempts[index]:
+                records.refinements[index] = factor
         records.timings = self._timings
         records.sessions = sorted(self._sessions.values(), key=lambda s: (s["started"], s["id"]))
         records.warnings[:0] = self.warnings
@@ -151,17 +157,26 @@ class _Reader:
 class _Trace:
     """Follows from mark to mark what a process was at.
 
+    Parameters
+    ----------
+    refine : float
+        The factor by which the retries that the process begins shorten time steps.
+
     Attributes
     ----------
     followed : int
         Number of frames.
     timings : list of Timing
         Of the batches that were done as a whole.
+    refinements : dict
+        That factor, by run index and attempt.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, refine: float) -> None:
         self.followed = 0
         self.timings: list[Timing] = []
+        self.refinements: dict[Place, float] = {}
+        self._refine = refine
         self._mark: Frame | None = None
         self._at_work: dict[int, int] = {}
 
@@ -173,7 +188,9 @@ class _Trace:
             if self._at_work.pop(index, None) is not None and not self._at_work:
                 batch = tuple(index for index, _ in self._mark.places)
                 self.timings.append(Timing(batch, frame.written - self._mark.written))
-        elif frame.kind != AGAIN:
+        elif frame.kind == AGAIN:
+            self.refinements |= dict.fromkeys(frame.places, self._refine)
+        else:
             self._mark, self._at_work = frame, dict(frame.places)
 
     def deaths(self) -> set[_Death]:

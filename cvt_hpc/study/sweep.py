@@ -5,8 +5,9 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from contextlib import ExitStack, closing
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,6 +33,7 @@ from cvt_hpc.study.recovery import read_records
 from cvt_hpc.study.report import RunReport, build_report
 from cvt_hpc.study.schedule import Counter, claimed_batches, open_counter
 from cvt_hpc.study.simulator import Simulator, default_simulator
+from cvt_hpc.study.steps import check_refinement
 from cvt_hpc.study.stopping import ELSEWHERE, SignalWatch, Stop
 from cvt_hpc.study.task import Task
 from cvt_hpc.study.time_limit import find_time_limit
@@ -54,7 +56,9 @@ def run(
     time_limit: float | None = None,
     run_limit: float = math.inf,
     retry: Collection[Status] = (),
+    refine: float = 1.0,
     chosen: Callable[[], np.ndarray] | None = None,
+    asked_steps: Callable[[], Mapping[int, float]] | None = None,
 ) -> RunReport:
     """Do all runs of a job that are not yet recorded, and gather the dataset.
 
@@ -85,9 +89,15 @@ def run(
     retry : collection of Status, optional
         Recorded runs that ended so are done again, from the beginning; their earlier records do not count any
         more.
+    refine : float, optional
+        Factor by which the time step of runs that are done again for failed numerics is shortened, against
+        that of the job. Kept on record: a retry that was stopped goes on with it.
     chosen : callable, optional
         Tells on rank 0 which runs are asked for, shape (runs,), always the same ones; by default those of the
         job's design.
+    asked_steps : callable, optional
+        Tells on rank 0 the time step [s] of runs that are not to take that of the job, by run index, always
+        the same one of a run.
 
     Returns
     -------
@@ -98,12 +108,15 @@ def run(
     ------
     InputError
         If the folder holds another job, is in use or cannot be written to, if ranks are not connected, or if
-        there is no such part, or it is to start over: the other parts would lose their runs.
+        there is no such part, or it is to start over: the other parts would lose their runs; or if steps
+        cannot be shortened so.
     """
     started = time.monotonic()
     simulator = simulator or default_simulator()
     study, share, folder = _accept(job, out, part, fresh, simulator)
-    task = Task(job, study, simulator, run_limit, chosen)
+    if refine != 1.0:
+        check_refinement(job, refine, retry)
+    task = Task(job, study, simulator, run_limit, chosen, asked_steps)
     first = True
 
     def sweep(team: Team) -> RunReport:
@@ -111,22 +124,24 @@ def run(
         begins, first = first, False  # the survivors of a death go on from what is on record
 
         def find_plan() -> Plan:
-            plan = prepare(folder, task, share, fresh and begins, retry if begins else (), team.size, held)
+            again = retry if begins else ()
+            plan = prepare(folder, task, share, fresh and begins, again, team.size, held, refine)
             asked = None if time_limit is None else time_limit - (time.monotonic() - started)
             return plan._replace(limit=find_time_limit(asked, study.size))
 
         with ExitStack() as held:
             plan = team.on_root(find_plan)
             with open_counter(team) as counter:
-                costs = simulator.run_costs(job)
                 order = [index for assignment in plan.assignments for index in assignment.runs]
                 visible = progress and team.rank == 0
-                display = Progress(counter, plan.total, plan.recorded, plan.failed, visible, costs[order])
+                display = Progress(
+                    counter, plan.total, plan.recorded, plan.failed, visible, plan.costs[order]
+                )
                 stop = Stop(counter, signals, plan.limit, display.show)
                 stopped = None
                 with closing(display):
                     while plan.assignments:
-                        trouble = _compute(task, folder, plan, costs, team.rank, counter, stop)
+                        trouble = _compute(task, folder, plan, team.rank, counter, stop)
                         team.wait_for_all(stop.look)
                         stopped = _settle(team, trouble, stop.reason)
                         if stopped or not study.is_traced:
@@ -164,14 +179,14 @@ def _compute(
     task: Task,
     folder: StudyFolder,
     plan: Plan,
-    costs: np.ndarray,
     rank: int,
     counter: Counter,
     stop: Stop,
 ) -> str | None:
     """Do and record the runs that this rank claims; return why it could not go on, if so."""
     layout = RecordFormat(task.study.fingerprint, task.study.record_dtype)
-    model = CostModel(costs, plan.fit)
+    model = CostModel(plan.costs, plan.fit)
+    task = replace(task, steps=plan.steps)
     try:
         # Every core has a rank of its own: threads of linear algebra would only wait for each other.
         log = RecordLog(folder.records, layout, plan.session, rank, plan.attempts)

@@ -6,7 +6,7 @@ import logging
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from cvt_hpc.study.batches import Batch
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.record import Record
 from cvt_hpc.study.simulator import Simulator
+from cvt_hpc.study.steps import point_at_step
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
@@ -80,6 +81,11 @@ class Task:
         Time [s] that a run may take; infinite for no limit.
     chosen : callable, optional
         Tells on rank 0 which runs are asked for, shape (runs,); by default those of the job's design.
+    asked_steps : callable, optional
+        Tells on rank 0 the time step [s] of runs that are not asked for that of the job, by run index.
+    steps : mapping
+        Time step [s] of the runs that do not take that of the job, by run index: asked for, or shortened by a
+        retry.
     """
 
     job: Job
@@ -87,6 +93,8 @@ class Task:
     simulator: Simulator
     run_limit: float = math.inf
     chosen: Callable[[], np.ndarray] | None = None
+    asked_steps: Callable[[], Mapping[int, float]] | None = None
+    steps: Mapping[int, float] = field(default_factory=dict)
 
     def do(self, batch: Batch, interrupt: Interrupt, begin: Begin) -> Iterator[Result]:
         """Do the runs of a batch, and yield their records as they come; none of runs that are broken off.
@@ -124,7 +132,7 @@ class Task:
         begin(batch)
         watch = _Watch(interrupt, self.run_limit * self.simulator.turns(self.job, len(batch)))
         try:
-            points = [self.job.point(index) for index in batch]
+            points = [point_at_step(self.job, index, self.steps) for index in batch]
             kept = [place for place, index in enumerate(batch) if index in self.job.histories]
             if kept:
                 found, histories = self.simulator.run_points_keeping(self.job, points, watch, kept)

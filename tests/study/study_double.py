@@ -41,6 +41,7 @@ class Job:
 
     Parameters that steer the double: `pause` [s] per run; `raise_at` and `diverge_at`, the value of the first
     axis at which a run raises, or fails as a diverging integration does; `crash_at`, at which the process dies;
+    `step` and `stable_step`, the time step [s] and one at which a run does not diverge in spite of that;
     `window`, the first and last value of that axis between which runs vibrate, instead of by their numbers.
     """
 
@@ -160,6 +161,7 @@ class Simulator:
         if first is not None and first == point.get("crash_at"):
             os.kill(os.getpid(), signal.SIGKILL)  # as for lack of memory
         diverges = first is not None and first == point.get("diverge_at")
+        diverges = diverges and point.get("step", math.inf) > point.get("stable_step", 0.0)
         numbers = np.full(24, np.nan) if diverges else logistic_numbers(point, job)
         window = point.get("window")
         vibrates = window[0] <= first <= window[1] if window else numbers[0] > 0.5
@@ -169,7 +171,7 @@ class Simulator:
             "reason": "step 17: the state is not finite" if diverges else "",
             "amplitude": numbers[:2],
             "spectrum": numbers[2:].reshape(2, 11),
-            "steps": 1000,
+            "steps": round(1e-3 / point.get("step", 1e-6)),
             "core_seconds": time.perf_counter() - started,
         }
 

@@ -115,11 +115,11 @@ def test_what_fails_in_full_is_no_error_of_the_rung(job, capsys):
 def test_audits_end_with_the_time(job, capsys, monkeypatch):
     asked = {}
 
-    def stopped(job, out, fraction, **options):
+    def stopped(repeat, **options):
         asked.update(options)
         raise InputError("stopped")
 
-    monkeypatch.setattr("cvt_hpc.study.audit.run_audit", stopped)
+    monkeypatch.setattr("cvt_hpc.study.repeats.Repeat.run", stopped)
     out = str(job.parent / "out")
     arguments = [
         "run",

@@ -1,10 +1,11 @@
-"""Model auto as a sweep: the same on two ranks as on one, CF conventions kept, drawn as any map."""
+"""Model auto as a sweep: the same on two ranks as on one, CF conventions kept, drawn as any map, and checked."""
 
 import numpy as np
 from cf import cf_findings
 from sweeps import call
 
 from cvt_hpc.study import open_results
+from cvt_hpc.variables import Status
 
 JOB = """name = "a"
 model = "auto"
@@ -19,12 +20,15 @@ duration = "0.3 s"
 """
 
 
-def test_two_ranks_and_their_audit(tmp_path):
+CHECKED = ("--audit", "0.7", "--check-step", "0.9")
+
+
+def test_two_ranks_their_audit_and_the_check_of_their_step(tmp_path):
     (tmp_path / "a.toml").write_text(JOB)
     printed, datasets = [], []
     for ranks in (0, 2):
         out = f"out{ranks}"
-        ended = call("run", "a.toml", "--out", out, "--audit", "0.7", cwd=tmp_path, ranks=ranks)
+        ended = call("run", "a.toml", "--out", out, *CHECKED, cwd=tmp_path, ranks=ranks)
         assert ended.returncode == 0, ended.stderr
         printed.append(ended.stdout.replace(out, "out"))
         assert cf_findings(tmp_path / out / "results.nc") == []
@@ -32,11 +36,19 @@ def test_two_ranks_and_their_audit(tmp_path):
             datasets.append(dataset.load())
     assert printed[0] == printed[1]
     assert "audit: " in printed[0] and "passive: 0 of " in printed[0] and "coarse: 0 of " in printed[0]
+    assert (
+        "\nstep check: " in printed[0]
+        and " of 4 runs that took steps done again at half the step" in printed[0]
+    )
+    with open_results(tmp_path / "out2" / "check_step") as dataset:
+        assert dataset.attrs["source"].endswith("model auto")
+        halved, done = dataset["time_step"].load(), dataset["status"].load() == Status.DONE
+    assert done.any() and np.allclose((datasets[0]["time_step"] / halved).where(done, 2.0), 2.0, rtol=1e-12)
     one, two = datasets
     for name in one.data_vars:
         if name != "core_seconds":
             assert np.array_equal(one[name], two[name], equal_nan=one[name].dtype.kind == "f"), name
     ended = call("map", "out2", cwd=tmp_path)
     assert ended.returncode == 0 and (tmp_path / "out2" / "map.png").stat().st_size > 0
-    again = call("run", "a.toml", "--out", "out2", "--audit", "0.7", cwd=tmp_path)
+    again = call("run", "a.toml", "--out", "out2", *CHECKED, cwd=tmp_path)
     assert again.returncode == 0 and again.stdout.replace("out2", "out") == printed[1]

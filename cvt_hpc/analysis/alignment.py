@@ -1,0 +1,147 @@
+"""The common runs of two studies: the same axes in the same order, and on each the values that both have."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Hashable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from cvt_hpc.analysis.arrangement import known_values, value_text
+from cvt_hpc.analysis.classes import check_results
+from cvt_hpc.analysis.scatter import is_sampled
+from cvt_hpc.errors import InputError, did_you_mean, mismatch
+from cvt_hpc.study.difference import flatten
+
+COMPARED = ("status", "vibrates", "amplitude", "frequency")
+
+
+class Aligned(NamedTuple):
+    """The common runs of two studies.
+
+    Attributes
+    ----------
+    a, b : Dataset
+        Those of COMPARED that each study has, in memory, over the same runs in the same order.
+    left_out : (int, int)
+        Number of runs of A and of B that the other study does not have.
+    notes : tuple of str
+        Which axis of one study was reduced to the value of the other one, in words.
+    """
+
+    a: xr.Dataset
+    b: xr.Dataset
+    left_out: tuple[int, int]
+    notes: tuple[str, ...]
+
+
+def align(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str]) -> Aligned:
+    """Return the common runs of two studies.
+
+    Parameters
+    ----------
+    a, b : Dataset
+        Results of either study, both over a grid or both of samples.
+    sources : (str, str)
+        Where they are from, for the errors.
+
+    Raises
+    ------
+    InputError
+        If a dataset holds no results, one is of samples and the other over a grid, an axis of one is neither
+        an axis nor a parameter of the other, or they have no run in common.
+    """
+    for dataset, source in zip((a, b), sources, strict=True):
+        check_results(dataset, source)
+    layouts = ["samples" if is_sampled(dataset) else "results over a grid" for dataset in (a, b)]
+    if layouts[0] != layouts[1]:
+        raise mismatch(sources[1], f"{layouts[0]}, as in {sources[0]}", layouts[1])
+    sizes = a["status"].size, b["status"].size
+    reduced = []
+    notes: list[str] = []
+    for one, other, label, source in ((a, b, "AB", sources), (b, a, "BA", sources[::-1])):
+        one = one[[name for name in COMPARED if name in one]]
+        reduced.append(_reduced(one, other, label, source, notes))
+    one, other = (_at_common_samples if is_sampled(a) else _on_common_grid)(*reduced, sources)
+    common = one["status"].size
+    return Aligned(one.load(), other.load(), (sizes[0] - common, sizes[1] - common), tuple(notes))
+
+
+def axes_of(dataset: xr.Dataset) -> list[str]:
+    """Names of the axes of a study: dimensions of a grid, coordinates of samples."""
+    if is_sampled(dataset):
+        return [str(name) for name, values in dataset.coords.items() if values.dims == ("run",)]
+    return list(map(str, dataset["status"].dims))
+
+
+def job_of(dataset: xr.Dataset) -> dict[str, Any]:
+    """The resolved job that a dataset keeps in its attributes; empty where it keeps none."""
+    return json.loads(dataset.attrs.get("job", "{}"))
+
+
+def _reduced(
+    one: xr.Dataset, other: xr.Dataset, labels: str, sources: tuple[str, str], notes: list[str]
+) -> xr.Dataset:
+    """Fix each axis that the other study does not have at the value which its runs have there."""
+    fixed = {key.rpartition(".")[2]: value for key, value in flatten(job_of(other)).items()}
+    for name in [name for name in axes_of(one) if name not in axes_of(other)]:
+        where = f"{sources[0]}: axis {name}"
+        if name not in fixed and (is_sampled(one) or one.sizes[name] > 1):
+            hint = did_you_mean(name, axes_of(other)) or f"; its axes: {', '.join(axes_of(other)) or 'none'}"
+            raise InputError(f"{where}: expected an axis or a parameter of {sources[1]}, found neither{hint}")
+        if is_sampled(one):
+            raise mismatch(where, f"an axis of {sources[1]}, since samples have no common values", "none")
+        places = np.flatnonzero(_keys(one[name]) == _key(fixed[name])) if name in fixed else np.zeros(1, int)
+        if not places.size:
+            raise mismatch(where, f"one of {known_values(one[name])}", f"{_key(fixed[name])} in {sources[1]}")
+        note = f"axis {name} of {labels[0]} alone: at {value_text(one[name], int(places[0]))}"
+        notes.append(note + (f", as in {labels[1]}" if name in fixed else f", unknown in {labels[1]}"))
+        one = one.isel({name: int(places[0])}, drop=True)
+    return one
+
+
+def _on_common_grid(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str]) -> tuple[xr.Dataset, xr.Dataset]:
+    for name in axes_of(a):
+        in_a, in_b = _common_places(_keys(a[name]), _keys(b[name]))
+        if not in_a:
+            where, expected = (
+                f"{sources[1]}: axis {name}",
+                f"a value of {sources[0]}: {known_values(a[name])}",
+            )
+            raise mismatch(where, expected, known_values(b[name]))
+        a, b = a.isel({name: in_a}), b.isel({name: in_b})
+    dims = a["status"].dims
+    return a.transpose(*dims, ...), b.transpose(*dims, ...)
+
+
+def _at_common_samples(
+    a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str]
+) -> tuple[xr.Dataset, xr.Dataset]:
+    names = axes_of(a)
+    in_a, in_b = _common_places(
+        *(list(zip(*(_keys(dataset[name]) for name in names), strict=True)) for dataset in (a, b))
+    )
+    if not in_a:
+        raise mismatch(sources[1], f"samples at places of those of {sources[0]}", "none")
+    return a.isel(run=in_a), b.isel(run=in_b)
+
+
+def _common_places(a: Sequence[Hashable], b: Sequence[Hashable]) -> tuple[list[int], list[int]]:
+    """Places of the common entries in either sequence, in the order of the first."""
+    known = {key: place for place, key in enumerate(b)}
+    pairs = [(place, known[key]) for place, key in enumerate(a) if key in known]
+    return [place for place, _ in pairs], [place for _, place in pairs]
+
+
+def _keys(coordinate: xr.DataArray) -> np.ndarray:
+    return np.array([_key(value) for value in coordinate.values.tolist()], dtype=object)
+
+
+def _key(value: Any) -> str:
+    """A value of an axis as text: the same for numbers that differ by rounding alone."""
+    try:
+        return f"{float(value):.10g}"
+    except ValueError:
+        return str(value)

@@ -1,0 +1,236 @@
+"""Two studies against each other, cell by cell: which classes contradict, how far amplitudes deviate."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from cvt_hpc.analysis.alignment import align, axes_of, job_of
+from cvt_hpc.analysis.classes import at_strongest_strand, occurrence_classes
+from cvt_hpc.files import written_aside
+from cvt_hpc.study.difference import differences, short
+from cvt_hpc.variables import Status
+from cvt_hpc.vibration.agreement import (
+    CONTRADICTIONS,
+    NEAR_CONTRADICTIONS,
+    WITHOUT_RESULTS,
+    PairClass,
+    classify_pairs,
+    is_near,
+)
+from cvt_hpc.vibration.classes import OccurrenceClass
+
+_HEAD = ("class_a", "class_b", "pair", "amplitude_a [um]", "amplitude_b [um]", "frequency_a [Hz]")
+_HEAD += ("frequency_b [Hz]",)
+
+
+class Deviation(NamedTuple):
+    """How far B deviates from A where both vibrate, relative to A; not a number where nothing is known.
+
+    Attributes
+    ----------
+    median, high, largest : float
+        Median, what 95 % of the cells keep, and the largest [1].
+    """
+
+    median: float
+    high: float
+    largest: float
+
+
+class Cell(NamedTuple):
+    """A cell of a comparison.
+
+    Attributes
+    ----------
+    at : dict
+        Values of the axes by name [SI].
+    classes : (OccurrenceClass, OccurrenceClass)
+        In A and in B.
+    pair : int
+        The class that both have, or a `PairClass`.
+    amplitude, frequency : (float, float)
+        In A and in B [m, Hz].
+    """
+
+    at: dict[str, Any]
+    classes: tuple[OccurrenceClass, OccurrenceClass]
+    pair: int
+    amplitude: tuple[float, float]
+    frequency: tuple[float, float]
+
+    @property
+    def pair_label(self) -> str:
+        """Name for people of `pair`."""
+        return (OccurrenceClass(self.pair) if self.pair >= 0 else PairClass(self.pair)).label
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two studies, A and B, over their common cells.
+
+    Attributes
+    ----------
+    cells : Dataset
+        Over the axes of A: `class_a`, `class_b`, values of `OccurrenceClass`; `occurrence_class`, as
+        `classify_pairs` has it; `amplitude_a`, `amplitude_b` [m] and `frequency_a`,
+        `frequency_b` [Hz] at the strand with the largest amplitude, not a number where unknown.
+    thresholds : (float, float)
+        Amplitude from which a strand of A and of B vibrates [m]; not a number where a job has none.
+    left_out : (int, int)
+        Number of runs of A and of B that are not among the cells.
+    notes : tuple of str
+        Which axes were reduced, in words.
+    differences : tuple of str
+        In what the jobs and the versions of the program differ, in words.
+    """
+
+    cells: xr.Dataset
+    thresholds: tuple[float, float]
+    left_out: tuple[int, int]
+    notes: tuple[str, ...]
+    differences: tuple[str, ...]
+
+    @property
+    def pairs(self) -> NDArray[np.int8]:
+        """Class of each cell, shape of the grid: that of both runs, or a `PairClass`."""
+        return self.cells["occurrence_class"].values
+
+    @property
+    def contradicts(self) -> NDArray[np.bool_]:
+        """Whether a cell is quiet in one study and vibrates in the other, shape of the grid."""
+        return np.isin(self.pairs, CONTRADICTIONS)
+
+    @property
+    def contradicts_beyond(self) -> NDArray[np.bool_]:
+        """Whether it does so with a larger amplitude that is not near the threshold, shape of the grid."""
+        return self.contradicts & ~np.isin(self.pairs, NEAR_CONTRADICTIONS)
+
+    @property
+    def answered(self) -> NDArray[np.bool_]:
+        """Whether both runs of a cell have ended with results, shape of the grid."""
+        both = (self.cells[name].values for name in ("class_a", "class_b"))
+        return ~np.any([np.isin(classes, WITHOUT_RESULTS) for classes in both], axis=0)
+
+    def counts(self) -> dict[tuple[OccurrenceClass, OccurrenceClass], int]:
+        """Number of cells by their class in A and in B, of all pairs of classes."""
+        a, b = self.cells["class_a"].values, self.cells["class_b"].values
+        kinds = product(OccurrenceClass, repeat=2)
+        return {(of_a, of_b): int(((a == of_a) & (b == of_b)).sum()) for of_a, of_b in kinds}
+
+    def deviation(self, name: str) -> Deviation:
+        """Return how far `name`, "amplitude" or "frequency", of B deviates where both vibrate."""
+        both = self.pairs == OccurrenceClass.VIBRATING
+        a, b = (self.cells[f"{name}_{study}"].values[both] for study in "ab")
+        deviations = np.abs(b / a - 1.0)
+        known = deviations[np.isfinite(deviations)]
+        if not known.size:
+            return Deviation(math.nan, math.nan, math.nan)
+        return Deviation(float(np.median(known)), float(np.quantile(known, 0.95)), float(known.max()))
+
+    def rows(self, chosen: NDArray[np.bool_]) -> Iterator[Cell]:
+        """Yield the cells that an array of bool marks, shape of the grid."""
+        dims = self.cells["status"].dims
+        along = {name: self.cells[name] for name in axes_of(self.cells)}
+        axes = {name: (values.values.tolist(), dims.index(values.dims[0])) for name, values in along.items()}
+        shown = {str(name): array.values for name, array in self.cells.data_vars.items()}
+        for place in map(tuple, np.argwhere(chosen)):
+            found = {name: values[place].item() for name, values in shown.items()}
+            yield Cell(
+                {name: values[place[dim]] for name, (values, dim) in axes.items()},
+                (OccurrenceClass(found["class_a"]), OccurrenceClass(found["class_b"])),
+                found["occurrence_class"],
+                (found["amplitude_a"], found["amplitude_b"]),
+                (found["frequency_a"], found["frequency_b"]),
+            )
+
+
+def compare(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str] = ("A", "B")) -> Comparison:
+    """Compare two studies over their common cells.
+
+    Parameters
+    ----------
+    a, b, sources
+        As `align` takes them.
+
+    Raises
+    ------
+    InputError
+        As of `align`.
+    """
+    aligned = align(a, b, sources)
+    thresholds = _threshold(a), _threshold(b)
+    known = [_known(dataset) for dataset in (aligned.a, aligned.b)]
+    near = is_near(*(found["amplitude"] / least for found, least in zip(known, thresholds, strict=True)))
+    frame = aligned.a["status"]
+    values = {f"{name}_{study}": array for study, found in zip("ab", known, strict=True)
+              for name, array in found.items()}  # fmt: skip
+    values |= {"status": frame.values}
+    values |= {"occurrence_class": classify_pairs(values["class_a"], values["class_b"], near)}
+    cells = xr.Dataset({name: frame.copy(data=array) for name, array in values.items()})
+    return Comparison(cells, thresholds, aligned.left_out, aligned.notes, tuple(_differences(a, b)))
+
+
+def only(dataset: xr.Dataset, chosen: NDArray[np.bool_]) -> xr.Dataset:
+    """Return results without the runs that are not chosen, shape (runs,): these count as not run."""
+    status = dataset["status"]
+    return dataset.assign(status=status.where(chosen.reshape(status.shape), Status.NOT_RUN))
+
+
+def _known(dataset: xr.Dataset) -> dict[str, NDArray]:
+    """What is compared of the runs of a study."""
+    sizes = {name: at_strongest_strand(dataset, name).values for name in ("amplitude", "frequency")}
+    return {"class": occurrence_classes(dataset).values, **sizes}
+
+
+def write_comparison(found: Comparison, table: Path) -> Path:
+    """Write all cells of a comparison as a CSV table, a row each, and return its path."""
+    with written_aside(table, parents=True) as path, path.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([*axes_of(found.cells), *_HEAD])
+        for cell in found.rows(np.ones(found.pairs.shape, bool)):
+            numbers = [_number(size * 1e6, ".4g") for size in cell.amplitude]
+            numbers += [_number(frequency, ".5g") for frequency in cell.frequency]
+            labels = [kind.label for kind in cell.classes]
+            writer.writerow([*cell.at.values(), *labels, cell.pair_label, *numbers])
+    return table
+
+
+def _number(value: float, layout: str) -> str:
+    """Return a number as a text; no text where it is not a number."""
+    return "" if math.isnan(value) else format(value, layout)
+
+
+def _threshold(dataset: xr.Dataset) -> float:
+    return float(job_of(dataset).get("vibration", {}).get("amplitude_threshold", math.nan))
+
+
+def _differences(a: xr.Dataset, b: xr.Dataset) -> Iterator[str]:
+    """Yield in what two studies differ beside their axes, in words."""
+    swept = {name for dataset in (a, b) for name in axes_of(dataset)}
+    found = differences(_document(a), _document(b))
+    found = {key: pair for key, pair in found.items() if key.rpartition(".")[2] not in swept}
+    for key, (in_a, in_b) in found.items():
+        if in_a is not None and in_b is not None:
+            yield f"{key}: {short(in_a)} in A, {short(in_b)} in B"
+    for label, missing in (("A", 1), ("B", 0)):
+        alone = [key for key, pair in found.items() if pair[missing] is None]
+        if alone:
+            yield f"in {label} alone: {', '.join(alone)}"
+
+
+def _document(dataset: xr.Dataset) -> dict[str, Any]:
+    """What determines the numbers of a study, its axes apart: the resolved job and the versions."""
+    job = {key: value for key, value in job_of(dataset).items() if key not in ("name", "description", "axes")}
+    versions = json.loads(dataset.attrs.get("versions", "{}"))
+    return job | {"versions": versions, "git_revision": dataset.attrs.get("git_revision")}

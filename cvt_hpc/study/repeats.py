@@ -1,0 +1,137 @@
+"""A sample of a study's runs, done again another way, to see how far its results depend on the way.
+
+The sample is drawn by the runs' indices: whoever goes on with a study, or asks for a larger share, goes on
+with the same sample. Its runs are a study of their own, in a folder of that of the first one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import binomtest
+
+from cvt_hpc.errors import mismatch, show
+from cvt_hpc.job import build_job
+from cvt_hpc.study.description import Study, describe
+from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.records import Records
+from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.report import RunReport
+from cvt_hpc.study.simulator import default_simulator
+from cvt_hpc.study.sweep import check_start, run
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
+
+CONFIDENCE = 0.95
+
+
+def _of_the_job(records: Records, runs: NDArray[np.intp]) -> Mapping[int, float]:
+    return {}
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """A sample of the runs of a study, and another way to do them.
+
+    Attributes
+    ----------
+    label : str
+        What it is called in messages.
+    way : str
+        How the runs are done again, in words.
+    first : Job
+        The runs as they were done.
+    out : Path
+        Their folder; all of them are done before the sample is drawn.
+    folder : str
+        Where the repeated runs are kept, in that folder.
+    job : Job
+        The same runs as they are done again.
+    fraction : float
+        Share of the eligible runs that is done again.
+    eligible : callable
+        Tells of the records of the first study which runs may be drawn, shape (runs,).
+    steps : callable
+        Tells of these records, and of the indices of drawn runs, the time step [s] of those that are not to
+        take that of `job`, by index.
+    """
+
+    label: str
+    way: str
+    first: Job
+    out: Path
+    folder: str
+    job: Job
+    fraction: float
+    eligible: Callable[[Records], NDArray[np.bool_]]
+    steps: Callable[[Records, NDArray[np.intp]], Mapping[int, float]] = _of_the_job
+
+    @property
+    def place(self) -> Path:
+        """The output folder of the repeated runs."""
+        return self.out / self.folder
+
+    @cached_property
+    def study(self) -> Study:
+        """The first study."""
+        return describe(self.first, default_simulator())
+
+    @cached_property
+    def records(self) -> Records:
+        """Records of the first study, as they are when they are first asked for."""
+        return read_records(StudyFolder(self.out).records, self.study)
+
+    @cached_property
+    def may_be_drawn(self) -> NDArray[np.bool_]:
+        """Which runs of the first study are eligible, shape (runs,)."""
+        return self.eligible(self.records)
+
+    @property
+    def sample(self) -> NDArray[np.bool_]:
+        """Which runs are done again, shape (runs,): each by a lot that is drawn for its index."""
+        lots = np.random.default_rng(int(self.study.fingerprint[:16], 16)).random(self.study.size)
+        return self.may_be_drawn & (lots < self.fraction)
+
+    def check(self, fresh: bool) -> None:
+        """Raise the InputError that `run` would raise before it computes anything; touches nothing."""
+        check_start(self.job, self.place, fresh=fresh)
+
+    def run(self, **options: Any) -> RunReport:
+        """Do the runs of the sample again; on all ranks, with the options of `cvt_hpc.study.run`."""
+        return run(
+            self.job,
+            self.place,
+            chosen=lambda: self.sample,
+            asked_steps=lambda: self.steps(self.records, np.flatnonzero(self.sample)),
+            **options,
+        )
+
+
+def check_fraction(flag: str, fraction: float, part: str | None = None) -> None:
+    """Raise InputError where a share is none, or where only a part of a study is to be done."""
+    if not 0.0 < fraction <= 1.0:
+        raise mismatch(flag, "a fraction above 0, at most 1", show(fraction))
+    if part is not None:
+        raise mismatch(flag, "a run of the whole study, once its parts have ended", f"part {part}")
+
+
+def built(job: Job, document: dict[str, Any]) -> Job:
+    """Return the job of a document of the same runs; of the whole grid where the first one traces it."""
+    if "first_spacing" in job.design:
+        document = {key: table for key, table in document.items() if key != "design"}
+    return build_job(document, job.source)
+
+
+def interval(count: int, runs: int) -> tuple[float, float]:
+    """Return the ends of the interval that holds a rate with CONFIDENCE (Clopper and Pearson 1934)."""
+    if runs == 0:
+        return 0.0, 1.0
+    ends = binomtest(count, runs).proportion_ci(CONFIDENCE, method="exact")
+    return ends.low, ends.high

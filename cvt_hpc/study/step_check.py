@@ -1,0 +1,110 @@
+"""How far a study depends on its time step: a sample of its runs done again at half the step, or explicitly.
+
+Both ways are repeats as `repeats.py` has them. A run of model auto is done again as such, so that the whole
+climb is at half the step and an error shows that its coarse transient shares with the full one; by the
+explicit step it is done in full.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cvt_hpc.errors import mismatch
+from cvt_hpc.job.handing import handed_to
+from cvt_hpc.models.auto.rules import COARSENESS, Rung
+from cvt_hpc.study.audit import AUDITED, FULL_MODEL
+from cvt_hpc.study.records import Records
+from cvt_hpc.study.repeats import Repeat, built
+from cvt_hpc.study.steps import STEP, stepper_in_words
+from cvt_hpc.variables import Status
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
+
+FLAG = "--check-step"
+EXPLICIT = "explicit"
+# By name of a way its words, and the folder of its runs
+WAYS = {
+    "half": ("at half the step", "check_step"),
+    EXPLICIT: ("by the explicit step", "check_explicit"),
+}
+
+
+def step_check(job: Job, out: Path, fraction: float, way: str = "half") -> Repeat:
+    """Return the check of a study's time step.
+
+    Parameters
+    ----------
+    job : Job
+        What was run, by a stepper with a fixed step.
+    out : Path
+        Its folder.
+    fraction : float
+        Share of the runs that is done again.
+    way : str
+        One of WAYS.
+
+    Raises
+    ------
+    InputError
+        If the job has no fixed step, varies it, or cannot be done the other way.
+    """
+    _check(job, way)
+    if way == EXPLICIT:
+        other, steps = built(job, _explicit(job)), {}
+    else:
+        other, steps = built(job, _halved(job)), {"steps": halved_steps}
+    words, folder = WAYS[way]
+    return Repeat("step check", words, job, out, folder, other, fraction, _eligible, **steps)
+
+
+def halved_steps(records: Records, runs: NDArray[np.intp]) -> Mapping[int, float]:
+    """Return half of the time step [s] that each run has taken, by its index.
+
+    As recorded, so that it holds for runs whose step was shortened, or chosen for their scene.
+    """
+    steps = 0.5 * records.read(runs, "time_step")
+    if "rung" in records.study.record_dtype.names:  # of auto, whose parameter is the step of the full run
+        steps = np.where(records.read(runs, "rung") == Rung.COARSE, COARSENESS * steps, steps)
+    return dict(zip(runs.tolist(), steps.tolist(), strict=True))
+
+
+def _check(job: Job, way: str) -> None:
+    if STEP not in job.parameters:
+        raise mismatch(FLAG, "a job whose stepper has a fixed step", stepper_in_words(job))
+    varied = [axis.name for axis in job.axes if job.schema.section_of[axis.name] == _section(job)]
+    if varied:
+        raise mismatch(FLAG, f"a job with one value of {varied[0]}", "an axis")
+    if way == EXPLICIT and job.stepper == EXPLICIT:
+        raise mismatch(f"{FLAG}-by {EXPLICIT}", "a job of another stepper", f"stepper {job.stepper}")
+
+
+def _section(job: Job) -> str:
+    return job.schema.section_of[STEP]
+
+
+def _halved(job: Job) -> dict[str, Any]:
+    document = job.resolved()
+    document[_section(job)][STEP] = 0.5 * job.parameters[STEP]
+    return document
+
+
+def _explicit(job: Job) -> dict[str, Any]:
+    """The same runs by the explicit step with its own defaults, in full where the job climbs a ladder."""
+    model = FULL_MODEL if job.model == AUDITED else job.model
+    document = handed_to(job, model, "by the explicit step, to check the step")
+    document.pop(_section(job), None)
+    return document | {"stepper": EXPLICIT}
+
+
+def _eligible(records: Records) -> NDArray[np.bool_]:
+    """Whether a run has ended with results, and has taken steps for them, shape (runs,)."""
+    done = records.status == Status.DONE
+    places = np.flatnonzero(done)
+    done[places] = np.isfinite(records.read(places, "time_step"))
+    return done

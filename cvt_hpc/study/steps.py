@@ -1,0 +1,74 @@
+"""Runs at another time step than that of their job: failed ones at a shorter one, and checks of others."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cvt_hpc.errors import mismatch, show
+from cvt_hpc.variables import Status
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
+    from cvt_hpc.study.records import Records
+
+STEP = "step"  # the key of the time step, of steppers that have a fixed one
+MOST_REFINED = 1000.0
+
+
+def asked_step(job: Job, index: int) -> float:
+    """Return the time step that a job asks of a run [s]."""
+    return job.point(index)[STEP]
+
+
+def refined_steps(job: Job, records: Records, others: Mapping[int, float]) -> dict[int, float]:
+    """Return the time steps [s] of the runs that do not take that of their job, by run index.
+
+    Parameters
+    ----------
+    job : Job
+        What is run.
+    records : Records
+        With the factors by which retries shorten steps.
+    others : mapping
+        Time steps by run index, where those of the job do not count whatever is on record.
+    """
+    steps = dict(others)
+    for index in np.flatnonzero(records.refinements != 1.0).tolist():
+        step = steps[index] if index in steps else asked_step(job, index)
+        steps[index] = step / float(records.refinements[index])
+    return steps
+
+
+def point_at_step(job: Job, index: int, steps: Mapping[int, float]) -> dict[str, Any]:
+    """Return the parameters of a run, at its time step of `steps` where that has one."""
+    point = job.point(index)
+    return {**point, STEP: steps[index]} if index in steps else point
+
+
+def check_refinement(job: Job, refine: float, retry: Collection[Status]) -> None:
+    """Raise InputError unless failed runs of a job can be done again at a step shorter by a factor.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    refine : float
+        The factor.
+    retry : collection of Status
+        How the runs ended that are done again: a shorter step is a cure for failed numerics alone.
+    """
+    if not 1.0 < refine <= MOST_REFINED:
+        raise mismatch("--refine", f"a factor above 1, at most {MOST_REFINED:g}", show(refine))
+    if set(retry) != {Status.FAILED_NUMERICS}:
+        found = ", ".join(Status(status).name.lower() for status in retry) or "no --retry"
+        raise mismatch("--refine", "--retry failed_numerics beside it, and no other", found)
+    if STEP not in job.point(0):
+        raise mismatch("--refine", "a job whose stepper has a fixed step", stepper_in_words(job))
+
+
+def stepper_in_words(job: Job) -> str:
+    """Return which stepper a job has, for an error."""
+    return f"stepper {job.stepper}" if job.stepper else f"model {job.model}, which has none"
