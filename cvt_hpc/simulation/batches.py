@@ -91,9 +91,21 @@ def turns(job: Job, runs: int) -> int:
     runs : int
         Runs of the batch.
     """
+    return -(-runs // lanes_at_once(job, job.parameters))
+
+
+def lanes_at_once(job: Job, parameters: dict[str, Any]) -> int:
+    """How many runs advance together.
+
+    Parameters
+    ----------
+    job : Job
+        For its model and stepper.
+    parameters : dict
+        Flat parameters of one of them [SI].
+    """
     model = record_module(job)
-    at_once = model.lanes(job.parameters, job.stepper) // getattr(model, "LANE_GROUPS", 1)
-    return -(-runs // at_once)
+    return model.lanes(parameters, job.stepper) // getattr(model, "LANE_GROUPS", 1)
 
 
 def pilot_share(job: Job) -> float:

@@ -41,7 +41,7 @@ def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
         If a value is not fit for its key.
     """
     point = job.point_at(at or {})
-    ((run, record),) = do(job, [point], lambda: None)
+    ((run, record),) = do(job, [point], lambda: None, kept=(0,))
     return _history(job, point, run, record)
 
 
@@ -64,7 +64,7 @@ def run_points_keeping(
     histories : dict
         Datasets as `simulate` returns them, by place.
     """
-    done = do(job, points, interrupt)
+    done = do(job, points, interrupt, kept)
     histories = {place: _history(job, points[place], *done[place]) for place in kept}
     return [record for _, record in done], histories
 

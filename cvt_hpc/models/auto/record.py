@@ -5,18 +5,30 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from cvt_hpc.models.auto.rules import COARSENESS, SHARE, Rung
+from cvt_hpc.models.auto.rules import COARSENESS, SHARE, Rung, coarse, is_clear, is_passive, is_settled
 from cvt_hpc.models.elastic_belt import grouping
 from cvt_hpc.models.elastic_belt import record as belt_record
 from cvt_hpc.models.elastic_belt.record import coordinates, lane_key
-from cvt_hpc.variables import Variable
+from cvt_hpc.variables import Status, Variable, Vibrates
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from cvt_hpc.models.auto.transient import ClimbingRun
+    from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
+    from cvt_hpc.vibration.assessment import Occurrence
 
-__all__ = ["VARIABLES", "coordinates", "cost", "histories", "judge", "lane_key", "lanes"]
+__all__ = [
+    "VARIABLES",
+    "coordinates",
+    "cost",
+    "histories",
+    "judge",
+    "known",
+    "lane_key",
+    "lanes",
+    "preliminary",
+    "settle",
+]
 
 VARIABLES = (
     Variable("rung", (), "i1", "", "rung of the ladder that answered", Rung),
@@ -45,13 +57,53 @@ def lanes(parameters: Mapping[str, Any], stepper: str) -> int:
     return LANE_GROUPS * grouping.lanes(dict(parameters), stepper)
 
 
-def judge(run: ClimbingRun) -> dict[str, Any]:
-    """The record of a run that has ended, its cost apart."""
-    return run.found
+def known(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The values of a run that needs no transient; None where it does.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Resolved parameters of the run [SI].
+    """
+    if not is_passive(parameters):
+        return None
+    reason = "friction does not fall with sliding speed"
+    return {"status": Status.DONE, "vibrates": Vibrates.NO, "reason": reason, "rung": Rung.PASSIVE}
 
 
-def histories(run: ClimbingRun) -> xr.Dataset:
+preliminary = coarse
+
+
+def settle(run: RecordedRun) -> dict[str, Any] | None:
+    """The values of a coarse run if it answers the question, else None.
+
+    Parameters
+    ----------
+    run : RecordedRun
+        With all samples recorded.
+    """
+    found = belt_record.assess(run)
+    if not is_settled(run.parameters, found):
+        return None
+    values = _values(run, found, Rung.COARSE)
+    if not is_clear(run.parameters, found):
+        reason = f"too close for a coarse run: {found.reason}"[:240]
+        values |= {"vibrates": Vibrates.UNDECIDED, "reason": reason}
+    return values
+
+
+def judge(run: RecordedRun) -> dict[str, Any]:
+    """The record of a full run that has reached its end, its cost apart."""
+    return _values(run, belt_record.assess(run), Rung.FULL)
+
+
+def _values(run: RecordedRun, found: Occurrence, rung: Rung) -> dict[str, Any]:
+    values = found.record() | belt_record.evaluate(run, found.strongest_probe)
+    return values | {"rung": rung, "margin": found.margin}
+
+
+def histories(run: RecordedRun | None) -> xr.Dataset:
     """Histories and profiles of the transient that answered; empty where none was needed."""
     import xarray as xr
 
-    return xr.Dataset() if run.answering is None else belt_record.histories(run.answering)
+    return xr.Dataset() if run is None else belt_record.histories(run)
