@@ -75,12 +75,13 @@ def sample_count(parameters: Mapping[str, Any]) -> int:
     return max(int(round(parameters["duration"] * parameters["sampling_rate"])), 1)
 
 
-def longest_duration(parameters: Mapping[str, Any]) -> float:
+def longest_duration(parameters: Mapping[str, Any]) -> Any:
     """How long a run may last that stays undecided [s].
 
     Parameters
     ----------
     parameters : mapping
-        Flat parameters of the run as its job has them [SI].
+        Flat parameters of the run as its job has them [SI], each a number or an array of them.
     """
-    return parameters["longest_duration"] or LONGEST * parameters["duration"]
+    given = parameters["longest_duration"]
+    return given + (given == 0.0) * LONGEST * parameters["duration"]

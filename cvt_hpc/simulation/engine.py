@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from cvt_hpc.simulation.batches import lanes_at_once
 from cvt_hpc.simulation.modules import record_module, transient_module
 from cvt_hpc.simulation.open_run import OpenRun
 
@@ -61,12 +60,12 @@ def march(
 
 def _in_lanes(job: Job, runs: Iterable[OpenRun]) -> Iterator[list[OpenRun]]:
     """Yield groups of runs whose next transients can advance together, as many as there are lanes."""
-    key = record_module(job).lane_key
+    model = record_module(job)
     groups: dict[Any, list[OpenRun]] = {}
     for run in runs:
-        groups.setdefault((key(run.next), run.paused is None), []).append(run)
+        groups.setdefault((model.lane_key(run.next), run.paused is None), []).append(run)
     for group in groups.values():
-        most = lanes_at_once(job, group[0].next)
+        most = model.lanes(group[0].next, job.stepper)
         for first in range(0, len(group), most):
             yield group[first : first + most]
 

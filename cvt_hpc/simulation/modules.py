@@ -17,8 +17,7 @@ A model with a transient may answer some runs without all of it. Its record modu
 Its `judge` reads the full transient as ever. The `transient` module of any model offers `batch(points,
 stepper, paused=())`: runs that advance together, each from its start or from where a shorter one has ended.
 
-A model whose batches do several groups of lanes one after the other says how many by LANE_GROUPS, and one
-whose runs cannot be shortened for a forecast by PILOT_SHARE.
+A model whose runs cannot be shortened for a forecast says so by PILOT_SHARE.
 
 `histories(run)`, or of a solution, is the dataset of what `simulate` has beyond the record, where there is
 such.

@@ -10,6 +10,7 @@ of these deaths the run is given up.
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,7 +57,7 @@ def plan_runs(
     for struck in (False, True):
         chosen = pending & ~suspect & ((records.died > 0) == struck)
         groups += simulator.lane_groups(job, np.flatnonzero(chosen).tolist())
-    batches = share_out(groups, costs, ranks)
+    batches = share_out(groups, costs, ranks, partial(simulator.turns, job))
     batches.sort(key=lambda batch: bool(records.died[batch[0]]))
     suspects = sorted(np.flatnonzero(suspect).tolist(), key=lambda i: (-costs[i], i))
     lethal = tuple(index for index in suspects if records.died_alone[index])

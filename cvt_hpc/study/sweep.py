@@ -171,7 +171,7 @@ def _compute(
 ) -> str | None:
     """Do and record the runs that this rank claims; return why it could not go on, if so."""
     layout = RecordFormat(task.study.fingerprint, task.study.record_dtype)
-    model = CostModel(costs, plan.fit)
+    model = CostModel(costs, plan.fit, task.turns)
     try:
         # Every core has a rank of its own: threads of linear algebra would only wait for each other.
         log = RecordLog(folder.records, layout, plan.session, rank, plan.attempts)

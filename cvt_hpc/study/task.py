@@ -7,13 +7,16 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.study.batches import Batch
+from cvt_hpc.study.batches import Batch, Turns
+from cvt_hpc.study.cost_model import Fit, fit_recorded
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.record import Record
+from cvt_hpc.study.records import Records
 from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.variables import Status
 
@@ -88,6 +91,16 @@ class Task:
     run_limit: float = math.inf
     chosen: Callable[[], np.ndarray] | None = None
 
+    @property
+    def turns(self) -> Turns:
+        """How many times so many runs fill the lanes."""
+        return partial(self.simulator.turns, self.job)
+
+    def fit(self, records: Records) -> Fit:
+        """Return what the batches on record tell of the machine."""
+        costs = self.simulator.run_costs(self.job)
+        return fit_recorded(costs, records.timings, records.status == Status.DONE, self.turns)
+
     def do(self, batch: Batch, interrupt: Interrupt, begin: Begin) -> Iterator[Result]:
         """Do the runs of a batch, and yield their records as they come; none of runs that are broken off.
 
@@ -122,7 +135,7 @@ class Task:
     def _attempt(self, batch: Batch, interrupt: Interrupt, begin: Begin) -> tuple[Result, _Trouble | None]:
         """Return the records of all runs, or none and what ended the batch."""
         begin(batch)
-        watch = _Watch(interrupt, self.run_limit * self.simulator.turns(self.job, len(batch)))
+        watch = _Watch(interrupt, self.run_limit * self.turns(len(batch)))
         try:
             points = [self.job.point(index) for index in batch]
             kept = [place for place, index in enumerate(batch) if index in self.job.histories]

@@ -41,20 +41,19 @@ VARIABLES = (
     ),
     *belt_record.VARIABLES,
 )
-LANE_GROUPS = 16  # batches of coarse runs in one: what they leave open fills the lanes of full runs again
 PILOT_SHARE = 1.0  # of a run's time that a pilot does: a shorter run would take another rung
 REFINED = 0.2  # of the runs are done in full, more of them in a trace
 
 
 def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
-    """Core-seconds of a batch."""
+    """Core-seconds of runs that fill the lanes once."""
     coarse = COARSENESS**2 * SHARE
-    return LANE_GROUPS * (coarse + REFINED) * grouping.cost(dict(parameters), stepper)
+    return (coarse + REFINED) * grouping.cost(dict(parameters), stepper)
 
 
 def lanes(parameters: Mapping[str, Any], stepper: str) -> int:
-    """Most runs that a batch can take."""
-    return LANE_GROUPS * grouping.lanes(dict(parameters), stepper)
+    """Most runs that can advance together."""
+    return grouping.lanes(dict(parameters), stepper)
 
 
 def known(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
