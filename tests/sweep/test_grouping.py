@@ -7,6 +7,7 @@ from recorded import assert_same_numbers
 from cvt_hpc import simulation
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt import grouping
+from cvt_hpc.simulation import batches
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status
 
@@ -78,7 +79,7 @@ def test_every_run_is_in_one_group_and_groups_do_not_depend_on_the_hour():
     assert simulation.lane_groups(asked, []) == []
 
 
-def test_groups_are_of_one_kind_and_no_larger_than_the_lanes(monkeypatch):
+def test_groups_are_of_one_kind_and_no_larger_than_may_be(monkeypatch):
     monkeypatch.setattr(grouping, "LANES", {"double": 3, "single": 3})
     asked = job(MIXED)
     groups = simulation.lane_groups(asked, range(asked.size))
@@ -88,9 +89,14 @@ def test_groups_are_of_one_kind_and_no_larger_than_the_lanes(monkeypatch):
     ]
     assert [len(kind) for kind in kinds] == [1] * 12
     assert sorted(map(len, groups)) == [2] * 12
-    # more of a kind than lanes
+    # more of a kind than lanes: several turns, as long as a batch takes less than half a minute
     many = job({"load": [0.0, 20.0, 40.0, 60.0, 80.0]})
-    assert sorted(map(len, simulation.lane_groups(many, range(5)))) == [2, 3]
+    assert list(map(len, simulation.lane_groups(many, range(5)))) == [5]
+    assert [simulation.turns(many, runs) for runs in (1, 3, 4, 5)] == [1, 1, 2, 2]
+    predicted = grouping.cost(many.parameters, "imex")
+    for seconds, sizes in ((1.9 * predicted, [2, 3]), (2.1 * predicted, [5])):
+        monkeypatch.setattr(batches, "BATCH_SECONDS", seconds)
+        assert list(map(len, simulation.lane_groups(many, range(5)))) == sizes
     general = job({"load": [0.0, 60.0]}, "symplectic_euler")  # takes one run at a time
     assert simulation.lane_groups(general, [0, 1]) == [(0,), (1,)]
 
