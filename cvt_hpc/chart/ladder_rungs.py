@@ -91,7 +91,7 @@ def _check(job: Job) -> None:
         raise mismatch(f"{where}: [axes]", "load among the axes, for its onsets", ", ".join(axes) or "none")
     if (course := job.parameters["load_history"]) != "constant":
         raise mismatch(f"{where}: [scene] load_history", "constant, as the lower rungs have it", course)
-    for name in ("stations", "step", "duration"):
+    for name in ("stations", "step", "duration", "longest_duration"):
         if name in axes:
             raise mismatch(f"{where}: [axes] {name}", "one value, which the reference refines", "an axis")
 
@@ -110,5 +110,6 @@ def _refined(job: Job) -> dict[str, Any]:
     document = job.resolved()
     document["mesh"]["stations"] = round(FINER * job.parameters["stations"])
     document["numerics"]["step"] = job.parameters["step"] / FINER
-    document["run"]["duration"] = LONGER * job.parameters["duration"]
+    for name in ("duration", "longest_duration"):
+        document["run"][name] = LONGER * job.parameters[name]
     return document
