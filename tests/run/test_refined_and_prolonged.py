@@ -233,3 +233,15 @@ def test_runs_without_lanes_go_on_as_well(transient, parameters):
     if hasattr(run, "means"):
         for name, values in whole.means.items():
             assert np.array_equal(run.means[name], values) and np.isfinite(values).all(), name
+
+
+def test_a_run_that_goes_on_and_one_that_begins_anew_share_no_lanes(script):
+    # in the second turn both have the same duration and step
+    script[0][1], script[1][2] = 2 * T, 10
+    values = [{"seed": 1, "step": 2.5e-6}, {"seed": 2, "step": 5e-6, "duration": 2 * T}]
+    points = [point(**asked_for) for asked_for in values]
+    together = run_points(asked(), points, never)
+    assert [record["simulated_seconds"] for record in together] == pytest.approx([2 * T, 2 * T])
+    assert together[0]["time_step"] == together[1]["time_step"]
+    for values, record in zip(points, together, strict=True):
+        assert_same_bits(record, run_point(asked(), values, never))
