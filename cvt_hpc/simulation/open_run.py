@@ -9,8 +9,10 @@ record module (`modules.py`), and what it answers so is neither refined nor prol
 from __future__ import annotations
 
 import math
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from cvt_hpc.models import MODELS
 from cvt_hpc.recording import longest_duration, sample_count
 from cvt_hpc.simulation.modules import record_module
 from cvt_hpc.simulation.record import record_of, record_without_run
@@ -39,7 +41,7 @@ class OpenRun:
     next : dict
         Flat parameters of the transient that comes next [SI].
     paused : object or None
-        What that goes on from, as the `paused` of a shorter run returned it; None: it begins anew.
+        The shorter run that the next transient goes on from, by its `paused`; None: it begins anew.
     record : dict or None
         Value of each of `record_variables`; None until they are known.
     run : object or None
@@ -102,7 +104,7 @@ class OpenRun:
         self.run, self.paused = run if self._is_kept else None, None
         self.record = record | {"refinements": self._refinements}
         if self._refinements and record["status"] == Status.FAILED_NUMERICS:
-            remedy = f"; so it is at {1 + self._refinements} steps down to {record['time_step']:.3g} s"
+            remedy = f"; failed at {1 + self._refinements} steps down to {record['time_step']:.3g} s"
             remedy += _remedy(self._job, self._point)
             self.record["reason"] = record["reason"][: 240 - len(remedy)] + remedy
 
@@ -133,6 +135,7 @@ def _is_undecided(record: dict[str, Any]) -> bool:
 
 def _remedy(job: Job, point: dict[str, Any]) -> str:
     """What may help a run that fails at every step, in words."""
-    ways = ['stepper = "explicit"'] if job.stepper == "imex" else []
+    others = import_module(MODELS[job.model]).STEPPER_NAMES
+    ways = ['stepper = "explicit"'] if job.stepper == "imex" and "explicit" in others else []
     ways += ["a finer or coarser mesh (stations)"] if "stations" in point else []
     return f": try {' or '.join(ways)}" if ways else ""

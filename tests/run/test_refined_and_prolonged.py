@@ -82,8 +82,8 @@ def test_what_fails_at_every_step_is_recorded_with_a_remedy(script, most):
     assert found["time_step"] == pytest.approx(T / 800 / STEPS / 2**most)
     assert found["steps"] == 800 * STEPS * (2 ** (most + 1) - 1)
     assert found["simulated_seconds"] == pytest.approx(T)
-    assert found["reason"].startswith("at 40 ms: too coarse; so it is at ")
-    assert f"at {most + 1} steps down to {found['time_step']:.3g} s" in found["reason"]
+    assert found["reason"].startswith(f"at 40 ms: too coarse; failed at {most + 1} steps down to ")
+    assert f"down to {found['time_step']:.3g} s: try " in found["reason"]
     assert 'try stepper = "explicit" or a finer or coarser mesh (stations)' in found["reason"]
 
 
