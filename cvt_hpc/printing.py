@@ -31,6 +31,7 @@ _KNOWN_OF_FAILURES = (
     "core_seconds",
     "simulated_seconds",
     "time_step",
+    "refinements",
     "steps",
     "contact_solves",
 )

@@ -5,13 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.parameters import Parameter, not_negative
 
+LONGEST = 4  # times the duration
 LEAST_SAMPLES_PER_PERIOD = 4  # of the band's highest frequency: amplitudes need 2, spectra and pictures more
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "run": {
         "duration": Parameter(0.3, "s", "simulated time of a run", minimum=0.0, exclusive=True),
+        "longest_duration": not_negative(
+            0.0, "s", "up to which a run goes on while it is undecided; 0: four times the duration"
+        ),
+    },
+    "numerics": {
+        "most_refinements": Parameter(
+            3,
+            "",
+            "times that a run which fails by its numerics is done again, at half the step each time",
+            minimum=0,
+            maximum=10,
+        ),
     },
     "record": {
         "sampling_rate": Parameter(
@@ -37,6 +50,10 @@ def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         Flat parameters of a run, those of [vibration] included.
     """
     problems = []
+    duration, longest = parameters["duration"], longest_duration(parameters)
+    if longest < duration * (1.0 - 1e-9):
+        expected = f"duration = {duration:g} s or more, or 0 for {LONGEST} times the duration"
+        problems.append(("longest_duration", expected, f"{longest:g} s"))
     needed = LEAST_SAMPLES_PER_PERIOD * parameters["band_high"]
     if parameters["sampling_rate"] < needed:
         expected = f"{LEAST_SAMPLES_PER_PERIOD} x band_high = {needed:g} Hz or more"
@@ -45,3 +62,26 @@ def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         expected = f"band_high = {parameters['band_high']:g} Hz or less"
         problems.append(("spectrum_step", expected, f"{parameters['spectrum_step']:g} Hz"))
     return problems
+
+
+def sample_count(parameters: Mapping[str, Any]) -> int:
+    """Samples of a whole run.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat parameters of the run [SI].
+    """
+    return max(int(round(parameters["duration"] * parameters["sampling_rate"])), 1)
+
+
+def longest_duration(parameters: Mapping[str, Any]) -> Any:
+    """How long a run may last that stays undecided [s].
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat parameters of the run as its job has them [SI], each a number or an array of them.
+    """
+    given = parameters["longest_duration"]
+    return given + (given == 0.0) * LONGEST * parameters["duration"]

@@ -89,9 +89,10 @@ def _is_known(dataset: xr.Dataset, name: str) -> bool:
 
 
 def _vibration_settings(dataset: xr.Dataset) -> dict[str, float]:
-    """Table [vibration] of the run's job, defaults where the dataset does not tell."""
+    """Table [vibration] of the run's job, with what the run had of its own; else defaults."""
     defaults = {key: parameter.default for key, parameter in PARAMETERS["vibration"].items()}
-    return defaults | json.loads(dataset.attrs.get("job", "{}")).get("vibration", {})
+    own = {key: dataset.attrs[key] for key in defaults if key in dataset.attrs}
+    return defaults | json.loads(dataset.attrs.get("job", "{}")).get("vibration", {}) | own
 
 
 def _title(dataset: xr.Dataset) -> str:

@@ -93,7 +93,7 @@ def _check(job: Job) -> None:
         raise mismatch(f"{where}: [scene] load_history", "constant, as the lower rungs have it", course)
     varied = dict.fromkeys([rule.key for rule in job.rules], ("derived", "a formula"))
     varied |= dict.fromkeys(axes, ("axes", "an axis"))
-    for name in ("stations", "step", "duration"):
+    for name in ("stations", "step", "duration", "longest_duration"):
         if name in varied:
             table, found = varied[name]
             raise mismatch(f"{where}: [{table}] {name}", "one value, which the reference refines", found)
@@ -113,5 +113,6 @@ def _refined(job: Job) -> dict[str, Any]:
     document = job.resolved()
     document["mesh"]["stations"] = round(FINER * job.parameters["stations"])
     document["numerics"]["step"] = job.parameters["step"] / FINER
-    document["run"]["duration"] = LONGER * job.parameters["duration"]
+    for name in ("duration", "longest_duration"):
+        document["run"][name] = LONGER * job.parameters[name]
     return document

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from cvt_hpc.variables import Status
@@ -61,5 +61,36 @@ class Alone:
         """
         self.failure = self.run.advance(samples)
 
+    def paused(self) -> Any:
+        """What a batch of the same point over a longer time goes on from: the run itself."""
+        return self.run
+
     def __getattr__(self, name: str) -> Any:
         return getattr(self.run, name)
+
+
+def batch_of_one(
+    run: Callable[[Mapping[str, Any], str], Any],
+    points: Sequence[Mapping[str, Any]],
+    stepper: str,
+    paused: Sequence[Any] = (),
+) -> Alone:
+    """One run in the form of a batch.
+
+    Parameters
+    ----------
+    run : type
+        The model's Transient.
+    points : sequence of mapping
+        Resolved parameters of the one run [SI].
+    stepper : str
+        One of the model's STEPPER_NAMES.
+    paused : sequence, optional
+        A shorter run at its end, as `Alone.paused` returns it: it goes on.
+    """
+    (parameters,) = points
+    if not paused:
+        return Alone(run(parameters, stepper))
+    (shorter,) = paused
+    shorter.prolong(parameters)
+    return Alone(shorter)

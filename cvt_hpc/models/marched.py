@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.models.alone import Alone
+from cvt_hpc.recording import sample_count
 from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.marching import Marching
 from cvt_hpc.steppers.system import SetValuedSystem, System
@@ -96,15 +96,27 @@ class MarchedRun(Marched):
         displacements: Sequence[int],
         frequency: float,
     ) -> None:
-        self.parameters = parameters
         self.probes = tuple(probes)
         self.interval = 1.0 / parameters["sampling_rate"]
-        self.samples = max(int(round(parameters["duration"] * parameters["sampling_rate"])), 1)
-        self.rows = np.full((self.samples, state.size), np.nan)
+        self.rows = np.empty((0, state.size))
+        self.prolong(parameters)
         self.done = 0
         self.marching = Marching(stepper, parameters, system, state, self.interval)
         self._displacements = list(displacements)
         self._longest = self.marching.facts.vibration_limit / frequency
+
+    def prolong(self, parameters: Mapping[str, Any]) -> None:
+        """Make room for the samples of a longer duration.
+
+        Parameters
+        ----------
+        parameters : mapping
+            Those of the run but for `duration` and `judged_fraction`.
+        """
+        self.parameters = parameters
+        self.samples = sample_count(parameters)
+        new = np.full((self.samples - len(self.rows), self.rows.shape[1]), np.nan)
+        self.rows = np.concatenate([self.rows, new])
 
     @property
     def times(self) -> np.ndarray:
@@ -148,21 +160,3 @@ class MarchedRun(Marched):
     def _doubt(self, first: int) -> str | None:
         """Why the samples from `first` on are none of the model's motion, by what the model knows of it."""
         return None
-
-
-def batch_of_one(
-    run: Callable[[Mapping[str, Any], str], Any], points: Sequence[Mapping[str, Any]], stepper: str
-) -> Alone:
-    """One run in the form of a batch.
-
-    Parameters
-    ----------
-    run : type
-        The model's Transient.
-    points : sequence of mapping
-        Resolved parameters of the one run [SI].
-    stepper : str
-        One of the model's STEPPER_NAMES.
-    """
-    (parameters,) = points
-    return Alone(run(parameters, stepper))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cvt_hpc.recording import longest_duration
 from cvt_hpc.simulation.modules import has_record, record_module
 
 if TYPE_CHECKING:
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from cvt_hpc.job.definition import Derived
 
 PILOT_SHARE = 0.25
+LEFT_SHARE = 1.0  # what refined and prolonged runs add to a map's cost, as measured by lebrecht_2004.toml
+BATCH_SECONDS = 30.0  # of computing in a batch, as predicted: so much a process that dies may lose
+MOST_TURNS = 16  # groups of lanes in a batch: with more, those of the runs left would be hardly fuller
 
 
 def run_costs(job: Job) -> np.ndarray:
@@ -36,7 +40,15 @@ def run_costs(job: Job) -> np.ndarray:
     p |= {derived.name: _over_the_grid(job, derived) for derived in job.derived}
     model = record_module(job)
     cost = model.cost(p, job.stepper) / model.lanes(job.parameters, job.stepper)
-    return np.broadcast_to(cost, job.shape).ravel()
+    return np.broadcast_to(cost * _allowance(p), job.shape).ravel()
+
+
+def _allowance(p: dict[str, Any]) -> Any:
+    """Cost of a run over that of its first transient, mean of a map: a number or an array of them."""
+    if "longest_duration" not in p:
+        return 1.0
+    goes_on = longest_duration(p) > p["duration"]
+    return 1.0 + LEFT_SHARE * (goes_on | (p["most_refinements"] > 0))
 
 
 def _over_the_grid(job: Job, derived: Derived) -> np.ndarray:
@@ -63,7 +75,7 @@ def estimate_cost(job: Job) -> float:
 
 
 def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
-    """Split runs into batches that can advance together.
+    """Split runs into batches, in which lanes can be filled again with the runs that are left.
 
     Parameters
     ----------
@@ -78,21 +90,29 @@ def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
     list of tuple of int
         Each index once, in as few batches as can be, of nearly equal size.
     """
-    model = record_module(job)
+    key = record_module(job).lane_key
     groups: dict[Any, list[int]] = {}
     for index in indices:
-        groups.setdefault(model.lane_key(job.point(index)), []).append(index)
+        groups.setdefault(key(job.point(index)), []).append(index)
     batches = []
     for group in groups.values():
-        most = model.lanes(job.point(group[0]), job.stepper)
-        parts = -(-len(group) // most)
+        parts = -(-len(group) // _batch_size(job, job.point(group[0])))
         bounds = [len(group) * part // parts for part in range(parts + 1)]
         batches += [tuple(group[first:last]) for first, last in pairwise(bounds)]
     return batches
 
 
+def _batch_size(job: Job, parameters: dict[str, Any]) -> int:
+    """Most runs of a batch: several times the lanes, unless a process that dies would lose too much."""
+    model = record_module(job)
+    most = model.lanes(parameters, job.stepper)
+    if most == 1:
+        return 1
+    return most * int(np.clip(BATCH_SECONDS / model.cost(parameters, job.stepper), 1, MOST_TURNS))
+
+
 def turns(job: Job, runs: int) -> int:
-    """How many groups of lanes a batch does one after the other.
+    """How many groups of lanes a batch does one after the other, those of runs that are left apart.
 
     Parameters
     ----------
@@ -101,9 +121,7 @@ def turns(job: Job, runs: int) -> int:
     runs : int
         Runs of the batch.
     """
-    model = record_module(job)
-    at_once = model.lanes(job.parameters, job.stepper) // getattr(model, "LANE_GROUPS", 1)
-    return -(-runs // at_once)
+    return -(-runs // record_module(job).lanes(job.parameters, job.stepper))
 
 
 def pilot_share(job: Job) -> float:

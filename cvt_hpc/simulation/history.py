@@ -41,7 +41,7 @@ def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
         If a value is not fit for its key.
     """
     point = job.point_at(at or {})
-    ((run, record),) = do(job, [point], lambda: None)
+    ((run, record),) = do(job, [point], lambda: None, kept=(0,))
     return _history(job, point, run, record)
 
 
@@ -64,7 +64,7 @@ def run_points_keeping(
     histories : dict
         Datasets as `simulate` returns them, by place.
     """
-    done = do(job, points, interrupt)
+    done = do(job, points, interrupt, kept)
     histories = {place: _history(job, points[place], *done[place]) for place in kept}
     return [record for _, record in done], histories
 
@@ -82,13 +82,15 @@ def _history(job: Job, point: dict[str, Any], run: Any, record: dict[str, Any]) 
         value = record[variable.name]
         value = value if variable.dtype.startswith("S") else np.asarray(value, variable.dtype)
         variables[variable.name] = (variable.dims, value, _variable_attributes(variable))
-    attributes = {
+    attributes: dict[str, Any] = {
         "Conventions": "CF-1.11",
         "title": job.description or job.name,
         "job_name": job.name,
         "job": json.dumps(job.resolved()),
         "point": json.dumps({key: repr(value) if value == np.inf else value for key, value in point.items()}),
     }
+    if job.stepper is not None and run is not None:
+        attributes["judged_fraction"] = run.parameters["judged_fraction"]  # less than asked if prolonged
     dataset = xr.Dataset(variables, coordinates, attributes)
     model = record_module(job)
     if not hasattr(model, "histories"):

@@ -8,8 +8,16 @@ The `record` module of a model offers VARIABLES, `coordinates(parameters)`, `cos
 - of a model without, which takes no stepper, `solve(parameters)`, whose result `judge(solution)` reads. It
   may leave out what is not known, such as all but status and reason where nothing was found.
 
-A model whose batches do several groups of lanes one after the other says how many by LANE_GROUPS, and one
-whose runs cannot be shortened for a forecast by PILOT_SHARE.
+A model with a transient may answer some runs without all of it. Its record module then also has
+
+- `known(parameters)`: the values where no transient is needed, else None;
+- `preliminary(parameters)`: the parameters of a cheaper transient that comes first, or None;
+- `settle(run)`: the values of a run by that transient if it answers, else None.
+
+Its `judge` reads the full transient as ever. The `transient` module of any model offers `batch(points,
+stepper, paused=())`: runs that advance together, each from its start or from where a shorter one has ended.
+
+A model whose runs cannot be shortened for a forecast says so by PILOT_SHARE.
 
 `histories(run)`, or of a solution, is the dataset of what `simulate` has beyond the record, where there is
 such.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,15 +27,22 @@ _COST = (
         (),
         "f8",
         "s",
-        "processor time of the run; of runs that advance together, their time divided by their number",
+        "processor time, all tries; of runs that advance together, their time divided by their number",
         volatile=True,
     ),
 )
 _MARCH = (
-    Variable("simulated_seconds", (), "f8", "s", "simulated time, less than asked where the run failed"),
-    Variable("time_step", (), "f8", "s", "time step"),
-    Variable("steps", (), "i8", "1", "time steps taken"),
-    Variable("contact_solves", (), "i8", "1", "linear solves of the contact problem"),
+    Variable(
+        "simulated_seconds",
+        (),
+        "f8",
+        "s",
+        "simulated time: more than asked where the run was prolonged, less where it failed",
+    ),
+    Variable("time_step", (), "f8", "s", "time step of the run that counts"),
+    Variable("refinements", (), "i1", "1", "times that the run was done again at half the step"),
+    Variable("steps", (), "i8", "1", "time steps taken, all tries"),
+    Variable("contact_solves", (), "i8", "1", "linear solves of the contact problem, all tries"),
 )
 
 
@@ -61,8 +69,10 @@ def record_coordinates(job: Job) -> dict[str, Coordinate]:
     return record_module(job).coordinates(job.parameters)
 
 
-def record_of(job: Job, run: Any, marched: float) -> dict[str, Any]:
-    """The record of a run that has ended.
+def record_of(
+    job: Job, run: Any, marched: float, judge: Callable[[Any], dict[str, Any] | None] | None = None
+) -> dict[str, Any]:
+    """The record of a transient that has ended.
 
     Parameters
     ----------
@@ -72,11 +82,14 @@ def record_of(job: Job, run: Any, marched: float) -> dict[str, Any]:
         A run as the model's batch has them.
     marched : float
         Processor time that it has taken [s].
+    judge : callable, optional
+        Gives the values of a run that has reached its end, by default as the model judges its runs; None,
+        and the record's status is not_run, where it does not answer.
     """
     started = time.process_time()
     record, failure = _blank(job), run.failure
-    if failure is None:
-        record |= record_module(job).judge(run)
+    if failure is None and (values := (judge or record_module(job).judge)(run)) is not None:
+        record |= values
         if hasattr(run, "numerical_doubt"):
             failure = run.numerical_doubt(record)
     if failure is not None:
@@ -89,6 +102,19 @@ def record_of(job: Job, run: Any, marched: float) -> dict[str, Any]:
         "steps": run.steps,
         "contact_solves": run.contact_solves,
     }
+
+
+def record_without_run(job: Job, values: dict[str, Any]) -> dict[str, Any]:
+    """The record of a run that needed no transient.
+
+    Parameters
+    ----------
+    job : Job
+        For its model.
+    values : dict
+        What is known.
+    """
+    return _blank(job) | values | {"core_seconds": 0.0, "simulated_seconds": 0.0}
 
 
 def record_of_solution(job: Job, solution: Any, solving: float) -> dict[str, Any]:

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
-from cvt_hpc.simulation.modules import record_module, transient_module
-from cvt_hpc.simulation.record import record_of, record_of_solution
+from cvt_hpc.simulation.engine import Interrupted, march
+from cvt_hpc.simulation.modules import record_module
+from cvt_hpc.simulation.record import record_of_solution
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
-
-SAMPLES_BETWEEN_POLLS = 200  # 10 ms of simulated time, some 50 ms of computing
-
-
-class Interrupted(Exception):
-    """The run was asked to stop before its end; the text says why."""
 
 
 def run_point(job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]) -> dict[str, Any]:
@@ -72,12 +67,15 @@ def run_points(
 
 
 def do(
-    job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+    job: Job,
+    points: Sequence[dict[str, Any]],
+    interrupt: Callable[[], str | None],
+    kept: Collection[int] = (),
 ) -> list[tuple[Any, dict[str, Any]]]:
-    """Do a batch of runs, and make their records: as `run_points`, with each run beside its record."""
+    """Do a batch of runs as `run_points`; beside each record what `histories` of the model reads, if kept."""
     if job.stepper is None:
         return [_solve(job, point, interrupt) for point in points]
-    return _march(job, points, interrupt)
+    return march(job, points, interrupt, kept)
 
 
 def _solve(
@@ -89,19 +87,3 @@ def _solve(
     started = time.process_time()
     solution = record_module(job).solve(point)
     return solution, record_of_solution(job, solution, time.process_time() - started)
-
-
-def _march(
-    job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
-) -> list[tuple[Any, dict[str, Any]]]:
-    """Runs that a stepper marches together to their end."""
-    batch = transient_module(job).batch(points, job.stepper)
-    batch.advance(0)  # compiles or loads the kernels, which is no cost of these runs
-    started = time.process_time()
-    while batch.running:
-        if stop := interrupt():
-            raise Interrupted(stop)
-        batch.advance(SAMPLES_BETWEEN_POLLS)
-    share = (time.process_time() - started) / len(points)
-    # runs that do not all take the same way know their own time
-    return [(run, record_of(job, run, getattr(run, "core_seconds", share))) for run in batch.runs]

@@ -10,6 +10,7 @@ of these deaths the run is given up.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -65,7 +66,7 @@ def plan_runs(
         chosen = pending & ~suspect & ((records.died > 0) == struck)
         for together in _by_step(np.flatnonzero(chosen).tolist(), steps or {}):
             groups += simulator.lane_groups(job, together)
-    batches = share_out(groups, costs, ranks)
+    batches = share_out(groups, costs, ranks, partial(simulator.turns, job))
     batches.sort(key=lambda batch: bool(records.died[batch[0]]))
     suspects = sorted(np.flatnonzero(suspect).tolist(), key=lambda i: (-costs[i], i))
     lethal = tuple(index for index in suspects if records.died_alone[index])

@@ -1,20 +1,24 @@
 """Which runs are done together, and in which order: full lanes, but no rank without work.
 
-A batch of runs that advance together takes little longer than one of its runs alone, so full batches cost
-the least processor time. But each is done by one rank: with few runs on many ranks, full ones would leave
-ranks without work. Where there are fewer full batches than ranks they are cut, as evenly and as far as all
-can still be done at once: the sweep ends sooner, or at worst at the same time, since a small batch takes no
-longer than a large one; the price is processor time of ranks that would have waited.
+Runs that advance together take little longer than one of them alone, so full lanes cost the least processor
+time. A batch fills the lanes several times, one turn after the other, and then again with those of its runs
+that need more than one transient: the more turns, the fuller. But each batch is done by one rank. So batches
+have no more turns than leave `PER_RANK` of them for each rank. Where even batches of one turn are fewer than
+ranks they are cut, as evenly and as far as all can still be done at once: the sweep ends sooner, or at worst
+at the same time, since few lanes take no longer than all; the price is processor time of ranks that would
+have waited.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 Batch = tuple[int, ...]  # run indices
+Turns = Callable[[int], int]  # how many times so many runs fill the lanes
+PER_RANK = 2  # batches, so that ranks end at about the same time
 
 
 class Assignment(NamedTuple):
@@ -36,7 +40,27 @@ class Assignment(NamedTuple):
         return [Assignment((index,), alone=True) for index in self.runs] if self.alone else [self]
 
 
-def share_out(groups: Sequence[Batch], costs: np.ndarray, ranks: int) -> list[Batch]:
+def one_turn(runs: int) -> int:
+    """Return 1: lanes for any number of runs."""
+    return 1
+
+
+def batch_cost(batch: Batch, costs: np.ndarray, turns: Turns = one_turn) -> float:
+    """Return the predicted cost of a batch: runs that advance together take as long as the longest.
+
+    Parameters
+    ----------
+    batch : tuple of int
+        Run indices.
+    costs : numpy.ndarray, shape (runs,)
+        Predicted duration of each run of the study, in any unit.
+    turns : callable
+        How many times so many runs fill the lanes.
+    """
+    return turns(len(batch)) * float(max(costs[index] for index in batch))
+
+
+def share_out(groups: Sequence[Batch], costs: np.ndarray, ranks: int, turns: Turns = one_turn) -> list[Batch]:
     """Return the batches of a sweep in the order in which they are to be started.
 
     The longest comes first, so that no rank is left with a long one at the end. Order and batches are a
@@ -45,21 +69,24 @@ def share_out(groups: Sequence[Batch], costs: np.ndarray, ranks: int) -> list[Ba
     Parameters
     ----------
     groups : sequence of tuple of int
-        Run indices that can be done together, in batches as large as the lanes.
+        Run indices that can be done together, in batches as large as may be.
     costs : numpy.ndarray, shape (runs,)
         Predicted duration of each run of the study, in any unit.
     ranks : int
         Number of processes that compute.
+    turns : callable
+        How many times so many runs fill the lanes.
 
     Returns
     -------
     list of tuple of int
         Each index of `groups` once; runs of two groups never share a batch.
     """
+    most_turns = max(sum(turns(len(group)) for group in groups) // (PER_RANK * ranks), 1)
+    groups = [part for group in groups for part in in_parts(group, -(-turns(len(group)) // most_turns))]
     most = _largest_batch(groups, ranks)
     batches = [batch for group in groups for batch in _cut(group, most)]
-    # Runs that advance together take about as long as the longest of them.
-    return sorted(batches, key=lambda batch: (-max(costs[index] for index in batch), -len(batch), batch))
+    return sorted(batches, key=lambda batch: (-batch_cost(batch, costs, turns), -len(batch), batch))
 
 
 def _largest_batch(groups: Sequence[Batch], ranks: int) -> int:
@@ -73,6 +100,10 @@ def _largest_batch(groups: Sequence[Batch], ranks: int) -> int:
 
 def _cut(group: Batch, most: int) -> Iterator[Batch]:
     """Yield the parts of a group, of nearly equal size and at most `most` runs."""
-    parts = -(-len(group) // most)
+    return in_parts(group, -(-len(group) // most))
+
+
+def in_parts(group: Batch, parts: int) -> Iterator[Batch]:
+    """Yield the parts of a group, of nearly equal size."""
     bounds = [len(group) * part // parts for part in range(parts + 1)]
     return (group[first:last] for first, last in zip(bounds, bounds[1:], strict=False))

@@ -1,9 +1,10 @@
 """How long a batch will take: predicted costs times a factor of the machine that is fitted while running.
 
-The logarithm of (time taken / cost of the longest run) is taken to scatter normally about that of the
-machine's factor. Each rank fits its own factor to its own batches: nodes differ, and nothing has to be
-sent. It starts from rank 0's fit to the batches on record, so that the first claim of a resumed sweep is
-informed; that fit counts as a few batches at most, and soon gives way to what the rank sees itself.
+The logarithm of (time taken / predicted cost) is taken to scatter normally about that of the machine's
+factor; batches with runs that are refined or prolonged widen the scatter. Each rank fits its own factor to
+its own batches: nodes differ, and nothing has to be sent. It starts from rank 0's fit to the batches on
+record, so that the first claim of a resumed sweep is informed; that fit counts as a few batches at most, and
+soon gives way to what the rank sees itself.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cvt_hpc.study.batches import Batch
+from cvt_hpc.study.batches import Batch, Turns, batch_cost, one_turn
 
 # Until there are batches to tell, costs are taken to be right within a factor of two, at two standard
 # deviations; this counts as much as two batches.
@@ -88,10 +89,12 @@ class CostModel:
         Predicted duration of each run of the study, in any unit.
     fit : Fit, optional
         What is known beforehand.
+    turns : callable
+        How many times so many runs fill the lanes.
     """
 
-    def __init__(self, costs: np.ndarray, fit: Fit | None = None) -> None:
-        self._costs = costs
+    def __init__(self, costs: np.ndarray, fit: Fit | None = None, turns: Turns = one_turn) -> None:
+        self._costs, self._turns = costs, turns
         self.fit = fit or Fit()
 
     def learn(self, batch: Batch, seconds: float) -> None:
@@ -105,11 +108,16 @@ class CostModel:
         return self.fit.upper() * self.cost(batch)
 
     def cost(self, batch: Batch) -> float:
-        """Return the predicted cost of a batch: runs that advance together take as long as the longest."""
-        return float(max(self._costs[index] for index in batch))
+        """Return the predicted cost of a batch, see `batch_cost`."""
+        return batch_cost(batch, self._costs, self._turns)
 
 
-def fit_recorded(costs: np.ndarray, timings: Iterable[tuple[Batch, float]], done: np.ndarray) -> Fit:
+def fit_recorded(
+    costs: np.ndarray,
+    timings: Iterable[tuple[Batch, float]],
+    done: np.ndarray,
+    turns: Turns = one_turn,
+) -> Fit:
     """Return the fit to batches on record.
 
     Parameters
@@ -120,8 +128,10 @@ def fit_recorded(costs: np.ndarray, timings: Iterable[tuple[Batch, float]], done
         How long batches have taken [s].
     done : numpy.ndarray of bool, shape (runs,)
         Which runs have results. A batch without any ended before its time, and tells nothing.
+    turns : callable
+        How many times so many runs fill the lanes.
     """
-    model = CostModel(costs)
+    model = CostModel(costs, turns=turns)
     for batch, seconds in timings:
         if any(done[index] for index in batch):
             model.learn(batch, seconds)

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cvt_hpc.study.batches import Batch, share_out
-from cvt_hpc.study.cost_model import CostModel, Fit
+from cvt_hpc.study.batches import Batch, Turns, batch_cost, one_turn, share_out
+from cvt_hpc.study.cost_model import Fit
 
 _EVENTS = 1_000_000  # claims to be simulated in all repeats, as far as their least number allows
 MOST_RANKS = 1_000_000  # each takes some us of every repeat
@@ -89,28 +89,30 @@ def forecast(
     ranks: int,
     claims: ClaimTimes = NETWORK,
     seed: int = 0,
+    turns: Turns = one_turn,
 ) -> Forecast:
     """Return what a sweep is expected to take, by repeated simulation.
 
     Parameters
     ----------
     groups : sequence of tuple of int
-        Run indices that can be done together, in batches as large as the lanes.
+        Run indices that can be done together, in batches as large as may be.
     costs : numpy.ndarray, shape (runs,)
         Predicted duration of each run of the study, in any unit.
     fit : Fit
-        Time [s] of a batch over the cost of its longest run.
+        Time [s] of a batch over its predicted cost.
     ranks : int
         Number of processes that compute.
     claims : ClaimTimes
         What a claim takes.
     seed : int
         Of the random numbers.
+    turns : callable
+        How many times so many runs fill the lanes.
     """
-    model = CostModel(costs)
-    planned = np.array([model.cost(batch) for batch in share_out(groups, costs, ranks)])
+    planned = np.array([batch_cost(batch, costs, turns) for batch in share_out(groups, costs, ranks, turns)])
     # What it costs that lanes stay empty, so that no rank does.
-    use_of_lanes = sum(map(model.cost, groups)) / planned.sum()
+    use_of_lanes = sum(batch_cost(batch, costs, turns) for batch in groups) / planned.sum()
     generator = np.random.default_rng(seed)
     repeats = min(max(_EVENTS // (ranks + planned.size), _FEWEST_REPEATS), _MOST_REPEATS)
     makespans, bounds, efficiencies = np.empty((3, repeats))

@@ -12,7 +12,7 @@ import numpy as np
 from cvt_hpc.files import discard
 from cvt_hpc.study.attempts import enter_attempts, later_attempts, plan_runs, predicted_costs
 from cvt_hpc.study.batches import Assignment
-from cvt_hpc.study.cost_model import Fit, fit_recorded
+from cvt_hpc.study.cost_model import Fit
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.histories import missing_histories
 from cvt_hpc.study.part import Part
@@ -83,7 +83,7 @@ def prepare(
         attempts=later_attempts(records),
         steps=steps,
         costs=costs,
-        fit=fit_recorded(costs, records.timings, done).inherited(),
+        fit=task.fit(records, costs).inherited(),
         total=int(asked.sum()),
         recorded=recorded,
         failed=recorded - int((done & asked).sum()),
@@ -123,7 +123,7 @@ def next_round(
     assignments = plan_runs(task.job, task.simulator, records, asked, ranks, plan.steps)
     counter.rewind()
     display.expect(costs[[index for assignment in assignments for index in assignment.runs]])
-    fit = fit_recorded(costs, records.timings, records.status == Status.DONE)
+    fit = task.fit(records, costs)
     return plan._replace(assignments=assignments, fit=fit.inherited())
 
 

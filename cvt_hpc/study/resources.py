@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -55,7 +56,8 @@ def expect(job: Job, out: Path, ranks: Sequence[int], pilots: int = 0) -> Expect
     study, costs = describe(job, simulator), simulator.run_costs(job)
     groups = simulator.lane_groups(job, range(study.size))
     known = find_out(job, simulator, groups, out, pilots)
-    forecasts = [forecast(groups, costs, known.fit, number) for number in ranks]
+    turns = partial(simulator.turns, job)
+    forecasts = [forecast(groups, costs, known.fit, number, turns=turns) for number in ranks]
     most = max(expected.batches for expected in forecasts)
     disk = disk_space(study, most, len(job.histories), known.history_bytes)
     return Expectation(forecasts, known.basis, disk)

@@ -31,7 +31,7 @@ class Simulator(Protocol):
         """Return the predicted duration of each run, in any unit."""
 
     def lane_groups(self, job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
-        """Split run indices into batches of runs that can advance together, as large as there are lanes."""
+        """Split run indices into batches of runs that can advance together, as large as may be."""
 
     def turns(self, job: Job, runs: int) -> int:
         """Return how many groups of lanes a batch of so many runs does one after the other."""

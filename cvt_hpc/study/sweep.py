@@ -185,7 +185,7 @@ def _compute(
 ) -> str | None:
     """Do and record the runs that this rank claims; return why it could not go on, if so."""
     layout = RecordFormat(task.study.fingerprint, task.study.record_dtype)
-    model = CostModel(plan.costs, plan.fit)
+    model = CostModel(plan.costs, plan.fit, task.turns)
     task = replace(task, steps=plan.steps)
     try:
         # Every core has a rank of its own: threads of linear algebra would only wait for each other.

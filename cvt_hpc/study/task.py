@@ -7,13 +7,16 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.study.batches import Batch
+from cvt_hpc.study.batches import Batch, Turns
+from cvt_hpc.study.cost_model import Fit, fit_recorded
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.record import Record
+from cvt_hpc.study.records import Records
 from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.study.steps import point_at_step
 from cvt_hpc.variables import Status
@@ -96,6 +99,15 @@ class Task:
     asked_steps: Callable[[], Mapping[int, float]] | None = None
     steps: Mapping[int, float] = field(default_factory=dict)
 
+    @property
+    def turns(self) -> Turns:
+        """How many times so many runs fill the lanes."""
+        return partial(self.simulator.turns, self.job)
+
+    def fit(self, records: Records, costs: np.ndarray) -> Fit:
+        """Return what the batches on record tell of the machine, beside the predicted costs of runs [s]."""
+        return fit_recorded(costs, records.timings, records.status == Status.DONE, self.turns)
+
     def do(self, batch: Batch, interrupt: Interrupt, begin: Begin) -> Iterator[Result]:
         """Do the runs of a batch, and yield their records as they come; none of runs that are broken off.
 
@@ -130,7 +142,7 @@ class Task:
     def _attempt(self, batch: Batch, interrupt: Interrupt, begin: Begin) -> tuple[Result, _Trouble | None]:
         """Return the records of all runs, or none and what ended the batch."""
         begin(batch)
-        watch = _Watch(interrupt, self.run_limit * self.simulator.turns(self.job, len(batch)))
+        watch = _Watch(interrupt, self.run_limit * self.turns(len(batch)))
         try:
             points = [point_at_step(self.job, index, self.steps) for index in batch]
             kept = [place for place, index in enumerate(batch) if index in self.job.histories]

@@ -62,6 +62,16 @@ def test_defaults_are_legal(model, stepper):
             "[vibration] band_high: expected a frequency above",
         ),
         (
+            {"run": {"longest_duration": 0.29}},
+            "[run] longest_duration: expected duration = 0.3 s or more, or 0 for 4 times the duration, found 0.29 s",
+        ),
+        ({"run": {"longest_duration": "3 N"}}, "[run] longest_duration: expected a value in s "),
+        ({"run": {"longest_duration": -1}}, "[run] longest_duration: expected >= 0 s, found -1"),
+        (
+            {"numerics": {"most_refinements": -1}},
+            "[numerics] most_refinements: expected >= 0 and <= 10, found -1",
+        ),
+        (
             {"run": {"duration": 0.08}, "vibration": {"judged_fraction": 0.1}},
             "[run] duration: expected a judged part of five periods",
         ),

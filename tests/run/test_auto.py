@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from rungs import rung_job
 
-from cvt_hpc.models.auto import transient
-from cvt_hpc.models.auto.record import LANE_GROUPS
 from cvt_hpc.models.auto.rules import Rung, coarse, is_passive, is_settled
+from cvt_hpc.models.elastic_belt import transient
 from cvt_hpc.models.elastic_belt.lane_run import LaneRun
 from cvt_hpc.printing import outcome_lines
 from cvt_hpc.simulation import (
@@ -20,6 +19,7 @@ from cvt_hpc.simulation import (
     simulate,
     turns,
 )
+from cvt_hpc.simulation.batches import MOST_TURNS
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.assessment import Occurrence
 
@@ -242,12 +242,12 @@ def test_runs_left_open_share_the_lanes_of_the_next_rung(monkeypatch):
     sizes = []
     own = transient.Batch
 
-    def counted(points, stepper):
+    def counted(points, stepper, paused):
         sizes.append((points[0]["stations"], len(points)))
-        return own(points, stepper)
+        return own(points, stepper, paused)
 
     monkeypatch.setattr(transient, "Batch", counted)
-    job = rung_job("auto", {"seed": list(range(1, 18))}, duration=0.2, **JUDDER)
+    job = rung_job("auto", {"seed": list(range(1, 18))}, duration=0.2, longest_duration=0.2, **JUDDER)
     (batch,) = lane_groups(job, range(17))
     found = run_points(job, [job.point(index) for index in batch], lambda: None)
     open_runs = sum(record["rung"] == Rung.FULL for record in found)
@@ -277,5 +277,5 @@ def test_a_batch_takes_as_many_turns_as_it_has_lanes_full(runs, groups):
 def test_batches_hold_several_lanes_full():
     job = rung_job("auto", {"seed": list(range(1, 131))})
     lengths = [len(batch) for batch in lane_groups(job, range(130))]
-    assert sum(lengths) == 130 and max(lengths) <= 16 * LANE_GROUPS
+    assert sum(lengths) == 130 and max(lengths) <= 16 * MOST_TURNS
     assert max(lengths) - min(lengths) <= 1

@@ -8,7 +8,7 @@ import xarray as xr
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
-from cvt_hpc.models.auto import transient
+from cvt_hpc.models.auto import record
 from cvt_hpc.study.audit import FULL_MODEL
 from cvt_hpc.variables import Status, Vibrates
 
@@ -55,7 +55,7 @@ def test_rungs_that_are_right_are_found_right(job, capsys):
 
 
 def test_a_rung_that_errs_is_found_out(job, capsys, monkeypatch):
-    monkeypatch.setattr(transient, "is_passive", lambda parameters: parameters["load"] > 100.0)
+    monkeypatch.setattr(record, "is_passive", lambda parameters: parameters["load"] > 100.0)
     status, printed, out = audited(job, capsys)
     assert status == 0
     assert "passive: 2 of 2 runs of another class (100.00%, 95 % interval 15.81% to 100.00%)" in printed

@@ -11,7 +11,8 @@ from recorded import assert_same_numbers
 from study_double import Axis, Job, Simulator
 
 from cvt_hpc.study import open_results, run
-from cvt_hpc.study.batches import share_out
+from cvt_hpc.study.batches import batch_cost, share_out
+from cvt_hpc.study.cost_model import CostModel
 from cvt_hpc.study.frames import RECORD
 from cvt_hpc.study.record import RecordLog
 from cvt_hpc.variables import Status
@@ -214,3 +215,33 @@ def test_the_rest_of_a_sweep_is_grouped_anew(tmp_path):
             file.write(b"\0")
     _, batches = batches_of(tmp_path, 5, job)
     assert batches == [[2, 7, 9]]
+
+
+@pytest.mark.parametrize(
+    ("runs", "ranks", "sizes"),
+    [
+        (512, 1, [256, 256]),  # at most 16 turns of 16 runs
+        (512, 4, [64] * 8),  # two batches for each rank
+        (190, 1, [95, 95]),
+        (190, 3, [32, 32, 32, 32, 31, 31]),
+        (190, 12, [16] * 10 + [15] * 2),  # turns are not cut as long as ranks have one each
+        (190, 13, [16] * 10 + [15] * 2),
+        (190, 24, [8] * 22 + [7] * 2),
+    ],
+)
+def test_batches_have_as_many_turns_as_leave_two_for_each_rank(runs, ranks, sizes):
+    groups, turns = chunks(runs, 256), lambda count: -(-count // 16)
+    batches = share_out(groups, np.ones(runs), ranks, turns)
+    assert sorted(map(len, batches), reverse=True) == sizes
+    assert sorted(index for batch in batches for index in batch) == list(range(runs))
+
+
+def test_a_batch_of_more_turns_is_predicted_to_take_longer():
+    turns = lambda count: -(-count // 2)  # noqa: E731
+    costs = np.array([1.0, 1.0, 1.0, 0.6, 0.6, 0.6, 1.5])
+    assert batch_cost((0, 1), costs, turns) == 1.0 and batch_cost((0, 1, 2), costs, turns) == 2.0
+    groups = [(3, 4, 5), (6,), (0, 1, 2)]
+    assert share_out(groups, costs, 1, turns) == [(0, 1, 2), (6,), (3, 4, 5)]
+    model = CostModel(costs, turns=turns)
+    model.learn((0, 1, 2), 6.0)
+    assert model.fit.likely() == pytest.approx(3.0)

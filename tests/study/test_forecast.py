@@ -130,6 +130,9 @@ class Timed(Simulator):
         super().__init__(lanes=lanes)
         self.clock = clock
 
+    def run_costs(self, job):
+        return super().run_costs(job) * job.parameters["duration"]
+
     def run_points(self, job, points, interrupt):
         interrupt()
         self.clock.now += 3.0 * points[0]["duration"]
@@ -154,7 +157,7 @@ def test_pilots_are_short_and_spread_over_the_grid(tmp_path, clock):
     known = knowledge(tmp_path, Timed(clock), 2)
     assert clock.done == [(2, 3), (8, 9)]
     assert clock.now == 2 * 3.0 * 2.0  # a quarter of the duration each
-    assert (known.fit.batches, known.fit.likely()) == (2, pytest.approx(24.0))
+    assert (known.fit.batches, known.fit.likely()) == (2, pytest.approx(3.0))
     assert known.basis == "2 pilot batches of 25% of the simulated time"
     assert list(tmp_path.iterdir()) == []
 
@@ -166,7 +169,7 @@ def test_more_pilots_than_batches_are_all_batches(tmp_path, clock):
 def test_a_duration_that_is_an_axis_is_not_shortened(tmp_path, clock):
     known = knowledge(tmp_path, Timed(clock), 1, axis="duration")
     assert clock.done == [(6, 7)]
-    assert known.fit.likely() == pytest.approx(18.0)
+    assert known.fit.likely() == pytest.approx(18.0 / 8.0)
     assert known.basis == "1 pilot batch of 100% of the simulated time"
 
 

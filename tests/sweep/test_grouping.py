@@ -1,5 +1,7 @@
 """Batches of real runs: which may be done together, that it leaves no trace in the numbers, and what it is to cost."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from recorded import assert_same_numbers
@@ -7,8 +9,11 @@ from recorded import assert_same_numbers
 from cvt_hpc import simulation
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt import grouping
+from cvt_hpc.models.elastic_belt.lane_run import LaneRun
+from cvt_hpc.simulation import batches
 from cvt_hpc.study import open_results, run
-from cvt_hpc.variables import Status
+from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.vibration import assessment
 
 # The last load is more than friction carries: its runs end early, beside others that go on.
 GRID = {"sheave_stiffness": [1.0, np.inf], "load": [0.0, 120.0, 500.0]}
@@ -78,7 +83,7 @@ def test_every_run_is_in_one_group_and_groups_do_not_depend_on_the_hour():
     assert simulation.lane_groups(asked, []) == []
 
 
-def test_groups_are_of_one_kind_and_no_larger_than_the_lanes(monkeypatch):
+def test_groups_are_of_one_kind_and_no_larger_than_may_be(monkeypatch):
     monkeypatch.setattr(grouping, "LANES", {"double": 3, "single": 3})
     asked = job(MIXED)
     groups = simulation.lane_groups(asked, range(asked.size))
@@ -88,9 +93,14 @@ def test_groups_are_of_one_kind_and_no_larger_than_the_lanes(monkeypatch):
     ]
     assert [len(kind) for kind in kinds] == [1] * 12
     assert sorted(map(len, groups)) == [2] * 12
-    # more of a kind than lanes
+    # more of a kind than lanes: several turns, as long as a batch takes less than half a minute
     many = job({"load": [0.0, 20.0, 40.0, 60.0, 80.0]})
-    assert sorted(map(len, simulation.lane_groups(many, range(5)))) == [2, 3]
+    assert list(map(len, simulation.lane_groups(many, range(5)))) == [5]
+    assert [simulation.turns(many, runs) for runs in (1, 3, 4, 5)] == [1, 1, 2, 2]
+    predicted = grouping.cost(many.parameters, "imex")
+    for seconds, sizes in ((1.9 * predicted, [2, 3]), (2.1 * predicted, [5])):
+        monkeypatch.setattr(batches, "BATCH_SECONDS", seconds)
+        assert list(map(len, simulation.lane_groups(many, range(5)))) == sizes
     general = job({"load": [0.0, 60.0]}, "symplectic_euler")  # takes one run at a time
     assert simulation.lane_groups(general, [0, 1]) == [(0,), (1,)]
 
@@ -125,3 +135,50 @@ def test_the_cost_of_each_run_is_that_of_a_job_of_its_own():
         alone = job({axis.name: [point[axis.name]] for axis in asked.axes})
         assert costs[index] == pytest.approx(simulation.estimate_cost(alone))
     assert simulation.run_costs(job({})).shape == (1,)
+
+
+class Impatient:
+    """`cvt_hpc.simulation` that breaks off a batch at one of its polls."""
+
+    def __init__(self, poll):
+        self.left = poll
+
+    def __getattr__(self, name):
+        return getattr(simulation, name)
+
+    def run_points(self, job, points, interrupt):
+        def impatient():
+            self.left -= 1
+            return "no time" if self.left == 0 else interrupt()
+
+        return simulation.run_points(job, points, impatient)
+
+
+@pytest.fixture
+def open_and_coarse(monkeypatch):
+    """Runs between rigid sheaves are undecided before 0.1 s; at 4.6 us those of 120 N m are too coarse."""
+    assess, doubt = assessment.assess, LaneRun.numerical_doubt
+
+    def slow(displacement, rate, strands, parameters):
+        found = assess(displacement, rate, strands, parameters)
+        is_open = np.isinf(parameters["sheave_stiffness"]) and len(displacement) / rate < 0.1
+        return replace(found, vibrates=Vibrates.UNDECIDED) if is_open else found
+
+    def strict(run, record):
+        is_coarse = run.parameters["load"] == 120.0 and run.step > 3e-6
+        return (Status.FAILED_NUMERICS, "too coarse") if is_coarse else doubt(run, record)
+
+    monkeypatch.setattr(assessment, "assess", slow)
+    monkeypatch.setattr(LaneRun, "numerical_doubt", strict)
+
+
+def test_a_sweep_broken_off_in_a_later_try_ends_with_the_same_numbers(open_and_coarse, tmp_path):
+    expected = swept(simulation, tmp_path / "whole")
+    assert expected["refinements"].values.tolist() == [[0, 1, 0]] * 2
+    assert expected["simulated_seconds"].values[:, :2] == pytest.approx(
+        np.array([[0.04, 0.04], [0.16, 0.16]])
+    )
+    impatient = Impatient(15)  # a first transient asks at least four times
+    report = run(job(GRID), tmp_path / "parts", simulator=impatient, progress=False)
+    assert impatient.left == 0 and report.remaining == 6
+    assert_same_numbers(swept(simulation, tmp_path / "parts"), expected)

@@ -5,18 +5,30 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from cvt_hpc.models.auto.rules import COARSENESS, SHARE, Rung
+from cvt_hpc.models.auto.rules import COARSENESS, SHARE, Rung, coarse, is_clear, is_passive, is_settled
 from cvt_hpc.models.elastic_belt import grouping
 from cvt_hpc.models.elastic_belt import record as belt_record
 from cvt_hpc.models.elastic_belt.record import coordinates, lane_key
-from cvt_hpc.variables import Variable
+from cvt_hpc.variables import Status, Variable, Vibrates
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from cvt_hpc.models.auto.transient import ClimbingRun
+    from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
+    from cvt_hpc.vibration.assessment import Occurrence
 
-__all__ = ["VARIABLES", "coordinates", "cost", "histories", "judge", "lane_key", "lanes"]
+__all__ = [
+    "VARIABLES",
+    "coordinates",
+    "cost",
+    "histories",
+    "judge",
+    "known",
+    "lane_key",
+    "lanes",
+    "preliminary",
+    "settle",
+]
 
 VARIABLES = (
     Variable("rung", (), "i1", "", "rung of the ladder that answered", Rung),
@@ -29,29 +41,68 @@ VARIABLES = (
     ),
     *belt_record.VARIABLES,
 )
-LANE_GROUPS = 16  # batches of coarse runs in one: what they leave open fills the lanes of full runs again
 PILOT_SHARE = 1.0  # of a run's time that a pilot does: a shorter run would take another rung
 REFINED = 0.2  # of the runs are done in full, more of them in a trace
 
 
 def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
-    """Core-seconds of a batch."""
+    """Core-seconds of runs that fill the lanes once."""
     coarse = COARSENESS**2 * SHARE
-    return LANE_GROUPS * (coarse + REFINED) * grouping.cost(dict(parameters), stepper)
+    return (coarse + REFINED) * grouping.cost(dict(parameters), stepper)
 
 
 def lanes(parameters: Mapping[str, Any], stepper: str) -> int:
-    """Most runs that a batch can take."""
-    return LANE_GROUPS * grouping.lanes(dict(parameters), stepper)
+    """Most runs that can advance together."""
+    return grouping.lanes(dict(parameters), stepper)
 
 
-def judge(run: ClimbingRun) -> dict[str, Any]:
-    """The record of a run that has ended, its cost apart."""
-    return run.found
+def known(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The values of a run that needs no transient; None where it does.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Resolved parameters of the run [SI].
+    """
+    if not is_passive(parameters):
+        return None
+    reason = "friction does not fall with sliding speed"
+    return {"status": Status.DONE, "vibrates": Vibrates.NO, "reason": reason, "rung": Rung.PASSIVE}
 
 
-def histories(run: ClimbingRun) -> xr.Dataset:
+preliminary = coarse
+
+
+def settle(run: RecordedRun) -> dict[str, Any] | None:
+    """The values of a coarse run if it answers the question, else None.
+
+    Parameters
+    ----------
+    run : RecordedRun
+        With all samples recorded.
+    """
+    found = belt_record.assess(run)
+    if not is_settled(run.parameters, found):
+        return None
+    values = _values(run, found, Rung.COARSE)
+    if not is_clear(run.parameters, found):
+        reason = f"too close for a coarse run: {found.reason}"[:240]
+        values |= {"vibrates": Vibrates.UNDECIDED, "reason": reason}
+    return values
+
+
+def judge(run: RecordedRun) -> dict[str, Any]:
+    """The record of a full run that has reached its end, its cost apart."""
+    return _values(run, belt_record.assess(run), Rung.FULL)
+
+
+def _values(run: RecordedRun, found: Occurrence, rung: Rung) -> dict[str, Any]:
+    values = found.record() | belt_record.evaluate(run, found.strongest_probe)
+    return values | {"rung": rung, "margin": found.margin}
+
+
+def histories(run: RecordedRun | None) -> xr.Dataset:
     """Histories and profiles of the transient that answered; empty where none was needed."""
     import xarray as xr
 
-    return xr.Dataset() if run.answering is None else belt_record.histories(run.answering)
+    return xr.Dataset() if run is None else belt_record.histories(run)

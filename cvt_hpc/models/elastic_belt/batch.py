@@ -14,7 +14,7 @@ from cvt_hpc.models.elastic_belt.grouping import lanes
 from cvt_hpc.models.elastic_belt.imex_work import imex_work
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
 from cvt_hpc.models.elastic_belt.lane_forces import derive
-from cvt_hpc.models.elastic_belt.lane_run import LaneRun
+from cvt_hpc.models.elastic_belt.lane_run import LaneRun, Paused, lane_arrays
 from cvt_hpc.models.elastic_belt.march import march_explicit, march_imex
 from cvt_hpc.models.elastic_belt.recorded_run import recording
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, ENDED_AT, PROFILES
@@ -32,6 +32,9 @@ class Batch:
         Resolved parameters of the runs [SI], all of one `lane_key`.
     stepper : str
         "imex" or "explicit".
+    paused : sequence of Paused, optional
+        What the runs go on from, one for each: shorter runs of the same points by the same stepper and step.
+        Each is then bit by bit the run of its point from the start.
 
     Attributes
     ----------
@@ -51,7 +54,7 @@ class Batch:
         Sampling interval and time step [s].
     """
 
-    def __init__(self, points: Sequence[dict[str, Any]], stepper: str) -> None:
+    def __init__(self, points: Sequence[dict[str, Any]], stepper: str, paused: Sequence[Paused] = ()) -> None:
         p = points[0]
         most = lanes(p, stepper)
         if not 0 < len(points) <= most:
@@ -67,21 +70,35 @@ class Batch:
         self.state = lane_state(self.belts, starts, self.dtype, self._sweeps)
         self._belt = lane_belt(self.belts, self.dtype)
         self._work_space, self._march = STEPS[stepper]
-        self._work = self._work_space(self.state)
-        derive(self._belt, self.state, self._work.stations)
+        self.work = self._work_space(self.state)
+        derive(self._belt, self.state, self.work.stations)
         self.plan = recording(p, self.dtype)
         self.interval, self.samples = self.plan.interval, self.plan.samples
         self.steps_per_sample = max(int(np.ceil(self.interval / p["step"] - 1e-9)), 1)
         self.step = self.interval / self.steps_per_sample
-        sensed = self.plan.sensing.matrix.shape[0]
-        self.rows = LaneArray(self.samples, sensed + len(CHANNELS), width)
-        self._ordered: np.ndarray | None = None
-        self.done, self.begun = 0, 0.0
+        self.begun = 0.0
         n = self.plan.mesh.cell.size
         self.profiles = [LaneArray(n, len(PROFILES), width) for _ in range(2)]
         self.ended = LaneArray(1, len(ENDED), width)
-        self._disturbed = False
+        columns = self.plan.sensing.matrix.shape[0] + len(CHANNELS)
+        self._go_on_after([run.rows for run in paused] or [np.zeros((0, columns))] * len(points))
+        if paused:
+            self._resume([*paused, *[paused[-1]] * (width - len(paused))])
         self.runs = tuple(LaneRun(self, lane) for lane in range(len(points)))
+
+    def _go_on_after(self, rows: Sequence[np.ndarray]) -> None:
+        """Take rows that have been recorded, (done, S + C) each, as the beginning of the runs' histories."""
+        self.done = self._recorded = len(rows[0])
+        self._disturbed = self.done > self.plan.kick
+        self.rows = LaneArray(self.samples - self.done, rows[0].shape[1], len(self.belts))
+        self._earlier = tuple(rows)
+        self._ordered: np.ndarray | None = None
+
+    def _resume(self, paused: Sequence[Paused]) -> None:
+        """Put the runs' states into the lanes, with all that the step remembers."""
+        for k, array in enumerate(lane_arrays(self.state, self.work, self.ended)):
+            array.data[:] = np.stack([run.lane[k] for run in paused], axis=-1)
+        self.state.time[0] = paused[0].time
 
     @property
     def running(self) -> bool:
@@ -101,20 +118,20 @@ class Batch:
             for lane, point in enumerate(self.points):
                 shape = random_strands(plan.mesh, point["disturbance"], point["seed"])
                 self.state.fields.data[:, W, lane] += shape
-            derive(self._belt, self.state, self._work.stations)
+            derive(self._belt, self.state, self.work.stations)
             self._disturbed = True
         borders = [border for border in (plan.kick, plan.first_judged, self.samples) if border > first]
         last = min(first + samples, *borders)
         self._march(
             self._belt,
             self.state,
-            self._work,
+            self.work,
             self.step,
             self.steps_per_sample,
             plan.sensing,
             self.rows,
-            first,
-            last,
+            first - self._recorded,
+            last - self._recorded,
             self.profiles[int(first >= plan.first_judged)],
             self.ended,
         )
@@ -128,25 +145,29 @@ class Batch:
         runs : sequence of LaneRun or GeneralTransient
             One for each run, of the same mesh, sampling and duration, all at the same time.
         """
-        self.done, self._disturbed = runs[0].done, runs[0].done > self.plan.kick
+        self._go_on_after([np.broadcast_to(run.rows, (run.done, self.rows.data.shape[1])) for run in runs])
         states = [run.state for run in runs]
         states += [states[-1].copy() for _ in self.belts[len(runs) :]]
         self.state = lane_state(self.belts, states, self.dtype, self._sweeps)
-        self._work = self._work_space(self.state)
-        derive(self._belt, self.state, self._work.stations)
+        self.work = self._work_space(self.state)
+        derive(self._belt, self.state, self.work.stations)
         self.begun = self.ended.data[0, ENDED_AT] = runs[0].time
-        for lane, run in enumerate(runs):
-            self.rows.data[: self.done, :, lane] = run.rows
         if self.done > self.plan.first_judged:
             self.profiles[1].data[:] = np.nan  # what the other has summed up is not known
 
     def history(self, lane: int) -> np.ndarray:
-        """Rows of a run, (samples, S + C); put in order of lanes and channels once all are there.
+        """Rows of a run so far, (done, S + C); put in order of lanes and channels once all are there.
 
         As they are written, values of a channel lie far apart: reading them costs more than the copy.
         """
         if self.done < self.samples:
-            return self.rows.data[:, :, lane]
+            earlier = self._earlier[lane]
+            new = self.rows.data[: self.done - self._recorded, :, lane]
+            return np.concatenate([earlier, new]) if len(earlier) else new
         if self._ordered is None:
-            self._ordered = np.ascontiguousarray(self.rows.data.transpose(2, 1, 0))
+            ordered = np.empty((len(self.runs), self.rows.data.shape[1], self.samples))
+            ordered[:, :, self._recorded :] = self.rows.data.transpose(2, 1, 0)[: len(self.runs)]
+            for k, earlier in enumerate(self._earlier):
+                ordered[k, :, : self._recorded] = earlier.T
+            self._ordered = ordered
         return self._ordered[lane].T

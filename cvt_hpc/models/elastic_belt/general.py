@@ -88,12 +88,11 @@ class GeneralTransient(Marched, RecordedRun):
     form = Form
 
     def __init__(self, parameters: dict[str, Any], stepper: str) -> None:
-        p, plan = parameters, recording(parameters, np.float64)
-        n = plan.mesh.cell.size
-        self._profiles = [LaneArray(n, len(PROFILES), 1) for _ in range(2)]
-        super().__init__(p, plan, self._profiles[1].data[:, :, 0])
+        p = parameters
+        self.done = 0
+        self.prolong(p)
+        n = self.mesh.cell.size
         self.belt = belt_constants(p)
-        self._rows = LaneArray(self.samples, self._sensed + len(CHANNELS), 1)
         self._disturbed = False
         self._ended = LaneArray(1, len(ENDED), 1)
         self._form = self.form(self.belt, self.mesh, p)
@@ -108,8 +107,23 @@ class GeneralTransient(Marched, RecordedRun):
         self._fastest = np.random.default_rng(0).normal(size=start.size)
         if stepper.startswith("scipy_"):
             self.marching.tell(**self._form.hints(stepper))
-        self.done = 0
         self.failure: tuple[Status, str] | None = None
+
+    def prolong(self, parameters: dict[str, Any]) -> None:
+        """Make room for the samples of a longer duration, whose judged part has yet to come.
+
+        Parameters
+        ----------
+        parameters : dict
+            Those of the run but for `duration` and `judged_fraction`.
+        """
+        plan = recording(parameters, np.float64)
+        self._profiles = [LaneArray(plan.mesh.cell.size, len(PROFILES), 1) for _ in range(2)]
+        RecordedRun.__init__(self, parameters, plan, self._profiles[1].data[:, :, 0])
+        rows = LaneArray(self.samples, self._sensed + len(CHANNELS), 1)
+        if self.done:
+            rows.data[: self.done, :, 0] = self.rows
+        self._rows = rows
 
     @property
     def state(self) -> State:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.elastic_belt.belt import State
 from cvt_hpc.models.elastic_belt.doubts import FAILURES
 from cvt_hpc.models.elastic_belt.lane_belt import take_lane
@@ -15,6 +17,33 @@ from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
     from cvt_hpc.models.elastic_belt.batch import Batch
+
+
+class Paused(NamedTuple):
+    """A run at its end, as another batch goes on with it; a copy, which keeps no batch alive.
+
+    Attributes
+    ----------
+    time : float
+        Simulated time [s].
+    lane : tuple of (rows, fields) arrays
+        Its lane of all that a batch keeps by lanes, in the order of `lane_arrays`.
+    rows : (done, S + C) array
+        Its history, as `LaneRun.rows`.
+    """
+
+    time: float
+    lane: tuple[np.ndarray, ...]
+    rows: np.ndarray
+
+
+def lane_arrays(*parts: Any) -> Iterator[LaneArray]:
+    """Yield the arrays of lanes in nested tuples, such as a LaneState or a step's work space."""
+    for part in parts:
+        if isinstance(part, LaneArray):
+            yield part
+        elif isinstance(part, tuple):
+            yield from lane_arrays(*part)
 
 
 class LaneRun(RecordedRun):
@@ -55,6 +84,12 @@ class LaneRun(RecordedRun):
     def state(self) -> State:
         """The present state; a copy."""
         return take_lane(self.batch.state, self._lane, self.batch.belts[self._lane])
+
+    def paused(self) -> Paused:
+        """What a batch of the same point over a longer time goes on from."""
+        kept = lane_arrays(self.batch.state, self.batch.work, self.batch.ended)
+        lane = tuple(array.data[:, :, self._lane].copy() for array in kept)
+        return Paused(float(self.batch.state.time[0]), lane, self.rows.copy(order="K"))
 
     @property
     def done(self) -> int:

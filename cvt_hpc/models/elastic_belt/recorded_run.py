@@ -10,6 +10,7 @@ from cvt_hpc.models.elastic_belt.belt import REGIONS, Mesh, mesh
 from cvt_hpc.models.elastic_belt.doubts import doubt
 from cvt_hpc.models.elastic_belt.fluctuation import Fluctuation, fluctuation
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, PROFILES, Probe, Sensors, probes, sensors
+from cvt_hpc.recording import sample_count
 from cvt_hpc.variables import Status
 
 
@@ -56,7 +57,7 @@ def recording(parameters: dict[str, Any], dtype: type) -> Recording:
     """
     p, grid = parameters, mesh(parameters)
     interval = 1.0 / p["sampling_rate"]
-    samples = max(int(round(p["duration"] * p["sampling_rate"])), 1)
+    samples = sample_count(p)
     places = probes(grid, p["strand_probes"], p["arc_probes"])
     return Recording(
         grid,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from cvt_hpc.models.alone import Alone
+from cvt_hpc.models.alone import Alone, batch_of_one
 from cvt_hpc.models.elastic_belt import OWN_STEPPERS
 from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.models.elastic_belt.grouping import lanes
@@ -15,7 +15,7 @@ from cvt_hpc.variables import Status
 __all__ = ["Transient", "batch", "lanes"]
 
 
-def batch(points: Sequence[dict[str, Any]], stepper: str) -> Batch | Alone:
+def batch(points: Sequence[dict[str, Any]], stepper: str, paused: Sequence[Any] = ()) -> Batch | Alone:
     """Runs that advance together by any stepper that the belt takes.
 
     Parameters
@@ -24,6 +24,8 @@ def batch(points: Sequence[dict[str, Any]], stepper: str) -> Batch | Alone:
         Resolved parameters of the runs [SI], all of one `lane_key`; one for steppers without lanes.
     stepper : str
         One of STEPPER_NAMES.
+    paused : sequence, optional
+        What `paused()` of shorter runs has returned, one for each point, to go on from.
 
     Returns
     -------
@@ -31,11 +33,10 @@ def batch(points: Sequence[dict[str, Any]], stepper: str) -> Batch | Alone:
         They have `runs`, `samples`, `done`, `running`, `interval` and `advance` in common.
     """
     if stepper in OWN_STEPPERS:
-        return Batch(points, stepper)
+        return Batch(points, stepper, paused)
     from cvt_hpc.models.elastic_belt.general import GeneralTransient
 
-    (parameters,) = points
-    return Alone(GeneralTransient(parameters, stepper))
+    return batch_of_one(GeneralTransient, points, stepper, paused)
 
 
 class Transient(LaneRun):

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.marched import MarchedRun, Probe, batch_of_one
+from cvt_hpc.models.alone import batch_of_one
+from cvt_hpc.models.marched import MarchedRun, Probe
 from cvt_hpc.models.moving_string.exact import probe_positions
 from cvt_hpc.models.moving_string.motion import energy, highest_frequency, initial_state, system
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.marched import MarchedRun, Probe, batch_of_one
+from cvt_hpc.models.alone import batch_of_one
+from cvt_hpc.models.marched import MarchedRun, Probe
 from cvt_hpc.models.oscillator.constants import normal_load, oscillator
 from cvt_hpc.models.oscillator.motion import (
     HUMP,

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.models.alone import batch_of_one
 from cvt_hpc.models.elastic_belt import quasi_static
 from cvt_hpc.models.elastic_belt.belt import Belt, Mesh, State
 from cvt_hpc.models.elastic_belt.general import GeneralTransient
-from cvt_hpc.models.marched import batch_of_one
 
 
 class QuasiStaticForm:

@@ -1,0 +1,247 @@
+"""Runs done again at half the step, and runs that go on: each is the run that a job would have asked for at once."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+from marched import CHEAP, job, never
+from test_run_lanes import assert_same_bits
+
+from cvt_hpc.job import build_job
+from cvt_hpc.models.alone import Alone
+from cvt_hpc.models.elastic_belt.general import GeneralTransient
+from cvt_hpc.models.elastic_belt.lane_run import LaneRun
+from cvt_hpc.models.oscillator.transient import Transient as Oscillator
+from cvt_hpc.simulation import Interrupted, run_point, run_points, simulate
+from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.vibration import assessment
+
+T = CHEAP["duration"]
+ALL = {"most_refinements": 3, "longest_duration": 4 * T}
+STEPS = 17  # in a sampling interval, by 3 us
+
+
+def asked(**values):
+    """A job whose runs are refined and prolonged as they are by default."""
+    return job(**CHEAP | ALL | {"step": 3e-6, "load": 60.0} | values)
+
+
+def point(**values):
+    return asked(**values).point(0)
+
+
+@pytest.fixture
+def script(monkeypatch):
+    """Tell by seed until when a run is undecided [s], and up to which number of steps it fails."""
+    until: dict[int, float] = {}
+    fails: dict[int, int] = {}
+    doubt, assess = LaneRun.numerical_doubt, assessment.assess
+
+    def scripted_assess(displacement, rate, strands, parameters):
+        found = assess(displacement, rate, strands, parameters)
+        # at the very instant a run is still decided
+        open_ = len(displacement) / rate < until.get(parameters["seed"], 0.0) - 1e-9
+        return replace(found, vibrates=Vibrates.UNDECIDED, reason="not yet") if open_ else found
+
+    def scripted_doubt(run, record):
+        steps = round(run.interval / run.step)
+        wrong = steps <= fails.get(run.parameters["seed"], 0)
+        return (Status.FAILED_NUMERICS, "too coarse") if wrong else doubt(run, record)
+
+    monkeypatch.setattr(assessment, "assess", scripted_assess)
+    monkeypatch.setattr(LaneRun, "numerical_doubt", scripted_doubt)
+    return until, fails
+
+
+@pytest.mark.parametrize(("step", "refinements"), [(50e-6, 2), (25e-6, 1), (12.5e-6, 0)])
+def test_a_step_that_is_too_long_is_halved_until_the_run_stands(step, refinements):
+    found = run_point(asked(), point(step=step, longest_duration=T), never)
+    assert (found["status"], found["refinements"]) == (Status.DONE, refinements)
+    fine = run_point(asked(), point(step=12.5e-6, longest_duration=T), never)
+    assert found["time_step"] == fine["time_step"] == pytest.approx(12.5e-6)
+    assert found["core_seconds"] > 0.0
+    for name in ("steps", "contact_solves"):
+        assert (found[name] > fine[name]) is bool(refinements)  # those of the tries that failed count
+    for values in (found, fine):
+        values |= dict.fromkeys(("refinements", "steps", "contact_solves"), 0)
+    assert_same_bits(found, fine)
+
+
+def test_without_refinements_the_bare_step_is_seen():
+    found = run_point(asked(), point(step=50e-6, most_refinements=0), never)
+    assert (found["status"], found["refinements"]) == (Status.FAILED_NUMERICS, 0)
+    assert found["time_step"] == pytest.approx(50e-6) and "steps down to" not in found["reason"]
+
+
+@pytest.mark.parametrize("most", [1, 3])
+def test_what_fails_at_every_step_is_recorded_with_a_remedy(script, most):
+    script[1][1] = 1000
+    found = run_point(asked(), point(most_refinements=most), never)
+    assert (found["status"], found["refinements"]) == (Status.FAILED_NUMERICS, most)
+    assert found["time_step"] == pytest.approx(T / 800 / STEPS / 2**most)
+    assert found["steps"] == 800 * STEPS * (2 ** (most + 1) - 1)
+    assert found["simulated_seconds"] == pytest.approx(T)
+    assert found["reason"].startswith(f"at 40 ms: too coarse; failed at {most + 1} steps down to ")
+    assert f"down to {found['time_step']:.3g} s: try " in found["reason"]
+    assert 'try stepper = "explicit" or a finer or coarser mesh (stations)' in found["reason"]
+
+
+def test_a_long_reason_leaves_room_for_the_remedy(script, monkeypatch):
+    monkeypatch.setattr(LaneRun, "numerical_doubt", lambda run, record: (Status.FAILED_NUMERICS, 300 * "x"))
+    found = run_point(asked(), point(most_refinements=1), never)
+    assert len(found["reason"]) == 240 and found["reason"].endswith("mesh (stations)")
+
+
+@pytest.mark.parametrize(
+    ("values", "times"),
+    [
+        ({"judged_fraction": 0.42}, 4),
+        ({"judged_fraction": 0.5}, 4),
+        ({"judged_fraction": 0.75}, 4),
+        ({"stepper": "explicit", "step": 4e-7, "stations": 24}, 2),
+    ],
+)
+def test_a_run_that_goes_on_is_the_longer_run(script, values, times):
+    values = {"judged_fraction": 0.5, "longest_duration": times * T} | values
+    longer = values | {"duration": times * T, "judged_fraction": min(values["judged_fraction"], 0.5)}
+    expected = run_point(asked(**values), point(**longer), never)
+    script[0][1] = times * T
+    found = run_point(asked(**values), point(**values), never)
+    assert found["simulated_seconds"] == pytest.approx(times * T)
+    assert expected["status"] == Status.DONE
+    assert_same_bits(found, expected)
+
+
+@pytest.mark.parametrize(
+    ("values", "until", "simulated"),
+    [
+        ({"longest_duration": T}, 1.0, T),
+        ({"longest_duration": 1.99 * T}, 1.0, T),
+        ({"longest_duration": 2 * T}, 1.0, 2 * T),
+        ({"longest_duration": 7.9 * T}, 1.0, 4 * T),
+        ({"longest_duration": 0.0}, 1.0, 4 * T),  # the default
+        ({}, 2 * T, 2 * T),
+        ({"load_history": "ramp"}, 1.0, T),  # the load has come to its end
+    ],
+)
+def test_how_long_a_run_goes_on(script, values, until, simulated):
+    script[0][1] = until
+    found = run_point(asked(), point(**values), never)
+    assert found["simulated_seconds"] == pytest.approx(simulated)
+    assert (found["vibrates"] == Vibrates.UNDECIDED) is (until > simulated)
+    assert found["refinements"] == 0
+
+
+def test_a_history_covers_the_whole_time(script):
+    script[0][1] = 2 * T
+    history = simulate(asked(), {"seed": 1})
+    assert history["time"].values[-1] == pytest.approx(2 * T) and history.sizes["time"] == 1600
+    longer = simulate(asked(duration=2 * T), {"seed": 9})
+    assert not np.array_equal(history["displacement"], longer["displacement"])
+    script[0].clear()
+    longer = simulate(asked(duration=2 * T), {"seed": 1})
+    assert np.array_equal(history["displacement"], longer["displacement"])
+    assert np.array_equal(history["push_force"], longer["push_force"])
+
+
+# by seed: decided at once; later; never; refined once; always failing; slipping through; refined, then prolonged
+UNTIL, FAILS = {2: 2 * T, 3: 9.0, 7: 2 * T}, {4: STEPS, 5: 1000, 7: 2 * STEPS}
+POINTS = [{"seed": seed} | ({"load": 500.0} if seed == 6 else {}) for seed in range(1, 8)]
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_neighbours_that_are_refined_or_prolonged_change_nothing(script, precision):
+    script[0].update(UNTIL)
+    script[1].update(FAILS)
+    points = [point(precision=precision, **values) for values in POINTS]
+    together = run_points(asked(), points, never)
+    for values, record in zip(points, together, strict=True):
+        assert_same_bits(record, run_point(asked(), values, never))
+    assert [record["refinements"] for record in together] == [0, 0, 0, 1, 3, 0, 2]
+    times = [record["simulated_seconds"] / T for record in together]
+    assert times[:5] + times[6:] == pytest.approx([1, 2, 4, 1, 1, 2])
+    assert [record["status"] for record in together[4:6]] == [Status.FAILED_NUMERICS, Status.FAILED_ERROR]
+    # other neighbours in the lanes that are filled again
+    some = [points[k] for k in (6, 2, 3)]
+    for record, place in zip(run_points(asked(), some, never), (6, 2, 3), strict=True):
+        assert_same_bits(record, together[place])
+
+
+def test_runs_that_are_left_share_lanes(script, monkeypatch):
+    from cvt_hpc.models.elastic_belt import transient
+
+    own, sizes = transient.Batch, []
+
+    def counted(points, stepper, paused):
+        sizes.append((len(points), round(points[0]["duration"] / T), bool(paused)))
+        return own(points, stepper, paused)
+
+    monkeypatch.setattr(transient, "Batch", counted)
+    script[0].update({2: 2 * T, 9: 4 * T, 10: 4 * T})
+    script[1].update({1: STEPS, 3: STEPS, 4: 2 * STEPS})
+    run_points(asked(), [point(seed=seed) for seed in range(1, 11)], never)  # 8 lanes in double precision
+    assert sizes[:2] == [(8, 1, False), (2, 1, False)]
+    assert sorted(sizes[2:4]) == [(3, 1, False), (3, 2, True)]
+    assert sorted(sizes[4:]) == [(1, 1, False), (2, 4, True)]
+
+
+def test_an_interrupt_in_a_later_try_ends_all(script):
+    script[0][1] = 9.0
+    polls = []
+    run_point(asked(), point(), lambda: polls.append(None))
+    answers = iter([None] * (len(polls) - 1) + ["SIGTERM"])
+    with pytest.raises(Interrupted, match="^SIGTERM$"):
+        run_point(asked(), point(), lambda: next(answers))
+
+
+def marched(run, samples):
+    batch = Alone(run)
+    while batch.running and run.done < samples:
+        batch.advance(samples - run.done)
+    assert batch.failure is None
+    return batch
+
+
+def general(duration):
+    values = {"stations": 24, "duration": duration, "rise_time": 2e-3, "load": 60.0, "step": 4e-7}
+    document = {"name": "test", "model": "elastic_belt", "stepper": "symplectic_euler"}
+    checked = build_job(document, "test.toml", values | {"duration": 0.04}).point(0)
+    return checked | {"duration": duration}
+
+
+def oscillator(duration):
+    document = {"name": "test", "model": "oscillator", "stepper": "moreau"}
+    return build_job(document, "test.toml", {"step": 1e-5}).point(0) | {"duration": duration}
+
+
+@pytest.mark.parametrize(
+    ("transient", "parameters"),
+    [
+        (partial(GeneralTransient, stepper="symplectic_euler"), general),
+        (partial(Oscillator, stepper="moreau"), oscillator),
+    ],
+)
+def test_runs_without_lanes_go_on_as_well(transient, parameters):
+    whole = marched(transient(parameters(0.01)), 200)
+    batch = marched(transient(parameters(0.005)), 100)
+    run = batch.paused()
+    run.prolong(parameters(0.01))
+    marched(run, 200)
+    assert np.array_equal(run.rows, whole.run.rows) and run.steps == whole.steps
+    assert run.samples == 200 and np.array_equal(run.displacement, whole.displacement)
+    if hasattr(run, "means"):
+        for name, values in whole.means.items():
+            assert np.array_equal(run.means[name], values) and np.isfinite(values).all(), name
+
+
+def test_a_run_that_goes_on_and_one_that_begins_anew_share_no_lanes(script):
+    # in the second turn both have the same duration and step
+    script[0][1], script[1][2] = 2 * T, 10
+    values = [{"seed": 1, "step": 2.5e-6}, {"seed": 2, "step": 5e-6, "duration": 2 * T}]
+    points = [point(**asked_for) for asked_for in values]
+    together = run_points(asked(), points, never)
+    assert [record["simulated_seconds"] for record in together] == pytest.approx([2 * T, 2 * T])
+    assert together[0]["time_step"] == together[1]["time_step"]
+    for values, record in zip(points, together, strict=True):
+        assert_same_bits(record, run_point(asked(), values, never))
