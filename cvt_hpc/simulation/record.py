@@ -31,7 +31,13 @@ _COST = (
     ),
 )
 _MARCH = (
-    Variable("simulated_seconds", (), "f8", "s", "simulated time, less than asked where the run failed"),
+    Variable(
+        "simulated_seconds",
+        (),
+        "f8",
+        "s",
+        "simulated time, less than asked where the run failed or slipped through",
+    ),
     Variable("time_step", (), "f8", "s", "time step"),
     Variable("steps", (), "i8", "1", "time steps taken"),
     Variable("contact_solves", (), "i8", "1", "linear solves of the contact problem"),
@@ -75,11 +81,11 @@ def record_of(job: Job, run: Any, marched: float) -> dict[str, Any]:
     """
     started = time.process_time()
     record, failure = _blank(job), run.failure
-    if failure is None:
+    if failure is None or failure[0] is Status.DONE:
         record |= record_module(job).judge(run)
-        if hasattr(run, "numerical_doubt"):
+        if failure is None and hasattr(run, "numerical_doubt"):
             failure = run.numerical_doubt(record)
-    if failure is not None:
+    if failure is not None and failure[0] is not Status.DONE:
         status, why = failure
         record = _blank(job) | {"status": status, "reason": f"at {run.time * 1e3:.4g} ms: {why}"[:240]}
     return record | {

@@ -49,7 +49,7 @@ class ClimbingRun:
 
     @property
     def failure(self) -> tuple[Status, str] | None:
-        """What has gone wrong in the full run."""
+        """Why the full run ended before its end, as `RecordedRun` has it."""
         return None if self.answering is None else self.answering.failure
 
     @property
@@ -82,7 +82,10 @@ class ClimbingRun:
         self.steps, self.contact_solves = self.steps + run.steps, self.contact_solves + run.contact_solves
         if rung is Rung.FULL:
             self.answering = run
-        if run.failure is None:
+        if run.failure is not None:
+            if rung is Rung.FULL and run.failure[0] is Status.DONE:
+                self.found = belt_record.judge(run) | {"rung": rung}
+        else:
             found = belt_record.assess(run)
             if rung is Rung.FULL or is_settled(self.parameters, found):
                 values = found.record() | belt_record.evaluate(run, found.strongest_probe)
