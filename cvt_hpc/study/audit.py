@@ -38,7 +38,8 @@ AUDITED = "auto"
 FULL_MODEL = "elastic_belt"
 LOWER = (Rung.PASSIVE, Rung.COARSE)
 CONFIDENCE = 0.95
-DECIDED = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
+OPPOSITE = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
+DECIDED = (*OPPOSITE, OccurrenceClass.SLIPPING, OccurrenceClass.IRREGULAR)
 FORCES = (("mean_ring_tension", "mean_push_force"), ("axial_force",))  # by what they are measured against
 
 
@@ -144,7 +145,7 @@ def report_audit(job: Job, out: Path, fraction: float) -> AuditReport:
     rungs, ended = low.read(audited, "rung"), full.status[audited] == Status.DONE
     classes = [classify_runs(r.status[audited], r.read(audited, "vibrates")) for r in (low, full)]
     differs = ended & (classes[0] != classes[1]) & np.isin(classes[0], DECIDED)
-    contrary = differs & np.isin(classes[1], DECIDED)
+    contrary = differs & np.isin(classes[0], OPPOSITE) & np.isin(classes[1], OPPOSITE)
     table = out / FOLDER / TABLE
     shown = differs | ~ended
     _write(table, study, audited[shown], (low, full), [found[shown] for found in classes])

@@ -13,7 +13,8 @@ below. Called irregular is a record of windows in which
 
 Windows within one burst are alike, so the interval is that of fewer independent windows: n (1 - r)/(1 + r)
 of n, r being the autocorrelation of neighbouring windows about the trend (Santer et al. 2000, J. Geophys.
-Res. 105, 7337-7356). A beat of which the record holds a few periods is undecided for that reason.
+Res. 105, 7337-7356), and of these there have to be LEAST_WINDOWS. A beat of which the record holds a few
+periods is undecided for that reason.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtrit
 
-LEAST_WINDOWS = 12
+LEAST_WINDOWS = 12  # that are independent
 LEAST_CROSSINGS = 4
 LEAST_SCATTER = 0.2
 _CONFIDENCE = 0.975  # one-sided
@@ -63,9 +64,11 @@ def _gain(levels: NDArray[np.float64]) -> tuple[float, float]:
     t = np.linspace(-0.5, 0.5, n)
     slope = t @ levels / (t @ t)
     scatter = levels - levels.mean() - slope * t
-    alike = max(scatter[1:] @ scatter[:-1] / (scatter @ scatter), 0.0)
+    # about a fitted line neighbours seem less alike than they are, by (2 + 4 r)/n
+    found = (scatter[1:] @ scatter[:-1]) / (scatter @ scatter)
+    alike = float(np.clip((n * found + 2.0) / (n - 4.0), 0.0, 1.0))
     freedom = n * (1.0 - alike) / (1.0 + alike) - 2.0
-    if freedom < 1.0:
+    if freedom < LEAST_WINDOWS - 2:
         return float(slope), np.inf
     error = np.sqrt(scatter @ scatter / (freedom * (t @ t)))
     return float(slope), float(stdtrit(freedom, _CONFIDENCE) * error)

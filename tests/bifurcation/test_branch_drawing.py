@@ -19,7 +19,7 @@ from cvt_hpc.vibration.criticality import Criticality, Kind
 
 ALONG = np.linspace(0.0, np.pi, 33)
 SHAPES = [np.sin(k * ALONG) + 0j for k in (1, 2, 3)]
-Q, V, U, F, NOT_RUN = OccurrenceClass
+Q, V, U, F, NOT_RUN, SLIPS, IRREGULAR = OccurrenceClass
 
 
 def mode(growth, frequency, shape=0):

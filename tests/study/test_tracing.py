@@ -20,7 +20,7 @@ from cvt_hpc.study.tracing import inferred_classes, needed_runs
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.classes import OccurrenceClass
 
-QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN = OccurrenceClass
+QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN, SLIPPING, IRREGULAR = OccurrenceClass
 FLAGS = {
     QUIET: (Status.DONE, Vibrates.NO),
     VIBRATING: (Status.DONE, Vibrates.YES),

@@ -5,14 +5,15 @@ The largest torque at the driving pulley is, by Bullinger et al. 2005, eq. 2,
     M* = r (2 mu / cos delta_0) min(Q_dr, Q_dn),
 
 r being the driving pulley's radius, Q the axial forces of the belt on the sheaves and mu friction's
-coefficient at the sliding speed of gross slip. Under the axial forces that the belt itself exerts, runs begin to
-slip grossly at 0.9 to 1.05 M*: ratios 0.5, 1 and 2.52, rigid and elastic sheaves, either sign of the load, mu_k
+coefficient at the sliding speed of gross slip. Under the axial forces that runs find they begin to slip
+grossly at 0.9 to 1.05 M*: ratios 0.5, 1 and 2.52, rigid and elastic sheaves, either sign of the load, mu_k
 0.06 and 0.1, gradients 0 to -1.2 s/m (96 stations, 0.8 s).
 
 Where the belt only creeps on a pulley, its mean sliding is up to 3 % of the belt's speed. Towards the largest
-torque that slip rises within 1 % of the load from 4 to 8 %; beyond, there are states in which a pulley slips by
-8 to 40 % all the time, and then none. So a run slips grossly if a pulley's mean slip over the last half of the
-judged part is beyond GROSS_SLIP, or if the driven pulley loses or gains half of its speed before the run's end.
+torque that slip rises from 4 to 8 % within 1 % of the load; beyond, there are states in which a pulley slips
+by 8 to 40 % all the time, and then none. So a run slips grossly if a pulley's mean slip over the last half of
+the judged part is beyond GROSS_SLIP, or if the driven pulley loses or gains half of its speed before the
+run's end.
 """
 
 from __future__ import annotations
