@@ -18,7 +18,7 @@ from cvt_hpc.study.recovery import read_records
 from cvt_hpc.study.report import count_special
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.tracing import needed_runs
-from cvt_hpc.variables import Status
+from cvt_hpc.variables import Status, Vibrates
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
@@ -118,6 +118,7 @@ def read_machine_factor(out: Path, job: Job) -> tuple[float, int]:
     if records is None or "core_seconds" not in records.study.record_dtype.names:
         return 1.0, 0
     done = np.flatnonzero(records.status == Status.DONE)
+    done = done[records.read(done, "vibrates") != Vibrates.SLIPS]  # they end early
     if not done.size:
         return 1.0, 0
     predicted = default_simulator().run_costs(job)[done].sum()
