@@ -83,8 +83,10 @@ def test_torque_that_friction_just_carries_does_not():
     carried = 2 * 0.1 * 50e3 / np.cos(np.deg2rad(11)) * 0.075 / 2.52
     below = record(load=0.6 * carried, duration=0.1)
     assert below["status"] == Status.DONE and below["vibrates"] != Vibrates.SLIPS
-    # the belt presses the driving sheaves apart less than the thrust does
-    assert -0.4 <= below["slip_margin"] < -0.3 and np.abs(below["slip"]).max() < 0.03
+    # the same with the smaller axial force in place of the thrust; at 0.47 m/s friction has fallen to mu_k
+    largest = carried * below["axial_force"].min() / 50e3
+    assert below["slip_margin"] == pytest.approx(0.6 * carried / largest - 1.0, abs=1e-4)
+    assert np.abs(below["slip"]).max() < 0.03
     assert_slips(record(load=1.2 * carried, duration=0.1))
 
 
