@@ -53,7 +53,8 @@ class Occurrence:
     strongest_probe : array of int, shape (strand,)
         Column of the displacement with the largest amplitude.
     margin : float
-        How far the amplitudes that decided lie from the threshold [e-folds]; 0 where nothing is decided.
+        How far what decided, as a rule the amplitudes, lies from the threshold [e-folds]; 0 where nothing is
+        decided.
     """
 
     vibrates: Vibrates

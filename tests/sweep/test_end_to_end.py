@@ -130,7 +130,7 @@ def test_costs_are_estimated_by_what_is_on_record(serial):
 
 def test_two_ranks_give_the_same_bits(serial, folder):
     done = call("run", "small.toml", "--out", "two", cwd=folder, ranks=2)
-    assert done.returncode == 1, done.stderr
+    assert done.returncode == 0, done.stderr
     assert len(list((folder / "two" / "records").glob("rank-0001-*.log"))) == 1
     assert_same_numbers(load_results(folder / "two"), load_results(serial))
 
@@ -184,9 +184,9 @@ def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):
 
 
 def test_simulate_of_a_run_that_fails_ends_with_1_and_still_draws(folder):
-    done = call("simulate", "small.toml", "--at", "load=500", "--plot", "f.png", cwd=folder)
+    done = call("simulate", "small.toml", "--at", "step=20 us", "--plot", "f.png", cwd=folder)
     assert done.returncode == 1
-    assert done.stderr.startswith("cvt-hpc: the run failed: failed_error: at ")
+    assert done.stderr.startswith("cvt-hpc: the run failed: failed_numerics: at ")
     assert (folder / "f.png").exists()
 
 
@@ -240,5 +240,5 @@ def test_a_serial_run_does_without_mpi4py(serial, folder):
     )
     assert "No module named 'mpi4py'" in hidden.stderr
     done = call("run", "small.toml", cwd=folder, **path)
-    assert done.returncode == 1, done.stderr
+    assert done.returncode == 0, done.stderr
     assert_same_numbers(load_results(folder / "out" / "small"), load_results(serial))

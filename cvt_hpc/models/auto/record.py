@@ -25,7 +25,7 @@ VARIABLES = (
         (),
         "f8",
         "1",
-        "distance of the amplitude that decided from the threshold, in e-folds; 0 where nothing is decided",
+        "distance of amplitude or slip from its threshold, the nearer one, in e-folds; 0: nothing decided",
     ),
     *belt_record.VARIABLES,
 )
