@@ -49,10 +49,16 @@ def is_irregular(windows: ArrayLike, threshold: float, most_gain: float) -> bool
         Growth or decay over the record that has to be ruled out [e-folds].
     """
     amplitudes = np.asarray(windows, dtype=float)
-    if len(amplitudes) < LEAST_WINDOWS or not np.all(amplitudes > 0.0):
-        return False
     crossings = np.count_nonzero(np.diff(amplitudes >= threshold))
     if crossings < LEAST_CROSSINGS or relative_scatter(amplitudes) < LEAST_SCATTER:
+        return False
+    return is_stationary(amplitudes, most_gain)
+
+
+def is_stationary(windows: ArrayLike, most_gain: float) -> bool:
+    """Whether a trend of an amplitude is ruled out; arguments as of `is_irregular`."""
+    amplitudes = np.asarray(windows, dtype=float)
+    if len(amplitudes) < LEAST_WINDOWS or not np.all(amplitudes > 0.0):
         return False
     gain, error = _gain(np.log(amplitudes))
     return abs(gain) < error and abs(gain) + error < most_gain

@@ -7,8 +7,8 @@ A strand vibrates if it is above the threshold in every window and not decaying.
 and goes about the threshold over so many windows that a trend is ruled out (`irregularity.py`): a longer run
 would say no more. It is quiet if it is below the threshold at the end and not on its way there. Everything
 else is undecided, and a longer run may tell: a start transient that has not died out yet, a vibration that is
-still growing. A run vibrates if a strand does, it is undecided if a strand is, else irregular if a strand is,
-and quiet only if all strands are. The thresholds are in `criterion.py`.
+still growing. A run vibrates if a strand does, and is quiet only if all strands are. It is irregular if a
+strand is, unless another one is undecided that may have a trend. The thresholds are in `criterion.py`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtrit
 
 from cvt_hpc.variables import Vibrates
-from cvt_hpc.vibration.irregularity import is_irregular
+from cvt_hpc.vibration.irregularity import is_irregular, is_stationary
 
 CONFIDENCE = 0.975  # one-sided, by Student's t: few windows know their own scatter badly
 STEADY_LOSS = 0.05  # e-folds over the judged part that a settled vibration may lose, scatter apart
@@ -74,7 +74,15 @@ def classify(
         name: _judge_strand(strand, rate, error, judged_time, record_time, parameters)
         for name, strand, rate, error in zip(strands, windows.T, growth_rate, growth_error, strict=True)
     }
-    for outcome in (Vibrates.YES, Vibrates.UNDECIDED, Vibrates.IRREGULAR, Vibrates.NO):
+    left_open = [
+        strand
+        for strand, (vibrates, _) in zip(windows.T, judged.values(), strict=True)
+        if vibrates is Vibrates.UNDECIDED
+    ]
+    order = [Vibrates.YES, Vibrates.UNDECIDED, Vibrates.IRREGULAR, Vibrates.NO]
+    if all(is_stationary(strand, parameters["growth_tolerance"]) for strand in left_open):
+        order[1:3] = order[2], order[1]
+    for outcome in order:
         told = [f"{name} {text}" for name, (vibrates, text) in judged.items() if vibrates is outcome]
         if told:
             return outcome, "; ".join(told)[:LONGEST_REASON]

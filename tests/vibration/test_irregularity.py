@@ -89,6 +89,10 @@ def test_a_run_is_irregular_only_where_no_strand_vibrates_or_may_yet():
     assert verdict(quiet, irregular)[0] is IRREGULAR
     assert verdict(irregular, steady)[0] is YES
     assert verdict(irregular, growing)[0] is UNDECIDED
+    # above the threshold once, and without a trend: a longer run would not tell more of it
+    burst = np.where(np.arange(60) == 40, 1.2, 0.5 * scattered(2, 60, scatter=0.2))
+    assert verdict(burst, burst)[0] is UNDECIDED
+    assert verdict(irregular, burst)[0] is IRREGULAR
     assert verdict(quiet, quiet)[0] is NO
 
 
