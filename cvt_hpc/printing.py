@@ -42,10 +42,18 @@ _LARGEST_LINE = 4  # values: one per strand or pulley, but no spectrum and no hi
 def report_lines(report: RunReport) -> Iterator[str]:
     """Yield the lines that say how a sweep ended."""
     yield f"{report.total} runs: {report.done} done, {len(report.failed)} failed, {report.remaining} left"
+    if words := _special_in_words(report):
+        yield f"of those done {words}"
     if report.unneeded:
         cells = report.total + report.unneeded
         yield f"{report.unneeded} of {cells} cells of the grid not run: their class is inferred"
     yield f"results: {report.results or 'gathered by the part that ends last'}"
+
+
+def _special_in_words(counted: RunReport | StudyStatus) -> str:
+    """Return how many runs slip or move irregularly, in words; empty if none."""
+    counts = {"slip": counted.slipping, "irregular": counted.irregular}
+    return ", ".join(f"{count} {word}" for word, count in counts.items() if count)
 
 
 def audit_lines(report: AuditReport) -> Iterator[str]:
@@ -162,7 +170,10 @@ def status_lines(status: StudyStatus) -> Iterator[str]:
     yield f"runs    {status.total}"
     if status.unneeded:
         yield f"grid    {status.total + status.unneeded} cells, {status.unneeded} not needed so far"
-    yield f"done    {status.done} ({status.done / status.total:.1%})"
+    words = _special_in_words(status)
+    yield f"done    {status.done} ({status.done / status.total:.1%})" + (
+        f", of these {words}" if words else ""
+    )
     yield f"failed  {status.failed}"
     yield f"left    {status.left}"
     if status.rate is not None:

@@ -20,11 +20,17 @@ class Status(IntEnum):
 
 
 class Vibrates(IntEnum):
-    """Whether a run vibrates; the CF flags of `vibrates` in results.nc."""
+    """Whether a run vibrates; the CF flags of `vibrates` in results.nc.
+
+    UNDECIDED: a longer run may tell. IRREGULAR: a longer run would not, because the amplitude comes and goes
+    about the threshold without a trend. SLIPS: the load is more than friction carries.
+    """
 
     NO = 0
     YES = 1
     UNDECIDED = 2
+    SLIPS = 3
+    IRREGULAR = 4
 
 
 @dataclass(frozen=True)

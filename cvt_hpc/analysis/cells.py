@@ -46,7 +46,11 @@ STYLES = {
     OccurrenceClass.UNDECIDED: ClassStyle("#bccde0", "#23405f", "#23405f", "///", "$?$", 2.0),
     OccurrenceClass.FAILED: ClassStyle("#ffffff", "#a01010", "#ffffff", "xxxx", "X", 2.2),
     OccurrenceClass.NOT_RUN: ClassStyle("#ffffff", "#8a8a8a", "#8a8a8a", "", "_", 1.4),
+    OccurrenceClass.SLIPPING: ClassStyle("#c9d8a6", "#4a5a14", "#ffffff", "...", ">", 1.3),
+    OccurrenceClass.IRREGULAR: ClassStyle("#f3dca3", "#7a4b00", "#ffffff", "|||", "*", 1.8),
 }
+LEGEND_COLUMNS = 5
+IF_PRESENT = (OccurrenceClass.SLIPPING, OccurrenceClass.IRREGULAR)  # in the legend where they occur
 
 # Of maps from two starts: lighter than any vibration, and hatched the other way than what is undecided.
 OF_STARTS = {StartClass.LARGE_START_ONLY: ClassStyle("#d8c5ea", "#5b2a86", "#ffffff", "\\\\\\", "D", 1.0)}
@@ -153,14 +157,24 @@ def draw_marks(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], marked
 
 
 def write_values(
-    axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], values: Array, fills: Array, scale: Scale
+    axes: Axes,
+    x: Ruler,
+    y: Ruler,
+    kind: OccurrenceClass,
+    classes: NDArray[np.int8],
+    values: Array,
+    fills: Array,
+    scale: Scale,
 ) -> None:
-    """Write `values` as whole numbers above the grid points of vibrating cells that are filled by `fills`."""
-    vibrating = (classes == OccurrenceClass.VIBRATING) & np.isfinite(values)
-    for row, column in np.argwhere(vibrating):
-        (fill,) = fills_of(OccurrenceClass.VIBRATING, fills[row : row + 1, column], scale)
+    """Write `values` above the grid points of the cells of a class that are filled by `fills`.
+
+    Whole numbers, or two digits of what is below 10.
+    """
+    for row, column in np.argwhere((classes == kind) & np.isfinite(values)):
+        (fill,) = fills_of(kind, fills[row : row + 1, column], scale)
+        value = values[row, column]
         axes.annotate(
-            f"{values[row, column]:.0f}",
+            f"{value:.0f}" if value >= 10.0 else f"{value:.2g}",
             (x.centres[column], y.centres[row]),
             xytext=(0, 2.5),
             textcoords="offset points",

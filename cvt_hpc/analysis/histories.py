@@ -79,8 +79,10 @@ def history_figure(dataset: xr.Dataset) -> Figure:
 
 
 def _is_judged(dataset: xr.Dataset) -> bool:
-    """Whether the run reached its end: one that failed has no verdict, and no part that was judged."""
-    return "status" not in dataset or int(dataset["status"]) == Status.DONE
+    """Whether the run reached its end: one that failed or slipped through before has no judged part."""
+    if "status" in dataset and int(dataset["status"]) != Status.DONE:
+        return False
+    return "amplitude" not in dataset or _is_known(dataset, "amplitude")
 
 
 def _is_known(dataset: xr.Dataset, name: str) -> bool:

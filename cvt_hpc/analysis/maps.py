@@ -3,7 +3,8 @@
 The classes differ in lightness, in hatching and in the mark on the grid point, so that a map reads the
 same in colour, in grey and in small print. Cells whose class is inferred have level lines and no mark.
 Vibrating cells are coloured by amplitude, darker for larger. Their dominant frequency is written into the
-cells where there is room, and drawn as a second set of panels where there is none.
+cells where there is room, and drawn as a second set of panels where there is none. Into irregular cells their
+amplitude is written where there is room.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.figures import WIDTH, draw, headline
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 from cvt_hpc.analysis.starts import has_starts, join_starts
+from cvt_hpc.variables import Vibrates
 
 MOST_STACKED = 5  # panels in one column; more go into two
 TITLE_HEIGHT = 0.42  # [inch], of a panel with the space around it
@@ -88,6 +90,7 @@ class Sheet:
     inferred: NDArray[np.bool_]  # whether the class of a cell is not that of a run
     amplitude: NDArray[np.float64]  # [um], nan where a run does not vibrate
     frequency: NDArray[np.float64]  # [Hz], likewise
+    irregular: NDArray[np.float64]  # amplitude [um] of runs that are irregular, nan elsewhere
 
     @property
     def panels(self) -> int:
@@ -122,33 +125,40 @@ class Sheet:
             72 * height * np.diff(self.y.edges).min() / np.ptp(self.y.edges),
         )
 
+    @property
+    def has_room(self) -> bool:
+        """Whether three digits fit into the smallest cell, above a dot."""
+        width, height = self.smallest_cell
+        return width >= 22 and height >= 22  # [point]
+
 
 def map_figure(arrangement: Arrangement) -> Figure:
     """Compose the picture of `draw_map`; to be called within STYLE."""
     sheet = sheet_of(arrangement)
     has_frequency = bool(np.isfinite(sheet.frequency).any())
-    width, height = sheet.smallest_cell
-    written = has_frequency and width >= 22 and height >= 22  # [point]: three digits above a dot
+    written = has_frequency and sheet.has_room
     blocks = 2 if has_frequency and not written else 1
     figure = Figure((WIDTH, blocks * sheet.rows * sheet.panel_height + 1.9), layout="constrained")
     axes = figure.subplots(blocks * sheet.rows, sheet.columns, sharex=True, sharey=True, squeeze=False)
     amplitude = cells.Scale(cells.AMPLITUDE_COLOURS, cells.norm_over(sheet.amplitude, 0.0), "amplitude [µm]")
     draw_block(figure, axes[: sheet.rows], sheet, sheet.amplitude, amplitude)
-    if written:
-        for ax, *shown in zip(axes.flat, sheet.classes, sheet.frequency, sheet.amplitude, strict=False):
-            cells.write_values(ax, sheet.x, sheet.y, *shown, amplitude)
-    elif has_frequency:
+    texts = [(OccurrenceClass.IRREGULAR, sheet.irregular)] if sheet.has_room else []
+    texts += [(OccurrenceClass.VIBRATING, sheet.frequency)] if written else []
+    for kind, values in texts:
+        for ax, *shown in zip(axes.flat, sheet.classes, values, sheet.amplitude, strict=False):
+            cells.write_values(ax, sheet.x, sheet.y, kind, *shown, amplitude)
+    if has_frequency and not written:
         frequency = cells.Scale(
             cells.FREQUENCY_COLOURS, cells.norm_over(sheet.frequency), "dominant frequency [Hz]"
         )
         draw_block(figure, axes[sheet.rows :], sheet, sheet.frequency, frequency)
     figure.suptitle(_title(sheet, written))
     figure.supylabel(sheet.y.label, fontsize=10)
-    # as wide as the page with the longest label
-    styles, columns = cells.STYLES, len(cells.STYLES)
+    styles, columns = cells.STYLES, cells.LEGEND_COLUMNS
     if "starts" in arrangement.dataset.attrs:
-        styles, columns = cells.STYLES | cells.OF_STARTS, 3
-    cells.class_legend(figure, styles, columns, with_inferred=bool(sheet.inferred.any()))
+        styles, columns = cells.STYLES | cells.OF_STARTS, 3  # as wide as the page with the longest label
+    shown = {k: s for k, s in styles.items() if k not in cells.IF_PRESENT or np.any(sheet.classes == k)}
+    cells.class_legend(figure, shown, columns, with_inferred=bool(sheet.inferred.any()))
     return figure
 
 
@@ -163,14 +173,18 @@ def sheet_of(arrangement: Arrangement) -> Sheet:
 
     runs, classes = grid(occurrence_classes(dataset)), grid(map_classes(dataset))
     vibrating = runs == OccurrenceClass.VIBRATING
+    # of a cell from two starts the amplitude is that from the small one
+    irregular = (runs == OccurrenceClass.IRREGULAR) & (grid(dataset["vibrates"]) == Vibrates.IRREGULAR)
+    amplitude = grid(at_strongest_strand(dataset, "amplitude")) * 1e6
     return Sheet(
         arrangement,
         ruler(dataset[arrangement.x]),
         ruler(dataset[arrangement.y]) if arrangement.y else ONE_ROW,
         classes,
         classes != runs,
-        np.where(vibrating, grid(at_strongest_strand(dataset, "amplitude")) * 1e6, np.nan),
+        np.where(vibrating, amplitude, np.nan),
         np.where(vibrating, grid(at_strongest_strand(dataset, "frequency")), np.nan),
+        np.where(irregular, amplitude, np.nan),
     )
 
 
@@ -223,4 +237,6 @@ def _title(sheet: Sheet, written: bool) -> str:
     lines.extend(sheet.arrangement.notes)
     if written:
         lines.append("in the cells: dominant frequency [Hz]")
+    if sheet.has_room and np.isfinite(sheet.irregular).any():
+        lines.append("in irregular cells: amplitude [µm]")
     return "\n".join(fill(line, 72) for line in lines)

@@ -69,7 +69,7 @@ def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> F
     figure.legend(
         *panels[0, 0].get_legend_handles_labels(),
         loc="outside lower center",
-        ncols=len(OccurrenceClass),
+        ncols=cells.LEGEND_COLUMNS,
         frameon=False,
     )
     return figure

@@ -2,7 +2,7 @@
 
 Above the steady state, solid where it is stable and dashed where it is not, its Hopf points and the
 amplitudes of limit cycles as dots; below growth rates and frequencies of its modes. Between loads without a
-steady state nothing is drawn. Runs that failed have no amplitude: they stand at the upper edge.
+steady state nothing is drawn. Runs that failed or slip have no limit cycle: they stand at the upper edge.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from matplotlib.patches import Patch
 
 from cvt_hpc.analysis.figures import WIDTH, balanced, draw
 from cvt_hpc.bifurcation.asking import Diagram
-from cvt_hpc.bifurcation.attractors import FROM
+from cvt_hpc.bifurcation.attractors import FROM, Attractor
 from cvt_hpc.bifurcation.dataset import mode_lines
-from cvt_hpc.bifurcation.table import failed_runs, gap_lines, place_text
+from cvt_hpc.bifurcation.table import gap_lines, place_text
 from cvt_hpc.models.linear_stability.branch import Onset, Point
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Kind
@@ -31,7 +31,12 @@ if TYPE_CHECKING:
 STRANDS = ("#0072b2", "#d55e00")  # t1 and t2
 HOPF, GAP = "#c00000", "#e6e6e6"
 STARTS = (("o", "#000000"), ("D", "#009e73"))  # of runs from the steady state and from the large start
-FAILED = ("X", (0.96, 0.90))  # the mark, and how high up the sheet it stands for either start
+EDGE = (0.96, 0.90)  # how high up the sheet runs without a limit cycle stand, of either start
+AT_EDGE = {  # their marks, and words
+    OccurrenceClass.FAILED: ("X", "failed {} (no amplitude)"),
+    OccurrenceClass.SLIPPING: (">", "slips {} (no limit cycle)"),
+}
+IRREGULAR = "#f3dca3"  # inside of the dots
 MARK = 4.5  # [point]
 KINDS = {
     Kind.SUPERCRITICAL: {"marker": "s", "markersize": 7},
@@ -96,7 +101,12 @@ def _draw_attractors(axes: Axes, followed: Followed) -> None:
             style = "-" if stable else (0, (4, 3))
             axes.plot([low, high], [0.0, 0.0], color="black", linewidth=1.8, linestyle=style, clip_on=False)
     for start, (mark, colour) in enumerate(STARTS):
-        for kind, fill in ((OccurrenceClass.VIBRATING, colour), (OccurrenceClass.UNDECIDED, "none")):
+        fills = (
+            (OccurrenceClass.VIBRATING, colour),
+            (OccurrenceClass.UNDECIDED, "none"),
+            (OccurrenceClass.IRREGULAR, IRREGULAR),
+        )
+        for kind, fill in fills:
             shown = [run for run in followed.runs if (run.start, run.occurrence) == (start, kind)]
             axes.plot(
                 [run.value for run in shown],
@@ -108,13 +118,12 @@ def _draw_attractors(axes: Axes, followed: Followed) -> None:
                 markerfacecolor=fill,
                 zorder=3 + start,
             )
-    for run in failed_runs(followed):
-        mark, heights = FAILED
+    for run in _at_edge(followed):
         axes.plot(
             run.value,
-            heights[run.start],
-            transform=axes.get_xaxis_transform(),  # they have no amplitude
-            marker=mark,
+            EDGE[run.start],
+            transform=axes.get_xaxis_transform(),
+            marker=AT_EDGE[run.occurrence][0],
             markersize=MARK + 2.0,
             color=STARTS[run.start][1],
             linestyle="",
@@ -125,6 +134,11 @@ def _draw_attractors(axes: Axes, followed: Followed) -> None:
         axes.plot(onset.load, 0.0, color=HOPF, clip_on=False, zorder=6, **KINDS[kind.kind])
     axes.set_ylabel("amplitude [µm]")
     axes.set_ylim(bottom=0.0)
+
+
+def _at_edge(followed: Followed) -> list[Attractor]:
+    """Runs that have come to no limit cycle."""
+    return [run for run in followed.runs if run.occurrence in AT_EDGE]
 
 
 def _draw_modes(growth: Axes, frequency: Axes, followed: Followed) -> None:
@@ -176,9 +190,13 @@ def _legend(followed: Followed) -> list[Line2D | Patch]:
         ]
         open_mark = {"marker": "o", "markerfacecolor": "none", "markeredgecolor": "black", "linestyle": ""}
         handles.append(Line2D([], [], markersize=MARK, label="undecided", **open_mark))
-    for start in sorted({run.start for run in failed_runs(followed)}):
-        style = {"color": STARTS[start][1], "marker": FAILED[0], "markersize": MARK + 2.0, "linestyle": ""}
-        handles.append(Line2D([], [], label=f"failed {FROM[start]} (no amplitude)", **style))
+        if any(run.occurrence == OccurrenceClass.IRREGULAR for run in followed.runs):
+            mark = open_mark | {"markerfacecolor": IRREGULAR}
+            handles.append(Line2D([], [], markersize=MARK, label="irregular", **mark))
+    for kind, start in sorted({(run.occurrence, run.start) for run in _at_edge(followed)}):
+        mark, words = AT_EDGE[kind]
+        style = {"color": STARTS[start][1], "marker": mark, "markersize": MARK + 2.0, "linestyle": ""}
+        handles.append(Line2D([], [], label=words.format(FROM[start]), **style))
     handles += [
         Line2D([], [], color=colour, marker=".", label=f"mode of strand t{k}")
         for k, colour in enumerate(STRANDS, 1)

@@ -30,6 +30,9 @@ def branch_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
         yield "no Hopf point between the loads that have a steady state"
     yield from gap_lines(followed)
     yield from left_out_lines(followed)
+    loads = sorted({run.value for run in followed.runs if run.occurrence == OccurrenceClass.SLIPPING})
+    if loads:
+        yield f"the belt slips at {few_of([f'{load:g}' for load in loads], MOST_NAMED)} N m"
 
 
 def place_text(diagram: Diagram, asked: Asked) -> str:

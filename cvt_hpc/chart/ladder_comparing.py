@@ -24,6 +24,7 @@ from cvt_hpc.vibration.classes import OccurrenceClass
 
 Array = NDArray[np.float64]
 
+DECIDED = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING, OccurrenceClass.SLIPPING)
 LEVELS = {OccurrenceClass.QUIET: -1.0, OccurrenceClass.VIBRATING: 1.0}  # of an onset: the sign decides
 
 
@@ -38,7 +39,8 @@ class Score(NamedTuple):
         Median of the errors and what 95 % of them keep: of onsets [N m], of all else relative. Not a number
         of occurrence, and where there is nothing to compare.
     wrong : float
-        Of occurrence, the share of cells that are quiet here and vibrate there, or the other way round.
+        Of occurrence, the share of cells that are decided here and there, but of another class: quiet,
+        vibrating or slipping.
     undecided : float
         Share of the reference's cells that the rung leaves undecided, fails at or does not speak of; of
         onsets the share of those that it misses.
@@ -114,13 +116,14 @@ def _beside(dataset: xr.Dataset, reference: xr.Dataset) -> xr.Dataset:
 
 
 def _occurrence(found: xr.Dataset, true: xr.Dataset) -> Score:
-    one, other = _levels(found), _levels(true)
-    decided = np.isfinite(other)
-    cells = int(decided.sum())
+    one, other = (occurrence_classes(each).values for each in (found, true))
+    asked = np.isin(other, DECIDED)
+    cells = int(asked.sum())
     if not cells:
         return Score(0)
-    wrong = (one * other < 0.0).sum() / cells
-    return Score(cells, wrong=float(wrong), undecided=float(np.isnan(one[decided]).mean()))
+    is_told = np.isin(one[asked], DECIDED)
+    wrong = (is_told & (one != other)[asked]).mean()
+    return Score(cells, wrong=float(wrong), undecided=float((~is_told).mean()))
 
 
 def _onset(found: xr.Dataset, true: xr.Dataset) -> Score:

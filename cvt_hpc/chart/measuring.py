@@ -138,7 +138,8 @@ def _outcome(point: Point, scene: Scene, marched: Marched) -> tuple[str, dict[st
 
 def _explained(run: Any, failure: tuple[Status, str], count: str = "") -> str:
     status, why = failure
-    return f"{status.name.lower()}{count} at {run.time * 1e3:.4g} ms: {why}"
+    how = "ended early" if status is Status.DONE else status.name.lower()
+    return f"{how}{count} at {run.time * 1e3:.4g} ms: {why}"
 
 
 def _history(run: Any) -> History:

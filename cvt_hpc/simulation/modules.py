@@ -4,7 +4,8 @@ The `record` module of a model offers VARIABLES, `coordinates(parameters)`, `cos
 `lanes(parameters, stepper)` and `lane_key(parameters)`; and
 
 - of a model with a transient, `judge(run)`: the values of VARIABLES and the verdict (status, vibrates,
-  reason) of a run that its `transient` module has made;
+  reason) of a run that its `transient` module has made and that has come to its end, or ended before with
+  a result, its `failure` then having the status done;
 - of a model without, which takes no stepper, `solve(parameters)`, whose result `judge(solution)` reads. It
   may leave out what is not known, such as all but status and reason where nothing was found.
 

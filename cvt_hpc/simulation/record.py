@@ -37,7 +37,7 @@ _MARCH = (
         (),
         "f8",
         "s",
-        "simulated time: more than asked where the run was prolonged, less where it failed",
+        "simulated time: more than asked where a run was prolonged, less where it failed or slipped through",
     ),
     Variable("time_step", (), "f8", "s", "time step of the run that counts"),
     Variable("refinements", (), "i1", "1", "times that the run was done again at half the step"),
@@ -88,11 +88,12 @@ def record_of(
     """
     started = time.process_time()
     record, failure = _blank(job), run.failure
-    if failure is None and (values := (judge or record_module(job).judge)(run)) is not None:
+    has_result = failure is None or failure[0] is Status.DONE
+    if has_result and (values := (judge or record_module(job).judge)(run)) is not None:
         record |= values
-        if hasattr(run, "numerical_doubt"):
+        if failure is None and hasattr(run, "numerical_doubt"):
             failure = run.numerical_doubt(record)
-    if failure is not None:
+    if failure is not None and failure[0] is not Status.DONE:
         status, why = failure
         record = _blank(job) | {"status": status, "reason": f"at {run.time * 1e3:.4g} ms: {why}"[:240]}
     return record | {

@@ -30,7 +30,8 @@ FOLDER, TABLE = "audit", "audit.csv"  # in the folder of the runs, and in that o
 AUDITED = "auto"
 FULL_MODEL = "elastic_belt"
 LOWER = (Rung.PASSIVE, Rung.COARSE)
-DECIDED = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
+OPPOSITE = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
+DECIDED = (*OPPOSITE, OccurrenceClass.SLIPPING, OccurrenceClass.IRREGULAR)
 FORCES = (("mean_ring_tension", "mean_push_force"), ("axial_force",))  # by what they are measured against
 
 
@@ -120,7 +121,7 @@ def report_audit(audit: Repeat) -> AuditReport:
     rungs, ended = low.read(audited, "rung"), full.status[audited] == Status.DONE
     classes = [classify_runs(r.status[audited], r.read(audited, "vibrates")) for r in (low, full)]
     differs = ended & (classes[0] != classes[1]) & np.isin(classes[0], DECIDED)
-    contrary = differs & np.isin(classes[1], DECIDED)
+    contrary = differs & np.isin(classes[0], OPPOSITE) & np.isin(classes[1], OPPOSITE)
     table = audit.place / TABLE
     shown = differs | ~ended
     _write(table, audit.study, audited[shown], (low, full), [found[shown] for found in classes])

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from cvt_hpc.study.attempts import predicted_costs
 from cvt_hpc.study.batches import Batch, in_parts
 from cvt_hpc.study.cost_model import CostModel, Fit
 from cvt_hpc.study.description import describe
@@ -61,6 +62,7 @@ def find_out(job: Job, simulator: Simulator, groups: Sequence[Batch], out: Path,
     else:
         records = find_records(out, job)
         if records is not None:
+            costs = predicted_costs(job, simulator, records)
             fit = Task(job, records.study, simulator).fit(records, costs)
             if fit.batches:
                 return Knowledge(fit, f"batches on record ({fit.batches})")

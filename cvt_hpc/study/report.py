@@ -11,7 +11,7 @@ import numpy as np
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.records import Records
-from cvt_hpc.variables import Status
+from cvt_hpc.variables import Status, Vibrates
 
 # exit statuses; 2 is bad input, raised as InputError
 DONE, SOME_FAILED, STALLED, STOPPED = 0, 1, 98, 99
@@ -60,6 +60,9 @@ class RunReport:
         Number of runs recorded since this start.
     unneeded : int
         Number of cells of the grid that a trace does not run.
+    slipping, irregular : int
+        Number of runs with results under more load than friction carries, and of those whose motion is
+        irregular.
     """
 
     out: Path
@@ -71,6 +74,8 @@ class RunReport:
     stopped: str | None
     gained: int
     unneeded: int = 0
+    slipping: int = 0
+    irregular: int = 0
 
     @property
     def exit_status(self) -> int:
@@ -115,4 +120,14 @@ def build_report(
         stopped=stopped,
         gained=gained,
         unneeded=int((~asked).sum()) if study.is_traced else 0,
+        **count_special(records, asked),
     )
+
+
+def count_special(records: Records, asked: np.ndarray | None = None) -> dict[str, int]:
+    """Return how many runs with results slip or move irregularly, of those that `asked` marks, or of all."""
+    is_done = records.status == Status.DONE
+    done = np.flatnonzero(is_done if asked is None else is_done & asked)
+    verdicts = records.read(done, "vibrates")
+    kinds = {"slipping": Vibrates.SLIPS, "irregular": Vibrates.IRREGULAR}
+    return {name: int((verdicts == verdict).sum()) for name, verdict in kinds.items()}

@@ -15,9 +15,10 @@ from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.records import Records
 from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.report import count_special
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.tracing import needed_runs
-from cvt_hpc.variables import Status
+from cvt_hpc.variables import Status, Vibrates
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
@@ -45,6 +46,9 @@ class StudyStatus:
         One line for each record file that is not sound.
     unneeded : int
         Number of cells of the grid that a trace does not run, as far as is known.
+    slipping, irregular : int
+        Number of runs with results under more load than friction carries, and of those whose motion is
+        irregular.
     """
 
     name: str
@@ -57,6 +61,8 @@ class StudyStatus:
     time_to_go: float | None
     warnings: tuple[str, ...]
     unneeded: int = 0
+    slipping: int = 0
+    irregular: int = 0
 
 
 def read_status(out: str | Path) -> StudyStatus:
@@ -94,6 +100,7 @@ def read_status(out: str | Path) -> StudyStatus:
         time_to_go=float(costs[left].sum() * elapsed / spent) if elapsed else None,
         warnings=tuple(records.warnings),
         unneeded=int((~needed).sum()),
+        **count_special(records),
     )
 
 
@@ -111,6 +118,7 @@ def read_machine_factor(out: Path, job: Job) -> tuple[float, int]:
     if records is None or "core_seconds" not in records.study.record_dtype.names:
         return 1.0, 0
     done = np.flatnonzero(records.status == Status.DONE)
+    done = done[records.read(done, "vibrates") != Vibrates.SLIPS]  # they end early
     if not done.size:
         return 1.0, 0
     predicted = default_simulator().run_costs(job)[done].sum()

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from cvt_hpc.variables import Status, Variable, Vibrates
 from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.criterion import fitting_window
+from cvt_hpc.vibration.irregularity import relative_scatter
 from cvt_hpc.vibration.occurrence import classify, margin
 
 VARIABLES = (
@@ -19,6 +20,13 @@ VARIABLES = (
     Variable("frequency", ("strand",), "f8", "Hz", "dominant frequency at the strongest probe"),
     Variable("growth_rate", ("strand",), "f8", "s-1", "growth rate of the amplitude over the judged part"),
     Variable("growth_error", ("strand",), "f8", "s-1", "standard error of the growth rate"),
+    Variable(
+        "amplitude_scatter",
+        ("strand",),
+        "f8",
+        "1",
+        "standard deviation over mean of the amplitudes in successive windows",
+    ),
 )
 
 
@@ -40,10 +48,13 @@ class Occurrence:
         Dominant frequency at that probe [Hz]; nan without a peak in the band.
     growth_rate, growth_error : array, shape (strand,)
         Growth rate over the judged part and its standard error [1/s]; nan where nothing moves.
+    amplitude_scatter : array, shape (strand,)
+        Standard deviation of the amplitudes in successive windows over their mean; nan where nothing moves.
     strongest_probe : array of int, shape (strand,)
         Column of the displacement with the largest amplitude.
     margin : float
-        How far the amplitudes that decided lie from the threshold [e-folds]; 0 where nothing is decided.
+        How far what decided, as a rule the amplitudes, lies from the threshold [e-folds]; 0 where nothing is
+        decided.
     """
 
     vibrates: Vibrates
@@ -53,6 +64,7 @@ class Occurrence:
     frequency: NDArray[np.float64]
     growth_rate: NDArray[np.float64]
     growth_error: NDArray[np.float64]
+    amplitude_scatter: NDArray[np.float64]
     strongest_probe: NDArray[np.int64]
     margin: float
 
@@ -121,6 +133,7 @@ def assess(
         frequency,
         growth.rate,
         growth.standard_error,
+        relative_scatter(strand_windows),
         strongest,
         margin(strand_windows, vibrates, parameters["amplitude_threshold"]),
     )

@@ -18,11 +18,22 @@ class OccurrenceClass(IntEnum):
     UNDECIDED = 2
     FAILED = 3
     NOT_RUN = 4
+    # 5 is `StartClass.LARGE_START_ONLY`, a class of cells and not of runs
+    SLIPPING = 6
+    IRREGULAR = 7
 
     @property
     def label(self) -> str:
         """Name for people."""
         return self.name.lower().replace("_", " ")
+
+
+_OF_VERDICTS = {
+    Vibrates.NO: OccurrenceClass.QUIET,
+    Vibrates.YES: OccurrenceClass.VIBRATING,
+    Vibrates.SLIPS: OccurrenceClass.SLIPPING,
+    Vibrates.IRREGULAR: OccurrenceClass.IRREGULAR,
+}
 
 
 def classify_runs(status: NDArray, vibrates: NDArray) -> NDArray[np.int8]:
@@ -44,8 +55,8 @@ def classify_runs(status: NDArray, vibrates: NDArray) -> NDArray[np.int8]:
     classes = np.full(status.shape, OccurrenceClass.FAILED, np.int8)
     done = status == Status.DONE
     classes[done] = OccurrenceClass.UNDECIDED
-    classes[done & (vibrates == Vibrates.NO)] = OccurrenceClass.QUIET
-    classes[done & (vibrates == Vibrates.YES)] = OccurrenceClass.VIBRATING
+    for verdict, kind in _OF_VERDICTS.items():
+        classes[done & (vibrates == verdict)] = kind
     missing = np.isnan(status.astype(float))
     classes[(status == Status.NOT_RUN) | missing] = OccurrenceClass.NOT_RUN
     return classes

@@ -22,6 +22,8 @@ class StartClass(IntEnum):
     FAILED = OccurrenceClass.FAILED
     NOT_RUN = OccurrenceClass.NOT_RUN
     LARGE_START_ONLY = 5
+    SLIPPING = OccurrenceClass.SLIPPING
+    IRREGULAR = OccurrenceClass.IRREGULAR
 
     @property
     def label(self) -> str:
@@ -37,6 +39,7 @@ def classify_starts(small: NDArray, large: NDArray) -> NDArray[np.int8]:
     Where a run failed the cell failed, whatever the other says, so that no failure is hidden. Else what
     vibrates from the small start vibrates; a cell is quiet only if it is so from both. Of a cell that is
     quiet from the small start the other run decides, and where one run says nothing the cell does not.
+    A cell that slips or moves irregularly from the small start is of that class.
 
     Parameters
     ----------
@@ -49,8 +52,9 @@ def classify_starts(small: NDArray, large: NDArray) -> NDArray[np.int8]:
         Values of `StartClass`.
     """
     classes = np.where(small == OccurrenceClass.QUIET, large, small).astype(np.int8)
-    # a vibration from the small start needs no second run, a doubtful one cannot do without
-    classes[(small == OccurrenceClass.UNDECIDED) & (large == OccurrenceClass.NOT_RUN)] = StartClass.NOT_RUN
+    # vibration or gross slip from the small start needs no second run, a doubtful motion cannot do without
+    is_doubtful = np.isin(small, (OccurrenceClass.UNDECIDED, OccurrenceClass.IRREGULAR))
+    classes[is_doubtful & (large == OccurrenceClass.NOT_RUN)] = StartClass.NOT_RUN
     classes[large == OccurrenceClass.FAILED] = StartClass.FAILED
     found = (small == OccurrenceClass.QUIET) & (large == OccurrenceClass.VIBRATING)
     classes[found] = StartClass.LARGE_START_ONLY

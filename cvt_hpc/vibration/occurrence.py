@@ -1,12 +1,14 @@
-"""Whether a run vibrates: yes, no, or undecided because the run was too short to tell.
+"""Whether a run vibrates: yes, no, irregularly, or undecided because the run was too short to tell.
 
 Judged are the amplitudes of each strand within a frequency band, in successive windows of the last part of
 the run, and the growth rate fitted to them; `assessment.py` takes both from the displacement.
 
-A strand vibrates if it is above the threshold in every window and not decaying. It is quiet if it is
-below the threshold at the end and not on its way there. Everything else is undecided: a start transient
-that has not died out yet, a vibration that is still growing, one that comes and goes. A run vibrates if a
-strand does, and is quiet only if all strands are. The thresholds are in `criterion.py`.
+A strand vibrates if it is above the threshold in every window and not decaying. It is irregular if it comes
+and goes about the threshold over so many windows that a trend is ruled out (`irregularity.py`): a longer run
+would say no more. It is quiet if it is below the threshold at the end and not on its way there. Everything
+else is undecided, and a longer run may tell: a start transient that has not died out yet, a vibration that is
+still growing. A run vibrates if a strand does, and is quiet only if all strands are. It is irregular if a
+strand is, unless another one is undecided that may have a trend. The thresholds are in `criterion.py`.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtrit
 
 from cvt_hpc.variables import Vibrates
+from cvt_hpc.vibration.irregularity import is_irregular, is_stationary
 
 CONFIDENCE = 0.975  # one-sided, by Student's t: few windows know their own scatter badly
 STEADY_LOSS = 0.05  # e-folds over the judged part that a settled vibration may lose, scatter apart
@@ -54,7 +57,8 @@ def classify(
     Returns
     -------
     Vibrates
-        YES if a strand vibrates, NO if all are quiet, UNDECIDED otherwise.
+        YES if a strand vibrates, UNDECIDED where a longer run may tell, IRREGULAR where it would not, NO if
+        all strands are quiet.
     str
         The reason, in one line.
 
@@ -70,7 +74,15 @@ def classify(
         name: _judge_strand(strand, rate, error, judged_time, record_time, parameters)
         for name, strand, rate, error in zip(strands, windows.T, growth_rate, growth_error, strict=True)
     }
-    for outcome in (Vibrates.YES, Vibrates.UNDECIDED, Vibrates.NO):
+    left_open = [
+        strand
+        for strand, (vibrates, _) in zip(windows.T, judged.values(), strict=True)
+        if vibrates is Vibrates.UNDECIDED
+    ]
+    order = [Vibrates.YES, Vibrates.UNDECIDED, Vibrates.IRREGULAR, Vibrates.NO]
+    if all(is_stationary(strand, parameters["growth_tolerance"]) for strand in left_open):
+        order[1:3] = order[2], order[1]
+    for outcome in order:
         told = [f"{name} {text}" for name, (vibrates, text) in judged.items() if vibrates is outcome]
         if told:
             return outcome, "; ".join(told)[:LONGEST_REASON]
@@ -124,6 +136,9 @@ def _judge_strand(
             return Vibrates.YES, f"vibrates for the last {judged_time:.3g} s, {size}, growth {rate:.2g} 1/s"
         why = "in too few windows to tell decay" if np.isnan(rate) else f"but decays at {-rate:.3g} 1/s"
         return Vibrates.UNDECIDED, f"is above the threshold, {size}, {why}"
+    if is_irregular(windows, threshold, parameters["growth_tolerance"]):
+        spread = f"{windows.min() * 1e6:.3g} to {windows.max() * 1e6:.3g} um"
+        return Vibrates.IRREGULAR, f"is irregular, {spread} in {len(windows)} windows without a trend"
     if last == 0:
         return Vibrates.NO, "is at rest"
     late = windows[len(windows) // 2 :]

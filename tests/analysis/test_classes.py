@@ -7,13 +7,24 @@ from studies import study, two_flags
 
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, occurrence_classes
 from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.vibration.hysteresis import StartClass
 
-QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN = OccurrenceClass
+QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN, SLIPPING, IRREGULAR = OccurrenceClass
 
 
 CLASS_TABLE = [
     (Status.NOT_RUN, {v: NOT_RUN for v in Vibrates}),
-    (Status.DONE, {Vibrates.NO: QUIET, Vibrates.YES: VIBRATING, Vibrates.UNDECIDED: UNDECIDED, 7: UNDECIDED}),
+    (
+        Status.DONE,
+        {
+            Vibrates.NO: QUIET,
+            Vibrates.YES: VIBRATING,
+            Vibrates.UNDECIDED: UNDECIDED,
+            Vibrates.SLIPS: SLIPPING,
+            Vibrates.IRREGULAR: IRREGULAR,
+            7: UNDECIDED,
+        },
+    ),
     (Status.FAILED_NUMERICS, {v: FAILED for v in Vibrates}),
     (Status.FAILED_ERROR, {v: FAILED for v in Vibrates}),
     (Status.TIMED_OUT, {v: FAILED for v in Vibrates}),
@@ -33,6 +44,15 @@ def test_class_of_every_pair_of_flags(status, expected):
 def test_every_status_and_verdict_is_in_the_table():
     told = {status: set(expected) for status, expected in CLASS_TABLE}
     assert all(set(Vibrates) <= told[status] for status in Status)
+
+
+def test_no_flag_is_ever_renumbered():
+    assert [(v.name, int(v)) for v in Vibrates] == [
+        ("NO", 0), ("YES", 1), ("UNDECIDED", 2), ("SLIPS", 3), ("IRREGULAR", 4)]  # fmt: skip
+    kinds = {c.name: int(c) for c in StartClass}
+    assert kinds == {"QUIET": 0, "VIBRATING": 1, "UNDECIDED": 2, "FAILED": 3, "NOT_RUN": 4,
+                     "LARGE_START_ONLY": 5, "SLIPPING": 6, "IRREGULAR": 7}  # fmt: skip
+    assert all(int(c) == kinds[c.name] for c in OccurrenceClass)
 
 
 def test_classes_of_a_study_follow_its_flags_in_any_order_of_dimensions():

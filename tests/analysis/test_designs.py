@@ -15,7 +15,7 @@ from cvt_hpc.analysis.maps import draw_map, map_figure
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 from cvt_hpc.errors import InputError
 
-QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN = OccurrenceClass
+QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN, SLIPPING, IRREGULAR = OccurrenceClass
 SOFT = {"sheave_stiffness": 1.0}
 
 

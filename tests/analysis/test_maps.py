@@ -21,7 +21,13 @@ from cvt_hpc.variables import Status, Vibrates
 
 LIMIT = 300_000  # bytes that a picture may have
 FINE = {"gradients": np.linspace(-2.4, -0.4, 6), "loads": np.linspace(5, 200, 40)}
-QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN = OccurrenceClass
+QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN, SLIPPING, IRREGULAR = OccurrenceClass
+VERDICTS = {
+    QUIET: Vibrates.NO,
+    VIBRATING: Vibrates.YES,
+    SLIPPING: Vibrates.SLIPS,
+    IRREGULAR: Vibrates.IRREGULAR,
+}
 
 
 def figure_of(dataset, at=()):
@@ -71,7 +77,7 @@ def test_cells_show_their_class_at_their_place():
 @pytest.mark.parametrize("kind", OccurrenceClass)
 def test_each_class_alone_is_drawn_as_what_it_is(kind):
     status = {FAILED: Status.FAILED_ERROR, NOT_RUN: Status.NOT_RUN}.get(kind, Status.DONE)
-    vibrates = {QUIET: Vibrates.NO, VIBRATING: Vibrates.YES}.get(kind, Vibrates.UNDECIDED)
+    vibrates = VERDICTS.get(kind, Vibrates.UNDECIDED)
     figure = figure_of(two_flags([status] * 3, [vibrates] * 3))
     (axes,) = panels_of(figure)
     fills = {tuple(colour) for cells in axes.collections for colour in np.atleast_2d(cells.get_facecolor())}
@@ -100,9 +106,40 @@ def test_counts_and_all_classes_are_told():
     assert "Vibration occurrence: occurrence" in figure.get_suptitle()
     assert "120 runs: 53 quiet, 59 vibrating, 3 undecided, 4 failed, 1 not run" in figure.get_suptitle()
     (legend,) = figure.legends
-    assert [text.get_text() for text in legend.get_texts()] == [kind.label for kind in OccurrenceClass]
+    of_any_map = [kind.label for kind in (QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN)]
+    assert [text.get_text() for text in legend.get_texts()] == of_any_map
     assert panels_of(figure)[-1].get_xlabel() == "load [N m]"
     assert figure.get_supylabel() == "friction gradient [s/m]"
+
+
+def special_runs():
+    """A study in which the highest loads slip, and the lowest but one is irregular."""
+    dataset = study(stiffnesses=(1.0,))
+    dataset["status"].values[:] = Status.DONE
+    dataset["vibrates"].values[..., -2:] = Vibrates.SLIPS
+    dataset["amplitude"].values[..., -1, :] = np.nan  # slipped through
+    dataset["vibrates"].values[..., 1] = Vibrates.IRREGULAR
+    dataset["amplitude"].values[..., 1, :] = 4.2e-6
+    return dataset
+
+
+def test_slipping_and_irregular_runs_are_in_the_legend_where_they_occur():
+    figure = figure_of(special_runs())
+    (legend,) = figure.legends
+    words = [text.get_text() for text in legend.get_texts()]
+    assert words[-2:] == ["slipping", "irregular"] and len(words) == 7
+    assert "6 slipping, 3 irregular" in figure.get_suptitle()
+    figure.draw_without_rendering()
+    extent = legend.get_window_extent()
+    assert 0.0 <= extent.x0 < extent.x1 <= figure.bbox.width and extent.y0 >= 0.0
+
+
+def test_irregular_cells_tell_their_amplitude():
+    figure = figure_of(special_runs())
+    (axes,) = panels_of(figure)
+    assert [text.get_text() for text in axes.texts].count("4.2") == 3
+    assert "in irregular cells: amplitude [µm]" in figure.get_suptitle()
+    assert "irregular cells" not in figure_of(study()).get_suptitle()
 
 
 @pytest.mark.parametrize("stiffnesses", [(1.0,), (1.0, 1.5, np.inf), STIFFNESSES, (1, 2, 3, 4, 5, 6, 7)])

@@ -17,14 +17,16 @@ from cvt_hpc.analysis.starts import has_starts, join_starts, start_line
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.hysteresis import StartClass, classify_starts
 
-Q, V, U, F, N = (OccurrenceClass[name] for name in ("QUIET", "VIBRATING", "UNDECIDED", "FAILED", "NOT_RUN"))
+Q, V, U, F, N, S, IRR = OccurrenceClass
 ONLY = StartClass.LARGE_START_ONLY
 TABLE = {  # by the class from the small start, then from the large one
-    Q: {Q: Q, V: ONLY, U: U, F: F, N: N},
-    V: {Q: V, V: V, U: V, F: F, N: V},
-    U: {Q: U, V: U, U: U, F: F, N: N},
-    F: {Q: F, V: F, U: F, F: F, N: F},
-    N: {Q: N, V: N, U: N, F: F, N: N},
+    Q: {Q: Q, V: ONLY, U: U, F: F, N: N, S: S, IRR: IRR},
+    V: {Q: V, V: V, U: V, F: F, N: V, S: V, IRR: V},
+    U: {Q: U, V: U, U: U, F: F, N: N, S: U, IRR: U},
+    F: {Q: F, V: F, U: F, F: F, N: F, S: F, IRR: F},
+    N: {Q: N, V: N, U: N, F: F, N: N, S: N, IRR: N},
+    S: {Q: S, V: S, U: S, F: F, N: S, S: S, IRR: S},
+    IRR: {Q: IRR, V: IRR, U: IRR, F: F, N: N, S: IRR, IRR: IRR},
 }
 
 

@@ -23,7 +23,7 @@ from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 
 JOB = Path(__file__).parents[2] / "jobs" / "auto.toml"
 LONGER = 4.0
-QUIET, VIBRATING, UNDECIDED, FAILED, _ = OccurrenceClass
+QUIET, VIBRATING, UNDECIDED, FAILED, *_ = OccurrenceClass
 
 
 def jobs() -> dict[str, Job]:

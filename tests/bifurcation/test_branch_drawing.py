@@ -8,7 +8,7 @@ import pytest
 
 from cvt_hpc.analysis.figures import STYLE
 from cvt_hpc.bifurcation.attractors import Attractor
-from cvt_hpc.bifurcation.drawing import GAP, HOPF, branch_figure, stable_parts
+from cvt_hpc.bifurcation.drawing import GAP, HOPF, STARTS, branch_figure, stable_parts
 from cvt_hpc.bifurcation.table import branch_lines, failure_lines, gap_lines
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.models.linear_stability.branch import Branch, Onset, Point, branch, onsets, tracks
@@ -19,7 +19,7 @@ from cvt_hpc.vibration.criticality import Criticality, Kind
 
 ALONG = np.linspace(0.0, np.pi, 33)
 SHAPES = [np.sin(k * ALONG) + 0j for k in (1, 2, 3)]
-Q, V, U, F, NOT_RUN = OccurrenceClass
+Q, V, U, F, NOT_RUN, SLIPS, IRREGULAR = OccurrenceClass
 
 
 def mode(growth, frequency, shape=0):
@@ -104,6 +104,24 @@ def test_failed_runs_stand_at_the_upper_edge_and_in_the_legend(panels):
     assert {f"failed from the {start} (no amplitude)" for start in ("steady state", "large start")} <= {
         *words
     }
+
+
+def test_slipping_and_irregular_runs_have_marks_and_words_of_their_own():
+    special = [run(60.0, 0, SLIPS), run(60.0, 1, SLIPS), run(50.0, 0, IRREGULAR, 4e-6)]
+    one = followed()
+    one.runs[:] = special
+    with matplotlib.rc_context(STYLE):
+        figure = branch_figure(diagram(), one)
+    upper = figure.axes[0]
+    edge = [line for line in upper.lines if line.get_marker() == ">"]
+    assert [(line.get_xdata()[0], line.get_color()) for line in edge] == [(60.0, c) for _, c in STARTS]
+    assert all(line.get_transform() == upper.get_xaxis_transform() for line in edge)
+    (dot,) = [line for line in upper.lines if line.get_marker() == "o" and len(line.get_xdata())]
+    assert dot.get_ydata() == pytest.approx([4.0]) and dot.get_markerfacecolor() not in ("none", STARTS[0][1])
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "irregular" in words and "slips from the large start (no limit cycle)" in words
+    assert "the belt slips at 60 N m" in list(branch_lines(diagram(), one))
+    assert not list(failure_lines(diagram(), one))
 
 
 @pytest.mark.parametrize("onsets", [(), (ONSET,)])

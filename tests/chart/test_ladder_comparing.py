@@ -56,6 +56,14 @@ def scores(dataset, answers=QUESTIONS, full=None, rung="rung"):
     return {f.question: f for f in found if f.rung == rung}
 
 
+def test_gross_slip_is_an_answer_and_irregular_motion_is_none():
+    verdicts = np.array(VERDICTS)
+    verdicts[1, -2:] = Vibrates.SLIPS  # where the reference is quiet
+    verdicts[1, 0] = Vibrates.IRREGULAR
+    score = scores(transient(verdicts))["occurrence"].score
+    assert (score.cells, score.wrong, score.undecided) == (16, 2 / 16, 1 / 16)
+
+
 def test_a_rung_that_says_the_same_has_no_error():
     found = scores(transient())
     assert found["occurrence"].score == Score(16, wrong=0.0, undecided=0.0)

@@ -5,6 +5,7 @@ import pytest
 from toy_jobs import GRID
 
 from cvt_hpc import cli
+from cvt_hpc.printing import report_lines
 from cvt_hpc.study import FailedRun, RunReport, StudyStatus
 from cvt_hpc.variables import Status
 
@@ -154,6 +155,15 @@ def test_status_of_a_sweep_at_work(call, monkeypatch):
         ],
         ["cvt-hpc: a.log: damaged"],
     )
+
+
+def test_slipping_and_irregular_runs_are_counted(call, monkeypatch, tmp_path):
+    status = StudyStatus("x", 40, 30, 2, 8, False, None, None, (), slipping=3, irregular=1)
+    monkeypatch.setattr("cvt_hpc.study.read_status", lambda path: status)
+    assert "done    30 (75.0%), of these 3 slip, 1 irregular" in call("status", "out/x")[1]
+    report = RunReport(tmp_path, tmp_path / "results.nc", 40, 40, (), 0, None, 40, slipping=3)
+    assert list(report_lines(report))[:2] == ["40 runs: 40 done, 0 failed, 0 left", "of those done 3 slip"]
+    assert report.exit_status == 0
 
 
 def test_another_job_in_the_folder_is_refused_and_kept(write_job, call, tmp_path):

@@ -11,7 +11,7 @@ from cvt_hpc.models.oscillator.steady import steady_sliding
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Kind, criticality
 
-QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN = OccurrenceClass
+QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN, SLIPPING, IRREGULAR = OccurrenceClass
 BOTH_STARTS = (Start({"start": "sliding"}), Start({"start": "sticking"}))
 OF_RUNS = {
     "initial_displacement": 1e-4,

@@ -7,10 +7,12 @@ from marched import CHEAP, job, record
 from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.models.elastic_belt.doubts import FAILURES, LARGEST_POWER_RESIDUAL
 from cvt_hpc.models.elastic_belt.lane_belt import POSITION, SPEED
-from cvt_hpc.models.elastic_belt.sampling import LEAST_SPEED, Outcome
+from cvt_hpc.models.elastic_belt.sampling import LEAST_SPEED, MOST_SPEED, Outcome
+from cvt_hpc.models.elastic_belt.slip import GROSS_SLIP
 from cvt_hpc.physics.lane_compliance import ROUND_OFF
 from cvt_hpc.simulation import record_variables, run_point
 from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.vibration import ramp
 
 
 def assert_no_numbers(found):
@@ -68,20 +70,49 @@ def test_a_sound_run_without_load_passes_the_power_balance():
 
 def test_more_torque_than_friction_carries_slips_through():
     found = record(load=400.0, duration=0.1)
-    assert found["status"] == Status.FAILED_ERROR
+    assert_slips(found)
     assert "the belt slips through: the driven pulley has lost 50% of its speed" in found["reason"]
-    assert_no_numbers(found)
     # physics, not numerics: half the step slips at the same time
     half = record(load=400.0, duration=0.1, step=1.25e-6)
-    assert half["status"] == Status.FAILED_ERROR
+    assert_slips(half)
     assert half["simulated_seconds"] == pytest.approx(found["simulated_seconds"], rel=0.02)
 
 
 def test_torque_that_friction_just_carries_does_not():
     # mu_k x thrust, two flanks each, on the driven pulley's radius: 2 x 0.1 x 50 kN / cos 11 deg x 75 mm / 2.52
     carried = 2 * 0.1 * 50e3 / np.cos(np.deg2rad(11)) * 0.075 / 2.52
-    assert record(load=0.6 * carried, duration=0.1)["status"] == Status.DONE
-    assert record(load=1.2 * carried, duration=0.1)["status"] == Status.FAILED_ERROR
+    below = record(load=0.6 * carried, duration=0.1)
+    assert below["status"] == Status.DONE and below["vibrates"] != Vibrates.SLIPS
+    # the same with the smaller axial force in place of the thrust; at 0.47 m/s friction has fallen to mu_k
+    largest = carried * below["axial_force"].min() / 50e3
+    assert below["slip_margin"] == pytest.approx(0.6 * carried / largest - 1.0, abs=1e-4)
+    assert np.abs(below["slip"]).max() < 0.03
+    assert_slips(record(load=1.2 * carried, duration=0.1))
+
+
+def test_a_load_that_drives_beyond_what_friction_carries_slips_through():
+    found = record(load=-400.0, duration=0.1)
+    assert_slips(found)
+    assert "the belt slips through: the driven pulley has gained 50% of its speed" in found["reason"]
+    assert found["slip"][0] > GROSS_SLIP and found["speed_loss"] < -GROSS_SLIP
+
+
+def test_gross_slip_to_the_end_of_a_run_is_found_by_its_size():
+    # a window of some 2 N m below the largest torque, in which the belt slides on steadily on rigid sheaves
+    values = {"sheave_stiffness": np.inf, "stations": 96, "step": 7.6e-6, "precision": "single"}
+    found = record(load=210.0, duration=0.3, **values)
+    assert (found["status"], found["vibrates"]) == (Status.DONE, Vibrates.SLIPS)
+    assert found["reason"].startswith("the driving pulley slips by 0.0")
+    assert found["simulated_seconds"] == pytest.approx(0.3) and abs(found["power_residual"]) < 0.02
+    assert -found["slip"][0] > GROSS_SLIP and -0.15 < found["slip_margin"] < 0.0
+
+
+def assert_slips(found):
+    """A run that ended early: the slide is told, and no vibration."""
+    assert (found["status"], found["vibrates"]) == (Status.DONE, Vibrates.SLIPS)
+    assert found["simulated_seconds"] < 0.1 and np.isnan(found["amplitude"]).all()
+    assert found["slip_margin"] > 0.0 and np.abs(found["slip"]).max() > GROSS_SLIP
+    assert (found["axial_force"] > 1e4).all() and abs(found["speed_loss"]) > GROSS_SLIP
 
 
 def poisoned(monkeypatch, spoil, when=300, **values):
@@ -155,14 +186,15 @@ def test_done_records_are_numbers_throughout():
     for load in (0.0, 60.0, 120.0):
         found = record(**CHEAP, load=load)
         assert found["status"] == Status.DONE
+        along_ramps = {variable.name for variable in ramp.VARIABLES}
         for variable in record_variables(job()):
-            if variable.dtype == "f8":
+            if variable.dtype == "f8" and variable.name not in along_ramps:
                 assert np.all(np.isfinite(found[variable.name])), variable.name
 
 
 def test_every_outcome_of_a_march_has_a_status_and_a_reason():
     assert set(FAILURES) == set(Outcome) - {Outcome.OK}
     for status, reason in FAILURES.values():
-        assert status in (Status.FAILED_NUMERICS, Status.FAILED_ERROR)
+        assert status in (Status.FAILED_NUMERICS, Status.DONE)
         assert reason.isascii() and len(reason) < 200
-    assert 0 < LEAST_SPEED < 1
+    assert 0 < LEAST_SPEED < 1 < MOST_SPEED

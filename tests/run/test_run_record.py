@@ -10,13 +10,17 @@ from cvt_hpc.models.elastic_belt.record import MODES, evaluate
 from cvt_hpc.simulation import Interrupted, estimate_cost, record_coordinates, record_variables, run_point
 from cvt_hpc.study.description import describe
 from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.vibration import ramp
 
 LOADED = CHEAP | {"load": 120.0}
 ENDINGS = {
     "done": (LOADED, Status.DONE),
     "diverged": (LOADED | {"step": 50e-6}, Status.FAILED_NUMERICS),
-    "slipped through": (CHEAP | {"load": 500.0}, Status.FAILED_ERROR),
+    "slipped through": (CHEAP | {"load": 500.0}, Status.DONE),
 }
+ALONG_RAMPS = {variable.name for variable in ramp.VARIABLES}
+# known of a run that has slipped through before its end
+OF_THE_SLIDE = {"slip", "axial_force", "open_share", "thrust_ratio", "speed_loss", "slip_margin"}
 COST = {"core_seconds", "simulated_seconds", "time_step", "steps", "contact_solves"}
 
 
@@ -80,7 +84,10 @@ def test_numbers_are_missing_only_where_a_run_failed(ending):
     for variable in record_variables(asked):
         if variable.dtype != "f8":
             continue
-        known = status == Status.DONE or variable.name in COST
+        slipped = found["vibrates"] == Vibrates.SLIPS
+        known = variable.name in (COST | OF_THE_SLIDE if slipped else COST)
+        if status == Status.DONE and not slipped:
+            known = variable.name not in ALONG_RAMPS
         assert np.all(np.isfinite(found[variable.name]) == known), variable.name
     if status != Status.DONE:
         assert Vibrates(int(found["vibrates"])) is not Vibrates.YES
@@ -99,7 +106,7 @@ def test_costs_are_consistent(ending):
     # each step solves the contact of two wraps
     assert found["contact_solves"] >= 2 * found["steps"] > 0
     assert found["core_seconds"] > 0
-    if status == Status.DONE:
+    if status == Status.DONE and found["vibrates"] != Vibrates.SLIPS:
         assert found["simulated_seconds"] == pytest.approx(0.04, rel=1e-11)
         default = job().parameters["step"]
         assert found["steps"] == 0.04 * 20e3 * np.ceil(1 / 20e3 / default)

@@ -20,8 +20,9 @@ from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.forces import distributions, quantities
 from cvt_hpc.models.steady_variator.newton import newton
+from cvt_hpc.models.steady_variator.record import judge
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
-from cvt_hpc.variables import Status
+from cvt_hpc.variables import Status, Vibrates
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
 DEFAULTS |= {"duration": 0.1, "stations": 96}
@@ -145,3 +146,15 @@ def test_record_is_that_of_the_state():
     assert record["status"] == Status.DONE
     assert record["mean_push_force"] == pytest.approx(numbers["mean_push_force"], rel=1e-6)
     assert record["thrust_ratio"] == pytest.approx(numbers["thrust_ratio"], rel=1e-9)
+
+
+@pytest.mark.parametrize(("slip", "verdict"), [(0.049, Vibrates.UNDECIDED), (-0.051, Vibrates.SLIPS)])
+def test_a_state_in_which_a_pulley_slips_grossly_is_called_so(slip, verdict):
+    found = judge({"slip": np.array([slip, 0.02])})
+    assert (found["status"], found["vibrates"]) == (Status.DONE, verdict)
+
+
+def test_the_margin_of_gross_slip_is_that_of_the_elastic_belt():
+    found = rung_record("steady_variator", load=100.0, stations=96)
+    torque = 2 * 0.1 / np.cos(np.deg2rad(11)) * found["axial_force"].min() * 0.075 / 2.52
+    assert found["slip_margin"] == pytest.approx(100.0 / torque - 1.0, abs=1e-4)

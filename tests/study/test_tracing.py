@@ -20,7 +20,7 @@ from cvt_hpc.study.tracing import inferred_classes, needed_runs
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.classes import OccurrenceClass
 
-QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN = OccurrenceClass
+QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN, SLIPPING, IRREGULAR = OccurrenceClass
 FLAGS = {
     QUIET: (Status.DONE, Vibrates.NO),
     VIBRATING: (Status.DONE, Vibrates.YES),
@@ -233,7 +233,8 @@ def test_a_trace_runs_a_part_of_the_grid_and_infers_the_rest(tmp_path, reference
     assert (dataset["status"].values[np.setdiff1d(range(RUNS), NEEDED)] == Status.NOT_RUN).all()
     expected = [VIBRATING if 22 <= load <= 33 else QUIET for load in range(RUNS)]
     assert dataset["inferred_class"].values.tolist() == expected
-    assert dataset["inferred_class"].attrs["flag_meanings"] == "quiet vibrating undecided failed not_run"
+    words = "quiet vibrating undecided failed not_run slipping irregular"
+    assert dataset["inferred_class"].attrs["flag_meanings"] == words
     status = read_status(tmp_path)
     assert (status.total, status.done, status.left, status.unneeded) == (20, 20, 0, 40)
     run(JOB, tmp_path, simulator=simulator, progress=False)

@@ -73,9 +73,10 @@ def serial(tmp_path_factory):
     folder = tmp_path_factory.mktemp("serial")
     (folder / "small.toml").write_text(JOB + HISTORY)
     done = call("run", "small.toml", cwd=folder)
-    assert done.returncode == 1, done.stderr  # both sheaves slip through at 500 N m
+    assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == [
-        "8 runs: 6 done, 2 failed, 0 left",
+        "8 runs: 8 done, 0 failed, 0 left",
+        "of those done 2 slip",  # at 500 N m, on both sheaves
         "results: out/small/results.nc",
     ]
     return folder / "out" / "small"
@@ -100,13 +101,15 @@ def test_the_dataset_of_a_sweep(serial):
     dataset = load_results(serial)
     assert dataset["status"].dims == ("sheave_stiffness", "load")
     status = [[Status(value) for value in row] for row in dataset["status"].values]
-    assert status == [[Status.DONE] * 3 + [Status.FAILED_ERROR]] * 2
+    assert status == [[Status.DONE] * 4] * 2
+    assert (dataset["vibrates"].values == Vibrates.SLIPS).tolist() == [[False] * 3 + [True]] * 2
     vibrating = dataset["vibrates"].values == Vibrates.YES
     # the coarse belt vibrates where the fine one does
     assert np.argwhere(vibrating & (dataset["status"].values == Status.DONE)).tolist() == [[0, 2]]
     assert np.isfinite(dataset["amplitude"].values[:, :3]).all()
     assert np.isnan(dataset["amplitude"].values[:, 3]).all()
     assert "slips through" in str(dataset["reason"].values[0, 3])
+    assert (dataset["slip_margin"].values > 0.0).tolist() == [[False] * 3 + [True]] * 2
     assert json.loads(dataset.attrs["job"])["axes"]["sheave_stiffness"] == [1.0, "inf"]
 
 
@@ -127,7 +130,7 @@ def test_costs_are_estimated_by_what_is_on_record(serial):
 
 def test_two_ranks_give_the_same_bits(serial, folder):
     done = call("run", "small.toml", "--out", "two", cwd=folder, ranks=2)
-    assert done.returncode == 1, done.stderr
+    assert done.returncode == 0, done.stderr
     assert len(list((folder / "two" / "records").glob("rank-0001-*.log"))) == 1
     assert_same_numbers(load_results(folder / "two"), load_results(serial))
 
@@ -181,9 +184,9 @@ def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):
 
 
 def test_simulate_of_a_run_that_fails_ends_with_1_and_still_draws(folder):
-    done = call("simulate", "small.toml", "--at", "load=500", "--plot", "f.png", cwd=folder)
+    done = call("simulate", "small.toml", "--at", "step=20 us", "--plot", "f.png", cwd=folder)
     assert done.returncode == 1
-    assert done.stderr.startswith("cvt-hpc: the run failed: failed_error: at ")
+    assert done.stderr.startswith("cvt-hpc: the run failed: failed_numerics: at ")
     assert (folder / "f.png").exists()
 
 
@@ -237,5 +240,5 @@ def test_a_serial_run_does_without_mpi4py(serial, folder):
     )
     assert "No module named 'mpi4py'" in hidden.stderr
     done = call("run", "small.toml", cwd=folder, **path)
-    assert done.returncode == 1, done.stderr
+    assert done.returncode == 0, done.stderr
     assert_same_numbers(load_results(folder / "out" / "small"), load_results(serial))

@@ -71,7 +71,8 @@ def test_numbers_do_not_depend_on_the_batch(singles, tmp_path, size, batches):
     assert simulator.done == batches
     assert_same_numbers(dataset, singles)
     status = [[Status(value) for value in row] for row in dataset["status"].values]
-    assert status == [[Status.DONE, Status.DONE, Status.FAILED_ERROR]] * 2
+    assert status == [[Status.DONE] * 3] * 2
+    assert (dataset["vibrates"].values == Vibrates.SLIPS).tolist() == [[False, False, True]] * 2
 
 
 def test_every_run_is_in_one_group_and_groups_do_not_depend_on_the_hour():

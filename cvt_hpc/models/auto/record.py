@@ -37,7 +37,7 @@ VARIABLES = (
         (),
         "f8",
         "1",
-        "distance of the amplitude that decided from the threshold, in e-folds; 0 where nothing is decided",
+        "distance of amplitude or slip from its threshold, the nearer one, in e-folds; 0: nothing decided",
     ),
     *belt_record.VARIABLES,
 )
@@ -79,8 +79,10 @@ def settle(run: RecordedRun) -> dict[str, Any] | None:
     Parameters
     ----------
     run : RecordedRun
-        With all samples recorded.
+        With all samples recorded, or those until it slipped through: then a full run answers.
     """
+    if run.failure is not None:
+        return None
     found = belt_record.assess(run)
     if not is_settled(run.parameters, found):
         return None
@@ -92,7 +94,9 @@ def settle(run: RecordedRun) -> dict[str, Any] | None:
 
 
 def judge(run: RecordedRun) -> dict[str, Any]:
-    """The record of a full run that has reached its end, its cost apart."""
+    """The record of a full run that has reached its end, or slipped through before, its cost apart."""
+    if run.failure is not None:
+        return belt_record.judge(run) | {"rung": Rung.FULL}
     return _values(run, belt_record.assess(run), Rung.FULL)
 
 

@@ -6,8 +6,8 @@ The rungs, from the cheapest up:
   dissipates; that its changing normal force does not either is found, not proved. Up to half of the torque
   that rigid pulleys would carry, 2 mu thrust R / cos(half wedge angle): beyond, the belt may slip through.
 - COARSE, a transient of 0.6 times the stations, a step 1/0.6 times as long, over 0.3 of the duration. Its
-  class is taken if the amplitudes lie a factor of two (`least_margin`) above or below the threshold: a
-  coarse mesh shifts the edges of a window by less than a step of the load, but it does shift them. Its mean
+  class is taken if amplitudes and slip lie a factor of two (`least_margin`) above or below their thresholds:
+  a coarse mesh shifts the edges of a window by less than a step of the load, but it does shift them. Its mean
   forces are taken always, since vibration hardly moves them.
 - FULL, the transient that the job describes: where the coarse one is undecided, near the threshold, not to
   be trusted, or refused for a run so short; and for the amplitude of what vibrates.

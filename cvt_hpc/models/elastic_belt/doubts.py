@@ -10,12 +10,14 @@ from cvt_hpc.models.elastic_belt.sampling import (
     LARGEST_ELEMENT_STRAIN,
     LARGEST_STRAIN,
     LEAST_SPEED,
+    MOST_SPEED,
     Outcome,
 )
 from cvt_hpc.variables import Status
 
 LARGEST_POWER_RESIDUAL = 0.02
 
+# Of an end with a result the status is done.
 FAILURES = {
     Outcome.NO_CONTACT_SOLUTION: (
         Status.FAILED_NUMERICS,
@@ -30,10 +32,14 @@ FAILURES = {
         Status.FAILED_NUMERICS,
         f"strain is beyond {LARGEST_STRAIN:.0%} in the rings or {LARGEST_ELEMENT_STRAIN:.0%} in the elements",
     ),
-    # physics, no fault of the numerics: the torque is more than friction carries
+    # results, and no faults: the torque is more than friction carries, and nothing new would come of the rest
     Outcome.SLIPPED_THROUGH: (
-        Status.FAILED_ERROR,
+        Status.DONE,
         f"the belt slips through: the driven pulley has lost {1 - LEAST_SPEED:.0%} of its speed",
+    ),
+    Outcome.RAN_AWAY: (
+        Status.DONE,
+        f"the belt slips through: the driven pulley has gained {MOST_SPEED - 1:.0%} of its speed",
     ),
 }
 

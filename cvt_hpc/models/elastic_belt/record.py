@@ -10,8 +10,10 @@ import numpy as np
 from cvt_hpc.models.elastic_belt import fluctuation
 from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.models.elastic_belt.history import histories
-from cvt_hpc.variables import Coordinate, Variable
-from cvt_hpc.vibration import assessment
+from cvt_hpc.models.elastic_belt.slip import PULLEYS, slid, slip_margin, with_slip
+from cvt_hpc.models.elastic_belt.slip import VARIABLE as SLIP_MARGIN
+from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+from cvt_hpc.vibration import assessment, ramp
 from cvt_hpc.vibration.signals import amplitude_spectrum, band_amplitude
 
 if TYPE_CHECKING:
@@ -30,7 +32,6 @@ __all__ = [
 ]
 
 STRANDS = ("t1", "t2")
-PULLEYS = ("driving", "driven")
 MODES = 5  # half waves along a strand that are told apart
 
 LOSSES = (
@@ -45,6 +46,7 @@ LOSSES = (
 
 VARIABLES = (
     *assessment.VARIABLES,
+    *ramp.VARIABLES,
     Variable(
         "mode", ("strand",), "i1", "1", "half waves of the strongest mode of the strand in the band; 0: none"
     ),
@@ -58,6 +60,7 @@ VARIABLES = (
     Variable(
         "slip", ("pulley",), "f8", "1", "mean tangential sliding over belt speed, weighted by contact force"
     ),
+    SLIP_MARGIN,
     Variable("open_share", ("pulley",), "f8", "1", "mean share of the wrap that is out of contact"),
     Variable("flank_loss", ("pulley",), "f8", "W", "mean friction power of the flanks"),
     Variable("thrust_ratio", (), "f8", "1", "mean axial force of the driving over that of the driven pulley"),
@@ -103,34 +106,62 @@ def coordinates(parameters: dict[str, Any]) -> dict[str, Coordinate]:
         "arc_part": Coordinate(
             np.arange(1, fluctuation.ARC_PARTS + 1), "1", "part of the wrap, from its inlet to its outlet"
         ),
+        "ramp_share": ramp.coordinate(),
         "half_waves": Coordinate(np.arange(1, MODES + 1), "1", "half waves along the strand"),
         "frequency_bin": Coordinate(bins, "Hz", "frequency"),
     }
 
 
 def judge(run: RecordedRun) -> dict[str, Any]:
-    """The record of a run that has reached its end, its cost apart.
+    """The record of a run that has reached its end, or slipped through before, its cost apart.
 
     Parameters
     ----------
     run : RecordedRun
-        With all samples recorded.
+        With all samples recorded, or those until it slipped through.
     """
+    if run.failure is not None:
+        return _slipped(run, *run.failure)
     found = assess(run)
     return found.record() | evaluate(run, found.strongest_probe)
 
 
 def assess(run: RecordedRun) -> assessment.Occurrence:
     """Whether and how a run vibrates that has reached its end; its probes are columns of the displacement."""
+    p = run.parameters
+    if p["load_history"] == "ramp":
+        found = _assess_ramp(run)
+    else:
+        columns, strands = _on_strands(run)
+        found = assessment.assess(run.displacement[:, columns], p["sampling_rate"], strands, p)
+        found = replace(found, strongest_probe=columns[found.strongest_probe])
+    return with_slip(run, found)
+
+
+def _assess_ramp(run: RecordedRun) -> ramp.RampOccurrence | None:
+    """Whether and how a run vibrates along a ramp of load; None if it ended too soon to tell."""
+    p, first = run.parameters, run.kick
+    columns, strands = _on_strands(run)
+    rate, moved = p["sampling_rate"], run.displacement[first:, columns]
+    loads = run.channel("load")[first:]
+    found = ramp.assess_ramp(moved, rate, strands, loads, run.samples - first, p)
+    return found and replace(found, strongest_probe=columns[found.strongest_probe])
+
+
+def _on_strands(run: RecordedRun) -> tuple[np.ndarray, list[str]]:
+    """Columns of the displacement whose probes lie on strands, and on which."""
     regions = [probe.label.split()[0] for probe in run.probes]
-    on_strands = [k for k, region in enumerate(regions) if region in STRANDS]
-    found = assessment.assess(
-        run.displacement[:, on_strands],
-        run.parameters["sampling_rate"],
-        [regions[k] for k in on_strands],
-        run.parameters,
-    )
-    return replace(found, strongest_probe=np.array(on_strands)[found.strongest_probe])
+    columns = [k for k, region in enumerate(regions) if region in STRANDS]
+    return np.array(columns), [regions[k] for k in columns]
+
+
+def _slipped(run: RecordedRun, status: Status, why: str) -> dict[str, Any]:
+    """The record of a run that has slipped through before its end: what is known until then."""
+    found = {"status": status, "vibrates": Vibrates.SLIPS, "reason": f"at {run.time * 1e3:.4g} ms: {why}"}
+    before = _assess_ramp(run) if run.parameters["load_history"] == "ramp" else None
+    if before is not None:
+        found = before.record() | found | {"reason": f"{found['reason']}; before: {before.reason}"[:240]}
+    return found | slid(run)
 
 
 def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
@@ -173,6 +204,7 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
         "mean_push_force": pair("push_force", STRANDS),
         "axial_force": axial,
         "slip": pair("slip", PULLEYS),
+        SLIP_MARGIN.name: slip_margin(run, judged),
         "open_share": pair("open_share", PULLEYS),
         "flank_loss": np.array([mean(f"{pulley}_flank_loss") for pulley in PULLEYS]),
         "thrust_ratio": axial[0] / axial[1],

@@ -86,14 +86,14 @@ class RecordedRun:
     ----------
     parameters
         As given.
-    mesh, probes, interval, samples
+    mesh, probes, interval, samples, kick
         Of the plan.
     rows : (done, S + C) array
         The sensors' displacement [m], the strands' modes [m], and CHANNELS; of who marches the run.
     done : int
         Samples recorded so far, up to the one at which the run failed; of who marches it.
     failure : (Status, str) or None
-        What has gone wrong, where the run cannot go on; of who marches it.
+        Why the run does not go on: what has gone wrong, or a result, with the status done; of who marches it.
     """
 
     rows: np.ndarray
@@ -103,7 +103,7 @@ class RecordedRun:
     def __init__(self, parameters: dict[str, Any], plan: Recording, sums: np.ndarray) -> None:
         self.parameters = parameters
         self.mesh, self.probes = plan.mesh, plan.probes
-        self.interval, self.samples = plan.interval, plan.samples
+        self.interval, self.samples, self.kick = plan.interval, plan.samples, plan.kick
         self._plan, self._sums = plan, sums
         self._sensed = plan.sensing.matrix.shape[0]
 

@@ -60,6 +60,7 @@ LARGEST_DISPLACEMENT = 10e-3  # [m]: the belt has left its grooves
 LARGEST_STRAIN = 0.05  # of the rings, which break at 1 %
 LARGEST_ELEMENT_STRAIN = 0.2  # gaps of a fifth: all the play in a few cells
 LEAST_SPEED = 0.5  # of the driven pulley's nominal speed: beyond the torque that friction carries
+MOST_SPEED = 1.5  # likewise, under a load that drives
 
 
 class Outcome(IntEnum):
@@ -71,6 +72,7 @@ class Outcome(IntEnum):
     LEFT_THE_GROOVES = 3
     OVERSTRAINED = 4
     SLIPPED_THROUGH = 5
+    RAN_AWAY = 6
 
 
 # Where a lane's run has to be stopped for the first time, or the last one: the `Outcome`, the time [s], and
@@ -252,14 +254,15 @@ def _watch(belt: LaneBelt, state: LaneState, stations: LaneArray, ended: LaneArr
         element_strain = maximum(absolute(stations[j, EPS_0]), element_strain)
     speed, c = state.scalars[0, SPEED], belt.constants
     total = fma(speed, 0.0, fma(state.scalars[0, POSITION], 0.0, like(content, speed)))
-    least = like(LEAST_SPEED * c[0, DRIVING_SPEED] / c[0, RATIO], speed)
+    nominal = like(c[0, DRIVING_SPEED] / c[0, RATIO], speed)
     code = like(0.0, speed)
     beyond = maximum(like(element_strain, speed) - LARGEST_ELEMENT_STRAIN, 0.0)
     beyond = maximum(like(strain, speed) - LARGEST_STRAIN, beyond)
     code = select(beyond > 0.0, 4.0, code)
     unsolved = state.contacts[0].scalars[0, UNSOLVED] + state.contacts[1].scalars[0, UNSOLVED]
     code = select(like(unsolved, speed) > 0.0, 1.0, code)
-    code = select(speed < least, 5.0, code)
+    code = select(speed < LEAST_SPEED * nominal, 5.0, code)
+    code = select(speed > MOST_SPEED * nominal, 6.0, code)
     code = select(like(largest, speed) > LARGEST_DISPLACEMENT, 3.0, code)
     code = select(total <= 0.0, code, 2.0)
     running = ended[0, OUTCOME] < 0.5

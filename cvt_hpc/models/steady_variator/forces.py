@@ -8,6 +8,7 @@ import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import DRIVEN_POSITION, DRIVEN_SPEED, V_ELEMENT, V_RING, Mesh, W
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, strains
+from cvt_hpc.models.elastic_belt.slip import largest_torque
 from cvt_hpc.models.steady_variator.walking import Steady
 from cvt_hpc.physics.compliance import contact_state
 
@@ -72,11 +73,13 @@ def quantities(steady: Steady, grid: Mesh) -> dict[str, Any]:
         axial[k] = pressing.sum()
         slip[k] = pressing @ around.tangential_sliding[arc] / (axial[k] * belt.belt_speed)
         opened[k] = sheave.weight[around.contact_force[arc] == 0.0].sum() / sheave.weight.sum()
+    carried = largest_torque(belt.law, belt.half_wedge_angle, grid.path, belt.belt_speed, axial)
     return {
         "mean_ring_tension": around.ring_tension[middles],
         "mean_push_force": around.push_force[middles],
         "axial_force": axial,
         "slip": slip,
+        "slip_margin": abs(steady.load) / carried - 1.0,
         "open_share": opened,
         "thrust_ratio": axial[0] / axial[1],
         "speed_loss": 1.0 - belt.ratio * steady.state.scalars[DRIVEN_SPEED] / belt.driving_speed,

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.models.alone import lane_key, lanes
-from cvt_hpc.models.elastic_belt.record import PULLEYS, STRANDS
+from cvt_hpc.models.elastic_belt.record import STRANDS
+from cvt_hpc.models.elastic_belt.slip import GROSS_SLIP, PULLEYS
+from cvt_hpc.models.elastic_belt.slip import VARIABLE as SLIP_MARGIN
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 
 __all__ = ["VARIABLES", "coordinates", "cost", "judge", "lane_key", "lanes", "solve"]
@@ -18,6 +20,7 @@ VARIABLES = (
     Variable("mean_push_force", ("strand",), "f8", "N", "push force in the middle of the strand"),
     Variable("axial_force", ("pulley",), "f8", "N", "axial force of the belt on a sheave"),
     Variable("slip", ("pulley",), "f8", "1", "tangential sliding over belt speed, weighted by contact force"),
+    SLIP_MARGIN,
     Variable("open_share", ("pulley",), "f8", "1", "share of the wrap that is out of contact"),
     Variable("thrust_ratio", (), "f8", "1", "axial force of the driving over that of the driven pulley"),
     Variable("speed_loss", (), "f8", "1", "1 - ratio x driven speed / driving speed"),
@@ -54,5 +57,9 @@ def judge(solution: dict[str, Any] | ValueError) -> dict[str, Any]:
     """The record of a run, its cost apart."""
     if isinstance(solution, ValueError):
         return {"status": Status.FAILED_NUMERICS, "reason": str(solution)}
+    largest = np.abs(solution["slip"]).max()
+    if largest > GROSS_SLIP:
+        reason = f"a steady state in which a pulley slips by {largest:.3g} of the belt's speed"
+        return {"status": Status.DONE, "vibrates": Vibrates.SLIPS, "reason": reason, **solution}
     reason = "a steady state, and whether it is stable is not asked here"
     return {"status": Status.DONE, "vibrates": Vibrates.UNDECIDED, "reason": reason, **solution}

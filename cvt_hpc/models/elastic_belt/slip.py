@@ -1,0 +1,122 @@
+"""Gross slip: how far the load lies from what friction carries, and when a run counts as slipping.
+
+The largest torque at the driving pulley is, by Bullinger et al. 2005, eq. 2,
+
+    M* = r (2 mu / cos delta_0) min(Q_dr, Q_dn),
+
+r being the driving pulley's radius, Q the axial forces of the belt on the sheaves and mu friction's
+coefficient at the sliding speed of gross slip. Under the axial forces that runs find they begin to slip
+grossly at 0.9 to 1.05 M*: ratios 0.5, 1 and 2.52, rigid and elastic sheaves, either sign of the load, mu_k
+0.06 and 0.1, gradients 0 to -1.2 s/m (96 stations, 0.8 s).
+
+Where the belt only creeps on a pulley, its mean sliding is up to 3 % of the belt's speed. Towards the largest
+torque that slip rises from 4 to 8 % within 1 % of the load; beyond, there are states in which a pulley slips
+by 8 to 40 % all the time, and then none. So a run slips grossly if a pulley's mean slip over the last half of
+the judged part is beyond GROSS_SLIP, or if the driven pulley loses or gains half of its speed before the
+run's end.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cvt_hpc.physics.friction import FrictionLaw, friction_coefficients, given_law
+from cvt_hpc.physics.geometry import Variator
+from cvt_hpc.variables import Variable, Vibrates
+from cvt_hpc.vibration.assessment import Occurrence
+from cvt_hpc.vibration.occurrence import LONGEST_REASON
+
+if TYPE_CHECKING:
+    from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
+
+PULLEYS = ("driving", "driven")
+GROSS_SLIP = 0.05  # of the belt's speed
+
+VARIABLE = Variable(
+    "slip_margin",
+    (),
+    "f8",
+    "1",
+    "load over the largest torque that friction carries under these axial forces, less 1; slips from about 0",
+)
+
+
+def largest_torque(
+    law: FrictionLaw, half_wedge_angle: float, path: Variator, belt_speed: float, axial_force: np.ndarray
+) -> float:
+    """Largest torque at the driving pulley that friction carries [N m].
+
+    Parameters
+    ----------
+    law : FrictionLaw
+        Of the flanks; read at the sliding speed of gross slip.
+    half_wedge_angle : float
+        [rad]
+    path : Variator
+        Radii of the pulleys, and lengths of the arcs.
+    belt_speed : float
+        [m/s]
+    axial_force : (2,) array
+        Of the belt on a sheave of the driving and of the driven pulley [N].
+    """
+    arcs = np.array([path.lengths[0], path.lengths[2]])
+    normal_force = axial_force / (arcs * np.cos(half_wedge_angle))
+    mu = friction_coefficients(law, np.full(2, GROSS_SLIP * belt_speed), normal_force)
+    return float(path.driving_radius * 2.0 / np.cos(half_wedge_angle) * (mu * axial_force).min())
+
+
+def slip_margin(run: RecordedRun, samples: slice) -> float:
+    """Load over the largest torque that friction carries, less 1, by the means of some samples."""
+    p, path = run.parameters, run.mesh.path
+    axial = np.array([run.channel(f"axial_force {pulley}")[samples].mean() for pulley in PULLEYS])
+    # a run may slip through before a constant load has risen to its value
+    load = p["load"] if p["load_history"] == "constant" else run.channel("load")[samples].mean()
+    carried = largest_torque(
+        given_law(p), p["half_wedge_angle"], path, p["driving_speed"] * path.driving_radius, axial
+    )
+    return float(abs(load) / carried - 1.0)
+
+
+def with_slip(run: RecordedRun, found: Occurrence) -> Occurrence:
+    """What was found of the vibration of a run that reached its end, with gross slip where there is some.
+
+    The margin is that to gross slip, where this is nearer than the one of the amplitude.
+    """
+    late = slice((run.judged.start + run.samples) // 2, run.samples)
+    slips = np.array([run.channel(f"slip {pulley}")[late].mean() for pulley in PULLEYS])
+    k = int(np.argmax(np.abs(slips)))
+    with np.errstate(divide="ignore"):
+        beyond = float(np.log(abs(slips[k]) / GROSS_SLIP))
+    if beyond <= 0.0:
+        return replace(found, margin=min(found.margin, -beyond))
+    reason = f"the {PULLEYS[k]} pulley slips by {abs(slips[k]):.3g} of the belt's speed; {found.reason}"
+    return replace(found, vibrates=Vibrates.SLIPS, reason=reason[:LONGEST_REASON], margin=beyond)
+
+
+def slide(run: RecordedRun) -> slice:
+    """Samples of a run that has slipped through from where a pulley began to slip grossly for good."""
+    slips = np.abs([run.channel(f"slip {pulley}") for pulley in PULLEYS]).max(axis=0)
+    gripping = np.flatnonzero(slips <= GROSS_SLIP)
+    first = gripping[-1] + 1 if gripping.size else 0
+    return slice(min(int(first), max(run.done - 1, 0)), run.done)
+
+
+def slid(run: RecordedRun) -> dict[str, Any]:
+    """What is known of a run that has slipped through before its end: means over its slide."""
+    samples = slide(run)
+
+    def pair(name: str) -> np.ndarray:
+        return np.array([run.channel(f"{name} {pulley}")[samples].mean() for pulley in PULLEYS])
+
+    p, axial = run.parameters, pair("axial_force")
+    return {
+        "slip": pair("slip"),
+        "axial_force": axial,
+        "open_share": pair("open_share"),
+        "thrust_ratio": axial[0] / axial[1],
+        "speed_loss": 1.0 - p["ratio"] * run.channel("driven_speed")[samples].mean() / p["driving_speed"],
+        VARIABLE.name: slip_margin(run, samples),
+    }

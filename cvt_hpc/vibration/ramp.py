@@ -1,0 +1,236 @@
+"""Whether a run vibrates anywhere along a ramp of load, between which loads, and how far at each.
+
+Under a ramp no part of the run stands for the whole, so all windows after the start-up are judged. The run
+vibrates if a strand stays above the threshold for SUSTAINED windows in a row, wherever that is. It is quiet
+only if no window is above, and the amplitude is not growing at the end. What is above the threshold more
+briefly is undecided: a slower ramp may tell. A vibration takes time to grow, so a fast ramp shows the onset
+late, by the load that it passes meanwhile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cvt_hpc.variables import Coordinate, Variable, Vibrates
+from cvt_hpc.vibration import signals
+from cvt_hpc.vibration.assessment import Occurrence
+from cvt_hpc.vibration.criterion import SHORTEST_SEGMENT, fitting_window
+from cvt_hpc.vibration.occurrence import LEAST_RISES, LONGEST_REASON
+
+Array = NDArray[np.float64]
+
+SUSTAINED = 4  # windows in a row: as many as the shortest judged part of a run at constant load has
+LEAST_PERIODS = 1.9  # of `band_low` in a window; four windows in five periods, the least judged, have 1.95
+BINS = 20  # parts of a ramp whose amplitudes are recorded
+
+VARIABLES = (
+    Variable(
+        "onset_load",
+        (),
+        "f8",
+        "N m",
+        "load at which vibration sets in along a ramp; not a number where it is there from the start",
+    ),
+    Variable(
+        "end_load",
+        (),
+        "f8",
+        "N m",
+        "load at which vibration ends along a ramp; not a number where it lasts to the end",
+    ),
+    Variable("ramp_load", ("ramp_share",), "f8", "N m", "mean load in parts of a ramp"),
+    Variable(
+        "ramp_amplitude",
+        ("strand", "ramp_share"),
+        "f8",
+        "m",
+        "mean band-limited amplitude in parts of a ramp of load",
+    ),
+)
+
+
+def coordinate() -> Coordinate:
+    """The dimension `ramp_share`: middles of the parts of a ramp, as shares of it."""
+    return Coordinate((np.arange(BINS) + 0.5) / BINS, "1", "share of the ramp of load, after rise_time")
+
+
+@dataclass(frozen=True)
+class RampOccurrence(Occurrence):
+    """As `Occurrence`, along a ramp: amplitude and frequency are those of the window that moves most.
+
+    Attributes
+    ----------
+    onset_load, end_load : float
+        Loads of the ramp between which the run vibrates [N m]; nan where it does not, and where vibration is
+        there from the ramp's start, or lasts to its end.
+    ramp_load : array, shape (BINS,)
+        Mean load in equal parts of the ramp [N m]; nan where no window lies.
+    ramp_amplitude : array, shape (strand, BINS)
+        Mean amplitude in them [m].
+    """
+
+    onset_load: float
+    end_load: float
+    ramp_load: Array
+    ramp_amplitude: Array
+
+    def record(self) -> dict[str, Any]:
+        """Return what a record holds of it: as of `Occurrence`, and VARIABLES."""
+        return super().record() | {variable.name: getattr(self, variable.name) for variable in VARIABLES}
+
+
+def assess_ramp(
+    displacement: ArrayLike,
+    rate: float,
+    strands: Sequence[str],
+    loads: ArrayLike,
+    samples: int,
+    parameters: Mapping[str, Any],
+) -> RampOccurrence | None:
+    """Judge a run under a ramp of load.
+
+    Parameters
+    ----------
+    displacement : array, shape (time, probe)
+        Displacement of the probes along the ramp, without the start-up before it [m].
+    rate : float
+        Sampling rate [Hz].
+    strands : sequence of str, length probe
+        The strand on which each probe lies.
+    loads : array, shape (time,)
+        Load at the same instants [N m].
+    samples : int
+        Samples of the whole ramp, of which a run that ended early has fewer.
+    parameters : mapping
+        As `assessment.assess` takes them.
+
+    Returns
+    -------
+    RampOccurrence or None
+        None where the run ended before it could be judged.
+    """
+    w, band = np.asarray(displacement, dtype=float), (parameters["band_low"], parameters["band_high"])
+    length = fitting_window(len(w) / rate, parameters["window_length"])
+    width = round(length * rate)
+    if width < SHORTEST_SEGMENT or length * band[0] < LEAST_PERIODS:
+        return None
+    centres, windows = signals.window_amplitudes(w, rate, band, length)
+    names = tuple(dict.fromkeys(strands))
+    members = [np.flatnonzero(np.asarray(strands) == name) for name in names]
+    strongest = np.array([columns[np.argmax(windows[:, columns].max(axis=0))] for columns in members])
+    levels = np.stack([windows[:, columns].max(axis=1) for columns in members], axis=1)
+    at = np.interp(centres, np.arange(len(w)) / rate, loads)
+    bins = np.minimum((centres * rate / samples * BINS).astype(int), BINS - 1)
+    verdict = _Passages(levels, at, parameters)
+    vibrates, reason = verdict.classify(names)
+    unknown = np.full(len(names), np.nan)
+    return RampOccurrence(
+        vibrates,
+        reason,
+        names,
+        levels.max(axis=0),
+        _frequencies(w, rate, band, strongest, windows, centres, width),
+        unknown,
+        unknown,
+        unknown,
+        strongest,
+        verdict.margin(vibrates),
+        *verdict.loads(),
+        _means(at[:, np.newaxis], bins)[0],
+        _means(levels, bins),
+    )
+
+
+class _Passages:
+    """Where amplitudes (window, strand) [m] at loads (window,) [N m] stay above the threshold."""
+
+    def __init__(self, levels: Array, loads: Array, parameters: Mapping[str, Any]) -> None:
+        self.levels, self.at = levels, loads
+        self.threshold, self.negligible = (
+            parameters[key] for key in ("amplitude_threshold", "negligible_amplitude")
+        )
+        self.tolerance = parameters["growth_tolerance"]
+        self.kept = np.stack([_sustained(strand >= self.threshold) for strand in levels.T], axis=1)
+        self.low = np.log(np.maximum(levels, np.finfo(float).tiny))
+
+    def classify(self, names: Sequence[str]) -> tuple[Vibrates, str]:
+        """Verdict and reason; `names` are those of the strands."""
+        top = f"at most {self.levels.max() * 1e6:.3g} um"
+        if self.kept.any():
+            which = [name for name, kept in zip(names, self.kept.T, strict=True) if kept.any()]
+            who = " and ".join(which) + (" vibrates" if len(which) == 1 else " vibrate")
+            onset, end = self.loads()
+            since = "the ramp's start" if np.isnan(onset) else f"{onset:.4g} N m"
+            until = "its end" if np.isnan(end) else f"{end:.4g} N m"
+            return Vibrates.YES, f"{who} from {since} to {until}, {top}"[:LONGEST_REASON]
+        place = f"between {self.at[0]:.4g} and {self.at[-1]:.4g} N m"
+        above = int((self.levels >= self.threshold).any(axis=1).sum())
+        if above:
+            return Vibrates.UNDECIDED, f"above the threshold in {above} windows only {place}, {top}"
+        last = self.low[-LEAST_RISES - 1 :]
+        rising = np.all(np.diff(last, axis=0) >= 0.0, axis=0) & (self.levels[-1] >= self.negligible)
+        if np.any(rising & (last[-1] - last[0] >= self.tolerance)):
+            return Vibrates.UNDECIDED, f"below the threshold {place}, {top}, but growing at the end"
+        return Vibrates.NO, f"quiet {place}, {top}"
+
+    def loads(self) -> tuple[float, float]:
+        """Load of the onset and of the end."""
+        vibrating = np.flatnonzero(self.kept.any(axis=1))
+        if not vibrating.size:
+            return np.nan, np.nan
+        return self._crossing(vibrating[0], -1), self._crossing(vibrating[-1], 1)
+
+    def margin(self, vibrates: Vibrates) -> float:
+        """As `occurrence.margin`: of the best SUSTAINED windows in a row, or of the largest window."""
+        over = self.low - np.log(self.threshold)
+        if vibrates is Vibrates.YES:
+            rows = np.lib.stride_tricks.sliding_window_view(over, SUSTAINED, axis=0)
+            return float(rows.min(axis=-1).max())
+        return float(-over.max()) if vibrates is Vibrates.NO else 0.0
+
+    def _crossing(self, k: int, step: int) -> float:
+        """Load between window k, in which a strand vibrates, and its neighbour on one side."""
+        if not 0 <= k + step < len(self.at):
+            return np.nan
+        strand = int(np.argmax(np.where(self.kept[k], self.levels[k], -1.0)))
+        inside, outside = self.low[[k, k + step], strand]
+        share = (inside - np.log(self.threshold)) / (inside - outside)
+        return float(self.at[k] + share * (self.at[k + step] - self.at[k]))
+
+
+def _sustained(above: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which windows belong to SUSTAINED or more in a row that are above."""
+    kept = np.zeros(len(above), bool)
+    borders = np.flatnonzero(np.diff(np.concatenate([[False], above, [False]])))
+    for first, last in borders.reshape(-1, 2):
+        kept[first:last] = last - first >= SUSTAINED
+    return kept
+
+
+def _frequencies(
+    w: Array,
+    rate: float,
+    band: tuple[float, float],
+    strongest: NDArray[np.int64],
+    windows: Array,
+    centres: Array,
+    width: int,
+) -> Array:
+    """Dominant frequency of each strand in the window that moves most [Hz], (strand,)."""
+    found = []
+    for probe in strongest:
+        first = round(centres[np.argmax(windows[:, probe])] * rate - (width - 1) / 2)
+        found.append(signals.dominant_frequency(w[first : first + width, probe], rate, band))
+    return np.array(found, dtype=float)
+
+
+def _means(values: Array, bins: NDArray[np.int64]) -> Array:
+    """Means of values (window, n) in BINS, (n, BINS); nan where no window lies."""
+    counts = np.bincount(bins, minlength=BINS)
+    with np.errstate(invalid="ignore"):
+        return np.stack([np.bincount(bins, column, BINS) / counts for column in values.T])
