@@ -14,8 +14,10 @@ from cvt_hpc.models.elastic_belt.imex_work import (
     FLANK_SLOPE,
     LAG,
     LAST_U,
+    MEETING,
     PUSH,
     REVERSING,
+    RING_REVERSING,
     SLOPE,
     Y_0,
     Y_1,
@@ -48,6 +50,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     FORCE,
     PER_SPEED,
     RING_FACTOR,
+    SADDLE,
     SLIDING_T,
     lane_transverse,
     ring_grip,
@@ -88,7 +91,9 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
     zero = like(0.0, sine)
     for j in range(n):
         share = belt.arc_share[j]
-        if again and (share == 0.0 or not anywhere(stations[j, REVERSING] > 0.5)):
+        if again and (
+            share == 0.0 or not anywhere(stations[j, REVERSING] + stations[j, RING_REVERSING] > 0.5)
+        ):
             continue
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
         dual, per_left, span = belt.dual[j], belt.per_cell[a], belt.per_span[j]
@@ -119,6 +124,9 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
             grip = ring_grip(belt, j, ring_left, ring_right, ring_relief * longer, ring_friction)
             drag = grip * ring_factor
             stiff = grip * (fma(-ring_factor, ring_factor, 1.0) * per_ring_width)
+            if again:
+                # by the secant friction stops, and never turns the sliding about
+                stiff = select(stations[j, RING_REVERSING] > 0.5, drag / stations[j, SADDLE], stiff)
 
             # Bullinger et al. 2005, eqs 37-39, with the slopes of friction along and across the sliding
             mu = coefficient * factor
@@ -130,7 +138,6 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
             friction = twice_normal * mu
             tangential = -friction * run
             across = friction * per_speed
-            # by the secant friction stops, and never throws back
             thrown = stations[j, REVERSING] > 0.5 if again else share < zero
             along = twice_normal * coefficient * (fma(-factor, factor, 1.0) * per_width)
             along, across = implicit_shares(select(thrown, across, along), across, element_rate)
@@ -147,7 +154,9 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
             stations[j, FLANK], stations[j, FLANK_SLOPE] = tangential, flank_slope
             stations[j, FLANK_CROSS] = cross
             if not again:
-                stations[j, REVERSING] = zero
+                stations[j, REVERSING] = stations[j, RING_REVERSING] = zero
+        if not again:
+            stations[j, MEETING] = zero
         along_element = fma(outward, slope, along_element)
         mobility = 1.0 / radial_mass
         push, lag = (transverse + outward) * mobility, cross * mobility

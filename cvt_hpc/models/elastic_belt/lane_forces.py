@@ -70,10 +70,10 @@ LEAST_SHARE_OF_WIDTH = 1e-3  # of friction_speed: below it friction is linear to
 
 # Of a state, by `derive`: axial line force; the cells' strains, 1 / (1 + strain) and 1 / content. By
 # `lane_sliding`: sliding speeds, the law's coefficient, tanh of sliding speed over regularisation, 1 / that
-# speed, the same tanh of rings.
+# speed, the same tanh of rings, the elements' sliding speed under them.
 FORCE, EPS_0, EPS_1, SHORT_0, SHORT_1, PER_CONTENT_0, PER_CONTENT_1 = range(7)
-SLIDING_R, SLIDING_T, COEFFICIENT, FACTOR, PER_SPEED, RING_FACTOR = range(7, 13)
-FIELDS_OF_FORCES = 13
+SLIDING_R, SLIDING_T, COEFFICIENT, FACTOR, PER_SPEED, RING_FACTOR, SADDLE = range(7, 14)
+FIELDS_OF_FORCES = 14
 
 
 @kernel
@@ -255,3 +255,4 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
             (1.0 + rest) * per_flank,
         )
         stations[j, RING_FACTOR] = with_sign_of((1.0 - ring_rest) / (1.0 + ring_rest), saddle)
+        stations[j, SADDLE] = saddle
