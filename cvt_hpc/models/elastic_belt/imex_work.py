@@ -10,11 +10,11 @@ from cvt_hpc.models.elastic_belt.lane_belt import LaneState
 from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES
 
 # fields of ImexWork.stations, after those of `lane_forces`
-LAST_U, PUSH, LAG, SLOPE, FLANK, FLANK_SLOPE, FLANK_CROSS = range(FIELDS_OF_FORCES, 21)
-REVERSING, RING_REVERSING, MEETING, AHEAD = range(21, 25)
-D_00, D_01, D_11, Y_0, Y_1 = range(25, 30)
-I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(30, 41)
-FIELDS_OF_WORK = 41
+LAST_U, PUSH, LAG, SLOPE, FLANK, FLANK_SLOPE, FLANK_CROSS = range(FIELDS_OF_FORCES, 24)
+REVERSING, RING_REVERSING, MEETING, AHEAD = range(24, 28)
+D_00, D_01, D_11, Y_0, Y_1 = range(28, 33)
+I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(33, 44)
+FIELDS_OF_WORK = 44
 
 
 class ImexWork(NamedTuple):
@@ -22,7 +22,7 @@ class ImexWork(NamedTuple):
 
     Attributes
     ----------
-    stations : (N, 41) LaneArray
+    stations : (N, 44) LaneArray
         The fields of `lane_forces`; u one step earlier. Of the step: pending increment of u, its sensitivity
         to v_element's, slope w_s, the flanks' tangential force and its slopes, whether (1) the linearised
         friction would turn the sliding of the flanks, or of the saddle, about, whether (1) the elements of
