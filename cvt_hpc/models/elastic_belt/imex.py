@@ -29,7 +29,6 @@ from cvt_hpc.models.elastic_belt.imex_work import (
     FLANK_CROSS,
     FLANK_SLOPE,
     LAG,
-    LAST_U,
     LINK_0,
     PUSH,
     SLOPE,
@@ -133,7 +132,6 @@ def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
         dv = stations[j, DV_0]
         u = fields[j, U]
         du = fma(-stations[j, LAG], dv, stations[j, PUSH])
-        stations[j, LAST_U] = u
         u = u + du
         fields[j, U] = u
         w = fields[j, W]
