@@ -69,7 +69,7 @@ class ExplicitWork(NamedTuple):
 
     Attributes
     ----------
-    stations : (N, 19) LaneArray
+    stations : (N, 23) LaneArray
         The fields of `lane_forces`; slope w_s; a step's increments of u, v_element and v_ring; forces of the
         layers' dampers in the cells.
     """

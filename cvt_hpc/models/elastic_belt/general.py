@@ -221,6 +221,7 @@ class GeneralTransient(Marched, RecordedRun):
         profiles = self._profiles[int(self.done >= self._plan.first_judged)]
         place = self._plan.sensing, self._rows, self.done, profiles, self._ended
         sample_state(self._lane_belt, lane, self._stations, *place)
+        self._rows.data[self.done, -1, 0] = np.nan  # its steps are not seen here: no step_ripple
         outcome = int(self._ended.data[0, OUTCOME, 0])
         self.done += int(outcome == Outcome.OK)
         return outcome

@@ -29,7 +29,6 @@ from cvt_hpc.models.elastic_belt.imex_work import (
     FLANK_CROSS,
     FLANK_SLOPE,
     LAG,
-    LAST_U,
     LINK_0,
     PUSH,
     SLOPE,
@@ -59,7 +58,9 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     lane_sliding,
 )
 
-MOST_PASSES = 3  # one, unless friction turns sliding about; a third where the second turns others
+# One, unless friction turns sliding about or elements meet; then each closes the cells beside the last ones,
+# and a push goes through c dt / h of them in a step.
+MOST_PASSES = 9
 
 
 @kernel
@@ -78,7 +79,7 @@ def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
     for attempt in range(MOST_PASSES):
         assemble(belt, state, work, step, attempt > 0)
         eliminate(belt, state, work, step)
-        if not substitute(belt, work, scalars):
+        if not substitute(belt, work, scalars, step):
             break
     moment = _advance(belt, state, work, step)
     advance_pulley(belt, state, stations, moment, step)
@@ -131,7 +132,6 @@ def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
         dv = stations[j, DV_0]
         u = fields[j, U]
         du = fma(-stations[j, LAG], dv, stations[j, PUSH])
-        stations[j, LAST_U] = u
         u = u + du
         fields[j, U] = u
         w = fields[j, W]

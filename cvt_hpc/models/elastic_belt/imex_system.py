@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel, merged_kernel
-from cvt_hpc.lanes import LaneArray, anywhere, fma, like, minimum, select
+from cvt_hpc.lanes import LaneArray, absolute, anywhere, fma, like, minimum, select
 from cvt_hpc.models.elastic_belt.belt import V_ELEMENT, V_RING, U
 from cvt_hpc.models.elastic_belt.imex_work import (
+    AHEAD,
     D_00,
     D_01,
     D_11,
@@ -21,8 +22,10 @@ from cvt_hpc.models.elastic_belt.imex_work import (
     LAG,
     LINK_0,
     LINK_1,
+    MEETING,
     PUSH,
     REVERSING,
+    RING_REVERSING,
     SLOPE,
     Y_0,
     Y_1,
@@ -35,6 +38,8 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     FRICTION_SPEED,
     REPEATS,
     RING_DAMPING,
+    RING_FRICTION_SPEED,
+    RING_OFFSET,
     RING_STIFFNESS,
     LaneBelt,
     LaneState,
@@ -44,6 +49,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     EPS_1,
     PER_CONTENT_0,
     PER_CONTENT_1,
+    SADDLE,
     SHORT_0,
     SLIDING_R,
     SLIDING_T,
@@ -52,11 +58,14 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
 # Share of the speeds' change in a step that the rings' stress feels. From 1/4 on it is stable for any step
 # and damps nothing (Newmark); the rest keeps changing contact from exciting the shortest waves at long steps.
 CENTRED = 0.35
+# Overlap of elements, in strain, from which a cell that a step has taken as apart is closed in it: 500 N of
+# the default belt, a tenth of its rings' tension.
+LARGEST_OVERLAP = 1.25e-5
 FADED = 0.1  # [N s/m]: couplings of stations are 1e3 and more
 
 
 @merged_kernel
-def _element_stress(stiffness, grip, eps, closing, ahead, per_length, last):
+def _element_stress(stiffness, grip, eps, closing, ahead, per_length, last, meet):
     """-P in a cell [N] with the speeds that the step begins with, and its slope with their change.
 
     Parameters
@@ -69,12 +78,14 @@ def _element_stress(stiffness, grip, eps, closing, ahead, per_length, last):
         Strain at the end of the step with these speeds, and its slope with the difference [s/m].
     last
         Slope of -P in the step before [N s/m]: 0 where the elements were apart.
+    meet
+        1 where the step was found to press elements together that it had taken as apart.
     """
     viscous = grip * closing
     # elements never pull: their damper ends where it would outweigh the push force
     pulls = viscous > -stiffness * eps
     viscous, grip = select(pulls, -stiffness * minimum(eps, 0.0), viscous), select(pulls, 0.0, grip)
-    apart = (eps >= 0.0) & (ahead >= 0.0) & (pulls | (last <= 0.0))
+    apart = (eps >= 0.0) & (ahead >= 0.0) & (pulls | (last <= 0.0)) & (meet < 0.5)
     stress = select(apart, 0.0, fma(stiffness, ahead, viscous))
     return stress, select(apart, 0.0, fma(stiffness, per_length, grip))
 
@@ -105,14 +116,17 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
             lifts = fields[j, U] + stations[j, PUSH] + fields[b, U] + stations[b, PUSH]
             outflow = fma(0.5 * kappa * belt.cell[j], lifts, outflow)
         per_length = (step * per_cell) * stations[j, PER_CONTENT_0]
+        ahead = fma(per_length, outflow, eps)
+        stations[j, AHEAD] = ahead
         stress_0, e0 = _element_stress(
             element_stiffness,
             element_damping * per_cell,
             eps,
             closing_0,
-            fma(per_length, outflow, eps),
+            ahead,
             per_length,
             stations[j, LINK_0],
+            stations[j, MEETING],
         )
         grip = ring_damping * per_cell
         stress_1 = fma(ring_stiffness, stations[j, EPS_1], grip * closing_1)
@@ -161,17 +175,21 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
 
 
 @kernel
-def substitute(belt: LaneBelt, work: ImexWork, scalars: LaneArray) -> bool:
-    """Back substitution: DV become the increments of v_element and v_ring. Whether friction has to be redone.
+def substitute(belt: LaneBelt, work: ImexWork, scalars: LaneArray, step: float) -> bool:
+    """Back substitution: DV become the increments of v_element and v_ring. Whether the step has to be redone.
 
-    It has where a station slid in the saturated range and would now slide back. There the tangent of friction
-    is flat, the step all but explicit, and a large friction force turns the sliding about within a step: it
-    chatters, and takes energy out of nothing. Such stations are marked.
+    It has for two reasons, and marks the places:
+
+    - Flanks or saddles that slid in the saturated range would now slide back. There the tangent of friction
+      is flat, the step all but explicit, and a large friction force turns the sliding about within a step: it
+      chatters from step to step, and takes energy out of nothing.
+    - Elements that the step has taken as apart would be pressed together. Their push would set in a step
+      late, go on by one cell a step instead of at the speed of waves, and pile up.
     """
-    stations = work.stations
+    stations, c = work.stations, belt.constants
     last = belt.cell.size - 1
     x0, x1 = stations[last, DV_0], stations[last, DV_1]
-    width = belt.constants[0, FRICTION_SPEED]
+    width, ring_width, offset = c[0, FRICTION_SPEED], c[0, RING_FRICTION_SPEED], c[0, RING_OFFSET]
     saturated = width * width
     n0, n1 = x0, x1
     found = width < 0.0
@@ -185,6 +203,7 @@ def substitute(belt: LaneBelt, work: ImexWork, scalars: LaneArray) -> bool:
                 i01 = stations[j, I_01]
                 z0 = fma(stations[j, I_00], e0, fma(i01, e1, z0))
                 z1 = fma(i01, e0, fma(stations[j, I_11], e1, z1))
+            found |= _meeting(belt, stations, j, n0 - z0, step)
             n0, n1 = z0, z1
             stations[j, DV_0], stations[j, DV_1] = n0, n1
         if belt.arc_share[j] > 0.0:
@@ -196,5 +215,22 @@ def substitute(belt: LaneBelt, work: ImexWork, scalars: LaneArray) -> bool:
             back &= stations[j, REVERSING] < 0.5
             found |= back
             stations[j, REVERSING] = select(back, 1.0, stations[j, REVERSING])
+            saddle = stations[j, SADDLE]
+            change = fma(fma(offset, belt.arc_curvature[j], 1.0), n0, -n1)
+            back = (absolute(saddle) > ring_width) & (saddle * (saddle + change) < 0.0)
+            back &= stations[j, RING_REVERSING] < 0.5
+            found |= back
+            stations[j, RING_REVERSING] = select(back, 1.0, stations[j, RING_REVERSING])
+    found |= _meeting(belt, stations, last, n0 - x0, step)
     scalars[0, REPEATS] = scalars[0, REPEATS] + select(found, like(1.0, scalars[0, REPEATS]), 0.0)
     return anywhere(found)
+
+
+@merged_kernel
+def _meeting(belt: LaneBelt, stations: LaneArray, j: int, opening, step: float):
+    """Whether elements of cell j overlap that the step has taken as apart, by the change of `opening` [m/s]."""
+    per_length = (step * belt.per_cell[j]) * stations[j, PER_CONTENT_0]
+    overlap = fma(per_length, opening, stations[j, AHEAD]) < -LARGEST_OVERLAP
+    overlap &= (stations[j, LINK_0] <= 0.0) & (stations[j, MEETING] < 0.5)
+    stations[j, MEETING] = select(overlap, 1.0, stations[j, MEETING])
+    return overlap

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from cvt_hpc.lanes import LaneArray
-from cvt_hpc.models.elastic_belt.belt import U
 from cvt_hpc.models.elastic_belt.lane_belt import LaneState
 from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES
 
 # fields of ImexWork.stations, after those of `lane_forces`
-LAST_U, PUSH, LAG, SLOPE, FLANK, FLANK_SLOPE, FLANK_CROSS, REVERSING = range(FIELDS_OF_FORCES, 21)
-D_00, D_01, D_11, Y_0, Y_1 = range(21, 26)
-I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(26, 37)
-FIELDS_OF_WORK = 37
+PUSH, MOBILITY, LAG, SLOPE, GYROSCOPIC, FLANK, FLANK_SLOPE, FLANK_CROSS = range(FIELDS_OF_FORCES, 25)
+REVERSING, RING_REVERSING, MEETING, AHEAD = range(25, 29)
+D_00, D_01, D_11, Y_0, Y_1 = range(29, 34)
+I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(34, 45)
+FIELDS_OF_WORK = 45
 
 
 class ImexWork(NamedTuple):
@@ -21,10 +21,12 @@ class ImexWork(NamedTuple):
 
     Attributes
     ----------
-    stations : (N, 37) LaneArray
-        The fields of `lane_forces`; u one step earlier. Of the step: pending increment of u, its sensitivity
-        to v_element's, slope w_s, the flanks' tangential force and its slopes, whether (1) the linearised
-        friction would throw the station back; the blocks of the system and its right side; the eliminated
+    stations : (N, 45) LaneArray
+        The fields of `lane_forces`. Of the step: pending increment of u, that per line force, its sensitivity
+        to v_element's, slope w_s, the gyroscopic force of that increment, the flanks' tangential force and its slopes, whether (1) the linearised
+        friction would turn the sliding of the flanks, or of the saddle, about, whether (1) the elements of
+        the cell ahead of a station meet within the step, their strain at its end with the speeds that it
+        begins with; the blocks of the system and its right side; the eliminated
         system: inverse pivots, the increments of v_element and v_ring, the border, the stresses' slopes with
         the speeds' differences.
     """
@@ -35,6 +37,4 @@ class ImexWork(NamedTuple):
 def imex_work(state: LaneState) -> ImexWork:
     """Work space for a state; `derive` has to be called before the first step."""
     rows, _, lanes = state.fields.data.shape
-    stations = LaneArray(rows, FIELDS_OF_WORK, lanes, state.fields.data.dtype)
-    stations.data[:, LAST_U] = state.fields.data[:, U]
-    return ImexWork(stations)
+    return ImexWork(LaneArray(rows, FIELDS_OF_WORK, lanes, state.fields.data.dtype))

@@ -8,7 +8,7 @@ from cvt_hpc.models.elastic_belt.explicit import ExplicitWork, step_explicit
 from cvt_hpc.models.elastic_belt.imex import step_imex
 from cvt_hpc.models.elastic_belt.imex_work import ImexWork
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
-from cvt_hpc.models.elastic_belt.lane_forces import derive
+from cvt_hpc.models.elastic_belt.lane_forces import derive, note_speeds
 from cvt_hpc.models.elastic_belt.sampling import Sensors, sample
 
 
@@ -40,7 +40,8 @@ def march_imex(
         Which rows.
     """
     for k in range(first, last):
-        for _ in range(steps):
+        for taken in range(steps):
+            note_speeds(belt, state, work.stations, taken, steps)
             step_imex(belt, state, work, step)
         sample(belt, state, work.stations, sensing, rows, k, profiles, ended)
 
@@ -61,7 +62,8 @@ def march_explicit(
 ) -> None:
     """As `march_imex`, by the explicit step."""
     for k in range(first, last):
-        for _ in range(steps):
+        for taken in range(steps):
+            note_speeds(belt, state, work.stations, taken, steps)
             step_explicit(belt, state, work, step)
         sample(belt, state, work.stations, sensing, rows, k, profiles, ended)
 

@@ -85,6 +85,13 @@ VARIABLES = (
         "1",
         "what the power balance leaves open, over the larger of drive and losses",
     ),
+    Variable(
+        "step_ripple",
+        (),
+        "f8",
+        "m s-1",
+        "speed that alternates from step to step, root mean square over the belt's mass and the judged part",
+    ),
     *fluctuation.VARIABLES,
     Variable("least_strand_force", (), "f8", "N", "smallest T - P - m v^2 in a strand: below 0 it is slack"),
 )
@@ -217,6 +224,7 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
         **{name: mean(name) for name in LOSSES if "flank" not in name},
         "loss": loss,
         "power_residual": open_power / max(abs(mean("driving_power")), loss),
+        "step_ripple": np.sqrt(np.mean(run.channel("step_ripple")[judged] ** 2)),
         **fluctuation.record(run),
         "least_strand_force": run.channel("least_strand_force")[judged].min(),
     }

@@ -31,6 +31,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     EPS_1,
     FORCE,
     lane_load,
+    step_ripple,
 )
 from cvt_hpc.models.elastic_belt.moments import MOMENTS
 from cvt_hpc.models.elastic_belt.power import POWERS, audit
@@ -53,7 +54,7 @@ SCALARS = (
     "open_share driven",
     "least_strand_force",
 )
-CHANNELS = SCALARS + POWERS
+CHANNELS = (*SCALARS, *POWERS, "step_ripple")
 PROFILES = (*MOMENTS, "contact_force", "mean_displacement")
 
 LARGEST_DISPLACEMENT = 10e-3  # [m]: the belt has left its grooves
@@ -234,6 +235,7 @@ def sample(
         rows[k, sensed + 9 + wrap] = sliding / (maximum(axial, 1e-9) * c[0, BELT_SPEED])
         rows[k, sensed + 11 + wrap] = open_length / length
     audit(belt, state, stations, axial, sensing.interval, rows, k, sensed + 14, profiles)
+    rows[k, sensed + len(CHANNELS) - 1] = step_ripple(belt, state, stations)
     column = len(MOMENTS)
     for j in range(n):
         profiles[j, column] = profiles[j, column] + like(stations[j, FORCE], speed)
