@@ -17,11 +17,26 @@ NEEDS = (
 )
 
 
+def torque_limit(mu: Any, axial_force: Any, driving_radius: float, half_wedge_angle: float) -> Any:
+    """Torque at the driving pulley [N m] at which a pulley slips: Bullinger et al. 2005, eq. 2.
+
+    Parameters
+    ----------
+    mu : float or array
+        Coefficient of friction [1].
+    axial_force : float or array
+        Of the belt on a sheave [N]; the least result over both pulleys counts.
+    driving_radius, half_wedge_angle : float
+        [m], [rad].
+    """
+    return 2.0 * mu * axial_force * driving_radius / math.cos(half_wedge_angle)
+
+
 def carried_torque(parameters: Mapping[str, Any]) -> float:
     """Torque at the driving pulley [N m] that friction carries on rigid sheaves.
 
-    Bullinger et al. 2005, eq. 2: M* = 2 mu / cos(delta_0) r_dr Q. Here Q is the thrust on the driven pulley,
-    which is the one that a job prescribes, and mu is the level of `friction_level`.
+    By `torque_limit`, with the thrust on the driven pulley, which is the one that a job prescribes, and the
+    coefficient of `friction_level`.
 
     Parameters
     ----------
@@ -36,7 +51,7 @@ def carried_torque(parameters: Mapping[str, Any]) -> float:
     """
     p = parameters
     radius = p["driven_radius"] / p["ratio"]
-    return 2.0 * friction_level(p) * p["thrust"] * radius / math.cos(p["half_wedge_angle"])
+    return torque_limit(friction_level(p), p["thrust"], radius, p["half_wedge_angle"])
 
 
 def friction_level(parameters: Mapping[str, Any]) -> float:

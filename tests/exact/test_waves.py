@@ -6,7 +6,6 @@ from fast_runs import FastRuns
 from straight import LENGTH, WAVE, moving_straight, straight_belt
 
 from cvt_hpc.models.elastic_belt.belt import U, W
-from cvt_hpc.models.elastic_belt.imex_work import LAST_U
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.steppers import imex
 
@@ -28,20 +27,19 @@ def test_waves_keep_amplitude_and_frequency(share):
     number = 6.0 * np.pi / LENGTH  # six waves around, 13 stations each
     phase = number * belt.cell[0] * np.arange(belt.cell.size)
     omega = downstream(number, belt.cell[0], share)
-    # u half a step, last_u one and a half before w
+    # u half a step before w
     state.fields[W] = SIZE * np.cos(phase)
     state.fields[U] = SIZE * omega * np.sin(phase + 0.5 * omega * STEP)
     run = FastRuns([belt], [state])
-    run.work.stations.data[:, LAST_U, 0] = SIZE * omega * np.sin(phase + 1.5 * omega * STEP)
     track, stride = [], 10
     for _ in range(8000 // stride):
         run.advance(stride, STEP)
         track.append(2.0 * np.exp(1j * phase) @ run.state().fields[W] / (belt.cell.size * SIZE))
     assert run.outcome() is Outcome.OK
-    # Leapfrog keeps amplitudes, the extrapolated gyroscopic term changes them by up to 1 % in these 40 ms. Taken
-    # half a step late it would feed k v omega dt / 2, ten per second and more.
-    assert np.abs(track[-1]) == pytest.approx(np.abs(track[0]), rel=2e-2)
+    # Leapfrog and the gyroscopic term by the mean speed of a step keep amplitudes. Taken half a step late it would
+    # feed k v omega dt / 2, ten per second and more.
+    assert np.abs(track[-1]) == pytest.approx(np.abs(track[0]), rel=2e-3)
     turned = np.unwrap(np.angle(track))
-    # leapfrog: (omega dt)^2 / 24, the extrapolation below (omega dt)^2
+    # leapfrog: (omega dt)^2 / 24, the mean speed (omega dt)^2 / 8 of the gyroscopic part
     found = (turned[-1] - turned[0]) / ((len(track) - 1) * stride * STEP)
-    assert found == pytest.approx(omega, rel=(omega * STEP) ** 2)
+    assert found == pytest.approx(omega, rel=0.2 * (omega * STEP) ** 2)

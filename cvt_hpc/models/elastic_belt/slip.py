@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cvt_hpc.physics.capacity import torque_limit
 from cvt_hpc.physics.friction import FrictionLaw, friction_coefficients, given_law
 from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.variables import Variable, Vibrates
@@ -65,7 +66,7 @@ def largest_torque(
     arcs = np.array([path.lengths[0], path.lengths[2]])
     normal_force = axial_force / (arcs * np.cos(half_wedge_angle))
     mu = friction_coefficients(law, np.full(2, GROSS_SLIP * belt_speed), normal_force)
-    return float(path.driving_radius * 2.0 / np.cos(half_wedge_angle) * (mu * axial_force).min())
+    return float(torque_limit(mu, axial_force, path.driving_radius, half_wedge_angle).min())
 
 
 def slip_margin(run: RecordedRun, samples: slice) -> float:
