@@ -53,6 +53,9 @@ class Parameter:
     gives : Substitute or None
         Another parameter, in whose place a job may give this one. Such a parameter has no default: runs know
         it only if the job gives it.
+    chosen : Substitute or None
+        How the value follows from others where a job gives none, by the first of its `needs`; the default
+        then counts for nothing.
     """
 
     default: Any
@@ -65,6 +68,7 @@ class Parameter:
     choices: tuple[str, ...] = ()
     compared_only: bool = False
     gives: Substitute | None = None
+    chosen: Substitute | None = None
 
 
 def positive(default: float, unit: str, description: str) -> Parameter:

@@ -1,7 +1,8 @@
 """Which parameters of a job follow from others: its tables [derived] and [linked.AXIS], and substitutes.
 
 [derived] has formulas, [linked.AXIS] the parameters that follow an axis value by value. Substitutes are the
-model's: `belt_length` gives `driven_radius`. Each rule comes after those that give what it needs.
+model's: `belt_length` gives `driven_radius`, and the scene gives the time step where the job does not. Each
+rule comes after those that give what it needs.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from cvt_hpc.job.formula import read_formula
 from cvt_hpc.job.rules import Link, Rule, Substituted
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.values import kind_of
+from cvt_hpc.parameters import Substitute
 
 
 def read_derived(table: Mapping[str, Any], schema: Schema, source: str) -> list[Rule]:
@@ -122,17 +124,22 @@ def ordered_rules(rules: Iterable[Rule], given: Collection[str], schema: Schema,
 
 
 def _substituted(known: set[str], schema: Schema, source: str) -> dict[str, Rule]:
-    rules = {}
-    for key, parameter in schema.parameters.items():
-        if parameter.gives is None or key not in known:
-            continue
-        target = parameter.gives.key
+    rules: dict[str, Rule] = {}
+
+    def add(key: str, substitute: Substitute) -> None:
         where = f"{source}: [{schema.section_of[key]}] {key}"
+        target = substitute.key
         if target in known or target in rules:
             raise mismatch(where, f"either {key} or {target}", "both")
-        names = (key, *(need for need in parameter.gives.needs if need in schema.parameters))
-        source_of = Substituted(key, names, parameter.unit, parameter.gives)
+        names = (key, *(need for need in substitute.needs if need in schema.parameters and need != key))
+        source_of = Substituted(key, names, schema.parameters[key].unit, substitute)
         rules[target] = Rule(target, source_of, where, schema.parameters[target])
+
+    for key, parameter in schema.parameters.items():
+        if parameter.gives is not None and key in known:
+            add(key, parameter.gives)
+        if parameter.chosen is not None and key not in known:
+            add(parameter.chosen.needs[0], parameter.chosen)
     return rules
 
 

@@ -77,7 +77,7 @@ def _rules(job: Job) -> list[tuple[str, ...]]:
     varied = {derived.name: derived for derived in job.derived}
     rows = []
     for rule in job.rules:
-        if rule.key in varied:
+        if rule.key in varied and len(set(varied[rule.key].values)) > 1:
             values = _range_in_words(varied[rule.key])
             along = f"varies with {', '.join(varied[rule.key].axes)}"
         else:

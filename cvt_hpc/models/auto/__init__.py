@@ -5,7 +5,7 @@ package is cheap.
 """
 
 from cvt_hpc.models import elastic_belt
-from cvt_hpc.models.elastic_belt import check, inert
+from cvt_hpc.models.elastic_belt import CHOSEN, check, inert
 from cvt_hpc.parameters import Parameter, not_negative
 
 # Questions that a rung answers which is a model of its own, and why that one
@@ -37,6 +37,7 @@ REFUSED = elastic_belt.REFUSED | {
 
 __all__ = [
     "ANSWERED_BY",
+    "CHOSEN",
     "DEFAULT_STEPPER",
     "OWN_STEPPERS",
     "PARAMETERS",

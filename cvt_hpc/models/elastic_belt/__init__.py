@@ -4,6 +4,7 @@ Importing this package is cheap: kernels are compiled when `belt` is imported.
 """
 
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS, check, inert
+from cvt_hpc.models.elastic_belt.step_choice import CHOICE
 
 DEFAULT_STEPPER = "imex"
 # Steppers that the belt takes: two of its own, and general ones by `general`
@@ -26,4 +27,15 @@ REFUSED = {
     "has no set-valued forces",
 }
 
-__all__ = ["DEFAULT_STEPPER", "OWN_STEPPERS", "PARAMETERS", "REFUSED", "STEPPER_NAMES", "check", "inert"]
+CHOSEN = {"imex": {CHOICE.key: CHOICE}}  # by stepper: what follows from the scene where a job gives none
+
+__all__ = [
+    "CHOSEN",
+    "DEFAULT_STEPPER",
+    "OWN_STEPPERS",
+    "PARAMETERS",
+    "REFUSED",
+    "STEPPER_NAMES",
+    "check",
+    "inert",
+]

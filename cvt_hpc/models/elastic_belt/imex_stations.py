@@ -174,7 +174,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
 
 @kernel
 def _centre_gyroscopic(belt: LaneBelt, stations: LaneArray, gyroscopic) -> None:
-    """Take the gyroscopic force with the mean of u before and after the step: it then neither damps nor feeds.
+    """Take the gyroscopic force with the mean of u over the step: it then neither damps nor feeds.
 
     By one correction with the pending increments, since it changes them little: by v step / h, some 0.02.
     Extrapolated from earlier steps it feeds waves of a frequency w that run against the belt, at the rate

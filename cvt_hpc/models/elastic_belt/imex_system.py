@@ -228,7 +228,7 @@ def substitute(belt: LaneBelt, work: ImexWork, scalars: LaneArray, step: float) 
 
 @merged_kernel
 def _meeting(belt: LaneBelt, stations: LaneArray, j: int, opening, step: float):
-    """Whether elements of cell j overlap that the step has taken as apart, by the change of `opening` [m/s]."""
+    """Whether elements of cell j that the step has taken as apart overlap, as `opening` [m/s] changes."""
     per_length = (step * belt.per_cell[j]) * stations[j, PER_CONTENT_0]
     overlap = fma(per_length, opening, stations[j, AHEAD]) < -LARGEST_OVERLAP
     overlap &= (stations[j, LINK_0] <= 0.0) & (stations[j, MEETING] < 0.5)

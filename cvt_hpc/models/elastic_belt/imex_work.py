@@ -23,12 +23,12 @@ class ImexWork(NamedTuple):
     ----------
     stations : (N, 45) LaneArray
         The fields of `lane_forces`. Of the step: pending increment of u, that per line force, its sensitivity
-        to v_element's, slope w_s, the gyroscopic force of that increment, the flanks' tangential force and its slopes, whether (1) the linearised
-        friction would turn the sliding of the flanks, or of the saddle, about, whether (1) the elements of
-        the cell ahead of a station meet within the step, their strain at its end with the speeds that it
-        begins with; the blocks of the system and its right side; the eliminated
-        system: inverse pivots, the increments of v_element and v_ring, the border, the stresses' slopes with
-        the speeds' differences.
+        to v_element's, slope w_s, the gyroscopic force of that increment, the flanks' tangential force and
+        its slopes, whether (1) the linearised friction would turn the sliding of the flanks, or of the
+        saddle, about, whether (1) the elements of the cell ahead of a station meet within the step, their
+        strain at its end with the speeds that it begins with; the blocks of the system and its right side;
+        the eliminated system: inverse pivots, the increments of v_element and v_ring, the border, the
+        stresses' slopes with the speeds' differences.
     """
 
     stations: LaneArray

@@ -9,10 +9,11 @@ import numpy as np
 
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.elastic_belt.belt import State
-from cvt_hpc.models.elastic_belt.doubts import FAILURES
+from cvt_hpc.models.elastic_belt.doubts import FAILURES, step_doubt
 from cvt_hpc.models.elastic_belt.lane_belt import take_lane
 from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
 from cvt_hpc.models.elastic_belt.sampling import CONTACT_SOLVES, ENDED_AT, OUTCOME, REPEATED, Outcome
+from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
@@ -74,6 +75,13 @@ class LaneRun(RecordedRun):
         """What has gone wrong, where the run cannot go on."""
         outcome = int(self._ended(OUTCOME))
         return FAILURES[Outcome(outcome)] if outcome else None
+
+    def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
+        """Whether a run that reached its end is not to be trusted, as `RecordedRun` has it; or its step."""
+        found = super().numerical_doubt(record)
+        if found is None and self.batch.stepper == "imex":
+            found = step_doubt(self.step, transverse_limit(self.parameters))
+        return found
 
     @property
     def time(self) -> float:

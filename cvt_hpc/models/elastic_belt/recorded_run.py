@@ -151,7 +151,7 @@ class RecordedRun:
         Parameters
         ----------
         record : dict
-            With `power_residual` and `least_strand_force`.
+            With `power_residual`, `step_ripple` and `least_strand_force`.
 
         Returns
         -------

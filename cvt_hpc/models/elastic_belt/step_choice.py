@@ -1,0 +1,66 @@
+"""The step of `imex` for a scene: as long as accuracy and stability allow.
+
+**Accuracy.** The step is of first order: what it changes of a vibration's amplitude is in proportion to its
+length. REFERENCE_STEP changes it by at most REFERENCE_ERROR, at each ratio, law and stiffness tried; table in
+`README.md`.
+
+**Stability.** Transverse motion is explicit: beyond 2 / w the shortest waves grow, w being their angular
+frequency under bending, tension and contact (`transverse_limit`). Measured limits are 1.00 to 1.2 of that
+(`EDGES.md`); the step chosen stays at SAFE_SHARE of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.parameters import Substitute
+from cvt_hpc.physics.geometry import variator
+
+REFERENCE_STEP, REFERENCE_ERROR = 4.6e-6, 0.02  # [s], share of the amplitude
+SAFE_SHARE = 0.75
+NEEDS = (
+    "step_error",
+    "ratio",
+    "driven_radius",
+    "centre_distance",
+    "stations",
+    "thrust",
+    "element_mass",
+    "ring_mass",
+    "bending_stiffness",
+    "flank_stiffness",
+    "half_wedge_angle",
+)
+
+
+def transverse_limit(parameters: Mapping[str, Any]) -> float:
+    """Longest stable step of the transverse motion [s].
+
+    The fastest waves are two cells long, in the grooves:
+    w^2 = (16 EI / h^4 + 4 F / h^2 + 4 c_e tan^2 delta) / m.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat values [SI] of a run; F is the tension that the thrust has the grooves bear.
+    """
+    p = parameters
+    path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
+    cell = path.path_length / p["stations"]
+    slope = np.tan(p["half_wedge_angle"])
+    force = 2.0 * slope * p["thrust"] / np.pi
+    stiffness = 16.0 * p["bending_stiffness"] / cell**4 + 4.0 * force / cell**2
+    stiffness += 4.0 * slope**2 * p["flank_stiffness"]
+    return float(2.0 / np.sqrt(stiffness / (p["element_mass"] + p["ring_mass"])))
+
+
+def chosen_step(parameters: Mapping[str, Any]) -> float:
+    """Step of `imex` [s] for a scene, by flat values [SI] of NEEDS."""
+    accurate = REFERENCE_STEP * parameters["step_error"] / REFERENCE_ERROR
+    return min(accurate, SAFE_SHARE * transverse_limit(parameters))
+
+
+CHOICE = Substitute("step", NEEDS, chosen_step)
