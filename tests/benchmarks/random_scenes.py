@@ -1,0 +1,152 @@
+"""Random scenes by the default step against a step eight times shorter: does the map show physics only?
+
+    python tests/benchmarks/random_scenes.py OUT.csv [groups] [--explicit]
+
+A group is 16 scenes of one speed ratio and one friction law, which advance together; 125 groups (the default) take some
+50 minutes of processor time, on two cores. Ratio and law follow one Sobol sequence, all else another: driving speed,
+thrust, load, friction gradient and memory, stiffness of the sheaves (one in ten rigid), masses, bending stiffness.
+With --explicit the reference is the explicit step, for the first groups alone: 16 scenes take about two minutes.
+"""
+
+import argparse
+import csv
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import qmc
+
+from cvt_hpc.job import Job, build_job
+from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP
+from cvt_hpc.simulation import run_points
+from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
+
+LAWS = ("stribeck", "linear", "hyperbolic", "cubic")
+TOGETHER, FINER, SEED = 16, 8, 7
+BELT = {"belt_length": 0.6612, "centre_distance": 0.155, "duration": 0.4}
+THRESHOLD, NEAR = 5e-6, 0.2  # [m], and the share of it within which two classes may differ
+FOUND = (
+    "class",
+    "amplitude [um]",
+    "frequency [Hz]",
+    "power_residual",
+    "step_ripple [mm/s]",
+    "refinements",
+    "seconds",
+)
+GIVEN = ("ratio", "friction_law", "driving_speed", "thrust", "load_share", "friction_gradient", "friction_memory",
+         "sheave_stiffness", "element_mass", "ring_mass", "bending_stiffness")  # fmt: skip
+
+
+def scenes(groups: int) -> list[list[dict]]:
+    """Parameters [SI] of the scenes, by group."""
+    outer = qmc.Sobol(2, seed=SEED).random(groups)
+    inner = qmc.Sobol(9, seed=SEED + 1).random(groups * TOGETHER).reshape(groups, TOGETHER, 9)
+    return [
+        [_scene(float(0.45 * (2.6 / 0.45) ** a), LAWS[int(b * len(LAWS))], x) for x in inner[group]]
+        for group, (a, b) in enumerate(outer)
+    ]
+
+
+def _scene(ratio: float, law: str, x: np.ndarray) -> dict:
+    stiffness = np.inf if x[5] > 0.9 else 0.7 * 10 ** (x[5] / 0.9)
+    values = (
+        500.0 * 12.0 ** x[0] * np.pi / 30.0,  # 500 to 6000 rpm
+        5e3 * 16.0 ** x[1],  # to 80 kN
+        0.8 * x[2],  # of what friction carries: the belt slips from about 0.7 on
+        -1.2 * x[3],
+        1e-4 * 5.0 ** x[4],  # to 0.5 ms
+        stiffness,
+        0.7 * 2.0 ** x[6],  # each to 1.4 of the default's
+        0.3 * 0.7 * 2.0 ** x[7],
+        0.5 * 0.7 * 2.0 ** x[8],
+    )
+    return {"ratio": ratio, "friction_law": law} | dict(zip(GIVEN[2:], map(float, values), strict=True))
+
+
+def run_group(scenes_: list[dict], stepper: str, step: float | None) -> list[dict]:
+    """What was found of each scene of a group."""
+    values = {} if step is None else {"step": step}
+    jobs = [_job(scene | values, stepper) for scene in scenes_]
+    records = []
+    for first in range(0, len(jobs), TOGETHER):
+        part = jobs[first : first + TOGETHER]
+        records += run_points(part[0], [job.point(0) for job in part], lambda: None)
+    return [_found(record) for record in records]
+
+
+def _job(values: dict, stepper: str) -> Job:
+    return build_job({"name": "scene", "model": "elastic_belt", "stepper": stepper}, "scene", BELT | values)
+
+
+def _found(record: dict) -> dict:
+    kind = classify_runs(np.array(record["status"]), np.array(record["vibrates"]))
+    strongest = int(np.nanargmax(record["amplitude"])) if np.isfinite(record["amplitude"]).any() else 0
+    values = (
+        OccurrenceClass(int(kind)).label,
+        f"{record['amplitude'][strongest] * 1e6:.3f}",
+        f"{record['frequency'][strongest]:.1f}",
+        f"{record['power_residual']:.5f}",
+        f"{record['step_ripple'] * 1e3:.4f}",
+        record["refinements"],
+        f"{record['simulated_seconds']:.2f}",
+    )
+    return dict(zip(FOUND, values, strict=True))
+
+
+def report(pairs: list[tuple[dict, dict]]) -> list[str]:
+    """Lines: classes against classes, what contradicts, and how far amplitudes and frequencies lie apart."""
+    classes: dict[tuple[str, str], int] = {}
+    for pair in pairs:
+        key = tuple(found["class"] for found in pair)
+        classes[key] = classes.get(key, 0) + 1
+    lines = [
+        f"{count:5d}  {a} by the default, {b} by the reference" for (a, b), count in sorted(classes.items())
+    ]
+    contrary = [pair for pair in pairs if {found["class"] for found in pair} == {"quiet", "vibrating"}]
+    beyond = [pair for pair in contrary if _larger(pair) > (1.0 + NEAR) * THRESHOLD * 1e6]
+    lines.append(f"contradict: {len(contrary)}, {len(beyond)} of them beyond {NEAR:.0%} above the threshold")
+    both = [pair for pair in pairs if all(found["class"] == "vibrating" for found in pair)]
+    for name in ("amplitude [um]", "frequency [Hz]"):
+        off = [abs(float(a[name]) / float(b[name]) - 1.0) for a, b in both]
+        if off:
+            tell = np.percentile(off, [50, 90, 100]) * 100
+            lines.append(
+                f"{name.split()[0]} off by {tell[0]:.2f} % (median), {tell[1]:.2f} % (9 in 10), {tell[2]:.1f} %"
+            )
+    return lines
+
+
+def _larger(pair: tuple[dict, dict]) -> float:
+    return max(float(found["amplitude [um]"]) for found in pair)
+
+
+def main() -> None:
+    """Run, tabulate and report."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("table", type=Path)
+    parser.add_argument("groups", type=int, nargs="?", default=125)
+    parser.add_argument("--explicit", action="store_true")
+    arguments = parser.parse_args()
+    groups = scenes(arguments.groups)
+    reference = ("explicit", None) if arguments.explicit else ("imex", REFERENCE_STEP / FINER)
+    with ProcessPoolExecutor(2) as pool:
+        tasks = [
+            tuple(pool.submit(run_group, group, *how) for how in (("imex", None), reference))
+            for group in groups
+        ]
+        found = [
+            pair for default, finer in tasks for pair in zip(default.result(), finer.result(), strict=True)
+        ]
+    with arguments.table.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        sides = ("default", "reference")
+        writer.writerow([*GIVEN, *(f"{side} {name}" for side in sides for name in FOUND)])
+        for scene, pair in zip((scene for group in groups for scene in group), found, strict=True):
+            given = [value if isinstance(value, str) else f"{value:.4g}" for value in scene.values()]
+            writer.writerow([*given, *(value for side in pair for value in side.values())])
+    print(*report(found), sep="\n")
+
+
+if __name__ == "__main__":
+    main()
