@@ -105,8 +105,6 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
         slope = (fields[b, W] - fields[a, W]) * span
         transverse = lane_transverse(belt, fields, j, net_left, net_right, bending)
         transverse = fma(-gyroscopic, (fields[b, U] - fields[a, U]) * span, transverse)
-        if again:
-            transverse += stations[j, GYROSCOPIC]
         full_speed = belt_speed + v0
         v_radial = fma(full_speed, slope, u)
         outward = -damping * v_radial
@@ -168,6 +166,8 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
         stations[j, D_11] = dual * ring
         stations[j, Y_0] = dual * fma(-cross, push, along_element)
         stations[j, Y_1] = dual * along_ring
+        if again:
+            _push_more(belt, stations, j, stations[j, GYROSCOPIC])
     if not again:
         _centre_gyroscopic(belt, stations, gyroscopic)
 
@@ -186,8 +186,15 @@ def _centre_gyroscopic(belt: LaneBelt, stations: LaneArray, gyroscopic) -> None:
         here = stations[j, PUSH]
         ahead = stations[j + 1, PUSH] if j < n - 1 else first
         force = (-0.5 * gyroscopic) * ((ahead - behind) * belt.per_span[j])
-        more = stations[j, MOBILITY] * force
-        stations[j, GYROSCOPIC], stations[j, PUSH] = force, here + more
-        if belt.arc_share[j] > 0.0:
-            stations[j, Y_0] = fma(-belt.dual[j] * stations[j, FLANK_CROSS], more, stations[j, Y_0])
+        stations[j, GYROSCOPIC] = force
+        _push_more(belt, stations, j, force)
         behind = here
+
+
+@merged_kernel
+def _push_more(belt: LaneBelt, stations: LaneArray, j: int, force):
+    """Add a line force across the belt at station j to what `assemble` has found there."""
+    more = stations[j, MOBILITY] * force
+    stations[j, PUSH] = stations[j, PUSH] + more
+    if belt.arc_share[j] > 0.0:
+        stations[j, Y_0] = fma(-belt.dual[j] * stations[j, FLANK_CROSS], more, stations[j, Y_0])
