@@ -173,8 +173,10 @@ def sheet_of(arrangement: Arrangement) -> Sheet:
 
     runs, classes = grid(occurrence_classes(dataset)), grid(map_classes(dataset))
     vibrating = runs == OccurrenceClass.VIBRATING
-    # of a cell from two starts the amplitude is that from the small one
-    irregular = (runs == OccurrenceClass.IRREGULAR) & (grid(dataset["vibrates"]) == Vibrates.IRREGULAR)
+    irregular = runs == OccurrenceClass.IRREGULAR
+    if "vibrates" in dataset:
+        # of a cell from two starts the amplitude is that from the small one
+        irregular &= grid(dataset["vibrates"]) == Vibrates.IRREGULAR
     amplitude = grid(at_strongest_strand(dataset, "amplitude")) * 1e6
     return Sheet(
         arrangement,

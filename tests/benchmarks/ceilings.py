@@ -159,7 +159,7 @@ def count(step: float, precision: str) -> collections.Counter:
                 kept.append((module, name, thing))
                 setattr(module, name, plain)
     try:
-        state, work, belt = (_counting_tuple(part) for part in (batch.state, batch._work, batch._belt))
+        state, work, belt = (_counting_tuple(part) for part in (batch.state, batch.work, batch._belt))
         for _ in range(50):
             passes = state.scalars.data[0, REPEATS, 0]
             Counted.tally = collections.Counter()

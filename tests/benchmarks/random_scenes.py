@@ -40,8 +40,11 @@ GIVEN = ("ratio", "friction_law", "driving_speed", "thrust", "load_share", "fric
 
 def scenes(groups: int) -> list[list[dict]]:
     """Parameters [SI] of the scenes, by group."""
-    outer = qmc.Sobol(2, seed=SEED).random(groups)
-    inner = qmc.Sobol(9, seed=SEED + 1).random(groups * TOGETHER).reshape(groups, TOGETHER, 9)
+    power = (
+        groups - 1
+    ).bit_length()  # the sequences are balanced over powers of 2, of which the first are taken
+    outer = qmc.Sobol(2, seed=SEED).random_base2(power)[:groups]
+    inner = qmc.Sobol(9, seed=SEED + 1).random_base2(power + 4).reshape(-1, TOGETHER, 9)
     return [
         [_scene(float(0.45 * (2.6 / 0.45) ** a), LAWS[int(b * len(LAWS))], x) for x in inner[group]]
         for group, (a, b) in enumerate(outer)

@@ -105,7 +105,7 @@ def longest_belt(ratio):
 def test_one_belt_has_the_same_rings_and_elements_at_each_ratio():
     document = {
         "name": "x",
-        "model": "steady_variator",
+        "model": "elastic_belt",
         "scene": {"belt_length": BELT, "centre_distance": CENTRES},
     }
     job = build_job(document | {"axes": {"ratio": [0.5, 1.0, 2.5]}}, "x.toml")

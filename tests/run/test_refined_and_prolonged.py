@@ -161,7 +161,7 @@ def test_neighbours_that_are_refined_or_prolonged_change_nothing(script, precisi
     assert [record["refinements"] for record in together] == [0, 0, 0, 1, 3, 0, 2]
     times = [record["simulated_seconds"] / T for record in together]
     assert times[:5] + times[6:] == pytest.approx([1, 2, 4, 1, 1, 2])
-    assert [record["status"] for record in together[4:6]] == [Status.FAILED_NUMERICS, Status.FAILED_ERROR]
+    assert [record["status"] for record in together[4:6]] == [Status.FAILED_NUMERICS, Status.DONE]
     # other neighbours in the lanes that are filled again
     some = [points[k] for k in (6, 2, 3)]
     for record, place in zip(run_points(asked(), some, never), (6, 2, 3), strict=True):
@@ -228,7 +228,8 @@ def test_runs_without_lanes_go_on_as_well(transient, parameters):
     run = batch.paused()
     run.prolong(parameters(0.01))
     marched(run, 200)
-    assert np.array_equal(run.rows, whole.run.rows) and run.steps == whole.steps
+    # general steppers know no step_ripple
+    assert np.array_equal(run.rows, whole.run.rows, equal_nan=True) and run.steps == whole.steps
     assert run.samples == 200 and np.array_equal(run.displacement, whole.displacement)
     if hasattr(run, "means"):
         for name, values in whole.means.items():

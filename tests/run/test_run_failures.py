@@ -175,7 +175,7 @@ def test_a_search_for_the_closed_stations_that_does_not_end_ends_the_run(monkeyp
 def test_a_power_balance_that_is_not_a_number_is_no_balance(monkeypatch):
     # the judged part is complete, and one of its powers is spoiled
     def spoil(batch):
-        batch.rows.data[500, -2] = np.nan
+        batch.rows.data[500, -3] = np.nan  # before the stored energy and step_ripple
 
     found = poisoned(monkeypatch, spoil, when=600)
     assert found["status"] == Status.FAILED_NUMERICS

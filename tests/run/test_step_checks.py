@@ -130,7 +130,10 @@ def test_the_step_is_chosen_for_the_scene():
     assert chosen() == REFERENCE_STEP
     assert chosen(step_error=0.01) == pytest.approx(0.5 * REFERENCE_STEP)
     fine = job(stations=288).point(0)
-    assert chosen(stations=288) == SAFE_SHARE * transverse_limit(fine) < REFERENCE_STEP
+    assert chosen(stations=288) == pytest.approx(
+        SAFE_SHARE * transverse_limit(fine), rel=5e-3
+    )  # three digits
+    assert chosen(stations=288) < REFERENCE_STEP
     assert chosen(step=2e-6) == 2e-6
     assert chosen(stepper="explicit") == 1e-7
 

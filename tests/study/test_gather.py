@@ -76,7 +76,7 @@ def test_status_and_vibrates_are_cf_flags_and_come_first(out):
         assert status.flag_values.dtype == np.int8  # CF: of the type of the variable
         assert status.flag_values.tolist() == [0, 1, 2, 3, 4]
         assert status.flag_meanings == "not_run done failed_numerics failed_error timed_out"
-        assert file["vibrates"].flag_meanings == "no yes undecided"
+        assert file["vibrates"].flag_meanings == "no yes undecided slips irregular"
         assert "units" not in status.ncattrs()
 
 

@@ -58,9 +58,12 @@ def transverse_limit(parameters: Mapping[str, Any]) -> float:
 
 
 def chosen_step(parameters: Mapping[str, Any]) -> float:
-    """Step of `imex` [s] for a scene, by flat values [SI] of NEEDS."""
+    """Step of `imex` [s] for a scene, by flat values [SI] of NEEDS, to three digits.
+
+    So that scenes whose limits differ by rounding have one step, and advance together.
+    """
     accurate = REFERENCE_STEP * parameters["step_error"] / REFERENCE_ERROR
-    return min(accurate, SAFE_SHARE * transverse_limit(parameters))
+    return float(f"{min(accurate, SAFE_SHARE * transverse_limit(parameters)):.2e}")
 
 
 CHOICE = Substitute("step", NEEDS, chosen_step)
