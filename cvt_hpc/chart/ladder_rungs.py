@@ -91,7 +91,8 @@ def _check(job: Job) -> None:
         raise mismatch(f"{where}: [axes]", "load among the axes, for its onsets", ", ".join(axes) or "none")
     if (course := job.parameters["load_history"]) != "constant":
         raise mismatch(f"{where}: [scene] load_history", "constant, as the lower rungs have it", course)
-    varied = dict.fromkeys([rule.key for rule in job.rules], ("derived", "a formula"))
+    stated = [rule.key for rule in job.rules if not rule.is_substituted]
+    varied = dict.fromkeys(stated, ("derived", "a formula"))
     varied |= dict.fromkeys(axes, ("axes", "an axis"))
     for name in ("stations", "step", "duration", "longest_duration"):
         if name in varied:
@@ -112,7 +113,9 @@ def _handed(job: Job, model: str, table: dict[str, Any]) -> Job:
 def _refined(job: Job) -> dict[str, Any]:
     document = job.resolved()
     document["mesh"]["stations"] = round(FINER * job.parameters["stations"])
-    document["numerics"]["step"] = job.parameters["step"] / FINER
+    # a step that follows from the scene follows from that of the finer mesh
+    setting = "step_error" if any(rule.key == "step" for rule in job.rules) else "step"
+    document["numerics"][setting] = job.parameters[setting] / FINER
     for name in ("duration", "longest_duration"):
         document["run"][name] = LONGER * job.parameters[name]
     return document

@@ -82,6 +82,7 @@ def _read_link(name: str, raw: Any, axis: Axis, schema: Schema, where: str) -> R
 def overridden(keys: Collection[str], schema: Schema) -> set[str]:
     """Return what values of these keys put out of force: what they give, and what else would give them."""
     given = {schema.parameters[key].gives.key for key in keys if schema.parameters[key].gives}
+    given |= {key for key, p in schema.parameters.items() if p.chosen and p.chosen.needs[0] in keys}
     return given | {key for key, p in schema.parameters.items() if p.gives and p.gives.key in keys}
 
 

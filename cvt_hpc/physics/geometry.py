@@ -126,6 +126,15 @@ def driven_radius(ratio: float, belt_length: float, centre_distance: float) -> f
     return ratio * radius
 
 
+def cell_counts(path: Variator, cells: int) -> tuple[int, int, int, int]:
+    """Cells of each region of a path in `cells`, equal within a region and nearly equal over all.
+
+    At least four in each of the regions but the driven arc, which takes what the others leave.
+    """
+    driving, strand, _, _ = (max(round(cells * part / path.path_length), 4) for part in path.lengths)
+    return driving, strand, cells - driving - 2 * strand, strand
+
+
 def variator_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Problems of a variator's geometry, in the form of a model's check: (key, expected, found).
 

@@ -7,7 +7,8 @@ explicit step it is done in full.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job.handing import handed_to
 from cvt_hpc.models.auto.rules import COARSENESS, Rung
+from cvt_hpc.steppers import STEPPERS
 from cvt_hpc.study.audit import AUDITED, FULL_MODEL
 from cvt_hpc.study.records import Records
 from cvt_hpc.study.repeats import Repeat, built
@@ -89,7 +91,7 @@ def _section(job: Job) -> str:
 
 
 def _halved(job: Job) -> dict[str, Any]:
-    document = job.resolved()
+    document = _without(job.resolved(), _section(job), (STEP,))
     document[_section(job)][STEP] = 0.5 * job.parameters[STEP]
     return document
 
@@ -98,8 +100,17 @@ def _explicit(job: Job) -> dict[str, Any]:
     """The same runs by the explicit step with its own defaults, in full where the job climbs a ladder."""
     model = FULL_MODEL if job.model == AUDITED else job.model
     document = handed_to(job, model, "by the explicit step, to check the step")
-    document.pop(_section(job), None)
-    return document | {"stepper": EXPLICIT}
+    own = import_module(STEPPERS[job.stepper]).PARAMETERS[_section(job)]
+    return _without(document, _section(job), own) | {"stepper": EXPLICIT}
+
+
+def _without(document: dict[str, Any], section: str, keys: Iterable[str]) -> dict[str, Any]:
+    """The document without some keys, whether its tables, its formulas or its links give them."""
+    tables = (document.get(section, {}), document.get("derived", {}), *document.get("linked", {}).values())
+    for table in tables:
+        for key in keys:
+            table.pop(key, None)
+    return document
 
 
 def _eligible(records: Records) -> NDArray[np.bool_]:

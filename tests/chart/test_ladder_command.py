@@ -2,6 +2,7 @@
 
 import csv
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from cf import cf_findings
 from cvt_hpc.chart.ladder_rungs import ladder
 from cvt_hpc.cli import main
 from cvt_hpc.job import load_job
+from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
 
 JOB = """name = "small"
 model = "elastic_belt"
@@ -22,6 +24,14 @@ stations = 48
 [run]
 duration = "0.1 s"
 """
+
+
+def test_the_ladder_of_the_repository_has_all_its_rungs():
+    rungs, refusals = ladder(load_job(Path(__file__).parents[2] / "jobs" / "chart_ladder.toml"))
+    assert refusals == {} and len(rungs) == 8
+    reference = rungs[-1].job.point(0)
+    # its step follows from its own mesh
+    assert reference["step"] <= 0.75 * transverse_limit(reference) * 1.005
 
 
 @pytest.fixture

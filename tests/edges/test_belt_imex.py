@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from belts import point
 
-from cvt_hpc.models.elastic_belt.belt import belt_constants
+from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
 from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.variables import Status
 
@@ -18,13 +18,7 @@ RIGID = {"sheave_stiffness": np.inf, "friction_gradient": 0.0, "lag_stiffness": 
 
 def limit(values):
     """2 / w of the shortest wave across the belt: bending, tension and, in the grooves, the elements' flanks."""
-    belt = belt_constants(point("imex", **values))
-    h, tangent = belt.cell.min(), np.tan(belt.half_wedge_angle)
-    # what the thrust leaves of tension
-    tension = 2.0 * tangent * belt.thrust / (belt.driven.weight.sum() / belt.driven_radius)
-    stiffness = 16.0 * values.get("bending_stiffness", 0.5) / h**4 + 4.0 * tension / h**2
-    stiffness += 4.0 * tangent**2 * belt.driven.element_stiffness
-    return 2.0 / np.sqrt(stiffness / belt.mass)
+    return transverse_limit(point("imex", **values))
 
 
 def outcome(step, values):

@@ -10,7 +10,9 @@ import pytest
 from fast_runs import FastRuns
 from marched import fresh_record, job, record
 
+from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
+from cvt_hpc.models.auto.rules import coarse
 from cvt_hpc.models.elastic_belt.belt import V_ELEMENT, V_RING, U, belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.doubts import LARGEST_STEP_RIPPLE, doubt, step_doubt
 from cvt_hpc.models.elastic_belt.lane_forces import NOTED
@@ -151,3 +153,24 @@ def test_a_run_by_hand_beyond_the_limit_is_done_again_shorter():
     found = fresh_record(step=14e-6, stations=160, duration=0.04, rise_time=0.01, most_refinements=1)
     assert (found["status"], found["refinements"]) == (Status.DONE, 1)
     assert found["time_step"] <= 7e-6
+
+
+def test_what_asks_for_a_step_by_error_replaces_a_given_step():
+    document = {"name": "test", "model": "elastic_belt", "numerics": {"step": "2 us"}}
+    assert build_job(document, "test.toml", {}).point(0)["step"] == 2e-6
+    asked = build_job(document, "test.toml", {"step_error": 0.01})
+    assert asked.point(0)["step"] == pytest.approx(0.5 * REFERENCE_STEP)
+    # and the resolved job, which tells its error beside a given step, gives the same runs again
+    given = build_job(document, "test.toml", {})
+    assert build_job(given.resolved(), "test.toml", {}).fingerprint() == given.fingerprint()
+
+
+def test_pulleys_that_overlap_are_told_of_and_not_the_step():
+    with pytest.raises(InputError, match="ratio: expected pulleys that do not overlap"):
+        build_job({"name": "test", "model": "elastic_belt"}, "test.toml", {"driven_radius": 0.2})
+
+
+def test_a_coarse_run_stays_within_the_limit_of_its_mesh():
+    # where the contact sets the limit it does not grow with the cells
+    point = job(flank_stiffness=1.5e12).point(0) | {"question": "occurrence"}
+    assert coarse(point)["step"] <= SAFE_SHARE * transverse_limit(coarse(point)) * (1.0 + 1e-9)

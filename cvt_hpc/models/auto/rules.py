@@ -27,6 +27,7 @@ import numpy as np
 
 from cvt_hpc import recording
 from cvt_hpc.models import elastic_belt
+from cvt_hpc.models.elastic_belt.step_choice import SAFE_SHARE, transverse_limit
 from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.variables import Vibrates
 from cvt_hpc.vibration import criterion
@@ -64,9 +65,9 @@ def coarse(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
     p = {
         **parameters,
         "stations": round(COARSENESS * parameters["stations"]),
-        "step": parameters["step"] / COARSENESS,
         "duration": SHARE * parameters["duration"],
     }
+    p["step"] = min(p["step"] / COARSENESS, SAFE_SHARE * transverse_limit(p))
     least = elastic_belt.PARAMETERS["mesh"]["stations"].minimum
     problems = (check for module in (elastic_belt, criterion, recording) for check in module.check(p))
     if p["load_history"] != "constant" or p["stations"] < least or any(problems):

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.physics.friction import FrictionLaw, given_law
-from cvt_hpc.physics.geometry import Variator, variator
+from cvt_hpc.physics.geometry import Variator, cell_counts, variator
 from cvt_hpc.physics.sheaves import Sheaves, flexibility, sheaves
 
 FIELDS = ("w", "u", "v_element", "v_ring", "v_filtered", "n_element", "n_ring")
@@ -131,9 +131,7 @@ def mesh(parameters: dict[str, Any]) -> Mesh:
     path = variator(parameters["ratio"], parameters["driven_radius"], parameters["centre_distance"])
     total = parameters["stations"]
     lengths = np.array(path.lengths)
-    counts = np.maximum(np.rint(total * lengths / lengths.sum()).astype(int), 4)
-    counts[1] = counts[3]
-    counts[2] = total - counts[0] - 2 * counts[1]
+    counts = np.array(cell_counts(path, total))
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     return Mesh(tuple(map(int, counts)), tuple(map(int, starts)), np.repeat(lengths / counts, counts), path)
 

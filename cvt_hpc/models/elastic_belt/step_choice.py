@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.parameters import Substitute
-from cvt_hpc.physics.geometry import variator
+from cvt_hpc.physics.geometry import cell_counts, variator, variator_problems
 
 REFERENCE_STEP, REFERENCE_ERROR = 4.6e-6, 0.02  # [s], share of the amplitude
 SAFE_SHARE = 0.75
+SHORTEST = 1e-9  # [s], of a step: of scenes that are beyond all sense
 NEEDS = (
     "step_error",
     "ratio",
@@ -49,9 +50,10 @@ def transverse_limit(parameters: Mapping[str, Any]) -> float:
     """
     p = parameters
     path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
-    cell = path.path_length / p["stations"]
+    counts = cell_counts(path, p["stations"])
+    cell = min(length / count for length, count in zip(path.lengths, counts, strict=True))
     slope = np.tan(p["half_wedge_angle"])
-    force = 2.0 * slope * p["thrust"] / np.pi
+    force = 2.0 * slope * p["thrust"] / path.driven_wrap
     stiffness = 16.0 * p["bending_stiffness"] / cell**4 + 4.0 * force / cell**2
     stiffness += 4.0 * slope**2 * p["flank_stiffness"]
     return float(2.0 / np.sqrt(stiffness / (p["element_mass"] + p["ring_mass"])))
@@ -60,10 +62,13 @@ def transverse_limit(parameters: Mapping[str, Any]) -> float:
 def chosen_step(parameters: Mapping[str, Any]) -> float:
     """Step of `imex` [s] for a scene, by flat values [SI] of NEEDS, to three digits.
 
-    So that scenes whose limits differ by rounding have one step, and advance together.
+    So that scenes whose limits differ by rounding have one step, and advance together. Of a scene that is no
+    variator, which the model refuses, it is the one by accuracy alone.
     """
-    accurate = REFERENCE_STEP * parameters["step_error"] / REFERENCE_ERROR
-    return float(f"{min(accurate, SAFE_SHARE * transverse_limit(parameters)):.2e}")
+    step = REFERENCE_STEP * parameters["step_error"] / REFERENCE_ERROR
+    if not variator_problems(parameters):
+        step = min(step, SAFE_SHARE * transverse_limit(parameters))
+    return max(float(f"{step:.2e}"), SHORTEST)
 
 
 CHOICE = Substitute("step", NEEDS, chosen_step)
