@@ -25,6 +25,7 @@ FLAGS = {
     QUIET: (Status.DONE, Vibrates.NO),
     VIBRATING: (Status.DONE, Vibrates.YES),
     UNDECIDED: (Status.DONE, Vibrates.UNDECIDED),
+    IRREGULAR: (Status.DONE, Vibrates.IRREGULAR),
     FAILED: (Status.FAILED_NUMERICS, Vibrates.UNDECIDED),
 }
 
@@ -164,11 +165,12 @@ def test_nothing_is_inferred_before_all_corners_of_a_box_are_run():
 def test_the_published_map_is_traced_with_half_of_its_runs():
     with (HERE.parents[1] / "jobs" / "results" / "lebrecht_2004.csv").open() as table:
         rows = list(csv.DictReader(table))
-    verdicts = {"no": QUIET, "yes": VIBRATING, "undecided": UNDECIDED, "": FAILED}
+    verdicts = {"no": QUIET, "yes": VIBRATING, "undecided": UNDECIDED, "irregular": IRREGULAR, "": FAILED}
     truth = np.array([verdicts[row["vibrates"]] for row in rows], np.int8).reshape(5, 4, 19)
     for spacing in (4, 6, 8):
         done, inferred = traced(truth, [None, None, spacing])
-        assert ((inferred == VIBRATING) == (truth == VIBRATING)).all()
+        # but for the one vibrating cell between rigid sheaves, an island
+        assert ((inferred == VIBRATING) != (truth == VIBRATING)).sum() <= 1
         assert done.mean() < 0.5
         # what is missed are islands of one cell
         assert (inferred != truth).mean() < 0.05
