@@ -3,7 +3,7 @@
     python tests/benchmarks/random_scenes.py OUT.csv [groups] [--explicit]
 
 A group is 16 scenes of one speed ratio and one friction law, which advance together; 125 groups (the default) take some
-50 minutes of processor time, on two cores. Ratio and law follow one Sobol sequence, all else another: driving speed,
+80 minutes of processor time, on two cores. jobs/results/random_scenes.csv is of the first 12. Ratio and law follow one Sobol sequence, all else another: driving speed,
 thrust, load, friction gradient and memory, stiffness of the sheaves (one in ten rigid), masses, bending stiffness.
 With --explicit the reference is the explicit step, for the first groups alone: 16 scenes take about two minutes.
 """
