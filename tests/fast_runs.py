@@ -9,6 +9,7 @@ from cvt_hpc.models.elastic_belt.batch import STEPS
 from cvt_hpc.models.elastic_belt.belt import LAYER_WORK, Belt, State
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state, take_lane
 from cvt_hpc.models.elastic_belt.lane_forces import derive
+from cvt_hpc.models.elastic_belt.march import Sampled
 from cvt_hpc.models.elastic_belt.power import LAYER_LOSS, POWERS
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFILES, Outcome, Sensors
 
@@ -39,7 +40,7 @@ class FastRuns:
         n, width = belts[0].cell.size, len(belts)
         nowhere = np.zeros(2, dtype=np.int64)
         # an interval of 1 s: the dampers' mean power is their work since the last sample
-        self._sensing = Sensors(np.zeros((0, n), dtype), nowhere, nowhere, nowhere, 1.0)
+        self._sensing = Sensors(np.zeros((0, n), dtype), *[nowhere] * 5, 1.0)
         self._rows = LaneArray(1, len(CHANNELS), width)
         self._profiles = LaneArray(n, len(PROFILES), width)
         self._ended = LaneArray(1, len(ENDED), width)
@@ -55,6 +56,7 @@ class FastRuns:
             self.work,
             step,
             steps,
+            Sampled(self._constants, self.lanes, self.work.stations),
             self._sensing,
             self._rows,
             0,

@@ -26,20 +26,42 @@ from cvt_hpc.lanes.functions import (
     with_sign_of,
 )
 from cvt_hpc.lanes.kinds import ALIGNMENT, LaneArray
+from cvt_hpc.lanes.rings import (
+    ahead,
+    around,
+    at_station,
+    behind,
+    from_ahead,
+    from_behind,
+    merge_parts,
+    ring_solution,
+    set_station,
+    split,
+)
 
 __all__ = [
     "ALIGNMENT",
     "LaneArray",
     "absolute",
+    "ahead",
     "anywhere",
+    "around",
+    "at_station",
+    "behind",
     "decay",
     "fma",
+    "from_ahead",
+    "from_behind",
     "like",
     "maximum",
+    "merge_parts",
     "minimum",
     "nearest_integer",
     "reciprocals",
+    "ring_solution",
     "select",
+    "set_station",
+    "split",
     "sqrt",
     "with_sign_of",
 ]

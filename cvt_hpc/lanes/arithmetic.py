@@ -42,7 +42,7 @@ def _define_comparison(op, symbol: str) -> None:
     class Comparison(AbstractTemplate):
         def generic(self, arguments, keywords):
             if len(arguments) == 2 and (kind := _common(*arguments)):
-                return signature(Mask(kind.count), *arguments)
+                return signature(Mask(kind.count, kind.linked), *arguments)
 
     def build(context, builder, sig, arguments):
         kind = _common(*sig.args)

@@ -84,9 +84,11 @@ def like(context, x, pattern):
 
 @intrinsic
 def anywhere(context, mask):
-    """Whether a mask holds in any lane."""
+    """Whether a mask holds in any lane; a plain truth is what it is."""
 
     def build(context, builder, sig, arguments):
+        if sig.args[0] == types.boolean:
+            return arguments[0]
         bits = builder.bitcast(arguments[0], ir.IntType(sig.args[0].count))
         return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 

@@ -6,7 +6,14 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import NativeValue, models, register_model, typeof_impl, unbox
+from numba.extending import (
+    NativeValue,
+    make_attribute_wrapper,
+    models,
+    register_model,
+    typeof_impl,
+    unbox,
+)
 
 ALIGNMENT = 64  # bytes: the widest register, so that no access crosses a line of the cache
 
@@ -20,14 +27,21 @@ class LaneArray:
         Shape.
     dtype : type
         np.float64 or np.float32.
+    linked : bool
+        Whether the lanes are parts of one ring, each ahead of the last, and not systems of their own.
 
     Attributes
     ----------
     data : (rows, fields, lanes) array
         The values, in order of memory; zero at first.
+    linked : bool
+        As given.
     """
 
-    def __init__(self, rows: int, fields: int, lanes: int, dtype: type = np.float64) -> None:
+    def __init__(
+        self, rows: int, fields: int, lanes: int, dtype: type = np.float64, linked: bool = False
+    ) -> None:
+        self.linked = linked
         size = rows * fields * lanes * np.dtype(dtype).itemsize
         memory = np.zeros(size + ALIGNMENT, dtype=np.uint8)
         first = -memory.ctypes.data % ALIGNMENT
@@ -37,27 +51,28 @@ class LaneArray:
 class Lanes(types.Type):
     """Type of a number of `count` lanes."""
 
-    def __init__(self, dtype: types.Float, count: int) -> None:
-        self.dtype, self.count = dtype, count
-        super().__init__(name=f"Lanes({dtype} x {count})")
+    def __init__(self, dtype: types.Float, count: int, linked: bool) -> None:
+        self.dtype, self.count, self.linked = dtype, count, linked
+        super().__init__(name=f"Lanes({dtype} x {count}, linked={linked})")
 
 
 class Mask(types.Type):
     """Type of a truth of `count` lanes."""
 
-    def __init__(self, count: int) -> None:
-        self.count = count
-        super().__init__(name=f"Mask({count})")
+    def __init__(self, count: int, linked: bool) -> None:
+        self.count, self.linked = count, linked
+        super().__init__(name=f"Mask({count}, linked={linked})")
 
 
 class LaneArrayKind(types.Type):
     """Type of a LaneArray."""
 
-    def __init__(self, dtype: types.Float, count: int) -> None:
-        self.dtype, self.count = dtype, count
+    def __init__(self, dtype: types.Float, count: int, linked: bool) -> None:
+        self.dtype, self.count, self.linked = dtype, count, linked
         self.array = types.Array(dtype, 3, "C")
-        self.element = Lanes(dtype, count)
-        super().__init__(name=f"LaneArray({dtype} x {count})")
+        self.element = Lanes(dtype, count, linked)
+        self.of_one_part = Lanes(dtype, 1, False) if linked else self.element
+        super().__init__(name=f"LaneArray({dtype} x {count}, linked={linked})")
 
 
 def vector_type(kind: Lanes) -> ir.VectorType:
@@ -86,7 +101,10 @@ class _LaneArrayModel(models.StructModel):
 @typeof_impl.register(LaneArray)
 def _type_of_lane_array(value, context):
     dtype = types.float32 if value.data.dtype == np.float32 else types.float64
-    return LaneArrayKind(dtype, value.data.shape[2])
+    return LaneArrayKind(dtype, value.data.shape[2], value.linked)
+
+
+make_attribute_wrapper(LaneArrayKind, "data", "data")
 
 
 @unbox(LaneArrayKind)
@@ -100,14 +118,29 @@ def _unbox_lane_array(kind, value, context):
 
 
 def converted(context, builder, value, kind, wanted: Lanes):
-    """A value of any numeric type or precision as one of type `wanted`."""
+    """A value of any numeric type or precision as one of type `wanted`.
+
+    Between one lane and several: what all lanes have in common.
+    """
     if isinstance(kind, Lanes):
         if kind == wanted:
             return value
-        narrows = wanted.dtype == types.float32
-        return (builder.fptrunc if narrows else builder.fpext)(value, vector_type(wanted))
-    plain = context.cast(builder, value, kind, wanted.dtype)
+        if kind.count == wanted.count:
+            return _in_precision(builder, value, kind, wanted)
+        if 1 not in (kind.count, wanted.count):
+            raise TypeError(f"{kind} cannot be {wanted}")
+        plain = builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
+        plain = context.cast(builder, plain, kind.dtype, wanted.dtype)
+    else:
+        plain = context.cast(builder, value, kind, wanted.dtype)
     vector = vector_type(wanted)
     first = builder.insert_element(ir.Constant(vector, ir.Undefined), plain, ir.Constant(ir.IntType(32), 0))
     zeros = ir.Constant(ir.VectorType(ir.IntType(32), wanted.count), [0] * wanted.count)
     return builder.shuffle_vector(first, ir.Constant(vector, ir.Undefined), zeros)
+
+
+def _in_precision(builder, value, kind: Lanes, wanted: Lanes):
+    if kind.dtype == wanted.dtype:
+        return value
+    narrows = wanted.dtype == types.float32
+    return (builder.fptrunc if narrows else builder.fpext)(value, vector_type(wanted))

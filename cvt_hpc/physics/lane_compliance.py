@@ -17,7 +17,7 @@ from cvt_hpc.physics.compliance import ROUNDS_OF_BLOCK_FLIPS
 from cvt_hpc.physics.sheaves import Sheaves
 
 # fields of LaneContact.stations
-GAP, PUSH, DIAGONAL, PIVOT, MULTIPLIER, RESPONSE_1, RESPONSE_2, Y, CLOSED = range(9)
+GAP, PUSH, DIAGONAL, PIVOT, MULTIPLIER, RESPONSE_1, RESPONSE_2, Y, CLOSED, FORCED = range(10)
 # fields of LaneContact.scalars
 ELEMENT_STIFFNESS, COMPLIANCE, OFF_DIAGONAL, TILT_COMPLIANCE, INVERSE_11, INVERSE_12, INVERSE_22 = range(7)
 ROUND_OFF, SOLVES, UNSOLVED = range(7, 10)
@@ -33,9 +33,10 @@ class LaneContact(NamedTuple):
     ----------
     weight, cosine, sine : (m,) arrays
         Length that a station stands for [m]; directions of the tilt.
-    stations : (m, 9) LaneArray
+    stations : (m, 10) LaneArray
         Gap of the rigid bodies [m] (set by the caller), -c_e times the opening without f / c_e [N/m]; the
-        local kernel's diagonal, factors, the tilt's response, work space, closed set (1 or 0).
+        local kernel's diagonal, factors, the tilt's response, work space, closed set (1 or 0), and the force
+        that the caller takes from it [N/m].
     scalars : (1, 10) LaneArray
         Constants of the wrap, the inverse of the tilt's 2x2 system, the round-off of forces [N/m]; linear
         solves so far, and whether (1) a search for the closed set did not end.
@@ -67,7 +68,7 @@ def lane_contact(wraps: list[Sheaves], dtype: type, sweeps: int = 0) -> LaneCont
         As in `LaneContact`.
     """
     weight = wraps[0].weight
-    stations = LaneArray(weight.size, 9, len(wraps), dtype)
+    stations = LaneArray(weight.size, 10, len(wraps), dtype)
     scalars = LaneArray(1, 10, len(wraps), dtype)
     stations.data[:, CLOSED] = 1.0
     scalars.data[:, ROUND_OFF] = _ROUND_OFF[np.dtype(dtype)]

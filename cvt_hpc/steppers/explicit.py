@@ -8,7 +8,7 @@ where it falls least.
 """
 
 from cvt_hpc.parameters import Parameter
-from cvt_hpc.steppers.facts import Facts
+from cvt_hpc.steppers.facts import LANES, Facts
 
 FACTS = Facts(
     order=1,
@@ -37,5 +37,6 @@ PARAMETERS = {
             "of the numbers in a step, of which the reference takes no other; 8 runs advance together",
             choices=("double",),
         ),
+        "lanes": LANES,
     }
 }

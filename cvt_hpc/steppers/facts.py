@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from math import inf
 
+from cvt_hpc.parameters import Parameter
+
 
 class Result(IntEnum):
     """How a march ended, as kernels return it."""
@@ -36,6 +38,15 @@ MESSAGES: dict[Result, str] = {
 # Work counters, in the order of the array that every march adds to.
 COUNTERS = ("steps", "rejected", "rates", "jacobians", "factorisations", "solves")
 STEPS, REJECTED, RATES, JACOBIANS, FACTORISATIONS, SOLVES = range(len(COUNTERS))
+
+
+# Of steps that are written for the processor's registers.
+LANES = Parameter(
+    "runs",
+    "",
+    "what fills the lanes of a register: runs side by side, or stations of one run, done sooner so",
+    choices=("runs", "stations"),
+)
 
 
 @dataclass(frozen=True)

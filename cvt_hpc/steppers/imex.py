@@ -7,7 +7,7 @@ Stable where the explicit part is. Without a step of the job's own the model cho
 """
 
 from cvt_hpc.parameters import Parameter
-from cvt_hpc.steppers.facts import Facts
+from cvt_hpc.steppers.facts import LANES, Facts
 
 FACTS = Facts(
     order=1,
@@ -41,6 +41,7 @@ PARAMETERS = {
             "of the numbers in a step: 8 runs advance together in double, 16 in single",
             choices=("double", "single"),
         ),
+        "lanes": LANES,
         "contact_sweeps": Parameter(
             0,
             "",

@@ -3,8 +3,9 @@
     python tests/benchmarks/random_scenes.py OUT.csv [groups] [--explicit]
 
 A group is 16 scenes of one speed ratio and one friction law, which advance together; 125 groups (the default) take some
-80 minutes of processor time, on two cores. jobs/results/random_scenes.csv is of the first 12. Ratio and law follow one Sobol sequence, all else another: driving speed,
-thrust, load, friction gradient and memory, stiffness of the sheaves (one in ten rigid), masses, bending stiffness.
+80 minutes of processor time, on two cores. A table that is there is gone on with. Ratio and law follow one Sobol
+sequence, all else another: driving speed, thrust, load, friction gradient and memory, stiffness of the sheaves (one in
+ten rigid), masses, bending stiffness.
 With --explicit the reference is the explicit step, for the first groups alone: 16 scenes take about two minutes.
 """
 
@@ -34,6 +35,7 @@ FOUND = (
     "refinements",
     "seconds",
 )
+SIDES = ("default", "reference")
 GIVEN = ("ratio", "friction_law", "driving_speed", "thrust", "load_share", "friction_gradient", "friction_memory",
          "sheave_stiffness", "element_mass", "ring_mass", "bending_stiffness")  # fmt: skip
 
@@ -133,22 +135,40 @@ def main() -> None:
     arguments = parser.parse_args()
     groups = scenes(arguments.groups)
     reference = ("explicit", None) if arguments.explicit else ("imex", REFERENCE_STEP / FINER)
-    with ProcessPoolExecutor(2) as pool:
+    pairs = _read(arguments.table)
+    done = len(pairs) // TOGETHER
+    with ProcessPoolExecutor(2) as pool, arguments.table.open("a", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        if not done:
+            writer.writerow([*GIVEN, *(f"{side} {name}" for side in SIDES for name in FOUND)])
         tasks = [
             tuple(pool.submit(run_group, group, *how) for how in (("imex", None), reference))
-            for group in groups
+            for group in groups[done:]
         ]
-        found = [
-            pair for default, finer in tasks for pair in zip(default.result(), finer.result(), strict=True)
-        ]
-    with arguments.table.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        sides = ("default", "reference")
-        writer.writerow([*GIVEN, *(f"{side} {name}" for side in sides for name in FOUND)])
-        for scene, pair in zip((scene for group in groups for scene in group), found, strict=True):
-            given = [value if isinstance(value, str) else f"{value:.4g}" for value in scene.values()]
-            writer.writerow([*given, *(value for side in pair for value in side.values())])
-    print(*report(found), sep="\n")
+        for group, (default, finer) in zip(groups[done:], tasks, strict=True):
+            found = list(zip(default.result(), finer.result(), strict=True))
+            pairs += found
+            for scene, pair in zip(group, found, strict=True):
+                given = [value if isinstance(value, str) else f"{value:.4g}" for value in scene.values()]
+                writer.writerow([*given, *(value for side in pair for value in side.values())])
+            file.flush()
+    print(*report(pairs), sep="\n")
+
+
+def _read(table: Path) -> list[tuple[dict, dict]]:
+    """Pairs of a table that an earlier call has begun; it is cut where a group is not whole."""
+    if not table.exists():
+        return []
+    with table.open(newline="") as file:
+        lines = list(csv.reader(file))
+    rows = lines[1 : 1 + max(len(lines) - 1, 0) // TOGETHER * TOGETHER]
+    with table.open("w", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows(lines[:1] + rows if rows else [])
+    first, second = len(GIVEN), len(GIVEN) + len(FOUND)
+    return [
+        (dict(zip(FOUND, row[first:second], strict=True)), dict(zip(FOUND, row[second:], strict=True)))
+        for row in rows
+    ]
 
 
 if __name__ == "__main__":

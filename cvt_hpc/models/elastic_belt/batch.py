@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.lanes import LaneArray
+from cvt_hpc.lanes import LaneArray, split
 from cvt_hpc.models.elastic_belt.belt import W, belt_constants, initial_state, random_strands
 from cvt_hpc.models.elastic_belt.explicit import explicit_work
-from cvt_hpc.models.elastic_belt.grouping import lanes
+from cvt_hpc.models.elastic_belt.grouping import LANES, lanes
 from cvt_hpc.models.elastic_belt.imex_work import imex_work
-from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
+from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state, parted, parted_state, parts_of
 from cvt_hpc.models.elastic_belt.lane_forces import derive
 from cvt_hpc.models.elastic_belt.lane_run import LaneRun, Paused, lane_arrays
-from cvt_hpc.models.elastic_belt.march import march_explicit, march_imex
+from cvt_hpc.models.elastic_belt.march import Sampled, march_explicit, march_imex
 from cvt_hpc.models.elastic_belt.recorded_run import recording
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, ENDED_AT, PROFILES
 
@@ -78,13 +78,15 @@ class Batch:
         self.step = self.interval / self.steps_per_sample
         self.begun = 0.0
         n = self.plan.mesh.cell.size
-        self.profiles = [LaneArray(n, len(PROFILES), width) for _ in range(2)]
+        # of the part that is not judged nothing is summed up
+        self.profiles = [LaneArray(rows, len(PROFILES), width) for rows in (0, n)]
         self.ended = LaneArray(1, len(ENDED), width)
         columns = self.plan.sensing.matrix.shape[0] + len(CHANNELS)
         self._go_on_after([run.rows for run in paused] or [np.zeros((0, columns))] * len(points))
         if paused:
             self._resume([*paused, *[paused[-1]] * (width - len(paused))])
         self.runs = tuple(LaneRun(self, lane) for lane in range(len(points)))
+        self._parts = parts_of(n, LANES[p["precision"]]) if p["lanes"] == "stations" else 1
 
     def _go_on_after(self, rows: Sequence[np.ndarray]) -> None:
         """Take rows that have been recorded, (done, S + C) each, as the beginning of the runs' histories."""
@@ -122,12 +124,19 @@ class Batch:
             self._disturbed = True
         borders = [border for border in (plan.kick, plan.first_judged, self.samples) if border > first]
         last = min(first + samples, *borders)
+        whole = Sampled(self._belt, self.state, self.work.stations)
+        marched = self._belt, self.state, self.work
+        if self._parts > 1:
+            marched = (
+                parted(self._belt, self._parts),
+                parted_state(self.state, self._parts),
+                type(self.work)(split(self.work.stations, self._parts)),
+            )
         self._march(
-            self._belt,
-            self.state,
-            self.work,
+            *marched,
             self.step,
             self.steps_per_sample,
+            whole,
             plan.sensing,
             self.rows,
             first - self._recorded,

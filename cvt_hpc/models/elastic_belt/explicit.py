@@ -10,7 +10,21 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import LaneArray, fma, like, minimum, reciprocals, select, sqrt
+from cvt_hpc.lanes import (
+    LaneArray,
+    ahead,
+    anywhere,
+    around,
+    behind,
+    fma,
+    from_ahead,
+    from_behind,
+    like,
+    minimum,
+    reciprocals,
+    select,
+    sqrt,
+)
 from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_FILTERED, V_RING, U, W
 from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
@@ -97,7 +111,7 @@ def step_explicit(belt: LaneBelt, state: LaneState, work: ExplicitWork, step: fl
     stations = work.stations
     lane_sliding(belt, state, stations)
     moment = _accelerate(belt, state, stations, step)
-    advance_pulley(belt, state, stations, moment, step)
+    advance_pulley(belt, state, moment, step)
     _advance_layers(belt, state, stations, step)
     _advance_across(belt, state, stations, step)
     state.time[0] += step
@@ -107,7 +121,7 @@ def step_explicit(belt: LaneBelt, state: LaneState, work: ExplicitWork, step: fl
 @kernel
 def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float):
     """Increments of the velocities into DU and DV; the moment of the flanks on the driven pulley [N m]."""
-    n, fields, c = belt.cell.size, state.fields, belt.constants
+    n, fields, c = state.fields.rows, state.fields, belt.constants
     sine, cosine, offset = c[0, SINE], c[0, COSINE], c[0, RING_OFFSET]
     per_cosine, radius = 1.0 / cosine, c[0, DRIVEN_RADIUS]
     element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
@@ -121,15 +135,15 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
     moment = net_left = ring_left = stress_left_0 = stress_left_1 = zero
     gap_left_0 = gap_left_1 = zero
     for k in range(-1, n):
-        # the last cell first, which is behind station 0
+        # the last cell first, which is behind row 0
         j = k if k >= 0 else n - 1
-        a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
         per_cell = belt.per_cell[j]
         v0, v1 = fields[j, V_ELEMENT], fields[j, V_RING]
         push = element_stiffness * minimum(stations[j, EPS_0], 0.0)
         ring_right = ring_stiffness * stations[j, EPS_1]
         net_right = push + (ring_right - centrifugal)
-        gap_0, gap_1 = (fields[b, V_ELEMENT] - v0) * per_cell, (fields[b, V_RING] - v1) * per_cell
+        gap_0 = (ahead(fields, j, V_ELEMENT) - v0) * per_cell
+        gap_1 = (ahead(fields, j, V_RING) - v1) * per_cell
         # elements that are apart have no damper, and it never makes them pull
         damped_0 = select(push < 0.0, minimum(element_damping * gap_0, -push), 0.0)
         damped_1 = ring_damping * gap_1
@@ -138,14 +152,14 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
             stations[j, DAMPED_0], stations[j, DAMPED_1] = damped_0, damped_1
             span, per_dual, share = belt.per_span[j], belt.per_dual[j], belt.arc_share[j]
             u, full_speed = fields[j, U], belt_speed + v0
-            slope = (fields[b, W] - fields[a, W]) * span
+            slope = (ahead(fields, j, W) - behind(fields, j, W)) * span
             across = lane_transverse(belt, fields, j, net_left, net_right, bending)
-            across = fma(-gyroscopic, (fields[b, U] - fields[a, U]) * span, across)
+            across = fma(-gyroscopic, (ahead(fields, j, U) - behind(fields, j, U)) * span, across)
             v_radial = fma(full_speed, slope, u)
             outward = -damping * v_radial
             along_element = (stress_0 - stress_left_0) * per_dual
             along_ring = (stress_1 - stress_left_1) * per_dual
-            if share > 0.0:
+            if anywhere(share > 0.0):
                 longer = fma(offset, belt.ring_curvature[j], 1.0)
                 lever = fma(offset, belt.arc_curvature[j], 1.0)
                 grip = ring_grip(belt, j, ring_left, ring_right, ring_relief * longer, ring_friction)
@@ -157,8 +171,10 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
                 twice_normal = (2.0 * share) * stations[j, FORCE] * per_normal
                 outward = fma(twice_normal, fma(-upward, cosine, sine), outward)
                 tangential = -twice_normal * (mu * (stations[j, SLIDING_T] * per_speed))
-                if j >= belt.driven_start:
-                    moment = fma(-tangential, (radius + fields[j, W]) * belt.dual[j], moment)
+                is_driven = belt.on_driven[j] > 0.5
+                if anywhere(is_driven):
+                    lever_arm = select(is_driven, (radius + fields[j, W]) * belt.dual[j], zero)
+                    moment = fma(-tangential, lever_arm, moment)
                 along_element += fma(-lever, drag, tangential)
                 along_ring = (along_ring + drag) * (per_ring * step)
             else:
@@ -170,13 +186,17 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
             stations[j, DV_1] = fma(-(belt_speed + v1), step * gap_left_1, along_ring)
         net_left, ring_left, stress_left_0, stress_left_1 = net_right, ring_right, stress_0, stress_1
         gap_left_0, gap_left_1 = gap_0, gap_1
-    return moment
+        if k < 0:
+            net_left, ring_left = from_behind(net_left), from_behind(ring_left)
+            stress_left_0, stress_left_1 = from_behind(stress_left_0), from_behind(stress_left_1)
+            gap_left_0, gap_left_1 = from_behind(gap_left_0), from_behind(gap_left_1)
+    return around(moment)
 
 
 @kernel
 def _advance_layers(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float) -> None:
     """Speeds of both layers, contents by the fluxes of the new speeds, work of the layers' dampers."""
-    n, fields, scalars = belt.cell.size, state.fields, state.scalars
+    n, fields, scalars = state.fields.rows, state.fields, state.scalars
     belt_speed = belt.constants[0, BELT_SPEED]
     work_done = like(0.0, belt_speed)
     for layer in range(2):
@@ -185,43 +205,46 @@ def _advance_layers(belt: LaneBelt, state: LaneState, stations: LaneArray, step:
         # at the station ahead of a cell: increment, speed, and the flux of content less the belt speed
         dv_b = stations[0, dv_row]
         v_b = fields[0, v_row] + dv_b
-        flux_b = fma(-belt_speed, stations[n - 1, eps_row], v_b) * stations[n - 1, short_row]
+        flux_b = fma(-belt_speed, behind(stations, 0, eps_row), v_b) * behind(stations, 0, short_row)
+        dv_b, v_b, flux_b = from_ahead(dv_b), from_ahead(v_b), from_ahead(flux_b)
         for j in range(n - 1, -1, -1):
-            a = j - 1 if j > 0 else n - 1
             dv = stations[j, dv_row]
             v = fields[j, v_row] + dv
-            flux = fma(-belt_speed, stations[a, eps_row], v) * stations[a, short_row]
+            flux = fma(-belt_speed, behind(stations, j, eps_row), v) * behind(stations, j, short_row)
             # a damper's force at the start of the step times the mean closing speed
             work_done = fma(stations[j, damped_row], fma(-0.5, dv_b - dv, v_b - v), work_done)
             fields[j, n_row] = fma(step * belt.per_cell[j], flux - flux_b, fields[j, n_row])
             fields[j, v_row] = v
             dv_b, v_b, flux_b = dv, v, flux
-    scalars[0, LAYER_WORK] = scalars[0, LAYER_WORK] + work_done * step
+    scalars[0, LAYER_WORK] = scalars[0, LAYER_WORK] + around(work_done) * step
 
 
 @kernel
 def _advance_across(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float) -> None:
     """Transverse velocity, memory by the sliding speeds of the new velocities, and displacement."""
-    n, fields, c = belt.cell.size, state.fields, belt.constants
+    n, fields, c = state.fields.rows, state.fields, belt.constants
     per_cosine, belt_speed, driven_speed = 1.0 / c[0, COSINE], c[0, BELT_SPEED], state.scalars[0, SPEED]
-    forget, carry, turning = step * c[0, FORGET], step * c[0, DRIVING_CARRY], c[0, DRIVING_SPEED]
-    surface = turning * c[0, DRIVING_RADIUS] - belt_speed
-    behind = like(0.0, forget)
+    forget, turnings = step * c[0, FORGET], (c[0, DRIVING_SPEED], driven_speed)
+    carries = step * c[0, DRIVING_CARRY], step * c[0, DRIVEN_CARRY]
+    surfaces = (
+        turnings[0] * c[0, DRIVING_RADIUS] - belt_speed,
+        turnings[1] * c[0, DRIVEN_RADIUS] - belt_speed,
+    )
+    before = behind(fields, 0, V_FILTERED)
     for j in range(n):
         u, w = fields[j, U] + stations[j, DU], fields[j, W]
-        if belt.memory and belt.arc_share[j] > 0.0:
-            if j == belt.driven_start:
-                carry, turning = step * c[0, DRIVEN_CARRY], driven_speed
-                surface = turning * c[0, DRIVEN_RADIUS] - belt_speed
+        share = belt.arc_share[j]
+        if belt.memory and anywhere(share > 0.0):
+            is_driven = belt.on_driven[j] > 0.5
+            surface = select(is_driven, surfaces[1], surfaces[0])
             v0, remembered = fields[j, V_ELEMENT], fields[j, V_FILTERED]
-            v_tangential = v0 - fma(turning, w, surface)
+            v_tangential = v0 - fma(select(is_driven, turnings[1], turnings[0]), w, surface)
             meridian = fma(belt_speed + v0, stations[j, SLOPE], u) * per_cosine
             speed = sqrt(fma(meridian, meridian, v_tangential * v_tangential))
-            if j == 0 or j == belt.driven_start:
-                remembered = speed
-                fields[j, V_FILTERED] = speed
-            else:
-                change = fma(carry, behind - remembered, forget * (speed - remembered))
-                fields[j, V_FILTERED] = remembered + change
-            behind = remembered
+            carry = select(is_driven, carries[1], carries[0])
+            change = fma(carry, before - remembered, forget * (speed - remembered))
+            filtered = select(belt.enters[j] > 0.5, speed, remembered + change)
+            fields[j, V_FILTERED] = select(share > 0.0, filtered, 0.0)
+            # an arc's second station takes what its first has become
+            before = select(belt.enters[j] > 0.5, speed, remembered)
         fields[j, U], fields[j, W] = u, fma(step, u, w)

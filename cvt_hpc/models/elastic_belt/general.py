@@ -118,7 +118,7 @@ class GeneralTransient(Marched, RecordedRun):
             Those of the run but for `duration` and `judged_fraction`.
         """
         plan = recording(parameters, np.float64)
-        self._profiles = [LaneArray(plan.mesh.cell.size, len(PROFILES), 1) for _ in range(2)]
+        self._profiles = [LaneArray(rows, len(PROFILES), 1) for rows in (0, plan.mesh.cell.size)]
         RecordedRun.__init__(self, parameters, plan, self._profiles[1].data[:, :, 0])
         rows = LaneArray(self.samples, self._sensed + len(CHANNELS), 1)
         if self.done:

@@ -9,6 +9,7 @@ from cvt_hpc.models.elastic_belt import OWN_STEPPERS
 
 # Core-seconds per station and time step of a batch, measured on one core of an EPYC (Zen 5) at 160 stations.
 STEP_COST = {"imex": 1.3e-7, "explicit": 6.2e-8}
+ALONE_SHARE = 0.3  # of that, of a run whose stations fill the lanes
 
 LANES = {"double": 8, "single": 16}  # what registers of 64 bytes hold
 # What the runs of a batch have in common: the mesh, the law's kind, and the course of time.
@@ -30,6 +31,7 @@ SHARED = (
     "arc_probes",
     "step",
     "precision",
+    "lanes",
     "contact_sweeps",
 )
 
@@ -47,7 +49,8 @@ def cost(parameters: dict[str, Any], stepper: str, step_cost: Mapping[str, float
         Core-seconds per station and time step, by stepper.
     """
     p = parameters
-    return step_cost.get(stepper, 1e-5) * p["stations"] * p["duration"] / p.get("step", 1e-6)
+    share = ALONE_SHARE if p.get("lanes") == "stations" else 1.0
+    return share * step_cost.get(stepper, 1e-5) * p["stations"] * p["duration"] / p.get("step", 1e-6)
 
 
 def lanes(parameters: dict[str, Any], stepper: str) -> int:
@@ -60,7 +63,9 @@ def lanes(parameters: dict[str, Any], stepper: str) -> int:
     stepper : str
         Name of a stepper; general ones take one.
     """
-    return LANES[parameters["precision"]] if stepper in OWN_STEPPERS else 1
+    if stepper not in OWN_STEPPERS or parameters["lanes"] == "stations":
+        return 1
+    return LANES[parameters["precision"]]
 
 
 def lane_key(parameters: dict[str, Any]) -> tuple:

@@ -19,18 +19,22 @@ c dt / h about 5, and the transverse contact and bending.
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import decay, fma, like, minimum, select, sqrt
-from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_FILTERED, U, W
+from cvt_hpc.lanes import anywhere, around, behind, decay, fma, from_ahead, like, minimum, select, sqrt
+from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, N_RING, V_ELEMENT, V_FILTERED, V_RING, U, W
 from cvt_hpc.models.elastic_belt.imex_stations import assemble
-from cvt_hpc.models.elastic_belt.imex_system import eliminate, substitute
+from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
 from cvt_hpc.models.elastic_belt.imex_work import (
     DV_0,
+    DV_1,
     FLANK,
     FLANK_CROSS,
     FLANK_SLOPE,
     LAG,
     LINK_0,
+    MEETING,
     PUSH,
+    REVERSING,
+    RING_REVERSING,
     SLOPE,
     ImexWork,
 )
@@ -46,15 +50,20 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     ELEMENT_STIFFNESS,
     FORGET,
     LAYER_WORK,
+    RING_DAMPING,
+    RING_OFFSET,
     SPEED,
     LaneBelt,
     LaneState,
 )
 from cvt_hpc.models.elastic_belt.lane_forces import (
     EPS_0,
+    EPS_1,
     SHORT_0,
+    SHORT_1,
     advance_pulley,
-    derive,
+    cell_strains,
+    lane_contact_forces,
     lane_sliding,
 )
 
@@ -76,86 +85,108 @@ def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
     """
     stations, scalars = work.stations, state.scalars
     lane_sliding(belt, state, stations)
+    assemble(belt, state, work, step, False)
     for attempt in range(MOST_PASSES):
-        assemble(belt, state, work, step, attempt > 0)
-        eliminate(belt, state, work, step)
-        if not substitute(belt, work, scalars, step):
+        eliminate(belt, state, work, step, attempt > 0)
+        found = substitute(belt, work, scalars, step)
+        if found == 0 and attempt == 0:
             break
+        if found == 0 or attempt == MOST_PASSES - 1:
+            _forget(work)
+            break
+        if found & TURNS_BACK:
+            assemble(belt, state, work, step, True)
     moment = _advance(belt, state, work, step)
-    advance_pulley(belt, state, stations, moment, step)
+    advance_pulley(belt, state, moment, step)
     state.time[0] += step
-    derive(belt, state, stations)
+    lane_contact_forces(belt, state, stations)
+
+
+@kernel
+def _forget(work: ImexWork) -> None:
+    """Clear the marks of what a step had to do again."""
+    stations = work.stations
+    for j in range(stations.rows):
+        stations[j, REVERSING] = stations[j, RING_REVERSING] = stations[j, MEETING] = 0.0
 
 
 @kernel
 def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
-    """Apply the increments; returns the moment of the flanks on the driven pulley [N m], in doubles."""
-    n, fields, stations, c = belt.cell.size, state.fields, work.stations, belt.constants
+    """Apply the increments, and find the new strains; the moment of the flanks on the driven pulley [N m]."""
+    n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
     per_cosine = 1.0 / c[0, COSINE]
-    belt_speed, forget = c[0, BELT_SPEED], c[0, FORGET]
+    belt_speed, forget, offset = c[0, BELT_SPEED], c[0, FORGET], c[0, RING_OFFSET]
+    stiffness, damper_0, damper_1 = c[0, ELEMENT_STIFFNESS], c[0, ELEMENT_DAMPING], c[0, RING_DAMPING]
     driven_speed = state.scalars[0, SPEED]
     driven_base = driven_speed * like(c[0, DRIVEN_RADIUS], driven_speed) - like(belt_speed, driven_speed)
     zero = like(0.0, forget)
-    surface, turning, radius = like(driven_base, zero), like(driven_speed, zero), c[0, DRIVEN_RADIUS]
-    carry = c[0, DRIVEN_CARRY]
-    per_rate = 1.0 / (carry + forget)
-    keep = decay((carry + forget) * step)
     moment = like(0.0, driven_speed)
+    radius, turning = c[0, DRIVEN_RADIUS], like(driven_speed, zero)
+    surfaces = c[0, DRIVING_SPEED] * c[0, DRIVING_RADIUS] - belt_speed, like(driven_base, zero)
+    carries = c[0, DRIVING_CARRY], c[0, DRIVEN_CARRY]
+    rates = carries[0] + forget, carries[1] + forget
+    per_rates = 1.0 / rates[0], 1.0 / rates[1]
+    kept = decay(rates[0] * step), decay(rates[1] * step)
+    last_filtered = behind(fields, 0, V_FILTERED)
+    # at the station ahead of a cell: speeds, increments, fluxes of content less the belt speed, displacement
+    v0_b, dv0_b, v1_b, dv1_b = fields[0, V_ELEMENT], stations[0, DV_0], fields[0, V_RING], stations[0, DV_1]
+    first_0 = fma(-belt_speed, behind(stations, 0, EPS_0), v0_b + dv0_b) * behind(stations, 0, SHORT_0)
+    first_1 = fma(-belt_speed, behind(stations, 0, EPS_1), v1_b + dv1_b) * behind(stations, 0, SHORT_1)
+    w_b = fma(step, fields[0, U] + fma(-stations[0, LAG], dv0_b, stations[0, PUSH]), fields[0, W])
+    v0_b, dv0_b, flux0_b = from_ahead(v0_b), from_ahead(dv0_b), from_ahead(first_0)
+    v1_b, dv1_b, flux1_b = from_ahead(v1_b), from_ahead(dv1_b), from_ahead(first_1)
+    w_b = from_ahead(w_b)
     work_done = zero
-    for layer in range(2):
-        stiffness, damper = c[0, ELEMENT_STIFFNESS + layer], c[0, ELEMENT_DAMPING + layer]
-        v_row, dv_row, eps_row, n_row = V_ELEMENT + layer, DV_0 + layer, EPS_0 + layer, N_ELEMENT + layer
-        # at the station ahead of a cell: speed, its increment, and the flux of content less the belt speed
-        v_b, dv_b = fields[0, v_row], stations[0, dv_row]
-        shorter = stations[n - 1, SHORT_0 + layer]
-        flux_b = first_flux = fma(-belt_speed, stations[n - 1, eps_row], v_b + dv_b) * shorter
-        for j in range(n - 1, -1, -1):
-            v, dv, eps = fields[j, v_row], stations[j, dv_row], stations[j, eps_row]
-            new = v + dv
-            flux = first_flux
-            if j > 0:
-                flux = fma(-belt_speed, stations[j - 1, eps_row], new) * stations[j - 1, SHORT_0 + layer]
-            per_cell = belt.per_cell[j]
-            closing, change = v_b - v, dv_b - dv
-            viscous = damper * per_cell * closing
-            damped = fma(damper * per_cell, change, viscous)
-            if layer == 0:
-                # what is left of the push beyond the length at rest stores nothing: all of it is damping
-                damped = select(eps > 0.0, minimum(fma(stiffness, eps, damped), 0.0), damped)
-                damped = select(viscous > -stiffness * eps, -stiffness * minimum(eps, 0.0), damped)
-                damped = select(stations[j, LINK_0] > 0.0, damped, 0.0)
-            work_done = fma(damped, fma(0.5, change, closing), work_done)
-            fields[j, n_row] = fma(step * per_cell, flux - flux_b, fields[j, n_row])
-            fields[j, v_row] = new
-            v_b, dv_b, flux_b = v, dv, flux
     for j in range(n - 1, -1, -1):
-        dv = stations[j, DV_0]
-        u = fields[j, U]
-        du = fma(-stations[j, LAG], dv, stations[j, PUSH])
-        u = u + du
-        fields[j, U] = u
-        w = fields[j, W]
-        if belt.arc_share[j] > 0.0:
-            if j < belt.driven_start:
-                surface = c[0, DRIVING_SPEED] * c[0, DRIVING_RADIUS] - belt_speed
-                turning = c[0, DRIVING_SPEED]
-                carry = c[0, DRIVING_CARRY]
-                per_rate = 1.0 / (carry + forget)
-                keep = decay((carry + forget) * step)
-            else:
-                slopes = fma(stations[j, FLANK_SLOPE], dv, stations[j, FLANK_CROSS] * du)
+        per_cell = belt.per_cell[j]
+        v0, dv0, eps = fields[j, V_ELEMENT], stations[j, DV_0], stations[j, EPS_0]
+        v1, dv1 = fields[j, V_RING], stations[j, DV_1]
+        new_0, new_1 = v0 + dv0, v1 + dv1
+        flux_0, flux_1 = first_0, first_1
+        if j > 0:
+            flux_0 = fma(-belt_speed, stations[j - 1, EPS_0], new_0) * stations[j - 1, SHORT_0]
+            flux_1 = fma(-belt_speed, stations[j - 1, EPS_1], new_1) * stations[j - 1, SHORT_1]
+        closing, change = v0_b - v0, dv0_b - dv0
+        viscous = damper_0 * per_cell * closing
+        damped = fma(damper_0 * per_cell, change, viscous)
+        # what is left of the push beyond the length at rest stores nothing: all of it is damping
+        damped = select(eps > 0.0, minimum(fma(stiffness, eps, damped), 0.0), damped)
+        damped = select(viscous > -stiffness * eps, -stiffness * minimum(eps, 0.0), damped)
+        damped = select(stations[j, LINK_0] > 0.0, damped, 0.0)
+        work_done = fma(damped, fma(0.5, change, closing), work_done)
+        closing, change = v1_b - v1, dv1_b - dv1
+        damped = damper_1 * per_cell * (closing + change)
+        work_done = fma(damped, fma(0.5, change, closing), work_done)
+        more_0 = fma(step * per_cell, flux_0 - flux0_b, fields[j, N_ELEMENT])
+        more_1 = fma(step * per_cell, flux_1 - flux1_b, fields[j, N_RING])
+        fields[j, V_ELEMENT], fields[j, V_RING] = new_0, new_1
+        fields[j, N_ELEMENT], fields[j, N_RING] = more_0, more_1
+        v0_b, dv0_b, flux0_b, v1_b, dv1_b, flux1_b = v0, dv0, flux_0, v1, dv1, flux_1
+
+        du = fma(-stations[j, LAG], dv0, stations[j, PUSH])
+        u, w = fields[j, U] + du, fields[j, W]
+        share = belt.arc_share[j]
+        if anywhere(share > 0.0):
+            is_driven = belt.on_driven[j] > 0.5
+            if anywhere(is_driven):
+                slopes = fma(stations[j, FLANK_SLOPE], dv0, stations[j, FLANK_CROSS] * du)
                 tangential = (stations[j, FLANK] - slopes) * (belt.dual[j] * (radius + w))
-                moment = moment - like(tangential, moment)
+                moment = moment - like(select(is_driven, tangential, zero), moment)
             if belt.memory:
-                v0 = fields[j, V_ELEMENT]
-                v_tangential = v0 - fma(turning, w, surface)
-                meridian = fma(belt_speed + v0, stations[j, SLOPE], u) * per_cosine
+                surface = select(is_driven, surfaces[1], surfaces[0])
+                v_tangential = new_0 - fma(select(is_driven, turning, c[0, DRIVING_SPEED]), w, surface)
+                meridian = fma(belt_speed + new_0, stations[j, SLOPE], u) * per_cosine
                 speed = sqrt(fma(meridian, meridian, v_tangential * v_tangential))
-                if j == 0 or j == belt.driven_start:
-                    fields[j, V_FILTERED] = speed
-                else:
-                    target = fma(carry, fields[j - 1, V_FILTERED], forget * speed) * per_rate
-                    fields[j, V_FILTERED] = fma(fields[j, V_FILTERED] - target, keep, target)
-        fields[j, W] = fma(step, u, w)
-    state.scalars[0, LAYER_WORK] = state.scalars[0, LAYER_WORK] + like(work_done, moment) * step
-    return moment
+                before = fields[j - 1, V_FILTERED] if j > 0 else last_filtered
+                target = fma(select(is_driven, carries[1], carries[0]), before, forget * speed)
+                target = target * select(is_driven, per_rates[1], per_rates[0])
+                keep = select(is_driven, kept[1], kept[0])
+                filtered = fma(fields[j, V_FILTERED] - target, keep, target)
+                filtered = select(belt.enters[j] > 0.5, speed, filtered)
+                fields[j, V_FILTERED] = select(share > 0.0, filtered, 0.0)
+        w = fma(step, u, w)
+        fields[j, U], fields[j, W] = u, w
+        cell_strains(belt, stations, j, w, w_b, more_0, more_1, offset)
+        w_b = w
+    state.scalars[0, LAYER_WORK] = state.scalars[0, LAYER_WORK] + around(like(work_done, moment)) * step
+    return around(moment)

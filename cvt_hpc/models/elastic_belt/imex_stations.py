@@ -3,7 +3,19 @@
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel, merged_kernel
-from cvt_hpc.lanes import LaneArray, anywhere, fma, like, minimum, reciprocals, select
+from cvt_hpc.lanes import (
+    LaneArray,
+    ahead,
+    anywhere,
+    behind,
+    fma,
+    from_ahead,
+    from_behind,
+    like,
+    minimum,
+    reciprocals,
+    select,
+)
 from cvt_hpc.models.elastic_belt.belt import V_ELEMENT, V_RING, U, W
 from cvt_hpc.models.elastic_belt.imex_work import (
     D_00,
@@ -12,10 +24,7 @@ from cvt_hpc.models.elastic_belt.imex_work import (
     FLANK,
     FLANK_CROSS,
     FLANK_SLOPE,
-    GYROSCOPIC,
     LAG,
-    MEETING,
-    MOBILITY,
     PUSH,
     REVERSING,
     RING_REVERSING,
@@ -74,9 +83,14 @@ def implicit_shares(one, other, inertia):
 def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, again: bool) -> None:
     """Forces and slopes at the stations, but for the stresses T and P: the system's blocks and right side.
 
-    `again` looks at stations alone that some lane's friction would throw back.
+    `again` takes the secant of friction where a pass before has found that it would turn sliding about.
+
+    The gyroscopic force is taken with the mean of u over the step: it then neither damps nor feeds. By one
+    correction with the pending increments, since it changes them little: by v step / h, some 0.02.
+    Extrapolated from earlier steps it feeds waves of a frequency w that run against the belt, at the rate
+    (v / h) (w step)^3 / 4.
     """
-    n, fields, stations, c = belt.cell.size, state.fields, work.stations, belt.constants
+    n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
     per_step = 1.0 / step
     sine, cosine, width = c[0, SINE], c[0, COSINE], c[0, FRICTION_SPEED]
     per_cosine, per_width = 1.0 / cosine, 1.0 / width
@@ -86,35 +100,36 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
     ring_friction, per_ring_width = c[0, RING_FRICTION], 1.0 / c[0, RING_FRICTION_SPEED]
     ring_relief = c[0, RING_RELIEF]
     centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
+    half_gyroscopic = -0.5 * gyroscopic
     damping = c[0, TRANSVERSE_DAMPING] + start_damping(belt, state.time[0])
     base_mass = fma(mass, per_step, 0.5 * damping)
     element_rate = element_mass * per_step
     zero = like(0.0, sine)
+    last_push, last = zero, (zero, zero, zero, zero)
+    first, second_push = last, zero
     for j in range(n):
         share = belt.arc_share[j]
-        if again and (
-            share == 0.0 or not anywhere(stations[j, REVERSING] + stations[j, RING_REVERSING] > 0.5)
-        ):
-            continue
-        a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
-        dual, per_left, span = belt.dual[j], belt.per_cell[a], belt.per_span[j]
+        dual, per_left, span = belt.dual[j], behind(belt.per_cell, j, 0), belt.per_span[j]
         u, v0, v1 = fields[j, U], fields[j, V_ELEMENT], fields[j, V_RING]
-        ring_left, ring_right = ring_stiffness * stations[a, EPS_1], ring_stiffness * stations[j, EPS_1]
-        net_left = fma(element_stiffness, minimum(stations[a, EPS_0], 0.0), ring_left - centrifugal)
+        ring_left, ring_right = (
+            ring_stiffness * behind(stations, j, EPS_1),
+            ring_stiffness * stations[j, EPS_1],
+        )
+        net_left = fma(element_stiffness, minimum(behind(stations, j, EPS_0), 0.0), ring_left - centrifugal)
         net_right = fma(element_stiffness, minimum(stations[j, EPS_0], 0.0), ring_right - centrifugal)
-        slope = (fields[b, W] - fields[a, W]) * span
+        slope = (ahead(fields, j, W) - behind(fields, j, W)) * span
         transverse = lane_transverse(belt, fields, j, net_left, net_right, bending)
-        transverse = fma(-gyroscopic, (fields[b, U] - fields[a, U]) * span, transverse)
+        transverse = fma(-gyroscopic, (ahead(fields, j, U) - behind(fields, j, U)) * span, transverse)
         full_speed = belt_speed + v0
         v_radial = fma(full_speed, slope, u)
         outward = -damping * v_radial
         longer = fma(offset, belt.ring_curvature[j], 1.0)
         ring_here = ring_mass * longer
         element, ring, coupling = element_rate, ring_here * per_step, zero
-        along_element = -full_speed * ((v0 - fields[a, V_ELEMENT]) * per_left) * element_mass
-        along_ring = -(belt_speed + v1) * ((v1 - fields[a, V_RING]) * per_left) * ring_here
+        along_element = -full_speed * ((v0 - behind(fields, j, V_ELEMENT)) * per_left) * element_mass
+        along_ring = -(belt_speed + v1) * ((v1 - behind(fields, j, V_RING)) * per_left) * ring_here
         radial_mass, cross = base_mass, zero
-        if share > 0.0:
+        if anywhere(share > 0.0):
             lever = fma(offset, belt.arc_curvature[j], 1.0)
             v_tangential, coefficient = stations[j, SLIDING_T], stations[j, COEFFICIENT]
             per_speed, factor = stations[j, PER_SPEED], stations[j, FACTOR]
@@ -137,7 +152,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
             friction = twice_normal * mu
             tangential = -friction * run
             across = friction * per_speed
-            thrown = stations[j, REVERSING] > 0.5 if again else share < zero
+            thrown = stations[j, REVERSING] > 0.5 if again else zero > 0.0
             along = twice_normal * coefficient * (fma(-factor, factor, 1.0) * per_width)
             along, across = implicit_shares(select(thrown, across, along), across, element_rate)
             excess = along - across
@@ -150,51 +165,40 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
             element += fma(lever * lever, stiff, flank_slope)
             ring += stiff
             coupling = -lever * stiff
-            stations[j, FLANK], stations[j, FLANK_SLOPE] = tangential, flank_slope
-            stations[j, FLANK_CROSS] = cross
-            if not again:
-                stations[j, REVERSING] = stations[j, RING_REVERSING] = zero
-        if not again:
-            stations[j, MEETING] = zero
+            if anywhere(belt.on_driven[j] > 0.5):
+                stations[j, FLANK], stations[j, FLANK_SLOPE] = tangential, flank_slope
+                stations[j, FLANK_CROSS] = cross
         along_element = fma(outward, slope, along_element)
         mobility = 1.0 / radial_mass
         push, lag = (transverse + outward) * mobility, cross * mobility
-        stations[j, PUSH], stations[j, LAG], stations[j, SLOPE] = push, lag, slope
-        stations[j, MOBILITY] = mobility
+        stations[j, LAG], stations[j, SLOPE] = lag, slope
         stations[j, D_00] = dual * fma(-cross, lag, element)
         stations[j, D_01] = dual * coupling
         stations[j, D_11] = dual * ring
-        stations[j, Y_0] = dual * fma(-cross, push, along_element)
         stations[j, Y_1] = dual * along_ring
-        if again:
-            _push_more(belt, stations, j, stations[j, GYROSCOPIC])
-    if not again:
-        _centre_gyroscopic(belt, stations, gyroscopic)
-
-
-@kernel
-def _centre_gyroscopic(belt: LaneBelt, stations: LaneArray, gyroscopic) -> None:
-    """Take the gyroscopic force with the mean of u over the step: it then neither damps nor feeds.
-
-    By one correction with the pending increments, since it changes them little: by v step / h, some 0.02.
-    Extrapolated from earlier steps it feeds waves of a frequency w that run against the belt, at the rate
-    (v / h) (w step)^3 / 4.
-    """
-    n = belt.cell.size
-    first, behind = stations[0, PUSH], stations[n - 1, PUSH]
-    for j in range(n):
-        here = stations[j, PUSH]
-        ahead = stations[j + 1, PUSH] if j < n - 1 else first
-        force = (-0.5 * gyroscopic) * ((ahead - behind) * belt.per_span[j])
-        stations[j, GYROSCOPIC] = force
-        _push_more(belt, stations, j, force)
-        behind = here
+        station = push, mobility * half_gyroscopic * span, dual * cross, dual * along_element
+        if j == 0:
+            first = station
+        elif j == 1:
+            second_push = push
+        else:
+            _put(stations, j - 1, last, last_push, push)
+        last_push, last = last[0], station
+    for j in (n - 1, 0):  # a loop: the compiler loses kernels merged into a function's last lines
+        if j == 0:
+            _put(stations, j, first, from_behind(last[0]), second_push)
+        else:
+            _put(stations, j, last, last_push, from_ahead(first[0]))
 
 
 @merged_kernel
-def _push_more(belt: LaneBelt, stations: LaneArray, j: int, force):
-    """Add a line force across the belt at station j to what `assemble` has found there."""
-    more = stations[j, MOBILITY] * force
-    stations[j, PUSH] = stations[j, PUSH] + more
-    if belt.arc_share[j] > 0.0:
-        stations[j, Y_0] = fma(-belt.dual[j] * stations[j, FLANK_CROSS], more, stations[j, Y_0])
+def _put(stations: LaneArray, j: int, station, push_behind, push_ahead):
+    """Store the increment of u and the right side of station j, with the gyroscopic force's correction.
+
+    `station` is its increment of u [m/s], that per difference of its neighbours' increments, the length times
+    the cross slope of friction [N s/m], and the force along the belt [N].
+    """
+    push, gyration, cross, along = station
+    push = fma(gyration, push_ahead - push_behind, push)
+    stations[j, PUSH] = push
+    stations[j, Y_0] = fma(-cross, push, along)

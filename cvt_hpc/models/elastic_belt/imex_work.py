@@ -9,11 +9,11 @@ from cvt_hpc.models.elastic_belt.lane_belt import LaneState
 from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES
 
 # fields of ImexWork.stations, after those of `lane_forces`
-PUSH, MOBILITY, LAG, SLOPE, GYROSCOPIC, FLANK, FLANK_SLOPE, FLANK_CROSS = range(FIELDS_OF_FORCES, 25)
-REVERSING, RING_REVERSING, MEETING, AHEAD = range(25, 29)
-D_00, D_01, D_11, Y_0, Y_1 = range(29, 34)
-I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(34, 45)
-FIELDS_OF_WORK = 45
+PUSH, LAG, SLOPE, FLANK, FLANK_SLOPE, FLANK_CROSS = range(FIELDS_OF_FORCES, 23)
+REVERSING, RING_REVERSING, MEETING, AHEAD = range(23, 27)
+D_00, D_01, D_11, Y_0, Y_1 = range(27, 32)
+I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(32, 43)
+FIELDS_OF_WORK = 43
 
 
 class ImexWork(NamedTuple):
@@ -21,12 +21,12 @@ class ImexWork(NamedTuple):
 
     Attributes
     ----------
-    stations : (N, 45) LaneArray
-        The fields of `lane_forces`. Of the step: pending increment of u, that per line force, its sensitivity
-        to v_element's, slope w_s, the gyroscopic force of that increment, the flanks' tangential force and
-        its slopes, whether (1) the linearised friction would turn the sliding of the flanks, or of the
-        saddle, about, whether (1) the elements of the cell ahead of a station meet within the step, their
-        strain at its end with the speeds that it begins with; the blocks of the system and its right side;
+    stations : (N, 43) LaneArray
+        The fields of `lane_forces`. Of the step: pending increment of u, its sensitivity to v_element's,
+        slope w_s, of the driven pulley's stations the flanks' tangential force and its slopes, whether (1)
+        linearised friction would turn the sliding of the flanks, or of the saddle, about, whether (1) the
+        elements of the cell ahead of a station meet within the step, and, where they are apart, their strain
+        at its end with the speeds that it begins with; the blocks of the system and its right side;
         the eliminated system: inverse pivots, the increments of v_element and v_ring, the border, the
         stresses' slopes with the speeds' differences.
     """

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cvt_hpc.lanes import LaneArray
+from cvt_hpc.lanes import LaneArray, split
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
@@ -105,9 +105,13 @@ CONSTANTS = (
 LANE_SCALARS = ("driven_speed", "driven_position", "layer_work", "repeats")
 SPEED, POSITION, LAYER_WORK, REPEATS = range(len(LANE_SCALARS))
 
+LEAST_ROWS = 3  # of a part of a run: bending reaches two stations
+
 
 class LaneBelt(NamedTuple):
     """Constants of W runs on one mesh of N stations; arrays of one number a station are shared.
+
+    Of one run in linked parts (`parted`), arrays of stations are LaneArrays, of one field or of five.
 
     Attributes
     ----------
@@ -118,6 +122,8 @@ class LaneBelt(NamedTuple):
         ring_mass (1 + ring_offset ring_curvature), and so with its centrifugal relief.
     bending : (N, 5) array
         As in `Belt`, for a bending stiffness of 1 N m^2.
+    on_driven, enters : (N,) arrays
+        Whether (1) a station lies on the driven half, from `driven_start` on, and is the first of an arc.
     constants : (1, 34) LaneArray
         CONSTANTS.
     driven_start : int
@@ -140,6 +146,8 @@ class LaneBelt(NamedTuple):
     arc_share: np.ndarray
     ring_curvature: np.ndarray
     bending: np.ndarray
+    on_driven: np.ndarray
+    enters: np.ndarray
     constants: LaneArray
     driven_start: int
     memory: bool
@@ -184,6 +192,7 @@ def lane_belt(belts: list[Belt], dtype: type) -> LaneBelt:
     for lane, belt in enumerate(belts):
         constants.data[0, :, lane] = _constants_of(belt)
     cell, dual, kappa = first.cell, first.dual, first.curvature
+    stations = np.arange(cell.size)
     law = first.law
     tables = (law.table_force.astype(dtype), law.table_speed.astype(dtype), law.table_mu.astype(dtype))
     shared = (
@@ -197,6 +206,8 @@ def lane_belt(belts: list[Belt], dtype: type) -> LaneBelt:
         first.arc_share,
         _ring_curvature(first),
         bending_bands(cell, dual, 1.0),
+        stations >= first.driven_start,
+        (stations == 0) | (stations == first.driven_start),
     )
     return LaneBelt(
         *(array.astype(dtype) for array in shared),
@@ -262,6 +273,51 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type, sweeps: int 
     wraps = [[belt.driving for belt in belts], [belt.driven for belt in belts]]
     contacts = (lane_contact(wraps[0], dtype, sweeps), lane_contact(wraps[1], dtype, sweeps))
     return LaneState(fields, scalars, np.array([states[0].scalars[0]]), contacts)
+
+
+def parts_of(stations: int, most: int) -> int:
+    """Into how many linked parts one run's stations go: as many as are of equal length and long enough."""
+    parts = most
+    while parts > 1 and (stations % parts or stations // parts < LEAST_ROWS):
+        parts //= 2
+    return parts
+
+
+def parted_state(state: LaneState, parts: int) -> LaneState:
+    """State of one run, its stations in linked parts; time and contacts remain those of `state`."""
+    return state._replace(fields=split(state.fields, parts), scalars=alike(state.scalars, parts))
+
+
+def parted(belt: LaneBelt, parts: int) -> LaneBelt:
+    """Constants of one run, its stations in linked parts.
+
+    Parameters
+    ----------
+    belt : LaneBelt
+        Of one lane.
+    parts : int
+        Their number, a power of 2 that divides that of the stations.
+    """
+    arrays = {
+        name: split(_one_lane(array), parts)
+        for name, array in belt._asdict().items()
+        if isinstance(array, np.ndarray)
+    }
+    return belt._replace(constants=alike(belt.constants, parts), **arrays)
+
+
+def _one_lane(array: np.ndarray) -> LaneArray:
+    fields = array.reshape(len(array), -1)
+    lane = LaneArray(*fields.shape, 1, array.dtype)
+    lane.data[:, :, 0] = fields
+    return lane
+
+
+def alike(array: LaneArray, parts: int) -> LaneArray:
+    """Numbers of one ring, (1, F, 1), in all its linked parts."""
+    linked = LaneArray(1, array.data.shape[1], parts, array.data.dtype, linked=True)
+    linked.data[:] = array.data
+    return linked
 
 
 def put_lane(fields: np.ndarray, scalars: np.ndarray, lane: int, belt: Belt, state: State) -> None:

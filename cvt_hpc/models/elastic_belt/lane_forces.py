@@ -12,12 +12,19 @@ from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import (
     LaneArray,
     absolute,
+    ahead,
+    anywhere,
+    at_station,
+    behind,
     decay,
     fma,
+    from_ahead,
+    from_behind,
     like,
     maximum,
     reciprocals,
     select,
+    set_station,
     sqrt,
     with_sign_of,
 )
@@ -59,7 +66,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneBelt,
     LaneState,
 )
-from cvt_hpc.physics.lane_compliance import CLOSED, GAP, solve_lane_contact
+from cvt_hpc.physics.lane_compliance import CLOSED, FORCED, GAP, solve_lane_contact
 from cvt_hpc.physics.lane_compliance import PUSH as PUSHED
 from cvt_hpc.physics.lane_friction import (
     lane_coefficient,
@@ -97,7 +104,7 @@ def note_speeds(belt: LaneBelt, state: LaneState, stations: LaneArray, taken: in
     fields = state.fields
     is_first = taken == max(steps - 2, 0)
     weight = 0.0 if taken < steps - 1 else -2.0
-    for j in range(belt.cell.size):
+    for j in range(fields.rows):
         for k, row in enumerate((U, V_ELEMENT, V_RING)):
             speed = fields[j, row]
             if is_first:
@@ -112,7 +119,7 @@ def step_ripple(belt: LaneBelt, state: LaneState, stations: LaneArray):
     A speed that goes to and fro by A at every step has the second difference 4 A; one that vibrates with the
     amplitude A at the angular frequency w has (w step)^2 A, below A / 3000 at 600 Hz and 4.6 us.
     """
-    n, fields, c = belt.cell.size, state.fields, belt.constants
+    n, fields, c = state.fields.rows, state.fields, belt.constants
     element_mass, ring_mass, mass = c[0, ELEMENT_MASS], c[0, RING_MASS], c[0, MASS]
     total = like(0.0, mass)
     length = 0.0
@@ -145,23 +152,23 @@ def start_damping(belt: LaneBelt, time: float) -> float:
 
 
 @kernel
-def lane_thrust(belt: LaneBelt, state: LaneState, stations: LaneArray):
+def lane_thrust(state: LaneState):
     """Axial force of the belt on the driven sheave [N]."""
-    weight = state.contacts[1].weight
-    total = like(0.0, stations[0, FORCE])
+    weight, pushed = state.contacts[1].weight, state.contacts[1].stations
+    total = like(0.0, pushed[0, FORCED])
     for k in range(weight.size):
-        total = fma(weight[k], stations[belt.driven_start + k, FORCE], total)
+        total = fma(weight[k], pushed[k, FORCED], total)
     return total
 
 
 @kernel
-def advance_pulley(belt: LaneBelt, state: LaneState, stations: LaneArray, moment, step: float) -> None:
+def advance_pulley(belt: LaneBelt, state: LaneState, moment, step: float) -> None:
     """Driven pulley's speed and opening at the end of a step, by the belt's moment [N m] and axial forces."""
     c, scalars = belt.constants, state.scalars
     speed = scalars[0, SPEED]
     load = like(c[0, RATIO], speed) * lane_load(belt, state.time[0], speed)
     scalars[0, SPEED] = speed + step * (moment - load) / like(c[0, DRIVEN_INERTIA], speed)
-    axial = like(lane_thrust(belt, state, stations), speed)
+    axial = like(lane_thrust(state), speed)
     scalars[0, POSITION] = scalars[0, POSITION] + step * (axial - like(c[0, THRUST], speed)) / like(
         c[0, AXIAL_DAMPING], speed
     )
@@ -173,19 +180,22 @@ def lane_transverse(belt: LaneBelt, fields: LaneArray, j: int, net_left, net_rig
 
     `net_left`, `net_right` are T - P - m v^2 in the cells beside it [N], `bending` is EI [N m^2].
     """
-    n = belt.cell.size
+    n = fields.rows
+    # of the rows two away, those beside the neighbours
     a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
-    aa, bb = a - 1 if a > 0 else n - 1, b + 1 if b < n - 1 else 0
-    w, w_a, w_b = fields[j, W], fields[a, W], fields[b, W]
-    bent = fma(
-        belt.bending[j, 0],
-        fields[aa, W],
-        fma(belt.bending[j, 4], fields[bb, W], belt.bending[j, 2] * w),
-    )
+    w, w_a, w_b = fields[j, W], behind(fields, j, W), ahead(fields, j, W)
+    w_aa, w_bb = behind(fields, a, W), ahead(fields, b, W)
+    if j == 0:
+        w_aa = from_behind(w_aa)
+    if j == n - 1:
+        w_bb = from_ahead(w_bb)
+    bent = fma(belt.bending[j, 0], w_aa, fma(belt.bending[j, 4], w_bb, belt.bending[j, 2] * w))
     bent = fma(belt.bending[j, 1], w_a, fma(belt.bending[j, 3], w_b, bent))
-    tension = net_right * ((w_b - w) * belt.per_cell[j]) - net_left * ((w - w_a) * belt.per_cell[a])
+    tension = net_right * ((w_b - w) * belt.per_cell[j]) - net_left * (
+        (w - w_a) * behind(belt.per_cell, j, 0)
+    )
     inward = net_right * (0.5 * belt.cell[j] * belt.curvature[j])
-    inward += net_left * (0.5 * belt.cell[a] * belt.curvature[a])
+    inward += net_left * (0.5 * behind(belt.cell, j, 0) * behind(belt.curvature, j, 0))
     return fma(tension - inward, belt.per_dual[j], bending * bent)
 
 
@@ -195,57 +205,71 @@ def ring_grip(belt: LaneBelt, j: int, ring_left, ring_right, relief, friction):
 
     `ring_left`, `ring_right` are T in the cells beside it [N], `relief` what the rings' own weight takes.
     """
-    a = j - 1 if j > 0 else belt.cell.size - 1
     pressure = maximum(ring_right - relief, 0.0) * (belt.cell[j] * belt.curvature[j])
-    pressure += maximum(ring_left - relief, 0.0) * (belt.cell[a] * belt.curvature[a])
+    bent = behind(belt.cell, j, 0) * behind(belt.curvature, j, 0)
+    pressure += maximum(ring_left - relief, 0.0) * bent
     return friction * (0.5 * belt.per_dual[j]) * pressure
 
 
 @kernel
 def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Axial line forces of both wraps into FORCE [N/m]; on the strands it stays 0."""
-    fields, c = state.fields, belt.constants
-    wedge = c[0, WEDGE]
+    n, fields, c = state.fields.rows, state.fields, belt.constants
+    wedge, speed = c[0, WEDGE], state.scalars[0, SPEED]
     for wrap in range(2):
         contact = state.contacts[1] if wrap else state.contacts[0]
-        opening = like(state.scalars[0, POSITION], wedge) if wrap else c[0, DRIVING_POSITION]
+        pushed = contact.stations
+        slope = like(wedge, pushed[0, GAP])
+        opening = like(state.scalars[0, POSITION] if wrap else like(c[0, DRIVING_POSITION], speed), slope)
         first = belt.driven_start if wrap else 0
-        wrap_stations = contact.stations
+        row, part = first % n, first // n
         for k in range(contact.weight.size):
-            wrap_stations[k, GAP] = fma(wedge, fields[first + k, W], opening)
+            pushed[k, GAP] = fma(slope, at_station(fields, row, part, W), opening)
+            row += 1
+            if row == n:
+                row, part = 0, part + 1
         if contact.sweeps > 0:
             sweep_lane_contact(contact)
         else:
             solve_lane_contact(contact, MOST_CONTACT_ROUNDS)
+        row, part = first % n, first // n
         for k in range(contact.weight.size):
-            push = maximum(wrap_stations[k, PUSHED], 0.0)
-            stations[first + k, FORCE] = select(wrap_stations[k, CLOSED] > 0.5, push, 0.0)
+            force = select(pushed[k, CLOSED] > 0.5, maximum(pushed[k, PUSHED], 0.0), 0.0)
+            pushed[k, FORCED] = force
+            set_station(stations, row, part, FORCE, force)
+            row += 1
+            if row == n:
+                row, part = 0, part + 1
 
 
 @kernel
 def lane_strains(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Strains of elements and rings in the cells, with 1 / (1 + strain) and 1 / content."""
-    n, fields = belt.cell.size, state.fields
-    offset = belt.constants[0, RING_OFFSET]
-    w_b = fields[0, W]
-    for k in range(n - 1, -1, -1):
-        kappa = belt.curvature[k]
-        w = fields[k, W]
-        more_0, more_1 = fields[k, N_ELEMENT], fields[k, N_RING]
-        content_0, content_1 = more_0 + 1.0, fma(offset, kappa, more_1 + 1.0)
-        per_0, per_1 = reciprocals(content_0, content_1)
-        if kappa > 0.0:
-            bent = (w + w_b) * (0.5 * kappa)
-            length_0, length_1 = bent + 1.0, fma(offset, kappa, bent + 1.0)
-            per_length_0, per_length_1 = reciprocals(length_0, length_1)
-            stations[k, EPS_0], stations[k, EPS_1] = (bent - more_0) * per_0, (bent - more_1) * per_1
-            stations[k, SHORT_0] = content_0 * per_length_0
-            stations[k, SHORT_1] = content_1 * per_length_1
-        else:
-            stations[k, EPS_0], stations[k, EPS_1] = -more_0 * per_0, -more_1 * per_1
-            stations[k, SHORT_0], stations[k, SHORT_1] = content_0, content_1
-        stations[k, PER_CONTENT_0], stations[k, PER_CONTENT_1] = per_0, per_1
+    fields, offset = state.fields, belt.constants[0, RING_OFFSET]
+    w_b = from_ahead(fields[0, W])
+    for j in range(fields.rows - 1, -1, -1):
+        w = fields[j, W]
+        cell_strains(belt, stations, j, w, w_b, fields[j, N_ELEMENT], fields[j, N_RING], offset)
         w_b = w
+
+
+@merged_kernel
+def cell_strains(belt: LaneBelt, stations: LaneArray, j: int, w, w_b, more_0, more_1, offset):
+    """As `lane_strains`, of cell j, by the displacement at both ends [m] and the contents' deviations."""
+    kappa = belt.curvature[j]
+    content_0, content_1 = more_0 + 1.0, fma(offset, kappa, more_1 + 1.0)
+    per_0, per_1 = reciprocals(content_0, content_1)
+    if anywhere(kappa > 0.0):
+        bent = (w + w_b) * (0.5 * kappa)
+        length_0, length_1 = bent + 1.0, fma(offset, kappa, bent + 1.0)
+        per_length_0, per_length_1 = reciprocals(length_0, length_1)
+        stations[j, EPS_0], stations[j, EPS_1] = (bent - more_0) * per_0, (bent - more_1) * per_1
+        stations[j, SHORT_0] = content_0 * per_length_0
+        stations[j, SHORT_1] = content_1 * per_length_1
+    else:
+        stations[j, EPS_0], stations[j, EPS_1] = -more_0 * per_0, -more_1 * per_1
+        stations[j, SHORT_0], stations[j, SHORT_1] = content_0, content_1
+    stations[j, PER_CONTENT_0], stations[j, PER_CONTENT_1] = per_0, per_1
 
 
 @kernel
@@ -255,7 +279,7 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     A loop of its own: the chain of operations from a speed to the system's rows is longer than what a
     processor looks ahead, so that it would not begin a station before the last one is nearly done.
     """
-    n, fields, c = belt.cell.size, state.fields, belt.constants
+    n, fields, c = state.fields.rows, state.fields, belt.constants
     kind, memory = belt.law.kind, belt.memory
     table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
     kinetic, fall, per_scale = lane_law(
@@ -266,16 +290,19 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     per_width, per_ring_width = 1.0 / c[0, FRICTION_SPEED], 1.0 / c[0, RING_FRICTION_SPEED]
     driven_speed = state.scalars[0, SPEED]
     driven_base = driven_speed * like(c[0, DRIVEN_RADIUS], driven_speed) - like(belt_speed, driven_speed)
-    turning = c[0, DRIVING_SPEED]
-    surface = turning * c[0, DRIVING_RADIUS] - belt_speed
+    driving_turning, driven_turning = c[0, DRIVING_SPEED], like(driven_speed, least)
+    driving_surface, driven_surface = (
+        driving_turning * c[0, DRIVING_RADIUS] - belt_speed,
+        like(driven_base, least),
+    )
     for j in range(n):
-        if j == belt.driven_start:
-            surface, turning = like(driven_base, least), like(driven_speed, least)
-        if belt.arc_share[j] == 0.0:
+        if not anywhere(belt.arc_share[j] > 0.0):
             continue
-        a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
+        is_driven = belt.on_driven[j] > 0.5
+        surface = select(is_driven, driven_surface, driving_surface)
+        turning = select(is_driven, driven_turning, driving_turning)
         full_speed = belt_speed + fields[j, V_ELEMENT]
-        slope = (fields[b, W] - fields[a, W]) * belt.per_span[j]
+        slope = (ahead(fields, j, W) - behind(fields, j, W)) * belt.per_span[j]
         v_radial = fma(full_speed, slope, fields[j, U])
         v_tangential = fields[j, V_ELEMENT] - fma(turning, fields[j, W], surface)
         meridian = v_radial * per_cosine

@@ -2,14 +2,32 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import LaneArray
+from cvt_hpc.lanes import LaneArray, like, merge_parts
 from cvt_hpc.models.elastic_belt.explicit import ExplicitWork, step_explicit
 from cvt_hpc.models.elastic_belt.imex import step_imex
 from cvt_hpc.models.elastic_belt.imex_work import ImexWork
-from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
-from cvt_hpc.models.elastic_belt.lane_forces import derive, note_speeds
+from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK, LaneBelt, LaneState
+from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES, derive, note_speeds
 from cvt_hpc.models.elastic_belt.sampling import Sensors, sample
+
+
+class Sampled(NamedTuple):
+    """What samples are taken of: the belt that is marched, where that is in linked parts all in one.
+
+    Attributes
+    ----------
+    belt, state
+        Constants and state, not in parts.
+    stations : LaneArray
+        The step's work space.
+    """
+
+    belt: LaneBelt
+    state: LaneState
+    stations: LaneArray
 
 
 @kernel
@@ -19,6 +37,7 @@ def march_imex(
     work: ImexWork,
     step: float,
     steps: int,
+    sampled: Sampled,
     sensing: Sensors,
     rows: LaneArray,
     first: int,
@@ -34,6 +53,8 @@ def march_imex(
         As the step kernel takes them.
     step, steps : float, int
         Step [s] and their number between samples.
+    sampled : Sampled
+        Of the same run or runs; at the end it has all of the state.
     sensing, rows, profiles, ended
         As `sample` takes them.
     first, last : int
@@ -43,7 +64,13 @@ def march_imex(
         for taken in range(steps):
             note_speeds(belt, state, work.stations, taken, steps)
             step_imex(belt, state, work, step)
-        sample(belt, state, work.stations, sensing, rows, k, profiles, ended)
+        _gather(state, work.stations, sampled, FIELDS_OF_FORCES)
+        sample(sampled.belt, sampled.state, sampled.stations, sensing, rows, k, profiles, ended)
+        # a sample takes it to its end
+        state.scalars[0, LAYER_WORK] = like(
+            sampled.state.scalars[0, LAYER_WORK], state.scalars[0, LAYER_WORK]
+        )
+    _gather(state, work.stations, sampled, work.stations.data.shape[1])
 
 
 @kernel
@@ -53,6 +80,7 @@ def march_explicit(
     work: ExplicitWork,
     step: float,
     steps: int,
+    sampled: Sampled,
     sensing: Sensors,
     rows: LaneArray,
     first: int,
@@ -65,7 +93,21 @@ def march_explicit(
         for taken in range(steps):
             note_speeds(belt, state, work.stations, taken, steps)
             step_explicit(belt, state, work, step)
-        sample(belt, state, work.stations, sensing, rows, k, profiles, ended)
+        _gather(state, work.stations, sampled, FIELDS_OF_FORCES)
+        sample(sampled.belt, sampled.state, sampled.stations, sensing, rows, k, profiles, ended)
+        # a sample takes it to its end
+        state.scalars[0, LAYER_WORK] = like(
+            sampled.state.scalars[0, LAYER_WORK], state.scalars[0, LAYER_WORK]
+        )
+    _gather(state, work.stations, sampled, work.stations.data.shape[1])
+
+
+@kernel
+def _gather(state: LaneState, stations: LaneArray, sampled: Sampled, fields: int) -> None:
+    """Put what is sampled together from linked parts, of the stations' work space its first `fields`."""
+    merge_parts(state.fields, sampled.state.fields, state.fields.data.shape[1])
+    merge_parts(stations, sampled.stations, fields)
+    merge_parts(state.scalars, sampled.state.scalars, state.scalars.data.shape[1])
 
 
 @kernel

@@ -128,7 +128,7 @@ def audit(
     rows, k, first
         Results go into row k from field `first` on, in the order of POWERS.
     profiles : (N, M) LaneArray of doubles
-        MOMENTS of this state are added to its first fields.
+        MOMENTS of this state are added to its first fields; one without rows takes none.
     """
     n, fields, c, scalars = belt.cell.size, state.fields, belt.constants, state.scalars
     speed = scalars[0, SPEED]

@@ -33,7 +33,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     lane_load,
     step_ripple,
 )
-from cvt_hpc.models.elastic_belt.moments import MOMENTS
+from cvt_hpc.models.elastic_belt.moments import MOMENTS, add
 from cvt_hpc.models.elastic_belt.power import POWERS, audit
 from cvt_hpc.models.elastic_belt.record import MODES
 from cvt_hpc.physics.lane_compliance import SOLVES, UNSOLVED
@@ -90,6 +90,8 @@ class Sensors(NamedTuple):
     matrix : (S, N) array, of the lanes' precision
         Weights of the stations' displacement: first the probes, then MODES sine amplitudes of each strand,
         measured from the chord between its ends.
+    begins, ends : (S,) int arrays
+        The stations that count in each of them: the first, and the one behind the last.
     middles : (2,) int array
         Cell in the middle of each strand.
     starts, stops : (2,) int arrays
@@ -99,6 +101,8 @@ class Sensors(NamedTuple):
     """
 
     matrix: np.ndarray
+    begins: np.ndarray
+    ends: np.ndarray
     middles: np.ndarray
     starts: np.ndarray
     stops: np.ndarray
@@ -155,7 +159,10 @@ def sensors(grid: Mesh, places: tuple[Probe, ...], interval: float, dtype: type)
             rows.append(row)
     starts = np.array([grid.starts[1], grid.starts[3]])
     stops = starts + np.array([grid.counts[1], grid.counts[3]])
-    return Sensors(np.array(rows, dtype=dtype), (starts + stops) // 2, starts, stops, interval)
+    counting = [np.flatnonzero(row) for row in rows]
+    begins = np.array([stations[0] for stations in counting])
+    ends_ = np.array([stations[-1] + 1 for stations in counting])
+    return Sensors(np.array(rows, dtype=dtype), begins, ends_, (starts + stops) // 2, starts, stops, interval)
 
 
 @kernel
@@ -184,7 +191,7 @@ def sample(
     k : int
         Which row.
     profiles : (N, 21) LaneArray of doubles
-        PROFILES of this state are added to it.
+        PROFILES of this state are added to it; one without rows takes none.
     ended : (1, 4) LaneArray of doubles
         ENDED of each lane.
     """
@@ -194,7 +201,7 @@ def sample(
     zero = like(0.0, fields[0, W])
     for s in range(sensed):
         total = zero
-        for j in range(n):
+        for j in range(sensing.begins[s], sensing.ends[s]):
             total = fma(sensing.matrix[s, j], fields[j, W], total)
         rows[k, s] = total
     speed = state.scalars[0, SPEED]
@@ -238,8 +245,8 @@ def sample(
     rows[k, sensed + len(CHANNELS) - 1] = step_ripple(belt, state, stations)
     column = len(MOMENTS)
     for j in range(n):
-        profiles[j, column] = profiles[j, column] + like(stations[j, FORCE], speed)
-        profiles[j, column + 1] = profiles[j, column + 1] + like(fields[j, W], speed)
+        add(profiles, j, column, stations[j, FORCE])
+        add(profiles, j, column + 1, fields[j, W])
 
 
 @kernel
