@@ -236,14 +236,16 @@ def _read_axes(
 def _resolve(values: Mapping[str, Any], rules: Sequence[Rule], schema: Schema, source: str) -> dict[str, Any]:
     """Return the value of every key that has one and does not follow from others."""
     follows = {rule.key for rule in rules}
+    giving = {rule.needs[0] for rule in rules if rule.is_substituted}
     resolved = {}
     for key, parameter in schema.parameters.items():
+        where = f"{source}: [{schema.section_of[key]}] {key}"
         if key in values:
             resolved[key] = values[key]
-        elif key not in follows and parameter.default is not None:
-            where = f"{source}: [{schema.section_of[key]}] {key}"
-            resolved[key] = read_value(parameter, parameter.default, where)
-        elif key not in follows and parameter.gives is None:
-            where = f"{source}: [{schema.section_of[key]}] {key}"
+        elif key in follows or (parameter.gives and key not in giving):
+            continue
+        elif parameter.default is None:
             raise mismatch(where, expectation(parameter), "nothing")
+        else:
+            resolved[key] = read_value(parameter, parameter.default, where)
     return resolved

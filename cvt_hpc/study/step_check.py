@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cvt_hpc.errors import mismatch
+from cvt_hpc.job.derivation import overridden
 from cvt_hpc.job.handing import handed_to
 from cvt_hpc.models.auto.rules import COARSENESS, Rung
 from cvt_hpc.steppers import STEPPERS
@@ -91,7 +92,7 @@ def _section(job: Job) -> str:
 
 
 def _halved(job: Job) -> dict[str, Any]:
-    document = _without(job.resolved(), _section(job), (STEP,))
+    document = _without(job.resolved(), _section(job), (STEP, *overridden((STEP,), job.schema)))
     document[_section(job)][STEP] = 0.5 * job.parameters[STEP]
     return document
 
