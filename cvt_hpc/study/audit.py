@@ -21,7 +21,7 @@ from cvt_hpc.study.recovery import read_records
 from cvt_hpc.study.repeats import Repeat, built, interval
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
+from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, classify_runs
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
@@ -31,7 +31,6 @@ AUDITED = "auto"
 FULL_MODEL = "elastic_belt"
 LOWER = (Rung.PASSIVE, Rung.COARSE)
 OPPOSITE = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
-DECIDED = (*OPPOSITE, OccurrenceClass.SLIPPING, OccurrenceClass.IRREGULAR)
 FORCES = (("mean_ring_tension", "mean_push_force"), ("axial_force",))  # by what they are measured against
 
 
