@@ -176,7 +176,7 @@ def _add_assignments(command: argparse.ArgumentParser, flag: str, text: str) -> 
 def _run(arguments: argparse.Namespace) -> int:
     from cvt_hpc.job import load_job
     from cvt_hpc.job.durations import read_duration
-    from cvt_hpc.printing import report_lines, trouble_lines
+    from cvt_hpc.printing import repeat_line, report_lines, trouble_lines
     from cvt_hpc.study import check_start, run
     from cvt_hpc.study.launch import end_process
     from cvt_hpc.study.steps import check_refinement
@@ -197,6 +197,9 @@ def _run(arguments: argparse.Namespace) -> int:
     if arguments.dry_run:
         check_start(job, arguments.out, part=arguments.part, fresh=arguments.fresh)
         _show(job, arguments.out)
+        if _speaks():
+            for repeat, _ in repeats:
+                print(repeat_line(repeat))
         return DONE
     started = time.monotonic()
     report = run(job, arguments.out, part=arguments.part, **options)
@@ -461,11 +464,9 @@ def _show(job: Job, out: Path | None) -> None:
 
     describe(job, default_simulator())  # refuses axes that the dataset of a run could not hold
     if _speaks():
-        from cvt_hpc.simulation import estimate_cost
-        from cvt_hpc.study.status import read_machine_factor
+        from cvt_hpc.study.status import expected_cost
 
-        factor, runs = read_machine_factor(out or Path("out") / job.name, job)
-        print(summarize(job, factor * estimate_cost(job), runs))
+        print(summarize(job, *expected_cost(job, out or Path("out") / job.name)))
 
 
 def _check_ranks(ranks: list[int]) -> None:

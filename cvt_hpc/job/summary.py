@@ -47,7 +47,7 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
     product = f" = {' x '.join(map(str, job.shape))}" if len(job.shape) > 1 else ""
     at_most = "at most " if "first_spacing" in job.design else ""
     basis = f" (by what {measured} runs on record took)" if measured else ""
-    cost = f"estimated cost: {at_most}{_cost_in_words(core_seconds, job.size)}{basis}"
+    cost = f"estimated cost: {at_most}{cost_in_words(core_seconds, job.size)}{basis}"
     lines += ["", f"runs: {at_most}{job.size}{product}"]
     lines += [f"histories kept: of runs {', '.join(map(str, job.histories))}"] if job.histories else []
     lines += [cost]
@@ -114,7 +114,8 @@ def _setting_in_words(value: Any) -> str:
     return ", ".join(f"{count} along {name}" for name, count in value.items())
 
 
-def _cost_in_words(core_seconds: float, runs: int) -> str:
+def cost_in_words(core_seconds: float, runs: int) -> str:
+    """Return what runs cost, each and in all; nan: not known."""
     if math.isnan(core_seconds):
         return "not known for this model"
     total = core_seconds * runs

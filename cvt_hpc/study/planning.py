@@ -76,8 +76,8 @@ def prepare(
     records.written[missing_histories(task.job, folder, records)] = np.nan  # done again; the record stays
     done = records.status == Status.DONE
     recorded = int((records.recorded & asked).sum())
-    costs = predicted_costs(task.job, task.simulator, records)
     steps = refined_steps(task.job, records, task.asked_steps() if task.asked_steps else {})
+    costs = predicted_costs(task.job, task.simulator, steps)
     return Plan(
         assignments=plan_runs(task.job, task.simulator, records, asked, ranks, steps),
         attempts=later_attempts(records),

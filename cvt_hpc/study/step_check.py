@@ -23,6 +23,7 @@ from cvt_hpc.steppers import STEPPERS
 from cvt_hpc.study.audit import AUDITED, FULL_MODEL
 from cvt_hpc.study.records import Records
 from cvt_hpc.study.repeats import Repeat, built
+from cvt_hpc.study.status import expected_cost
 from cvt_hpc.study.steps import STEP, stepper_in_words
 from cvt_hpc.variables import Status
 
@@ -58,12 +59,15 @@ def step_check(job: Job, out: Path, fraction: float, way: str = "half") -> Repea
         If the job has no fixed step, varies it, or cannot be done the other way.
     """
     _check(job, way)
-    if way == EXPLICIT:
-        other, steps = built(job, _explicit(job)), {}
-    else:
-        other, steps = built(job, _halved(job)), {"steps": halved_steps}
     words, folder = WAYS[way]
-    return Repeat("step check", words, job, out, folder, other, fraction, _eligible, **steps)
+    if way == EXPLICIT:
+        other = built(job, _explicit(job))
+        own = {"core_seconds": lambda: expected_cost(other, out / folder)[0]}
+    else:
+        # each run has a step of its own to be halved
+        other = built(job, _halved(job))
+        own = {"core_seconds": lambda: 2.0 * expected_cost(job, out)[0], "steps": halved_steps}
+    return Repeat("step check", words, job, out, folder, other, fraction, _eligible, **own)
 
 
 def halved_steps(records: Records, runs: NDArray[np.intp]) -> Mapping[int, float]:

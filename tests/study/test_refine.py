@@ -2,6 +2,7 @@
 
 import os
 import signal
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,8 +11,10 @@ from study_double import Axis, Job, Simulator
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.study import open_results, run
+from cvt_hpc.study.attempts import predicted_costs
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.steps import refined_steps
 from cvt_hpc.variables import Status
 
 RUNS = 12
@@ -139,6 +142,13 @@ def test_runs_of_different_steps_share_no_batch(tmp_path):
     sweep(tmp_path, time_limit=0.0, **AGAIN)
     sweep(tmp_path, Watched(lanes=8))
     assert sorted(batches) == [[(3, STEP / 2), (7, STEP / 2), (8, STEP / 2)], [(10, STEP), (11, STEP)]]
+
+
+def test_runs_at_steps_of_their_own_are_priced_by_these():
+    records = SimpleNamespace(refinements=np.array([1.0, 4.0, 1.0]))
+    steps = refined_steps(JOB, records, {0: STEP / 2, 1: STEP / 2})
+    costs = predicted_costs(JOB, Simulator(), steps)
+    assert costs[:3].tolist() == pytest.approx([2.0, 8.0, 1.0])
 
 
 @pytest.mark.parametrize(
