@@ -105,7 +105,7 @@ def read_status(out: str | Path) -> StudyStatus:
 
 
 def expected_cost(job: Job, out: Path) -> tuple[float, int]:
-    """Return the core-seconds that a run of a job takes, mean over the job, and on how many records this rests.
+    """Return the core-seconds of a run, mean over the job, and the number of records that tell.
 
     Parameters
     ----------
