@@ -66,10 +66,10 @@ def _check(arguments: argparse.Namespace) -> int:
 def show_job(job: Job, out: Path | None) -> None:
     """Print what a job runs."""
     from cvt_hpc.job.summary import summarize
-    from cvt_hpc.study.description import describe
+    from cvt_hpc.study.description import check_names
     from cvt_hpc.study.simulator import default_simulator
 
-    describe(job, default_simulator())  # refuses axes that the dataset of a run could not hold
+    check_names(job, default_simulator())
     if speaks():
         from cvt_hpc.study.status import expected_cost
 

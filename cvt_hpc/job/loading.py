@@ -157,11 +157,12 @@ def _settled(rules: Sequence[Rule], axes: tuple[Axis, ...]) -> set[str]:
 
 
 def _refuse_what_is_compared_only(job: Job) -> None:
-    values = {name: (value,) for name, value in job.parameters.items()}
-    values.update({axis.name: axis.values for axis in (*job.axes, *job.derived)})
+    varied = {axis.name: axis for axis in (*job.axes, *job.derived)}
     for key, parameter in job.schema.parameters.items():
-        others = [value for value in values.get(key, ()) if value != parameter.default]
-        if parameter.compared_only and others:
+        if not parameter.compared_only:
+            continue
+        values = varied[key].values if key in varied else (job.parameters[key],)
+        if others := [value for value in values if value != parameter.default]:
             where = f"{job.source}: [{job.schema.section_of[key]}] {key}"
             expected = f"{show(parameter.default)} in a job of runs; `cvt-hpc chart` compares other values"
             raise mismatch(where, expected, show(others[0]))
