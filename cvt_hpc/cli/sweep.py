@@ -50,13 +50,15 @@ def add(commands: Any) -> None:
         action="append",
         default=[],
         choices=RETRIED,
-        help="do recorded runs that ended so again; may be repeated",
+        help="do recorded runs that ended so again, from their start; may be repeated",
     )
     run.add_argument(
         "--refine",
         type=float,
         metavar="FACTOR",
-        help="with --retry failed_numerics: at a time step shorter by this factor",
+        help="with --retry failed_numerics: begin at the job's time step over this factor, and halve it from "
+        "there as often as most_refinements says (default: the first factor not tried yet, 16 after three "
+        "halvings; 1: the job's own step again)",
     )
     audit = "do so large a part of the runs that lower rungs of model auto have answered in full, and compare"
     run.add_argument("--audit", type=float, metavar="FRACTION", help=audit)

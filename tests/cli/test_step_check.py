@@ -232,5 +232,8 @@ def test_failed_runs_are_done_again_at_a_shorter_step_from_the_command_line(
         [],
         ["cvt-hpc: --refine: expected --retry failed_numerics beside it, and no other, found no --retry"],
     )
-    status, _, err = call("run", "x.toml", "--refine", "1", "--retry", "failed_numerics")
-    assert (status, err) == (2, ["cvt-hpc: --refine: expected a factor above 1, at most 1000, found 1.0"])
+    status, _, err = call("run", "x.toml", "--refine", "0.5", "--retry", "failed_numerics")
+    assert (status, err) == (
+        2,
+        ["cvt-hpc: --refine: expected a factor of 1 or more, at most 1000, found 0.5"],
+    )
