@@ -78,6 +78,10 @@ def test_the_margin_is_the_load_over_the_torque_less_one():
     limit = carried(0.1, 40e3)
     for load in (90.0, -90.0):
         assert slip_margin(run(load=load), ALL) == pytest.approx(90.0 / limit - 1.0, rel=1e-12)
+    # gross slip is in proportion to the belt's speed, that of the driving pulley's rim
+    falling = run(friction_law="hyperbolic", friction_gradient=-0.8, driving_speed=300.0)
+    mu = 0.1 / (1.0 + 8.0 * GROSS_SLIP * 300.0 * PATH.driving_radius)
+    assert slip_margin(falling, ALL) == pytest.approx(90.0 / carried(mu, 40e3) - 1.0, rel=1e-12)
     # along a ramp it is the mean load of the samples, as are the axial forces
     ramp = run(
         {"load": np.arange(8.0), "axial_force driven": np.linspace(10e3, 80e3, 8)}, load_history="ramp"

@@ -85,6 +85,14 @@ def test_it_takes_a_scatter_of_a_fifth():
     assert not is_irregular(alternating(40, 1.19), 1.0, 1.0)
 
 
+def test_two_excursions_above_the_threshold_suffice():
+    windows = 0.7 * alternating(40, 1.25)
+    windows[9] = 1.1
+    assert not is_irregular(windows, 1.0, 1.0)
+    windows[30] = 1.1
+    assert is_irregular(windows, 1.0, 1.0)
+
+
 def test_the_gain_is_as_uncertain_as_that_of_a_fitted_line():
     windows = alternating(14, 1.3)
     line = linregress(np.linspace(-0.5, 0.5, 14), np.log(windows))
