@@ -2,6 +2,7 @@
 
 import os
 import signal
+from contextlib import ExitStack
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,10 +12,12 @@ from study_double import Axis, Job, Simulator
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.study import open_results, run
-from cvt_hpc.study.attempts import predicted_costs
+from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.planning import prepare
 from cvt_hpc.study.recovery import read_records
-from cvt_hpc.study.steps import refined_steps, untried_factor
+from cvt_hpc.study.steps import untried_factor
+from cvt_hpc.study.task import Task
 from cvt_hpc.variables import Status
 
 RUNS = 12
@@ -159,11 +162,14 @@ def test_runs_of_different_steps_share_no_batch(tmp_path):
     assert sorted(batches) == [[(3, STEP / 2), (7, STEP / 2), (8, STEP / 2)], [(10, STEP), (11, STEP)]]
 
 
-def test_runs_at_steps_of_their_own_are_priced_by_these():
-    records = SimpleNamespace(refinements=np.array([1.0, 4.0, 1.0]))
-    steps = refined_steps(JOB, records, {0: STEP / 2, 1: STEP / 2})
-    costs = predicted_costs(JOB, Simulator(), steps)
-    assert costs[:3].tolist() == pytest.approx([2.0, 8.0, 1.0])
+def test_runs_at_steps_of_their_own_are_priced_by_these(tmp_path):
+    sweep(tmp_path)
+    sweep(tmp_path, time_limit=0.0, **AGAIN)  # 3, 7, 8, 10 are asked for again, none is done
+    simulator = Simulator()
+    task = Task(JOB, describe(JOB, simulator), simulator, asked_steps=lambda: {0: STEP / 4, 3: STEP / 4})
+    with ExitStack() as held:
+        plan = prepare(StudyFolder(tmp_path), task, None, False, (), 1, held)
+    assert plan.costs == pytest.approx([4, 1, 1, 8, 1, 1, 1, 2, 2, 1, 2, 1])
 
 
 @pytest.mark.parametrize(
