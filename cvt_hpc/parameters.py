@@ -51,11 +51,9 @@ class Parameter:
     compared_only : bool
         Values other than the default are for `cvt-hpc chart` alone, which shows what is wrong with them.
     gives : Substitute or None
-        Another parameter, in whose place a job may give this one. Such a parameter has no default: runs know
-        it only if the job gives it.
-    chosen : Substitute or None
-        How the value follows from others where a job gives none, by the first of its `needs`; the default
-        then counts for nothing.
+        Another parameter, in whose place a job may give this one; a job that gives both is refused. Runs know
+        it only where the other one follows from it: where the job gives it, or where the job gives neither
+        and this one has a default.
     """
 
     default: Any
@@ -68,7 +66,6 @@ class Parameter:
     choices: tuple[str, ...] = ()
     compared_only: bool = False
     gives: Substitute | None = None
-    chosen: Substitute | None = None
 
 
 def positive(default: float, unit: str, description: str) -> Parameter:

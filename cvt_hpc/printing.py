@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+from cvt_hpc.job.summary import cost_in_words
 from cvt_hpc.job.values import in_words
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS, PairClass
@@ -54,6 +55,14 @@ def _special_in_words(counted: RunReport | StudyStatus) -> str:
     """Return how many runs slip or move irregularly, in words; empty if none."""
     counts = {"slip": counted.slipping, "irregular": counted.irregular}
     return ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+
+
+def repeat_line(repeat: Repeat) -> str:
+    """Return what doing a sample of the runs again is expected to cost."""
+    runs = round(repeat.fraction * repeat.first.size)
+    at_most = "at most" if repeat.first.design else "about"
+    cost = cost_in_words(repeat.core_seconds(), runs)
+    return f"{repeat.label}: {at_most} {runs} runs again {repeat.way}, estimated cost: {cost}"
 
 
 def audit_lines(report: AuditReport) -> Iterator[str]:

@@ -20,11 +20,10 @@ from cvt_hpc.chart.ladder_rungs import MODEL, REFERENCE, Rung
 from cvt_hpc.models.linear_stability.modes import DECAY
 from cvt_hpc.study.audit import FORCES
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.classes import OccurrenceClass
+from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass
 
 Array = NDArray[np.float64]
 
-DECIDED = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING, OccurrenceClass.SLIPPING)
 LEVELS = {OccurrenceClass.QUIET: -1.0, OccurrenceClass.VIBRATING: 1.0}  # of an onset: the sign decides
 
 
@@ -39,8 +38,7 @@ class Score(NamedTuple):
         Median of the errors and what 95 % of them keep: of onsets [N m], of all else relative. Not a number
         of occurrence, and where there is nothing to compare.
     wrong : float
-        Of occurrence, the share of cells that are decided here and there, but of another class: quiet,
-        vibrating or slipping.
+        Of occurrence, the share of cells that are decided here and there, but of another class.
     undecided : float
         Share of the reference's cells that the rung leaves undecided, fails at or does not speak of; of
         onsets the share of those that it misses.

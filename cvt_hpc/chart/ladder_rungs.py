@@ -94,7 +94,7 @@ def _check(job: Job) -> None:
     stated = [rule.key for rule in job.rules if not rule.is_substituted]
     varied = dict.fromkeys(stated, ("derived", "a formula"))
     varied |= dict.fromkeys(axes, ("axes", "an axis"))
-    for name in ("stations", "step", "duration", "longest_duration"):
+    for name in ("stations", "step_error", "step", "duration", "longest_duration"):
         if name in varied:
             table, found = varied[name]
             raise mismatch(f"{where}: [{table}] {name}", "one value, which the reference refines", found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Any
@@ -41,6 +42,40 @@ class Axis:
     unit: str
     description: str
     spacing: str = field(default="linear", compare=False)
+
+
+def thinned(axes: tuple[Axis, ...], most: int, *, sampled: bool = False) -> tuple[Axis, ...]:
+    """Return axes of fewer values, spread over those given, the first and the last among them.
+
+    Parameters
+    ----------
+    axes : tuple of Axis
+        A grid; of samples the values at one place belong together, and stay so.
+    most : int
+        Number of combinations that are to be left, or of samples. Two values of each axis stay, and all
+        texts.
+    sampled : bool
+        Whether they are samples.
+    """
+    if sampled:
+        return tuple(_spread(axis, most) for axis in axes)
+    texts = {axis.name: len(axis.values) for axis in axes if isinstance(axis.values[0], str)}
+    sizes = sorted(len(axis.values) for axis in axes if axis.name not in texts)
+    left, longest = most / math.prod(texts.values()), math.inf
+    for place, size in enumerate(sizes):
+        share = left ** (1.0 / (len(sizes) - place))
+        if size > share:
+            longest = max(int(share), 2)
+            break
+        left /= size  # short axes stay as they are, and leave the more to long ones
+    return tuple(axis if axis.name in texts else _spread(axis, longest) for axis in axes)
+
+
+def _spread(axis: Axis, most: float) -> Axis:
+    size = len(axis.values)
+    if size <= most:
+        return axis
+    return replace(axis, values=tuple(axis.values[k * (size - 1) // (most - 1)] for k in range(most)))
 
 
 def read_axis(name: str, parameter: Parameter, raw: Any, where: str) -> Axis:

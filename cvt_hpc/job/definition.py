@@ -5,14 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job.assignments import Assignments, read_assignments
-from cvt_hpc.job.axes import Axis
+from cvt_hpc.job.axes import Axis, thinned
 from cvt_hpc.job.crosscheck import check_point, complete_point
 from cvt_hpc.job.derivation import ordered_rules, overridden
 from cvt_hpc.job.design import Design
@@ -33,20 +33,29 @@ class Derived:
         Of the parameter.
     axes : tuple of str
         Those along which it varies, in the job's order.
-    values : tuple
-        Its values [unit] at their combinations in C order; of a sampled job those of all samples.
     unit, description : str
         Of the parameter.
     words : str
         How it follows: a formula, or what it is linked to or given by.
+    evaluate : callable
+        Returns `values`.
     """
 
     name: str
     axes: tuple[str, ...]
-    values: tuple
     unit: str
     description: str
     words: str
+    evaluate: Callable[[], tuple] = field(compare=False, repr=False)
+
+    @cached_property
+    def values(self) -> tuple:
+        """Its values [unit] along the axes in C order; of a sampled job those of all samples.
+
+        Computed when they are first asked for, because of a huge grid that takes long. InputError where one
+        is not legal.
+        """
+        return self.evaluate()
 
 
 @dataclass(frozen=True)
@@ -121,13 +130,21 @@ class Job:
         return tuple(self._derived(rule, varied[rule.key]) for rule in self.rules if varied[rule.key])
 
     def _derived(self, rule: Rule, along: tuple[str, ...]) -> Derived:
-        needed = needed_rules(self.rules, rule.key)
-        values = tuple(
-            follow(needed, {**self.parameters, **place})[rule.key]
-            for place in places(self.axes, along, sampled=self.is_sampled)
-        )
+        def evaluate() -> tuple:
+            schema, needed = self.schema, needed_rules(self.rules, rule.key)
+            return tuple(
+                complete_point(schema, needed, self.parameters, place)[rule.key]
+                for place in places(self.axes, along, sampled=self.is_sampled)
+            )
+
         parameter = rule.parameter
-        return Derived(rule.key, along, values, parameter.unit, parameter.description, rule.words)
+        return Derived(rule.key, along, parameter.unit, parameter.description, rule.words, evaluate)
+
+    def thinned(self, most: int) -> Job:
+        """Return this job with runs from all over it, as many as `most` if it has more; for estimates."""
+        axes = thinned(self.axes, most, sampled=self.is_sampled)
+        design = self.design | ({"runs": len(axes[0].values)} if self.is_sampled else {})
+        return replace(self, axes=axes, design=design, histories=())
 
     def complete(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return the base scene with values [SI] of axes, and with what follows from them."""

@@ -1,7 +1,7 @@
 """Which parameters of a job follow from others: its tables [derived] and [linked.AXIS], and substitutes.
 
 [derived] has formulas, [linked.AXIS] the parameters that follow an axis value by value. Substitutes are the
-model's: `belt_length` gives `driven_radius`, and the scene gives the time step where the job does not. Each
+model's: `belt_length` gives `driven_radius`, and `step_error` gives `step` where the job gives neither. Each
 rule comes after those that give what it needs.
 """
 
@@ -17,7 +17,6 @@ from cvt_hpc.job.formula import read_formula
 from cvt_hpc.job.rules import Link, Rule, Substituted
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.values import kind_of
-from cvt_hpc.parameters import Substitute
 
 
 def read_derived(table: Mapping[str, Any], schema: Schema, source: str) -> list[Rule]:
@@ -82,7 +81,6 @@ def _read_link(name: str, raw: Any, axis: Axis, schema: Schema, where: str) -> R
 def overridden(keys: Collection[str], schema: Schema) -> set[str]:
     """Return what values of these keys put out of force: what they give, and what else would give them."""
     given = {schema.parameters[key].gives.key for key in keys if schema.parameters[key].gives}
-    given |= {key for key, p in schema.parameters.items() if p.chosen and p.chosen.needs[0] in keys}
     return given | {key for key, p in schema.parameters.items() if p.gives and p.gives.key in keys}
 
 
@@ -111,8 +109,9 @@ def ordered_rules(rules: Iterable[Rule], given: Collection[str], schema: Schema,
             raise mismatch(rule.where, "one source of its values", f"a second one of {rule.key}")
         found[rule.key] = rule
     found |= _substituted({*given, *found}, schema, source)
+    giving = {rule.needs[0] for rule in found.values() if rule.is_substituted}
     for rule in found.values():
-        _check_known(rule, {*given, *found}, schema)
+        _check_known(rule, {*given, *found, *giving}, schema)
     # in the order of declaration where they are free of each other: a job's rules do not depend on its layout
     needs = {key: found[key].needs for key in schema.parameters if key in found}
     try:
@@ -126,21 +125,19 @@ def ordered_rules(rules: Iterable[Rule], given: Collection[str], schema: Schema,
 
 def _substituted(known: set[str], schema: Schema, source: str) -> dict[str, Rule]:
     rules: dict[str, Rule] = {}
-
-    def add(key: str, substitute: Substitute) -> None:
-        where = f"{source}: [{schema.section_of[key]}] {key}"
-        target = substitute.key
-        if target in known or target in rules:
-            raise mismatch(where, f"either {key} or {target}", "both")
-        names = (key, *(need for need in substitute.needs if need in schema.parameters and need != key))
-        source_of = Substituted(key, names, schema.parameters[key].unit, substitute)
-        rules[target] = Rule(target, source_of, where, schema.parameters[target])
-
     for key, parameter in schema.parameters.items():
-        if parameter.gives is not None and key in known:
-            add(key, parameter.gives)
-        if parameter.chosen is not None and key not in known:
-            add(parameter.chosen.needs[0], parameter.chosen)
+        substitute = parameter.gives
+        if substitute is None or (key not in known and parameter.default is None):
+            continue
+        target = substitute.key
+        is_taken = target in known or target in rules
+        where = f"{source}: [{schema.section_of[key]}] {key}"
+        if key in known and is_taken:
+            raise mismatch(where, f"either {key} or {target}", "both")
+        if not is_taken:
+            names = (key, *(need for need in substitute.needs if need in schema.parameters and need != key))
+            gives = Substituted(key, names, parameter.unit, substitute)
+            rules[target] = Rule(target, gives, where, schema.parameters[target])
     return rules
 
 

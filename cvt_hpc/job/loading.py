@@ -157,11 +157,12 @@ def _settled(rules: Sequence[Rule], axes: tuple[Axis, ...]) -> set[str]:
 
 
 def _refuse_what_is_compared_only(job: Job) -> None:
-    values = {name: (value,) for name, value in job.parameters.items()}
-    values.update({axis.name: axis.values for axis in (*job.axes, *job.derived)})
+    varied = {axis.name: axis for axis in (*job.axes, *job.derived)}
     for key, parameter in job.schema.parameters.items():
-        others = [value for value in values.get(key, ()) if value != parameter.default]
-        if parameter.compared_only and others:
+        if not parameter.compared_only:
+            continue
+        values = varied[key].values if key in varied else (job.parameters[key],)
+        if others := [value for value in values if value != parameter.default]:
             where = f"{job.source}: [{job.schema.section_of[key]}] {key}"
             expected = f"{show(parameter.default)} in a job of runs; `cvt-hpc chart` compares other values"
             raise mismatch(where, expected, show(others[0]))
@@ -236,14 +237,16 @@ def _read_axes(
 def _resolve(values: Mapping[str, Any], rules: Sequence[Rule], schema: Schema, source: str) -> dict[str, Any]:
     """Return the value of every key that has one and does not follow from others."""
     follows = {rule.key for rule in rules}
+    giving = {rule.needs[0] for rule in rules if rule.is_substituted}
     resolved = {}
     for key, parameter in schema.parameters.items():
+        where = f"{source}: [{schema.section_of[key]}] {key}"
         if key in values:
             resolved[key] = values[key]
-        elif key not in follows and parameter.default is not None:
-            where = f"{source}: [{schema.section_of[key]}] {key}"
-            resolved[key] = read_value(parameter, parameter.default, where)
-        elif key not in follows and parameter.gives is None:
-            where = f"{source}: [{schema.section_of[key]}] {key}"
+        elif key in follows or (parameter.gives and key not in giving):
+            continue
+        elif parameter.default is None:
             raise mismatch(where, expectation(parameter), "nothing")
+        else:
+            resolved[key] = read_value(parameter, parameter.default, where)
     return resolved

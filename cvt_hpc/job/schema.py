@@ -151,9 +151,9 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     for module in modules:
         for section, table in module.PARAMETERS.items():
             sections.setdefault(section, {}).update(table)
-    for key, substitute in getattr(model_module, "CHOSEN", {}).get(stepper, {}).items():
+    for key, substitute in getattr(model_module, "GIVES", {}).get(stepper, {}).items():
         section = next(name for name, table in sections.items() if key in table)
-        sections[section][key] = replace(sections[section][key], chosen=substitute)
+        sections[section][key] = replace(sections[section][key], gives=substitute)
     checks = tuple(module.check for module in modules if hasattr(module, "check"))
     inert = getattr(model_module, "inert", lambda parameters: {})
     return Schema(model, stepper, sections, checks, inert)

@@ -10,6 +10,7 @@ from cvt_hpc.job.definition import Derived, Job
 from cvt_hpc.job.values import in_words
 
 _FEW = 8
+_MOST_EVALUATED = 2_000
 
 
 def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
@@ -47,7 +48,7 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
     product = f" = {' x '.join(map(str, job.shape))}" if len(job.shape) > 1 else ""
     at_most = "at most " if "first_spacing" in job.design else ""
     basis = f" (by what {measured} runs on record took)" if measured else ""
-    cost = f"estimated cost: {at_most}{_cost_in_words(core_seconds, job.size)}{basis}"
+    cost = f"estimated cost: {at_most}{cost_in_words(core_seconds, job.size)}{basis}"
     lines += ["", f"runs: {at_most}{job.size}{product}"]
     lines += [f"histories kept: of runs {', '.join(map(str, job.histories))}"] if job.histories else []
     lines += [cost]
@@ -73,8 +74,11 @@ def _tables(job: Job) -> dict[str, list[tuple[str, ...]]]:
 
 
 def _rules(job: Job) -> list[tuple[str, ...]]:
-    """Return for each parameter that follows from others its values, how it follows, and along which axes."""
-    varied = {derived.name: derived for derived in job.derived}
+    """Return for each parameter that follows from others its values, how it follows, and along which axes.
+
+    Of a huge grid the values are those at places all over it.
+    """
+    varied = {derived.name: derived for derived in job.thinned(_MOST_EVALUATED).derived}
     rows = []
     for rule in job.rules:
         if rule.key in varied and len(set(varied[rule.key].values)) > 1:
@@ -114,7 +118,8 @@ def _setting_in_words(value: Any) -> str:
     return ", ".join(f"{count} along {name}" for name, count in value.items())
 
 
-def _cost_in_words(core_seconds: float, runs: int) -> str:
+def cost_in_words(core_seconds: float, runs: int) -> str:
+    """Return what runs cost, each and in all; nan: not known."""
     if math.isnan(core_seconds):
         return "not known for this model"
     total = core_seconds * runs

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 PILOT_SHARE = 0.25
 LEFT_SHARE = 1.0  # what refined and prolonged runs add to a map's cost, as measured by lebrecht_2004.toml
+_MOST_ESTIMATED = 2_000  # runs whose costs are averaged
 BATCH_SECONDS = 30.0  # of computing in a batch, as predicted: so much a process that dies may lose
 MOST_TURNS = 16  # groups of lanes in a batch: with more, those of the runs left would be hardly fuller
 
@@ -60,7 +61,7 @@ def _over_the_grid(job: Job, derived: Derived) -> np.ndarray:
 
 
 def estimate_cost(job: Job) -> float:
-    """Core-seconds of a run, mean over the job.
+    """Core-seconds of a run, mean over the job; of a huge one, over runs from all over it.
 
     Not known (nan) of a model that no study runs.
 
@@ -71,7 +72,7 @@ def estimate_cost(job: Job) -> float:
     """
     if not has_record(job):
         return float("nan")
-    return float(run_costs(job).mean())
+    return float(run_costs(job.thinned(_MOST_ESTIMATED)).mean())
 
 
 def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:

@@ -24,12 +24,12 @@ PARAMETERS = {
         "step_error": Parameter(
             0.02,
             "",
-            "error in a vibration's amplitude that the step may cause; the step follows where none is given",
+            "error in a vibration's amplitude that the step may cause; gives the step",
             minimum=1e-4,
             maximum=0.2,
         ),
         "step": Parameter(
-            4.6e-6,
+            None,
             "s",
             "largest time step; a whole number of steps makes a sampling interval",
             minimum=1e-9,

@@ -22,6 +22,7 @@ from cvt_hpc.study.frames import RecordFormat
 from cvt_hpc.study.record import RecordLog
 from cvt_hpc.study.records import Records
 from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.steps import asked_step
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def plan_runs(
         Time steps [s] of the runs that do not take that of the job, by run index: only runs of one step can
         advance together.
     """
-    costs = predicted_costs(job, simulator, records)
+    costs = predicted_costs(job, simulator, steps or {})
     pending = asked & ~records.recorded
     suspect = pending & (records.died >= DEATHS)
     groups = []
@@ -77,9 +78,22 @@ def plan_runs(
     ]
 
 
-def predicted_costs(job: Job, simulator: Simulator, records: Records) -> np.ndarray:
-    """Return the predicted duration of each run, in any unit: longer where its step is shortened."""
-    return simulator.run_costs(job) * records.refinements
+def predicted_costs(job: Job, simulator: Simulator, steps: Mapping[int, float]) -> np.ndarray:
+    """Return the predicted duration of each run, in any unit.
+
+    Parameters
+    ----------
+    job : Job
+        What is run.
+    simulator : Simulator
+        What does the runs.
+    steps : mapping
+        Time steps [s] of the runs that do not take that of the job, by run index: as much longer they take.
+    """
+    costs = np.array(simulator.run_costs(job), float)
+    for index, step in steps.items():
+        costs[index] *= asked_step(job, index) / step
+    return costs
 
 
 def _by_step(runs: list[int], steps: Mapping[int, float]) -> Iterable[list[int]]:

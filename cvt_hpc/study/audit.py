@@ -20,8 +20,9 @@ from cvt_hpc.study.records import Records
 from cvt_hpc.study.recovery import read_records
 from cvt_hpc.study.repeats import Repeat, built, interval
 from cvt_hpc.study.simulator import default_simulator
+from cvt_hpc.study.status import expected_cost
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
+from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, classify_runs
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
@@ -31,7 +32,6 @@ AUDITED = "auto"
 FULL_MODEL = "elastic_belt"
 LOWER = (Rung.PASSIVE, Rung.COARSE)
 OPPOSITE = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
-DECIDED = (*OPPOSITE, OccurrenceClass.SLIPPING, OccurrenceClass.IRREGULAR)
 FORCES = (("mean_ring_tension", "mean_push_force"), ("axial_force",))  # by what they are measured against
 
 
@@ -104,7 +104,17 @@ def audit_of(job: Job, out: Path, fraction: float) -> Repeat:
     if job.model != AUDITED:
         raise mismatch("--audit", f"a job of model {AUDITED}, whose rungs can err", f"model {job.model}")
     full = built(job, handed_to(job, FULL_MODEL, "done in full, to audit the rungs below"))
-    return Repeat("audit", "in full", job, out, FOLDER, full, fraction, _answered)
+    return Repeat(
+        "audit",
+        "in full",
+        job,
+        out,
+        FOLDER,
+        full,
+        fraction,
+        _answered,
+        core_seconds=lambda: expected_cost(full, out / FOLDER)[0],
+    )
 
 
 def report_audit(audit: Repeat) -> AuditReport:

@@ -163,20 +163,29 @@ class Study:
 
 
 def describe(job: Job, simulator: Simulator) -> Study:
-    """Return the study of a job.
-
-    Raises
-    ------
-    InputError
-        If an axis, or a parameter that follows from one, has the name of a recorded quantity, so that the
-        dataset could not hold both.
-    """
+    """Return the study of a job; errors as of `check_names`."""
+    check_names(job, simulator)
     variables = tuple(simulator.record_variables(job))
     coordinates = tuple(
         Dimension(name, tuple(np.asarray(c.values).tolist()), c.units, c.long_name)
         for name, c in simulator.record_coordinates(job).items()
     )
-    taken = {variable.name for variable in variables} | {dimension.name for dimension in coordinates}
+    axes = tuple(axis_dimension(axis) for axis in job.axes)
+    derived = tuple(derived_coordinate(one, sampled="runs" in job.design) for one in job.derived)
+    head = job.name, job.description, job.fingerprint(), job.resolved()
+    return Study(*head, axes, variables, coordinates, derived)
+
+
+def check_names(job: Job, simulator: Simulator) -> None:
+    """Refuse a job whose runs the dataset could not hold.
+
+    Raises
+    ------
+    InputError
+        If an axis, or a parameter that follows from one, has the name of a recorded quantity.
+    """
+    taken = {variable.name for variable in simulator.record_variables(job)}
+    taken |= set(simulator.record_coordinates(job))
     for table, name in [("axes", axis.name) for axis in job.axes] + [
         ("derived", d.name) for d in job.derived
     ]:
@@ -185,10 +194,6 @@ def describe(job: Job, simulator: Simulator) -> Study:
                 f"{job.source}: [{table}] {name}: expected a parameter that is not also the name of a "
                 f"recorded quantity, found {name}"
             )
-    axes = tuple(axis_dimension(axis) for axis in job.axes)
-    derived = tuple(derived_coordinate(one, sampled="runs" in job.design) for one in job.derived)
-    head = job.name, job.description, job.fingerprint(), job.resolved()
-    return Study(*head, axes, variables, coordinates, derived)
 
 
 def fit_text(text: str, size: int) -> bytes:

@@ -15,6 +15,7 @@ from cvt_hpc.study.cost_model import CostModel, Fit
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.study.status import find_records
+from cvt_hpc.study.steps import refined_steps
 from cvt_hpc.study.task import Task
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ def find_out(job: Job, simulator: Simulator, groups: Sequence[Batch], out: Path,
     else:
         records = find_records(out, job)
         if records is not None:
-            costs = predicted_costs(job, simulator, records)
+            costs = predicted_costs(job, simulator, refined_steps(job, records, {}))
             fit = Task(job, records.study, simulator).fit(records, costs)
             if fit.batches:
                 return Knowledge(fit, f"batches on record ({fit.batches})")

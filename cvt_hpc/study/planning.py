@@ -10,7 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.files import discard
-from cvt_hpc.study.attempts import enter_attempts, later_attempts, plan_runs, predicted_costs
+from cvt_hpc.study.attempts import (
+    enter_attempts,
+    later_attempts,
+    plan_runs,
+    predicted_costs,
+    runs_to_repeat,
+)
 from cvt_hpc.study.batches import Assignment
 from cvt_hpc.study.cost_model import Fit
 from cvt_hpc.study.folder import StudyFolder
@@ -21,7 +27,7 @@ from cvt_hpc.study.provenance import new_session
 from cvt_hpc.study.records import Records
 from cvt_hpc.study.recovery import read_records
 from cvt_hpc.study.schedule import Counter
-from cvt_hpc.study.steps import refined_steps
+from cvt_hpc.study.steps import refined_steps, untried_factor
 from cvt_hpc.study.task import Task
 from cvt_hpc.study.time_limit import TimeLimit
 from cvt_hpc.study.tracing import needed_runs
@@ -53,7 +59,7 @@ def prepare(
     retry: Collection[Status],
     ranks: int,
     held: ExitStack,
-    refine: float = 1.0,
+    refine: float | None = None,
 ) -> Plan:
     """Take the folder into possession and find what is left to do; on rank 0 alone."""
     study = task.study
@@ -72,12 +78,14 @@ def prepare(
     for warning in records.warnings + _other_versions(records, session):
         _logger.warning(warning)
     asked = asked_runs(task, records, part)
+    if refine is None:
+        refine = untried_factor(task.job, records, runs_to_repeat(records, asked, retry), retry)
     records = enter_attempts(folder, study, records, asked, retry, session, refine)
     records.written[missing_histories(task.job, folder, records)] = np.nan  # done again; the record stays
     done = records.status == Status.DONE
     recorded = int((records.recorded & asked).sum())
-    costs = predicted_costs(task.job, task.simulator, records)
     steps = refined_steps(task.job, records, task.asked_steps() if task.asked_steps else {})
+    costs = predicted_costs(task.job, task.simulator, steps)
     return Plan(
         assignments=plan_runs(task.job, task.simulator, records, asked, ranks, steps),
         attempts=later_attempts(records),

@@ -58,6 +58,8 @@ class Repeat:
         Share of the eligible runs that is done again.
     eligible : callable
         Tells of the records of the first study which runs may be drawn, shape (runs,).
+    core_seconds : callable
+        Tells what a run that is done again is expected to take [core-seconds], mean over the job.
     steps : callable
         Tells of these records, and of the indices of drawn runs, the time step [s] of those that are not to
         take that of `job`, by index.
@@ -71,6 +73,7 @@ class Repeat:
     job: Job
     fraction: float
     eligible: Callable[[Records], NDArray[np.bool_]]
+    core_seconds: Callable[[], float]
     steps: Callable[[Records, NDArray[np.intp]], Mapping[int, float]] = _of_the_job
 
     @property

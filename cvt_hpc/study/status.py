@@ -104,6 +104,22 @@ def read_status(out: str | Path) -> StudyStatus:
     )
 
 
+def expected_cost(job: Job, out: Path) -> tuple[float, int]:
+    """Return the core-seconds of a run, mean over the job, and the number of records that tell.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    out : Path
+        The output folder, whose records of this job tell how fast the machine is.
+    """
+    from cvt_hpc.simulation import estimate_cost
+
+    factor, runs = read_machine_factor(out, job)
+    return factor * estimate_cost(job), runs
+
+
 def read_machine_factor(out: Path, job: Job) -> tuple[float, int]:
     """Return processor time over predicted cost of the recorded runs of a job, and their number.
 

@@ -16,12 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cvt_hpc.errors import mismatch
+from cvt_hpc.job.derivation import overridden
 from cvt_hpc.job.handing import handed_to
 from cvt_hpc.models.auto.rules import COARSENESS, Rung
 from cvt_hpc.steppers import STEPPERS
 from cvt_hpc.study.audit import AUDITED, FULL_MODEL
 from cvt_hpc.study.records import Records
 from cvt_hpc.study.repeats import Repeat, built
+from cvt_hpc.study.status import expected_cost
 from cvt_hpc.study.steps import STEP, stepper_in_words
 from cvt_hpc.variables import Status
 
@@ -57,12 +59,15 @@ def step_check(job: Job, out: Path, fraction: float, way: str = "half") -> Repea
         If the job has no fixed step, varies it, or cannot be done the other way.
     """
     _check(job, way)
-    if way == EXPLICIT:
-        other, steps = built(job, _explicit(job)), {}
-    else:
-        other, steps = built(job, _halved(job)), {"steps": halved_steps}
     words, folder = WAYS[way]
-    return Repeat("step check", words, job, out, folder, other, fraction, _eligible, **steps)
+    if way == EXPLICIT:
+        other = built(job, _explicit(job))
+        own = {"core_seconds": lambda: expected_cost(other, out / folder)[0]}
+    else:
+        # each run has a step of its own to be halved
+        other = built(job, _halved(job))
+        own = {"core_seconds": lambda: 2.0 * expected_cost(job, out)[0], "steps": halved_steps}
+    return Repeat("step check", words, job, out, folder, other, fraction, _eligible, **own)
 
 
 def halved_steps(records: Records, runs: NDArray[np.intp]) -> Mapping[int, float]:
@@ -91,7 +96,7 @@ def _section(job: Job) -> str:
 
 
 def _halved(job: Job) -> dict[str, Any]:
-    document = _without(job.resolved(), _section(job), (STEP,))
+    document = _without(job.resolved(), _section(job), (STEP, *overridden((STEP,), job.schema)))
     document[_section(job)][STEP] = 0.5 * job.parameters[STEP]
     return document
 

@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cvt_hpc.errors import mismatch, show
 from cvt_hpc.variables import Status
@@ -48,6 +49,29 @@ def point_at_step(job: Job, index: int, steps: Mapping[int, float]) -> dict[str,
     return {**point, STEP: steps[index]} if index in steps else point
 
 
+def untried_factor(job: Job, records: Records, again: NDArray[np.int64], retry: Collection[Status]) -> float:
+    """Return the factor by which a retry shortens time steps where none is given: half of the shortest tried.
+
+    The same run at the same step would only fail again. Where not failed numerics alone are done again, or
+    the job has no fixed step, it is 1.
+
+    Parameters
+    ----------
+    job : Job
+        What is run.
+    records : Records
+        With the factors of earlier retries.
+    again : array of int
+        Indices of the runs that are done again.
+    retry : collection of Status
+        How these ended.
+    """
+    if set(retry) != {Status.FAILED_NUMERICS} or STEP not in job.parameters or not again.size:
+        return 1.0
+    tried = records.refinements[again].max() * 2.0 ** job.parameters.get("most_refinements", 0)
+    return min(2.0 * float(tried), MOST_REFINED)
+
+
 def check_refinement(job: Job, refine: float, retry: Collection[Status]) -> None:
     """Raise InputError unless failed runs of a job can be done again at a step shorter by a factor.
 
@@ -60,8 +84,8 @@ def check_refinement(job: Job, refine: float, retry: Collection[Status]) -> None
     retry : collection of Status
         How the runs ended that are done again: a shorter step is a cure for failed numerics alone.
     """
-    if not 1.0 < refine <= MOST_REFINED:
-        raise mismatch("--refine", f"a factor above 1, at most {MOST_REFINED:g}", show(refine))
+    if not 1.0 <= refine <= MOST_REFINED:
+        raise mismatch("--refine", f"a factor of 1 or more, at most {MOST_REFINED:g}", show(refine))
     if set(retry) != {Status.FAILED_NUMERICS}:
         found = ", ".join(Status(status).name.lower() for status in retry) or "no --retry"
         raise mismatch("--refine", "--retry failed_numerics beside it, and no other", found)

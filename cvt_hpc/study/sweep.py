@@ -56,7 +56,7 @@ def run(
     time_limit: float | None = None,
     run_limit: float = math.inf,
     retry: Collection[Status] = (),
-    refine: float = 1.0,
+    refine: float | None = None,
     chosen: Callable[[], np.ndarray] | None = None,
     asked_steps: Callable[[], Mapping[int, float]] | None = None,
 ) -> RunReport:
@@ -91,7 +91,9 @@ def run(
         more.
     refine : float, optional
         Factor by which the time step of runs that are done again for failed numerics is shortened, against
-        that of the job. Kept on record: a retry that was stopped goes on with it.
+        that of the job; a run that fails there is refined by itself from there on. By default the first
+        factor that these runs have not tried (`untried_factor`); 1: the step of the job again. Kept on
+        record: a retry that was stopped goes on with it.
     chosen : callable, optional
         Tells on rank 0 which runs are asked for, shape (runs,), always the same ones; by default those of the
         job's design.
@@ -114,7 +116,7 @@ def run(
     started = time.monotonic()
     simulator = simulator or default_simulator()
     study, share, folder = _accept(job, out, part, fresh, simulator)
-    if refine != 1.0:
+    if refine is not None:
         check_refinement(job, refine, retry)
     task = Task(job, study, simulator, run_limit, chosen, asked_steps)
     first = True

@@ -28,6 +28,13 @@ class OccurrenceClass(IntEnum):
         return self.name.lower().replace("_", " ")
 
 
+# What a longer run would not change: irregular motion is among them, undecided runs are not.
+DECIDED = (
+    OccurrenceClass.QUIET,
+    OccurrenceClass.VIBRATING,
+    OccurrenceClass.SLIPPING,
+    OccurrenceClass.IRREGULAR,
+)
 _OF_VERDICTS = {
     Vibrates.NO: OccurrenceClass.QUIET,
     Vibrates.YES: OccurrenceClass.VIBRATING,

@@ -126,7 +126,7 @@ def assess_ramp(
     levels = np.stack([windows[:, columns].max(axis=1) for columns in members], axis=1)
     at = np.interp(centres, np.arange(len(w)) / rate, loads)
     bins = np.minimum((centres * rate / samples * BINS).astype(int), BINS - 1)
-    verdict = _Passages(levels, at, parameters)
+    verdict = Passages(levels, at, parameters)
     vibrates, reason = verdict.classify(names)
     unknown = np.full(len(names), np.nan)
     return RampOccurrence(
@@ -146,8 +146,18 @@ def assess_ramp(
     )
 
 
-class _Passages:
-    """Where amplitudes (window, strand) [m] at loads (window,) [N m] stay above the threshold."""
+class Passages:
+    """Where amplitudes stay above the threshold.
+
+    Parameters
+    ----------
+    levels : array, shape (window, strand)
+        Amplitudes in successive windows [m].
+    loads : array, shape (window,)
+        Load in their middles [N m].
+    parameters : mapping
+        As `assess_ramp` takes them.
+    """
 
     def __init__(self, levels: Array, loads: Array, parameters: Mapping[str, Any]) -> None:
         self.levels, self.at = levels, loads

@@ -22,12 +22,11 @@ from cvt_hpc.lanes import LaneArray, fma, like
 from cvt_hpc.models.elastic_belt import imex, imex_stations, imex_system, lane_forces
 from cvt_hpc.models.elastic_belt.batch import PRECISIONS, Batch
 from cvt_hpc.models.elastic_belt.lane_belt import REPEATS
+from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP as STEP
 from cvt_hpc.physics import lane_compliance, lane_friction
-from cvt_hpc.steppers.imex import PARAMETERS
 
 CALLS = 15
 STATIONS = 160
-STEP = PARAMETERS["numerics"]["step"].default
 
 
 class Counted:

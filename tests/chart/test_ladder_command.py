@@ -96,6 +96,11 @@ def test_jobs_without_a_ladder_are_refused(job, options, message, capsys):
             "[axes] stations: expected one value, which the reference refines, found an axis",
         ),
         (
+            "[mesh]\nstations = 48",
+            "step_error = [0.01, 0.02]",
+            "[axes] step_error: expected one value, which the reference refines, found an axis",
+        ),
+        (
             "load = [100, 110]",
             'load = { from = 100, to = 110, step = 1 }\n[design]\nkind = "trace"',
             "[design]: expected none: a ladder goes over the whole grid, found trace",

@@ -56,12 +56,17 @@ def scores(dataset, answers=QUESTIONS, full=None, rung="rung"):
     return {f.question: f for f in found if f.rung == rung}
 
 
-def test_gross_slip_is_an_answer_and_irregular_motion_is_none():
+@pytest.mark.parametrize("verdict", [Vibrates.SLIPS, Vibrates.IRREGULAR])
+def test_gross_slip_and_irregular_motion_are_answers(verdict):
     verdicts = np.array(VERDICTS)
-    verdicts[1, -2:] = Vibrates.SLIPS  # where the reference is quiet
-    verdicts[1, 0] = Vibrates.IRREGULAR
+    verdicts[1, -2:] = verdict  # where the reference is quiet
     score = scores(transient(verdicts))["occurrence"].score
-    assert (score.cells, score.wrong, score.undecided) == (16, 2 / 16, 1 / 16)
+    assert (score.cells, score.wrong, score.undecided) == (16, 2 / 16, 0.0)
+    # and of the reference they are asked for
+    rungs = [Rung("rung", ("occurrence",), None)]
+    results = {"rung": transient(), "elastic_belt": transient(), "reference": transient(verdicts)}
+    score = next(found.score for found in compare(rungs, results) if found.rung == "rung")
+    assert (score.cells, score.wrong, score.undecided) == (16, 2 / 16, 0.0)
 
 
 def test_a_rung_that_says_the_same_has_no_error():

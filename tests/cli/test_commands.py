@@ -4,7 +4,7 @@ import netCDF4
 import pytest
 from toy_jobs import GRID
 
-from cvt_hpc import cli
+from cvt_hpc.cli.parts import INTERRUPTED
 from cvt_hpc.printing import report_lines
 from cvt_hpc.study import FailedRun, RunReport, StudyStatus
 from cvt_hpc.variables import Status
@@ -338,4 +338,4 @@ def test_an_interrupt_ends_with_130(write_job, call, monkeypatch):
 
     monkeypatch.setattr("cvt_hpc.study.read_status", interrupt)
     assert call("status", "out/x") == (130, [], ["cvt-hpc: interrupted"])
-    assert cli.INTERRUPTED == 130
+    assert INTERRUPTED == 130

@@ -8,6 +8,9 @@ import pytest
 import xarray as xr
 
 import cvt_hpc.job.schema as schema
+from cvt_hpc.job import build_job
+from cvt_hpc.simulation import estimate_cost
+from cvt_hpc.study.step_check import step_check
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 
 STEP = 1e-6
@@ -99,6 +102,27 @@ def test_each_run_is_done_at_half_of_the_step_that_it_took(checked, tmp_path):
         0.125 * STEP if load == 9 else 0.5 * STEP for load in found
     ]  # 9 N m: a quarter, halved by itself
     assert np.allclose(steps, wanted, rtol=1e-12)
+
+
+def test_a_dry_run_tells_what_the_check_will_cost(checked, tmp_path):
+    status, out, _ = checked("0.1", "--dry-run")
+    # the double's run takes 30 core-seconds, and twice that at half the step
+    assert (status, out[-2:]) == (
+        0,
+        [
+            "estimated cost: 30 core-seconds per run, 1.2e+03 core-seconds in all",
+            "step check: about 4 runs again at half the step, estimated cost: 60 core-seconds per run, 240 core-seconds in all",
+        ],
+    )
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_check_by_the_explicit_step_is_priced_by_it(tmp_path):
+    job = build_job({"name": "x", "model": "elastic_belt", "numerics": {"most_refinements": 2}}, "x.toml")
+    check = step_check(job, tmp_path, 1.0, "explicit")
+    # 0.1 us instead of 4.6 us, at half the cost of a step, eight lanes instead of 16
+    assert check.core_seconds() == estimate_cost(check.job)
+    assert check.core_seconds() > 20.0 * estimate_cost(job)
 
 
 def test_a_study_that_is_right_has_no_contradiction(checked):
@@ -208,5 +232,8 @@ def test_failed_runs_are_done_again_at_a_shorter_step_from_the_command_line(
         [],
         ["cvt-hpc: --refine: expected --retry failed_numerics beside it, and no other, found no --retry"],
     )
-    status, _, err = call("run", "x.toml", "--refine", "1", "--retry", "failed_numerics")
-    assert (status, err) == (2, ["cvt-hpc: --refine: expected a factor above 1, at most 1000, found 1.0"])
+    status, _, err = call("run", "x.toml", "--refine", "0.5", "--retry", "failed_numerics")
+    assert (status, err) == (
+        2,
+        ["cvt-hpc: --refine: expected a factor of 1 or more, at most 1000, found 0.5"],
+    )

@@ -7,9 +7,8 @@ from straight import LENGTH, WAVE, moving_straight, straight_belt
 
 from cvt_hpc.models.elastic_belt.belt import U, W
 from cvt_hpc.models.elastic_belt.sampling import Outcome
-from cvt_hpc.steppers import imex
+from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP as STEP
 
-STEP = imex.PARAMETERS["numerics"]["step"].default
 SIZE = 1e-8  # amplitude [m]
 
 

@@ -1,11 +1,12 @@
 import math
+from itertools import pairwise
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.job.axes import read_axis
+from cvt_hpc.job.axes import Axis, read_axis, thinned
 from cvt_hpc.parameters import Parameter
 
 LOAD = Parameter(0.0, "N m", "torque at the driving pulley")
@@ -192,3 +193,38 @@ def test_a_log_range_has_equal_ratios(start, factor, count):
     assert (found[0], found[-1]) == (start, start * factor)
     ratios = [after / before for before, after in zip(found, found[1:], strict=False)]
     assert ratios == pytest.approx([factor ** (1 / (count - 1))] * (count - 1), rel=1e-9)
+
+
+def axis(name, values):
+    return Axis(name, tuple(values), "", "")
+
+
+@pytest.mark.parametrize(
+    ("sizes", "most", "left"),
+    [
+        ((3, 4), 12, (3, 4)),
+        ((1000, 1000), 100, (10, 10)),
+        ((2, 1000, 1000), 200, (2, 10, 10)),
+        ((100_000,), 2000, (2000,)),
+        ((9, 9, 9), 2, (2, 2, 2)),
+        ((), 5, ()),
+    ],
+)
+def test_a_thinned_grid_keeps_short_axes_and_all_ends(sizes, most, left):
+    axes = tuple(axis(f"a{k}", range(size)) for k, size in enumerate(sizes))
+    found = thinned(axes, most)
+    assert tuple(len(one.values) for one in found) == left
+    for one, other in zip(found, axes, strict=True):
+        assert (one.values[0], one.values[-1]) == (other.values[0], other.values[-1])
+        # evenly, but for rounding
+        steps = {b - a for a, b in pairwise(one.values)}
+        assert max(steps, default=0) - min(steps, default=0) <= 1
+
+
+def test_a_thinned_grid_keeps_texts_and_samples_stay_together():
+    kinds = axis("kind", "abcdefg")
+    found = thinned((kinds, axis("a", range(100))), 14)
+    assert (found[0], found[1].values) == (kinds, (0, 99))
+    pair = thinned((axis("a", range(100)), axis("b", range(100, 0, -1))), 10, sampled=True)
+    assert [len(one.values) for one in pair] == [10, 10]
+    assert all(a + b == 100 for a, b in zip(pair[0].values, pair[1].values, strict=True))

@@ -7,6 +7,7 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job, crosscheck, load_job
+from cvt_hpc.job.formula import Formula
 from cvt_hpc.job.summary import summarize
 
 JOB = """
@@ -181,8 +182,9 @@ def test_values_that_follow_are_checked_at_each_place(write_job, monkeypatch):
         message
         == "[derived] half_wedge_angle: expected >= 0 and <= 1 rad, found -0.09999999999999998 (at ratio = 0.5)"
     )
-    # what lies between the extremes of a huge grid, too
+    # what lies between the extremes of a huge grid, too: of three values along the axis with which it varies
     monkeypatch.setattr(crosscheck, "MOST_CHECKED_POINTS", 1)
+    monkeypatch.setattr(crosscheck, "MOST_CHECKED_VALUES", 3)
     message = refusal(
         write_job(JOB.replace("2 * element_mass / 10", "abs(ratio - 1) + 0.01 * log(abs(ratio - 1))"))
     )
@@ -191,6 +193,40 @@ def test_values_that_follow_are_checked_at_each_place(write_job, monkeypatch):
         "(math domain error) (at ratio = 1)"
     )
     monkeypatch.undo()
+
+
+HUGE = """
+[scene]
+thrust = "20 kN"
+[derived]
+half_wedge_angle = "{}"
+[axes]
+ratio = {{ from = 1, to = 2, count = 400 }}
+driving_speed = {{ from = 1, to = 250, count = 250 }}
+friction_gradient = {{ from = -1, to = 0, count = 100 }}
+"""
+
+
+def test_of_a_huge_grid_few_values_are_evaluated_before_its_runs(write_job, monkeypatch):
+    evaluated = []
+    value = Formula.value
+    monkeypatch.setattr(Formula, "value", lambda *given: evaluated.append(1) or value(*given))
+    formula = "0.3 + 1e-4 * ratio * driving_speed * friction_gradient"
+    job = load_job(write_job(HUGE.format(formula)))
+    told = summarize(job, 2.0)
+    assert job.size == 10_000_000
+    # some 10 us each: a tenth of a second
+    assert 0 < len(evaluated) < 10_000
+    assert "half_wedge_angle  0.25 to 0.3 rad" in told
+    assert "varies with ratio, driving_speed, friction_gradient" in told
+    # a single value, in the middle of all axes: told of when the runs begin, with its place
+    hidden = "0.1 + 2 * max(0, 1 - 1e3 * abs(ratio - 1.501253) - abs(driving_speed - 126) - abs(friction_gradient + 0.5))"
+    job = load_job(write_job(HUGE.format(hidden).replace("count = 100", "count = 3")))
+    assert job.size == 300_000
+    with pytest.raises(
+        InputError, match=r"half_wedge_angle: expected >= 0 and <= 1 rad, found .* \(at ratio = 1.50"
+    ):
+        _ = job.derived[0].values
 
 
 def test_checks_between_parameters_see_what_follows(write_job):

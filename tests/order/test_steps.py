@@ -25,12 +25,11 @@ from cvt_hpc.models.elastic_belt.belt import (
 )
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.sampling import Outcome
-from cvt_hpc.steppers import imex
+from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP as STEP
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
 DEFAULTS |= {"duration": 0.1, "load": 100.0}
 WINDOW = 2e-4  # [s]
-STEP = imex.PARAMETERS["numerics"]["step"].default
 STARTS = (0, 1, 2)
 CASES = {"memory": {}, "no memory": {"friction_memory": 0.0}}
 QUANTITIES = {"w": W, "u": U, "v_ring": V_RING}

@@ -215,6 +215,9 @@ def test_what_settles_a_question(question, vibrates, margin, settled):
 def test_nothing_is_settled_at_the_edge_of_what_undecided_means():
     point = {"question": "occurrence", "least_margin": 0.0}
     assert not is_settled(point, occurrence(Vibrates.UNDECIDED, 0.0))
+    # irregular motion is an answer; of how far it goes the full run tells
+    assert is_settled(point, occurrence(Vibrates.IRREGULAR, 0.0))
+    assert not is_settled(point | {"question": "amplitude"}, occurrence(Vibrates.IRREGULAR, 0.0))
 
 
 def test_a_coarse_run_that_is_not_to_be_trusted_decides_nothing(monkeypatch):

@@ -155,14 +155,57 @@ def test_a_run_by_hand_beyond_the_limit_is_done_again_shorter():
     assert found["time_step"] <= 7e-6
 
 
-def test_what_asks_for_a_step_by_error_replaces_a_given_step():
+BOTH = "[numerics] step_error: expected either step_error or step, found both"
+
+
+@pytest.mark.parametrize(
+    ("tables", "overrides"),
+    [
+        ({"numerics": {"step": "2 us", "step_error": 0.02}}, {}),  # the default, but stated
+        ({"numerics": {"step": "2 us"}, "axes": {"step_error": [0.01, 0.02]}}, {}),
+        ({"numerics": {"step_error": 0.01}, "axes": {"step": [1e-6, 2e-6]}}, {}),
+        ({"numerics": {"step_error": 0.01}, "derived": {"step": "1e-8 * stations"}}, {}),
+        (
+            {"numerics": {"step": "2 us"}, "axes": {"ratio": [1, 2]}, "linked": {"ratio": {"step_error": [0.1, 0.2]}}},
+            {},
+        ),
+        ({}, {"step": 2e-6, "step_error": 0.01}),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("model", ["elastic_belt", "auto"])
+def test_a_step_beside_an_error_that_asks_for_one_is_refused(model, tables, overrides):
+    with pytest.raises(InputError) as caught:
+        build_job({"name": "test", "model": model, **tables}, "test.toml", overrides)
+    assert str(caught.value) == f"test.toml: {BOTH}"
+
+
+def test_of_step_and_step_error_an_override_replaces_the_other():
     document = {"name": "test", "model": "elastic_belt", "numerics": {"step": "2 us"}}
-    assert build_job(document, "test.toml", {}).point(0)["step"] == 2e-6
-    asked = build_job(document, "test.toml", {"step_error": 0.01})
-    assert asked.point(0)["step"] == pytest.approx(0.5 * REFERENCE_STEP)
-    # and the resolved job, which tells its error beside a given step, gives the same runs again
     given = build_job(document, "test.toml", {})
+    assert given.point(0)["step"] == 2e-6
+    assert "step_error" not in given.parameters
     assert build_job(given.resolved(), "test.toml", {}).fingerprint() == given.fingerprint()
+    for asked in (
+        build_job(document, "test.toml", {"step_error": 0.01}).point(0),
+        given.point_at({"step_error": 0.01}),
+    ):
+        assert asked["step"] == pytest.approx(0.5 * REFERENCE_STEP)
+    document["numerics"] = {"step_error": 0.01}
+    asked = build_job(document, "test.toml", {})
+    for given in (build_job(document, "test.toml", {"step": 2e-6}).point(0), asked.point_at({"step": 2e-6})):
+        assert given["step"] == 2e-6 and "step_error" not in given
+    assert asked.point_at(asked.point(0)) == asked.point(0)  # of a whole run, both agree
+    with pytest.raises(InputError, match="either step_error or step, found both, which do not agree"):
+        asked.point_at({"step": 2e-6, "step_error": 0.01})
+
+
+def test_formulas_may_name_the_error_that_gives_the_step():
+    document = {"name": "test", "model": "elastic_belt", "derived": {"rise_time": "step_error"}}
+    assert build_job(document, "test.toml", {}).point(0)["rise_time"] == 0.02
+    with pytest.raises(
+        InputError, match="parameters that the job gives, found step_error, which it does not"
+    ):
+        build_job(document, "test.toml", {"step": 2e-6})
 
 
 def test_pulleys_that_overlap_are_told_of_and_not_the_step():

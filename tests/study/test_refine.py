@@ -2,6 +2,8 @@
 
 import os
 import signal
+from contextlib import ExitStack
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,8 +12,12 @@ from study_double import Axis, Job, Simulator
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.study import open_results, run
+from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.planning import prepare
 from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.steps import untried_factor
+from cvt_hpc.study.task import Task
 from cvt_hpc.variables import Status
 
 RUNS = 12
@@ -77,11 +83,26 @@ def test_failed_runs_are_done_again_at_a_shorter_step(tmp_path, lanes):
     assert numbers(tmp_path)["steps"].values[[7, 8, 10]].tolist() == [2000, 4000, 4000]
 
 
-def test_a_retry_without_a_factor_has_the_step_of_the_job_again(tmp_path):
+def test_a_retry_without_a_factor_goes_on_at_half_of_the_shortest_step_tried(tmp_path):
     sweep(tmp_path)
-    sweep(tmp_path, **AGAIN)
-    sweep(tmp_path, retry=[Status.FAILED_NUMERICS])
-    assert numbers(tmp_path)["steps"].values[[3, 7, 8, 10]].tolist() == [2000, 2000, 1000, 1000]
+    for steps in ([2000, 2000, 2000, 2000], [2000, 2000, 4000, 4000], [2000, 2000, 4000, 8000]):
+        sweep(tmp_path, retry=[Status.FAILED_NUMERICS])
+        assert numbers(tmp_path)["steps"].values[[3, 7, 8, 10]].tolist() == steps
+    # asked for, or beside runs that no shorter step helps, it is the step of the job
+    for options in ({"refine": 1.0}, {"retry": [Status.FAILED_NUMERICS, Status.TIMED_OUT]}):
+        sweep(tmp_path / "other")
+        sweep(tmp_path / "other", **{"retry": [Status.FAILED_NUMERICS]} | options)
+        assert numbers(tmp_path / "other")["steps"].values[10] == 1000
+
+
+@pytest.mark.parametrize(
+    ("most", "earlier", "factor"), [(3, 1.0, 16.0), (0, 1.0, 2.0), (3, 16.0, 256.0), (3, 256.0, 1000.0)]
+)
+def test_the_first_factor_that_is_not_tried(most, earlier, factor):
+    job = Job(JOB.axes, {"step": STEP, "most_refinements": most})
+    records = SimpleNamespace(refinements=np.array([1.0, earlier]))
+    found = untried_factor(job, records, np.array([0, 1]), [Status.FAILED_NUMERICS])
+    assert found == factor
 
 
 def test_lanes_and_interruptions_change_no_number(tmp_path):
@@ -141,13 +162,23 @@ def test_runs_of_different_steps_share_no_batch(tmp_path):
     assert sorted(batches) == [[(3, STEP / 2), (7, STEP / 2), (8, STEP / 2)], [(10, STEP), (11, STEP)]]
 
 
+def test_runs_at_steps_of_their_own_are_priced_by_these(tmp_path):
+    sweep(tmp_path)
+    sweep(tmp_path, time_limit=0.0, **AGAIN)  # 3, 7, 8, 10 are asked for again, none is done
+    simulator = Simulator()
+    task = Task(JOB, describe(JOB, simulator), simulator, asked_steps=lambda: {0: STEP / 4, 3: STEP / 4})
+    with ExitStack() as held:
+        plan = prepare(StudyFolder(tmp_path), task, None, False, (), 1, held)
+    assert plan.costs == pytest.approx([4, 1, 1, 8, 1, 1, 1, 2, 2, 1, 2, 1])
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"refine": 2.0}, "expected --retry failed_numerics beside it, and no other, found no --retry"),
         ({"refine": 2.0, "retry": [Status.TIMED_OUT]}, "and no other, found timed_out"),
-        ({**AGAIN, "refine": 0.5}, "--refine: expected a factor above 1, at most 1000, found 0.5"),
-        ({**AGAIN, "refine": float("nan")}, "--refine: expected a factor above 1"),
+        ({**AGAIN, "refine": 0.5}, "--refine: expected a factor of 1 or more, at most 1000, found 0.5"),
+        ({**AGAIN, "refine": float("nan")}, "--refine: expected a factor of 1 or more"),
     ],
 )
 def test_what_cannot_be_refined_is_refused(tmp_path, options, message):

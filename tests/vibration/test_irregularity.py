@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.stats import linregress, t
 
 from cvt_hpc.variables import Vibrates
 from cvt_hpc.vibration.assessment import assess
 from cvt_hpc.vibration.criterion import PARAMETERS
-from cvt_hpc.vibration.irregularity import is_irregular, relative_scatter
+from cvt_hpc.vibration.irregularity import is_irregular, is_stationary, relative_scatter
 from cvt_hpc.vibration.occurrence import classify, margin
 from cvt_hpc.vibration.signals import growth_fit
 
@@ -68,8 +69,41 @@ def test_one_crossing_a_burst_a_steady_amplitude_and_slow_beats_are_not(windows)
     assert not is_irregular(windows, 1.0, 1.0)
 
 
+def alternating(count, factor):
+    """Amplitudes by turns above and below 1, by the same factor."""
+    return factor ** (-1.0) ** np.arange(count)
+
+
+def test_twelve_windows_suffice_if_they_are_independent():
+    assert is_irregular(alternating(12, 1.3), 1.0, 1.0)
+    assert not is_irregular(alternating(11, 1.3), 1.0, 1.0)
+
+
+def test_it_takes_a_scatter_of_a_fifth():
+    # a factor of 1 + s scatters by s
+    assert is_irregular(alternating(40, 1.23), 1.0, 1.0)
+    assert not is_irregular(alternating(40, 1.19), 1.0, 1.0)
+
+
+def test_two_excursions_above_the_threshold_suffice():
+    windows = 0.7 * alternating(40, 1.25)
+    windows[9] = 1.1
+    assert not is_irregular(windows, 1.0, 1.0)
+    windows[30] = 1.1
+    assert is_irregular(windows, 1.0, 1.0)
+
+
+def test_the_gain_is_as_uncertain_as_that_of_a_fitted_line():
+    windows = alternating(14, 1.3)
+    line = linregress(np.linspace(-0.5, 0.5, 14), np.log(windows))
+    largest = abs(line.slope) + t.ppf(0.975, 12) * line.stderr
+    assert is_stationary(windows, 1.001 * largest)
+    assert not is_stationary(windows, 0.999 * largest)
+
+
 def test_scatter_is_relative():
     assert relative_scatter([[1.0, 2.0], [3.0, 2.0]]).tolist() == [0.5, 0.0]
+    assert relative_scatter([1.0, 1.0, 4.0]) == pytest.approx(np.sqrt(2.0) / 2.0)
     assert np.isnan(relative_scatter(np.zeros((3, 1)))).all()
 
 

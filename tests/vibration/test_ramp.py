@@ -5,7 +5,7 @@ import pytest
 
 from cvt_hpc.variables import Vibrates
 from cvt_hpc.vibration.criterion import PARAMETERS
-from cvt_hpc.vibration.ramp import BINS, SUSTAINED, assess_ramp
+from cvt_hpc.vibration.ramp import BINS, SUSTAINED, Passages, assess_ramp
 
 RATE = 20_000.0
 DEFAULTS = {key: parameter.default for key, parameter in PARAMETERS["vibration"].items()}
@@ -91,6 +91,36 @@ def test_vibration_counts_from_a_number_of_windows_in_a_row():
     assert set(verdicts[:first]) == {Vibrates.UNDECIDED} and set(verdicts[first:]) == {Vibrates.YES}
 
 
+def passages(*levels):
+    """Verdict and margin of one strand by its amplitudes in windows, over the threshold."""
+    found = Passages(5e-6 * np.array(levels)[:, np.newaxis], 10.0 * np.arange(len(levels)), DEFAULTS)
+    vibrates, _ = found.classify(["t1"])
+    return vibrates, found.margin(vibrates)
+
+
+def test_four_windows_in_a_row_vibrate_and_three_do_not():
+    below = [0.5] * 5
+    assert passages(*below, *[1.2] * 4, *below) == (Vibrates.YES, pytest.approx(np.log(1.2)))
+    assert passages(*below, *[1.2] * 3, *below, *[1.2] * 3) == (Vibrates.UNDECIDED, 0.0)
+
+
+def test_the_margin_of_a_vibration_is_that_of_its_best_four_windows_in_a_row():
+    found = passages(0.5, 1.1, 1.3, 3.0, 2.0, 2.5, 4.0, 1.2, 0.5, 9.0, 0.5)
+    assert found == (Vibrates.YES, pytest.approx(np.log(2.0)))
+
+
+@pytest.mark.parametrize(
+    ("gains", "verdict"),
+    [
+        ([0.0, 0.4, 0.8, 1.05], Vibrates.UNDECIDED),  # e-folds over three windows: 1 is growth
+        ([0.0, 0.4, 0.8, 0.95], Vibrates.NO),
+        ([0.0, 0.6, 0.5, 1.2], Vibrates.NO),  # not at every window
+    ],
+)
+def test_growth_at_the_end_is_a_gain_of_an_e_fold_over_three_windows(gains, verdict):
+    assert passages(*[0.1] * 10, *(0.1 * np.exp(gains)))[0] is verdict
+
+
 def test_growth_at_the_end_of_a_ramp_is_undecided():
     found = ramp(lambda load: 2e-6 * np.exp(load - 200.0))
     assert found.vibrates is Vibrates.UNDECIDED and "growing at the end" in found.reason
@@ -101,7 +131,9 @@ def test_a_ramp_that_ended_early_tells_what_it_has_seen():
     found = ramp(window(60.0, 90.0), until=1.0)
     assert found.vibrates is Vibrates.YES and found.end_load == pytest.approx(90.0, abs=2.0)
     assert np.isfinite(found.ramp_load[:10]).all() and np.isnan(found.ramp_load[11:]).all()
-    assert ramp(window(60.0, 90.0), until=0.01) is None
+    # five periods of 300 Hz are the least that is judged
+    assert ramp(window(60.0, 90.0), until=5.0 / 300.0) is not None
+    assert ramp(window(60.0, 90.0), until=0.96 * 5.0 / 300.0) is None
 
 
 def test_the_record_has_what_is_declared():

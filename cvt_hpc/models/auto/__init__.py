@@ -5,7 +5,7 @@ package is cheap.
 """
 
 from cvt_hpc.models import elastic_belt
-from cvt_hpc.models.elastic_belt import CHOSEN, check, inert
+from cvt_hpc.models.elastic_belt import GIVES, check, inert
 from cvt_hpc.parameters import Parameter, not_negative
 
 # Questions that a rung answers which is a model of its own, and why that one
@@ -37,8 +37,8 @@ REFUSED = elastic_belt.REFUSED | {
 
 __all__ = [
     "ANSWERED_BY",
-    "CHOSEN",
     "DEFAULT_STEPPER",
+    "GIVES",
     "OWN_STEPPERS",
     "PARAMETERS",
     "REFUSED",

@@ -10,7 +10,7 @@ The rungs, from the cheapest up:
   a coarse mesh shifts the edges of a window by less than a step of the load, but it does shift them. Its mean
   forces are taken always, since vibration hardly moves them.
 - FULL, the transient that the job describes: where the coarse one is undecided, near the threshold, not to
-  be trusted, or refused for a run so short; and for the amplitude of what vibrates.
+  be trusted, or refused for a run so short; and for the amplitude of what vibrates or moves irregularly.
 
 Eigenvalues of the steady state (`linear_stability`) are no rung here: a steady state and its spectrum cost
 more than the coarse transient that they could spare. Contact that never opens needs no rule either: the
@@ -92,5 +92,6 @@ def is_settled(parameters: Mapping[str, Any], found: Occurrence) -> bool:
     """
     if parameters["question"] == "forces":
         return True
-    is_larger_asked = parameters["question"] == "amplitude" and found.vibrates is Vibrates.YES
-    return is_clear(parameters, found) and not is_larger_asked
+    is_size_asked = parameters["question"] == "amplitude"
+    moves = found.vibrates in (Vibrates.YES, Vibrates.IRREGULAR)
+    return is_clear(parameters, found) and not (is_size_asked and moves)

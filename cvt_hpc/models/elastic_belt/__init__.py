@@ -27,11 +27,11 @@ REFUSED = {
     "has no set-valued forces",
 }
 
-CHOSEN = {"imex": {CHOICE.key: CHOICE}}  # by stepper: what follows from the scene where a job gives none
+GIVES = {"imex": {"step_error": CHOICE}}  # by stepper: what its parameters give for a scene of the model
 
 __all__ = [
-    "CHOSEN",
     "DEFAULT_STEPPER",
+    "GIVES",
     "OWN_STEPPERS",
     "PARAMETERS",
     "REFUSED",

@@ -1,0 +1,75 @@
+"""The command line: parse, call, print. Whatever a command needs is imported when it runs.
+
+A module for each group of commands: `add` declares them and their options, and a function does each.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import sys
+import traceback
+from typing import NoReturn
+
+from cvt_hpc import __version__
+from cvt_hpc.cli import checking, experiments, results, single_run, sweep
+from cvt_hpc.cli.parts import BAD_INPUT, DONE, INTERRUPTED, complain
+from cvt_hpc.errors import CRASHED, InputError
+
+__all__ = ["main"]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run a command line.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        Those of the process by default.
+
+    Returns
+    -------
+    int
+        Exit status: 0 done, 1 some runs failed, 2 bad input, 70 a defect of this program, 99 stopped early
+        and to be gone on with, 98 the same without any gain.
+    """
+    logging.basicConfig(format="cvt-hpc: %(message)s")
+    try:
+        parsed = _parser().parse_args(arguments)
+        status = parsed.command(parsed)
+        sys.stdout.flush()
+        return status
+    except InputError as error:
+        complain(str(error))
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        complain("interrupted")
+        return INTERRUPTED
+    except BrokenPipeError:  # the reader, such as `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+    except Exception:  # Python's own status for a defect, 1, means here that some runs failed
+        traceback.print_exc()
+        return CRASHED
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are ours: under MPI one rank prints them, not all."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message}; see `{self.prog} --help`")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="cvt-hpc",
+        description="Vibration-occurrence maps of metal pushbelt CVTs.",
+        epilog="Exit status: 0 done, 1 some runs failed, 2 bad input, 99 stopped early (run again to go on), "
+        "98 stopped before any run had ended.",
+    )
+    parser.add_argument("--version", action="version", version=f"cvt_hpc {__version__}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    for group in (sweep, results, single_run, experiments, checking):
+        group.add(commands)
+    return parser

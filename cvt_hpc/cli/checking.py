@@ -1,0 +1,84 @@
+"""`check`: what a job would do, and what that costs."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cvt_hpc.cli.parts import (
+    DONE,
+    PICTURES,
+    REPLACE,
+    add_assignments,
+    add_command,
+    check_output,
+    output_folder,
+    speaks,
+)
+from cvt_hpc.errors import mismatch
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
+
+
+def add(commands: Any) -> None:
+    """Declare the command."""
+    text = "validate a job, show its defaults and estimate its cost"
+    check = add_command(commands, "check", _check, text, "JOB")
+    ranks = "forecast the sweep on so many ranks: makespan, efficiency, core-hours, disk and Slurm's --time"
+    check.add_argument("--ranks", type=int, nargs="+", default=[], metavar="N", help=ranks)
+    pilots = "forecast by K batches that are done for it, shortened (default: by records, else by prediction)"
+    check.add_argument("--pilots", type=int, default=0, metavar="K", help=pilots)
+    check.add_argument("--plot", type=Path, metavar="PNG", help="picture of the forecast, 1 to 10 000 ranks")
+    add_assignments(check, "--set", REPLACE)
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.job import load_job
+
+    _check_ranks(arguments.ranks)
+    if arguments.pilots < 0:
+        raise mismatch("--pilots", "a number of batches", str(arguments.pilots))
+    if (arguments.pilots or arguments.plot) and not arguments.ranks:
+        raise mismatch("--pilots" if arguments.pilots else "--plot", "--ranks beside it", "none")
+    check_output(arguments.plot, PICTURES)
+    job = load_job(arguments.path, arguments.set)
+    show_job(job, None)
+    if arguments.ranks and speaks():
+        from cvt_hpc.printing import disk_line, forecast_lines
+        from cvt_hpc.study.forecast import CURVE
+        from cvt_hpc.study.resources import expect
+
+        ranks = [*arguments.ranks, *(CURVE if arguments.plot else ())]
+        expected = expect(job, output_folder(None, job), ranks, arguments.pilots)
+        asked, curve = expected.forecasts[: len(arguments.ranks)], expected.forecasts[len(arguments.ranks) :]
+        print("", *forecast_lines(asked, job, expected.basis), sep="\n")
+        print(disk_line(expected.disk, len(job.histories)))
+        if arguments.plot is not None:
+            from cvt_hpc.analysis.efficiency import draw_efficiency
+
+            title = f"{job.name}: {job.size} runs"
+            print(f"picture: {draw_efficiency(curve, title, expected.basis, arguments.plot)}")
+    return DONE
+
+
+def show_job(job: Job, out: Path | None) -> None:
+    """Print what a job runs."""
+    from cvt_hpc.job.summary import summarize
+    from cvt_hpc.study.description import check_names
+    from cvt_hpc.study.simulator import default_simulator
+
+    check_names(job, default_simulator())
+    if speaks():
+        from cvt_hpc.study.status import expected_cost
+
+        print(summarize(job, *expected_cost(job, output_folder(out, job))))
+
+
+def _check_ranks(ranks: list[int]) -> None:
+    from cvt_hpc.study.forecast import MOST_RANKS
+
+    for number in ranks:
+        if not 1 <= number <= MOST_RANKS:
+            raise mismatch("--ranks", f"numbers of ranks from 1 to {MOST_RANKS}", str(number))

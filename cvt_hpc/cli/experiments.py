@@ -1,0 +1,93 @@
+"""`chart`, `ladder` and `branch`: many runs whose results are tables and pictures of their own."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from cvt_hpc.cli.parts import (
+    DONE,
+    REPLACE,
+    SOME_FAILED,
+    add_assignments,
+    add_command,
+    add_folder,
+    check_output,
+    complain,
+    output_folder,
+    refuse_ranks,
+    speaks,
+)
+
+
+def add(commands: Any) -> None:
+    """Declare the commands."""
+    chart = add_command(commands, "chart", _chart, "measure speed against accuracy, and draw it", "JOB")
+    add_folder(chart, "earlier results of the folder")
+    add_assignments(chart, "--set", "replace a value of the job and of all its scenes")
+    text = "do the runs of a job on every rung, and compare them"
+    ladder = add_command(commands, "ladder", _ladder, text, "JOB")
+    add_folder(ladder, "earlier results of all rungs")
+    add_assignments(ladder, "--set", REPLACE)
+    text = "follow steady states along the load, to their Hopf points"
+    branch = add_command(commands, "branch", _branch, text, "JOB")
+    add_folder(branch, "an earlier diagram of the folder")
+    add_assignments(branch, "--set", REPLACE)
+
+
+def _chart(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.chart import load_chart, make_chart
+    from cvt_hpc.chart.table import table_lines
+
+    refuse_ranks("chart", "measures times")
+    chart = load_chart(arguments.path, arguments.set)
+    report = make_chart(chart, arguments.out, fresh=arguments.fresh, tell=complain)
+    for comparison in report.comparisons:
+        print(*table_lines(comparison), "", sep="\n")
+    print(f"table: {report.table}", f"dataset: {report.dataset}", sep="\n")
+    print(*(f"picture: {picture}" for picture in report.pictures), sep="\n")
+    return DONE
+
+
+def _ladder(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.chart.ladder import report_ladder, run_ladder
+    from cvt_hpc.chart.ladder_rungs import ladder
+    from cvt_hpc.chart.ladder_table import ladder_lines
+    from cvt_hpc.job import load_job
+    from cvt_hpc.printing import trouble_lines
+    from cvt_hpc.study.launch import end_process
+    from cvt_hpc.study.report import STALLED
+
+    job = load_job(arguments.path, arguments.set)
+    out = output_folder(arguments.out, job)
+    rungs, refusals = ladder(job)
+    complain(*(f"{name} left out: {why}" for name, why in refusals.items()))
+    status = run_ladder(
+        rungs,
+        out,
+        fresh=arguments.fresh,
+        tell=lambda rung, report: complain(*(f"{rung.name}: {line}" for line in trouble_lines(report))),
+    )
+    if status < STALLED and speaks():
+        report = report_ladder(job, rungs, out)
+        print(*ladder_lines(report.findings), sep="\n")
+        print(f"table: {report.table}", f"dataset: {report.dataset}", f"picture: {report.picture}", sep="\n")
+    return end_process(status)
+
+
+def _branch(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.bifurcation import load_diagram, make_diagram
+    from cvt_hpc.bifurcation.folder import DATASET
+    from cvt_hpc.bifurcation.table import branch_lines, failure_lines
+
+    refuse_ranks("branch", "walks along the load")
+    diagram = load_diagram(arguments.path, arguments.set)
+    folder = output_folder(arguments.out, diagram.job)
+    check_output(folder / DATASET, (".nc",))
+    report = make_diagram(diagram, folder, fresh=arguments.fresh, tell=complain)
+    failures = [line for followed in report.followed for line in failure_lines(diagram, followed)]
+    complain(*failures)
+    for followed in report.followed:
+        print(*branch_lines(diagram, followed), "", sep="\n")
+    print(f"dataset: {report.dataset}", *(f"picture: {picture}" for picture in report.pictures), sep="\n")
+    return SOME_FAILED if failures else DONE

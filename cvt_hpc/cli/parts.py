@@ -1,0 +1,96 @@
+"""What several commands share: how they are declared, whom they talk to, and which files they may write."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cvt_hpc.errors import mismatch
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
+
+DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+PICTURES = (".png", ".svg", ".pdf")
+REPLACE = "replace a value of the job, or an axis by one value"  # what --set does
+_SUBJECTS = {
+    "JOB": "job file (TOML)",
+    "DIR": "output folder of a run",
+    "RESULTS": "output folder of a run, or a dataset (.nc)",
+}
+
+
+def add_command(
+    commands: Any, name: str, call: Callable[[Any], int], text: str, subject: str
+) -> argparse.ArgumentParser:
+    """Return a new command; `subject`, what it is about, is one of the keys of _SUBJECTS."""
+    command = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+    command.add_argument("path", type=Path, metavar=subject, help=_SUBJECTS[subject])
+    command.set_defaults(command=call)
+    return command
+
+
+def add_assignments(command: argparse.ArgumentParser, flag: str, text: str) -> None:
+    """Add an option that sets values, KEY=VALUE."""
+    text = f"{text}; may be repeated"
+    command.add_argument(flag, action="append", default=[], metavar="KEY=VALUE", help=text)
+
+
+def add_folder(command: argparse.ArgumentParser, earlier: str) -> None:
+    """Add the options of a command that fills an output folder; `earlier` is what --fresh throws away."""
+    command.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: out/<job name>)")
+    command.add_argument("--fresh", action="store_true", help=f"throw {earlier} away")
+
+
+def output_folder(out: Path | None, job: Job) -> Path:
+    """Return the output folder of a job: the one asked for, or that of its name."""
+    return out or Path("out") / job.name
+
+
+def folder_of(results: Path) -> Path:
+    """Return the folder of results that are given as a folder or as a dataset in it."""
+    return results if results.is_dir() else results.parent
+
+
+def refuse_ranks(command: str, why: str) -> None:
+    """Raise InputError if several processes were started together for a command that one does."""
+    from cvt_hpc.study.launch import detect_launch
+
+    if (size := detect_launch().size) > 1:
+        raise mismatch(command, f"one process, because it {why}", f"{size} started")
+
+
+def check_output(path: Path | None, suffixes: tuple[str, ...]) -> None:
+    """Refuse a file that could not be written, before anything is computed for it."""
+    if path is None:
+        return
+    if path.suffix.lower() not in suffixes:
+        raise mismatch(str(path), f"a file name in {', '.join(suffixes)}", path.suffix or "no suffix")
+    nearest = next(parent for parent in path.absolute().parents if parent.exists())
+    if path.is_dir():
+        found = "a folder of this name"
+    elif not nearest.is_dir():
+        found = f"the file {nearest} in the place of a folder"
+    elif not os.access(nearest, os.W_OK):
+        found = f"no permission to write to {nearest}"
+    else:
+        return
+    raise mismatch(str(path), "a file that can be written", found)
+
+
+def complain(*lines: str) -> None:
+    """Print lines on stderr, on the rank that talks to the user."""
+    if speaks():
+        for line in lines:
+            print(f"cvt-hpc: {line}", file=sys.stderr)
+
+
+def speaks() -> bool:
+    """Return whether this process is the one of those started together that talks to the user."""
+    from cvt_hpc.study import process_rank
+
+    return process_rank() == 0

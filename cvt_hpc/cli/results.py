@@ -1,0 +1,88 @@
+"""`status`, `gather`, `map` and `compare`: what a run has left in its folder."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cvt_hpc.cli.parts import DONE, add_assignments, add_command, complain, folder_of
+
+if TYPE_CHECKING:
+    from cvt_hpc.analysis.comparison import Comparison
+
+CONTRADICTING = 1  # exit status of `compare`: some cells are quiet in one study and vibrate in the other
+
+
+def add(commands: Any) -> None:
+    """Declare the commands."""
+    add_command(commands, "status", _status, "how far a study is", "DIR")
+    add_command(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
+    picture = add_command(commands, "map", _map, "draw where vibration occurs", "RESULTS")
+    picture.add_argument("--out", type=Path, metavar="PNG", help="default: map.png beside the dataset")
+    add_assignments(picture, "--at", "fix an axis at a value")
+    text = "compare two studies, cell by cell; exit status 1: some contradict"
+    compare = add_command(commands, "compare", _compare, text, "RESULTS")
+    compare.add_argument("other", type=Path, metavar="RESULTS", help="the one to compare with it")
+    folder = "folder of compare.csv and compare.png (default: that of the second study)"
+    compare.add_argument("--out", type=Path, metavar="DIR", help=folder)
+
+
+def _status(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.printing import status_lines
+    from cvt_hpc.study import read_status
+
+    status = read_status(arguments.path)
+    complain(*status.warnings)
+    print(*status_lines(status), sep="\n")
+    return DONE
+
+
+def _gather(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.study import gather
+
+    print(f"results: {gather(arguments.path)}")
+    return DONE
+
+
+def _map(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.job.assignments import read_coordinates
+    from cvt_hpc.study import open_results
+
+    with open_results(arguments.path) as dataset:
+        units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
+        at = read_coordinates(arguments.at, units, str(arguments.path), "--at")
+        from cvt_hpc.analysis.maps import draw_map
+        from cvt_hpc.analysis.starts import has_starts, start_line
+
+        picture = draw_map(
+            dataset, arguments.out or folder_of(arguments.path) / "map.png", at, str(arguments.path)
+        )
+        if has_starts(dataset, at):
+            print(start_line(dataset, at, str(arguments.path)))
+        print(f"map: {picture}")
+    return DONE
+
+
+def _compare(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.comparison import compare
+    from cvt_hpc.printing import comparison_lines
+    from cvt_hpc.study import open_results
+
+    sources = str(arguments.path), str(arguments.other)
+    with open_results(arguments.path) as a, open_results(arguments.other) as b:
+        found = compare(a, b, sources)
+    written = leave_comparison(found, arguments.out or folder_of(arguments.other), sources)
+    print(*comparison_lines(found, sources), *written, sep="\n")
+    return CONTRADICTING if found.contradicts.any() else DONE
+
+
+def leave_comparison(found: Comparison, folder: Path, sources: tuple[str, str]) -> list[str]:
+    """Leave table and picture of a comparison, and return the lines that say where."""
+    from cvt_hpc.analysis.comparison import write_comparison
+    from cvt_hpc.analysis.comparison_drawing import draw_comparison
+
+    return [
+        f"picture: {draw_comparison(found, folder / 'compare.png', sources)}",
+        f"table: {write_comparison(found, folder / 'compare.csv')}",
+    ]

@@ -1,0 +1,64 @@
+"""`simulate`: one run with its history."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from cvt_hpc.cli.parts import (
+    DONE,
+    PICTURES,
+    REPLACE,
+    SOME_FAILED,
+    add_assignments,
+    add_command,
+    check_output,
+    complain,
+)
+from cvt_hpc.errors import mismatch
+
+
+def add(commands: Any) -> None:
+    """Declare the command."""
+    simulate = add_command(commands, "simulate", _simulate, "one run with its full history", "JOB")
+    simulate.add_argument("--out", type=Path, metavar="FILE.nc", help="dataset of the history")
+    simulate.add_argument("--plot", type=Path, metavar="PNG", help="picture of the history")
+    add_assignments(simulate, "--set", REPLACE)
+    at = "where to run; an axis that is not named takes the value of its table, or else its first one"
+    add_assignments(simulate, "--at", at)
+
+
+def _simulate(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.job import load_job
+    from cvt_hpc.job.assignments import read_assignments
+
+    job = load_job(arguments.path, arguments.set)
+    at = read_assignments(arguments.at, job.schema, job.source, "--at")
+    job.point_at(at, "--at")
+    check_output(arguments.out, (".nc",))
+    check_output(arguments.plot, PICTURES)
+    from cvt_hpc.analysis.histories import draw_history
+    from cvt_hpc.history_files import is_history, write_history
+    from cvt_hpc.printing import outcome_lines, point_lines
+    from cvt_hpc.simulation import simulate
+    from cvt_hpc.study.provenance import command, history_line
+    from cvt_hpc.variables import Status
+
+    if arguments.out is not None and arguments.out.exists() and not is_history(arguments.out):
+        raise mismatch(str(arguments.out), "a new file, or a history written by cvt_hpc", "another file")
+    dataset = simulate(job, at).assign_attrs(history=history_line(command()))
+    # files first: whoever reads the lines may close the pipe
+    written = []
+    if arguments.out is not None:
+        written.append(f"history: {write_history(dataset, arguments.out)}")
+    if arguments.plot is not None and dataset.sizes.get("time", 0) > 1:
+        written.append(f"picture: {draw_history(dataset, arguments.plot)}")
+    elif arguments.plot is not None:
+        written.append("picture: none, the run has no history")
+    print(*point_lines(job, at), *outcome_lines(dataset), *written, sep="\n")
+    status = Status(int(dataset["status"]))
+    if status != Status.DONE:
+        complain(f"the run failed: {status.name.lower()}: {dataset['reason'].item()}")
+        return SOME_FAILED
+    return DONE

@@ -1,0 +1,165 @@
+"""`run`: all runs of a job, and samples of them done again another way."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from cvt_hpc.cli.checking import show_job
+from cvt_hpc.cli.parts import (
+    DONE,
+    REPLACE,
+    add_assignments,
+    add_command,
+    add_folder,
+    complain,
+    output_folder,
+    speaks,
+)
+from cvt_hpc.cli.results import leave_comparison
+from cvt_hpc.errors import mismatch
+
+if TYPE_CHECKING:
+    from cvt_hpc.job import Job
+    from cvt_hpc.study.repeats import Repeat
+
+RETRIED = ("timed_out", "failed_error", "failed_numerics")
+
+
+def add(commands: Any) -> None:
+    """Declare the command."""
+    run = add_command(
+        commands, "run", _run, "do all runs of a job, or those that an earlier start has left", "JOB"
+    )
+    add_folder(run, "earlier results of the folder")
+    run.add_argument(
+        "--part",
+        metavar="K/N",
+        help="only the K-th of N parts of the runs; parts may be at work in one folder at the same time",
+    )
+    run.add_argument("--dry-run", action="store_true", help="validate options, job and folder; runs nothing")
+    limit = (
+        "time after which no run computes, such as 2h30m (default: until the end of the Slurm job, if any)"
+    )
+    run.add_argument("--time-limit", metavar="TIME", help=limit)
+    run.add_argument("--run-limit", metavar="TIME", help="time that one run may take (default: any)")
+    run.add_argument(
+        "--retry",
+        action="append",
+        default=[],
+        choices=RETRIED,
+        help="do recorded runs that ended so again, from their start; may be repeated",
+    )
+    run.add_argument(
+        "--refine",
+        type=float,
+        metavar="FACTOR",
+        help="with --retry failed_numerics: begin at the job's time step over this factor, and halve it from "
+        "there as often as most_refinements says (default: the first factor not tried yet, 16 after three "
+        "halvings; 1: the job's own step again)",
+    )
+    audit = "do so large a part of the runs that lower rungs of model auto have answered in full, and compare"
+    run.add_argument("--audit", type=float, metavar="FRACTION", help=audit)
+    check_step = "do so large a part of the runs again at half their time step, and compare"
+    run.add_argument("--check-step", type=float, metavar="FRACTION", help=check_step)
+    check_by = "how --check-step does them: at half the step (default), or by the stepper explicit"
+    run.add_argument("--check-step-by", choices=("half", "explicit"), help=check_by)
+    add_assignments(run, "--set", REPLACE)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.job import load_job
+    from cvt_hpc.job.durations import read_duration
+    from cvt_hpc.printing import repeat_line, report_lines, trouble_lines
+    from cvt_hpc.study import check_start, run
+    from cvt_hpc.study.launch import end_process
+    from cvt_hpc.study.steps import check_refinement
+    from cvt_hpc.variables import Status
+
+    limits = {
+        name: read_duration(getattr(arguments, name), f"--{name.replace('_', '-')}")
+        for name in ("time_limit", "run_limit")
+        if getattr(arguments, name) is not None
+    }
+    retry = [Status[name.upper()] for name in arguments.retry]
+    job = load_job(arguments.path, arguments.set)
+    options = {"fresh": arguments.fresh, "retry": retry, **limits}
+    if arguments.refine is not None:
+        check_refinement(job, arguments.refine, retry)
+        options["refine"] = arguments.refine
+    repeats = _repeats(job, arguments)
+    if arguments.dry_run:
+        check_start(job, arguments.out, part=arguments.part, fresh=arguments.fresh)
+        show_job(job, arguments.out)
+        if speaks():
+            for repeat, _ in repeats:
+                print(repeat_line(repeat))
+        return DONE
+    started = time.monotonic()
+    report = run(job, arguments.out, part=arguments.part, **options)
+    complain(*trouble_lines(report))
+    if speaks():
+        print(*report_lines(report), sep="\n")
+    statuses = [report.exit_status]
+    for repeat, show in repeats:
+        if not report.remaining:
+            statuses.append(_repeat(repeat, show, options, started))
+    return end_process(max(statuses))
+
+
+def _repeats(job: Job, arguments: argparse.Namespace) -> list[tuple[Repeat, Callable[[Repeat], None]]]:
+    """Return which samples are to be done again, each with what prints what came of it."""
+    if arguments.check_step_by and arguments.check_step is None:
+        raise mismatch("--check-step-by", "--check-step FRACTION beside it", "none")
+    if arguments.audit is None and arguments.check_step is None:
+        return []
+    from cvt_hpc.study.audit import audit_of
+    from cvt_hpc.study.repeats import check_fraction
+    from cvt_hpc.study.step_check import step_check
+
+    out, repeats = output_folder(arguments.out, job), []
+    if arguments.audit is not None:
+        check_fraction("--audit", arguments.audit, arguments.part)
+        repeats.append((audit_of(job, out, arguments.audit), _show_audit))
+    if arguments.check_step is not None:
+        check_fraction("--check-step", arguments.check_step, arguments.part)
+        way = arguments.check_step_by or "half"
+        repeats.append((step_check(job, out, arguments.check_step, way), _show_step_check))
+    for repeat, _ in repeats:
+        repeat.check(arguments.fresh)
+    return repeats
+
+
+def _repeat(repeat: Repeat, show: Callable[[Repeat], None], options: dict[str, Any], started: float) -> int:
+    """Do the runs of a sample again in the time that is left, and print what was found."""
+    from cvt_hpc.printing import trouble_lines
+
+    if "time_limit" in options:
+        left = options["time_limit"] - (time.monotonic() - started)
+        options = {**options, "time_limit": max(left, 0.0)}
+    report = repeat.run(**options)
+    complain(*(f"{repeat.label}: {line}" for line in trouble_lines(report)))
+    if speaks() and not report.remaining:
+        show(repeat)
+    return report.exit_status
+
+
+def _show_audit(audit: Repeat) -> None:
+    from cvt_hpc.printing import audit_lines
+    from cvt_hpc.study.audit import report_audit
+
+    print(*audit_lines(report_audit(audit)), sep="\n")
+
+
+def _show_step_check(check: Repeat) -> None:
+    from cvt_hpc.analysis.comparison import compare, only
+    from cvt_hpc.printing import step_check_lines
+    from cvt_hpc.study import open_results
+
+    sources = str(check.out), str(check.place)
+    with open_results(check.out) as a, open_results(check.place) as b:
+        found = compare(a, only(b, check.sample), sources)
+    written = leave_comparison(found, check.place, sources)
+    print(*step_check_lines(check, found), *written, sep="\n")
