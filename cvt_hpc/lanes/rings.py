@@ -202,7 +202,7 @@ def _ring_solution(p, q, r, f0, f1, l00, l01, l10, l11, faded):
 
 def _reducing(distances: list[int]):
     if not distances:
-        return _closed
+        return closed
     reduced = register_jitable(_reduction(distances[0]))
     rest = register_jitable(_reducing(distances[1:]))
 
@@ -213,7 +213,8 @@ def _reducing(distances: list[int]):
     return solve
 
 
-def _closed(p, q, r, f0, f1, l00, l01, l10, l11, faded):
+def closed(p, q, r, f0, f1, l00, l01, l10, l11, faded):
+    """`ring_solution` where a part is its own neighbour."""
     p, q, r = fma(2.0, l00, p), q + (l01 + l10), fma(2.0, l11, r)
     per_determinant = 1.0 / fma(p, r, -q * q)
     return fma(r, f0, -q * f1) * per_determinant, fma(p, f1, -q * f0) * per_determinant

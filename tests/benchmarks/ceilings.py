@@ -18,7 +18,7 @@ import numpy as np
 from cvt_hpc import lanes
 from cvt_hpc.job import build_job
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import LaneArray, fma, like
+from cvt_hpc.lanes import LaneArray, fma, like, rings
 from cvt_hpc.models.elastic_belt import imex, imex_stations, imex_system, lane_forces
 from cvt_hpc.models.elastic_belt.batch import PRECISIONS, Batch
 from cvt_hpc.models.elastic_belt.lane_belt import REPEATS
@@ -113,14 +113,30 @@ def _counting_functions(terms: int) -> dict:
         "with_sign_of": lambda size, sign: Counted(np.copysign(_value(size), _value(sign))),
         "like": lambda x, pattern: Counted(_value(x)),
         "anywhere": bool,
+        "behind": lambda array, j, field: _row(array, (j or len(_data(array))) - 1, field),
+        "ahead": lambda array, j, field: _row(array, (j + 1) % len(_data(array)), field),
+        "from_behind": lambda x: x,
+        "from_ahead": lambda x: x,
+        "around": lambda x: x,
+        "at_station": lambda array, row, part, field: array[row, field],
+        "set_station": lambda array, row, part, field, value: array.__setitem__((row, field), value),
+        "ring_solution": lambda *system: rings.closed(*system),
     }
+
+
+def _data(array) -> np.ndarray:
+    return array.data if isinstance(array, CountingArray) else array
+
+
+def _row(array, row: int, field: int):
+    return array[row, field] if isinstance(array, CountingArray) else array[row]
 
 
 class CountingArray:
     """A LaneArray of one lane, whose places count when they are read and written."""
 
     def __init__(self, array: LaneArray, memory: str) -> None:
-        self.data, self.memory = array.data, memory
+        self.data, self.rows, self.memory = array.data, len(array.data), memory
 
     def __getitem__(self, place) -> Counted:
         Counted.tally[f"{self.memory} read"] += 1
@@ -151,7 +167,7 @@ def count(step: float, precision: str) -> collections.Counter:
     batch.advance(700)
     functions = _counting_functions(7 if precision == "single" else 13)
     kept = []
-    for module in (imex, imex_stations, imex_system, lane_forces, lane_compliance, lane_friction):
+    for module in (imex, imex_stations, imex_system, lane_forces, lane_compliance, lane_friction, rings):
         for name, thing in list(vars(module).items()):
             plain = functions.get(name) or getattr(thing, "py_func", None)
             if plain is not None:

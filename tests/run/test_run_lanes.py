@@ -1,5 +1,6 @@
 """Runs that advance together: each is bit by bit what it is alone, and what becomes of one is no other's business."""
 
+import weakref
 from functools import cache
 
 import numpy as np
@@ -166,6 +167,15 @@ def test_work_is_counted_until_the_run_ends(method):
     else:
         assert through.counters()["repeats"] == repeats[0] > 0
         assert 0 < slipped.counters()["repeats"] < repeats[1]
+
+
+def test_a_batch_goes_with_the_last_of_its_runs():
+    batch = Batch(points("double"), "imex")
+    kept, runs = weakref.ref(batch), batch.runs
+    del batch
+    assert kept() is runs[0].batch
+    del runs  # at once, without waiting for the collector of circles: a batch holds megabytes
+    assert kept() is None
 
 
 def test_a_batch_takes_no_more_than_a_register():

@@ -17,7 +17,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import derive
 from cvt_hpc.models.elastic_belt.lane_run import LaneRun, Paused, lane_arrays
 from cvt_hpc.models.elastic_belt.march import Sampled, march_explicit, march_imex
 from cvt_hpc.models.elastic_belt.recorded_run import recording
-from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, ENDED_AT, PROFILES
+from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, ENDED_AT, OUTCOME, PROFILES, Outcome
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
 STEPS = {"imex": (imex_work, march_imex), "explicit": (explicit_work, march_explicit)}
@@ -42,8 +42,6 @@ class Batch:
         As given.
     plan : Recording
         What is recorded.
-    runs : tuple of LaneRun
-        The runs.
     samples : int
         Samples of a whole run.
     done : int
@@ -85,7 +83,6 @@ class Batch:
         self._go_on_after([run.rows for run in paused] or [np.zeros((0, columns))] * len(points))
         if paused:
             self._resume([*paused, *[paused[-1]] * (width - len(paused))])
-        self.runs = tuple(LaneRun(self, lane) for lane in range(len(points)))
         self._parts = parts_of(n, LANES[p["precision"]]) if p["lanes"] == "stations" else 1
 
     def _go_on_after(self, rows: Sequence[np.ndarray]) -> None:
@@ -103,9 +100,15 @@ class Batch:
         self.state.time[0] = paused[0].time
 
     @property
+    def runs(self) -> tuple[LaneRun, ...]:
+        """The runs; they keep the batch, which does not keep them, so that it goes with the last of them."""
+        return tuple(LaneRun(self, lane) for lane in range(len(self.points)))
+
+    @property
     def running(self) -> bool:
         """Whether any run has not ended."""
-        return self.done < self.samples and any(run.failure is None for run in self.runs)
+        outcomes = self.ended.data[0, OUTCOME, : len(self.points)]
+        return self.done < self.samples and bool((outcomes == Outcome.OK).any())
 
     def advance(self, samples: int) -> None:
         """March on, at most to the next border of the judged part.
@@ -174,8 +177,8 @@ class Batch:
             new = self.rows.data[: self.done - self._recorded, :, lane]
             return np.concatenate([earlier, new]) if len(earlier) else new
         if self._ordered is None:
-            ordered = np.empty((len(self.runs), self.rows.data.shape[1], self.samples))
-            ordered[:, :, self._recorded :] = self.rows.data.transpose(2, 1, 0)[: len(self.runs)]
+            ordered = np.empty((len(self.points), self.rows.data.shape[1], self.samples))
+            ordered[:, :, self._recorded :] = self.rows.data.transpose(2, 1, 0)[: len(self.points)]
             for k, earlier in enumerate(self._earlier):
                 ordered[k, :, : self._recorded] = earlier.T
             self._ordered = ordered
