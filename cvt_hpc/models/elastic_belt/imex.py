@@ -163,9 +163,10 @@ def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
         fields[j, N_ELEMENT], fields[j, N_RING] = more_0, more_1
         v0_b, dv0_b, flux0_b, v1_b, dv1_b, flux1_b = v0, dv0, flux_0, v1, dv1, flux_1
 
-        du = fma(-stations[j, LAG], dv0, stations[j, PUSH])
-        u, w = fields[j, U] + du, fields[j, W]
-        share = belt.arc_share[j]
+        share, du, w = belt.arc_share[j], stations[j, PUSH], fields[j, W]
+        if anywhere(share > 0.0):
+            du = fma(-stations[j, LAG], dv0, du)
+        u = fields[j, U] + du
         if anywhere(share > 0.0):
             is_driven = belt.on_driven[j] > 0.5
             if anywhere(is_driven):

@@ -171,10 +171,9 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
         along_element = fma(outward, slope, along_element)
         mobility = 1.0 / radial_mass
         push, lag = (transverse + outward) * mobility, cross * mobility
-        stations[j, LAG], stations[j, SLOPE] = lag, slope
-        stations[j, D_00] = dual * fma(-cross, lag, element)
-        stations[j, D_01] = dual * coupling
-        stations[j, D_11] = dual * ring
+        if anywhere(share > 0.0):
+            stations[j, LAG], stations[j, SLOPE], stations[j, D_01] = lag, slope, dual * coupling
+        stations[j, D_00], stations[j, D_11] = dual * fma(-cross, lag, element), dual * ring
         stations[j, Y_1] = dual * along_ring
         station = push, mobility * half_gyroscopic * span, dual * cross, dual * along_element
         if j == 0:
