@@ -19,7 +19,6 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     DRIVEN_CARRY,
     DRIVEN_RADIUS,
     DRIVING_CARRY,
-    DRIVING_RADIUS,
     DRIVING_SPEED,
     ELEMENT_DAMPING,
     ELEMENT_MASS,
@@ -53,7 +52,12 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     SLIDING_T,
     advance_pulley,
     derive,
+    driving_surface,
+    lane_acceleration,
+    lane_belt_speed,
+    lane_carry,
     lane_sliding,
+    lane_speed_share,
     lane_transverse,
     ring_grip,
     start_damping,
@@ -98,9 +102,9 @@ def step_explicit(belt: LaneBelt, state: LaneState, work: ExplicitWork, step: fl
     lane_sliding(belt, state, stations)
     moment = _accelerate(belt, state, stations, step)
     advance_pulley(belt, state, stations, moment, step)
+    state.time[0] += step
     _advance_layers(belt, state, stations, step)
     _advance_across(belt, state, stations, step)
-    state.time[0] += step
     derive(belt, state, stations)
 
 
@@ -112,12 +116,15 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
     per_cosine, radius = 1.0 / cosine, c[0, DRIVEN_RADIUS]
     element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
     element_damping, ring_damping = c[0, ELEMENT_DAMPING], c[0, RING_DAMPING]
-    mass, ring_mass, belt_speed = c[0, MASS], c[0, RING_MASS], c[0, BELT_SPEED]
-    bending, ring_friction, ring_relief = c[0, BENDING_STIFFNESS], c[0, RING_FRICTION], c[0, RING_RELIEF]
+    speed_share = lane_speed_share(belt, state.time[0], sine)
+    mass, ring_mass, belt_speed = c[0, MASS], c[0, RING_MASS], speed_share * c[0, BELT_SPEED]
+    bending, ring_friction = c[0, BENDING_STIFFNESS], c[0, RING_FRICTION]
+    ring_relief = c[0, RING_RELIEF] * speed_share * speed_share
+    acceleration = lane_acceleration(belt, state.time[0], step)
     centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
     damping = c[0, TRANSVERSE_DAMPING] + start_damping(belt, state.time[0])
     mobility, element_mobility, ring_mobility = step / mass, step / c[0, ELEMENT_MASS], step / ring_mass
-    zero = like(0.0, sine)
+    rise, zero = acceleration * step, like(0.0, sine)
     moment = net_left = ring_left = stress_left_0 = stress_left_1 = zero
     gap_left_0 = gap_left_1 = zero
     for k in range(-1, n):
@@ -141,6 +148,7 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
             slope = (fields[b, W] - fields[a, W]) * span
             across = lane_transverse(belt, fields, j, net_left, net_right, bending)
             across = fma(-gyroscopic, (fields[b, U] - fields[a, U]) * span, across)
+            across = fma(-acceleration * mass, slope, across)
             v_radial = fma(full_speed, slope, u)
             outward = -damping * v_radial
             along_element = (stress_0 - stress_left_0) * per_dual
@@ -166,8 +174,9 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
             along_element = fma(outward, slope, along_element)
             stations[j, SLOPE] = slope
             stations[j, DU] = (across + outward) * mobility
-            stations[j, DV_0] = fma(along_element, element_mobility, -full_speed * (step * gap_left_0))
-            stations[j, DV_1] = fma(-(belt_speed + v1), step * gap_left_1, along_ring)
+            dv_0 = fma(along_element, element_mobility, -full_speed * (step * gap_left_0))
+            dv_1 = fma(-(belt_speed + v1), step * gap_left_1, along_ring)
+            stations[j, DV_0], stations[j, DV_1] = dv_0 - rise, dv_1 - rise
         net_left, ring_left, stress_left_0, stress_left_1 = net_right, ring_right, stress_0, stress_1
         gap_left_0, gap_left_1 = gap_0, gap_1
     return moment
@@ -177,7 +186,7 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
 def _advance_layers(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float) -> None:
     """Speeds of both layers, contents by the fluxes of the new speeds, work of the layers' dampers."""
     n, fields, scalars = belt.cell.size, state.fields, state.scalars
-    belt_speed = belt.constants[0, BELT_SPEED]
+    belt_speed = lane_belt_speed(belt, state.time[0])
     work_done = like(0.0, belt_speed)
     for layer in range(2):
         v_row, dv_row, eps_row, n_row = V_ELEMENT + layer, DV_0 + layer, EPS_0 + layer, N_ELEMENT + layer
@@ -203,15 +212,21 @@ def _advance_layers(belt: LaneBelt, state: LaneState, stations: LaneArray, step:
 def _advance_across(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float) -> None:
     """Transverse velocity, memory by the sliding speeds of the new velocities, and displacement."""
     n, fields, c = belt.cell.size, state.fields, belt.constants
-    per_cosine, belt_speed, driven_speed = 1.0 / c[0, COSINE], c[0, BELT_SPEED], state.scalars[0, SPEED]
-    forget, carry, turning = step * c[0, FORGET], step * c[0, DRIVING_CARRY], c[0, DRIVING_SPEED]
-    surface = turning * c[0, DRIVING_RADIUS] - belt_speed
+    share = lane_speed_share(belt, state.time[0], c[0, BELT_SPEED])
+    per_cosine, belt_speed, driven_speed = (
+        1.0 / c[0, COSINE],
+        share * c[0, BELT_SPEED],
+        state.scalars[0, SPEED],
+    )
+    forget, carry = step * c[0, FORGET], step * lane_carry(belt, 0, DRIVING_CARRY, belt_speed)
+    turning, surface = share * c[0, DRIVING_SPEED], driving_surface(belt, share)
     behind = like(0.0, forget)
     for j in range(n):
         u, w = fields[j, U] + stations[j, DU], fields[j, W]
         if belt.memory and belt.arc_share[j] > 0.0:
             if j == belt.driven_start:
-                carry, turning = step * c[0, DRIVEN_CARRY], driven_speed
+                carry = step * lane_carry(belt, belt.driven_start, DRIVEN_CARRY, belt_speed)
+                turning = driven_speed
                 surface = turning * c[0, DRIVEN_RADIUS] - belt_speed
             v0, remembered = fields[j, V_ELEMENT], fields[j, V_FILTERED]
             v_tangential = v0 - fma(turning, w, surface)

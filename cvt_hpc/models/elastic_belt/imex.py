@@ -40,7 +40,6 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     DRIVEN_CARRY,
     DRIVEN_RADIUS,
     DRIVING_CARRY,
-    DRIVING_RADIUS,
     DRIVING_SPEED,
     ELEMENT_DAMPING,
     ELEMENT_STIFFNESS,
@@ -55,7 +54,10 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     SHORT_0,
     advance_pulley,
     derive,
+    driving_surface,
+    lane_carry,
     lane_sliding,
+    lane_speed_share,
 )
 
 # One, unless friction turns sliding about or elements meet; then each closes the cells beside the last ones,
@@ -92,12 +94,14 @@ def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
     """Apply the increments; returns the moment of the flanks on the driven pulley [N m], in doubles."""
     n, fields, stations, c = belt.cell.size, state.fields, work.stations, belt.constants
     per_cosine = 1.0 / c[0, COSINE]
-    belt_speed, forget = c[0, BELT_SPEED], c[0, FORGET]
+    share = lane_speed_share(belt, state.time[0], c[0, BELT_SPEED])
+    belt_speed, forget = share * c[0, BELT_SPEED], c[0, FORGET]
     driven_speed = state.scalars[0, SPEED]
     driven_base = driven_speed * like(c[0, DRIVEN_RADIUS], driven_speed) - like(belt_speed, driven_speed)
     zero = like(0.0, forget)
     surface, turning, radius = like(driven_base, zero), like(driven_speed, zero), c[0, DRIVEN_RADIUS]
-    carry = c[0, DRIVEN_CARRY]
+    carry = lane_carry(belt, belt.driven_start, DRIVEN_CARRY, belt_speed)
+    driving_carry = lane_carry(belt, 0, DRIVING_CARRY, belt_speed)
     per_rate = 1.0 / (carry + forget)
     keep = decay((carry + forget) * step)
     moment = like(0.0, driven_speed)
@@ -137,9 +141,8 @@ def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
         w = fields[j, W]
         if belt.arc_share[j] > 0.0:
             if j < belt.driven_start:
-                surface = c[0, DRIVING_SPEED] * c[0, DRIVING_RADIUS] - belt_speed
-                turning = c[0, DRIVING_SPEED]
-                carry = c[0, DRIVING_CARRY]
+                surface, turning = driving_surface(belt, share), share * c[0, DRIVING_SPEED]
+                carry = driving_carry
                 per_rate = 1.0 / (carry + forget)
                 keep = decay((carry + forget) * step)
             else:
