@@ -54,9 +54,10 @@ def history_figure(dataset: xr.Dataset) -> Figure:
         (1.6, [(LEFT, panels.draw_displacement, strand), (RIGHT, panels.draw_close_up, strand)])
         for strand in strands
     ]
-    load = dataset["load"].values if "load" in dataset and "time" in dataset["load"].dims else np.zeros(0)
-    if load.size and np.ptp(load) > 0:
-        rows.append((1.2, [(LEFT, panels.draw_load, dataset)]))
+    courses = [name for name in panels.COURSES if _changes(dataset, name)]
+    if courses:
+        places = zip((LEFT, RIGHT), courses, strict=False)
+        rows.append((1.2, [(place, panels.draw_course, dataset[name]) for place, name in places]))
     if with_spectrum:
         rows.append((2.1, [(WHOLE, panels.draw_spectra, with_spectrum)]))
     if _is_known(dataset, "ring_tension") or _is_known(dataset, "push_force"):
@@ -76,6 +77,11 @@ def history_figure(dataset: xr.Dataset) -> Figure:
         for columns, draw_panel, what in row:
             draw_panel(figure.add_subplot(grid[i, columns]), what)
     return figure
+
+
+def _changes(dataset: xr.Dataset, name: str) -> bool:
+    """Whether a quantity has a history, and is not the same all along."""
+    return name in dataset and "time" in dataset[name].dims and bool(np.ptp(dataset[name].values) > 0)
 
 
 def _is_judged(dataset: xr.Dataset) -> bool:

@@ -21,6 +21,7 @@ CLOSE_UP = 0.01  # [s]: six periods at 600 Hz
 MOST_PEAKS = 3
 COLOURS = {"t1": "#b5460f", "t2": "#1f4e8c"}  # of like lightness, so line styles tell them apart in grey
 LINES = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))  # one for each probe of a strand, by default
+COURSES = {"driving_speed": "driving pulley [rad/s]", "load": "load [N m]"}  # what a run may change
 FEEDS = {
     "flank_feed": ("friction of the flanks", "#b5460f", "-"),
     "stress_feed": ("push and tension", "#1f4e8c", "--"),
@@ -209,10 +210,11 @@ def _peaks(signal: Array, strand: Strand, bins: Array, spectrum: Array) -> list[
     return peaks
 
 
-def draw_load(axes: Axes, dataset: xr.Dataset) -> None:
-    """The load over time."""
-    axes.plot(1e3 * dataset["time"].values, dataset["load"].values, color=_OTHER_COLOUR, linewidth=1.2)
-    axes.set(xlabel="time [ms]", ylabel="load [N m]", xlim=1e3 * dataset["time"].values[[0, -1]])
+def draw_course(axes: Axes, course: xr.DataArray) -> None:
+    """One of COURSES over time."""
+    time = 1e3 * course["time"].values
+    axes.plot(time, course.values, color=_OTHER_COLOUR, linewidth=1.2)
+    axes.set(xlabel="time [ms]", ylabel=COURSES[str(course.name)], xlim=time[[0, -1]])
 
 
 def draw_forces(axes: Axes, dataset: xr.Dataset) -> None:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.job import Job, build_job, known_keys
 from cvt_hpc.job.handing import handed_to
+from cvt_hpc.vibration.ramp import QUANTITIES
 
 QUESTIONS = ("occurrence", "onset", "frequency", "amplitude", "forces")
 MODEL, STEPPER = "elastic_belt", "imex"
@@ -89,8 +90,9 @@ def _check(job: Job) -> None:
         raise mismatch(f"{where}: [design]", "none: a ladder goes over the whole grid", job.design["kind"])
     if "load" not in axes:
         raise mismatch(f"{where}: [axes]", "load among the axes, for its onsets", ", ".join(axes) or "none")
-    if (course := job.parameters["load_history"]) != "constant":
-        raise mismatch(f"{where}: [scene] load_history", "constant, as the lower rungs have it", course)
+    for key in (quantity.history for quantity in QUANTITIES.values()):
+        if (course := job.parameters[key]) != "constant":
+            raise mismatch(f"{where}: [scene] {key}", "constant, as the lower rungs have it", course)
     stated = [rule.key for rule in job.rules if not rule.is_substituted]
     varied = dict.fromkeys(stated, ("derived", "a formula"))
     varied |= dict.fromkeys(axes, ("axes", "an axis"))

@@ -17,6 +17,7 @@ from cvt_hpc.recording import longest_duration, sample_count
 from cvt_hpc.simulation.modules import record_module
 from cvt_hpc.simulation.record import record_of, record_without_run
 from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.vibration.ramp import ramped
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
@@ -116,7 +117,7 @@ class OpenRun:
         return self._point | {"step": run.interval / (2 * steps)}
 
     def _longer(self, run: Any) -> dict[str, Any] | None:
-        """The parameters of a run over twice its time; None where that is too long, or the load would end.
+        """The parameters of a run over twice its time; None where that is too long, or a ramp would end.
 
         The judged part keeps its share, but begins no sooner than the run was prolonged: what is summed over
         the judged part is not known of less than that.
@@ -124,7 +125,7 @@ class OpenRun:
         p = run.parameters
         duration = 2 * sample_count(p) / p["sampling_rate"]
         is_too_long = duration > longest_duration(self._point) * (1.0 + 1e-9)
-        if is_too_long or p.get("load_history", "constant") != "constant":
+        if is_too_long or ramped(p):
             return None
         return p | {"duration": duration, "judged_fraction": min(p["judged_fraction"], 0.5)}
 

@@ -1,17 +1,17 @@
-"""Whether a run vibrates anywhere along a ramp of load, between which loads, and how far at each.
+"""Whether a run vibrates anywhere along a ramp of load or speed, between which values, and how far at each.
 
 Under a ramp no part of the run stands for the whole, so all windows after the start-up are judged. The run
 vibrates if a strand stays above the threshold for SUSTAINED windows in a row, wherever that is. It is quiet
 only if no window is above, and the amplitude is not growing at the end. What is above the threshold more
 briefly is undecided: a slower ramp may tell. A vibration takes time to grow, so a fast ramp shows the onset
-late, by the load that it passes meanwhile.
+late, by what it passes meanwhile.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,35 +28,70 @@ SUSTAINED = 4  # windows in a row: as many as the shortest judged part of a run 
 LEAST_PERIODS = 1.9  # of `band_low` in a window; four windows in five periods, the least judged, have 1.95
 BINS = 20  # parts of a ramp whose amplitudes are recorded
 
+
+class Quantity(NamedTuple):
+    """What a ramp changes: the parameter that says so, units in sentences and in attributes, and its name."""
+
+    history: str
+    units: str
+    cf_units: str
+    long_name: str
+
+
+QUANTITIES = {
+    "load": Quantity("load_history", "N m", "N m", "load"),
+    "speed": Quantity("speed_history", "rad/s", "rad s-1", "speed of the driving pulley"),
+}
+
+
+def _variables(name: str, quantity: Quantity) -> tuple[Variable, ...]:
+    units, what = quantity.cf_units, quantity.long_name
+    return (
+        Variable(
+            f"onset_{name}",
+            (),
+            "f8",
+            units,
+            f"{what} at which vibration sets in along a ramp; not a number where it is there from the start",
+        ),
+        Variable(
+            f"end_{name}",
+            (),
+            "f8",
+            units,
+            f"{what} at which vibration ends along a ramp; not a number where it lasts to the end",
+        ),
+        Variable(f"ramp_{name}", ("ramp_share",), "f8", units, f"mean {what} in parts of a ramp"),
+    )
+
+
 VARIABLES = (
-    Variable(
-        "onset_load",
-        (),
-        "f8",
-        "N m",
-        "load at which vibration sets in along a ramp; not a number where it is there from the start",
-    ),
-    Variable(
-        "end_load",
-        (),
-        "f8",
-        "N m",
-        "load at which vibration ends along a ramp; not a number where it lasts to the end",
-    ),
-    Variable("ramp_load", ("ramp_share",), "f8", "N m", "mean load in parts of a ramp"),
+    *(variable for name, quantity in QUANTITIES.items() for variable in _variables(name, quantity)),
     Variable(
         "ramp_amplitude",
         ("strand", "ramp_share"),
         "f8",
         "m",
-        "mean band-limited amplitude in parts of a ramp of load",
+        "mean band-limited amplitude in parts of a ramp",
     ),
 )
 
 
 def coordinate() -> Coordinate:
     """The dimension `ramp_share`: middles of the parts of a ramp, as shares of it."""
-    return Coordinate((np.arange(BINS) + 0.5) / BINS, "1", "share of the ramp of load, after rise_time")
+    return Coordinate((np.arange(BINS) + 0.5) / BINS, "1", "share of the ramp, after rise_time")
+
+
+def ramped(parameters: Mapping[str, Any]) -> str:
+    """Which of QUANTITIES a run changes all along; "" where it keeps both.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat parameters of a run; of a model without ramps, without their keys.
+    """
+    ramps = (name for name, q in QUANTITIES.items() if parameters.get(q.history, "constant") == "ramp")
+    return next(ramps, "")
 
 
 @dataclass(frozen=True)
@@ -65,34 +100,40 @@ class RampOccurrence(Occurrence):
 
     Attributes
     ----------
-    onset_load, end_load : float
-        Loads of the ramp between which the run vibrates [N m]; nan where it does not, and where vibration is
-        there from the ramp's start, or lasts to its end.
-    ramp_load : array, shape (BINS,)
-        Mean load in equal parts of the ramp [N m]; nan where no window lies.
+    quantity : str
+        Of QUANTITIES, what the ramp changes: a load [N m] or a speed [rad/s].
+    onset, end : float
+        Its values between which the run vibrates; nan where it does not, and where vibration is there from
+        the ramp's start, or lasts to its end.
+    mean : array, shape (BINS,)
+        Its mean in equal parts of the ramp; nan where no window lies.
     ramp_amplitude : array, shape (strand, BINS)
         Mean amplitude in them [m].
     """
 
-    onset_load: float
-    end_load: float
-    ramp_load: Array
+    quantity: str
+    onset: float
+    end: float
+    mean: Array
     ramp_amplitude: Array
 
     def record(self) -> dict[str, Any]:
-        """Return what a record holds of it: as of `Occurrence`, and VARIABLES."""
-        return super().record() | {variable.name: getattr(self, variable.name) for variable in VARIABLES}
+        """Return what a record holds of it: as of `Occurrence`, and VARIABLES of its quantity."""
+        name = self.quantity
+        along = {f"onset_{name}": self.onset, f"end_{name}": self.end, f"ramp_{name}": self.mean}
+        return super().record() | along | {"ramp_amplitude": self.ramp_amplitude}
 
 
 def assess_ramp(
     displacement: ArrayLike,
     rate: float,
     strands: Sequence[str],
-    loads: ArrayLike,
+    quantity: str,
+    values: ArrayLike,
     samples: int,
     parameters: Mapping[str, Any],
 ) -> RampOccurrence | None:
-    """Judge a run under a ramp of load.
+    """Judge a run along a ramp.
 
     Parameters
     ----------
@@ -102,8 +143,10 @@ def assess_ramp(
         Sampling rate [Hz].
     strands : sequence of str, length probe
         The strand on which each probe lies.
-    loads : array, shape (time,)
-        Load at the same instants [N m].
+    quantity : str
+        Of QUANTITIES, what the ramp changes.
+    values : array, shape (time,)
+        Its values at the same instants.
     samples : int
         Samples of the whole ramp, of which a run that ended early has fewer.
     parameters : mapping
@@ -124,9 +167,9 @@ def assess_ramp(
     members = [np.flatnonzero(np.asarray(strands) == name) for name in names]
     strongest = np.array([columns[np.argmax(windows[:, columns].max(axis=0))] for columns in members])
     levels = np.stack([windows[:, columns].max(axis=1) for columns in members], axis=1)
-    at = np.interp(centres, np.arange(len(w)) / rate, loads)
+    at = np.interp(centres, np.arange(len(w)) / rate, values)
     bins = np.minimum((centres * rate / samples * BINS).astype(int), BINS - 1)
-    verdict = Passages(levels, at, parameters)
+    verdict = Passages(levels, at, QUANTITIES[quantity].units, parameters)
     vibrates, reason = verdict.classify(names)
     unknown = np.full(len(names), np.nan)
     return RampOccurrence(
@@ -140,7 +183,8 @@ def assess_ramp(
         unknown,
         strongest,
         verdict.margin(vibrates),
-        *verdict.loads(),
+        quantity,
+        *verdict.ends(),
         _means(at[:, np.newaxis], bins)[0],
         _means(levels, bins),
     )
@@ -153,14 +197,16 @@ class Passages:
     ----------
     levels : array, shape (window, strand)
         Amplitudes in successive windows [m].
-    loads : array, shape (window,)
-        Load in their middles [N m].
+    values : array, shape (window,)
+        What is ramped, in their middles.
+    units : str
+        Of the values.
     parameters : mapping
         As `assess_ramp` takes them.
     """
 
-    def __init__(self, levels: Array, loads: Array, parameters: Mapping[str, Any]) -> None:
-        self.levels, self.at = levels, loads
+    def __init__(self, levels: Array, values: Array, units: str, parameters: Mapping[str, Any]) -> None:
+        self.levels, self.at, self.units = levels, values, units
         self.threshold, self.negligible = (
             parameters[key] for key in ("amplitude_threshold", "negligible_amplitude")
         )
@@ -174,11 +220,11 @@ class Passages:
         if self.kept.any():
             which = [name for name, kept in zip(names, self.kept.T, strict=True) if kept.any()]
             who = " and ".join(which) + (" vibrates" if len(which) == 1 else " vibrate")
-            onset, end = self.loads()
-            since = "the ramp's start" if np.isnan(onset) else f"{onset:.4g} N m"
-            until = "its end" if np.isnan(end) else f"{end:.4g} N m"
+            onset, end = self.ends()
+            since = "the ramp's start" if np.isnan(onset) else f"{onset:.4g} {self.units}"
+            until = "its end" if np.isnan(end) else f"{end:.4g} {self.units}"
             return Vibrates.YES, f"{who} from {since} to {until}, {top}"[:LONGEST_REASON]
-        place = f"between {self.at[0]:.4g} and {self.at[-1]:.4g} N m"
+        place = f"between {self.at[0]:.4g} and {self.at[-1]:.4g} {self.units}"
         above = int((self.levels >= self.threshold).any(axis=1).sum())
         if above:
             return Vibrates.UNDECIDED, f"above the threshold in {above} windows only {place}, {top}"
@@ -188,8 +234,8 @@ class Passages:
             return Vibrates.UNDECIDED, f"below the threshold {place}, {top}, but growing at the end"
         return Vibrates.NO, f"quiet {place}, {top}"
 
-    def loads(self) -> tuple[float, float]:
-        """Load of the onset and of the end."""
+    def ends(self) -> tuple[float, float]:
+        """Values at the onset and at the end."""
         vibrating = np.flatnonzero(self.kept.any(axis=1))
         if not vibrating.size:
             return np.nan, np.nan
@@ -204,7 +250,7 @@ class Passages:
         return float(-over.max()) if vibrates is Vibrates.NO else 0.0
 
     def _crossing(self, k: int, step: int) -> float:
-        """Load between window k, in which a strand vibrates, and its neighbour on one side."""
+        """Value between window k, in which a strand vibrates, and its neighbour on one side."""
         if not 0 <= k + step < len(self.at):
             return np.nan
         strand = int(np.argmax(np.where(self.kept[k], self.levels[k], -1.0)))

@@ -172,6 +172,8 @@ def test_what_is_absent_is_left_out(missing, gone):
 def test_a_constant_load_is_not_drawn():
     labels = {axes.get_ylabel() for axes in figure_of(run(ramp=False)).axes}
     assert "load [N m]" not in labels and "force [kN]" in labels
+    ramp = run().assign(driving_speed=("time", np.linspace(100.0, 400.0, run().sizes["time"])))
+    assert "driving pulley [rad/s]" in {axes.get_ylabel() for axes in figure_of(ramp).axes} - labels
     scalar = run().drop_vars("load").assign(load=120.0)
     assert "load [N m]" not in {axes.get_ylabel() for axes in figure_of(scalar).axes}
 

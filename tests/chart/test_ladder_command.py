@@ -77,6 +77,10 @@ def test_a_rung_that_refuses_the_job_is_named(job):
             ["load_history=ramp"],
             "[scene] load_history: expected constant, as the lower rungs have it, found ramp",
         ),
+        (
+            ["speed_history=ramp"],
+            "[scene] speed_history: expected constant, as the lower rungs have it, found ramp",
+        ),
     ],
 )
 def test_jobs_without_a_ladder_are_refused(job, options, message, capsys):

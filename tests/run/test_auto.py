@@ -179,6 +179,7 @@ def test_runs_in_company_are_what_they_are_alone():
     "values",
     [
         {"load_history": "ramp"},
+        {"speed_history": "ramp"},
         {
             "duration": 0.1
         },  # three tenths of it are over before the load has risen and five periods have passed

@@ -50,6 +50,7 @@ CASES = {
     "constant friction": {"friction_law": "coulomb", "friction_gradient": 0.0},
     "other laws": {"friction_law": "cubic", "friction_memory": 1e-3},
     "ramp": {"load_history": "ramp", "load_start": 60.0, "load": 140.0},
+    "ramp of speed": {"speed_history": "ramp", "speed_start": 100.0},
     "rising": {"rise_time": 0.03},  # the start-up's damping and load, half way
     "rigid": {"sheave_stiffness": np.inf, "load": -80.0},
 }
@@ -91,13 +92,13 @@ def plain_step(belt, before, step):
         fields[row] += step * rate[row]
     load = belt.ratio * load_at(belt, scalars[TIME])
     scalars[DRIVEN_SPEED] += step * (moments.sum() - load) / belt.driven_inertia
+    scalars[TIME] += step
     memory_rates(belt, state, rate)
     content_rates(belt, state, eps, rate)
     fields[W] += step * fields[U]
     for row in (V_FILTERED, N_ELEMENT, N_RING):
         fields[row] += step * rate[row]
     scalars[DRIVEN_POSITION] += step * (driven_thrust(belt, force) - belt.thrust) / belt.axial_damping
-    scalars[TIME] += step
     return state
 
 

@@ -54,6 +54,23 @@ def test_runs_are_those_of_the_explicit_step(stepper, values):
     assert run.step == pytest.approx(run.time / run.steps)
 
 
+def test_a_ramp_of_speed_is_that_of_the_explicit_step():
+    values = CHEAP | {"rise_time": 5e-4, "speed_history": "ramp", "speed_start": 305.0, "load": 60.0}
+    run = GeneralTransient(job("dormand_prince", **values, tolerance=1e-5).point(0), "dormand_prince")
+    assert run.advance(100) is None
+    coarse, fine = (
+        Transient(job("explicit", **values, step=step).point(0), "explicit") for step in (2e-7, 1e-7)
+    )
+    for plain_run in (coarse, fine):
+        while plain_run.done < 100:
+            assert plain_run.advance(100 - plain_run.done) is None
+    for name in ("ring_tension t1", "push_force t2", "axial_force driven", "driven_speed", "driving_speed"):
+        error = 2.0 * np.abs(coarse.channel(name) - fine.channel(name)).max()
+        size = np.abs(fine.channel(name)).max()
+        assert np.abs(run.channel(name) - fine.channel(name)).max() < 3.0 * error + 1e-4 * size, name
+    assert 305.5 < run.channel("driving_speed")[-1] < 307.0
+
+
 def test_the_strands_are_disturbed_once_the_start_up_is_over():
     run, same = (general("symplectic_euler", step=2e-7, disturbance=size) for size in (1e-6, 0.0))
     kick = round(CHEAP["rise_time"] / run.interval)

@@ -123,6 +123,7 @@ def test_a_run_that_goes_on_is_the_longer_run(script, values, times):
         ({"longest_duration": 0.0}, 1.0, 4 * T),  # the default
         ({}, 2 * T, 2 * T),
         ({"load_history": "ramp"}, 1.0, T),  # the load has come to its end
+        ({"speed_history": "ramp", "disturbance": 1e-4}, 1.0, T),  # and so has the speed
     ],
 )
 def test_how_long_a_run_goes_on(script, values, until, simulated):

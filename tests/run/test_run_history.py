@@ -115,11 +115,17 @@ def test_load_and_speed_are_those_of_the_record(history):
     assert history["driven_speed_ripple"].item() == pytest.approx(speed.std())
 
 
-def test_a_ramp_goes_from_its_start_to_its_end():
-    asked = job(**CHEAP, load=120.0, load_start=40.0, load_history="ramp")
-    load = simulate(asked)["load"].values
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("load", {"load": 120.0, "load_start": 40.0, "load_history": "ramp"}),
+        ("driving_speed", {"driving_speed": 120.0, "speed_start": 40.0, "speed_history": "ramp"}),
+    ],
+)
+def test_a_ramp_goes_from_its_start_to_its_end(name, values):
+    ramp = simulate(job(**CHEAP, **values))[name].values
     at = {0.01: 40.0, 0.025: 80.0, 0.04: 120.0}
-    assert [load[round(time * 20e3) - 1] for time in at] == pytest.approx(list(at.values()))
+    assert [ramp[round(time * 20e3) - 1] for time in at] == pytest.approx(list(at.values()))
 
 
 def test_the_file_alone_is_enough_to_repeat_the_run():

@@ -20,6 +20,7 @@ OTHER = {
     "kinetic_friction": 0.12,
     "stribeck_velocity": 0.06,
     "load_start": 10.0,
+    "speed_start": 200.0,
     "seed": 2,
     "ring_friction_speed": 0.02,
     "tilt_stiffness": 4e5,
@@ -33,7 +34,8 @@ CASES = [
     ({"friction_law": "cubic", "friction_gradient": 0.0}, ["stribeck_velocity"], "friction_gradient 0"),
     ({"friction_law": "hyperbolic"}, ["stribeck_velocity"], "friction_law hyperbolic"),
     ({"friction_gradient": 0.0}, ["stribeck_velocity"], "friction_gradient 0"),
-    ({"load_history": "constant"}, ["load_start"], "load_history constant"),
+    ({"load_history": "constant", "speed_history": "ramp"}, ["load_start"], "load_history constant"),
+    ({}, ["speed_start"], "speed_history constant"),
     ({"disturbance": 0.0}, ["seed"], "disturbance 0"),
     ({"ring_friction": 0.0}, ["ring_friction_speed"], "ring_friction 0"),
     (
@@ -58,7 +60,8 @@ def bits(**values):
 def test_what_is_inert_changes_nothing_and_is_no_axis(scene, keys, setting):
     scene = {"load_history": "ramp"} | scene
     asked = job(**COARSE, **scene)
-    assert inert(asked.parameters) == dict.fromkeys(keys, setting)
+    steady = {} if "speed_history" in scene else {"speed_start": "speed_history constant"}
+    assert inert(asked.parameters) == dict.fromkeys(keys, setting) | steady
     alone = bits(**scene)
     for key in keys:
         assert bits(**scene, **{key: OTHER[key]}) == alone, key
@@ -68,9 +71,12 @@ def test_what_is_inert_changes_nothing_and_is_no_axis(scene, keys, setting):
             job(axes={key: [asked.parameters[key], OTHER[key]]}, **COARSE, **scene)
 
 
-def test_the_reference_has_no_inert_parameter_once_its_load_ramps():
-    scene = {"load_history": "ramp"}
-    assert inert(job(**COARSE, **scene).parameters) == {}
-    alone = bits(**scene)
+def test_each_parameter_has_its_effect_once_load_or_speed_ramps():
+    scenes = {"load": {"load_history": "ramp"}, "speed": {"speed_history": "ramp"}}
+    starts = {name: f"{name}_start" for name in scenes}
+    alone = {name: bits(**scene) for name, scene in scenes.items()}
+    assert inert(job(**COARSE, **scenes["load"]).parameters) == {starts["speed"]: "speed_history constant"}
+    assert inert(job(**COARSE, **scenes["speed"]).parameters) == {starts["load"]: "load_history constant"}
     for key, value in OTHER.items():
-        assert bits(**scene, **{key: value}) != alone, key
+        name = "speed" if key == starts["speed"] else "load"
+        assert bits(**scenes[name], **{key: value}) != alone[name], key

@@ -64,8 +64,10 @@ def run(channels=None, *, samples=8, judged=0, done=None, **parameters):
     found = {f"{name} {pulley}": value for name, value in QUIET.items() for pulley in PULLEYS}
     found |= {"load": 7.0, "driven_speed": 100.0} | (channels or {})
     done = samples if done is None else done
+    given = DEFAULTS | SCENE | parameters
     return SimpleNamespace(
-        parameters=DEFAULTS | SCENE | parameters,
+        parameters=given,
+        mean_driving_speed=lambda samples: given["driving_speed"],
         samples=samples,
         done=done,
         judged=slice(judged, samples),

@@ -32,6 +32,7 @@ from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.variables import Vibrates
 from cvt_hpc.vibration import criterion
 from cvt_hpc.vibration.assessment import Occurrence
+from cvt_hpc.vibration.ramp import ramped
 
 COARSENESS = 0.6  # stations of the coarse run over those of the full one, and its inverse for the step
 SHARE = 0.3  # of the duration
@@ -60,7 +61,7 @@ def is_passive(parameters: Mapping[str, Any]) -> bool:
 def coarse(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
     """Parameters of the coarse run; None where it would tell nothing.
 
-    That is where the load rises all the time, and where so short a run could not be judged.
+    That is where load or speed change all the time, and where so short a run could not be judged.
     """
     p = {
         **parameters,
@@ -70,7 +71,7 @@ def coarse(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
     p["step"] = min(p["step"] / COARSENESS, SAFE_SHARE * transverse_limit(p))
     least = elastic_belt.PARAMETERS["mesh"]["stations"].minimum
     problems = (check for module in (elastic_belt, criterion, recording) for check in module.check(p))
-    if p["load_history"] != "constant" or p["stations"] < least or any(problems):
+    if ramped(p) or p["stations"] < least or any(problems):
         return None
     return p
 

@@ -15,6 +15,7 @@ import numpy as np
 from cvt_hpc.physics.friction import FrictionLaw, given_law
 from cvt_hpc.physics.geometry import Variator, cell_counts, variator
 from cvt_hpc.physics.sheaves import Sheaves, flexibility, sheaves
+from cvt_hpc.vibration.ramp import ramped
 
 FIELDS = ("w", "u", "v_element", "v_ring", "v_filtered", "n_element", "n_ring")
 W, U, V_ELEMENT, V_RING, V_FILTERED, N_ELEMENT, N_RING = range(len(FIELDS))
@@ -32,9 +33,11 @@ class Belt(NamedTuple):
 
     Arrays of cells and stations have shape (N,), `per_...` being reciprocals, the span that of two cells;
     `bending` is (N, 5): force per length on station j from the displacements of stations j-2 .. j+2;
-    `ring_relief` is the tension at which the rings' own weight bears them. `element_mass` and `ring_mass` are
-    the inertia along the path, `mass` that across it. Across a gap the elements' damper may push against
-    `bridging_stiffness` times the gap's strain; inf, as in every run: elements that are apart have no damper.
+    `ring_relief` is the tension at which the rings' own weight bears them. `belt_speed` is that of the pitch
+    line at `driving_speed`; along a ramp of speed both follow `rhs.speed_share_at`. `element_mass` and
+    `ring_mass` are the inertia along the path, `mass` that across it. Across a gap the elements' damper may
+    push against `bridging_stiffness` times the gap's strain; inf, as in every run: elements that are apart
+    have no damper.
     """
 
     cell: np.ndarray
@@ -78,6 +81,7 @@ class Belt(NamedTuple):
     ratio: float
     load: float
     load_start: float
+    speed_start: float
     rise_time: float
     ramp_end: float
 
@@ -170,7 +174,7 @@ def belt_constants(parameters: dict[str, Any]) -> Belt:
         for region, radius in ((0, path.driving_radius), (2, path.driven_radius))
     ]
     law = given_law(p)
-    ramp = p["load_history"] == "ramp"
+    quantity = ramped(p)
     return Belt(
         cell=cell,
         dual=dual,
@@ -212,9 +216,10 @@ def belt_constants(parameters: dict[str, Any]) -> Belt:
         thrust=p["thrust"],
         ratio=p["ratio"],
         load=p["load"],
-        load_start=p["load_start"] if ramp else p["load"],
+        load_start=p["load_start"] if quantity == "load" else p["load"],
+        speed_start=p["speed_start"] if quantity == "speed" else p["driving_speed"],
         rise_time=p["rise_time"],
-        ramp_end=p["duration"] if ramp else p["rise_time"],
+        ramp_end=p["duration"] if quantity else p["rise_time"],
     )
 
 
@@ -272,7 +277,7 @@ def initial_state(parameters: dict[str, Any], belt: Belt) -> State:
     _fill_strands(w, grid)
 
     mean = [(weight * w[stations]).sum() / weight.sum() for stations, weight, _ in arcs]
-    speed = belt.driving_speed * (belt.driving_radius + mean[0])
+    speed = belt.speed_start * (belt.driving_radius + mean[0])
     fields = np.zeros((len(FIELDS), grid.cell.size))
     fields[W] = w
     fields[V_ELEMENT] = fields[V_RING] = speed

@@ -31,9 +31,10 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     BENDING_STIFFNESS,
     COSINE,
     DRIVEN_CARRY,
+    DRIVEN_CELL,
     DRIVEN_RADIUS,
     DRIVING_CARRY,
-    DRIVING_RADIUS,
+    DRIVING_CELL,
     DRIVING_SPEED,
     ELEMENT_DAMPING,
     ELEMENT_MASS,
@@ -67,7 +68,12 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     SLIDING_T,
     advance_pulley,
     derive,
+    driving_surface,
+    lane_acceleration,
+    lane_belt_speed,
+    lane_carry,
     lane_sliding,
+    lane_speed_share,
     lane_transverse,
     ring_grip,
     start_damping,
@@ -112,9 +118,9 @@ def step_explicit(belt: LaneBelt, state: LaneState, work: ExplicitWork, step: fl
     lane_sliding(belt, state, stations)
     moment = _accelerate(belt, state, stations, step)
     advance_pulley(belt, state, moment, step)
+    state.time[0] += step
     _advance_layers(belt, state, stations, step)
     _advance_across(belt, state, stations, step)
-    state.time[0] += step
     derive(belt, state, stations)
 
 
@@ -126,12 +132,15 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
     per_cosine, radius = 1.0 / cosine, c[0, DRIVEN_RADIUS]
     element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
     element_damping, ring_damping = c[0, ELEMENT_DAMPING], c[0, RING_DAMPING]
-    mass, ring_mass, belt_speed = c[0, MASS], c[0, RING_MASS], c[0, BELT_SPEED]
-    bending, ring_friction, ring_relief = c[0, BENDING_STIFFNESS], c[0, RING_FRICTION], c[0, RING_RELIEF]
+    speed_share = lane_speed_share(belt, state.time[0], sine)
+    mass, ring_mass, belt_speed = c[0, MASS], c[0, RING_MASS], speed_share * c[0, BELT_SPEED]
+    bending, ring_friction = c[0, BENDING_STIFFNESS], c[0, RING_FRICTION]
+    ring_relief = c[0, RING_RELIEF] * speed_share * speed_share
+    acceleration = lane_acceleration(belt, state.time[0], step)
     centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
     damping = c[0, TRANSVERSE_DAMPING] + start_damping(belt, state.time[0])
     mobility, element_mobility, ring_mobility = step / mass, step / c[0, ELEMENT_MASS], step / ring_mass
-    zero = like(0.0, sine)
+    rise, zero = acceleration * step, like(0.0, sine)
     moment = net_left = ring_left = stress_left_0 = stress_left_1 = zero
     gap_left_0 = gap_left_1 = zero
     for k in range(-1, n):
@@ -155,6 +164,7 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
             slope = (ahead(fields, j, W) - behind(fields, j, W)) * span
             across = lane_transverse(belt, fields, j, net_left, net_right, bending)
             across = fma(-gyroscopic, (ahead(fields, j, U) - behind(fields, j, U)) * span, across)
+            across = fma(-acceleration * mass, slope, across)
             v_radial = fma(full_speed, slope, u)
             outward = -damping * v_radial
             along_element = (stress_0 - stress_left_0) * per_dual
@@ -182,8 +192,9 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
             along_element = fma(outward, slope, along_element)
             stations[j, SLOPE] = slope
             stations[j, DU] = (across + outward) * mobility
-            stations[j, DV_0] = fma(along_element, element_mobility, -full_speed * (step * gap_left_0))
-            stations[j, DV_1] = fma(-(belt_speed + v1), step * gap_left_1, along_ring)
+            dv_0 = fma(along_element, element_mobility, -full_speed * (step * gap_left_0))
+            dv_1 = fma(-(belt_speed + v1), step * gap_left_1, along_ring)
+            stations[j, DV_0], stations[j, DV_1] = dv_0 - rise, dv_1 - rise
         net_left, ring_left, stress_left_0, stress_left_1 = net_right, ring_right, stress_0, stress_1
         gap_left_0, gap_left_1 = gap_0, gap_1
         if k < 0:
@@ -197,7 +208,7 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
 def _advance_layers(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float) -> None:
     """Speeds of both layers, contents by the fluxes of the new speeds, work of the layers' dampers."""
     n, fields, scalars = state.fields.rows, state.fields, state.scalars
-    belt_speed = belt.constants[0, BELT_SPEED]
+    belt_speed = lane_belt_speed(belt, state.time[0])
     work_done = like(0.0, belt_speed)
     for layer in range(2):
         v_row, dv_row, eps_row, n_row = V_ELEMENT + layer, DV_0 + layer, EPS_0 + layer, N_ELEMENT + layer
@@ -223,13 +234,15 @@ def _advance_layers(belt: LaneBelt, state: LaneState, stations: LaneArray, step:
 def _advance_across(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float) -> None:
     """Transverse velocity, memory by the sliding speeds of the new velocities, and displacement."""
     n, fields, c = state.fields.rows, state.fields, belt.constants
-    per_cosine, belt_speed, driven_speed = 1.0 / c[0, COSINE], c[0, BELT_SPEED], state.scalars[0, SPEED]
-    forget, turnings = step * c[0, FORGET], (c[0, DRIVING_SPEED], driven_speed)
-    carries = step * c[0, DRIVING_CARRY], step * c[0, DRIVEN_CARRY]
-    surfaces = (
-        turnings[0] * c[0, DRIVING_RADIUS] - belt_speed,
-        turnings[1] * c[0, DRIVEN_RADIUS] - belt_speed,
+    speed_share = lane_speed_share(belt, state.time[0], c[0, BELT_SPEED])
+    per_cosine, belt_speed = 1.0 / c[0, COSINE], speed_share * c[0, BELT_SPEED]
+    forget, driven_speed = step * c[0, FORGET], state.scalars[0, SPEED]
+    carries = (
+        step * lane_carry(belt, DRIVING_CELL, DRIVING_CARRY, belt_speed),
+        step * lane_carry(belt, DRIVEN_CELL, DRIVEN_CARRY, belt_speed),
     )
+    turnings = speed_share * c[0, DRIVING_SPEED], driven_speed
+    surfaces = driving_surface(belt, speed_share), driven_speed * c[0, DRIVEN_RADIUS] - belt_speed
     before = behind(fields, 0, V_FILTERED)
     for j in range(n):
         u, w = fields[j, U] + stations[j, DU], fields[j, W]

@@ -26,7 +26,7 @@ part alone would not open the sum.
 
 The remainder is what the numerics do (upwinding, backward Euler, work of dampers that samples do not meet),
 what the vibration gains while it grows, and bending. Fluctuations of all frequencies count, judder and
-hum of gaps too, and a trend of the mean state would: under a ramp of load nothing is known.
+hum of gaps too, and a trend of the mean state would: along a ramp of load or speed nothing is known.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Mesh
 from cvt_hpc.variables import Variable
+from cvt_hpc.vibration.ramp import ramped
 
 if TYPE_CHECKING:
     from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
@@ -127,8 +128,8 @@ def fluctuation(means: dict[str, np.ndarray], grid: Mesh, parameters: dict[str, 
 
 
 def _steadiness(parameters: dict[str, Any]) -> float:
-    """1, or not a number under a ramp of load: its trend would count as a fluctuation."""
-    return np.nan if parameters["load_history"] == "ramp" else 1.0
+    """1, or not a number along a ramp: its trend would count as a fluctuation."""
+    return np.nan if ramped(parameters) else 1.0
 
 
 def _lifting(m: dict[str, np.ndarray], grid: Mesh, p: dict[str, Any]) -> np.ndarray:

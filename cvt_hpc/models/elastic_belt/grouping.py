@@ -24,6 +24,7 @@ SHARED = (
     "table_mu",
     "rise_time",
     "load_history",
+    "speed_history",
     "duration",
     "judged_fraction",
     "sampling_rate",

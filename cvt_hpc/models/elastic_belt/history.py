@@ -33,6 +33,7 @@ def histories(run: RecordedRun) -> xr.Dataset:
     time = (1 + np.arange(run.done)) * run.interval
     over_time = {
         "load": ("N m", "torque at the driving pulley"),
+        "driving_speed": ("rad s-1", "speed of the driving pulley"),
         "driven_speed": ("rad s-1", "speed of the driven pulley"),
         "driven_position": ("m", "axial opening of the driven pulley"),
     }

@@ -42,9 +42,10 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
     COSINE,
     DRIVEN_CARRY,
+    DRIVEN_CELL,
     DRIVEN_RADIUS,
     DRIVING_CARRY,
-    DRIVING_RADIUS,
+    DRIVING_CELL,
     DRIVING_SPEED,
     ELEMENT_DAMPING,
     ELEMENT_STIFFNESS,
@@ -63,8 +64,11 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     SHORT_1,
     advance_pulley,
     cell_strains,
+    driving_surface,
+    lane_carry,
     lane_contact_forces,
     lane_sliding,
+    lane_speed_share,
 )
 
 # One, unless friction turns sliding about or elements meet; then each closes the cells beside the last ones,
@@ -115,15 +119,19 @@ def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
     """Apply the increments, and find the new strains; the moment of the flanks on the driven pulley [N m]."""
     n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
     per_cosine = 1.0 / c[0, COSINE]
-    belt_speed, forget, offset = c[0, BELT_SPEED], c[0, FORGET], c[0, RING_OFFSET]
+    speed_share = lane_speed_share(belt, state.time[0], c[0, BELT_SPEED])
+    belt_speed, forget, offset = speed_share * c[0, BELT_SPEED], c[0, FORGET], c[0, RING_OFFSET]
     stiffness, damper_0, damper_1 = c[0, ELEMENT_STIFFNESS], c[0, ELEMENT_DAMPING], c[0, RING_DAMPING]
     driven_speed = state.scalars[0, SPEED]
     driven_base = driven_speed * like(c[0, DRIVEN_RADIUS], driven_speed) - like(belt_speed, driven_speed)
     zero = like(0.0, forget)
     moment = like(0.0, driven_speed)
-    radius, turning = c[0, DRIVEN_RADIUS], like(driven_speed, zero)
-    surfaces = c[0, DRIVING_SPEED] * c[0, DRIVING_RADIUS] - belt_speed, like(driven_base, zero)
-    carries = c[0, DRIVING_CARRY], c[0, DRIVEN_CARRY]
+    radius, turnings = c[0, DRIVEN_RADIUS], (speed_share * c[0, DRIVING_SPEED], like(driven_speed, zero))
+    surfaces = driving_surface(belt, speed_share), like(driven_base, zero)
+    carries = (
+        lane_carry(belt, DRIVING_CELL, DRIVING_CARRY, belt_speed),
+        lane_carry(belt, DRIVEN_CELL, DRIVEN_CARRY, belt_speed),
+    )
     rates = carries[0] + forget, carries[1] + forget
     per_rates = 1.0 / rates[0], 1.0 / rates[1]
     kept = decay(rates[0] * step), decay(rates[1] * step)
@@ -175,7 +183,7 @@ def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
                 moment = moment - like(select(is_driven, tangential, zero), moment)
             if belt.memory:
                 surface = select(is_driven, surfaces[1], surfaces[0])
-                v_tangential = new_0 - fma(select(is_driven, turning, c[0, DRIVING_SPEED]), w, surface)
+                v_tangential = new_0 - fma(select(is_driven, turnings[1], turnings[0]), w, surface)
                 meridian = fma(belt_speed + new_0, stations[j, SLOPE], u) * per_cosine
                 speed = sqrt(fma(meridian, meridian, v_tangential * v_tangential))
                 before = fields[j - 1, V_FILTERED] if j > 0 else last_filtered

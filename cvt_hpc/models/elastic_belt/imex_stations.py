@@ -62,6 +62,8 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     RING_FACTOR,
     SADDLE,
     SLIDING_T,
+    lane_acceleration,
+    lane_speed_share,
     lane_transverse,
     ring_grip,
     start_damping,
@@ -96,9 +98,11 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
     per_cosine, per_width = 1.0 / cosine, 1.0 / width
     element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
     element_mass, ring_mass, mass, offset = c[0, ELEMENT_MASS], c[0, RING_MASS], c[0, MASS], c[0, RING_OFFSET]
-    belt_speed, bending = c[0, BELT_SPEED], c[0, BENDING_STIFFNESS]
+    speed_share = lane_speed_share(belt, state.time[0], sine)
+    belt_speed, bending = speed_share * c[0, BELT_SPEED], c[0, BENDING_STIFFNESS]
+    acceleration = lane_acceleration(belt, state.time[0], step)
     ring_friction, per_ring_width = c[0, RING_FRICTION], 1.0 / c[0, RING_FRICTION_SPEED]
-    ring_relief = c[0, RING_RELIEF]
+    ring_relief = c[0, RING_RELIEF] * speed_share * speed_share
     centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
     half_gyroscopic = -0.5 * gyroscopic
     damping = c[0, TRANSVERSE_DAMPING] + start_damping(belt, state.time[0])
@@ -120,6 +124,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
         slope = (ahead(fields, j, W) - behind(fields, j, W)) * span
         transverse = lane_transverse(belt, fields, j, net_left, net_right, bending)
         transverse = fma(-gyroscopic, (ahead(fields, j, U) - behind(fields, j, U)) * span, transverse)
+        transverse = fma(-acceleration * mass, slope, transverse)
         full_speed = belt_speed + v0
         v_radial = fma(full_speed, slope, u)
         outward = -damping * v_radial
@@ -128,6 +133,8 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
         element, ring, coupling = element_rate, ring_here * per_step, zero
         along_element = -full_speed * ((v0 - behind(fields, j, V_ELEMENT)) * per_left) * element_mass
         along_ring = -(belt_speed + v1) * ((v1 - behind(fields, j, V_RING)) * per_left) * ring_here
+        along_element = fma(-acceleration, element_mass, along_element)
+        along_ring = fma(-acceleration, ring_here, along_ring)
         radial_mass, cross = base_mass, zero
         if anywhere(share > 0.0):
             lever = fma(offset, belt.arc_curvature[j], 1.0)

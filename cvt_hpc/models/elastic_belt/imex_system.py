@@ -46,7 +46,6 @@ from cvt_hpc.models.elastic_belt.imex_work import (
     ImexWork,
 )
 from cvt_hpc.models.elastic_belt.lane_belt import (
-    BELT_SPEED,
     ELEMENT_DAMPING,
     ELEMENT_STIFFNESS,
     FRICTION_SPEED,
@@ -67,6 +66,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     SHORT_0,
     SLIDING_R,
     SLIDING_T,
+    lane_belt_speed,
 )
 
 # Share of the speeds' change in a step that the rings' stress feels. From 1/4 on it is stable for any step
@@ -113,7 +113,7 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
     """
     fields, stations, c = state.fields, work.stations, belt.constants
     last = fields.rows - 1
-    belt_speed = c[0, BELT_SPEED]
+    belt_speed = lane_belt_speed(belt, state.time[0])
     element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
     element_damping, ring_damping = c[0, ELEMENT_DAMPING], c[0, RING_DAMPING]
     zero = like(0.0, belt_speed)

@@ -1,8 +1,9 @@
 """The elastic belt for several runs at once: constants and state of all lanes, in the order that steps read.
 
 Runs of one batch share the mesh, the friction law's kind and the course of time; all else is each lane's own.
-Velocities of the layers are kept as deviations from the belt's nominal speed, contents as deviations from the
-reference path's, so that single precision does not lose strains and sliding speeds in them.
+Velocities of the layers are kept as deviations from the belt speed that belongs to the driving pulley's
+present speed, contents as deviations from the reference path's, so that single precision does not lose
+strains and sliding speeds in them.
 """
 
 from __future__ import annotations
@@ -17,12 +18,14 @@ from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_SPEED,
     N_ELEMENT,
     N_RING,
+    TIME,
     V_ELEMENT,
     V_RING,
     Belt,
     State,
     bending_bands,
 )
+from cvt_hpc.models.elastic_belt.rhs import speed_share_at
 from cvt_hpc.physics.friction import FrictionLaw
 from cvt_hpc.physics.lane_compliance import LaneContact, lane_contact
 
@@ -62,6 +65,9 @@ CONSTANTS = (
     "ratio",
     "load",
     "load_start",
+    "start_share",
+    "driving_cell",
+    "driven_cell",
 )
 (
     ELEMENT_STIFFNESS,
@@ -98,6 +104,9 @@ CONSTANTS = (
     RATIO,
     LOAD,
     LOAD_START,
+    START_SHARE,
+    DRIVING_CELL,
+    DRIVEN_CELL,
 ) = range(len(CONSTANTS))
 
 # Scalars of the state, of each lane, double in any precision: the driven pulley's two, the work of the
@@ -124,7 +133,7 @@ class LaneBelt(NamedTuple):
         As in `Belt`, for a bending stiffness of 1 N m^2.
     on_driven, enters : (N,) arrays
         Whether (1) a station lies on the driven half, from `driven_start` on, and is the first of an arc.
-    constants : (1, 34) LaneArray
+    constants : (1, 37) LaneArray
         CONSTANTS.
     driven_start : int
         First station of the driven arc.
@@ -133,7 +142,9 @@ class LaneBelt(NamedTuple):
     law : FrictionLaw
         Its kind, and the table where it is one; coefficients are in `constants`.
     rise_time, ramp_end : float
-        Course of the load [s].
+        Course of the load and of the speed [s].
+    speed_ramps : bool
+        Whether some run's driving speed changes.
     """
 
     cell: np.ndarray
@@ -154,6 +165,7 @@ class LaneBelt(NamedTuple):
     law: FrictionLaw
     rise_time: float
     ramp_end: float
+    speed_ramps: bool
 
 
 class LaneState(NamedTuple):
@@ -162,7 +174,7 @@ class LaneState(NamedTuple):
     Attributes
     ----------
     fields : (N, 7) LaneArray
-        FIELDS at each station: layers' speeds less the belt speed; contents less 1 + kappa d_i.
+        FIELDS at each station: layers' speeds less the belt speed of `time`; contents less 1 + kappa d_i.
     scalars : (1, 4) LaneArray of doubles
         LANE_SCALARS.
     time : (1,) array
@@ -217,6 +229,7 @@ def lane_belt(belts: list[Belt], dtype: type) -> LaneBelt:
         FrictionLaw(law.kind, 0.0, 0.0, 0.0, *tables),
         first.rise_time,
         first.ramp_end,
+        any(belt.speed_start != belt.driving_speed for belt in belts),
     )
 
 
@@ -240,6 +253,9 @@ def _constants_of(belt: Belt) -> list[float]:
         "forget": 1.0 / memory if memory else 0.0,
         "driving_carry": _carry(belt, belt.cell[0]),
         "driven_carry": _carry(belt, belt.cell[belt.driven_start]),
+        "start_share": belt.speed_start / belt.driving_speed,
+        "driving_cell": belt.cell[0],
+        "driven_cell": belt.cell[belt.driven_start],
     }
     return [named[key] if key in named else getattr(belt, key) for key in CONSTANTS]
 
@@ -323,8 +339,9 @@ def alike(array: LaneArray, parts: int) -> LaneArray:
 def put_lane(fields: np.ndarray, scalars: np.ndarray, lane: int, belt: Belt, state: State) -> None:
     """Write a run's state into its lane of a LaneState's data."""
     values = state.fields.copy()
-    values[V_ELEMENT] -= belt.belt_speed
-    values[V_RING] -= belt.belt_speed
+    belt_speed = speed_share_at(belt, state.scalars[TIME]) * belt.belt_speed
+    values[V_ELEMENT] -= belt_speed
+    values[V_RING] -= belt_speed
     values[N_ELEMENT] -= 1.0
     values[N_RING] -= 1.0 + belt.curvature * belt.ring_offset
     fields[:, :, lane] = values.T
@@ -335,8 +352,9 @@ def put_lane(fields: np.ndarray, scalars: np.ndarray, lane: int, belt: Belt, sta
 def take_lane(state: LaneState, lane: int, belt: Belt) -> State:
     """One run's state out of its lane."""
     values = state.fields.data[:, :, lane].T.astype(float, order="C")
-    values[V_ELEMENT] += belt.belt_speed
-    values[V_RING] += belt.belt_speed
+    belt_speed = speed_share_at(belt, state.time[0]) * belt.belt_speed
+    values[V_ELEMENT] += belt_speed
+    values[V_RING] += belt_speed
     values[N_ELEMENT] += 1.0
     values[N_RING] += 1.0 + belt.curvature * belt.ring_offset
     scalars = state.scalars.data[0, :, lane]

@@ -48,6 +48,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     DRIVING_RADIUS,
     DRIVING_SPEED,
     ELEMENT_MASS,
+    FORGET,
     FRICTION_GRADIENT,
     FRICTION_SPEED,
     KINETIC_FRICTION,
@@ -61,6 +62,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     RING_MASS,
     RING_OFFSET,
     SPEED,
+    START_SHARE,
     THRUST,
     WEDGE,
     LaneBelt,
@@ -142,6 +144,55 @@ def lane_load(belt: LaneBelt, time: float, pattern):
     if time < belt.ramp_end:
         return start + (load - start) * ((time - belt.rise_time) / (belt.ramp_end - belt.rise_time))
     return load
+
+
+@merged_kernel
+def lane_speed_share(belt: LaneBelt, time: float, pattern):
+    """Speed of the driving pulley over `driving_speed`, as `rhs.speed_share_at`, in lanes like `pattern`."""
+    if not belt.speed_ramps or time >= belt.ramp_end:
+        return like(1.0, pattern)
+    start = like(belt.constants[0, START_SHARE], pattern)
+    share = (time - belt.rise_time) / (belt.ramp_end - belt.rise_time)
+    return start + (1.0 - start) * max(share, 0.0)
+
+
+@merged_kernel
+def lane_belt_speed(belt: LaneBelt, time: float):
+    """Belt speed at the driving pulley's speed [m/s], from which the layers' speeds are counted."""
+    nominal = belt.constants[0, BELT_SPEED]
+    return lane_speed_share(belt, time, nominal) * nominal
+
+
+@merged_kernel
+def lane_acceleration(belt: LaneBelt, time: float, step: float):
+    """Mean rate of the belt speed in a step [m/s^2].
+
+    A step has it act on the layers, so that their speeds are then counted from the belt speed at its end, and
+    the slopes of friction act on what they change against pulleys that accelerate as well.
+    """
+    return (lane_belt_speed(belt, time + step) - lane_belt_speed(belt, time)) / step
+
+
+@merged_kernel
+def driving_surface(belt: LaneBelt, share):
+    """Speed of the driving pulley's surface less the belt speed [m/s], at a share of their nominal values."""
+    c = belt.constants
+    return share * (c[0, DRIVING_SPEED] * c[0, DRIVING_RADIUS] - c[0, BELT_SPEED])
+
+
+@merged_kernel
+def lane_carry(belt: LaneBelt, cell: int, nominal: int, belt_speed):
+    """Rate of the memory's transport along an arc [1/s], as `rhs.memory_transport`.
+
+    `cell` and `nominal` are the constants that hold the arc's cells and the rate at `driving_speed`.
+    """
+    c = belt.constants
+    carry = c[0, nominal]
+    if not belt.speed_ramps:
+        return carry
+    left = decay(c[0, FORGET] * c[0, cell] / belt_speed)
+    start = c[0, START_SHARE]
+    return select((start > 1.0) | (start < 1.0), c[0, FORGET] * left / (1.0 - left), carry)
 
 
 @merged_kernel
@@ -285,22 +336,20 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     kinetic, fall, per_scale = lane_law(
         kind, c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED]
     )
-    per_cosine, belt_speed, offset = 1.0 / c[0, COSINE], c[0, BELT_SPEED], c[0, RING_OFFSET]
+    share = lane_speed_share(belt, state.time[0], c[0, BELT_SPEED])
+    per_cosine, belt_speed, offset = 1.0 / c[0, COSINE], share * c[0, BELT_SPEED], c[0, RING_OFFSET]
     least = LEAST_SHARE_OF_WIDTH * c[0, FRICTION_SPEED]
     per_width, per_ring_width = 1.0 / c[0, FRICTION_SPEED], 1.0 / c[0, RING_FRICTION_SPEED]
     driven_speed = state.scalars[0, SPEED]
     driven_base = driven_speed * like(c[0, DRIVEN_RADIUS], driven_speed) - like(belt_speed, driven_speed)
-    driving_turning, driven_turning = c[0, DRIVING_SPEED], like(driven_speed, least)
-    driving_surface, driven_surface = (
-        driving_turning * c[0, DRIVING_RADIUS] - belt_speed,
-        like(driven_base, least),
-    )
+    turnings = share * c[0, DRIVING_SPEED], like(driven_speed, least)
+    surfaces = driving_surface(belt, share), like(driven_base, least)
     for j in range(n):
         if not anywhere(belt.arc_share[j] > 0.0):
             continue
         is_driven = belt.on_driven[j] > 0.5
-        surface = select(is_driven, driven_surface, driving_surface)
-        turning = select(is_driven, driven_turning, driving_turning)
+        surface = select(is_driven, surfaces[1], surfaces[0])
+        turning = select(is_driven, turnings[1], turnings[0])
         full_speed = belt_speed + fields[j, V_ELEMENT]
         slope = (ahead(fields, j, W) - behind(fields, j, W)) * belt.per_span[j]
         v_radial = fma(full_speed, slope, fields[j, U])

@@ -7,8 +7,8 @@ from cvt_hpc.lanes import LaneArray, fma, like
 
 # Line forces at stations [N/m] are those on their whole length, also at an arc's end, where half of it is in
 # contact. Of stations but for the stresses, which are the cells' behind them [N]; `saddle_friction` is [N],
-# and powers are per length [W/m] but for `saddle_power` and `stress_power` [W]. Layers' speeds are less the
-# belt's nominal one.
+# and powers are per length [W/m] but for `saddle_power` and `stress_power` [W]. Layers' speeds are as in
+# `LaneState`, less the belt speed.
 MOMENTS = (
     "flank_power",
     "radial_friction",

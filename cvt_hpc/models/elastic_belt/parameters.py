@@ -38,7 +38,9 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             gives=Substitute("driven_radius", ("ratio", "centre_distance"), _closing_radius),
         ),
         "centre_distance": positive(0.155, "m", "distance of the shafts"),
-        "driving_speed": positive(3000.0 * np.pi / 30.0, "rad/s", "speed of the driving pulley, prescribed"),
+        "driving_speed": positive(
+            3000.0 * np.pi / 30.0, "rad/s", "speed of the driving pulley, prescribed; at the end of a ramp"
+        ),
         "thrust": positive(50e3, "N", "axial force on the driven pulley"),
         "load": Parameter(
             0.0, "N m", "torque at the driving pulley; the driven one is loaded by ratio x load"
@@ -56,6 +58,15 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             choices=("constant", "ramp"),
         ),
         "load_start": Parameter(0.0, "N m", "load at the start of a ramp"),
+        "speed_history": Parameter(
+            "constant",
+            "",
+            "driving_speed is kept, or the driving pulley goes to it from speed_start over the whole run",
+            choices=("constant", "ramp"),
+        ),
+        "speed_start": positive(
+            1000.0 * np.pi / 30.0, "rad/s", "speed of the driving pulley at the start of a ramp"
+        ),
         "rise_time": positive(
             0.03, "s", "start-up: load rises smoothly, extra damping of the belt fades out"
         ),
@@ -157,6 +168,8 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if p["rise_time"] > before * (1.0 + 1e-9):
         expected = f"a load that has risen before the run is judged, within {before:g} s"
         problems.append(("rise_time", expected, f"{p['rise_time']:g} s"))
+    if p["load_history"] == p["speed_history"] == "ramp":
+        problems.append(("speed_history", 'constant under load_history = "ramp": one ramp a run', "ramp"))
     return problems + friction_problems(p)
 
 
@@ -188,6 +201,7 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
     of_elastic_sheaves = ("tilt_stiffness", "local_stiffness", "local_length")
     cases = (
         (p["load_history"] == "constant", ("load_start",), "load_history constant"),
+        (p["speed_history"] == "constant", ("speed_start",), "speed_history constant"),
         (p["disturbance"] == 0.0, ("seed",), "disturbance 0"),
         (p["ring_friction"] == 0.0, ("ring_friction_speed",), "ring_friction 0"),
         (np.isinf(p["sheave_stiffness"]), of_elastic_sheaves, "sheave_stiffness inf"),

@@ -1,10 +1,12 @@
 """Where power enters and leaves the belt drive, and what it stores: the audit of a run.
 
-In a steady state, on average over a vibration,
+The driving pulley's speed is prescribed, and its power is its moment times its momentary speed. In a steady
+state, on average over a vibration,
 
     driving = load + thrust + losses,    losses = flanks + rings + belt + layers + lag + seating,
 
-and before that the difference is what the stored energy takes up. What does not close is the work of the
+and before that, or along a ramp, the difference is what the stored energy takes up; along a ramp of speed it
+is mostly the kinetic energy of the belt and of the driven pulley. What does not close is the work of the
 numerics: upwinded transport, backward Euler in the layers, and the linear stretch that leaves the product of
 changing tension and slope squared out. The layers' loss is not taken from a state, as all else is, but from
 the work of their dampers in the steps since the last one: a damper acts in a cell that is just closing, for a
@@ -61,7 +63,9 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     EPS_1,
     FORCE,
     LEAST_SHARE_OF_WIDTH,
+    driving_surface,
     lane_load,
+    lane_speed_share,
     start_damping,
 )
 from cvt_hpc.models.elastic_belt.moments import (
@@ -134,7 +138,8 @@ def audit(
     speed = scalars[0, SPEED]
     zero = like(0.0, axial)
     omega_driven = like(speed, zero)
-    belt_speed, sine, cosine, wedge = c[0, BELT_SPEED], c[0, SINE], c[0, COSINE], c[0, WEDGE]
+    speed_share = lane_speed_share(belt, state.time[0], zero)
+    belt_speed, sine, cosine, wedge = speed_share * c[0, BELT_SPEED], c[0, SINE], c[0, COSINE], c[0, WEDGE]
     per_cosine, width = 1.0 / cosine, c[0, FRICTION_SPEED]
     per_width, per_ring_width = 1.0 / width, 1.0 / c[0, RING_FRICTION_SPEED]
     kind = belt.law.kind
@@ -148,8 +153,8 @@ def audit(
     ring_stiffness, element_stiffness = c[0, RING_STIFFNESS], c[0, ELEMENT_STIFFNESS]
     element_damping, centrifugal = c[0, ELEMENT_DAMPING], mass * belt_speed * belt_speed
     driven_base = like(speed * like(c[0, DRIVEN_RADIUS], speed) - like(belt_speed, speed), zero)
-    omega, radius, opening_0 = c[0, DRIVING_SPEED], c[0, DRIVING_RADIUS], c[0, DRIVING_POSITION]
-    surface = omega * radius - belt_speed
+    omega, radius, opening_0 = speed_share * c[0, DRIVING_SPEED], c[0, DRIVING_RADIUS], c[0, DRIVING_POSITION]
+    surface, ring_relief = driving_surface(belt, speed_share), c[0, RING_RELIEF] * speed_share * speed_share
     driving = driving_rub = rub = ring_loss = belt_loss = seating = zero
     stored = 0.5 * c[0, DRIVEN_INERTIA] * omega_driven * omega_driven
     for j in range(n):
@@ -216,7 +221,7 @@ def audit(
         add_flanks(profiles, j, radial, tangential, v_radial, v_tangential)
         lever = fma(offset, belt.arc_curvature[j], 1.0)
         saddle = fma(lever, v0, -v1)
-        relief = c[0, RING_RELIEF] * longer
+        relief = ring_relief * longer
         pressure = maximum(ring_stiffness * stretched - relief, 0.0) * (right * belt.curvature[j])
         pressure += maximum(ring_stiffness * stations[a, EPS_1] - relief, 0.0) * (
             belt.cell[a] * belt.curvature[a]

@@ -33,6 +33,7 @@ __all__ = [
 
 STRANDS = ("t1", "t2")
 MODES = 5  # half waves along a strand that are told apart
+RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by what a ramp changes
 
 LOSSES = (
     "driving_flank_loss",
@@ -136,7 +137,7 @@ def judge(run: RecordedRun) -> dict[str, Any]:
 def assess(run: RecordedRun) -> assessment.Occurrence:
     """Whether and how a run vibrates that has reached its end; its probes are columns of the displacement."""
     p = run.parameters
-    if p["load_history"] == "ramp":
+    if ramp.ramped(p):
         found = _assess_ramp(run)
     else:
         columns, strands = _on_strands(run)
@@ -146,12 +147,12 @@ def assess(run: RecordedRun) -> assessment.Occurrence:
 
 
 def _assess_ramp(run: RecordedRun) -> ramp.RampOccurrence | None:
-    """Whether and how a run vibrates along a ramp of load; None if it ended too soon to tell."""
-    p, first = run.parameters, run.kick
+    """Whether and how a run vibrates along a ramp; None if it ended too soon to tell."""
+    p, first, quantity = run.parameters, run.kick, ramp.ramped(run.parameters)
     columns, strands = _on_strands(run)
     rate, moved = p["sampling_rate"], run.displacement[first:, columns]
-    loads = run.channel("load")[first:]
-    found = ramp.assess_ramp(moved, rate, strands, loads, run.samples - first, p)
+    values = run.channel(RAMPED_CHANNELS[quantity])[first:]
+    found = ramp.assess_ramp(moved, rate, strands, quantity, values, run.samples - first, p)
     return found and replace(found, strongest_probe=columns[found.strongest_probe])
 
 
@@ -165,7 +166,7 @@ def _on_strands(run: RecordedRun) -> tuple[np.ndarray, list[str]]:
 def _slipped(run: RecordedRun, status: Status, why: str) -> dict[str, Any]:
     """The record of a run that has slipped through before its end: what is known until then."""
     found = {"status": status, "vibrates": Vibrates.SLIPS, "reason": f"at {run.time * 1e3:.4g} ms: {why}"}
-    before = _assess_ramp(run) if run.parameters["load_history"] == "ramp" else None
+    before = _assess_ramp(run) if ramp.ramped(run.parameters) else None
     if before is not None:
         found = before.record() | found | {"reason": f"{found['reason']}; before: {before.reason}"[:240]}
     return found | slid(run)
@@ -215,7 +216,7 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
         "open_share": pair("open_share", PULLEYS),
         "flank_loss": np.array([mean(f"{pulley}_flank_loss") for pulley in PULLEYS]),
         "thrust_ratio": axial[0] / axial[1],
-        "speed_loss": 1.0 - p["ratio"] * driven_speed.mean() / p["driving_speed"],
+        "speed_loss": 1.0 - p["ratio"] * driven_speed.mean() / run.mean_driving_speed(judged),
         "driven_speed_ripple": driven_speed.std(),
         "driving_power": mean("driving_power"),
         "load_power": mean("load_power"),

@@ -12,6 +12,7 @@ from cvt_hpc.models.elastic_belt.fluctuation import Fluctuation, fluctuation
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, PROFILES, Probe, Sensors, probes, sensors
 from cvt_hpc.recording import sample_count
 from cvt_hpc.variables import Status
+from cvt_hpc.vibration.ramp import ramped
 
 
 class Recording(NamedTuple):
@@ -120,6 +121,12 @@ class RecordedRun:
     def channel(self, name: str) -> np.ndarray:
         """History of one of CHANNELS, (done,)."""
         return self.rows[:, self._sensed + CHANNELS.index(name)]
+
+    def mean_driving_speed(self, samples: slice) -> float:
+        """Mean speed of the driving pulley in some samples [rad/s]."""
+        if ramped(self.parameters) != "speed":
+            return self.parameters["driving_speed"]
+        return float(self.channel("driving_speed")[samples].mean())
 
     @property
     def judged(self) -> slice:

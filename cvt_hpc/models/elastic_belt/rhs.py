@@ -8,12 +8,13 @@ outward):
     content        n_i,t + (v_i / (1 + eps_i)),s = 0
     elements       m_0 (v_0,t + v_0 v_0,s) = -P,s + f_t - (1 + kappa d_1) q + (p_r - d_b (w_t + v_0 w_s)) w_s
     rings          m_1 (v_1,t + v_1 v_1,s) =  T,s + q
-    transverse     m (w_tt + 2 v w_ts) = (F w_s),s - EI w_ssss - F kappa - d_b (w_t + v_0 w_s) + p_r
+    transverse     m (w_tt + 2 v w_ts + v' w_s) = (F w_s),s - EI w_ssss - F kappa - d_b (w_t + v_0 w_s) + p_r
     memory         v_f,t + v v_f,s = (|v| - v_f) / tau_f on the arcs, v_f = |v| where the belt enters
     pulleys        J omega_dn' = -sum f_t (r + w) - i M,   T_1 k z_dn' = sum f_ax - F_dn
 
 with q the friction of the rings on the elements' saddle, p_r, f_t the flanks' forces, |v| their sliding
-speed and M the load. The last term of the elements' equation is the radial load in the direction of the
+speed and M the load; v = r_dr omega_dr is the speed of the pitch line at the driving pulley's present speed,
+and v' its rate. The last term of the elements' equation is the radial load in the direction of the
 belt's actual tangent: it carries the power that radial sliding dissipates, and closes the balance of power.
 Stresses of T and P enter cells, everything else stations; the content is upwinded, since centred fluxes
 leave a free checkerboard mode where P = 0.
@@ -54,6 +55,25 @@ def load_at(belt: Belt, time: float) -> float:
         share = (time - belt.rise_time) / (belt.ramp_end - belt.rise_time)
         return belt.load_start + (belt.load - belt.load_start) * share
     return belt.load
+
+
+@merged_kernel
+def speed_share_at(belt: Belt, time: float) -> float:
+    """Speed of the driving pulley over driving_speed [1]: that of speed_start, from rise_time linear to 1."""
+    if time >= belt.ramp_end:
+        return 1.0
+    start = belt.speed_start / belt.driving_speed
+    share = (time - belt.rise_time) / (belt.ramp_end - belt.rise_time)
+    return start + (1.0 - start) * max(share, 0.0)
+
+
+@merged_kernel
+def belt_acceleration_at(belt: Belt, time: float) -> float:
+    """Rate v' of the belt speed [m/s^2]; 0 but along a ramp of speed."""
+    if time < belt.rise_time or time >= belt.ramp_end:
+        return 0.0
+    start = belt.speed_start / belt.driving_speed
+    return (1.0 - start) * belt.belt_speed / (belt.ramp_end - belt.rise_time)
 
 
 @merged_kernel
@@ -101,11 +121,12 @@ def contact_forces(
 
 @merged_kernel
 def ring_drag(
-    belt: Belt, j: int, a: int, eps: np.ndarray, v_element: float, v_ring: float
+    belt: Belt, j: int, a: int, eps: np.ndarray, v_element: float, v_ring: float, share: float
 ) -> tuple[float, float]:
     """Friction of the elements' saddles on the rings at station j of an arc, between cells a and j.
 
-    The rings press on the saddles with what their own weight leaves (Bullinger et al. 2005, eq. 48).
+    The rings press on the saddles with what their own weight leaves (Bullinger et al. 2005, eq. 48), at
+    `share` of the belt's nominal speed.
 
     Returns
     -------
@@ -114,7 +135,7 @@ def ring_drag(
     """
     sliding_speed = (1.0 + belt.ring_offset * belt.arc_curvature[j]) * v_element - v_ring
     factor, _ = saturation(sliding_speed, belt.ring_friction_speed)
-    relief = belt.ring_relief[j]
+    relief = belt.ring_relief[j] * share * share
     pressure = max(belt.ring_stiffness * eps[1, j] - relief, 0.0) * belt.cell[j] * belt.curvature[j]
     pressure += max(belt.ring_stiffness * eps[1, a] - relief, 0.0) * belt.cell[a] * belt.curvature[a]
     return 0.5 * pressure / belt.dual[j] * belt.ring_friction * factor, sliding_speed
@@ -157,7 +178,10 @@ def accelerations(
     w, u = state.fields[W], state.fields[U]
     v0, v1, vf = state.fields[V_ELEMENT], state.fields[V_RING], state.fields[V_FILTERED]
     sine, cosine = np.sin(belt.half_wedge_angle), np.cos(belt.half_wedge_angle)
-    centrifugal = belt.mass * belt.belt_speed * belt.belt_speed
+    speed_share = speed_share_at(belt, state.scalars[TIME])
+    belt_speed, driving_speed = speed_share * belt.belt_speed, speed_share * belt.driving_speed
+    acceleration = belt_acceleration_at(belt, state.scalars[TIME])
+    centrifugal = belt.mass * belt_speed * belt_speed
     damping = damping_at(belt, state.scalars[TIME])
     for j in range(n):
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
@@ -172,7 +196,8 @@ def accelerations(
         transverse -= (
             0.5 * (net_right * right * belt.curvature[j] + net_left * left * belt.curvature[a]) / dual
         )
-        transverse -= 2.0 * belt.mass * belt.belt_speed * (u[b] - u[a]) / (left + right)
+        transverse -= 2.0 * belt.mass * belt_speed * (u[b] - u[a]) / (left + right)
+        transverse -= belt.mass * acceleration * slope
         for k in range(5):
             transverse += belt.bending[j, k] * w[(j + k - 2) % n]
         v_radial = u[j] + v0[j] * slope
@@ -190,7 +215,7 @@ def accelerations(
         if share > 0.0:
             driven = j >= belt.driven_start
             radius = (belt.driven_radius if driven else belt.driving_radius) + w[j]
-            omega = state.scalars[DRIVEN_SPEED] if driven else belt.driving_speed
+            omega = state.scalars[DRIVEN_SPEED] if driven else driving_speed
             v_tangential = v0[j] - omega * radius
             v_law = sliding(v_radial, v_tangential, cosine)[0] if belt.friction_memory == 0.0 else vf[j]
             coefficient, _ = friction_coefficient(belt.law, v_law, force[j] / cosine)
@@ -200,7 +225,7 @@ def accelerations(
             outward += share * radial
             along_element += share * tangential
             moments[j] = -driven * share * dual * tangential * radius
-            drag, _ = ring_drag(belt, j, a, eps, v0[j], v1[j])
+            drag, _ = ring_drag(belt, j, a, eps, v0[j], v1[j], speed_share)
             along_ring += drag
             along_element -= (1.0 + belt.ring_offset * belt.arc_curvature[j]) * drag
         along_element += outward * slope
@@ -228,6 +253,7 @@ def memory_rates(belt: Belt, state: State, rate: np.ndarray) -> None:
     """Rate of the filtered sliding speed [m/s^2] on the arcs; where the belt enters it is |v| itself."""
     n = belt.cell.size
     vf = state.fields[V_FILTERED]
+    belt_speed = speed_share_at(belt, state.scalars[TIME]) * belt.belt_speed
     for j in range(n):
         rate[V_FILTERED, j] = 0.0
         if belt.arc_share[j] == 0.0 or belt.friction_memory == 0.0:
@@ -236,14 +262,14 @@ def memory_rates(belt: Belt, state: State, rate: np.ndarray) -> None:
         if j == 0 or j == belt.driven_start:
             vf[j] = speed
         else:
-            carried = memory_transport(belt, belt.cell[j - 1])
+            carried = memory_transport(belt, belt.cell[j - 1], belt_speed)
             rate[V_FILTERED, j] = carried * (vf[j - 1] - vf[j]) + (speed - vf[j]) / belt.friction_memory
 
 
 @merged_kernel
-def memory_transport(belt: Belt, spacing: float) -> float:
+def memory_transport(belt: Belt, spacing: float, belt_speed: float) -> float:
     """Upwind rate of the memory's transport [1/s], fitted: a steady memory decays as exp(-s / (v tau_f))."""
-    return 1.0 / (belt.friction_memory * np.expm1(spacing / (belt.belt_speed * belt.friction_memory)))
+    return 1.0 / (belt.friction_memory * np.expm1(spacing / (belt_speed * belt.friction_memory)))
 
 
 @merged_kernel
@@ -256,5 +282,6 @@ def sliding_speed(belt: Belt, state: State, j: int) -> float:
     if j >= belt.driven_start:
         v_tangential = v - state.scalars[DRIVEN_SPEED] * (belt.driven_radius + w[j])
     else:
-        v_tangential = v - belt.driving_speed * (belt.driving_radius + w[j])
+        driving_speed = speed_share_at(belt, state.scalars[TIME]) * belt.driving_speed
+        v_tangential = v - driving_speed * (belt.driving_radius + w[j])
     return sliding(v_radial, v_tangential, np.cos(belt.half_wedge_angle))[0]

@@ -14,7 +14,6 @@ from cvt_hpc.models.elastic_belt.belt import REGIONS, V_ELEMENT, Mesh, W
 from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
     DRIVEN_RADIUS,
-    DRIVING_RADIUS,
     DRIVING_SPEED,
     ELEMENT_STIFFNESS,
     MASS,
@@ -30,7 +29,9 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     EPS_0,
     EPS_1,
     FORCE,
+    driving_surface,
     lane_load,
+    lane_speed_share,
     step_ripple,
 )
 from cvt_hpc.models.elastic_belt.moments import MOMENTS, add
@@ -53,6 +54,7 @@ SCALARS = (
     "open_share driving",
     "open_share driven",
     "least_strand_force",
+    "driving_speed",
 )
 CHANNELS = (*SCALARS, *POWERS, "step_ripple")
 PROFILES = (*MOMENTS, "contact_force", "mean_displacement")
@@ -60,7 +62,7 @@ PROFILES = (*MOMENTS, "contact_force", "mean_displacement")
 LARGEST_DISPLACEMENT = 10e-3  # [m]: the belt has left its grooves
 LARGEST_STRAIN = 0.05  # of the rings, which break at 1 %
 LARGEST_ELEMENT_STRAIN = 0.2  # gaps of a fifth: all the play in a few cells
-LEAST_SPEED = 0.5  # of the driven pulley's nominal speed: beyond the torque that friction carries
+LEAST_SPEED = 0.5  # of the driven pulley's speed without slip: beyond the torque that friction carries
 MOST_SPEED = 1.5  # likewise, under a load that drives
 
 
@@ -205,10 +207,12 @@ def sample(
             total = fma(sensing.matrix[s, j], fields[j, W], total)
         rows[k, s] = total
     speed = state.scalars[0, SPEED]
+    share = lane_speed_share(belt, state.time[0], zero)
+    belt_speed = share * c[0, BELT_SPEED]
     rows[k, sensed] = lane_load(belt, state.time[0], speed)
     rows[k, sensed + 1], rows[k, sensed + 2] = speed, state.scalars[0, POSITION]
     element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
-    centrifugal = c[0, MASS] * c[0, BELT_SPEED] * c[0, BELT_SPEED]
+    centrifugal = c[0, MASS] * belt_speed * belt_speed
     least = like(np.inf, zero)
     for strand in range(2):
         middle = sensing.middles[strand]
@@ -219,14 +223,14 @@ def sample(
             net = fma(element_stiffness, minimum(stations[j, EPS_0], 0.0), net)
             least = minimum(net, least)
     rows[k, sensed + 13] = least - centrifugal
+    rows[k, sensed + 14] = like(c[0, DRIVING_SPEED], speed) * lane_speed_share(belt, state.time[0], speed)
     driven_speed = like(speed, zero)
-    driven_surface = like(speed * like(c[0, DRIVEN_RADIUS], speed) - like(c[0, BELT_SPEED], speed), zero)
-    driving_surface = c[0, DRIVING_SPEED] * c[0, DRIVING_RADIUS] - c[0, BELT_SPEED]
+    driven_surface = like(speed * like(c[0, DRIVEN_RADIUS], speed) - like(belt_speed, speed), zero)
     axial = zero
     for wrap in range(2):
         weight = state.contacts[1].weight if wrap else state.contacts[0].weight
         first = belt.driven_start if wrap else 0
-        surface, turning = driving_surface, c[0, DRIVING_SPEED]
+        surface, turning = driving_surface(belt, share), share * c[0, DRIVING_SPEED]
         if wrap:
             surface, turning = driven_surface, driven_speed
         axial = sliding = open_length = zero
@@ -239,9 +243,9 @@ def sample(
             open_length += select(force > 0.0, zero, weight[i])
             length += weight[i]
         rows[k, sensed + 7 + wrap] = axial
-        rows[k, sensed + 9 + wrap] = sliding / (maximum(axial, 1e-9) * c[0, BELT_SPEED])
+        rows[k, sensed + 9 + wrap] = sliding / (maximum(axial, 1e-9) * belt_speed)
         rows[k, sensed + 11 + wrap] = open_length / length
-    audit(belt, state, stations, axial, sensing.interval, rows, k, sensed + 14, profiles)
+    audit(belt, state, stations, axial, sensing.interval, rows, k, sensed + len(SCALARS), profiles)
     rows[k, sensed + len(CHANNELS) - 1] = step_ripple(belt, state, stations)
     column = len(MOMENTS)
     for j in range(n):
@@ -264,6 +268,7 @@ def _watch(belt: LaneBelt, state: LaneState, stations: LaneArray, ended: LaneArr
     speed, c = state.scalars[0, SPEED], belt.constants
     total = fma(speed, 0.0, fma(state.scalars[0, POSITION], 0.0, like(content, speed)))
     nominal = like(c[0, DRIVING_SPEED] / c[0, RATIO], speed)
+    nominal = nominal * lane_speed_share(belt, state.time[0], speed)
     code = like(0.0, speed)
     beyond = maximum(like(element_strain, speed) - LARGEST_ELEMENT_STRAIN, 0.0)
     beyond = maximum(like(strain, speed) - LARGEST_STRAIN, beyond)

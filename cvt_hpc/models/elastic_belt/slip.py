@@ -76,7 +76,11 @@ def slip_margin(run: RecordedRun, samples: slice) -> float:
     # a run may slip through before a constant load has risen to its value
     load = p["load"] if p["load_history"] == "constant" else run.channel("load")[samples].mean()
     carried = largest_torque(
-        given_law(p), p["half_wedge_angle"], path, p["driving_speed"] * path.driving_radius, axial
+        given_law(p),
+        p["half_wedge_angle"],
+        path,
+        run.mean_driving_speed(samples) * path.driving_radius,
+        axial,
     )
     return float(abs(load) / carried - 1.0)
 
@@ -112,12 +116,12 @@ def slid(run: RecordedRun) -> dict[str, Any]:
     def pair(name: str) -> np.ndarray:
         return np.array([run.channel(f"{name} {pulley}")[samples].mean() for pulley in PULLEYS])
 
-    p, axial = run.parameters, pair("axial_force")
+    axial, driven_speed = pair("axial_force"), run.channel("driven_speed")[samples].mean()
     return {
         "slip": pair("slip"),
         "axial_force": axial,
         "open_share": pair("open_share"),
         "thrust_ratio": axial[0] / axial[1],
-        "speed_loss": 1.0 - p["ratio"] * run.channel("driven_speed")[samples].mean() / p["driving_speed"],
+        "speed_loss": 1.0 - run.parameters["ratio"] * driven_speed / run.mean_driving_speed(samples),
         VARIABLE.name: slip_margin(run, samples),
     }

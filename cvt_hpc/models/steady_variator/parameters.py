@@ -12,6 +12,8 @@ from cvt_hpc.physics.friction_problems import friction_problems
 OF_THE_COURSE = {
     "load_history": "constant",
     "load_start": 0.0,
+    "speed_history": "constant",
+    "speed_start": 1.0,
     "rise_time": 1.0,
     "disturbance": 0.0,
     "seed": 1,
