@@ -45,6 +45,8 @@ def merged_kernel(function: Callable[..., Any]) -> Any:
     """Compile a function into its callers.
 
     A call that hands over a tuple of arrays counts references to each, which costs more than a short loop.
+    Its call must not be its caller's last statement, nor that of another merged kernel unless it is straight
+    lines: the compiler loses such calls (numba 0.68).
     """
     return _compiled(function, {**_OPTIONS, "inline": "always"})
 

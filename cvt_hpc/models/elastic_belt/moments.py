@@ -55,9 +55,8 @@ MOMENTS = (
 
 @merged_kernel
 def add(profiles: LaneArray, j: int, k: int, value) -> None:
-    """Add lanes of any precision to field k of station j, if there is a place for it."""
-    if j < profiles.rows:
-        profiles[j, k] = profiles[j, k] + like(value, profiles[j, k])
+    """Add lanes of any precision to field k of station j."""
+    profiles[j, k] = profiles[j, k] + like(value, profiles[j, k])
 
 
 @merged_kernel

@@ -155,6 +155,7 @@ def audit(
     driven_base = like(speed * like(c[0, DRIVEN_RADIUS], speed) - like(belt_speed, speed), zero)
     omega, radius, opening_0 = speed_share * c[0, DRIVING_SPEED], c[0, DRIVING_RADIUS], c[0, DRIVING_POSITION]
     surface, ring_relief = driving_surface(belt, speed_share), c[0, RING_RELIEF] * speed_share * speed_share
+    summed = profiles.rows > 0
     driving = driving_rub = rub = ring_loss = belt_loss = seating = zero
     stored = 0.5 * c[0, DRIVEN_INERTIA] * omega_driven * omega_driven
     for j in range(n):
@@ -188,13 +189,16 @@ def audit(
         working = push * opening - tension * (fields[b, V_RING] - fields[j, V_RING])
         working -= (tension - push - centrifugal) * lifting
         damped = -element_stiffness * stations[j, EPS_0] - element_damping * belt.per_cell[j] * opening
-        add_stresses(profiles, j, working, tension, push, maximum(damped, zero) - push)
+        if summed:
+            add_stresses(profiles, j, working, tension, push, maximum(damped, zero) - push)
         stored += (0.5 * right) * (elastic + rings * ring_stiffness * stretched * stretched)
         v_element, across = fields[j, V_ELEMENT], -damping * v_radial
-        add_speeds(profiles, j, v_radial, u, v_element, fields[j, V_RING])
+        if summed:
+            add_speeds(profiles, j, v_radial, u, v_element, fields[j, V_RING])
         share = belt.arc_share[j]
         if share == 0.0:
-            add_forces(profiles, j, across, u, across * slope, v_element)
+            if summed:
+                add_forces(profiles, j, across, u, across * slope, v_element)
             continue
         force = stations[j, FORCE]
         v_tangential = v_element - fma(omega, w, surface)
@@ -217,8 +221,9 @@ def audit(
             driving += dual * tangential * (radius + w) * omega
         across += radial
         along = fma(across + elastic_radial, slope, tangential)
-        add_forces(profiles, j, across, u, along, v_element)
-        add_flanks(profiles, j, radial, tangential, v_radial, v_tangential)
+        if summed:
+            add_forces(profiles, j, across, u, along, v_element)
+            add_flanks(profiles, j, radial, tangential, v_radial, v_tangential)
         lever = fma(offset, belt.arc_curvature[j], 1.0)
         saddle = fma(lever, v0, -v1)
         relief = ring_relief * longer
@@ -229,7 +234,8 @@ def audit(
         grip = c[0, RING_FRICTION] * 0.5 * pressure
         drag = with_sign_of(grip * lane_saturation(absolute(saddle), per_ring_width), saddle)
         ring_loss += drag * saddle
-        add_saddles(profiles, j, drag, saddle)
+        if summed:
+            add_saddles(profiles, j, drag, saddle)
         stored -= 0.5 * share * dual * force * fma(wedge, w, opening_0)
     thrust = c[0, THRUST]
     axial_speed = (axial - thrust) / c[0, AXIAL_DAMPING]

@@ -198,7 +198,7 @@ def sample(
         ENDED of each lane.
     """
     _watch(belt, state, stations, ended)
-    n, fields, c = belt.cell.size, state.fields, belt.constants
+    fields, c = state.fields, belt.constants
     sensed = sensing.matrix.shape[0]
     zero = like(0.0, fields[0, W])
     for s in range(sensed):
@@ -248,7 +248,7 @@ def sample(
     audit(belt, state, stations, axial, sensing.interval, rows, k, sensed + len(SCALARS), profiles)
     rows[k, sensed + len(CHANNELS) - 1] = step_ripple(belt, state, stations)
     column = len(MOMENTS)
-    for j in range(n):
+    for j in range(profiles.rows):
         add(profiles, j, column, stations[j, FORCE])
         add(profiles, j, column + 1, fields[j, W])
 
