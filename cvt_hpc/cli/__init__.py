@@ -14,7 +14,7 @@ from typing import NoReturn
 
 from cvt_hpc import __version__
 from cvt_hpc.cli import checking, experiments, results, single_run, sweep
-from cvt_hpc.cli.parts import BAD_INPUT, DONE, INTERRUPTED, complain
+from cvt_hpc.cli.parts import BAD_INPUT, DONE, INTERRUPTED, complain, speaks
 from cvt_hpc.errors import CRASHED, InputError
 
 __all__ = ["main"]
@@ -35,6 +35,9 @@ def main(arguments: list[str] | None = None) -> int:
         and to be gone on with, 98 the same without any gain.
     """
     logging.basicConfig(format="cvt-hpc: %(message)s")
+    compiling = logging.getLogger("cvt_hpc.kernels")  # not imported, since that takes long
+    compiling.setLevel(logging.INFO)
+    compiling.addFilter(_told_once)
     try:
         parsed = _parser().parse_args(arguments)
         status = parsed.command(parsed)
@@ -52,6 +55,11 @@ def main(arguments: list[str] | None = None) -> int:
     except Exception:  # Python's own status for a defect, 1, means here that some runs failed
         traceback.print_exc()
         return CRASHED
+
+
+def _told_once(record: logging.LogRecord) -> bool:
+    """Whether a line that all ranks have is told by this one."""
+    return speaks()
 
 
 class _Parser(argparse.ArgumentParser):
