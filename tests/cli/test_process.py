@@ -91,3 +91,16 @@ def test_exports_are_there_whatever_was_imported_before(tmp_path):
         "True True",
         "module 'cvt_hpc' has no attribute 'simulat'",
     ], done.stderr
+
+
+@pytest.mark.parametrize(("rank", "told"), [("0", "cvt-hpc: compiling\n"), ("1", "")])
+def test_one_rank_tells_what_is_compiled(tmp_path, rank, told):
+    program = f"""
+        import logging, os
+        from cvt_hpc.cli import main
+        os.environ.update(PMI_SIZE="2", PMI_RANK="{rank}")
+        main(["check", "missing.toml"])
+        logging.getLogger("cvt_hpc.kernels").info("compiling")
+    """
+    done = call(sys.executable, "-c", textwrap.dedent(program), cwd=tmp_path)
+    assert done.stderr.removeprefix("cvt-hpc: missing.toml: expected a job file, found nothing\n") == told
