@@ -10,6 +10,8 @@ import logging
 import os
 import sys
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import NoReturn
 
 from cvt_hpc import __version__
@@ -35,12 +37,10 @@ def main(arguments: list[str] | None = None) -> int:
         and to be gone on with, 98 the same without any gain.
     """
     logging.basicConfig(format="cvt-hpc: %(message)s")
-    compiling = logging.getLogger("cvt_hpc.kernels")  # not imported, since that takes long
-    compiling.setLevel(logging.INFO)
-    compiling.addFilter(_told_once)
     try:
         parsed = _parser().parse_args(arguments)
-        status = parsed.command(parsed)
+        with _compiling_told():
+            status = parsed.command(parsed)
         sys.stdout.flush()
         return status
     except InputError as error:
@@ -57,8 +57,21 @@ def main(arguments: list[str] | None = None) -> int:
         return CRASHED
 
 
-def _told_once(record: logging.LogRecord) -> bool:
-    """Whether a line that all ranks have is told by this one."""
+@contextmanager
+def _compiling_told() -> Iterator[None]:
+    """Tell on stderr, by one rank for all, what is being compiled."""
+    logger = logging.getLogger("cvt_hpc.kernels")  # by its name: to import it takes long
+    before = logger.level
+    logger.setLevel(logging.INFO)
+    logger.addFilter(_by_one_rank)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
+        logger.removeFilter(_by_one_rank)
+
+
+def _by_one_rank(record: logging.LogRecord) -> bool:
     return speaks()
 
 
