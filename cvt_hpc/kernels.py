@@ -1,39 +1,58 @@
 """How the kernels are compiled, and where the machine code is kept: one way for all.
 
-The compiler keeps machine code beside a file's date alone, and would go on with the old code of a kernel when
-one that it calls, in another file, has changed. So the code is kept in a folder named by the content of all
-kernels' sources: below NUMBA_CACHE_DIR if that is set, else in the package, else in the user's cache. A
-folder that no process has asked for in a month goes when another is made.
+Compiling takes minutes, so machine code is kept, in a folder for each module with kernels. A folder is named
+by the module and by the content of what its code depends on: the module, all modules of the package that it
+imports, theirs in turn, this one and `lanes`, whose types any kernel may be called with. So code is found
+again whatever the dates of files are, and a change compiles only the kernels again that it may concern.
+A folder that no process has asked for in a month goes when another is made.
 
-A kernel may be handed to another as an argument, as a right-hand side to a stepper. The compiler tells
-kernels apart by an identity drawn at random, so that it would never find such code again: here it is the
-name, and for kernels from outside the package the content of their file, which the folder does not know. The
+A kernel may be handed to another as an argument, as a right-hand side to a stepper, whose machine code then
+holds that of the kernel. The compiler tells kernels apart by an identity drawn at random, so that it would
+never find such code again: here it is the name, and the content that names the kernel's own folder. The
 compiler cannot read an index that names a type of a script that is not at hand: here it skips that entry.
+
+The folders lie below NUMBA_CACHE_DIR if that is set; else in the package where it is the user's own, else in
+the user's cache. Whoever can write to them can run any code as the user, so folders to which others can write
+are not used: without any, code is compiled in each process anew.
+
+What takes long is told to the logger of this module: compiling as INFO, and that nothing is kept as WARNING.
 """
 
 from __future__ import annotations
 
+import ast
 import hashlib
+import logging
 import os
 import pickle
+import re
 import shutil
-import tempfile
+import stat
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
-from numba.core.caching import IndexDataCacheFile
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.event import Event, Listener, register
 
 _PACKAGE = Path(__file__).parent
+_PREFIX = f"{_PACKAGE}{os.sep}"  # of the paths of its modules, as texts, since Path objects take long
+_CODE_OF_ALL = (__file__, f"{_PREFIX}lanes{os.sep}__init__.py")
+_FOLDER = "cvt_hpc-kernels"
 _MONTH = 30 * 86400.0  # [s]: longer than any job lasts, so that none loses the folder it works in
-_ROOMS_WITH_KERNELS = ("lanes", "physics", "models", "steppers")
+_LONG = 3.0  # [s]: what compiles faster is not worth a line
 
 # Division by zero gives inf as in numpy, without a test for it. Every operation is rounded once, as written:
 # were products contracted with sums, the bits would depend on which kernels the compiler merges, and so on
 # whether their code is compiled or found in the folder.
-_OPTIONS = {"cache": True, "error_model": "numpy"}
+_OPTIONS = {"error_model": "numpy"}
+
+_logger = logging.getLogger(__name__)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -52,37 +71,249 @@ def merged_kernel(function: Callable[..., Any]) -> Any:
 
 
 def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    users = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = _CACHE
-    try:
-        compiled = numba.njit(**options)(function)
-        compiled._set_uuid(_identity(function))
-        compiled._cache._cache_file = _ForgivingIndex.of(compiled._cache._cache_file)
-        return compiled
-    finally:
-        numba.config.CACHE_DIR = users
-
-
-def _identity(function: Callable[..., Any]) -> str:
+    compiled = numba.njit(**options)(function)
     name = f"{function.__module__}.{function.__qualname__}"
-    source = Path(function.__code__.co_filename)
-    if source.is_relative_to(_PACKAGE):
-        return name
-    code = function.__code__
     try:
-        content = source.read_bytes()
-    except OSError:  # typed into a shell
-        content = repr((code.co_code, code.co_consts, code.co_names)).encode()
-    return f"{name}-{hashlib.sha256(content).hexdigest()[:16]}"
+        content = _content(os.path.abspath(function.__code__.co_filename))
+    except (OSError, SyntaxError):  # typed into a shell: what it depends on is not known, and nothing is kept
+        code = function.__code__
+        content = _digest(repr((code.co_code, code.co_consts, code.co_names)).encode())
+    else:
+        if place := _place():
+            compiled._cache = _Cache(function, place / f"{function.__module__}-{content}")
+    compiled._set_uuid(f"{name}-{content}")
+    return compiled
+
+
+# What the code of a kernel depends on
+
+
+def closure(source: str) -> set[str]:
+    """Return the files whose content the machine code of a module's kernels depends on.
+
+    Parameters
+    ----------
+    source : str
+        Path of the module; one outside the package may be a script.
+
+    Returns
+    -------
+    set of str
+        Paths: of the module itself, and of all of the package that it imports, also by way of others.
+
+    Raises
+    ------
+    OSError
+        If it is no file.
+    """
+    found: set[str] = set()
+    left = {source, *_CODE_OF_ALL}
+    while left:
+        path = left.pop()
+        found.add(path)
+        left |= _source(path).imports - found
+    return found
+
+
+def _content(source: str) -> str:
+    """A digest of the content of a closure, and of the path of a module outside the package."""
+    return _content_of(source, *_stamp(source))
+
+
+@cache
+def _content_of(source: str, *_: int) -> str:
+    # paths within the package are told as they are there, wherever that is
+    listed = sorted((path.removeprefix(_PREFIX), _source(path).digest) for path in closure(source))
+    return _digest(repr(listed).encode())
+
+
+class _Source(NamedTuple):
+    digest: str
+    imports: frozenset[str]  # paths of modules of the package
+
+
+def _source(path: str) -> _Source:
+    return _read(path, *_stamp(path))
+
+
+def _stamp(path: str) -> tuple[int, int]:
+    """What tells that a file was changed before it is imported again, as in a notebook."""
+    found = os.stat(path)
+    return found.st_mtime_ns, found.st_size
+
+
+@cache
+def _read(path: str, *_: int) -> _Source:
+    content = Path(path).read_bytes()
+    package = _package_of(path)
+    paths = [_paths(".".join(package))]
+    for statement in _import_statements(content.decode(errors="replace")):
+        names = [alias.name for alias in statement.names]
+        if isinstance(statement, ast.ImportFrom):
+            above = package[: len(package) + 1 - statement.level] if statement.level else []
+            module = ".".join([*above, *filter(None, [statement.module])])
+            names = [module, *(f"{module}.{name}" for name in names)]
+        paths += map(_paths, names)
+    return _Source(_digest(content), frozenset().union(*paths))
+
+
+def _package_of(path: str) -> list[str]:
+    """The names of the packages that a file of this package lies in; none of others."""
+    if not path.startswith(_PREFIX):
+        return []
+    return [_PACKAGE.name, *path.removeprefix(_PREFIX).split(os.sep)[:-1]]
+
+
+@cache
+def _paths(name: str) -> frozenset[str]:
+    """What an import of a name runs within the package: a module, and the __init__ of all packages above."""
+    above, _, last = name.rpartition(".")
+    if not above:
+        return frozenset([f"{_PREFIX}__init__.py"] if last == _PACKAGE.name else [])
+    runs, module = _paths(above), _PREFIX + os.sep.join([*above.split(".")[1:], last])
+    found = (f"{module}.py", f"{module}{os.sep}__init__.py") if runs else ()
+    return runs.union(path for path in found if os.path.isfile(path))
+
+
+_NEVER_RUN = re.compile(r"\nif TYPE_CHECKING:\n(?:(?:[ \t].*)?\n)+")
+_STATEMENT = re.compile(r"\n[ \t]*((?:from[ \t]+[\w.]+[ \t]+)?import\b[^()\n]*(?:\([^()]*\))?)")
+
+
+def _import_statements(text: str) -> list[ast.Import | ast.ImportFrom]:
+    """The import statements of a source, at whatever depth, but for those that only a type checker reads.
+
+    To parse whole files would take a tenth of a second for all. So statements are cut out beforehand, if no
+    import can be missed.
+    """
+    run = _NEVER_RUN.sub("\n", f"\n{text}")
+    cut = "\n".join(_STATEMENT.findall(run))
+    for part in (cut, run) if cut.count("import") == run.count("import") else (run,):
+        with suppress(SyntaxError):
+            return _imports(part)
+    return _imports(text)
+
+
+def _imports(text: str) -> list[ast.Import | ast.ImportFrom]:
+    return [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import | ast.ImportFrom)]
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:16]
+
+
+# Where it is kept
+
+
+@cache
+def _place() -> Path | None:
+    """The folder of all folders with machine code; None if nothing can be kept."""
+    if chosen := numba.config.CACHE_DIR:
+        bases = [Path(chosen).absolute()]
+    else:
+        own = _PACKAGE.stat().st_uid == os.getuid() and os.access(_PACKAGE, os.W_OK)
+        users = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
+        bases = [_PACKAGE / "__pycache__"] * own + [users] * users.is_absolute()
+    refusals = ["there is no home folder"]
+    for base in bases:
+        try:
+            return _made_safe(base / _FOLDER)
+        except OSError as error:
+            refusals.append(str(error))
+    _tell_not_kept(refusals[-1])
+    return None
+
+
+def _made_safe(folder: Path) -> Path:
+    """A folder in which nobody else can put code; made if needed.
+
+    Raises
+    ------
+    OSError
+        If there is none to be had.
+    """
+    folder.parent.mkdir(mode=0o755, parents=True, exist_ok=True)
+    with suppress(FileExistsError):
+        folder.mkdir(mode=0o700)
+    # a link is not followed: where it leads, another may have said
+    itself, above = folder.lstat(), folder.parent.stat()
+    if not stat.S_ISDIR(itself.st_mode):
+        raise PermissionError(f"{folder} is no folder")
+    if itself.st_uid != os.getuid():
+        raise PermissionError(f"{folder} belongs to somebody else")
+    if itself.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        raise PermissionError(f"others can write to {folder}")
+    open_to_all = above.st_mode & stat.S_IWOTH and not above.st_mode & stat.S_ISVTX
+    if open_to_all or above.st_uid not in (0, os.getuid()):
+        raise PermissionError(f"others can replace {folder}")
+    if not os.access(folder, os.W_OK):
+        raise PermissionError(f"no permission to write to {folder}")
+    return folder
+
+
+@cache
+def _asked_for(folder: Path) -> None:
+    """Set the date of a folder to now, by best effort."""
+    with suppress(OSError):
+        os.utime(folder)
+
+
+def _make(folder: Path) -> None:
+    """Make a folder for machine code; what nobody has asked for in a month goes."""
+    if folder.is_dir():
+        return
+    folder.mkdir(mode=0o700, exist_ok=True)
+    for other in folder.parent.iterdir():
+        with suppress(OSError):
+            if time.time() - other.stat().st_mtime > _MONTH:
+                shutil.rmtree(other, ignore_errors=True)
+
+
+class _Cache(FunctionCache):
+    """The machine code of a kernel on the disk; without what the disk refuses."""
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        _asked_for(folder)
+        self._py_func = function
+        self._name = repr(function)
+        self._impl = _Filing(function, folder)
+        self._cache_path = str(folder)
+        self._cache_file = _ForgivingIndex(self._cache_path, self._impl.filename_base, source_stamp="")
+        self.enable()
+
+    @contextmanager
+    def _guard_against_spurious_io_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            _tell_not_kept(str(error))
+
+
+class _Filing(CompileResultCacheImpl):
+    """What is written of a kernel, and under which name."""
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._lineno = function.__code__.co_firstlineno
+        self._locator = _Locator(function, folder)
+        self._filename_base = self.get_filename_base(function.__qualname__, sys.abiflags)
+
+
+class _Locator:
+    """What the compiler asks of where a kernel's code lies."""
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._py_file = function.__code__.co_filename
+        self._line = function.__code__.co_firstlineno
+        self._folder = folder
+
+    def get_disambiguator(self) -> str:
+        return str(self._line)
+
+    def ensure_cache_path(self) -> None:
+        _make(self._folder)
 
 
 class _ForgivingIndex(IndexDataCacheFile):
     """An index of machine code, entry by entry: what cannot be read is kept as it is and matches nothing."""
-
-    @classmethod
-    def of(cls, index: IndexDataCacheFile) -> _ForgivingIndex:
-        index.__class__ = cls
-        return index
 
     def _load_index(self) -> dict:
         return {_entry(packed): name for packed, name in super()._load_index().items()}
@@ -99,41 +330,41 @@ def _entry(packed: bytes) -> Any:
         return packed
 
 
-def _cache_folder() -> Path:
-    digest = hashlib.sha256(Path(__file__).read_bytes())
-    for room in _ROOMS_WITH_KERNELS:
-        for source in sorted((_PACKAGE / room).rglob("*.py")):
-            digest.update(source.read_bytes())
-    chosen = numba.config.CACHE_DIR
-    if chosen:
-        base = Path(chosen)
-    elif os.access(_PACKAGE, os.W_OK):
-        base = _PACKAGE / "__pycache__"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or _home_or_temporary() / ".cache") / "cvt_hpc"
-    return base / f"kernels-{digest.hexdigest()[:16]}"
+# What is told
 
 
-def _home_or_temporary() -> Path:
-    home = Path(os.path.expanduser("~"))
-    return home if os.access(home, os.W_OK) else Path(tempfile.gettempdir())
+@cache
+def _tell_not_kept(why: str) -> None:
+    _logger.warning(
+        "machine code is not kept, and every process compiles for minutes: %s; "
+        "NUMBA_CACHE_DIR can name a folder of your own",
+        why,
+    )
 
 
-def _asked_for(folder: Path) -> str:
-    """The folder, its date set to now; where it had to be made, what nobody has asked for in a month goes.
+class _Waiting(Listener):
+    """Tells that a kernel is being compiled, not loaded, once that takes long, and how long it took."""
 
-    All by best effort: what the system refuses, or another process has done, is left.
-    """
-    try:
-        made = not folder.exists()
-        folder.mkdir(parents=True, exist_ok=True)
-        os.utime(folder)
-        for other in folder.parent.glob("kernels-" + 16 * "[0-9a-f]") if made else ():
-            if time.time() - other.stat().st_mtime > _MONTH:
-                shutil.rmtree(other, ignore_errors=True)
-    except OSError:
-        pass
-    return str(folder)
+    def __init__(self) -> None:
+        self._depth = 0  # the kernels that a kernel calls are compiled within its own compilation
+        self._name, self._began, self._told = "", 0.0, False
+
+    def on_start(self, event: Event) -> None:
+        if self._depth == 0:
+            self._name = getattr(event.data["dispatcher"], "__name__", "a kernel")
+            self._began, self._told = time.monotonic(), False
+        self._depth += 1
+        if not self._told and self._elapsed() > _LONG:
+            self._told = True
+            _logger.info("compiling %s, once ...", self._name)
+
+    def on_end(self, event: Event) -> None:
+        self._depth -= 1
+        if self._depth == 0 and self._elapsed() > _LONG:
+            _logger.info("compiled %s in %.0f s", self._name, self._elapsed())
+
+    def _elapsed(self) -> float:
+        return time.monotonic() - self._began
 
 
-_CACHE = _asked_for(_cache_folder())
+register("numba:compile", _Waiting())

@@ -24,7 +24,8 @@ set -u
 export PATH="$PWD/.venv/bin:$PATH"
 # One rank a core: threads of numerical libraries would only get in each other's way.
 export OMP_NUM_THREADS=1
-# Compiled kernels are kept on a disk of the node: caches on network file systems are slow, and not always sound.
+# Machine code is kept on a disk of the node: caches on network file systems are slow, and not always sound. A folder
+# that somebody else has made or can write to is not used, and one line says so.
 export NUMBA_CACHE_DIR="${NUMBA_CACHE_DIR:-${TMPDIR:-/tmp}/cvt_hpc-numba-$(id -u)}"
 
 launch() {

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import multiprocessing
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from multiprocessing.synchronize import Lock
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -23,6 +25,8 @@ from cvt_hpc.chart.store import ChartFolder
 from cvt_hpc.chart.table import write_table
 from cvt_hpc.files import written_aside
 from cvt_hpc.netcdf import write_netcdf
+
+_COMPILING = "cvt_hpc.kernels"  # the logger that tells of it
 
 
 @dataclass(frozen=True)
@@ -123,13 +127,22 @@ def _measure_together(
     chart: Chart, points: list[Point], processes: int
 ) -> Iterator[tuple[Point, Measurement]]:
     # spawned, not forked: a forked child inherits locks of the compiler's and the drawing library's threads
-    pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"))
+    context = multiprocessing.get_context("spawn")
+    told = context.Lock(), logging.getLogger(_COMPILING).level
+    pool = ProcessPoolExecutor(processes, context, _tell_compiling, told)
     try:
         pending = {pool.submit(_measure, chart, point): point for point in points}
         for future in as_completed(pending):
             yield pending[future], future.result()
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _tell_compiling(turn: Lock, level: int) -> None:
+    """Let one of several processes, which all compile the same, tell of it as their parent would."""
+    first = turn.acquire(block=False)
+    logging.basicConfig(format="cvt-hpc: %(message)s")
+    logging.getLogger(_COMPILING).setLevel(level if first else logging.ERROR)
 
 
 def _measure(chart: Chart, point: Point) -> Measurement:

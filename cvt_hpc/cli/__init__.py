@@ -10,11 +10,13 @@ import logging
 import os
 import sys
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import NoReturn
 
 from cvt_hpc import __version__
 from cvt_hpc.cli import checking, experiments, results, single_run, sweep
-from cvt_hpc.cli.parts import BAD_INPUT, DONE, INTERRUPTED, complain
+from cvt_hpc.cli.parts import BAD_INPUT, DONE, INTERRUPTED, complain, speaks
 from cvt_hpc.errors import CRASHED, InputError
 
 __all__ = ["main"]
@@ -37,7 +39,8 @@ def main(arguments: list[str] | None = None) -> int:
     logging.basicConfig(format="cvt-hpc: %(message)s")
     try:
         parsed = _parser().parse_args(arguments)
-        status = parsed.command(parsed)
+        with _compiling_told():
+            status = parsed.command(parsed)
         sys.stdout.flush()
         return status
     except InputError as error:
@@ -52,6 +55,24 @@ def main(arguments: list[str] | None = None) -> int:
     except Exception:  # Python's own status for a defect, 1, means here that some runs failed
         traceback.print_exc()
         return CRASHED
+
+
+@contextmanager
+def _compiling_told() -> Iterator[None]:
+    """Tell on stderr, by one rank for all, what is being compiled."""
+    logger = logging.getLogger("cvt_hpc.kernels")  # by its name: to import it takes long
+    before = logger.level
+    logger.setLevel(logging.INFO)
+    logger.addFilter(_by_one_rank)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
+        logger.removeFilter(_by_one_rank)
+
+
+def _by_one_rank(record: logging.LogRecord) -> bool:
+    return speaks()
 
 
 class _Parser(argparse.ArgumentParser):

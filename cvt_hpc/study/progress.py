@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from contextlib import ExitStack
 
 import numpy as np
 
@@ -42,10 +43,13 @@ class Progress:
         self._visible = visible
         self._work = np.cumsum(costs)
         self._bar = None
+        self._lines_above = ExitStack()  # where what is logged goes while the bar is there
         if visible and sys.stderr.isatty():
             from tqdm import tqdm
+            from tqdm.contrib.logging import logging_redirect_tqdm
 
             self._bar = tqdm(total=total, initial=recorded, unit="run", dynamic_ncols=True)
+            self._lines_above.enter_context(logging_redirect_tqdm())
 
     def expect(self, costs: np.ndarray) -> None:
         """Add runs to those that are to be done, after all of these; `costs` as before."""
@@ -70,6 +74,7 @@ class Progress:
         self._show(time.monotonic() - self._started)
         if self._bar is not None:
             self._bar.close()
+            self._lines_above.close()
 
     def _show(self, elapsed: float) -> None:
         tally = self._counter.tally()

@@ -2,6 +2,8 @@
 
 import csv
 import json
+import logging
+import multiprocessing
 from importlib import metadata
 
 import numpy as np
@@ -12,6 +14,7 @@ from cf import cf_findings
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from cvt_hpc.chart import load_chart, make_chart
+from cvt_hpc.chart.making import _tell_compiling
 from cvt_hpc.chart.table import table_lines
 from cvt_hpc.errors import InputError
 from cvt_hpc.study.provenance import git_revision, machine
@@ -277,3 +280,13 @@ def test_two_charts_in_one_folder_are_refused(write_chart, undrawn, tmp_path):
 
     assert made(job, tell=second).table.exists()
     assert refusals[0].startswith("out/bells: expected a folder that no run is at work in, found process")
+
+
+def test_one_of_several_processes_tells_what_it_compiles():
+    logger, turn, levels = logging.getLogger("cvt_hpc.kernels"), multiprocessing.Lock(), []
+    before = logger.level
+    for _ in range(2):
+        _tell_compiling(turn, logging.INFO)
+        levels.append(logger.level)
+    logger.setLevel(before)
+    assert levels == [logging.INFO, logging.ERROR]

@@ -91,3 +91,21 @@ def test_exports_are_there_whatever_was_imported_before(tmp_path):
         "True True",
         "module 'cvt_hpc' has no attribute 'simulat'",
     ], done.stderr
+
+
+@pytest.mark.parametrize(("rank", "told"), [("0", "cvt-hpc: compiling\ncvt-hpc: and ended\n"), ("1", "")])
+def test_one_rank_tells_what_is_compiled(tmp_path, rank, told):
+    program = f"""
+        import logging, os
+        import cvt_hpc.job
+        from cvt_hpc.cli import main
+        from cvt_hpc.errors import InputError
+        def load_job(*arguments):
+            logging.getLogger("cvt_hpc.kernels").info("compiling")
+            raise InputError("and ended")
+        cvt_hpc.job.load_job = load_job
+        os.environ.update(PMI_SIZE="2", PMI_RANK="{rank}")
+        main(["check", "job.toml"])
+        logging.getLogger("cvt_hpc.kernels").info("compiling")  # of a library's user, who has not asked
+    """
+    assert call(sys.executable, "-c", textwrap.dedent(program), cwd=tmp_path).stderr == told

@@ -1,7 +1,9 @@
-"""Where machine code is kept: a folder for each content of the kernels' sources, and nobody else's business changed."""
+"""Where machine code is kept, by what content, in which folders; and what is told while it is compiled."""
 
+import ast
 import importlib
 import importlib.util
+import logging
 import os
 import pkgutil
 import shutil
@@ -9,25 +11,29 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import CodeType, ModuleType
 
 import numba
 import pytest
+from numba.core import event
 from numba.core.dispatcher import Dispatcher
 
 import cvt_hpc
 from cvt_hpc import kernels
 
 PACKAGE = Path(kernels.__file__).parent
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+MARCH = "models/elastic_belt/march.py"
+FRICTION = "physics/friction.py"
 
 
 @pytest.fixture
-def package(tmp_path):
-    """A copy of what the folder's name depends on."""
+def package(tmp_path, monkeypatch):
+    """A copy of the package."""
+    listeners = event._registered["numba:compile"]
+    monkeypatch.setitem(event._registered, "numba:compile", list(listeners))  # without those of copies, later
     copy = tmp_path / "site" / "cvt_hpc"
-    copy.mkdir(parents=True)
-    shutil.copy(PACKAGE / "kernels.py", copy)
-    for room in ("lanes", "physics", "models", "steppers", "study"):
-        shutil.copytree(PACKAGE / room, copy / room, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
     return copy
 
 
@@ -35,6 +41,14 @@ def package(tmp_path):
 def no_choice(monkeypatch):
     """No cache folder chosen by the user."""
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+
+
+@pytest.fixture
+def chosen(monkeypatch, tmp_path):
+    """A cache folder chosen by the user."""
+    folder = tmp_path / "mine"
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(folder))
+    return folder
 
 
 def load(package):
@@ -45,138 +59,189 @@ def load(package):
     return module
 
 
-def folder(package):
-    return Path(load(package)._CACHE)
+def place(package):
+    return load(package)._place()
 
 
-def without_access_to(monkeypatch, *refused):
-    """Let the system refuse to write to some folders, whoever runs the tests."""
-    ask = os.access
-    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) not in refused and ask(path, mode))
+def content(package, source):
+    return load(package)._content(str(package / source))
 
 
 def plus_one(x):
     return x + 1.0
 
 
-def test_the_folder_is_in_the_package_and_named_by_content(package, no_choice):
-    found = folder(package)
-    assert found.parent == package / "__pycache__"
-    assert found == folder(package)
+# What the code of a kernel depends on
 
 
 @pytest.mark.parametrize(
-    ("source", "is_other"),
+    ("changed", "asked", "is_other"),
     [
-        ("physics/friction.py", True),
-        ("models/elastic_belt/rhs.py", True),
-        ("models/elastic_belt/new_part.py", True),
-        ("steppers/imex.py", True),
-        ("kernels.py", True),
-        ("lanes/functions.py", True),
-        ("study/sweep.py", False),
+        (FRICTION, FRICTION, True),
+        (FRICTION, MARCH, True),  # by way of others
+        ("models/elastic_belt/__init__.py", MARCH, True),  # run before its modules are
+        ("models/__init__.py", MARCH, True),
+        ("lanes/arithmetic.py", FRICTION, True),  # may be called with lanes
+        ("kernels.py", FRICTION, True),
+        ("models/oscillator/motion.py", MARCH, False),
+        ("vibration/assessment.py", MARCH, False),
+        ("study/sweep.py", MARCH, False),
+        (MARCH, FRICTION, False),
     ],
 )
-def test_a_changed_source_gives_another_folder(package, no_choice, source, is_other):
-    before = folder(package)
-    with (package / source).open("a") as file:
-        file.write("\n")
-    assert (folder(package) != before) == is_other
+def test_a_changed_source_changes_what_imports_it(package, changed, asked, is_other):
+    before = content(package, asked)
+    with (package / changed).open("a") as file:
+        file.write("# a comment\n")
+    assert (content(package, asked) != before) == is_other
 
 
-def test_the_name_does_not_depend_on_dates(package, no_choice):
-    before = folder(package)
+def test_the_content_depends_on_neither_dates_nor_the_place_of_the_package(package):
+    before = kernels._content(str(PACKAGE / MARCH))
     for source in package.rglob("*.py"):
         os.utime(source, (1e9, 1e9))
-    assert folder(package) == before
+    assert content(package, MARCH) == before
 
 
-def aged(folder, days):
-    """A folder with code that was last asked for some days ago."""
-    (folder / "physics_0").mkdir(parents=True, exist_ok=True)
-    (folder / "physics_0" / "saturation.nbi").write_bytes(b"code")
-    os.utime(folder, 2 * (time.time() - days * 86400.0,))
-    return folder
+@pytest.mark.parametrize(
+    ("source", "text"),
+    [
+        ("outside.py", "from cvt_hpc.physics import friction\n"),
+        ("outside.py", "import numpy, cvt_hpc.physics.friction as f\n"),
+        ("outside.py", "def late():\n    from cvt_hpc.physics.friction import saturation\n"),
+        ("outside.py", "from cvt_hpc.physics import (  # two (2)\n    geometry,\n    friction,\n)\n"),
+        ("outside.py", "from cvt_hpc.physics import \\\n    friction\n"),
+        ("outside.py", "x = 1; import cvt_hpc.physics.friction\n"),
+        ("outside.py", "if TYPE_CHECKING:\n    import numpy\nelse:\n    import cvt_hpc.physics.friction\n"),
+        ("cvt_hpc/physics/new.py", "from . import friction\n"),
+        ("cvt_hpc/physics/new.py", "from .friction import saturation\n"),
+        ("cvt_hpc/models/new.py", "from ..physics import friction\n"),
+        ("cvt_hpc/models/new/__init__.py", "from ...physics.friction import saturation\n"),
+    ],
+)
+def test_an_import_is_found_however_it_is_written(package, source, text):
+    file = package.parent / source
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(text)
+    assert str(package / FRICTION) in load(package).closure(str(file))
 
 
-def test_a_new_folder_takes_the_place_of_those_that_nobody_asks_for(package, no_choice):
-    rooms = package / "__pycache__"
-    forgotten = [aged(rooms / f"kernels-{k:016x}", 31.0) for k in range(2)]
-    used, not_ours = aged(rooms / f"kernels-{2:016x}", 29.0), aged(rooms / "kernels-of-somebody-else", 31.0)
-    made = folder(package)
-    assert made.is_dir() and used.is_dir() and not_ours.is_dir()
-    assert not any(path.exists() for path in forgotten)
+def test_what_only_a_type_checker_imports_does_not_count(package):
+    file = package / "new.py"
+    file.write_text("if TYPE_CHECKING:\n    from cvt_hpc.physics import friction\n\nimport numpy\n")
+    assert str(package / FRICTION) not in load(package).closure(str(file))
 
 
-def test_asking_for_a_folder_renews_it_and_removes_none(package, no_choice):
-    asked = aged(folder(package), 31.0)
-    other = aged(asked.parent / f"kernels-{0:016x}", 31.0)
-    assert folder(package) == asked
-    assert time.time() - asked.stat().st_mtime < 86400.0
-    assert other.is_dir()
+def test_no_import_of_the_package_is_missed():
+    def found(body):
+        for node in body:
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                yield ast.unparse(node)
+            elif not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+                yield from found(ast.iter_child_nodes(node))
+
+    for text in (source.read_text() for source in SOURCES):
+        cut = [ast.unparse(node) for node in kernels._import_statements(text)]
+        assert sorted(cut) == sorted(found(ast.parse(text).body))
 
 
-@pytest.mark.parametrize("refused", ["pathlib.Path.mkdir", "os.utime", "os.rmdir"])
-def test_a_folder_that_cannot_be_renewed_or_removed_is_no_error(package, no_choice, monkeypatch, refused):
-    def refuse(*arguments, **options):
-        raise PermissionError(13, "Permission denied")
+@pytest.fixture(scope="module")
+def dispatchers():
+    """All kernels of the package."""
+    modules = [
+        importlib.import_module(info.name)
+        for info in pkgutil.walk_packages(cvt_hpc.__path__, "cvt_hpc.")
+        if info.name != "cvt_hpc.__main__"  # it runs the command
+    ]
+    found = {id(x): x for module in modules for x in vars(module).values() if isinstance(x, Dispatcher)}
+    assert len(found) > 30
+    return list(found.values())
 
-    aged(package / "__pycache__" / f"kernels-{0:016x}", 31.0)
-    monkeypatch.setattr(refused, refuse)
-    assert load(package).kernel(plus_one)
+
+def names(code):
+    """All that a code and those within it may look up, of modules and of attributes."""
+    within = [names(constant) for constant in code.co_consts if isinstance(constant, CodeType)]
+    return set(code.co_names).union(*within)
 
 
-def test_code_lies_in_the_users_folder_where_one_is_chosen(tmp_path):
-    # as a user does it, in a process of his own: the variable is read when numba is imported
-    program = (
-        "import numba; from cvt_hpc import kernels; from cvt_hpc.physics.friction import saturation; "
-        "saturation(0.1, 1.0); print(kernels._CACHE); print(saturation.stats.cache_path); print(numba.config.CACHE_DIR)"
-    )
-    chosen = tmp_path / "mine"
+def reached(function, seen):
+    """Modules of the package from which the globals of a function come, and those of what it calls."""
+    function = getattr(function, "py_func", function)
+    if function in seen:
+        return
+    seen.add(function)
+    yield function.__module__
+    looked_up = names(function.__code__)
+    found = [function.__globals__[name] for name in looked_up if name in function.__globals__]
+    found += [cell.cell_contents for cell in function.__closure__ or ()]
+    for module in [value for value in found if isinstance(value, ModuleType)]:
+        yield module.__name__
+        found += [vars(module)[name] for name in looked_up if name in vars(module)]
+    for value in found:
+        if callable(value) and str(getattr(value, "__module__", "")).startswith("cvt_hpc."):
+            yield value.__module__
+            if hasattr(getattr(value, "py_func", value), "__code__"):
+                yield from reached(value, seen)
+
+
+def test_all_that_a_kernel_calls_is_in_its_closure(dispatchers):
+    calls = 0
+    for dispatcher in dispatchers:
+        closure = kernels.closure(dispatcher.py_func.__code__.co_filename)
+        for name in set(reached(dispatcher, set())):
+            if name.startswith("cvt_hpc."):
+                assert sys.modules[name].__file__ in closure, f"{dispatcher}: {name}"
+                calls += name != dispatcher.__module__
+    assert calls > 100  # kernels do call others
+
+
+def test_what_teaches_the_compiler_is_in_every_closure():
+    # overloads are found by no name of a kernel: types of arguments lead to them
+    teach = {str(path) for path in SOURCES if "\nfrom numba" in path.read_text()}
+    assert len(teach) > 3
+    assert teach <= kernels.closure(str(PACKAGE / FRICTION))
+
+
+def test_a_script_depends_on_its_path_and_on_what_it_imports(package):
+    script, other = package.parent / "script.py", package.parent / "elsewhere" / "script.py"
+    other.parent.mkdir()
+    for path in (script, other):
+        path.write_text("from cvt_hpc.physics.friction import saturation\n")
+    before = content(package, script)
+    assert content(package, other) != before
+    with (package / FRICTION).open("a") as file:
+        file.write("# a comment\n")
+    assert content(package, script) != before
+
+
+def test_a_module_that_is_edited_and_imported_again_has_its_new_content(package):
+    module, source = load(package), package / FRICTION
+    before = module._content(str(source))
+    with source.open("a") as file:
+        file.write("# a comment\n")
+    assert module._content(str(source)) != before
+
+
+def output(program, tmp_path, path):
+    """What a program prints, in a process of its own with a cache of its own, which finds modules in a folder."""
+    environment = {
+        **os.environ,
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+        "PYTHONPATH": str(PACKAGE.parent),
+    }
     done = subprocess.run(
         [sys.executable, "-c", program],
-        env={**os.environ, "NUMBA_CACHE_DIR": str(chosen)},
-        capture_output=True,
+        cwd=path,
+        env=environment,
+        stdout=subprocess.PIPE,
         text=True,
         check=True,
         timeout=60,
     )
-    ours, used, left = done.stdout.splitlines()
-    assert Path(ours).parent == chosen
-    assert Path(used).is_relative_to(ours)
-    assert list(Path(used).glob("friction.saturation*.nbi"))
-    assert left == str(chosen)
-
-
-def test_code_of_a_kernel_that_takes_another_is_found_again(tmp_path):
-    (tmp_path / "falling.py").write_text(
-        "from cvt_hpc.kernels import kernel\n"
-        "@kernel\ndef fall(y):\n    return -y\n"
-        "@kernel\ndef euler(rate, y):\n    return y + 0.5 * rate(y)\n"
-    )
-    program = (
-        "from falling import euler, fall; assert euler(fall, 1.0) == 0.5; "
-        "print(sum(euler.stats.cache_hits.values()))"
-    )
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(tmp_path)}
-    hits = [
-        subprocess.run(
-            [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
-        ).stdout.strip()
-        for _ in range(2)
-    ]
-    assert hits == ["0", "1"]
-
-
-def cache_hits(folder, tmp_path, program):
-    """What a program prints, in a process of its own with a cache of its own."""
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(folder)}
-    command = [sys.executable, "-c", program]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     return done.stdout.split()
 
 
-MARCH = (
+EULER = (
     "from cvt_hpc.kernels import kernel\n"
     "@kernel\ndef euler(rate, constants, y):\n    return y + 0.5 * rate(constants, y)\n"
 )
@@ -192,79 +257,246 @@ RUN = (
 )
 
 
-def test_a_changed_kernel_from_outside_the_package_is_another(tmp_path):
-    # the marching kernel, as of the package, stays; what it was handed has changed under the same name
-    (tmp_path / "marching.py").write_text(MARCH)
+def test_a_changed_kernel_that_was_handed_over_is_another(package, tmp_path):
+    # the marching kernel stays; the one that it was handed stays, too, but what this calls has changed
+    (package / "steppers" / "marching_on.py").write_text(EULER)
+    (package / "physics" / "falling.py").write_text(
+        "from cvt_hpc.kernels import kernel\nfrom cvt_hpc.physics.slope import slope\n"
+        "@kernel\ndef fall(constants, y):\n    return -slope(y)\n"
+    )
+    program = (
+        "from cvt_hpc.physics.falling import fall; from cvt_hpc.steppers.marching_on import euler; "
+        "print(euler(fall, 1.0, 1.0), sum(euler.stats.cache_hits.values()))"
+    )
     found = []
     for slope in ("1.0", "1.0", "0.5", "1.0"):
-        (tmp_path / "falling.py").write_text(FALL.replace("SLOPE", slope).replace("NAME", "Rate"))
-        found.append(cache_hits(tmp_path, tmp_path, RUN))
+        text = f"from cvt_hpc.kernels import kernel\n@kernel\ndef slope(y):\n    return {slope} * y\n"
+        (package / "physics" / "slope.py").write_text(text)
+        found.append(output(program, tmp_path, package.parent))
     assert found == [["0.5", "0"], ["0.5", "1"], ["0.75", "0"], ["0.5", "1"]]
 
 
+def test_a_changed_kernel_from_outside_the_package_is_another(tmp_path):
+    (tmp_path / "marching.py").write_text(EULER)
+    found = []
+    for slope in ("1.0", "0.5", "1.0"):
+        (tmp_path / "falling.py").write_text(FALL.replace("SLOPE", slope).replace("NAME", "Rate"))
+        found.append(output(RUN, tmp_path, tmp_path))
+    assert found == [["0.5", "0"], ["0.75", "0"], ["0.5", "1"]]
+
+
 def test_an_entry_with_a_type_that_is_not_at_hand_is_skipped_and_kept(tmp_path):
-    (tmp_path / "marching.py").write_text(MARCH)
+    (tmp_path / "marching.py").write_text(EULER)
     found = []
     for name in ("Rate", "Speed", "Speed", "Rate"):
         (tmp_path / "falling.py").write_text(FALL.replace("SLOPE", "1.0").replace("NAME", name))
-        found.append(cache_hits(tmp_path, tmp_path, RUN))
+        found.append(output(RUN, tmp_path, tmp_path))
     assert found == [["0.5", "0"], ["0.5", "0"], ["0.5", "1"], ["0.5", "1"]]
 
 
-def test_functions_of_other_people_are_kept_where_they_always_were(package, monkeypatch, tmp_path):
-    theirs = tmp_path / "theirs"
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(theirs))
-    module = load(package)
-    ours = module.kernel(plus_one)
-    assert numba.config.CACHE_DIR == str(theirs)
-    other = numba.njit(cache=True)(plus_one)
-    assert Path(ours.stats.cache_path).is_relative_to(module._CACHE)
-    assert not Path(other.stats.cache_path).is_relative_to(module._CACHE)
-    assert Path(other.stats.cache_path).is_relative_to(theirs)
+def test_a_kernel_typed_into_a_shell_is_compiled_without_a_file(tmp_path):
+    program = (
+        "from cvt_hpc.kernels import kernel\n@kernel\ndef half(x):\n    return 0.5 * x\n"
+        "print(half(1.0), half.stats.cache_path)"
+    )
+    assert output(program, tmp_path, PACKAGE.parent) == ["0.5", "None"]
 
 
-def test_an_error_in_a_kernel_leaves_the_users_setting(package, no_choice):
-    module = load(package)
-    with pytest.raises(TypeError):
-        module.kernel("no function")
-    assert numba.config.CACHE_DIR == ""
+# Where it is kept
 
 
-def test_a_package_that_cannot_be_written_falls_back_to_the_users_cache(
-    package, no_choice, monkeypatch, tmp_path
-):
-    without_access_to(monkeypatch, package)
+def test_code_lies_in_the_folder_that_the_user_has_chosen(tmp_path):
+    # as a user does it, in a process of his own: the variable is read when numba is imported
+    program = (
+        "import numba; from cvt_hpc.physics.friction import saturation; "
+        "saturation(0.1, 1.0); print(saturation.stats.cache_path); print(numba.config.CACHE_DIR)"
+    )
+    used, left = output(program, tmp_path, PACKAGE.parent)
+    assert Path(used).parent == tmp_path / "cache" / "cvt_hpc-kernels"
+    assert Path(used).name == f"cvt_hpc.physics.friction-{kernels._content(str(PACKAGE / FRICTION))}"
+    assert list(Path(used).glob("saturation*.nbi"))
+    assert left == str(tmp_path / "cache")
+
+
+def test_without_a_choice_it_is_the_package(package, no_choice):
+    assert place(package) == package / "__pycache__" / "cvt_hpc-kernels"
+
+
+@pytest.mark.parametrize("why", ["no permission", "somebody else's", "open to others"])
+def test_a_package_that_is_not_the_users_own_leaves_his_cache(package, no_choice, monkeypatch, tmp_path, why):
+    if why == "no permission":  # whoever runs the tests
+        ask = os.access
+        monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != package and ask(path, mode))
+    elif why == "somebody else's":
+        if os.getuid() != 0:
+            pytest.skip("only root can give a folder away")
+        os.chown(package, 4321, 4321)
+    else:
+        (package / "__pycache__" / "cvt_hpc-kernels").mkdir(parents=True)
+        (package / "__pycache__" / "cvt_hpc-kernels").chmod(0o770)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    module = load(package)
-    assert Path(module._CACHE).parent == tmp_path / "cache" / "cvt_hpc"
-    function = module.kernel(plus_one)
-    assert function(1.0) == 2.0
-    assert list(Path(module._CACHE).rglob("*plus_one*.nbi"))
-    assert not (package / "__pycache__").exists() or not list((package / "__pycache__").glob("kernels-*"))
-
-
-def test_without_a_cache_of_the_user_it_is_home_or_else_a_temporary_folder(
-    package, no_choice, monkeypatch, tmp_path
-):
-    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    assert place(package) == tmp_path / "cache" / "cvt_hpc-kernels"
+    monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
-    (tmp_path / "home").mkdir()
-    without_access_to(monkeypatch, package)
-    assert folder(package).parent == tmp_path / "home" / ".cache" / "cvt_hpc"
-    without_access_to(monkeypatch, package, tmp_path / "home")
-    assert folder(package).parent == tmp_path / "temporary" / ".cache" / "cvt_hpc"
+    assert place(package) == tmp_path / "home" / ".cache" / "cvt_hpc-kernels"
 
 
-def test_no_kernel_may_be_rounded_otherwise_than_written():
+def test_nobody_else_can_write_to_the_folders(package, chosen):
+    before = os.umask(0)
+    try:
+        module = load(package)
+        assert module.kernel(plus_one)(1.0) == 2.0
+    finally:
+        os.umask(before)
+    made = [chosen / "cvt_hpc-kernels", *(chosen / "cvt_hpc-kernels").iterdir()]
+    assert [folder.stat().st_mode & 0o777 for folder in made] == [0o700, 0o700]
+
+
+def link(folder):
+    (folder.parent / "theirs").mkdir()
+    folder.symlink_to("theirs")
+
+
+def owned_by_another(folder):
+    folder.mkdir()
+    os.chown(folder, 4321, 4321)
+
+
+def open_to_others(folder):
+    folder.mkdir()
+    folder.chmod(0o702)
+
+
+def open_to_a_group(folder):
+    folder.mkdir()
+    folder.chmod(0o720)
+
+
+def in_a_folder_of_another(folder):
+    os.chown(folder.parent, 4321, 4321)
+
+
+def in_an_open_folder(folder):
+    folder.parent.chmod(0o777)
+
+
+def in_the_place_of_a_file(folder):
+    folder.write_text("")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (link, "FOLDER is no folder"),
+        (in_the_place_of_a_file, "FOLDER is no folder"),
+        (owned_by_another, "FOLDER belongs to somebody else"),
+        (open_to_others, "others can write to FOLDER"),
+        (open_to_a_group, "others can write to FOLDER"),
+        (in_a_folder_of_another, "others can replace FOLDER"),
+        (in_an_open_folder, "others can replace FOLDER"),
+    ],
+)
+def test_a_folder_that_is_not_safe_is_not_used(package, chosen, caplog, spoil, says):
+    if os.getuid() != 0 and spoil in (owned_by_another, in_a_folder_of_another):
+        pytest.skip("only root can give a folder away")
+    folder = chosen / "cvt_hpc-kernels"
+    chosen.mkdir(mode=0o755)
+    spoil(folder)
+    module = load(package)
+    functions = module.kernel(plus_one), module.merged_kernel(plus_one)
+    assert [function(1.0) for function in functions] == [2.0, 2.0]
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert says.replace("FOLDER", str(folder)) in line
+    assert "machine code is not kept" in line
+    assert "NUMBA_CACHE_DIR" in line
+    assert not list(chosen.rglob("*.nbi"))
+
+
+def test_the_temporary_folder_of_all_is_safe_where_the_folder_is_the_users(package, chosen):
+    chosen.mkdir()
+    chosen.chmod(0o1777)
+    assert place(package) == chosen / "cvt_hpc-kernels"
+
+
+def test_a_disk_that_refuses_is_told_and_no_error(package, chosen, monkeypatch, caplog):
+    def refuse(folder):
+        raise OSError(28, "No space left on device")
+
+    module = load(package)
+    monkeypatch.setattr(module, "_make", refuse)
+    assert [module.kernel(plus_one)(x) for x in (1.0, 2.0)] == [2.0, 3.0]
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert "No space left on device" in line
+
+
+def test_functions_of_other_people_are_kept_where_they_always_were(package, chosen):
+    ours = load(package).kernel(plus_one)
+    other = numba.njit(cache=True)(plus_one)
+    assert Path(ours.stats.cache_path).is_relative_to(chosen / "cvt_hpc-kernels")
+    assert not Path(other.stats.cache_path).is_relative_to(chosen / "cvt_hpc-kernels")
+    assert Path(other.stats.cache_path).is_relative_to(chosen)
+
+
+def aged(folder, days):
+    """A folder with code that was last asked for some days ago."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "saturation.nbi").write_bytes(b"code")
+    os.utime(folder, 2 * (time.time() - days * 86400.0,))
+    return folder
+
+
+def test_a_new_folder_takes_the_place_of_those_that_nobody_asks_for(package, chosen):
+    module = load(package)
+    forgotten = [aged(module._place() / f"cvt_hpc.physics.friction-{k}", 31.0) for k in range(2)]
+    used, not_ours = aged(module._place() / "used", 29.0), aged(chosen / "not_ours", 31.0)
+    module.kernel(plus_one)(1.0)
+    assert used.is_dir()
+    assert not_ours.is_dir()
+    assert not any(path.exists() for path in forgotten)
+
+
+def test_asking_for_a_folder_renews_it_and_removes_none(package, chosen):
+    load(package).kernel(plus_one)(1.0)
+    (asked,) = (chosen / "cvt_hpc-kernels").iterdir()
+    other = aged(asked.with_name("other"), 31.0)
+    aged(asked, 31.0)
+    function = load(package).kernel(plus_one)
+    function(1.0)
+    assert sum(function.stats.cache_hits.values()) == 1
+    function(1)  # written into the folder that there is
+    assert time.time() - asked.stat().st_mtime < 86400.0
+    assert other.is_dir()
+
+
+# What is told
+
+
+def test_what_takes_long_is_told_when_it_is_compiled_and_not_when_it_is_loaded(
+    package, chosen, monkeypatch, caplog
+):
+    caplog.set_level(logging.INFO)
+    module = load(package)
+    inner = module.kernel(plus_one)
+
+    @numba.njit
+    def outer(x):
+        return inner(x)
+
+    outer(1)  # in no time
+    assert caplog.messages == []
+    now = iter(range(0, 1000, 4))
+    monkeypatch.setattr(time, "monotonic", lambda: next(now))
+    outer(1.0)
+    first, last = (record.getMessage() for record in caplog.records if record.name == module.__name__)
+    assert first == "compiling outer, once ..."
+    assert last.startswith("compiled outer in ")
+    caplog.clear()
+    assert load(package).kernel(plus_one)(1.0) == 2.0
+    assert caplog.messages == []
+
+
+def test_no_kernel_may_be_rounded_otherwise_than_written(dispatchers):
     # with contraction allowed the same run gave other bits when its kernels were compiled than when they were found
-    modules = [
-        importlib.import_module(info.name)
-        for info in pkgutil.walk_packages(cvt_hpc.__path__, "cvt_hpc.")
-        if info.name != "cvt_hpc.__main__"  # it runs the command
-    ]
-    found = {id(x): x for module in modules for x in vars(module).values() if isinstance(x, Dispatcher)}
-    assert len(found) > 30
-    for dispatcher in found.values():
+    for dispatcher in dispatchers:
         assert not dispatcher.targetoptions.get("fastmath"), dispatcher
         assert not dispatcher.targetoptions.get("parallel"), dispatcher

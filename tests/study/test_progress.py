@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import logging
 import os
 import pty
 import termios
@@ -141,9 +142,11 @@ def test_a_bar_on_a_terminal(monkeypatch):
         monkeypatch.setattr("sys.stderr", terminal)
         counter = SerialCounter()
         progress = Progress(counter, total=10, recorded=2, failed=0, visible=True, costs=np.ones(8))
+        logging.getLogger("cvt_hpc.kernels").warning("compiling")
         counter.report(5, failed=5)
         progress.close()
     shown = read_terminal(ours)
+    assert "\rcompiling\r\n" in shown  # on a line of its own
     assert "7/10 [" in shown
     assert "run/s, 5 failed]" in shown
 

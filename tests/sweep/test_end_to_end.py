@@ -157,10 +157,10 @@ def test_kill_9_at_any_moment_and_resume(meshes, tmp_path, ranks):
 
 
 def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):
-    done = call(
-        "simulate", "small.toml", "--at", "load=120 N m", "--out", "h.nc", "--plot", "h.png", cwd=folder
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    at = ("--at", "load=120 N m", "--at", "lanes=runs")
+    done = call("simulate", "small.toml", *at, "--out", "h.nc", "--plot", "h.png", cwd=folder)
+    assert done.returncode == 0
+    assert [line for line in done.stderr.splitlines() if "cvt-hpc: compil" not in line] == []
     assert "vibrates" in done.stdout
     swept = load_results(serial).sel(sheave_stiffness=1.0, load=120.0)
     with xr.open_dataset(folder / "h.nc", decode_times=False) as history:

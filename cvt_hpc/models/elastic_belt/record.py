@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.models.elastic_belt import fluctuation
+from cvt_hpc.models.elastic_belt.belt import MODES
 from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.models.elastic_belt.history import histories
 from cvt_hpc.models.elastic_belt.slip import PULLEYS, slid, slip_margin, with_slip
@@ -32,7 +33,6 @@ __all__ = [
 ]
 
 STRANDS = ("t1", "t2")
-MODES = 5  # half waves along a strand that are told apart
 RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by what a ramp changes
 
 LOSSES = (

@@ -10,7 +10,7 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, select
-from cvt_hpc.models.elastic_belt.belt import REGIONS, V_ELEMENT, Mesh, W
+from cvt_hpc.models.elastic_belt.belt import MODES, REGIONS, V_ELEMENT, Mesh, W
 from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
     DRIVEN_RADIUS,
@@ -36,7 +36,6 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
 )
 from cvt_hpc.models.elastic_belt.moments import MOMENTS, add
 from cvt_hpc.models.elastic_belt.power import POWERS, audit
-from cvt_hpc.models.elastic_belt.record import MODES
 from cvt_hpc.physics.lane_compliance import SOLVES, UNSOLVED
 
 SCALARS = (
