@@ -7,7 +7,7 @@ import json
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 from cvt_hpc.errors import mismatch
@@ -130,15 +130,15 @@ class Job:
         return tuple(self._derived(rule, varied[rule.key]) for rule in self.rules if varied[rule.key])
 
     def _derived(self, rule: Rule, along: tuple[str, ...]) -> Derived:
-        def evaluate() -> tuple:
-            schema, needed = self.schema, needed_rules(self.rules, rule.key)
-            return tuple(
-                complete_point(schema, needed, self.parameters, place)[rule.key]
-                for place in places(self.axes, along, sampled=self.is_sampled)
-            )
-
-        parameter = rule.parameter
+        parameter, evaluate = rule.parameter, partial(self._values_of, rule.key, along)
         return Derived(rule.key, along, parameter.unit, parameter.description, rule.words, evaluate)
+
+    def _values_of(self, key: str, along: tuple[str, ...]) -> tuple:
+        schema, needed = self.schema, needed_rules(self.rules, key)
+        return tuple(
+            complete_point(schema, needed, self.parameters, place)[key]
+            for place in places(self.axes, along, sampled=self.is_sampled)
+        )
 
     def thinned(self, most: int) -> Job:
         """Return this job with runs from all over it, as many as `most` if it has more; for estimates."""

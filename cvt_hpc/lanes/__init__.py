@@ -1,10 +1,11 @@
-"""Several runs in one register: numbers that hold a value for each of W runs, for kernels.
+"""Several runs, or parts of one, in a register: numbers that hold W values, for kernels.
 
 A `LaneArray` of shape (rows, fields) holds W values of type double or single at each place, one for each run
-("lane"). In kernels `a[j, k]` is a number of W lanes: + - * /, comparisons and the functions below act on
-each lane for itself and become vector instructions of the processor; a plain number beside it counts for all
-lanes. So a run's results do not depend on its neighbours. Nor do they depend on W: every operation is rounded
-once, as IEEE 754 has it, and products are fused with sums only where `fma` says so.
+("lane"), or for each part of a ring (`rings`). In kernels `a[j, k]` is a number of W lanes: + - * /,
+comparisons and the functions below act on each lane for itself and become vector instructions of the
+processor; a plain number beside it counts for all lanes. So a run's results do not depend on its neighbours.
+Nor do they depend on W: every operation is rounded once, as IEEE 754 has it, and products are fused with sums
+only where `fma` says so.
 
 A loop over lanes in plain arrays would be left to the compiler's vectoriser, which gives up where it cannot
 rule out that two of many arrays overlap.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cvt_hpc.job.assignments import read_assignments
 from cvt_hpc.simulation.modules import record_module
 from cvt_hpc.simulation.record import record_coordinates, record_variables
 from cvt_hpc.simulation.running import do
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
     """Do one run and keep its history.
 
-    With `lanes` not given in `at`, its stations fill the lanes of the registers: it is done sooner than in a
+    Where `lanes` is not given, its stations fill the lanes of the registers: it is done sooner than in a
     sweep, and its numbers are those of the sweep's run but for round-off.
 
     Parameters
@@ -43,8 +44,9 @@ def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
     InputError
         If a value is not fit for its key.
     """
-    point = job.point_at(at or {})
-    if "lanes" in point and "lanes" not in [str(each).partition("=")[0].strip() for each in at or ()]:
+    at = read_assignments(at or {}, job.schema, job.source, "at")
+    point = job.point_at(at)
+    if "lanes" in point and "lanes" not in {*at, *job.given, *(axis.name for axis in job.axes)}:
         point["lanes"] = "stations"
     ((run, record),) = do(job, [point], lambda: None, kept=(0,))
     return _history(job, point, run, record)

@@ -35,7 +35,6 @@ FOUND = (
     "refinements",
     "seconds",
 )
-SIDES = ("default", "reference")
 GIVEN = ("ratio", "friction_law", "driving_speed", "thrust", "load_share", "friction_gradient", "friction_memory",
          "sheave_stiffness", "element_mass", "ring_mass", "bending_stiffness")  # fmt: skip
 
@@ -135,12 +134,13 @@ def main() -> None:
     arguments = parser.parse_args()
     groups = scenes(arguments.groups)
     reference = ("explicit", None) if arguments.explicit else ("imex", REFERENCE_STEP / FINER)
-    pairs = _read(arguments.table)
+    header = _header("explicit" if arguments.explicit else "finer")
+    pairs = _read(arguments.table, header, groups)
     done = len(pairs) // TOGETHER
     with ProcessPoolExecutor(2) as pool, arguments.table.open("a", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         if not done:
-            writer.writerow([*GIVEN, *(f"{side} {name}" for side in SIDES for name in FOUND)])
+            writer.writerow(header)
         tasks = [
             tuple(pool.submit(run_group, group, *how) for how in (("imex", None), reference))
             for group in groups[done:]
@@ -149,21 +149,31 @@ def main() -> None:
             found = list(zip(default.result(), finer.result(), strict=True))
             pairs += found
             for scene, pair in zip(group, found, strict=True):
-                given = [value if isinstance(value, str) else f"{value:.4g}" for value in scene.values()]
-                writer.writerow([*given, *(value for side in pair for value in side.values())])
+                writer.writerow([*_given(scene), *(value for side in pair for value in side.values())])
             file.flush()
     print(*report(pairs), sep="\n")
 
 
-def _read(table: Path) -> list[tuple[dict, dict]]:
+def _header(reference: str) -> list[str]:
+    return [*GIVEN, *(f"{side} {name}" for side in ("default", reference) for name in FOUND)]
+
+
+def _given(scene: dict) -> list[str]:
+    return [value if isinstance(value, str) else f"{value:.4g}" for value in scene.values()]
+
+
+def _read(table: Path, header: list[str], groups: list[list[dict]]) -> list[tuple[dict, dict]]:
     """Pairs of a table that an earlier call has begun; it is cut where a group is not whole."""
     if not table.exists():
         return []
     with table.open(newline="") as file:
         lines = list(csv.reader(file))
     rows = lines[1 : 1 + max(len(lines) - 1, 0) // TOGETHER * TOGETHER]
+    asked = [_given(scene) for group in groups for scene in group]
+    if rows and (lines[0] != header or [row[: len(GIVEN)] for row in rows] != asked[: len(rows)]):
+        raise SystemExit(f"{table}: a table of other scenes, or of another reference")
     with table.open("w", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows(lines[:1] + rows if rows else [])
+        csv.writer(file, lineterminator="\n").writerows([header, *rows] if rows else [])
     first, second = len(GIVEN), len(GIVEN) + len(FOUND)
     return [
         (dict(zip(FOUND, row[first:second], strict=True)), dict(zip(FOUND, row[second:], strict=True)))

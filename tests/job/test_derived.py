@@ -1,6 +1,7 @@
 """Parameters that follow from others, in a job of the toy model: [derived] and [linked.AXIS]."""
 
 import json
+import pickle
 import sys
 
 import pytest
@@ -31,6 +32,12 @@ def refusal(text, overrides=()):
     with pytest.raises(InputError) as caught:
         load_job(text, overrides)
     return str(caught.value).removeprefix("x.toml: ")
+
+
+def test_a_job_with_what_follows_goes_to_other_processes(write_job):
+    job = load_job(write_job(JOB))
+    other = pickle.loads(pickle.dumps(job))
+    assert other == job and [d.values for d in other.derived] == [d.values for d in job.derived]
 
 
 def test_each_run_has_what_follows_from_its_values(write_job):

@@ -143,6 +143,29 @@ def test_the_file_alone_is_enough_to_repeat_the_run():
     assert dataset.attrs["job_name"] == asked.name
 
 
+class Stopped(Exception):
+    """Before anything runs."""
+
+
+@pytest.mark.parametrize(
+    ("values", "at", "expected"),
+    [
+        ({}, {}, "stations"),
+        ({"lanes": "runs"}, {}, "runs"),
+        ({}, {"numerics.lanes": "runs"}, "runs"),
+        ({}, ["lanes=runs"], "runs"),
+    ],
+)
+def test_stations_fill_the_lanes_where_nothing_else_is_asked_for(monkeypatch, values, at, expected):
+    def do(asked, points, *others, **options):
+        assert points[0]["lanes"] == expected
+        raise Stopped
+
+    monkeypatch.setattr("cvt_hpc.simulation.history.do", do)
+    with pytest.raises(Stopped):
+        simulate(job(**CHEAP, **values), at)
+
+
 def test_a_value_that_is_not_fit_is_refused_before_anything_runs(monkeypatch):
     monkeypatch.setattr("cvt_hpc.simulation.history.do", None)
     with pytest.raises(InputError, match="sheave_stifness.*did you mean sheave_stiffness"):

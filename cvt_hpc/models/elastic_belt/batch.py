@@ -1,4 +1,4 @@
-"""Runs of the elastic belt that advance together by a step in lanes."""
+"""Runs of the elastic belt that advance together by a step in lanes, or one whose stations fill them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ STEPS = {"imex": (imex_work, march_imex), "explicit": (explicit_work, march_expl
 
 
 class Batch:
-    """Runs that advance together, sample by sample, each in a lane of its own.
+    """Runs that advance together, sample by sample, each in a lane of its own, or one in linked parts.
 
     Parameters
     ----------

@@ -243,7 +243,15 @@ def _advance_across(belt: LaneBelt, state: LaneState, stations: LaneArray, step:
     )
     turnings = speed_share * c[0, DRIVING_SPEED], driven_speed
     surfaces = driving_surface(belt, speed_share), driven_speed * c[0, DRIVEN_RADIUS] - belt_speed
-    before = behind(fields, 0, V_FILTERED)
+    # an arc's second station takes what its first becomes, which may be the last of the part behind
+    last = n - 1
+    v0, u = fields[last, V_ELEMENT], fields[last, U] + stations[last, DU]
+    surface = select(belt.on_driven[last] > 0.5, surfaces[1], surfaces[0])
+    turning = select(belt.on_driven[last] > 0.5, turnings[1], turnings[0])
+    v_tangential = v0 - fma(turning, fields[last, W], surface)
+    meridian = fma(belt_speed + v0, stations[last, SLOPE], u) * per_cosine
+    speed = sqrt(fma(meridian, meridian, v_tangential * v_tangential))
+    before = from_behind(select(belt.enters[last] > 0.5, speed, fields[last, V_FILTERED]))
     for j in range(n):
         u, w = fields[j, U] + stations[j, DU], fields[j, W]
         share = belt.arc_share[j]
@@ -258,6 +266,5 @@ def _advance_across(belt: LaneBelt, state: LaneState, stations: LaneArray, step:
             change = fma(carry, before - remembered, forget * (speed - remembered))
             filtered = select(belt.enters[j] > 0.5, speed, remembered + change)
             fields[j, V_FILTERED] = select(share > 0.0, filtered, 0.0)
-            # an arc's second station takes what its first has become
             before = select(belt.enters[j] > 0.5, speed, remembered)
         fields[j, U], fields[j, W] = u, fma(step, u, w)
