@@ -17,7 +17,8 @@ from cvt_hpc.variables import Status
 
 # What the power balance may leave open, of the power that flows, with cells of REFERENCE_CELL. Sound runs of
 # 160 stations leave 0.005-0.2 % (2,000 random scenes: 99 in 100 below 0.05 %, the largest 0.39 %), chatter of
-# friction 0.6 % and more. On coarser meshes the transport leaves more at any step, in proportion to the cells.
+# friction 0.6 % and more. On coarser meshes the transport leaves more, in proportion to the cells, at
+# any step.
 LARGEST_POWER_RESIDUAL, REFERENCE_CELL = 0.004, 4.1e-3  # [1], [m]
 # Speed that alternates from step to step [m/s]. Sound runs have 0.001-0.8 mm/s (random scenes up to 1.9),
 # chatter of friction 10 mm/s and more: its speeds are those over which friction is regularised.
