@@ -17,7 +17,7 @@ from cvt_hpc.recording import longest_duration, sample_count
 from cvt_hpc.simulation.modules import record_module
 from cvt_hpc.simulation.record import record_of, record_without_run
 from cvt_hpc.variables import Status, Vibrates
-from cvt_hpc.vibration.ramp import ramped
+from cvt_hpc.vibration.ramped import ramped
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,27 +21,13 @@ from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.assessment import Occurrence
 from cvt_hpc.vibration.criterion import SHORTEST_SEGMENT, fitting_window
 from cvt_hpc.vibration.occurrence import LEAST_RISES, LONGEST_REASON
+from cvt_hpc.vibration.ramped import QUANTITIES, Quantity
 
 Array = NDArray[np.float64]
 
 SUSTAINED = 4  # windows in a row: as many as the shortest judged part of a run at constant load has
 LEAST_PERIODS = 1.9  # of `band_low` in a window; four windows in five periods, the least judged, have 1.95
 BINS = 20  # parts of a ramp whose amplitudes are recorded
-
-
-class Quantity(NamedTuple):
-    """What a ramp changes: the parameter that says so, units in sentences and in attributes, and its name."""
-
-    history: str
-    units: str
-    cf_units: str
-    long_name: str
-
-
-QUANTITIES = {
-    "load": Quantity("load_history", "N m", "N m", "load"),
-    "speed": Quantity("speed_history", "rad/s", "rad s-1", "speed of the driving pulley"),
-}
 
 
 def _variables(name: str, quantity: Quantity) -> tuple[Variable, ...]:
@@ -80,18 +66,6 @@ VARIABLES = (
 def coordinate() -> Coordinate:
     """The dimension `ramp_share`: middles of the parts of a ramp, as shares of it."""
     return Coordinate((np.arange(BINS) + 0.5) / BINS, "1", "share of the ramp, after rise_time")
-
-
-def ramped(parameters: Mapping[str, Any]) -> str:
-    """Which of QUANTITIES a run changes all along; "" where it keeps both.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Flat parameters of a run; of a model without ramps, without their keys.
-    """
-    ramps = (name for name, q in QUANTITIES.items() if parameters.get(q.history, "constant") == "ramp")
-    return next(ramps, "")
 
 
 @dataclass(frozen=True)

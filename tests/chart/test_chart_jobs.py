@@ -15,7 +15,7 @@ CHARTS = [path for path in sorted(FOLDER.glob("*.toml")) if "chart" in tomllib.l
 
 
 def test_there_are_charts():
-    assert [path.stem for path in CHARTS] == ["chart_belt", "chart_oscillator"]
+    assert [path.stem for path in CHARTS] == ["chart_belt", "chart_oscillator", "chart_ratios"]
 
 
 @pytest.mark.parametrize("path", CHARTS, ids=lambda path: path.stem)

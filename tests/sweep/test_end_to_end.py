@@ -56,7 +56,7 @@ stations = { from = 48, to = 68, step = 4 }
 load = ["0 N m", "60 N m"]
 
 [run]
-duration = "0.1 s"
+duration = "0.15 s"
 """
 
 

@@ -32,7 +32,7 @@ from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.variables import Vibrates
 from cvt_hpc.vibration import criterion
 from cvt_hpc.vibration.assessment import Occurrence
-from cvt_hpc.vibration.ramp import ramped
+from cvt_hpc.vibration.ramped import ramped
 
 COARSENESS = 0.6  # stations of the coarse run over those of the full one, and its inverse for the step
 SHARE = 0.3  # of the duration

@@ -15,7 +15,7 @@ import numpy as np
 from cvt_hpc.physics.friction import FrictionLaw, given_law
 from cvt_hpc.physics.geometry import Variator, cell_counts, variator
 from cvt_hpc.physics.sheaves import Sheaves, flexibility, sheaves
-from cvt_hpc.vibration.ramp import ramped
+from cvt_hpc.vibration.ramped import ramped
 
 FIELDS = ("w", "u", "v_element", "v_ring", "v_filtered", "n_element", "n_ring")
 W, U, V_ELEMENT, V_RING, V_FILTERED, N_ELEMENT, N_RING = range(len(FIELDS))

@@ -37,7 +37,7 @@ import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Mesh
 from cvt_hpc.variables import Variable
-from cvt_hpc.vibration.ramp import ramped
+from cvt_hpc.vibration.ramped import ramped
 
 if TYPE_CHECKING:
     from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun

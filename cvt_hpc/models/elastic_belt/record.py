@@ -15,6 +15,7 @@ from cvt_hpc.models.elastic_belt.slip import PULLEYS, slid, slip_margin, with_sl
 from cvt_hpc.models.elastic_belt.slip import VARIABLE as SLIP_MARGIN
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 from cvt_hpc.vibration import assessment, ramp
+from cvt_hpc.vibration.ramped import ramped
 from cvt_hpc.vibration.signals import amplitude_spectrum, band_amplitude
 
 if TYPE_CHECKING:
@@ -137,7 +138,7 @@ def judge(run: RecordedRun) -> dict[str, Any]:
 def assess(run: RecordedRun) -> assessment.Occurrence:
     """Whether and how a run vibrates that has reached its end; its probes are columns of the displacement."""
     p = run.parameters
-    if ramp.ramped(p):
+    if ramped(p):
         found = _assess_ramp(run)
     else:
         columns, strands = _on_strands(run)
@@ -148,7 +149,7 @@ def assess(run: RecordedRun) -> assessment.Occurrence:
 
 def _assess_ramp(run: RecordedRun) -> ramp.RampOccurrence | None:
     """Whether and how a run vibrates along a ramp; None if it ended too soon to tell."""
-    p, first, quantity = run.parameters, run.kick, ramp.ramped(run.parameters)
+    p, first, quantity = run.parameters, run.kick, ramped(run.parameters)
     columns, strands = _on_strands(run)
     rate, moved = p["sampling_rate"], run.displacement[first:, columns]
     values = run.channel(RAMPED_CHANNELS[quantity])[first:]
@@ -166,7 +167,7 @@ def _on_strands(run: RecordedRun) -> tuple[np.ndarray, list[str]]:
 def _slipped(run: RecordedRun, status: Status, why: str) -> dict[str, Any]:
     """The record of a run that has slipped through before its end: what is known until then."""
     found = {"status": status, "vibrates": Vibrates.SLIPS, "reason": f"at {run.time * 1e3:.4g} ms: {why}"}
-    before = _assess_ramp(run) if ramp.ramped(run.parameters) else None
+    before = _assess_ramp(run) if ramped(run.parameters) else None
     if before is not None:
         found = before.record() | found | {"reason": f"{found['reason']}; before: {before.reason}"[:240]}
     return found | slid(run)

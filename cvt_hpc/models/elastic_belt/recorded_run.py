@@ -12,7 +12,7 @@ from cvt_hpc.models.elastic_belt.fluctuation import Fluctuation, fluctuation
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, PROFILES, Probe, Sensors, probes, sensors
 from cvt_hpc.recording import sample_count
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.ramp import ramped
+from cvt_hpc.vibration.ramped import ramped
 
 
 class Recording(NamedTuple):
