@@ -2,7 +2,8 @@
 
 **Accuracy.** The step is of first order: what it changes of a vibration's amplitude is in proportion to its
 length. REFERENCE_STEP changes it by REFERENCE_ERROR at the working point of the chart. Elsewhere that is no
-bound: of 81 random scenes that vibrate it changes half by more than 1.2 %, a tenth by more than 9 % (`README.md`).
+bound: of 81 random scenes that vibrate it changes half by more than 1.2 %, a tenth by more than 9 %
+(`README.md`).
 
 **Stability.** Transverse motion is explicit: beyond 2 / w the shortest waves grow, w being their angular
 frequency under bending, tension and contact (`transverse_limit`). Measured limits are 1.00 to 1.2 of that
