@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
     from cvt_hpc.analysis.comparison import Cell, Comparison
     from cvt_hpc.job import Job
+    from cvt_hpc.ladder.audit import AuditReport
     from cvt_hpc.study import RunReport, StudyStatus
-    from cvt_hpc.study.audit import AuditReport
-    from cvt_hpc.study.forecast import Forecast
+    from cvt_hpc.study.forecast.resources import Disk
+    from cvt_hpc.study.forecast.simulate import Forecast
     from cvt_hpc.study.repeats import Repeat
-    from cvt_hpc.study.resources import Disk
 
 MOST_FAILURES_NAMED = 10
 MOST_CONTRADICTIONS_NAMED = 20
@@ -173,7 +173,7 @@ def trouble_lines(report: RunReport) -> Iterator[str]:
 
 def status_lines(status: StudyStatus) -> Iterator[str]:
     """Yield the lines that say how far a study is."""
-    from cvt_hpc.study.progress import show_duration
+    from cvt_hpc.study.ranks.progress import show_duration
 
     yield f"job     {status.name} ({'running' if status.running else 'not running'})"
     yield f"runs    {status.total}"
@@ -193,8 +193,8 @@ def status_lines(status: StudyStatus) -> Iterator[str]:
 
 def forecast_lines(forecasts: Sequence[Forecast], job: Job, basis: str) -> Iterator[str]:
     """Yield the lines that say what a sweep will take on several numbers of ranks, a row each."""
-    from cvt_hpc.study.progress import show_duration
-    from cvt_hpc.study.resources import slurm_time, suggested_time
+    from cvt_hpc.study.forecast.resources import slurm_time, suggested_time
+    from cvt_hpc.study.ranks.progress import show_duration
 
     at_most = ", if all cells of the grid are run" if "first_spacing" in job.design else ""
     yield f"forecast of all {job.size} runs by {basis}{at_most}:"

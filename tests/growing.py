@@ -3,10 +3,10 @@
 import numpy as np
 from fast_runs import FastRuns
 
-from cvt_hpc.models.elastic_belt.flat import FlatBelt, flat_belt, pack, rates, unpack
-from cvt_hpc.models.elastic_belt.linearised import Linearisation
+from cvt_hpc.models.elastic_belt.one_system import FlatBelt, flat_belt, pack, rates, unpack
 from cvt_hpc.models.linear_stability.branch import Point
 from cvt_hpc.models.steady_variator.equations import LATE
+from cvt_hpc.models.steady_variator.linearised import Linearisation
 from cvt_hpc.models.steady_variator.walking import Steady
 
 

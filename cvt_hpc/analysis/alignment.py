@@ -13,7 +13,7 @@ from cvt_hpc.analysis.arrangement import known_values, value_text
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import InputError, did_you_mean, mismatch
-from cvt_hpc.study.difference import flatten
+from cvt_hpc.study.job_difference import flatten
 
 COMPARED = ("status", "vibrates", "amplitude", "frequency")
 

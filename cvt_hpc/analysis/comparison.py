@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis.alignment import align, axes_of, job_of
 from cvt_hpc.analysis.classes import at_strongest_strand, occurrence_classes
 from cvt_hpc.files import written_aside
-from cvt_hpc.study.difference import differences, short
+from cvt_hpc.study.job_difference import differences, short
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.agreement import (
     CONTRADICTIONS,

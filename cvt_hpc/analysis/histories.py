@@ -18,7 +18,7 @@ from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.values import in_words
 from cvt_hpc.models.auto.rules import Rung
 from cvt_hpc.variables import Status, Vibrates
-from cvt_hpc.vibration.criterion import PARAMETERS
+from cvt_hpc.vibration.settings import PARAMETERS
 
 LEFT, RIGHT, WHOLE = slice(0, 2), 2, slice(0, 3)  # columns of a panel
 

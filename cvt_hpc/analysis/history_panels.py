@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
-from cvt_hpc.vibration.criterion import SHORTEST_SEGMENT
+from cvt_hpc.vibration.settings import SHORTEST_SEGMENT
 from cvt_hpc.vibration.signals import amplitude_spectrum, band_amplitude, dominant_frequency
 
 Array = NDArray[np.float64]

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.job import Job
+from cvt_hpc.models.contract import record_module, transient_module
 from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.models.elastic_belt.belt import TIME, State
-from cvt_hpc.simulation.modules import record_module, transient_module
 from cvt_hpc.simulation.record import record_of
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from cvt_hpc.bifurcation.asking import Diagram
+from cvt_hpc.bifurcation.job import Diagram
 from cvt_hpc.history_files import CONTENT, DIAGRAM
 from cvt_hpc.models.linear_stability.branch import Branch, tracks
 from cvt_hpc.models.linear_stability.modes import Mode
@@ -21,7 +21,7 @@ from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Kind
 
 if TYPE_CHECKING:
-    from cvt_hpc.bifurcation.making import Followed
+    from cvt_hpc.bifurcation.followed import Followed
 
 OF_MODES = {  # what is told of a mode: value, unit, name for people
     "growth_rate": (lambda mode: mode.growth, "s-1", "growth rate of the mode"),

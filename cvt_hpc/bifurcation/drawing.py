@@ -17,16 +17,16 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from cvt_hpc.analysis.figures import WIDTH, balanced, draw
-from cvt_hpc.bifurcation.asking import Diagram
 from cvt_hpc.bifurcation.attractors import FROM, Attractor
 from cvt_hpc.bifurcation.dataset import mode_lines
+from cvt_hpc.bifurcation.job import Diagram
 from cvt_hpc.bifurcation.table import gap_lines, place_text
 from cvt_hpc.models.linear_stability.branch import Onset, Point
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Kind
 
 if TYPE_CHECKING:
-    from cvt_hpc.bifurcation.making import Followed
+    from cvt_hpc.bifurcation.followed import Followed
 
 STRANDS = ("#0072b2", "#d55e00")  # t1 and t2
 HOPF, GAP = "#c00000", "#e6e6e6"

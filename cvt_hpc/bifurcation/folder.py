@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from cvt_hpc.bifurcation.asking import Diagram
 from cvt_hpc.bifurcation.dataset import Stability
+from cvt_hpc.bifurcation.job import Diagram
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import naming_refusals
 from cvt_hpc.history_files import DIAGRAM, holds
-from cvt_hpc.study.difference import another_job
+from cvt_hpc.study.job_difference import another_job
 
 DATASET = "branch.nc"
 LABELS = ("name", "description")  # of a job, without effect on any number

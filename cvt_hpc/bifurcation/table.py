@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cvt_hpc.bifurcation.asking import Asked, Diagram
 from cvt_hpc.bifurcation.attractors import FROM, Attractor
+from cvt_hpc.bifurcation.job import Asked, Diagram
 from cvt_hpc.errors import few_of
 from cvt_hpc.job.values import in_words
 from cvt_hpc.models.linear_stability.branch import Onset
@@ -16,7 +16,7 @@ from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Criticality, Kind
 
 if TYPE_CHECKING:
-    from cvt_hpc.bifurcation.making import Followed
+    from cvt_hpc.bifurcation.followed import Followed
 
 NAMED = ("friction_gradient", "sheave_stiffness")  # of every branch, axis or not
 MOST_NAMED = 12  # loads in a row

@@ -13,10 +13,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from cvt_hpc.analysis.error_axes import COLOURS, LEGEND, MARGIN, set_error_axis
 from cvt_hpc.analysis.figures import STYLE, WIDTH, save_figure
 from cvt_hpc.chart.comparing import Comparison, Result
-from cvt_hpc.chart.figure_parts import COLOURS, LEGEND, MARGIN, error_label, set_error_axis
 from cvt_hpc.chart.plan import Quantity
+from cvt_hpc.chart.scene_drawing import error_label
 
 _ROW_HEIGHT = 0.24  # [inch], of the budget
 

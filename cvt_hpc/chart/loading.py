@@ -8,8 +8,8 @@ from typing import Any
 
 from cvt_hpc.chart.declarations import CHART
 from cvt_hpc.chart.plan import Chart, Point
-from cvt_hpc.chart.series import budget_points, method_points, reference_points
-from cvt_hpc.chart.stage import Stage, read_stage
+from cvt_hpc.chart.points import budget_points, method_points, reference_points
+from cvt_hpc.chart.scenes import Stage, read_stage
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.job.assignments import Assignments, split_assignments
 from cvt_hpc.job.definition import HEADER

@@ -15,11 +15,11 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from cvt_hpc.chart.budget_drawing import draw_budget
+from cvt_hpc.chart.checks import check_prospects
 from cvt_hpc.chart.comparing import Comparison, compare
 from cvt_hpc.chart.dataset import chart_dataset
 from cvt_hpc.chart.measuring import Measurement, measure
 from cvt_hpc.chart.plan import Chart, Point
-from cvt_hpc.chart.prospects import check_prospects
 from cvt_hpc.chart.scene_drawing import draw_scene
 from cvt_hpc.chart.store import ChartFolder
 from cvt_hpc.chart.table import write_table

@@ -22,7 +22,7 @@ from cvt_hpc.job.tables import read_table
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.assessment import assess
-from cvt_hpc.vibration.criterion import fitting_window
+from cvt_hpc.vibration.settings import fitting_window
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from cvt_hpc.analysis.figures import WIDTH, draw
+from cvt_hpc.analysis.error_axes import LEGEND, MARGIN, line_style, set_error_axis
+from cvt_hpc.analysis.figures import WIDTH, display_unit, draw
+from cvt_hpc.chart.captions import LARGEST_ERROR, notes
 from cvt_hpc.chart.comparing import Comparison, Result
-from cvt_hpc.chart.figure_parts import LEGEND, MARGIN, error_label, line_style, set_error_axis
-from cvt_hpc.chart.notes import LARGEST_ERROR, notes
 from cvt_hpc.chart.plan import Quantity
 from cvt_hpc.chart.quantities import KINDS
 
@@ -155,3 +155,13 @@ def _heading(quantity: Quantity) -> str:
     if quantity.name == "trajectory":
         return f"{title}, {1e3 * quantity.since:g}-{1e3 * quantity.until:g} ms"
     return title
+
+
+def error_label(quantity: Quantity) -> str:
+    """What stands at the axis of a quantity's errors."""
+    if quantity.scale == 0.0:
+        return "relative error"
+    factor, unit = (
+        (1e6, "µm") if KINDS[quantity.name].unit == "m" else display_unit(KINDS[quantity.name].unit)
+    )
+    return f"error / {factor * quantity.scale:g} {unit}"

@@ -19,8 +19,8 @@ from cvt_hpc.chart.measuring import Measurement
 from cvt_hpc.chart.plan import Chart
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import naming_refusals, written_aside
-from cvt_hpc.study.difference import another_job
 from cvt_hpc.study.folder import CHART_FILE, DamagedJobError
+from cvt_hpc.study.job_difference import another_job
 from cvt_hpc.study.lock import locked
 from cvt_hpc.study.provenance import git_revision, machine, versions
 

@@ -11,6 +11,7 @@ from textwrap import shorten
 from cvt_hpc.chart.comparing import Comparison, Result
 from cvt_hpc.chart.plan import Role
 from cvt_hpc.chart.quantities import KINDS
+from cvt_hpc.tables import columns, number, short
 
 _HEAD = (
     "scene",
@@ -119,21 +120,3 @@ def _note(result: Result) -> str:
     if result.point.role is Role.CHOICE:
         return "is an error of it" if result.point.refines else ""
     return "<- chosen" if result.chosen else ""
-
-
-def columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Yield rows as lines, their cells below each other; the last one is not padded."""
-    widths = [max(map(len, column)) for column in zip(*(row[:-1] for row in rows), strict=True)]
-    for row in rows:
-        cells = [cell.ljust(width) for cell, width in zip(row[:-1], widths, strict=True)]
-        yield f"  {'  '.join([*cells, row[-1]])}".rstrip()
-
-
-def short(value: float) -> str:
-    """Return a number to two digits, "" where it is none."""
-    return "" if math.isnan(value) else f"{value:.2g}"
-
-
-def number(value: float, digits: int = 10) -> str:
-    """Return a number to so many digits, "" where it is none."""
-    return "" if math.isnan(value) else f"{value:.{digits}g}"

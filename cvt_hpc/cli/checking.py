@@ -47,8 +47,8 @@ def _check(arguments: argparse.Namespace) -> int:
     show_job(job, None)
     if arguments.ranks and speaks():
         from cvt_hpc.printing import disk_line, forecast_lines
-        from cvt_hpc.study.forecast import CURVE
-        from cvt_hpc.study.resources import expect
+        from cvt_hpc.study.forecast.resources import expect
+        from cvt_hpc.study.forecast.simulate import CURVE
 
         ranks = [*arguments.ranks, *(CURVE if arguments.plot else ())]
         expected = expect(job, output_folder(None, job), ranks, arguments.pilots)
@@ -77,7 +77,7 @@ def show_job(job: Job, out: Path | None) -> None:
 
 
 def _check_ranks(ranks: list[int]) -> None:
-    from cvt_hpc.study.forecast import MOST_RANKS
+    from cvt_hpc.study.forecast.simulate import MOST_RANKS
 
     for number in ranks:
         if not 1 <= number <= MOST_RANKS:

@@ -50,12 +50,12 @@ def _chart(arguments: argparse.Namespace) -> int:
 
 
 def _ladder(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.chart.ladder import report_ladder, run_ladder
-    from cvt_hpc.chart.ladder_rungs import ladder
-    from cvt_hpc.chart.ladder_table import ladder_lines
     from cvt_hpc.job import load_job
+    from cvt_hpc.ladder.making import report_ladder, run_ladder
+    from cvt_hpc.ladder.rungs import ladder
+    from cvt_hpc.ladder.table import ladder_lines
     from cvt_hpc.printing import trouble_lines
-    from cvt_hpc.study.launch import end_process
+    from cvt_hpc.study.ranks.launch import end_process
     from cvt_hpc.study.report import STALLED
 
     job = load_job(arguments.path, arguments.set)

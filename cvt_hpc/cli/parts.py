@@ -58,7 +58,7 @@ def folder_of(results: Path) -> Path:
 
 def refuse_ranks(command: str, why: str) -> None:
     """Raise InputError if several processes were started together for a command that one does."""
-    from cvt_hpc.study.launch import detect_launch
+    from cvt_hpc.study.ranks.launch import detect_launch
 
     if (size := detect_launch().size) > 1:
         raise mismatch(command, f"one process, because it {why}", f"{size} started")

@@ -74,8 +74,8 @@ def _run(arguments: argparse.Namespace) -> int:
     from cvt_hpc.job.durations import read_duration
     from cvt_hpc.printing import repeat_line, report_lines, trouble_lines
     from cvt_hpc.study import check_start, run
-    from cvt_hpc.study.launch import end_process
-    from cvt_hpc.study.steps import check_refinement
+    from cvt_hpc.study.ranks.launch import end_process
+    from cvt_hpc.study.time_steps import check_refinement
     from cvt_hpc.variables import Status
 
     limits = {
@@ -115,7 +115,7 @@ def _repeats(job: Job, arguments: argparse.Namespace) -> list[tuple[Repeat, Call
         raise mismatch("--check-step-by", "--check-step FRACTION beside it", "none")
     if arguments.audit is None and arguments.check_step is None:
         return []
-    from cvt_hpc.study.audit import audit_of
+    from cvt_hpc.ladder.audit import audit_of
     from cvt_hpc.study.repeats import check_fraction
     from cvt_hpc.study.step_check import step_check
 
@@ -147,8 +147,8 @@ def _repeat(repeat: Repeat, show: Callable[[Repeat], None], options: dict[str, A
 
 
 def _show_audit(audit: Repeat) -> None:
+    from cvt_hpc.ladder.audit import report_audit
     from cvt_hpc.printing import audit_lines
-    from cvt_hpc.study.audit import report_audit
 
     print(*audit_lines(report_audit(audit)), sep="\n")
 

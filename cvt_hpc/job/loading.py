@@ -15,7 +15,7 @@ from cvt_hpc.job.definition import HEADER, Job
 from cvt_hpc.job.derivation import ordered_rules, overridden, read_derived, read_linked
 from cvt_hpc.job.design import Design, read_design, resolve_spacing
 from cvt_hpc.job.document import read_document
-from cvt_hpc.job.handing import answering_model, handed_to
+from cvt_hpc.job.for_model import answering_model, handed_to
 from cvt_hpc.job.histories import KEY, read_histories
 from cvt_hpc.job.rules import Link, Rule, follow
 from cvt_hpc.job.sampling import sampled_axes

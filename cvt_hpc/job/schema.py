@@ -14,9 +14,12 @@ from cvt_hpc.errors import InputError, mismatch, nearest, show, unknown
 from cvt_hpc.models import MODELS
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers import STEPPERS
-from cvt_hpc.vibration import criterion
+from cvt_hpc.vibration import settings as vibration_settings
 
-SHARED = (recording, criterion)  # what every job with a transient may set, whatever its model and stepper
+SHARED = (
+    recording,
+    vibration_settings,
+)  # what every job with a transient may set, whatever its model and stepper
 
 Problem = tuple[str, str, str]
 Check = Callable[[dict[str, Any]], list[Problem]]

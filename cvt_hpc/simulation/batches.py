@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cvt_hpc.models.contract import has_record, record_module
 from cvt_hpc.recording import longest_duration
-from cvt_hpc.simulation.modules import has_record, record_module
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from cvt_hpc.simulation.modules import record_module, transient_module
+from cvt_hpc.models.contract import record_module, transient_module
 from cvt_hpc.simulation.open_run import OpenRun
 
 if TYPE_CHECKING:

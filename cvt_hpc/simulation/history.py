@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.job.assignments import read_assignments
-from cvt_hpc.simulation.modules import record_module
+from cvt_hpc.models.contract import record_module
 from cvt_hpc.simulation.record import record_coordinates, record_variables
 from cvt_hpc.simulation.running import do
 from cvt_hpc.variables import Variable

@@ -3,7 +3,7 @@
 Most runs are one transient. A run that fails by its numerics is done again from its start at half the step,
 `most_refinements` times at most. A run that is undecided goes on to twice its time, and again, as long as
 that is within `longest_duration`. A model that may answer by less than the full transient says so in its
-record module (`modules.py`), and what it answers so is neither refined nor prolonged.
+record module (`contract.py`), and what it answers so is neither refined nor prolonged.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.models import MODELS
+from cvt_hpc.models.contract import record_module
 from cvt_hpc.recording import longest_duration, sample_count
-from cvt_hpc.simulation.modules import record_module
 from cvt_hpc.simulation.record import record_of, record_without_run
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.ramped import ramped

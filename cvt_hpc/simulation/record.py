@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.simulation.modules import record_module
+from cvt_hpc.models.contract import record_module
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
+from cvt_hpc.models.contract import record_module
 from cvt_hpc.simulation.engine import Interrupted, march
-from cvt_hpc.simulation.modules import record_module
 from cvt_hpc.simulation.record import record_of_solution
 
 if TYPE_CHECKING:

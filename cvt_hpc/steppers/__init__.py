@@ -17,8 +17,8 @@ march(system, control, interval, rows, clock, y, work, counts) -> int
 """
 
 STEPPERS = {
-    "imex": "cvt_hpc.steppers.imex",
-    "explicit": "cvt_hpc.steppers.explicit",
+    "imex": "cvt_hpc.models.elastic_belt.imex_settings",
+    "explicit": "cvt_hpc.models.elastic_belt.explicit_settings",
     "symplectic_euler": "cvt_hpc.steppers.symplectic_euler",
     "runge_kutta_4": "cvt_hpc.steppers.runge_kutta_4",
     "dormand_prince": "cvt_hpc.steppers.dormand_prince",

@@ -16,7 +16,7 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.steppers.facts import RATES, REJECTED, STEPS, Facts, Result
-from cvt_hpc.steppers.numerics import MOST_STEPS, TOLERANCE, Tolerance, tolerance
+from cvt_hpc.steppers.settings import MOST_STEPS, TOLERANCE, Tolerance, tolerance
 from cvt_hpc.steppers.system import System, all_finite, size
 
 FACTS = Facts(

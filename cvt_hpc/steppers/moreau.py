@@ -26,7 +26,7 @@ import numpy as np
 from cvt_hpc.kernels import kernel
 from cvt_hpc.steppers.facts import RATES, SOLVES, Facts, Result
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
-from cvt_hpc.steppers.numerics import STEP, FixedStep, fixed_step
+from cvt_hpc.steppers.settings import STEP, FixedStep, fixed_step
 from cvt_hpc.steppers.system import SetValuedSystem
 
 FACTS = Facts(

@@ -27,7 +27,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.steppers.facts import RATES, REJECTED, SOLVES, Facts, Result
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.frozen_jacobian import SHIFT, SIGN, Frozen, frozen, renew
-from cvt_hpc.steppers.numerics import STEP, FixedStep, fixed_step
+from cvt_hpc.steppers.settings import STEP, FixedStep, fixed_step
 from cvt_hpc.steppers.system import System, size
 
 FACTS = Facts(

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.integrate import OdeSolver
 
 from cvt_hpc.steppers.facts import FACTORISATIONS, JACOBIANS, RATES, STEPS, Facts, Result
-from cvt_hpc.steppers.numerics import MOST_STEPS, TOLERANCE, Tolerance, tolerance
+from cvt_hpc.steppers.settings import MOST_STEPS, TOLERANCE, Tolerance, tolerance
 from cvt_hpc.steppers.system import System
 
 # What the three have in common; each says what is its own.

@@ -19,7 +19,7 @@ from cvt_hpc.steppers.facts import RATES, Facts, Result
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.frozen_jacobian import Frozen, frozen
 from cvt_hpc.steppers.newton import solve_stage
-from cvt_hpc.steppers.numerics import SOLVER_TOLERANCE, STEP, from_parameters
+from cvt_hpc.steppers.settings import SOLVER_TOLERANCE, STEP, from_parameters
 from cvt_hpc.steppers.system import System
 
 FACTS = Facts(

@@ -1,7 +1,7 @@
 """Many runs of one job: the grid, its schedule over MPI ranks, the durable record, and the dataset."""
 
 from cvt_hpc.study.gather import gather, open_results
-from cvt_hpc.study.launch import process_rank
+from cvt_hpc.study.ranks.launch import process_rank
 from cvt_hpc.study.report import FailedRun, RunReport
 from cvt_hpc.study.status import StudyStatus, read_status
 from cvt_hpc.study.sweep import check_start, run

@@ -18,11 +18,11 @@ import numpy as np
 from cvt_hpc.study.batches import Assignment, share_out
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.frames import RecordFormat
-from cvt_hpc.study.record import RecordLog
-from cvt_hpc.study.records import Records
-from cvt_hpc.study.recovery import read_records
-from cvt_hpc.study.steps import asked_step
+from cvt_hpc.study.record.frames import RecordFormat
+from cvt_hpc.study.record.index import Records
+from cvt_hpc.study.record.log import RecordLog
+from cvt_hpc.study.record.recovery import read_records
+from cvt_hpc.study.time_steps import asked_step
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.records import Records, block_length
+from cvt_hpc.study.record.index import Records, block_length
 
 if TYPE_CHECKING:
     import h5py

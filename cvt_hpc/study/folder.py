@@ -13,11 +13,11 @@ from pathlib import Path
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import naming_refusals, written_aside
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.difference import refuse_other
-from cvt_hpc.study.frames import MAGIC
+from cvt_hpc.study.job_difference import refuse_other
 from cvt_hpc.study.lock import is_locked, locked
 from cvt_hpc.study.part import Part
-from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.record.frames import MAGIC
+from cvt_hpc.study.record.recovery import read_records
 
 FORMAT = "cvt_hpc study 1"
 CHART_FILE = "chart.json"  # what the other kind of output folder is known by

@@ -18,9 +18,9 @@ from cvt_hpc.study.dimensions import DerivedCoordinate, Dimension
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.lock import locked
 from cvt_hpc.study.provenance import command, git_revision, history_line, versions
-from cvt_hpc.study.record import KEPT
-from cvt_hpc.study.records import Records
-from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.record.index import Records
+from cvt_hpc.study.record.log import KEPT
+from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.study.tracing import inferred_classes
 from cvt_hpc.variables import Variable
 from cvt_hpc.vibration.classes import OccurrenceClass

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.records import Records
+from cvt_hpc.study.record.index import Records
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:

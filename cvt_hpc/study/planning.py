@@ -18,18 +18,18 @@ from cvt_hpc.study.attempts import (
     runs_to_repeat,
 )
 from cvt_hpc.study.batches import Assignment
-from cvt_hpc.study.cost_model import Fit
 from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.forecast.cost_model import Fit
 from cvt_hpc.study.histories import missing_histories
 from cvt_hpc.study.part import Part
-from cvt_hpc.study.progress import Progress
 from cvt_hpc.study.provenance import new_session
-from cvt_hpc.study.records import Records
-from cvt_hpc.study.recovery import read_records
-from cvt_hpc.study.schedule import Counter
-from cvt_hpc.study.steps import refined_steps, untried_factor
+from cvt_hpc.study.ranks.progress import Progress
+from cvt_hpc.study.ranks.schedule import Counter
+from cvt_hpc.study.ranks.time_limit import TimeLimit
+from cvt_hpc.study.record.index import Records
+from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.study.task import Task
-from cvt_hpc.study.time_limit import TimeLimit
+from cvt_hpc.study.time_steps import refined_steps, untried_factor
 from cvt_hpc.study.tracing import needed_runs
 from cvt_hpc.variables import Status
 

@@ -20,8 +20,8 @@ from cvt_hpc.errors import mismatch, show
 from cvt_hpc.job import build_job
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.records import Records
-from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.record.index import Records
+from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.study.report import RunReport
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.sweep import check_start, run
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
 CONFIDENCE = 0.95
+AUDITED, FULL_MODEL = "auto", "elastic_belt"  # what answers some runs cheaply, and what does all in full
 
 
 def _of_the_job(records: Records, runs: NDArray[np.intp]) -> Mapping[int, float]:

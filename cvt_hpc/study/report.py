@@ -10,7 +10,7 @@ import numpy as np
 
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.records import Records
+from cvt_hpc.study.record.index import Records
 from cvt_hpc.variables import Status, Vibrates
 
 # exit statuses; 2 is bad input, raised as InputError

@@ -13,8 +13,8 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.records import Records
-from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.record.index import Records
+from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.study.report import count_special
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.tracing import needed_runs

@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job.derivation import overridden
-from cvt_hpc.job.handing import handed_to
+from cvt_hpc.job.for_model import handed_to
 from cvt_hpc.models.auto.rules import COARSENESS, Rung
 from cvt_hpc.steppers import STEPPERS
-from cvt_hpc.study.audit import AUDITED, FULL_MODEL
-from cvt_hpc.study.records import Records
-from cvt_hpc.study.repeats import Repeat, built
+from cvt_hpc.study.record.index import Records
+from cvt_hpc.study.repeats import AUDITED, FULL_MODEL, Repeat, built
 from cvt_hpc.study.status import expected_cost
-from cvt_hpc.study.steps import STEP, stepper_in_words
+from cvt_hpc.study.time_steps import STEP, stepper_in_words
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:

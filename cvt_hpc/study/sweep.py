@@ -17,26 +17,26 @@ from threadpoolctl import threadpool_limits
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import StorageError
-from cvt_hpc.study.cost_model import CostModel
-from cvt_hpc.study.deaths import outlive
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.frames import RecordFormat
+from cvt_hpc.study.forecast.cost_model import CostModel
 from cvt_hpc.study.gather import gather_records
 from cvt_hpc.study.histories import keep_histories, missing_histories
-from cvt_hpc.study.launch import Team, assembled_team
 from cvt_hpc.study.part import Part, read_part
 from cvt_hpc.study.planning import Plan, asked_runs, next_round, prepare
-from cvt_hpc.study.progress import Progress
-from cvt_hpc.study.record import RecordLog
-from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.ranks.launch import Team, assembled_team
+from cvt_hpc.study.ranks.progress import Progress
+from cvt_hpc.study.ranks.schedule import Counter, claimed_batches, open_counter
+from cvt_hpc.study.ranks.stopping import ELSEWHERE, SignalWatch, Stop
+from cvt_hpc.study.ranks.survival import outlive
+from cvt_hpc.study.ranks.time_limit import find_time_limit
+from cvt_hpc.study.record.frames import RecordFormat
+from cvt_hpc.study.record.log import RecordLog
+from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.study.report import RunReport, build_report
-from cvt_hpc.study.schedule import Counter, claimed_batches, open_counter
 from cvt_hpc.study.simulator import Simulator, default_simulator
-from cvt_hpc.study.steps import check_refinement
-from cvt_hpc.study.stopping import ELSEWHERE, SignalWatch, Stop
 from cvt_hpc.study.task import Task
-from cvt_hpc.study.time_limit import find_time_limit
+from cvt_hpc.study.time_steps import check_refinement
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.study.batches import Batch, Turns
-from cvt_hpc.study.cost_model import Fit, fit_recorded
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.record import Record
-from cvt_hpc.study.records import Records
+from cvt_hpc.study.forecast.cost_model import Fit, fit_recorded
+from cvt_hpc.study.record.index import Records
+from cvt_hpc.study.record.log import Record
 from cvt_hpc.study.simulator import Simulator
-from cvt_hpc.study.steps import point_at_step
+from cvt_hpc.study.time_steps import point_at_step
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:

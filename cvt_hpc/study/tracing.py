@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.records import Records
+from cvt_hpc.study.record.index import Records
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 
 UNKNOWN = OccurrenceClass.NOT_RUN

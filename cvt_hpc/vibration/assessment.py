@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from cvt_hpc.variables import Status, Variable, Vibrates
 from cvt_hpc.vibration import signals
-from cvt_hpc.vibration.criterion import fitting_window
 from cvt_hpc.vibration.irregularity import relative_scatter
 from cvt_hpc.vibration.occurrence import classify, margin
+from cvt_hpc.vibration.settings import fitting_window
 
 VARIABLES = (
     Variable("amplitude", ("strand",), "f8", "m", "band-limited peak amplitude at the strongest probe"),
@@ -88,7 +88,7 @@ def assess(
     strands : sequence of str, length probe
         The strand on which each probe lies.
     parameters : mapping
-        Flat parameters with the keys of `criterion.PARAMETERS["vibration"]`.
+        Flat parameters with the keys of `settings.PARAMETERS["vibration"]`.
 
     Returns
     -------

@@ -19,9 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 from cvt_hpc.variables import Coordinate, Variable, Vibrates
 from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.assessment import Occurrence
-from cvt_hpc.vibration.criterion import SHORTEST_SEGMENT, fitting_window
 from cvt_hpc.vibration.occurrence import LEAST_RISES, LONGEST_REASON
 from cvt_hpc.vibration.ramped import QUANTITIES, Quantity
+from cvt_hpc.vibration.settings import SHORTEST_SEGMENT, fitting_window
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cvt_hpc.vibration.criterion import fitting_window
+from cvt_hpc.vibration.settings import fitting_window
 from cvt_hpc.vibration.tapering import Array, check_band, fine_spectrum, segment_amplitude, time_last
 
 WINDOWS_FOR_GROWTH = 3  # a slope and its standard error need one more point than a line has parameters

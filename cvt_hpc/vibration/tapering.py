@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cvt_hpc.vibration.criterion import SHORTEST_SEGMENT
+from cvt_hpc.vibration.settings import SHORTEST_SEGMENT
 
 Array = NDArray[np.float64]
 

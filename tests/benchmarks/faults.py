@@ -33,7 +33,7 @@ from test_batch_files import JOB, TWO_NODES, start_again  # noqa: E402
 
 from cvt_hpc import load_job, open_results, run  # noqa: E402
 from cvt_hpc.study.folder import StudyFolder  # noqa: E402
-from cvt_hpc.study.recovery import read_records  # noqa: E402
+from cvt_hpc.study.record.recovery import read_records  # noqa: E402
 
 SLURMD = "kill -9 of slurmd and its node"
 COUNTS = ("faults", "starts", "acknowledged", "lost", "different", "hangs", "left")

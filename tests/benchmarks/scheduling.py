@@ -28,16 +28,16 @@ from study_processes import clean_environment, find_mpirun  # noqa: E402
 
 from cvt_hpc.study import process_rank, run  # noqa: E402
 from cvt_hpc.study.batches import share_out  # noqa: E402
-from cvt_hpc.study.cost_model import Fit  # noqa: E402
-from cvt_hpc.study.forecast import (  # noqa: E402
+from cvt_hpc.study.forecast.cost_model import Fit  # noqa: E402
+from cvt_hpc.study.forecast.simulate import (  # noqa: E402
     ClaimTimes,
     Forecast,
     forecast,
     least_makespan,
     simulate_schedule,
 )
-from cvt_hpc.study.launch import assembled_team  # noqa: E402
-from cvt_hpc.study.schedule import open_counter  # noqa: E402
+from cvt_hpc.study.ranks.launch import assembled_team  # noqa: E402
+from cvt_hpc.study.ranks.schedule import open_counter  # noqa: E402
 from cvt_hpc.study.status import find_records  # noqa: E402
 
 SHARED_MEMORY = ClaimTimes(2e-6, 0.0, 0.0)

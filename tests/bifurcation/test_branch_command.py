@@ -5,9 +5,9 @@ import pytest
 import xarray as xr
 from cf import cf_findings
 
-from cvt_hpc.bifurcation.asking import load_diagram
 from cvt_hpc.bifurcation.attractors import Start, attractors
 from cvt_hpc.bifurcation.dataset import Direction, Stability
+from cvt_hpc.bifurcation.job import load_diagram
 from cvt_hpc.cli import main
 from cvt_hpc.job import build_job
 from cvt_hpc.models.steady_variator.walking import SteadyBelt

@@ -3,9 +3,10 @@
 import pytest
 import xarray as xr
 
-from cvt_hpc.bifurcation import making
+from cvt_hpc.bifurcation import diagram
 from cvt_hpc.bifurcation.attractors import Attractor
 from cvt_hpc.bifurcation.dataset import Stability
+from cvt_hpc.bifurcation.followed import Followed
 from cvt_hpc.cli import main
 from cvt_hpc.models.linear_stability.branch import Branch
 from cvt_hpc.vibration.classes import OccurrenceClass
@@ -32,11 +33,9 @@ def branch(tmp_path, monkeypatch):
             run = Attractor(90.0, 1, kind, 0.0, 0.0, "slips")
             if interrupted and asked is not diagram.branches[0]:
                 raise KeyboardInterrupt
-            return making.Followed(
-                asked, None, Branch([], dict.fromkeys(diagram.loads, "none")), [], [], [run], []
-            )
+            return Followed(asked, None, Branch([], dict.fromkeys(diagram.loads, "none")), [], [], [run], [])
 
-        monkeypatch.setattr(making, "_follow", follow)
+        monkeypatch.setattr(diagram, "_follow", follow)
         return main(["branch", str(tmp_path / "x.toml"), "--out", str(tmp_path / "out"), *options])
 
     return command

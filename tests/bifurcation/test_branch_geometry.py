@@ -2,8 +2,8 @@
 
 import pytest
 
-from cvt_hpc.bifurcation.asking import load_diagram
 from cvt_hpc.bifurcation.dataset import diagram_dataset
+from cvt_hpc.bifurcation.job import load_diagram
 from cvt_hpc.errors import InputError
 
 JOB = """

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from cvt_hpc.chart import load_chart
+from cvt_hpc.chart.checks import check_prospects
 from cvt_hpc.chart.plan import Role
-from cvt_hpc.chart.prospects import check_prospects
 from cvt_hpc.cli import main
 
 FOLDER = Path(__file__).parents[2] / "jobs"

@@ -9,9 +9,9 @@ import pytest
 import xarray as xr
 from cf import cf_findings
 
-from cvt_hpc.chart.ladder_rungs import ladder
 from cvt_hpc.cli import main
 from cvt_hpc.job import load_job
+from cvt_hpc.ladder.rungs import ladder
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
 
 JOB = """name = "small"

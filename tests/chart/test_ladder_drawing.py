@@ -4,8 +4,8 @@ import matplotlib
 import pytest
 
 from cvt_hpc.analysis.figures import STYLE
-from cvt_hpc.chart.ladder_comparing import Finding, Score
-from cvt_hpc.chart.ladder_drawing import ladder_figure
+from cvt_hpc.ladder.comparing import Finding, Score
+from cvt_hpc.ladder.drawing import ladder_figure
 
 FINDINGS = [
     Finding("occurrence", "cheap", Score(10, wrong=0.3, undecided=0.2), 0.01),

@@ -2,9 +2,9 @@
 
 import pytest
 
-from cvt_hpc.chart.ladder_rungs import ladder
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
+from cvt_hpc.ladder.rungs import ladder
 
 DOCUMENT = {
     "name": "x",

@@ -7,8 +7,8 @@ import pytest
 from bells import Transient
 
 from cvt_hpc.chart import load_chart
+from cvt_hpc.chart.checks import check_prospects
 from cvt_hpc.chart.measuring import measure
-from cvt_hpc.chart.prospects import check_prospects
 from cvt_hpc.chart.quantities import History, Quantity, observe
 from cvt_hpc.errors import InputError
 

@@ -56,7 +56,10 @@ def test_imports_run_downwards():
     ("modules", "rooms"),
     [
         ({"mpi4py"}, {"study"}),
-        ({"cvt_hpc.files.written_aside"}, {"study", "analysis", "chart", "bifurcation", "history_files"}),
+        (
+            {"cvt_hpc.files.written_aside"},
+            {"study", "analysis", "chart", "ladder", "bifurcation", "history_files"},
+        ),
     ],
 )
 def test_what_only_some_rooms_do(modules, rooms):

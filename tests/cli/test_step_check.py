@@ -61,7 +61,7 @@ def checked(mechanics, write_job, call, monkeypatch):
     strands = Coordinate(np.array(["t1", "t2"]), "", "strand")
     monkeypatch.setattr(double, "record_coordinates", lambda job: {"strand": strands})
     monkeypatch.setattr(double, "run_points", run_points)
-    criterion = {"vibration": {"amplitude_threshold": schema.criterion.PARAMETERS["vibration"]["amplitude_threshold"]}}  # fmt: skip
+    criterion = {"vibration": {"amplitude_threshold": schema.vibration_settings.PARAMETERS["vibration"]["amplitude_threshold"]}}  # fmt: skip
     monkeypatch.setattr(schema.SHARED[0], "PARAMETERS", schema.SHARED[0].PARAMETERS | criterion)
     write_job(GRID)
     return lambda fraction="1", *more: call("run", "x.toml", "--check-step", fraction, *more)

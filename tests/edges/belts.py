@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 
 from cvt_hpc.job import build_job
-from cvt_hpc.models.elastic_belt.flat import flat_belt, pack, system
-from cvt_hpc.models.elastic_belt.general import GeneralTransient
+from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
+from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, system
 from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.marching import Marching
 from cvt_hpc.steppers.system import RELATIVE_INCREMENT, System, jacobian

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from belts import eigenvalues, general, longest_stable_step, settled
 
-from cvt_hpc.models.elastic_belt.flat import unpack
+from cvt_hpc.models.elastic_belt.one_system import unpack
 from cvt_hpc.models.elastic_belt.rhs import ring_drag
-from cvt_hpc.steppers.stiffness import STABLE, fastest_rate
+from cvt_hpc.steppers.fastest_rate import STABLE, fastest_rate
 from cvt_hpc.variables import Status
 
 SMOOTH = {"ring_friction": 0.0, "friction_speed": 0.5, "friction_gradient": -0.05}

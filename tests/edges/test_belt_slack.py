@@ -15,8 +15,8 @@ from cvt_hpc.models.elastic_belt.belt import (
     State,
     belt_constants,
 )
-from cvt_hpc.models.elastic_belt.doubts import slack_doubt
-from cvt_hpc.models.elastic_belt.flat import flat_belt, pack, system
+from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, system
+from cvt_hpc.models.elastic_belt.validity import slack_doubt
 from cvt_hpc.steppers.system import jacobian
 from cvt_hpc.variables import Status
 

@@ -6,10 +6,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from cvt_hpc.models.elastic_belt.belt import DRIVEN_POSITION, SCALARS, State, W, belt_constants
-from cvt_hpc.models.elastic_belt.flank import flank_forces, sliding
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.rhs import contact_forces
 from cvt_hpc.physics.compliance import contact_state
+from cvt_hpc.physics.flank import flank_forces, sliding
 
 speeds = st.floats(-1.0, 1.0)
 coefficients = st.floats(0.01, 0.3)

@@ -20,7 +20,7 @@ from cvt_hpc.simulation import estimate_cost, simulate
 from cvt_hpc.steppers import STEPPERS
 from cvt_hpc.steppers.facts import Facts
 from cvt_hpc.study import run
-from cvt_hpc.vibration import criterion
+from cvt_hpc.vibration import settings as vibration_settings
 
 PAIRS = [(model, stepper) for model in MODELS for stepper in import_module(MODELS[model]).STEPPER_NAMES]
 DIRECT = [model for model in MODELS if not import_module(MODELS[model]).STEPPER_NAMES]
@@ -31,7 +31,7 @@ both = pytest.mark.parametrize(("model", "stepper"), PAIRS + [(model, None) for 
 def test_keys_are_unique_over_all_tables(model, stepper):
     modules = [import_module(MODELS[model])]
     if stepper is not None:
-        modules += [import_module(STEPPERS[stepper]), recording, criterion]
+        modules += [import_module(STEPPERS[stepper]), recording, vibration_settings]
     keys = [key for module in modules for table in module.PARAMETERS.values() for key in table]
     assert sorted(keys) == sorted(set(keys))
     assert set(keys) == set(load_schema(model, stepper, "x").parameters)

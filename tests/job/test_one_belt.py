@@ -6,7 +6,7 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job, known_keys, load_job
-from cvt_hpc.job.handing import handed_to
+from cvt_hpc.job.for_model import handed_to
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.models import MODELS
 from cvt_hpc.physics.capacity import carried_torque

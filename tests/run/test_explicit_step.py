@@ -24,7 +24,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     belt_constants,
     initial_state,
 )
-from cvt_hpc.models.elastic_belt.flat import driven_thrust
+from cvt_hpc.models.elastic_belt.one_system import driven_thrust
 from cvt_hpc.models.elastic_belt.rhs import (
     accelerations,
     contact_forces,

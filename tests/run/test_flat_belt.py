@@ -20,7 +20,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     belt_constants,
     initial_state,
 )
-from cvt_hpc.models.elastic_belt.flat import flat_belt, pack, rates, system, unpack
+from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates, system, unpack
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}

@@ -11,7 +11,7 @@ from scipy.sparse import csc_array
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt.belt import mesh
-from cvt_hpc.models.elastic_belt.flat import rates, system
+from cvt_hpc.models.elastic_belt.one_system import rates, system
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.linear_stability.branch import branch, onsets
 from cvt_hpc.models.linear_stability.modes import DECAY, HIGH, LOW, modes

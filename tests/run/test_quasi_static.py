@@ -13,10 +13,12 @@ from cvt_hpc.models.elastic_belt.belt import (
     initial_state,
     mesh,
 )
-from cvt_hpc.models.elastic_belt.flat import flat_belt
-from cvt_hpc.models.elastic_belt.flat import pack as flat_pack
-from cvt_hpc.models.elastic_belt.flat import rates as flat_rates
-from cvt_hpc.models.elastic_belt.quasi_static import (
+from cvt_hpc.models.elastic_belt.one_system import flat_belt
+from cvt_hpc.models.elastic_belt.one_system import pack as flat_pack
+from cvt_hpc.models.elastic_belt.one_system import rates as flat_rates
+from cvt_hpc.models.elastic_belt.rhs import content_rates
+from cvt_hpc.models.quasi_static_belt import PARAMETERS
+from cvt_hpc.models.quasi_static_belt.equations import (
     own_frequencies,
     pack,
     quasi_static_belt,
@@ -26,8 +28,6 @@ from cvt_hpc.models.elastic_belt.quasi_static import (
     transverse_stiffness,
     unpack,
 )
-from cvt_hpc.models.elastic_belt.rhs import content_rates
-from cvt_hpc.models.quasi_static_belt import PARAMETERS
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
 DEFAULTS |= {"duration": 0.1, "load": 100.0, "stations": 96}

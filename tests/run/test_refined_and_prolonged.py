@@ -10,7 +10,7 @@ from test_run_lanes import assert_same_bits
 
 from cvt_hpc.job import build_job
 from cvt_hpc.models.alone import Alone
-from cvt_hpc.models.elastic_belt.general import GeneralTransient
+from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
 from cvt_hpc.models.elastic_belt.lane_run import LaneRun
 from cvt_hpc.models.oscillator.transient import Transient as Oscillator
 from cvt_hpc.simulation import Interrupted, run_point, run_points, simulate

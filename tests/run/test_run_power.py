@@ -21,12 +21,12 @@ from cvt_hpc.models.elastic_belt.belt import (
     W,
     belt_constants,
 )
-from cvt_hpc.models.elastic_belt.doubts import power_limit
 from cvt_hpc.models.elastic_belt.lane_belt import take_lane
 from cvt_hpc.models.elastic_belt.power import LAYER_LOSS, POWERS, STORED_ENERGY
 from cvt_hpc.models.elastic_belt.record import LOSSES
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.sampling import Outcome
+from cvt_hpc.models.elastic_belt.validity import power_limit
 
 COARSE = {"stations": 64, "duration": 0.08}
 CONSTANT = {"friction_law": "coulomb", "friction_gradient": 0.0}

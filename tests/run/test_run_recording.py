@@ -10,7 +10,7 @@ from cvt_hpc import recording
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt import parameters as belt
 from cvt_hpc.models.elastic_belt.record import coordinates
-from cvt_hpc.vibration import criterion
+from cvt_hpc.vibration import settings as vibration_settings
 from cvt_hpc.vibration.assessment import assess
 from cvt_hpc.vibration.signals import amplitude_spectrum
 
@@ -20,7 +20,7 @@ DEFAULTS = job().parameters
 def problems(**values):
     """Keys that the checks of recording and judging complain about."""
     found = []
-    for check in (recording.check, criterion.check):
+    for check in (recording.check, vibration_settings.check):
         found += [key for key, expected, text in check(DEFAULTS | values) if expected and text]
     return found
 

@@ -15,7 +15,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     initial_state,
     mesh,
 )
-from cvt_hpc.models.elastic_belt.flat import flat_belt, pack, rates
+from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.forces import distributions, quantities

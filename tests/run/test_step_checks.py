@@ -14,12 +14,12 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.auto.rules import coarse
 from cvt_hpc.models.elastic_belt.belt import V_ELEMENT, V_RING, U, belt_constants, initial_state
-from cvt_hpc.models.elastic_belt.doubts import LARGEST_STEP_RIPPLE, doubt, step_doubt
 from cvt_hpc.models.elastic_belt.lane_forces import NOTED
 from cvt_hpc.models.elastic_belt.parameters import check
 from cvt_hpc.models.elastic_belt.recorded_run import recording
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP, SAFE_SHARE, chosen_step, transverse_limit
 from cvt_hpc.models.elastic_belt.transient import Transient
+from cvt_hpc.models.elastic_belt.validity import LARGEST_STEP_RIPPLE, doubt, step_doubt
 from cvt_hpc.variables import Status, Vibrates
 
 ONE_BELT = {"belt_length": 0.6612, "centre_distance": 0.155, "stations": 48}

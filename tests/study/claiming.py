@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.study.launch import Team, assembled_team
-from cvt_hpc.study.schedule import Counter, open_counter
+from cvt_hpc.study.ranks.launch import Team, assembled_team
+from cvt_hpc.study.ranks.schedule import Counter, open_counter
 
 PATIENCE = 20.0  # [s] that rank 0 computes at most while it waits for the others
 
@@ -65,7 +65,7 @@ def interrupt_from_last(team: Team, counter: Counter, options: dict[str, Any]) -
 
 def miscount(team: Team, options: dict[str, Any]) -> dict[str, Any]:
     """Let the counter's one-sided operation give each number twice, as a broken transport may."""
-    from cvt_hpc.study.shared_counter import SharedCounter
+    from cvt_hpc.study.ranks.shared_counter import SharedCounter
 
     fetch = SharedCounter._fetch
     SharedCounter._fetch = lambda *arguments: fetch(*arguments) // 2

@@ -23,7 +23,7 @@ from study_double import Axis, Job, Simulator, logistic_numbers
 
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.record.recovery import read_records
 
 RUNS = 40
 HISTORIES = (5, 23)

@@ -19,8 +19,9 @@ import numpy as np
 import study_double
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.study import gather, record
-from cvt_hpc.study.record import RecordLog
+from cvt_hpc.study import gather
+from cvt_hpc.study.record import log
+from cvt_hpc.study.record.log import Record, RecordLog
 
 # A record whose write has returned: run, SHA-256 of its bytes, and the name and the end [byte] of its log.
 ACKNOWLEDGED = np.dtype([("run", "i8"), ("digest", "S64"), ("log", "S160"), ("end", "i8")])
@@ -37,7 +38,7 @@ def main(options: dict[str, Any]) -> int:
     """
     acknowledge(options["acknowledged"])
     if "torn" in options:
-        record.os = TornWrites(options["torn"], options.get("turns_read_only", False))
+        log.os = TornWrites(options["torn"], options.get("turns_read_only", False))
     if "clock" in options:
         let_clock_jump(options["clock"])
     if not options.get("gathers"):
@@ -63,7 +64,7 @@ def acknowledge(path: str) -> None:
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
     append = RecordLog.append
 
-    def append_and_tell(log: RecordLog, records: list[record.Record]) -> None:
+    def append_and_tell(log: RecordLog, records: list[Record]) -> None:
         append(log, records)
         end = os.fstat(log._descriptor).st_size
         told = np.zeros(len(records), ACKNOWLEDGED)

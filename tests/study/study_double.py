@@ -208,8 +208,8 @@ def main(options: dict[str, Any]) -> int:
 
         mpi4py.rc.thread_level = options["thread_level"]
     from cvt_hpc.study import process_rank, run
-    from cvt_hpc.study.launch import end_process
-    from cvt_hpc.study.record import RecordLog
+    from cvt_hpc.study.ranks.launch import end_process
+    from cvt_hpc.study.record.log import RecordLog
 
     if process_rank() == options.get("break_rank"):
         RecordLog.append = raise_defect

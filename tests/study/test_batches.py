@@ -12,9 +12,9 @@ from study_double import Axis, Job, Simulator
 
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.batches import batch_cost, share_out
-from cvt_hpc.study.cost_model import CostModel
-from cvt_hpc.study.frames import RECORD
-from cvt_hpc.study.record import RecordLog
+from cvt_hpc.study.forecast.cost_model import CostModel
+from cvt_hpc.study.record.frames import RECORD
+from cvt_hpc.study.record.log import RecordLog
 from cvt_hpc.variables import Status
 
 RUNS = 20

@@ -13,10 +13,12 @@ from study_double import Axis, Job, Simulator
 
 from cvt_hpc.printing import disk_line
 from cvt_hpc.study import run
-from cvt_hpc.study.cost_model import Fit
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.forecast import (
+from cvt_hpc.study.forecast.cost_model import Fit
+from cvt_hpc.study.forecast.pilots import find_out
+from cvt_hpc.study.forecast.resources import Disk, disk_space, slurm_time, suggested_time
+from cvt_hpc.study.forecast.simulate import (
     NETWORK,
     ClaimTimes,
     Forecast,
@@ -24,9 +26,7 @@ from cvt_hpc.study.forecast import (
     least_makespan,
     simulate_schedule,
 )
-from cvt_hpc.study.frames import PREAMBLE
-from cvt_hpc.study.pilots import find_out
-from cvt_hpc.study.resources import Disk, disk_space, slurm_time, suggested_time
+from cvt_hpc.study.record.frames import PREAMBLE
 
 AT_ONCE = ClaimTimes(0.0, 0.0, 0.0)
 MANY = 10**8

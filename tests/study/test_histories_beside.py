@@ -10,7 +10,7 @@ from study_processes import wait_until
 
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.frames import RECORD
+from cvt_hpc.study.record.frames import RECORD
 from cvt_hpc.variables import Status
 
 RUNS = 12

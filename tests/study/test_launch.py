@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.study.launch import Launch, assembled_team, detect_launch
+from cvt_hpc.study.ranks.launch import Launch, assembled_team, detect_launch
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,8 @@ from study_processes import wait_until
 
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.frames import PLACE, RECORD
-from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.record.frames import PLACE, RECORD
+from cvt_hpc.study.record.recovery import read_records
 
 RUNS = 60
 

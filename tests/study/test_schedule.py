@@ -3,7 +3,7 @@
 import json
 
 from cvt_hpc.study.batches import Assignment
-from cvt_hpc.study.schedule import SerialCounter, claimed_batches
+from cvt_hpc.study.ranks.schedule import SerialCounter, claimed_batches
 
 PLAN = [Assignment((5, 2)), Assignment((9,)), Assignment((0, 1, 3))]
 

@@ -10,7 +10,7 @@ from study_double import Axis, Coordinate, Job, Simulator
 from cvt_hpc.job import load_job
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.description import Study, describe
-from cvt_hpc.study.recovery import read_records
+from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.variables import Status
 
 
@@ -109,7 +109,7 @@ def test_time_limit_ends_claiming_and_the_rest_comes_later(tmp_path, monkeypatch
     class Late(Simulator):
         def run_point(self, job, point, interrupt):
             if point["load"] == 4:
-                monkeypatch.setattr("cvt_hpc.study.stopping.time.monotonic", lambda: math.inf)
+                monkeypatch.setattr("cvt_hpc.study.ranks.stopping.time.monotonic", lambda: math.inf)
             return super().run_point(job, point, interrupt)
 
     report = sweep(Job(), tmp_path, simulator=Late(), time_limit=1000.0)

@@ -9,14 +9,14 @@ import pytest
 from study_double import Axis, Job, Simulator
 
 from cvt_hpc.study import run
-from cvt_hpc.study.cost_model import CostModel, Fit, fit_recorded
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.frames import RecordFormat
-from cvt_hpc.study.record import RecordLog
-from cvt_hpc.study.recovery import read_records
-from cvt_hpc.study.schedule import SerialCounter
-from cvt_hpc.study.stopping import SignalWatch, Stop
-from cvt_hpc.study.time_limit import TimeLimit, find_time_limit, gathering_margin
+from cvt_hpc.study.forecast.cost_model import CostModel, Fit, fit_recorded
+from cvt_hpc.study.ranks.schedule import SerialCounter
+from cvt_hpc.study.ranks.stopping import SignalWatch, Stop
+from cvt_hpc.study.ranks.time_limit import TimeLimit, find_time_limit, gathering_margin
+from cvt_hpc.study.record.frames import RecordFormat
+from cvt_hpc.study.record.log import RecordLog
+from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.variables import Status
 
 JOB = Job((Axis("load", tuple(range(12))),))
@@ -40,8 +40,8 @@ def write_history(out, monkeypatch, jump=0.0):
     done = study.blank_rows()
     done["status"] = Status.DONE
     now, wrong = 1e9, 0.0
-    monkeypatch.setattr("cvt_hpc.study.record.time.time", lambda: now + wrong)
-    monkeypatch.setattr("cvt_hpc.study.record.time.monotonic", lambda: now)
+    monkeypatch.setattr("cvt_hpc.study.record.log.time.time", lambda: now + wrong)
+    monkeypatch.setattr("cvt_hpc.study.record.log.time.monotonic", lambda: now)
     layout = RecordFormat(study.fingerprint, study.record_dtype)
     session = {"id": "a", "started": now, "versions": {}, "git_revision": "", "command": "", "host": "",
                "ranks": 1}  # fmt: skip
@@ -147,7 +147,7 @@ def test_no_limit_without_slurm():
 
 
 def test_the_end_is_read_from_the_environment(monkeypatch):
-    monkeypatch.setattr("cvt_hpc.study.time_limit.time.time", lambda: 5000.0)
+    monkeypatch.setattr("cvt_hpc.study.ranks.time_limit.time.time", lambda: 5000.0)
     limit = find_time_limit(None, 10_000, {"SLURM_JOB_ID": "17", "SLURM_JOB_END_TIME": "8600"})
     assert limit.seconds == 3600.0 - gathering_margin(10_000)
     assert limit.name == "end of the Slurm job"

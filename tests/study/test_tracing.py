@@ -250,7 +250,7 @@ def test_an_interrupted_trace_goes_on_to_the_same_runs(tmp_path, monkeypatch, re
     class Late(Counting):
         def run_point(self, *arguments):
             if self.runs + 1 == until:
-                monkeypatch.setattr("cvt_hpc.study.stopping.time.monotonic", lambda: float("inf"))
+                monkeypatch.setattr("cvt_hpc.study.ranks.stopping.time.monotonic", lambda: float("inf"))
             return super().run_point(*arguments)
 
     report = run(JOB, tmp_path, simulator=Late(lanes=lanes), progress=False, time_limit=1000.0)
@@ -267,7 +267,7 @@ def test_an_interrupted_trace_goes_on_to_the_same_runs(tmp_path, monkeypatch, re
 
 
 def test_a_round_that_leaves_no_records_is_a_defect_and_no_endless_loop(tmp_path, monkeypatch):
-    monkeypatch.setattr("cvt_hpc.study.stopping.Stop.fits", lambda self, seconds: False)
+    monkeypatch.setattr("cvt_hpc.study.ranks.stopping.Stop.fits", lambda self, seconds: False)
     with pytest.raises(RuntimeError, match="without records of its runs"):
         run(JOB, tmp_path, simulator=Simulator(), progress=False)
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cvt_hpc.variables import Vibrates
-from cvt_hpc.vibration.criterion import PARAMETERS
 from cvt_hpc.vibration.ramp import BINS, SUSTAINED, VARIABLES, Passages, assess_ramp
+from cvt_hpc.vibration.settings import PARAMETERS
 
 RATE = 20_000.0
 DEFAULTS = {key: parameter.default for key, parameter in PARAMETERS["vibration"].items()}

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cvt_hpc.vibration import signals
-from cvt_hpc.vibration.criterion import fitting_window
+from cvt_hpc.vibration.settings import fitting_window
 from cvt_hpc.vibration.tapering import SHORTEST_SEGMENT
 
 RATE = 20_000.0

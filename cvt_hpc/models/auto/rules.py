@@ -30,7 +30,7 @@ from cvt_hpc.models import elastic_belt
 from cvt_hpc.models.elastic_belt.step_choice import SAFE_SHARE, transverse_limit
 from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.variables import Vibrates
-from cvt_hpc.vibration import criterion
+from cvt_hpc.vibration import settings as vibration_settings
 from cvt_hpc.vibration.assessment import Occurrence
 from cvt_hpc.vibration.ramped import ramped
 
@@ -70,7 +70,9 @@ def coarse(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
     }
     p["step"] = min(p["step"] / COARSENESS, SAFE_SHARE * transverse_limit(p))
     least = elastic_belt.PARAMETERS["mesh"]["stations"].minimum
-    problems = (check for module in (elastic_belt, criterion, recording) for check in module.check(p))
+    problems = (
+        check for module in (elastic_belt, vibration_settings, recording) for check in module.check(p)
+    )
     if ramped(p) or p["stations"] < least or any(problems):
         return None
     return p

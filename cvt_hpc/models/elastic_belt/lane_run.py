@@ -9,11 +9,11 @@ import numpy as np
 
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.elastic_belt.belt import State
-from cvt_hpc.models.elastic_belt.doubts import FAILURES, step_doubt
 from cvt_hpc.models.elastic_belt.lane_belt import take_lane
 from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
 from cvt_hpc.models.elastic_belt.sampling import CONTACT_SOLVES, ENDED_AT, OUTCOME, REPEATED, Outcome
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
+from cvt_hpc.models.elastic_belt.validity import FAILURES, step_doubt
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import REGIONS, Mesh, mesh
-from cvt_hpc.models.elastic_belt.doubts import doubt
 from cvt_hpc.models.elastic_belt.fluctuation import Fluctuation, fluctuation
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, PROFILES, Probe, Sensors, probes, sensors
+from cvt_hpc.models.elastic_belt.validity import doubt
 from cvt_hpc.recording import sample_count
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.ramped import ramped

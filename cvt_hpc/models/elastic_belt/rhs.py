@@ -40,8 +40,8 @@ from cvt_hpc.models.elastic_belt.belt import (
     U,
     W,
 )
-from cvt_hpc.models.elastic_belt.flank import flank_forces, sliding
 from cvt_hpc.physics.compliance import ContactState, solve_contact
+from cvt_hpc.physics.flank import flank_forces, sliding
 from cvt_hpc.physics.friction import friction_coefficient, saturation
 from cvt_hpc.physics.sheaves import Sheaves
 

@@ -34,7 +34,7 @@ def batch(points: Sequence[dict[str, Any]], stepper: str, paused: Sequence[Any] 
     """
     if stepper in OWN_STEPPERS:
         return Batch(points, stepper, paused)
-    from cvt_hpc.models.elastic_belt.general import GeneralTransient
+    from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
 
     return batch_of_one(GeneralTransient, points, stepper, paused)
 

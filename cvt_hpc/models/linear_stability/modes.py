@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import MODES, Mesh
-from cvt_hpc.models.elastic_belt.flat import flat_belt, pack, rates
-from cvt_hpc.models.elastic_belt.linearised import Linearisation
+from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates
 from cvt_hpc.models.linear_stability.spectrum import eigenpairs
 from cvt_hpc.models.steady_variator.equations import LATE
+from cvt_hpc.models.steady_variator.linearised import Linearisation
 from cvt_hpc.models.steady_variator.walking import Steady
 
 LOW, HIGH = 100.0, 1500.0  # [Hz]: the band of strands

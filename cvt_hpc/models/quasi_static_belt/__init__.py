@@ -1,7 +1,7 @@
 """The elastic belt with all that is faster than a limit frequency lagging behind its forces.
 
-Another model than `elastic_belt`, made of its parts: `cvt_hpc/models/elastic_belt/quasi_static.py` says what
-it keeps and what it drops. Importing this package is cheap.
+Another model than `elastic_belt`, made of its parts: `equations.py` says what it
+keeps and what it drops. Importing this package is cheap.
 """
 
 from cvt_hpc.models import elastic_belt

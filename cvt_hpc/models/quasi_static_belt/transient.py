@@ -8,25 +8,25 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.models.alone import batch_of_one
-from cvt_hpc.models.elastic_belt import quasi_static
 from cvt_hpc.models.elastic_belt.belt import Belt, Mesh, State
-from cvt_hpc.models.elastic_belt.general import GeneralTransient
+from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
+from cvt_hpc.models.quasi_static_belt import equations
 
 
 class QuasiStaticForm:
-    """As `cvt_hpc.models.elastic_belt.general.Form`, of the split model."""
+    """As `cvt_hpc.models.elastic_belt.general_run.Form`, of the split model."""
 
     def __init__(self, belt: Belt, grid: Mesh, parameters: dict[str, Any]) -> None:
-        self._model = quasi_static.quasi_static_belt(belt, grid, parameters["limit_frequency"])
-        self.system = quasi_static.system(self._model)
+        self._model = equations.quasi_static_belt(belt, grid, parameters["limit_frequency"])
+        self.system = equations.system(self._model)
 
     def pack(self, state: State) -> np.ndarray:
         """Unknowns nearest to a state."""
-        return quasi_static.pack(self._model, state)
+        return equations.pack(self._model, state)
 
     def state(self, time: float, y: np.ndarray) -> State:
         """State of unknowns; overwritten by the next call, and by the next evaluation of rates."""
-        quasi_static.unpack(self._model, time, y)
+        equations.unpack(self._model, time, y)
         return self._model.flat.state
 
     def hints(self, stepper: str) -> dict[str, Any]:

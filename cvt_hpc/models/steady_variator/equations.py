@@ -35,9 +35,9 @@ from cvt_hpc.models.elastic_belt.belt import (
     W,
     initial_state,
 )
-from cvt_hpc.models.elastic_belt.flat import ROWS, flat_belt, rates, unpack
-from cvt_hpc.models.elastic_belt.linearised import Linearisation
+from cvt_hpc.models.elastic_belt.one_system import ROWS, flat_belt, rates, unpack
 from cvt_hpc.models.elastic_belt.rhs import strains
+from cvt_hpc.models.steady_variator.linearised import Linearisation
 
 LATE = 1e9  # [s]: load and damping are those after any start-up
 TYPICAL_SLIDING = 0.1  # [m/s]: filtered speed to begin with

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, N_RING, V_ELEMENT, V_FILTERED, V_RING, U, W
-from cvt_hpc.models.elastic_belt.flat import ROWS, FlatBelt, rates, system
+from cvt_hpc.models.elastic_belt.one_system import ROWS, FlatBelt, rates, system
 from cvt_hpc.steppers.system import RELATIVE_INCREMENT
 
 SPEED, OPENING = -1, -2  # of the driven pulley, beside the rows of the state

@@ -38,7 +38,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     U,
     W,
 )
-from cvt_hpc.models.elastic_belt.flat import (
+from cvt_hpc.models.elastic_belt.one_system import (
     SIZE_OF_POSITION,
     SIZE_OF_SPEED,
     SIZES,

@@ -29,28 +29,32 @@ from __future__ import annotations
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models import MODELS
 
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
+
+class Named(Protocol):
+    """What a job says of its model: which, and in which file."""
+
+    model: str
+    source: str
 
 
-def transient_module(job: Job) -> ModuleType:
+def transient_module(job: Named) -> ModuleType:
     """Of its runs; InputError where nothing is recorded of them."""
     _check_recorded(job)
     return import_module(MODELS[job.model] + ".transient")
 
 
-def record_module(job: Job) -> ModuleType:
+def record_module(job: Named) -> ModuleType:
     """Of what is recorded of its runs; InputError where nothing is."""
     _check_recorded(job)
     return import_module(MODELS[job.model] + ".record")
 
 
-def _check_recorded(job: Job) -> None:
+def _check_recorded(job: Named) -> None:
     if not has_record(job):
         known = ", ".join(model for model in MODELS if _is_recorded(model))
         raise InputError(
@@ -59,7 +63,7 @@ def _check_recorded(job: Job) -> None:
         )
 
 
-def has_record(job: Job) -> bool:
+def has_record(job: Named) -> bool:
     """Whether runs of the job's model are judged and recorded."""
     return _is_recorded(job.model)
 

@@ -15,10 +15,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.classes import at_strongest_strand, occurrence_classes
-from cvt_hpc.chart.ladder_onsets import onsets, paired_errors
-from cvt_hpc.chart.ladder_rungs import MODEL, REFERENCE, Rung
+from cvt_hpc.ladder.audit import FORCES
+from cvt_hpc.ladder.onsets import onsets, paired_errors
+from cvt_hpc.ladder.rungs import MODEL, REFERENCE, Rung
 from cvt_hpc.models.linear_stability.modes import DECAY
-from cvt_hpc.study.audit import FORCES
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass
 

@@ -12,13 +12,13 @@ import numpy as np
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import written_aside
-from cvt_hpc.job.handing import handed_to
+from cvt_hpc.job.for_model import handed_to
 from cvt_hpc.models.auto.rules import Rung
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.records import Records
-from cvt_hpc.study.recovery import read_records
-from cvt_hpc.study.repeats import Repeat, built, interval
+from cvt_hpc.study.record.index import Records
+from cvt_hpc.study.record.recovery import read_records
+from cvt_hpc.study.repeats import AUDITED, FULL_MODEL, Repeat, built, interval
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.status import expected_cost
 from cvt_hpc.variables import Status
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
 FOLDER, TABLE = "audit", "audit.csv"  # in the folder of the runs, and in that of the audit
-AUDITED = "auto"
-FULL_MODEL = "elastic_belt"
 LOWER = (Rung.PASSIVE, Rung.COARSE)
 OPPOSITE = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
 FORCES = (("mean_ring_tension", "mean_push_force"), ("axial_force",))  # by what they are measured against

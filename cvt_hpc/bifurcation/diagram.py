@@ -6,18 +6,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from cvt_hpc.bifurcation.asking import Asked, Diagram
 from cvt_hpc.bifurcation.attractors import Attractor, Start, attractors
 from cvt_hpc.bifurcation.dataset import diagram_dataset
 from cvt_hpc.bifurcation.drawing import draw_branch
 from cvt_hpc.bifurcation.folder import DATASET, claim_folder, picture_names
+from cvt_hpc.bifurcation.followed import Followed
+from cvt_hpc.bifurcation.job import Asked, Diagram
 from cvt_hpc.files import written_aside
-from cvt_hpc.models.elastic_belt.belt import Mesh, State, mesh
+from cvt_hpc.models.elastic_belt.belt import State, mesh
 from cvt_hpc.models.linear_stability.branch import CLOSE, Branch, Onset, branch, onsets
 from cvt_hpc.models.linear_stability.modes import LOW
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
@@ -33,36 +33,6 @@ AGREEMENT = 5.0
 # of 583 Hz beside a mode of 277. On jobs/branch.toml a third gives the same verdicts, since beside slow modes
 # (185 Hz and less) no run begins to vibrate; at four thirds modes of 277-346 Hz are left undecided
 SEEN = 2.0 / 3.0
-
-
-class Followed(NamedTuple):
-    """One branch with all that was found of it.
-
-    Attributes
-    ----------
-    asked : Asked
-        What was asked for.
-    grid : Mesh
-        Of the belt.
-    branch : Branch
-        Steady states and their modes.
-    onsets : list of Onset
-        Its Hopf points, in the order of their loads.
-    hidden : list of (float, float)
-        Loads between which stability changes without a Hopf point that could be found [N m].
-    runs : list of Attractor
-        From near the steady state (start 0) and from the large start (1); empty if none were asked for.
-    kinds : list of Criticality
-        One for each of `onsets`.
-    """
-
-    asked: Asked
-    grid: Mesh
-    branch: Branch
-    onsets: list[Onset]
-    hidden: list[tuple[float, float]]
-    runs: list[Attractor]
-    kinds: list[Criticality]
 
 
 @dataclass(frozen=True)

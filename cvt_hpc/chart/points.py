@@ -8,7 +8,7 @@ from typing import Any
 
 from cvt_hpc.chart.declarations import BUDGET, CHOICE, METHOD, SETTINGS
 from cvt_hpc.chart.plan import Point, Role, Scene
-from cvt_hpc.chart.stage import Stage, check_word, in_words
+from cvt_hpc.chart.scenes import Stage, check_word, in_words
 from cvt_hpc.errors import mismatch, show, unknown
 from cvt_hpc.job import Job
 from cvt_hpc.job.schema import load_schema

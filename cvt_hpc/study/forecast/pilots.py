@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from cvt_hpc.study.attempts import predicted_costs
 from cvt_hpc.study.batches import Batch, in_parts
-from cvt_hpc.study.cost_model import CostModel, Fit
 from cvt_hpc.study.description import describe
+from cvt_hpc.study.forecast.cost_model import CostModel, Fit
 from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.study.status import find_records
-from cvt_hpc.study.steps import refined_steps
 from cvt_hpc.study.task import Task
+from cvt_hpc.study.time_steps import refined_steps
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job

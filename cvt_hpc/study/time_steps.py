@@ -13,7 +13,7 @@ from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
-    from cvt_hpc.study.records import Records
+    from cvt_hpc.study.record.index import Records
 
 STEP = "step"  # the key of the time step, of steppers that have a fixed one
 MOST_REFINED = 1000.0

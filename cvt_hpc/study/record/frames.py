@@ -1,4 +1,4 @@
-"""The bytes of a record log, format version 2; README.md of this folder has them in a table.
+"""The bytes of a record log, format version 2; README.md of the folder above has them in a table.
 
 A log is a preamble (magic, format version, a JSON header and its checksum) and then frames: a head (marker,
 payload length, time of writing, checksum) and a payload. A frame's checksum starts from the job's fingerprint

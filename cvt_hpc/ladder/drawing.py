@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from cvt_hpc.analysis.error_axes import line_style, set_error_axis
 from cvt_hpc.analysis.figures import WIDTH, draw
-from cvt_hpc.chart.figure_parts import line_style, set_error_axis
-from cvt_hpc.chart.ladder_comparing import Finding
-from cvt_hpc.chart.ladder_rungs import QUESTIONS, REFERENCE
+from cvt_hpc.ladder.comparing import Finding
+from cvt_hpc.ladder.rungs import QUESTIONS, REFERENCE
 
 HEIGHT = 7.2  # [inch]
 ROOM = 1.15  # length of a linear axis over its largest error

@@ -9,7 +9,7 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray
-from cvt_hpc.models.elastic_belt import flat
+from cvt_hpc.models.elastic_belt import one_system
 from cvt_hpc.models.elastic_belt.belt import (
     V_ELEMENT,
     Belt,
@@ -20,18 +20,18 @@ from cvt_hpc.models.elastic_belt.belt import (
     initial_state,
     random_strands,
 )
-from cvt_hpc.models.elastic_belt.doubts import FAILURES
 from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK, lane_belt, lane_state, put_lane
 from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES
 from cvt_hpc.models.elastic_belt.march import sample_state
 from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, recording
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFILES, Outcome
-from cvt_hpc.models.elastic_belt.structure import SparseJacobian
+from cvt_hpc.models.elastic_belt.sparsity import SparseJacobian
+from cvt_hpc.models.elastic_belt.validity import FAILURES
 from cvt_hpc.models.marched import Marched
 from cvt_hpc.steppers.facts import Result
+from cvt_hpc.steppers.fastest_rate import STABLE, fastest_rate
 from cvt_hpc.steppers.marching import Marching
-from cvt_hpc.steppers.stiffness import STABLE, fastest_rate
 from cvt_hpc.variables import Status
 
 SAMPLES_TOGETHER = 20  # between two looks at what was sampled: a run that has left its path goes not far
@@ -54,16 +54,16 @@ class Form:
     """
 
     def __init__(self, belt: Belt, grid: Mesh, parameters: dict[str, Any]) -> None:
-        self._flat = flat.flat_belt(belt)
-        self.system = flat.system(self._flat)
+        self._flat = one_system.flat_belt(belt)
+        self.system = one_system.system(self._flat)
 
     def pack(self, state: State) -> np.ndarray:
         """Unknowns of a state."""
-        return flat.pack(self._flat, state)
+        return one_system.pack(self._flat, state)
 
     def state(self, time: float, y: np.ndarray) -> State:
         """State of unknowns; overwritten by the next call, and by the next evaluation of rates."""
-        flat.unpack(self._flat, time, y)
+        one_system.unpack(self._flat, time, y)
         return self._flat.state
 
     def hints(self, stepper: str) -> dict[str, Any]:

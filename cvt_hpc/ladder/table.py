@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from cvt_hpc.chart.ladder_comparing import Finding
-from cvt_hpc.chart.ladder_rungs import QUESTIONS, Rung
-from cvt_hpc.chart.table import columns, number, short
 from cvt_hpc.job import Job
+from cvt_hpc.ladder.comparing import Finding
+from cvt_hpc.ladder.rungs import QUESTIONS, Rung
 from cvt_hpc.study.provenance import command, git_revision, history_line, machine, versions
+from cvt_hpc.tables import columns, number, short
 
 UNITS = dict.fromkeys(QUESTIONS, "1") | {"onset": "N m"}
 # Column -> what it is; `error_unit` tells the unit of those of errors

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, Protocol, Self
 
 from cvt_hpc.study.batches import Assignment, Batch
-from cvt_hpc.study.launch import Team
+from cvt_hpc.study.ranks.launch import Team
 
 INTERRUPTED = 2**40  # claims count from here when all are interrupted: beyond every plan
 
@@ -48,7 +48,7 @@ def open_counter(team: Team) -> Counter:
     """Return the counter of a team, at zero."""
     if team.communicator is None:
         return SerialCounter()
-    from cvt_hpc.study.shared_counter import SharedCounter
+    from cvt_hpc.study.ranks.shared_counter import SharedCounter
 
     return SharedCounter(team.communicator)
 

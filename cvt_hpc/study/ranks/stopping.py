@@ -9,10 +9,10 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any, Self
 
-from cvt_hpc.study.deaths import RankDied
-from cvt_hpc.study.progress import show_duration
-from cvt_hpc.study.schedule import Counter
-from cvt_hpc.study.time_limit import TimeLimit
+from cvt_hpc.study.ranks.progress import show_duration
+from cvt_hpc.study.ranks.schedule import Counter
+from cvt_hpc.study.ranks.survival import RankDied
+from cvt_hpc.study.ranks.time_limit import TimeLimit
 
 # What a person at the terminal, Slurm at the end of a job, and Slurm as a warning before that send.
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)

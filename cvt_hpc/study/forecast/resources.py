@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from cvt_hpc.study.description import Study, describe
-from cvt_hpc.study.forecast import Forecast, forecast
-from cvt_hpc.study.frames import HEAD, PLACE, RecordFormat
-from cvt_hpc.study.pilots import find_out
+from cvt_hpc.study.forecast.pilots import find_out
+from cvt_hpc.study.forecast.simulate import Forecast, forecast
+from cvt_hpc.study.ranks.time_limit import gathering_margin
+from cvt_hpc.study.record.frames import HEAD, PLACE, RecordFormat
 from cvt_hpc.study.simulator import default_simulator
-from cvt_hpc.study.time_limit import gathering_margin
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job

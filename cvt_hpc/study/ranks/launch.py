@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from cvt_hpc.errors import CRASHED, InputError
-from cvt_hpc.study.deaths import RankDied, noticing_deaths
+from cvt_hpc.study.ranks.survival import RankDied, noticing_deaths
 
 if TYPE_CHECKING:
     from mpi4py import MPI

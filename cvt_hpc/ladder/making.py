@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 from threadpoolctl import threadpool_limits
 
-from cvt_hpc.chart.ladder_comparing import Finding, compare
-from cvt_hpc.chart.ladder_drawing import draw_ladder
-from cvt_hpc.chart.ladder_rungs import Rung
-from cvt_hpc.chart.ladder_table import ladder_dataset, write_ladder
 from cvt_hpc.files import written_aside
 from cvt_hpc.job import Job
+from cvt_hpc.ladder.comparing import Finding, compare
+from cvt_hpc.ladder.drawing import draw_ladder
+from cvt_hpc.ladder.rungs import Rung
+from cvt_hpc.ladder.table import ladder_dataset, write_ladder
 from cvt_hpc.netcdf import write_netcdf
 from cvt_hpc.simulation import simulate
 from cvt_hpc.study import RunReport, check_start, open_results, run

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.study.batches import Batch, Turns, batch_cost, one_turn, share_out
-from cvt_hpc.study.cost_model import Fit
+from cvt_hpc.study.forecast.cost_model import Fit
 
 _EVENTS = 1_000_000  # claims to be simulated in all repeats, as far as their least number allows
 MOST_RANKS = 1_000_000  # each takes some us of every repeat

@@ -13,7 +13,7 @@ from scipy.sparse import csc_array
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt.belt import DRIVEN_SPEED, FIELDS, V_FILTERED, W
-from cvt_hpc.models.elastic_belt.flat import (
+from cvt_hpc.models.elastic_belt.one_system import (
     ROWS,
     SIZE_OF_SPEED,
     SIZES,

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
-    from cvt_hpc.study.launch import Team
+    from cvt_hpc.study.ranks.launch import Team
 
 Result = TypeVar("Result")
 _logger = logging.getLogger(__name__)

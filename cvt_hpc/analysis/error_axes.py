@@ -1,4 +1,4 @@
-"""What the pictures of a chart share: lines and markers of the methods, axes of errors."""
+"""Error over cost in pictures: lines and markers of the methods or models compared, axes of errors."""
 
 from __future__ import annotations
 
@@ -7,10 +7,6 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullFormatter
-
-from cvt_hpc.analysis.figures import display_unit
-from cvt_hpc.chart.plan import Quantity
-from cvt_hpc.chart.quantities import KINDS
 
 # Okabe and Ito's colours, told apart by those who do not see all; with the lines enough for 21 methods.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#333333")
@@ -39,13 +35,3 @@ def set_error_axis(axes: Axes, values: Sequence[float]) -> float:
     axes.set_xlim(low / wanting, high * wanting)
     axes.xaxis.set_minor_formatter(NullFormatter())
     return low / wanting
-
-
-def error_label(quantity: Quantity) -> str:
-    """What stands at the axis of a quantity's errors."""
-    if quantity.scale == 0.0:
-        return "relative error"
-    factor, unit = (
-        (1e6, "µm") if KINDS[quantity.name].unit == "m" else display_unit(KINDS[quantity.name].unit)
-    )
-    return f"error / {factor * quantity.scale:g} {unit}"

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.job import Job, build_job, known_keys
-from cvt_hpc.job.handing import handed_to
+from cvt_hpc.job.for_model import handed_to
 from cvt_hpc.vibration.ramped import QUANTITIES
 
 QUESTIONS = ("occurrence", "onset", "frequency", "amplitude", "forces")

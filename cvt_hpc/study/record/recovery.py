@@ -12,7 +12,7 @@ import numpy as np
 
 from cvt_hpc.files import naming_refusals
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.frames import (
+from cvt_hpc.study.record.frames import (
     AGAIN,
     ALONE,
     HEAD,
@@ -26,7 +26,7 @@ from cvt_hpc.study.frames import (
     RecordFormat,
     read_preamble,
 )
-from cvt_hpc.study.records import ENTRY, Records, Timing, choose
+from cvt_hpc.study.record.index import ENTRY, Records, Timing, choose
 
 
 class _Death(NamedTuple):

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.files import storage_error, sync_folder
-from cvt_hpc.study.frames import AGAIN, ALONE, BEGUN, Place, RecordFormat
+from cvt_hpc.study.record.frames import AGAIN, ALONE, BEGUN, Place, RecordFormat
 
 KEPT = "The runs recorded so far are kept, and the same command goes on from them"
 SYNC_INTERVAL = 5.0  # [s]; a dead process loses nothing, a power failure at most this much

@@ -1,0 +1,1 @@
+"""How long a sweep will take, and what to ask a cluster for."""

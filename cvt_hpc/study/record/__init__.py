@@ -1,0 +1,1 @@
+"""The durable record of a study: logs of frames, their recovery, and the index of the records that count."""

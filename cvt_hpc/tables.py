@@ -1,0 +1,24 @@
+"""Tables for people, as aligned lines of text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+
+def columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yield rows as lines, their cells below each other; the last one is not padded."""
+    widths = [max(map(len, column)) for column in zip(*(row[:-1] for row in rows), strict=True)]
+    for row in rows:
+        cells = [cell.ljust(width) for cell, width in zip(row[:-1], widths, strict=True)]
+        yield f"  {'  '.join([*cells, row[-1]])}".rstrip()
+
+
+def short(value: float) -> str:
+    """Return a number to two digits, "" where it is none."""
+    return "" if math.isnan(value) else f"{value:.2g}"
+
+
+def number(value: float, digits: int = 10) -> str:
+    """Return a number to so many digits, "" where it is none."""
+    return "" if math.isnan(value) else f"{value:.{digits}g}"
