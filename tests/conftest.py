@@ -9,7 +9,6 @@ from hypothesis import HealthCheck, settings
 from cvt_hpc.job import schema
 from cvt_hpc.models import MODELS
 from cvt_hpc.parameters import Parameter
-from cvt_hpc.steppers import STEPPERS
 
 # No test depends on the clock: a busy machine, or the first loading of pint, takes longer than an example may.
 settings.register_profile(
@@ -67,14 +66,13 @@ def toy(monkeypatch):
     """Register the model "toy" and the stepper "hop", and put a table [run] in the place of all shared ones."""
     model, stepper, shared = ModuleType("toy_model"), ModuleType("toy_stepper"), ModuleType("toy_shared")
     model.PARAMETERS, model.DEFAULT_STEPPER, model.check = TOY_PARAMETERS, "hop", check_toy
-    model.STEPPER_NAMES, model.REFUSED = ("hop",), {"imex": "the toy has no step of its own"}
+    model.STEPPERS, model.REFUSED = {"hop": "toy_stepper"}, {"imex": "the toy has no step of its own"}
     stepper.PARAMETERS, stepper.check = TOY_NUMERICS, check_hop
     shared.PARAMETERS, shared.check = TOY_SHARED, check_run
     monkeypatch.setattr(schema, "SHARED", (shared,))
     for module in (model, stepper):
         monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setitem(MODELS, "toy", "toy_model")
-    monkeypatch.setitem(STEPPERS, "hop", "toy_stepper")
 
 
 @pytest.fixture

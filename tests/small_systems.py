@@ -6,10 +6,9 @@ import numpy as np
 
 from cvt_hpc import recording
 from cvt_hpc.models import MODELS
-from cvt_hpc.models.elastic_belt import OWN_STEPPERS
 from cvt_hpc.steppers import STEPPERS
 
-METHODS = [name for name in STEPPERS if name not in OWN_STEPPERS]
+METHODS = list(STEPPERS)
 FACTS = {name: import_module(STEPPERS[name]).FACTS for name in METHODS}
 FIXED = [name for name in METHODS if not FACTS[name].adaptive]
 ADAPTIVE = [name for name in METHODS if FACTS[name].adaptive]

@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.job import Job
-from cvt_hpc.models.contract import record_module, transient_module
-from cvt_hpc.models.elastic_belt.batch import Batch
+from cvt_hpc.models.contract import load_model
 from cvt_hpc.models.elastic_belt.belt import TIME, State
-from cvt_hpc.simulation.record import record_of
+from cvt_hpc.simulation.batches import in_lanes
+from cvt_hpc.simulation.marching import march
+from cvt_hpc.simulation.record import record_of, recorded_model
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 
 FROM = ("from the steady state", "from the large start")  # the starts of a branch, in words
@@ -123,21 +124,26 @@ def close_values(
 
 def _run_all(job: Job, parameter: str, starts: Sequence[Start], values: Sequence[float]) -> list[Attractor]:
     """Run from all starts, as many runs together as can advance so."""
-    groups: dict[Any, list[tuple[float, int, Any, dict[str, Any]]]] = {}
+    runs: list[_Started] = []
     for k, start in enumerate(starts):
         for value in values:
             point = job.point_at({**start.settings, parameter: value})
             state = start.state(value) if start.state else None
             if start.state and state is None:
                 continue
-            key = record_module(job).lane_key(point), state is None
-            groups.setdefault(key, []).append((value, k, state, point))
-    found = []
-    for group in groups.values():
-        most = record_module(job).lanes(group[0][3], job.stepper)
-        for first in range(0, len(group), most):
-            found += _run_batch(job, group[first : first + most])
-    return found
+            runs.append(_Started(value, k, state, point))
+    model = recorded_model(job)
+    groups = in_lanes(model, job.stepper, runs, lambda run: run.point, lambda run: run.state is None)
+    return [attractor for group in groups for attractor in _run_batch(job, group)]
+
+
+class _Started(NamedTuple):
+    """A run at one value of the parameter, from one of the starts, in a state or by itself."""
+
+    value: float
+    start: int
+    state: State | None
+    point: dict[str, Any]
 
 
 class _AtRest(NamedTuple):
@@ -149,7 +155,7 @@ class _AtRest(NamedTuple):
     rows: float = 0.0
 
 
-def _at_rest(batch: Batch, state: State) -> _AtRest:
+def _at_rest(batch: Any, state: State) -> _AtRest:
     """In a state when the strands are to be disturbed, and the load has risen."""
     done = batch.plan.kick
     state = state.copy()
@@ -157,23 +163,23 @@ def _at_rest(batch: Batch, state: State) -> _AtRest:
     return _AtRest(done, state.scalars[TIME], state)
 
 
-def _run_batch(job: Job, group: list[tuple[float, int, Any, dict[str, Any]]]) -> list[Attractor]:
+def _run_batch(job: Job, group: list[_Started]) -> list[Attractor]:
     """Do runs that advance together; those with a state begin in it when strands are disturbed."""
-    batch = transient_module(job).batch([point for *_, point in group], job.stepper)
-    if group[0][2] is not None:
-        batch.take_over([_at_rest(batch, state) for _, _, state, _ in group])
-    while batch.running:
-        batch.advance(batch.samples)
+    batch = load_model(job.model).batch([run.point for run in group], job.stepper)
+    states = [run.state for run in group if run.state is not None]
+    if states:
+        batch.take_over([_at_rest(batch, state) for state in states])
+    march(batch)
     found = []
-    for (value, start, _, _), run in zip(group, batch.runs, strict=True):
+    for asked, run in zip(group, batch.runs, strict=True):
         record = record_of(job, run, 0.0)
         (kind,) = classify_runs(np.array([record["status"]]), np.array([record["vibrates"]]))
         amplitude, frequency = (np.atleast_1d(record[name]) for name in ("amplitude", "frequency"))
         largest = 0 if np.isnan(amplitude).all() else int(np.nanargmax(amplitude))
         found.append(
             Attractor(
-                value,
-                start,
+                asked.value,
+                asked.start,
                 OccurrenceClass(int(kind)),
                 float(amplitude[largest]),
                 float(frequency[largest]),

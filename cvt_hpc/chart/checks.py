@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
-
-from cvt_hpc.chart.marching import most_lanes
 from cvt_hpc.chart.measuring import exact_displacement
 from cvt_hpc.chart.plan import Chart, Point, Role, Scene
 from cvt_hpc.chart.quantities import channels_needed
+from cvt_hpc.chart.timed_runs import most_lanes
 from cvt_hpc.errors import InputError, mismatch
-from cvt_hpc.models import MODELS
+from cvt_hpc.models.contract import load_model
 
 
 def check_prospects(chart: Chart) -> None:
@@ -37,18 +34,17 @@ def check_prospects(chart: Chart) -> None:
 
 
 def _check_exact(point: Point, where: str) -> None:
+    if not load_model(point.job.model).has_exact:
+        found = f"{point.job.model}, which has none"
+        raise mismatch(f"{where} reference", "a model with an exact solution", found)
     try:
         exact_displacement(point, 0)
-    except ModuleNotFoundError:
-        found = f"{point.job.model}, which has none"
-        raise mismatch(f"{where} reference", "a model with an exact solution", found) from None
     except InputError as error:
         raise InputError(f"{where} reference: {error}") from error
 
 
 def _check_lead(point: Point, where: str) -> None:
-    module = import_module(MODELS[point.job.model] + ".transient")
-    if not hasattr(module.batch([point.parameters(0)], point.job.stepper), "take_over"):
+    if not load_model(point.job.model).takes_over:
         raise mismatch(f"{where} lead", "a model whose runs can take over from others", point.job.model)
 
 
@@ -56,19 +52,7 @@ def _check_channels(point: Point, scene: Scene, where: str) -> None:
     needed = channels_needed(scene.quantities)
     if scene.exact and needed:
         raise mismatch(f"{where} quantities", "those that an exact solution has", f"channel {needed[0]}")
-    if not needed:
-        return
-    module = import_module(MODELS[point.job.model] + ".transient")
-    run = module.batch([point.parameters(0)], point.job.stepper).runs[0]
     for channel in needed:
-        if not _has_channel(run, channel):
+        if channel not in load_model(point.job.model).channels:
             expected = f"a model that records {channel}"
             raise mismatch(f"{where} quantities", expected, point.job.model)
-
-
-def _has_channel(run: Any, name: str) -> bool:
-    try:
-        run.channel(name)
-    except (KeyError, ValueError):
-        return False
-    return True

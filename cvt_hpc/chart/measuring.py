@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.chart.marching import Marched, lead, march, most_lanes, warm_up
 from cvt_hpc.chart.plan import Point, Scene, start_parameters
 from cvt_hpc.chart.quantities import History, observe, strand_of
-from cvt_hpc.models import MODELS
+from cvt_hpc.chart.timed_runs import Marched, lead, march, most_lanes, warm_up
+from cvt_hpc.models.contract import Failure, Run, load_model
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.assessment import assess
 
 _LONG = 2.0  # [s] of processor time: beyond, a run is timed once, because noise averages out within it
 
@@ -101,13 +99,11 @@ def exact_displacement(point: Point, start: int) -> tuple[Any, NDArray[np.float6
     ------
     InputError
         If the model has no closed form for these parameters.
-    ModuleNotFoundError
-        If it has none at all.
     """
     parameters = point.parameters(start)
-    solution = import_module(MODELS[point.job.model] + ".exact").exact
-    run = import_module(MODELS[point.job.model] + ".transient").Transient(parameters, point.job.stepper)
-    return run, solution(parameters, (1 + np.arange(run.samples)) * run.interval)
+    model = load_model(point.job.model)
+    (run,) = model.batch([parameters], point.job.stepper).runs
+    return run, model.exact(parameters, (1 + np.arange(run.samples)) * run.interval)
 
 
 def _exact(point: Point, scene: Scene) -> Measurement:
@@ -153,14 +149,10 @@ def _columns(run: Any) -> tuple[list[int], tuple[str, ...]]:
     return columns, tuple(strands[k] for k in columns)
 
 
-def _doubt(model: str, run: Any) -> Any:
-    """Whether a model that audits its runs does not trust one that has reached its end."""
-    if not hasattr(run, "numerical_doubt"):
-        return None
-    history = _history(run)
-    found = assess(history.displacement, history.rate, history.strands, history.parameters)
-    strongest = np.array(_columns(run)[0])[found.strongest_probe]
-    return run.numerical_doubt(import_module(MODELS[model] + ".record").evaluate(run, strongest))
+def _doubt(name: str, run: Run) -> Failure | None:
+    """Why a run that has reached its end is not to be trusted, of models that judge their runs."""
+    model = load_model(name)
+    return run.numerical_doubt(model.judge(run)) if model.is_recorded else None
 
 
 def _stacked(observed: list[dict[str, NDArray[np.float64]]]) -> dict[str, NDArray[np.float64]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, replace
-from importlib import import_module
 from typing import Any
 
 from cvt_hpc.chart.declarations import LEAD, SCENE, SETTINGS
@@ -17,7 +16,7 @@ from cvt_hpc.job.assignments import read_assignments
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.tables import read_set, read_table, read_tables
 from cvt_hpc.job.values import read_value
-from cvt_hpc.models import MODELS
+from cvt_hpc.models.contract import load_model
 
 _WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9_]{0,59}")
 
@@ -120,7 +119,7 @@ def read_stage(name: str, raw: Any, document: dict[str, Any], replaced: dict[str
 def _check_replaced(replaced: dict[str, Any], model: Any, where: str, source: str) -> None:
     """Raise what is wrong with values of the command line, for all steppers of the scene's model."""
     schemas = [load_schema(model, None, where)]
-    schemas += [load_schema(model, name, where) for name in import_module(MODELS[model]).STEPPER_NAMES]
+    schemas += [load_schema(model, name, where) for name in load_model(model).steppers]
     for name, raw in replaced.items():
         key = name.rpartition(".")[2]
         schema = next((schema for schema in schemas if key in schema.parameters), schemas[0])

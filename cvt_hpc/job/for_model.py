@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job.definition import Job
 from cvt_hpc.job.schema import known_keys
-from cvt_hpc.models import MODELS
+from cvt_hpc.models.contract import load_model
 
 
 def answering_model(job: Job) -> tuple[str, str] | None:
@@ -19,7 +18,7 @@ def answering_model(job: Job) -> tuple[str, str] | None:
     InputError
         If the runs ask different questions.
     """
-    answered_by = getattr(import_module(MODELS[job.model]), "ANSWERED_BY", {})
+    answered_by = load_model(job.model).answered_by
     if any(axis.name == "question" for axis in job.axes):
         raise mismatch(f"{job.source}: [axes] question", "one question for all runs", "several")
     return answered_by.get(job.parameters.get("question"))

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
-from types import ModuleType
 from typing import Any
 
 from cvt_hpc import recording
 from cvt_hpc.errors import InputError, mismatch, nearest, show, unknown
 from cvt_hpc.models import MODELS
+from cvt_hpc.models.contract import Model, load_model
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers import STEPPERS
 from cvt_hpc.vibration import settings as vibration_settings
@@ -128,8 +128,8 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     model : str
         A name in `cvt_hpc.models.MODELS`.
     stepper : str or None
-        A name in `cvt_hpc.steppers.STEPPERS`; None for the model's own choice, which is none of a model
-        without a transient.
+        One that the model takes; None for the model's own choice, which is none of a model without a
+        transient.
     source : str
         The file, for the error.
 
@@ -143,23 +143,21 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     InputError
         If there is no such model or stepper, or the model does not take it.
     """
-    model_module = import_module(_look_up(model, MODELS, "model", source))
-    stepper = model_module.DEFAULT_STEPPER if stepper is None else stepper
-    modules = [model_module]
+    loaded = load_model(_known(model, MODELS, "model", source))
+    stepper = loaded.default_stepper if stepper is None else stepper
+    tables, checks = [loaded.parameters], [loaded.check]
     if stepper is not None:
-        stepper_module = import_module(_look_up(stepper, STEPPERS, "stepper", source))
-        _check_accepted(model, model_module, stepper, source)
-        modules += [stepper_module, *SHARED]
+        modules = [import_module(_stepper(loaded, stepper, source)), *SHARED]
+        tables += [module.PARAMETERS for module in modules]
+        checks += [module.check for module in modules if hasattr(module, "check")]
     sections: dict[str, dict[str, Parameter]] = {}
-    for module in modules:
-        for section, table in module.PARAMETERS.items():
+    for sectioned in tables:
+        for section, table in sectioned.items():
             sections.setdefault(section, {}).update(table)
-    for key, substitute in getattr(model_module, "GIVES", {}).get(stepper, {}).items():
+    for key, substitute in loaded.gives.get(stepper, {}).items():
         section = next(name for name, table in sections.items() if key in table)
         sections[section][key] = replace(sections[section][key], gives=substitute)
-    checks = tuple(module.check for module in modules if hasattr(module, "check"))
-    inert = getattr(model_module, "inert", lambda parameters: {})
-    return Schema(model, stepper, sections, checks, inert)
+    return Schema(loaded.name, stepper, sections, tuple(checks), loaded.inert)
 
 
 def known_keys(model: str, stepper: str | None = None) -> tuple[str, ...]:
@@ -167,18 +165,23 @@ def known_keys(model: str, stepper: str | None = None) -> tuple[str, ...]:
     return tuple(load_schema(model, stepper, "known_keys").parameters)
 
 
-def _check_accepted(model: str, module: ModuleType, stepper: str, source: str) -> None:
-    if not module.STEPPER_NAMES:
-        raise mismatch(f"{source}: stepper", f"none, since {model} has no transient", show(stepper))
-    if stepper not in module.STEPPER_NAMES:
-        reason = module.REFUSED.get(stepper, "the model does not take it")
-        expected = f"one that {model} takes ({', '.join(module.STEPPER_NAMES)})"
-        raise mismatch(f"{source}: stepper", expected, f"{show(stepper)}: {reason}")
+def _stepper(model: Model, stepper: Any, source: str) -> str:
+    """The module that declares a stepper which the model takes."""
+    where = f"{source}: stepper"
+    if isinstance(stepper, str) and stepper in model.steppers:
+        return model.steppers[stepper]
+    owners = {name: other for other in MODELS for name in load_model(other).steppers if name not in STEPPERS}
+    _known(stepper, STEPPERS | owners, "stepper", source)
+    if not model.steppers:
+        raise mismatch(where, f"none, since {model.name} has no transient", show(stepper))
+    reason = model.refused.get(stepper) or f"it is {owners[stepper]}'s own step"
+    expected = f"one that {model.name} takes ({', '.join(model.steppers)})"
+    raise mismatch(where, expected, f"{show(stepper)}: {reason}")
 
 
-def _look_up(name: Any, registry: dict[str, str], what: str, source: str) -> str:
+def _known(name: Any, registry: Mapping[str, Any], what: str, source: str) -> str:
     if not isinstance(name, str):
         raise mismatch(f"{source}: {what}", f"one of {', '.join(registry)}", show(name))
     if name not in registry:
         raise unknown(f"{source}: {what}", f"{what} {show(name)}", name, registry)
-    return registry[name]
+    return name

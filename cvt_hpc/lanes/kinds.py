@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 from llvmlite import ir
 from numba import types
@@ -46,6 +48,12 @@ class LaneArray:
         memory = np.zeros(size + ALIGNMENT, dtype=np.uint8)
         first = -memory.ctypes.data % ALIGNMENT
         self.data = memory[first : first + size].view(dtype).reshape(rows, fields, lanes)
+
+    if TYPE_CHECKING:  # what kernels see of it
+
+        def __getitem__(self, place: tuple[int, int]) -> Any: ...
+
+        def __setitem__(self, place: tuple[int, int], number: Any) -> None: ...
 
 
 class Lanes(types.Type):

@@ -157,7 +157,8 @@ def _around(x):
         return lambda x: x
     if isinstance(x, Mask):
         return lambda x: _alike(x, anywhere(x))
-    turns = [_rotation(1 << k) for k in range(x.count.bit_length() - 1)]
+    # halves first: then all parts add the same pairs, and have the same sum to the last bit
+    turns = [_rotation(1 << k) for k in reversed(range(x.count.bit_length() - 1))]
     return _folding(turns)
 
 

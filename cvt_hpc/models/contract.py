@@ -1,72 +1,372 @@
-"""The modules of a job's model that make its runs and say what is recorded of them.
+"""What a model offers to the rest of the program, and `load_model`, the only way to it.
 
-The `record` module of a model offers VARIABLES, `coordinates(parameters)`, `cost(parameters, stepper)`,
-`lanes(parameters, stepper)` and `lane_key(parameters)`; and
+A model is a package of up to four modules, of which all but the first are imported when they are needed:
 
-- of a model with a transient, `judge(run)`: the values of VARIABLES and the verdict (status, vibrates,
-  reason) of a run that its `transient` module has made and that has come to its end, or ended before with
-  a result, its `failure` then having the status done;
-- of a model without, which takes no stepper, `solve(parameters)`, whose result `judge(solution)` reads. It
-  may leave out what is not known, such as all but status and reason where nothing was found.
+- the package itself (`Declaration`): what a job may set; cheap to import;
+- `record` (`Recorded`): what the record of a run holds, what a run costs, and how a run is judged. A model
+  without it is there to compare steppers. A model without a transient offers `solve` there;
+- `transient` (`Transient`): runs that march;
+- `exact`: `exact(parameters, times)`, the displacement (time, probe) [m] in closed form.
 
-A model with a transient may answer some runs without all of it. Its record module then also has
+A model leaves out what it has no use for; `Model` has the default of each such member.
 
-- `known(parameters)`: the values where no transient is needed, else None;
-- `preliminary(parameters)`: the parameters of a cheaper transient that comes first, or None;
-- `settle(run)`: the values of a run by that transient if it answers, else None.
-
-Its `judge` reads the full transient as ever. The `transient` module of any model offers `batch(points,
-stepper, paused=())`: runs that advance together, each from its start or from where a shorter one has ended.
-
-A model whose runs cannot be shortened for a forecast says so by PILOT_SHARE.
-
-`histories(run)`, or of a solution, is the dataset of what `simulate` has beyond the record, where there is
-such.
+A model with a transient may answer some runs without all of it. Its `record` then has `known(parameters)`,
+the values where no transient is needed, else None; `preliminary(parameters)`, the parameters of a cheaper
+transient that comes first, or None; and `settle(run)`, the values by that transient if it answers, else None.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
-from typing import Protocol
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models import MODELS
+from cvt_hpc.parameters import Parameter
+from cvt_hpc.variables import Coordinate, Status, Variable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Parameters = Mapping[str, Any]  # flat, of one run [SI]
+Values = dict[str, Any]  # of a record, by the names of its variables
+Failure = tuple[Status, str]  # how a run ended before its time, and why; a result, if the status is done
+
+PILOT_SHARE = 0.25  # of a run's simulated time: what a forecast runs to tell the cost of the whole
 
 
-class Named(Protocol):
-    """What a job says of its model: which, and in which file."""
+class Probe(Protocol):
+    """A place where displacement is recorded."""
 
-    model: str
-    source: str
-
-
-def transient_module(job: Named) -> ModuleType:
-    """Of its runs; InputError where nothing is recorded of them."""
-    _check_recorded(job)
-    return import_module(MODELS[job.model] + ".transient")
+    @property
+    def label(self) -> str:
+        """Name of the strand or arc and a number, or of the body."""
 
 
-def record_module(job: Named) -> ModuleType:
-    """Of what is recorded of its runs; InputError where nothing is."""
-    _check_recorded(job)
-    return import_module(MODELS[job.model] + ".record")
+class Run(Protocol):
+    """One run of a batch.
+
+    Attributes
+    ----------
+    interval : float
+        Sampling interval [s].
+    samples, done : int
+        Samples of the whole run, and those recorded so far, up to the one at which it failed.
+    """
+
+    interval: float
+    samples: int
+
+    @property
+    def parameters(self) -> Parameters:
+        """Resolved parameters, the stepper's among them."""
+
+    @property
+    def probes(self) -> Sequence[Probe]:
+        """Where displacement is recorded."""
+
+    @property
+    def done(self) -> int:
+        """Samples recorded so far."""
+
+    @property
+    def failure(self) -> Failure | None:
+        """Why the run does not go on: what has gone wrong, or a result, with the status done."""
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+
+    @property
+    def step(self) -> float:
+        """Time step, of adaptive methods the mean [s]."""
+
+    @property
+    def steps(self) -> int:
+        """Steps taken so far."""
+
+    @property
+    def contact_solves(self) -> int:
+        """Linear solves of the contact problem so far."""
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Displacement at the probes, (done, probe) [m]."""
+
+    def channel(self, name: str) -> np.ndarray:
+        """History of one of the model's channels, (done,)."""
+
+    def counters(self) -> dict[str, int]:
+        """Work done so far, by its name."""
+
+    def numerical_doubt(self, record: Values) -> Failure | None:
+        """Why a run that reached its end is not to be trusted, by its values; None where it is."""
+
+    def paused(self) -> Any:
+        """What a batch of the same point over a longer time goes on from."""
 
 
-def _check_recorded(job: Named) -> None:
-    if not has_record(job):
-        known = ", ".join(model for model in MODELS if _is_recorded(model))
-        raise InputError(
-            f"{job.source}: model: expected one whose runs are judged and recorded ({known}), "
-            f"found {job.model}, which is there to compare steppers: `cvt-hpc chart`"
-        )
+class Batch(Protocol):
+    """Runs that advance together."""
+
+    interval: float
+    samples: int
+
+    @property
+    def runs(self) -> Sequence[Run]:
+        """In the order of their points."""
+
+    @property
+    def done(self) -> int:
+        """Samples taken so far."""
+
+    @property
+    def running(self) -> bool:
+        """Whether any run has not ended."""
+
+    def advance(self, samples: int) -> None:
+        """March on by so many samples at most; 0 compiles or loads the kernels only."""
+
+    def take_over(self, runs: Sequence[Any]) -> None:
+        """Go on from where runs by another stepper stand; of models with TAKES_OVER."""
 
 
-def has_record(job: Named) -> bool:
-    """Whether runs of the job's model are judged and recorded."""
-    return _is_recorded(job.model)
+class Declaration(Protocol):
+    """The package of a model: what a job may set of it.
+
+    It may also have `check(parameters)`, which yields (key, expected, found) of what does not fit together;
+    `inert(parameters)`, the keys without effect with the reason of each; `GIVES`, by stepper and key what a
+    key of the stepper is for this model (`cvt_hpc.parameters.Substitute`); `REFUSED`, steppers that it does
+    not take, each with the reason; and `ANSWERED_BY`, questions that another model answers, each with that
+    model's name and the reason.
+    """
+
+    @property
+    def PARAMETERS(self) -> dict[str, dict[str, Parameter]]:  # noqa: N802
+        """By table and key."""
+
+    @property
+    def DEFAULT_STEPPER(self) -> str | None:  # noqa: N802
+        """The model's own choice; None: there is no transient."""
+
+    @property
+    def STEPPERS(self) -> Mapping[str, str]:  # noqa: N802
+        """By name the module that declares it; a step of the model's own lives with the model."""
 
 
-def _is_recorded(model: str) -> bool:
-    return find_spec(MODELS[model] + ".record") is not None
+class Recorded(Protocol):
+    """The module `record` of a model."""
+
+    @property
+    def VARIABLES(self) -> tuple[Variable, ...]:  # noqa: N802
+        """What the record holds beside verdict and cost."""
+
+    def coordinates(self, parameters: Parameters) -> dict[str, Coordinate]:
+        """Dimensions of the record beside the grid's."""
+
+    def cost(self, parameters: Parameters, stepper: Any) -> Any:
+        """Core-seconds of a batch with full lanes; of parameters that are arrays, an array."""
+
+    def judge(self, run: Any) -> Values:
+        """Values of VARIABLES and the verdict of a run at its end, or of what `solve` found."""
+
+
+class Transient(Protocol):
+    """The module `transient` of a model."""
+
+    @property
+    def CHANNELS(self) -> tuple[str, ...]:  # noqa: N802
+        """Names of the histories that runs record beside displacement."""
+
+    @property
+    def batch(self) -> Callable[..., Batch]:
+        """`batch(points, stepper, paused=())`: runs from their starts, or from where shorter ones ended."""
+
+
+class Model:
+    """A model of the ladder: all that the rest of the program may ask of it.
+
+    Parameters
+    ----------
+    name : str
+        A name in `cvt_hpc.models.MODELS`.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._declared: Any = import_module(MODELS[name])
+
+    @property
+    def parameters(self) -> dict[str, dict[str, Parameter]]:
+        """What a job may set, by table and key."""
+        return self._declared.PARAMETERS
+
+    @property
+    def default_stepper(self) -> str | None:
+        """The model's own choice; None of a model without a transient."""
+        return self._declared.DEFAULT_STEPPER
+
+    @property
+    def steppers(self) -> Mapping[str, str]:
+        """Steppers that the model takes, by name the module that declares them."""
+        return self._declared.STEPPERS
+
+    @property
+    def refused(self) -> Mapping[str, str]:
+        """Steppers that the model does not take, and why."""
+        return _member(self._declared, "REFUSED", {})
+
+    @property
+    def gives(self) -> Mapping[str, Mapping[str, Any]]:
+        """By stepper and key what the value of a key follows from for this model."""
+        return _member(self._declared, "GIVES", {})
+
+    @property
+    def answered_by(self) -> Mapping[str, tuple[str, str]]:
+        """Questions that another model answers: its name, and the reason."""
+        return _member(self._declared, "ANSWERED_BY", {})
+
+    @property
+    def check(self) -> Callable[[Parameters], Any]:
+        """Yields (key, expected, found) of parameters that do not fit together."""
+        return _member(self._declared, "check", lambda parameters: ())
+
+    @property
+    def inert(self) -> Callable[[Parameters], dict[str, str]]:
+        """Keys without effect beside others, and why."""
+        return _member(self._declared, "inert", lambda parameters: {})
+
+    @property
+    def is_recorded(self) -> bool:
+        """Whether runs are judged and recorded; else the model is there to compare steppers."""
+        return self._offers("record")
+
+    @property
+    def has_exact(self) -> bool:
+        """Whether there is a solution in closed form."""
+        return self._offers("exact")
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """What a record holds beside verdict and cost."""
+        return self._record.VARIABLES
+
+    def coordinates(self, parameters: Parameters) -> dict[str, Coordinate]:
+        """Dimensions of the record beside the grid's."""
+        return self._record.coordinates(parameters)
+
+    def cost(self, parameters: Parameters, stepper: str | None) -> Any:
+        """Core-seconds of a batch with full lanes; of parameters that are arrays, an array."""
+        return self._record.cost(parameters, stepper)
+
+    def lanes(self, parameters: Parameters, stepper: str | None) -> int:
+        """Most runs that can advance together."""
+        if not self.is_recorded:
+            return 1
+        return _member(self._record, "lanes", lambda parameters, stepper: 1)(parameters, stepper)
+
+    def lane_key(self, parameters: Parameters) -> tuple:
+        """What runs in one batch have in common."""
+        return _member(self._record, "lane_key", lambda parameters: ())(parameters)
+
+    @property
+    def pilot_share(self) -> float:
+        """Share of a run's simulated time that tells what the whole run costs."""
+        return _member(self._record, "PILOT_SHARE", PILOT_SHARE)
+
+    def known(self, parameters: Parameters) -> Values | None:
+        """Values of a run that needs no transient; None where it does."""
+        return _member(self._record, "known", lambda parameters: None)(parameters)
+
+    def preliminary(self, parameters: Parameters) -> Values | None:
+        """Parameters of a cheaper transient that comes first; None where there is none."""
+        return _member(self._record, "preliminary", lambda parameters: None)(parameters)
+
+    def settle(self, run: Run) -> Values | None:
+        """Values of a run by its cheaper transient if that answers, else None."""
+        return self._record.settle(run)
+
+    def judge(self, run: Any) -> Values:
+        """Values and verdict of a run at its end, or of what `solve` found."""
+        return self._record.judge(run)
+
+    def solve(self, parameters: Parameters) -> Any:
+        """What `judge` and `histories` read, of a model without a transient."""
+        return self._record.solve(parameters)
+
+    def histories(self, run: Any) -> xr.Dataset:
+        """What `simulate` has beyond the record, of a run or of what `solve` found."""
+        import xarray as xr
+
+        return _member(self._record, "histories", lambda run: xr.Dataset())(run)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the histories that runs record beside displacement."""
+        return self._transient.CHANNELS
+
+    @property
+    def takes_over(self) -> bool:
+        """Whether runs can go on from where runs by another stepper stand."""
+        return _member(self._transient, "TAKES_OVER", False)
+
+    def batch(self, points: Sequence[Parameters], stepper: str | None, paused: Sequence[Any] = ()) -> Batch:
+        """Runs that advance together, from their starts or from where shorter ones ended."""
+        return self._transient.batch(points, stepper, paused)
+
+    def exact(self, parameters: Parameters, times: np.ndarray) -> np.ndarray:
+        """Displacement in closed form, (time, probe) [m].
+
+        Raises
+        ------
+        InputError
+            If there is none for these parameters.
+        """
+        return self._module("exact").exact(parameters, times)
+
+    def check_recorded(self, source: str) -> None:
+        """Raise InputError where runs are not judged and recorded; `source` is the file that asks for it."""
+        if not self.is_recorded:
+            known = ", ".join(name for name in MODELS if load_model(name).is_recorded)
+            raise InputError(
+                f"{source}: model: expected one whose runs are judged and recorded ({known}), "
+                f"found {self.name}, which is there to compare steppers: `cvt-hpc chart`"
+            )
+
+    @cached_property
+    def _record(self) -> Any:
+        return self._module("record")
+
+    @cached_property
+    def _transient(self) -> Any:
+        return self._module("transient")
+
+    def _module(self, name: str) -> ModuleType:
+        return import_module(f"{MODELS[self.name]}.{name}")
+
+    def _offers(self, name: str) -> bool:
+        try:
+            return find_spec(f"{MODELS[self.name]}.{name}") is not None
+        except ModuleNotFoundError:  # a model that is one module
+            return False
+
+
+def _member(module: Any, name: str, default: Any) -> Any:
+    return vars(module).get(name, default)
+
+
+def load_model(name: str) -> Model:
+    """Return a model of the ladder.
+
+    Parameters
+    ----------
+    name : str
+        A name in `cvt_hpc.models.MODELS`.
+    """
+    return Model(name)

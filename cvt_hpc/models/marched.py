@@ -1,8 +1,12 @@
-"""A transient run of a model that offers its rates: any stepper marches it, and each sample is kept."""
+"""A transient run of a model that offers its rates: any stepper marches it, and each sample is kept.
+
+Such a run has no lanes: it is alone in its batch.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,9 +32,15 @@ class Marched:
     ----------
     marching : Marching
         The stepper at work on the model's equations.
+    failure : (Status, str) or None
+        Why the run does not go on.
+    contact_solves : int
+        Solves of a contact problem so far.
     """
 
     marching: Marching
+    failure: tuple[Status, str] | None = None
+    contact_solves: int = 0
 
     @property
     def time(self) -> float:
@@ -50,6 +60,14 @@ class Marched:
     def counters(self) -> dict[str, int]:
         """Work done so far: steps, rejected, rates, jacobians, factorisations, solves."""
         return self.marching.counters()
+
+    def paused(self) -> Marched:
+        """What a batch of the same point over a longer time goes on from: the run itself."""
+        return self
+
+    def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
+        """Why a run that reached its end is not to be trusted: its marching has told all."""
+        return None
 
 
 class MarchedRun(Marched):
@@ -149,7 +167,8 @@ class MarchedRun(Marched):
             wrong = wrong or self._doubt(first)
         else:
             wrong = wrong or self.marching.explain(outcome)
-        return (Status.FAILED_NUMERICS, wrong) if wrong else None
+        self.failure = (Status.FAILED_NUMERICS, wrong) if wrong else None
+        return self.failure
 
     def _too_long(self) -> str | None:
         """Whether the fastest vibration grows from step to step, which shows late in a linear model."""
@@ -160,3 +179,82 @@ class MarchedRun(Marched):
     def _doubt(self, first: int) -> str | None:
         """Why the samples from `first` on are none of the model's motion, by what the model knows of it."""
         return None
+
+
+class BatchOfOne:
+    """A batch of one run.
+
+    Parameters
+    ----------
+    run : object
+        Which has `samples`, `done`, `interval`, `failure`, and `advance(samples)`.
+
+    Attributes
+    ----------
+    runs : tuple
+        The run.
+    samples : int
+        Samples of the whole run.
+    interval : float
+        Sampling interval [s].
+    """
+
+    def __init__(self, run: Any) -> None:
+        self.runs = (run,)
+        self.samples, self.interval = run.samples, run.interval
+
+    @property
+    def done(self) -> int:
+        """Samples recorded so far."""
+        return self.runs[0].done
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended."""
+        (run,) = self.runs
+        return run.failure is None and run.done < self.samples
+
+    def advance(self, samples: int) -> None:
+        """March on.
+
+        Parameters
+        ----------
+        samples : int
+            How many samples at most.
+        """
+        self.runs[0].advance(samples)
+
+    def take_over(self, runs: Sequence[Any]) -> None:
+        """Go on from where a run by another stepper stands; of models with TAKES_OVER.
+
+        Parameters
+        ----------
+        runs : sequence of one run
+            Of the same point.
+        """
+        self.runs[0].take_over(runs)
+
+
+def batches_of_one(run: Callable[[Mapping[str, Any], str], Any]) -> Callable[..., BatchOfOne]:
+    """The function `batch` of a model without lanes.
+
+    Parameters
+    ----------
+    run : type
+        Makes a run from its parameters and the name of a stepper.
+    """
+    return partial(_batch_of_one, run)
+
+
+def _batch_of_one(
+    run: Callable[[Mapping[str, Any], str], Any],
+    points: Sequence[Mapping[str, Any]],
+    stepper: str,
+    paused: Sequence[Any] = (),
+) -> BatchOfOne:
+    (parameters,) = points
+    if not paused:
+        return BatchOfOne(run(parameters, stepper))
+    (shorter,) = paused
+    shorter.prolong(parameters)
+    return BatchOfOne(shorter)

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from cvt_hpc.models.contract import has_record, record_module
+from cvt_hpc.models.contract import Model, Parameters, load_model
 from cvt_hpc.recording import longest_duration
+from cvt_hpc.simulation.record import recorded_model
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
     from cvt_hpc.job.definition import Derived
 
-PILOT_SHARE = 0.25
 LEFT_SHARE = 1.0  # what refined and prolonged runs add to a map's cost, as measured by lebrecht_2004.toml
 _MOST_ESTIMATED = 2_000  # runs whose costs are averaged
 BATCH_SECONDS = 30.0  # of computing in a batch, as predicted: so much a process that dies may lose
+Item = TypeVar("Item")
+
 MOST_TURNS = 16  # groups of lanes in a batch: with more, those of the runs left would be hardly fuller
 
 
@@ -39,7 +41,7 @@ def run_costs(job: Job) -> np.ndarray:
     grids = values if job.is_sampled else np.meshgrid(*values, indexing="ij", sparse=True)
     p = {**job.parameters, **dict(zip((axis.name for axis in job.axes), grids, strict=True))}
     p |= {derived.name: _over_the_grid(job, derived) for derived in job.derived}
-    model = record_module(job)
+    model = recorded_model(job)
     cost = model.cost(p, job.stepper) / model.lanes(job.parameters, job.stepper)
     return np.broadcast_to(cost * _allowance(p), job.shape).ravel()
 
@@ -70,7 +72,7 @@ def estimate_cost(job: Job) -> float:
     job : Job
         A validated job.
     """
-    if not has_record(job):
+    if not load_model(job.model).is_recorded:
         return float("nan")
     return float(run_costs(job.thinned(_MOST_ESTIMATED)).mean())
 
@@ -81,8 +83,8 @@ def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
     Parameters
     ----------
     job : Job
-        A validated job. Its model's record says by `lanes` how many runs a stepper takes at once, and by
-        `lane_key` of a run's parameters which ones: those with equal keys.
+        A validated job. Its model says by `lanes` how many runs a stepper takes at once, and by `lane_key`
+        of a run's parameters which ones: those with equal keys.
     indices : sequence of int
         Run indices.
 
@@ -91,21 +93,56 @@ def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
     list of tuple of int
         Each index once, in as few batches as can be, of nearly equal size.
     """
-    key = record_module(job).lane_key
-    groups: dict[Any, list[int]] = {}
-    for index in indices:
-        groups.setdefault(key(job.point(index)), []).append(index)
     batches = []
-    for group in groups.values():
+    for group in _grouped(load_model(job.model), indices, job.point):
         parts = -(-len(group) // _batch_size(job, job.point(group[0])))
         bounds = [len(group) * part // parts for part in range(parts + 1)]
         batches += [tuple(group[first:last]) for first, last in pairwise(bounds)]
     return batches
 
 
+def in_lanes(
+    model: Model,
+    stepper: str | None,
+    runs: Iterable[Item],
+    parameters: Callable[[Item], Parameters],
+    apart: Callable[[Item], Any],
+) -> Iterator[list[Item]]:
+    """Yield groups of runs that can advance together, as many as there are lanes.
+
+    Parameters
+    ----------
+    model, stepper
+        Of the runs.
+    runs : iterable of object
+        Anything that stands for a run.
+    parameters : callable
+        Flat parameters of such a run [SI].
+    apart : callable
+        What else the runs of a group have in common.
+    """
+    for group in _grouped(model, runs, parameters, apart):
+        most = model.lanes(parameters(group[0]), stepper)
+        for first in range(0, len(group), most):
+            yield group[first : first + most]
+
+
+def _grouped(
+    model: Model,
+    runs: Iterable[Item],
+    parameters: Callable[[Item], Parameters],
+    apart: Callable[[Item], Any] = lambda run: None,
+) -> Iterable[list[Item]]:
+    """Runs of equal lane keys."""
+    groups: dict[Any, list[Item]] = {}
+    for run in runs:
+        groups.setdefault((model.lane_key(parameters(run)), apart(run)), []).append(run)
+    return groups.values()
+
+
 def _batch_size(job: Job, parameters: dict[str, Any]) -> int:
     """Most runs of a batch: several times the lanes, unless a process that dies would lose too much."""
-    model = record_module(job)
+    model = load_model(job.model)
     most = model.lanes(parameters, job.stepper)
     if most == 1:
         return 1
@@ -122,9 +159,9 @@ def turns(job: Job, runs: int) -> int:
     runs : int
         Runs of the batch.
     """
-    return -(-runs // record_module(job).lanes(job.parameters, job.stepper))
+    return -(-runs // load_model(job.model).lanes(job.parameters, job.stepper))
 
 
 def pilot_share(job: Job) -> float:
     """Share of a run's simulated time that tells what the whole run costs."""
-    return getattr(record_module(job), "PILOT_SHARE", PILOT_SHARE)
+    return load_model(job.model).pilot_share

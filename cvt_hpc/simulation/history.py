@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.job.assignments import read_assignments
-from cvt_hpc.models.contract import record_module
+from cvt_hpc.models.contract import load_model
 from cvt_hpc.simulation.record import record_coordinates, record_variables
 from cvt_hpc.simulation.running import do
 from cvt_hpc.variables import Variable
@@ -99,10 +99,7 @@ def _history(job: Job, point: dict[str, Any], run: Any, record: dict[str, Any]) 
     if job.stepper is not None and run is not None:
         attributes["judged_fraction"] = run.parameters["judged_fraction"]  # less than asked if prolonged
     dataset = xr.Dataset(variables, coordinates, attributes)
-    model = record_module(job)
-    if not hasattr(model, "histories"):
-        return dataset
-    return dataset.merge(model.histories(run), combine_attrs="override")
+    return dataset.merge(load_model(job.model).histories(run), combine_attrs="override")
 
 
 def _attributes(long_name: str, units: str) -> dict[str, str]:

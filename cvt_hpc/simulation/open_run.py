@@ -9,11 +9,9 @@ record module (`contract.py`), and what it answers so is neither refined nor pro
 from __future__ import annotations
 
 import math
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from cvt_hpc.models import MODELS
-from cvt_hpc.models.contract import record_module
+from cvt_hpc.models.contract import load_model
 from cvt_hpc.recording import longest_duration, sample_count
 from cvt_hpc.simulation.record import record_of, record_without_run
 from cvt_hpc.variables import Status, Vibrates
@@ -50,7 +48,7 @@ class OpenRun:
     """
 
     def __init__(self, job: Job, point: dict[str, Any], is_kept: bool = False) -> None:
-        self._job, self._point, self._model = job, point, record_module(job)
+        self._job, self._point, self._model = job, point, load_model(job.model)
         self._is_kept = is_kept
         self.next, self.paused = point, None
         self.record: dict[str, Any] | None = None
@@ -58,8 +56,7 @@ class OpenRun:
         self._refinements = 0
         self._spent = dict.fromkeys(_COST, 0)
         self._is_preliminary = False
-        if hasattr(self._model, "preliminary"):
-            self._begin_cheaply()
+        self._begin_cheaply()
 
     def _begin_cheaply(self) -> None:
         values = self._model.known(self._point)
@@ -136,7 +133,7 @@ def _is_undecided(record: dict[str, Any]) -> bool:
 
 def _remedy(job: Job, point: dict[str, Any]) -> str:
     """What may help a run that fails at every step, in words."""
-    others = import_module(MODELS[job.model]).STEPPER_NAMES
+    others = load_model(job.model).steppers
     ways = ['stepper = "explicit"'] if job.stepper == "imex" and "explicit" in others else []
     ways += ["a finer or coarser mesh (stations)"] if "stations" in point else []
     return f": try {' or '.join(ways)}" if ways else ""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.models.contract import record_module
+from cvt_hpc.models.contract import Model, Run, load_model
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 
 if TYPE_CHECKING:
@@ -46,6 +46,13 @@ _MARCH = (
 )
 
 
+def recorded_model(job: Job) -> Model:
+    """Return the model of a job; InputError where its runs are not judged and recorded."""
+    model = load_model(job.model)
+    model.check_recorded(job.source)
+    return model
+
+
 def record_variables(job: Job) -> tuple[Variable, ...]:
     """Quantities of a run's record, `status` first.
 
@@ -55,7 +62,7 @@ def record_variables(job: Job) -> tuple[Variable, ...]:
         Of which only the model counts.
     """
     march = () if job.stepper is None else _MARCH
-    return (*_VERDICT, *record_module(job).VARIABLES, *_COST, *march)
+    return (*_VERDICT, *recorded_model(job).variables, *_COST, *march)
 
 
 def record_coordinates(job: Job) -> dict[str, Coordinate]:
@@ -66,11 +73,11 @@ def record_coordinates(job: Job) -> dict[str, Coordinate]:
     job : Job
         A validated job.
     """
-    return record_module(job).coordinates(job.parameters)
+    return recorded_model(job).coordinates(job.parameters)
 
 
 def record_of(
-    job: Job, run: Any, marched: float, judge: Callable[[Any], dict[str, Any] | None] | None = None
+    job: Job, run: Run, marched: float, judge: Callable[[Any], dict[str, Any] | None] | None = None
 ) -> dict[str, Any]:
     """The record of a transient that has ended.
 
@@ -89,9 +96,9 @@ def record_of(
     started = time.process_time()
     record, failure = _blank(job), run.failure
     has_result = failure is None or failure[0] is Status.DONE
-    if has_result and (values := (judge or record_module(job).judge)(run)) is not None:
+    if has_result and (values := (judge or load_model(job.model).judge)(run)) is not None:
         record |= values
-        if failure is None and hasattr(run, "numerical_doubt"):
+        if failure is None:
             failure = run.numerical_doubt(record)
     if failure is not None and failure[0] is not Status.DONE:
         status, why = failure
@@ -131,7 +138,7 @@ def record_of_solution(job: Job, solution: Any, solving: float) -> dict[str, Any
         Processor time that it has taken [s].
     """
     started = time.process_time()
-    record = _blank(job) | record_module(job).judge(solution)
+    record = _blank(job) | load_model(job.model).judge(solution)
     return record | {"core_seconds": solving + time.process_time() - started}
 
 

@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
-from cvt_hpc.models.contract import record_module
-from cvt_hpc.simulation.engine import Interrupted, march
-from cvt_hpc.simulation.record import record_of_solution
+from cvt_hpc.models.contract import Model
+from cvt_hpc.simulation.marching import Interrupted, march_runs
+from cvt_hpc.simulation.record import record_of_solution, recorded_model
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
@@ -73,17 +73,18 @@ def do(
     kept: Collection[int] = (),
 ) -> list[tuple[Any, dict[str, Any]]]:
     """Do a batch of runs as `run_points`; beside each record what `histories` of the model reads, if kept."""
+    model = recorded_model(job)
     if job.stepper is None:
-        return [_solve(job, point, interrupt) for point in points]
-    return march(job, points, interrupt, kept)
+        return [_solve(job, model, point, interrupt) for point in points]
+    return march_runs(job, points, interrupt, kept)
 
 
 def _solve(
-    job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]
+    job: Job, model: Model, point: dict[str, Any], interrupt: Callable[[], str | None]
 ) -> tuple[Any, dict[str, Any]]:
     """A run of a model without a transient: its record follows from the parameters at once."""
     if stop := interrupt():
         raise Interrupted(stop)
     started = time.process_time()
-    solution = record_module(job).solve(point)
+    solution = model.solve(point)
     return solution, record_of_solution(job, solution, time.process_time() - started)

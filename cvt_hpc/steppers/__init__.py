@@ -1,7 +1,6 @@
 """Time integration only: one method per module, which declares what a job may set.
 
-`imex` and `explicit` are the elastic belt's own steps, and live with it. Every other module offers, beside
-PARAMETERS,
+Steps with the structure of one model live with that model. Every module here offers, beside PARAMETERS,
 
 FACTS
     Order, stability, damping and needs of the method (`cvt_hpc.steppers.facts.Facts`).
@@ -16,9 +15,9 @@ march(system, control, interval, rows, clock, y, work, counts) -> int
     a numerical failure: where it stopped is in `y` and `clock`.
 """
 
+from collections.abc import Collection
+
 STEPPERS = {
-    "imex": "cvt_hpc.models.elastic_belt.imex_settings",
-    "explicit": "cvt_hpc.models.elastic_belt.explicit_settings",
     "symplectic_euler": "cvt_hpc.steppers.symplectic_euler",
     "runge_kutta_4": "cvt_hpc.steppers.runge_kutta_4",
     "dormand_prince": "cvt_hpc.steppers.dormand_prince",
@@ -31,3 +30,8 @@ STEPPERS = {
     "scipy_bdf": "cvt_hpc.steppers.scipy_bdf",
     "scipy_radau": "cvt_hpc.steppers.scipy_radau",
 }
+
+
+def taken(refused: Collection[str]) -> dict[str, str]:
+    """Return STEPPERS but for those that a model refuses."""
+    return {name: place for name, place in STEPPERS.items() if name not in refused}

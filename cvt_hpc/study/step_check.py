@@ -19,7 +19,7 @@ from cvt_hpc.errors import mismatch
 from cvt_hpc.job.derivation import overridden
 from cvt_hpc.job.for_model import handed_to
 from cvt_hpc.models.auto.rules import COARSENESS, Rung
-from cvt_hpc.steppers import STEPPERS
+from cvt_hpc.models.contract import load_model
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.repeats import AUDITED, FULL_MODEL, Repeat, built
 from cvt_hpc.study.status import expected_cost
@@ -104,7 +104,7 @@ def _explicit(job: Job) -> dict[str, Any]:
     """The same runs by the explicit step with its own defaults, in full where the job climbs a ladder."""
     model = FULL_MODEL if job.model == AUDITED else job.model
     document = handed_to(job, model, "by the explicit step, to check the step")
-    own = import_module(STEPPERS[job.stepper]).PARAMETERS[_section(job)]
+    own = import_module(load_model(job.model).steppers[job.stepper]).PARAMETERS[_section(job)]
     return _without(document, _section(job), own) | {"stepper": EXPLICIT}
 
 

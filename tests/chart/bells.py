@@ -22,6 +22,7 @@ STEP = {"numerics": {"step": Parameter(1e-5, "s", "time step", minimum=0.0, excl
 TOLERANCE = {"numerics": {"tolerance": Parameter(1e-3, "", "tolerance", minimum=0.0, exclusive=True)}}
 # relative error per step or tolerance
 LOUDER = {"soft": 100.0, "hard": 1000.0, "clever": 0.1}
+CHANNELS = ("load",)
 LONGEST_STEP = 1e-3  # from here on runs fail half way
 
 
@@ -48,7 +49,7 @@ class Transient:
         self.probes = (Probe("rim 1/2"), Probe("foot"), Probe("driving arc 1/2"))
         self.interval = 1 / parameters["sampling_rate"]
         self.samples = round(parameters["duration"] * parameters["sampling_rate"])
-        self.done, self.led = 0, None
+        self.done, self.led, self.failure = 0, None, None
         self.setting = parameters["step"] if "step" in parameters else parameters["tolerance"]
 
     @property
@@ -87,10 +88,10 @@ class Transient:
         ):
             Transient.clock.now += (self.samples // 2 - self.done) * 1.1e-9 / self.setting
             self.done = self.samples // 2
-            return Status.FAILED_NUMERICS, "the bell has cracked (by 3 mm)"
+            self.failure = Status.FAILED_NUMERICS, "the bell has cracked (by 3 mm)"
+            return
         self.done += samples
         Transient.clock.now += samples * 1.1e-9 / self.setting
-        return None
 
 
 class Clock:

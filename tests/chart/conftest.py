@@ -1,14 +1,14 @@
 """The bell in the place of a model, and a chart job of it."""
 
 import sys
+from importlib.machinery import ModuleSpec
 from types import ModuleType
 
 import pytest
-from bells import JOB, PARAMETERS, STEP, TOLERANCE, Clock, Transient, exact
+from bells import CHANNELS, JOB, PARAMETERS, STEP, TOLERANCE, Clock, Transient, exact
 
 from cvt_hpc.models import MODELS
-from cvt_hpc.models.alone import Alone
-from cvt_hpc.steppers import STEPPERS
+from cvt_hpc.models.marched import batches_of_one
 
 
 @pytest.fixture
@@ -16,22 +16,24 @@ def bell(monkeypatch):
     """Register the bell and its steppers; return the clock."""
     model, transient, solution = ModuleType("bell"), ModuleType("bell.transient"), ModuleType("bell.exact")
     model.PARAMETERS, model.DEFAULT_STEPPER = PARAMETERS, "soft"
-    model.STEPPER_NAMES, model.REFUSED = ("soft", "hard", "clever"), {}
+    model.STEPPERS = {name: name for name in ("soft", "hard", "clever")}
     model.check = lambda parameters: []
-    transient.Transient, solution.exact = Transient, exact
-    transient.batch = lambda points, stepper: Alone(Transient(points[0], stepper))
+    solution.exact = exact
+    transient.batch, transient.CHANNELS = batches_of_one(Transient), CHANNELS
     clock = Clock()
     monkeypatch.setattr(Transient, "clock", clock)
     monkeypatch.setattr(Transient, "made", 0)
-    monkeypatch.setattr("cvt_hpc.chart.marching.time", clock)
+    monkeypatch.setattr("cvt_hpc.simulation.marching.time", clock)
+    monkeypatch.setattr("cvt_hpc.chart.timed_runs.time", clock)
+    transient.TAKES_OVER = True
     for module in (model, transient, solution):
+        module.__spec__ = ModuleSpec(module.__name__, None)
         monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setitem(MODELS, "bell", "bell")
     for name, table in (("soft", STEP), ("hard", STEP), ("clever", TOLERANCE)):
         stepper = ModuleType(name)
         stepper.PARAMETERS = table
         monkeypatch.setitem(sys.modules, name, stepper)
-        monkeypatch.setitem(STEPPERS, name, name)
     return clock
 
 

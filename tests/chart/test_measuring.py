@@ -11,6 +11,7 @@ from cvt_hpc.chart.checks import check_prospects
 from cvt_hpc.chart.measuring import measure
 from cvt_hpc.chart.quantities import History, Quantity, observe
 from cvt_hpc.errors import InputError
+from cvt_hpc.models.contract import Model
 
 
 def measured(chart, name, repeats=2, time_limit=math.inf):
@@ -126,7 +127,9 @@ def test_a_lead_that_fails_is_named_as_such(write_chart):
 
 
 def test_a_model_whose_runs_cannot_take_over_is_refused(write_chart, monkeypatch):
-    monkeypatch.delattr(Transient, "take_over")
+    import bell.transient as module
+
+    monkeypatch.delattr(module, "TAKES_OVER")
     with pytest.raises(InputError, match="lead: expected a model whose runs can take over from others"):
         check_prospects(load_chart(write_chart(*LED)))
 
@@ -134,10 +137,8 @@ def test_a_model_whose_runs_cannot_take_over_is_refused(write_chart, monkeypatch
 class Batch:
     """Bells that ring together: two cost as much as one."""
 
-    def __init__(self, points, stepper):
+    def __init__(self, points, stepper, paused=()):
         self.runs = tuple(Transient(point, stepper) for point in points)
-        for run in self.runs:
-            run.failure = None
         self.samples, self.interval = self.runs[0].samples, self.runs[0].interval
 
     @property
@@ -159,7 +160,7 @@ def test_lanes_are_filled_and_share_their_time(write_chart, monkeypatch):
     import bell.transient as module
 
     monkeypatch.setattr(module, "batch", Batch)
-    monkeypatch.setattr(module, "lanes", lambda parameters, stepper: 2, raising=False)
+    monkeypatch.setattr(Model, "lanes", lambda model, parameters, stepper: 2)
     chart = load_chart(
         write_chart(('stepper = "soft"', 'stepper = "soft"\nlanes = 2'), ('title = "Ringing"', "starts = 3"))
     )

@@ -15,15 +15,17 @@ from cvt_hpc.job.summary import summarize
 from cvt_hpc.job.units import to_si
 from cvt_hpc.job.values import read_value
 from cvt_hpc.models import MODELS
-from cvt_hpc.models.elastic_belt import OWN_STEPPERS
+from cvt_hpc.models.contract import load_model
 from cvt_hpc.simulation import estimate_cost, simulate
 from cvt_hpc.steppers import STEPPERS
 from cvt_hpc.steppers.facts import Facts
 from cvt_hpc.study import run
 from cvt_hpc.vibration import settings as vibration_settings
 
-PAIRS = [(model, stepper) for model in MODELS for stepper in import_module(MODELS[model]).STEPPER_NAMES]
-DIRECT = [model for model in MODELS if not import_module(MODELS[model]).STEPPER_NAMES]
+TAKEN = {model: load_model(model).steppers for model in MODELS}
+PAIRS = [(model, stepper) for model in MODELS for stepper in TAKEN[model]]
+DIRECT = [model for model in MODELS if not TAKEN[model]]
+OWN = {name: place for taken in TAKEN.values() for name, place in taken.items() if name not in STEPPERS}
 both = pytest.mark.parametrize(("model", "stepper"), PAIRS + [(model, None) for model in DIRECT])
 
 
@@ -31,7 +33,7 @@ both = pytest.mark.parametrize(("model", "stepper"), PAIRS + [(model, None) for 
 def test_keys_are_unique_over_all_tables(model, stepper):
     modules = [import_module(MODELS[model])]
     if stepper is not None:
-        modules += [import_module(STEPPERS[stepper]), recording, vibration_settings]
+        modules += [import_module(TAKEN[model][stepper]), recording, vibration_settings]
     keys = [key for module in modules for table in module.PARAMETERS.values() for key in table]
     assert sorted(keys) == sorted(set(keys))
     assert set(keys) == set(load_schema(model, stepper, "x").parameters)
@@ -85,24 +87,22 @@ def test_every_transient_is_checked_for_what_all_runs_share(model, stepper, tabl
 
 @pytest.mark.parametrize("model", [model for model in MODELS if model not in DIRECT])
 def test_every_stepper_is_taken_or_refused_with_a_reason(model):
-    module = import_module(MODELS[model])
-    assert sorted((*module.STEPPER_NAMES, *module.REFUSED)) == sorted(STEPPERS)
-    assert module.DEFAULT_STEPPER in module.STEPPER_NAMES
-    for stepper in set(module.STEPPER_NAMES) - set(getattr(module, "OWN_STEPPERS", ())):
-        assert hasattr(import_module(STEPPERS[stepper]), "march"), (
-            stepper
-        )  # of any system; others are a model's own
-    for stepper, reason in module.REFUSED.items():
+    asked = load_model(model)
+    assert not asked.refused.keys() & asked.steppers.keys()
+    assert asked.default_stepper in asked.steppers
+    for stepper in (STEPPERS | OWN).keys() - asked.steppers.keys():
+        reason = asked.refused.get(stepper, "it is elastic_belt's own step")
         assert len(reason.split()) > 3, stepper
+        assert stepper in OWN or stepper in asked.refused
         with pytest.raises(InputError) as caught:
             build_job({"name": "x", "model": model, "stepper": stepper}, "x.toml")
         assert str(caught.value).startswith(f"x.toml: stepper: expected one that {model} takes (")
         assert str(caught.value).endswith(f'found "{stepper}": {reason}')
 
 
-@pytest.mark.parametrize("stepper", STEPPERS)
+@pytest.mark.parametrize("stepper", STEPPERS | OWN)
 def test_every_stepper_says_what_a_chooser_has_to_know(stepper):
-    module = import_module(STEPPERS[stepper])
+    module = import_module((STEPPERS | OWN)[stepper])
     facts = module.FACTS
     assert isinstance(facts, Facts)
     assert isinstance(facts.order, int) and facts.order >= 1
@@ -114,7 +114,7 @@ def test_every_stepper_says_what_a_chooser_has_to_know(stepper):
     assert facts.adaptive or 0.0 < facts.order_at_events <= facts.order
     assert facts.rest_limit > 0.0
     assert len(facts.stability.split()) > 1 and facts.damping.strip()
-    if stepper in OWN_STEPPERS:
+    if stepper in OWN:
         assert facts.needs == frozenset()
     else:
         assert "rates" in facts.needs and facts.needs <= {"rates", "partition", "friction"}
@@ -129,7 +129,7 @@ def test_every_stepper_stands_in_the_table_of_methods():
         .split("## The methods")[1]
         .split("\n## ")[0]
     )
-    for stepper in set(STEPPERS) - set(OWN_STEPPERS):
+    for stepper in STEPPERS:
         assert re.search(rf"^\|[^|]*`{stepper}`", table, re.MULTILINE), stepper
 
 

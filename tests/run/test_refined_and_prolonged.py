@@ -9,9 +9,9 @@ from marched import CHEAP, job, never
 from test_run_lanes import assert_same_bits
 
 from cvt_hpc.job import build_job
-from cvt_hpc.models.alone import Alone
 from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
 from cvt_hpc.models.elastic_belt.lane_run import LaneRun
+from cvt_hpc.models.marched import BatchOfOne
 from cvt_hpc.models.oscillator.transient import Transient as Oscillator
 from cvt_hpc.simulation import Interrupted, run_point, run_points, simulate
 from cvt_hpc.variables import Status, Vibrates
@@ -197,11 +197,11 @@ def test_an_interrupt_in_a_later_try_ends_all(script):
 
 
 def marched(run, samples):
-    batch = Alone(run)
+    batch = BatchOfOne(run)
     while batch.running and run.done < samples:
         batch.advance(samples - run.done)
-    assert batch.failure is None
-    return batch
+    assert run.failure is None
+    return run
 
 
 def general(duration):
@@ -225,12 +225,11 @@ def oscillator(duration):
 )
 def test_runs_without_lanes_go_on_as_well(transient, parameters):
     whole = marched(transient(parameters(0.01)), 200)
-    batch = marched(transient(parameters(0.005)), 100)
-    run = batch.paused()
+    run = marched(transient(parameters(0.005)), 100).paused()
     run.prolong(parameters(0.01))
     marched(run, 200)
     # general steppers know no step_ripple
-    assert np.array_equal(run.rows, whole.run.rows, equal_nan=True) and run.steps == whole.steps
+    assert np.array_equal(run.rows, whole.rows, equal_nan=True) and run.steps == whole.steps
     assert run.samples == 200 and np.array_equal(run.displacement, whole.displacement)
     if hasattr(run, "means"):
         for name, values in whole.means.items():

@@ -29,20 +29,18 @@ PARAMETERS = elastic_belt.PARAMETERS | {
     },
 }
 DEFAULT_STEPPER = "imex"
-OWN_STEPPERS = ("imex",)
-STEPPER_NAMES = OWN_STEPPERS
+STEPPERS = {"imex": elastic_belt.STEPPERS["imex"]}
 REFUSED = elastic_belt.REFUSED | {
-    name: "its rules were measured with imex" for name in elastic_belt.STEPPER_NAMES if name != "imex"
+    name: "its rules were measured with imex" for name in elastic_belt.STEPPERS if name not in STEPPERS
 }
 
 __all__ = [
     "ANSWERED_BY",
     "DEFAULT_STEPPER",
     "GIVES",
-    "OWN_STEPPERS",
     "PARAMETERS",
     "REFUSED",
-    "STEPPER_NAMES",
+    "STEPPERS",
     "check",
     "inert",
 ]

@@ -30,7 +30,6 @@ harmonic, which are those with a `damping_ratio` below -0.1; and stick-slip.
 from cvt_hpc.models.criterion.parameters import PARAMETERS, check, inert
 
 DEFAULT_STEPPER = None
-STEPPER_NAMES = ()
-REFUSED: dict[str, str] = {}
+STEPPERS: dict[str, str] = {}
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPER_NAMES", "check", "inert"]
+__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "STEPPERS", "check", "inert"]

@@ -8,11 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from cvt_hpc.models.alone import lane_key, lanes
 from cvt_hpc.models.criterion.energy import Flank, energy_per_cycle, flank
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
-
-__all__ = ["VARIABLES", "coordinates", "cost", "judge", "lane_key", "lanes", "solve"]
 
 # Speed of the vibration over that of sliding: above 1 radial sliding turns about, and at 2 friction takes
 # energy whatever the law, since each speed that feeds then has its opposite

@@ -40,7 +40,7 @@ SHARED = (
 )
 
 
-def cost(parameters: dict[str, Any], stepper: str, step_cost: Mapping[str, float] = STEP_COST) -> Any:
+def cost(parameters: Mapping[str, Any], stepper: str, step_cost: Mapping[str, float] = STEP_COST) -> Any:
     """Core-seconds of a batch; of general steppers, some of which choose their step, little is known.
 
     Parameters
@@ -58,7 +58,7 @@ def cost(parameters: dict[str, Any], stepper: str, step_cost: Mapping[str, float
     return share * step_cost.get(stepper, 1e-5) * p["stations"] * p["duration"] / p.get("step", 1e-6)
 
 
-def lanes(parameters: dict[str, Any], stepper: str) -> int:
+def lanes(parameters: Mapping[str, Any], stepper: str) -> int:
     """Most runs that a batch can take.
 
     Parameters
@@ -73,7 +73,7 @@ def lanes(parameters: dict[str, Any], stepper: str) -> int:
     return LANES[parameters["precision"]]
 
 
-def lane_key(parameters: dict[str, Any]) -> tuple:
+def lane_key(parameters: Mapping[str, Any]) -> tuple:
     """What two runs must have in common to be in one batch.
 
     Parameters

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -99,7 +100,7 @@ VARIABLES = (
 )
 
 
-def coordinates(parameters: dict[str, Any]) -> dict[str, Coordinate]:
+def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions.
 
     Parameters

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cvt_hpc.models.alone import Alone, batch_of_one
 from cvt_hpc.models.elastic_belt import OWN_STEPPERS
 from cvt_hpc.models.elastic_belt.batch import Batch
-from cvt_hpc.models.elastic_belt.grouping import lanes
 from cvt_hpc.models.elastic_belt.lane_run import LaneRun
+from cvt_hpc.models.elastic_belt.sampling import CHANNELS
+from cvt_hpc.models.marched import BatchOfOne, batches_of_one
 from cvt_hpc.variables import Status
 
-__all__ = ["Transient", "batch", "lanes"]
+__all__ = ["CHANNELS", "TAKES_OVER", "Transient", "batch"]
+
+TAKES_OVER = True  # runs go on from where others stand
 
 
-def batch(points: Sequence[dict[str, Any]], stepper: str, paused: Sequence[Any] = ()) -> Batch | Alone:
+def batch(
+    points: Sequence[Mapping[str, Any]], stepper: str, paused: Sequence[Any] = ()
+) -> Batch | BatchOfOne:
     """Runs that advance together by any stepper that the belt takes.
 
     Parameters
@@ -23,20 +27,20 @@ def batch(points: Sequence[dict[str, Any]], stepper: str, paused: Sequence[Any] 
     points : sequence of dict
         Resolved parameters of the runs [SI], all of one `lane_key`; one for steppers without lanes.
     stepper : str
-        One of STEPPER_NAMES.
+        One that the model takes.
     paused : sequence, optional
         What `paused()` of shorter runs has returned, one for each point, to go on from.
 
     Returns
     -------
-    Batch or Alone
+    Batch or BatchOfOne
         They have `runs`, `samples`, `done`, `running`, `interval` and `advance` in common.
     """
     if stepper in OWN_STEPPERS:
         return Batch(points, stepper, paused)
     from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
 
-    return batch_of_one(GeneralTransient, points, stepper, paused)
+    return batches_of_one(GeneralTransient)(points, stepper, paused)
 
 
 class Transient(LaneRun):
@@ -50,7 +54,7 @@ class Transient(LaneRun):
         "imex" or "explicit".
     """
 
-    def __init__(self, parameters: dict[str, Any], stepper: str) -> None:
+    def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
         super().__init__(Batch([parameters], stepper), 0)
 
     def advance(self, samples: int) -> tuple[Status, str] | None:

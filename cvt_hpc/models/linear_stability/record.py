@@ -7,11 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.models.alone import lane_key, lanes
 from cvt_hpc.models.steady_variator import record as steady_record
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
-
-__all__ = ["VARIABLES", "coordinates", "cost", "judge", "lane_key", "lanes", "solve"]
 
 VARIABLES = (
     Variable("growth_rate", (), "f8", "s-1", "growth rate of the mode that grows fastest; none found: nan"),
@@ -60,7 +57,7 @@ def cost(parameters: Mapping[str, Any], stepper: None) -> Any:
     return 1.1 * steady_record.cost(parameters, stepper)
 
 
-def solve(parameters: dict[str, Any]) -> Solution:
+def solve(parameters: Mapping[str, Any]) -> Solution:
     """Steady state and its modes for the parameters of a run [SI]."""
     from cvt_hpc.models.elastic_belt.belt import mesh
     from cvt_hpc.models.linear_stability.modes import modes

@@ -7,14 +7,12 @@ from v = c on it holds no shape (critical speed).
 """
 
 from cvt_hpc.models.moving_string.parameters import PARAMETERS, check
-from cvt_hpc.steppers import STEPPERS
+from cvt_hpc.steppers import taken
 
 DEFAULT_STEPPER = "runge_kutta_4"
 REFUSED = {
-    "imex": "it is the elastic belt's own step",
-    "explicit": "it is the elastic belt's own step; symplectic_euler is the same method",
     "moreau": "nothing rubs here: it is for set-valued friction and rigid contact",
 }
-STEPPER_NAMES = tuple(name for name in STEPPERS if name not in REFUSED)
+STEPPERS = taken(REFUSED)
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPER_NAMES", "check"]
+__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check"]

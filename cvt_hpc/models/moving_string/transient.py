@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.alone import batch_of_one
-from cvt_hpc.models.marched import MarchedRun, Probe
+from cvt_hpc.models.marched import MarchedRun, Probe, batches_of_one
 from cvt_hpc.models.moving_string.exact import probe_positions
 from cvt_hpc.models.moving_string.motion import energy, highest_frequency, initial_state, system
 
@@ -30,7 +28,7 @@ class Transient(MarchedRun):
     parameters : mapping
         Resolved parameters of the run [SI].
     stepper : str
-        One of the model's STEPPER_NAMES.
+        One that the model takes.
     """
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
@@ -55,4 +53,4 @@ class Transient(MarchedRun):
         return {"energy": energy}[name](self.parameters, self.rows[: self.done])
 
 
-batch = partial(batch_of_one, Transient)
+batch = batches_of_one(Transient)

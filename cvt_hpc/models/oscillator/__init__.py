@@ -24,10 +24,5 @@ from cvt_hpc.models.oscillator.parameters import PARAMETERS, check, inert
 from cvt_hpc.steppers import STEPPERS
 
 DEFAULT_STEPPER = "moreau"
-REFUSED = {
-    "imex": "it is the elastic belt's own step",
-    "explicit": "it is the elastic belt's own step; symplectic_euler is the same method",
-}
-STEPPER_NAMES = tuple(name for name in STEPPERS if name not in REFUSED)
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPER_NAMES", "check", "inert"]
+__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "STEPPERS", "check", "inert"]

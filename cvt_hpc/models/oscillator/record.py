@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.models.alone import lane_key, lanes
 from cvt_hpc.models.oscillator.cycles import cycle_starts, work_per_cycle
 from cvt_hpc.models.oscillator.steady import steady_sliding
 from cvt_hpc.variables import Coordinate, Variable
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from cvt_hpc.models.oscillator.transient import Transient
-
-__all__ = ["VARIABLES", "coordinates", "cost", "histories", "judge", "lane_key", "lanes"]
 
 STEP_COST = 1e-6  # core-seconds of a step of moreau, and of a sample
 

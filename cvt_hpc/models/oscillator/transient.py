@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.alone import batch_of_one
-from cvt_hpc.models.marched import MarchedRun, Probe
+from cvt_hpc.models.marched import MarchedRun, Probe, batches_of_one
 from cvt_hpc.models.oscillator.constants import normal_load, oscillator
 from cvt_hpc.models.oscillator.motion import (
     HUMP,
@@ -41,7 +39,7 @@ class Transient(MarchedRun):
     parameters : mapping
         Resolved parameters of the run [SI].
     stepper : str
-        One of the model's STEPPER_NAMES.
+        One that the model takes.
 
     Attributes
     ----------
@@ -104,4 +102,4 @@ class Transient(MarchedRun):
         return self.rows[: self.done, {"speed": V}[name]]
 
 
-batch = partial(batch_of_one, Transient)
+batch = batches_of_one(Transient)

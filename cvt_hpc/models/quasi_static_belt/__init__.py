@@ -7,6 +7,7 @@ keeps and what it drops. Importing this package is cheap.
 from cvt_hpc.models import elastic_belt
 from cvt_hpc.models.elastic_belt import check
 from cvt_hpc.parameters import Parameter
+from cvt_hpc.steppers import taken
 
 PARAMETERS = elastic_belt.PARAMETERS | {
     "limit": {
@@ -20,9 +21,9 @@ PARAMETERS = elastic_belt.PARAMETERS | {
     },
 }
 DEFAULT_STEPPER = "scipy_bdf"
-STEPPER_NAMES = tuple(name for name in elastic_belt.STEPPER_NAMES if name not in elastic_belt.OWN_STEPPERS)
-REFUSED = elastic_belt.REFUSED | {
-    name: "it is a step for the belt with all its inertia" for name in elastic_belt.OWN_STEPPERS
-}
+STEPPERS = taken(elastic_belt.REFUSED)
+REFUSED = elastic_belt.REFUSED | dict.fromkeys(
+    elastic_belt.OWN_STEPPERS, "it is a step for the belt with all its inertia"
+)
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPER_NAMES", "check"]
+__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check"]

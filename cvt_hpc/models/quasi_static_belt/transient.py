@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.alone import batch_of_one
 from cvt_hpc.models.elastic_belt.belt import Belt, Mesh, State
 from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
+from cvt_hpc.models.elastic_belt.sampling import CHANNELS
+from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.quasi_static_belt import equations
+
+__all__ = ["CHANNELS", "TAKES_OVER", "Transient", "batch"]
+
+TAKES_OVER = True  # runs go on from where others stand
 
 
 class QuasiStaticForm:
@@ -40,4 +44,4 @@ class Transient(GeneralTransient):
     form = QuasiStaticForm
 
 
-batch = partial(batch_of_one, Transient)
+batch = batches_of_one(Transient)

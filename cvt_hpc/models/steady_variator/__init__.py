@@ -10,7 +10,6 @@ Importing this package is cheap.
 from cvt_hpc.models.steady_variator.parameters import PARAMETERS, check, inert
 
 DEFAULT_STEPPER = None
-STEPPER_NAMES = ()
-REFUSED: dict[str, str] = {}
+STEPPERS: dict[str, str] = {}
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPER_NAMES", "check", "inert"]
+__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "STEPPERS", "check", "inert"]

@@ -7,13 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.alone import lane_key, lanes
 from cvt_hpc.models.elastic_belt.record import STRANDS
 from cvt_hpc.models.elastic_belt.slip import GROSS_SLIP, PULLEYS
 from cvt_hpc.models.elastic_belt.slip import VARIABLE as SLIP_MARGIN
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
-
-__all__ = ["VARIABLES", "coordinates", "cost", "judge", "lane_key", "lanes", "solve"]
 
 VARIABLES = (
     Variable("mean_ring_tension", ("strand",), "f8", "N", "ring tension in the middle of the strand"),
@@ -41,7 +38,7 @@ def cost(parameters: Mapping[str, Any], stepper: None) -> Any:
     return 6e-3 * parameters["stations"]
 
 
-def solve(parameters: dict[str, Any]) -> Any:
+def solve(parameters: Mapping[str, Any]) -> Any:
     """Steady state of the parameters of a run [SI] with what it means; or why none was found."""
     from cvt_hpc.models.elastic_belt.belt import mesh
     from cvt_hpc.models.steady_variator.forces import quantities

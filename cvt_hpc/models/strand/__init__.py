@@ -21,7 +21,6 @@ energy), how far, the arcs at its ends, the neighbouring strand, and damping.
 from cvt_hpc.models.strand.parameters import PARAMETERS, check, inert
 
 DEFAULT_STEPPER = None
-STEPPER_NAMES = ()
-REFUSED: dict[str, str] = {}
+STEPPERS: dict[str, str] = {}
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPER_NAMES", "check", "inert"]
+__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "STEPPERS", "check", "inert"]

@@ -7,13 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.models.alone import lane_key, lanes
 from cvt_hpc.models.strand.forces import net_forces
 from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies, resting_frequencies
 from cvt_hpc.physics.geometry import variator
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
-
-__all__ = ["VARIABLES", "coordinates", "cost", "judge", "lane_key", "lanes", "solve"]
 
 STRANDS = ("t1", "t2")
 MODES = 5  # that are recorded

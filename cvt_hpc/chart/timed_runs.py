@@ -1,20 +1,17 @@
-"""Runs marched and timed, alone or in lanes: the one place that knows how several runs are carried out."""
+"""Runs marched and timed, alone or in lanes."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from types import ModuleType
 from typing import Any
 
-from cvt_hpc.models import MODELS
+from cvt_hpc.models.contract import Failure, Run, load_model
+from cvt_hpc.simulation import marching
 from cvt_hpc.variables import Status
 
-_FIRST_SLICE = 1  # sample; doubled while a slice takes less than _SLICE, so that a time limit can be kept
-_SLICE = 0.2  # [s]
 _TOO_LONG = (Status.TIMED_OUT, "takes longer than the chart's time_limit")
 
 
@@ -34,8 +31,8 @@ class Marched:
         What they have simulated together [s].
     """
 
-    runs: tuple[Any, ...]
-    failures: tuple[tuple[Status, str] | None, ...]
+    runs: tuple[Run, ...]
+    failures: tuple[Failure | None, ...]
     core_seconds: float
     simulated: float
 
@@ -45,20 +42,19 @@ class Marched:
         return self.core_seconds / self.simulated if self.simulated > 0.0 else math.nan
 
 
-def warm_up(model: str, stepper: str, points: Sequence[dict[str, Any]]) -> None:
+def warm_up(model: str, stepper: str | None, points: Sequence[dict[str, Any]]) -> None:
     """Compile or load all that a group of runs needs, which is no cost of theirs."""
-    _module(model).batch(points, stepper).advance(1)
+    load_model(model).batch(points, stepper).advance(1)
 
 
-def most_lanes(model: str, stepper: str, parameters: dict[str, Any]) -> int:
+def most_lanes(model: str, stepper: str | None, parameters: dict[str, Any]) -> int:
     """Return how many runs of a model can advance together, in the lanes of the processor's registers."""
-    module = _module(model)
-    return module.lanes(parameters, stepper) if hasattr(module, "lanes") else 1
+    return load_model(model).lanes(parameters, stepper)
 
 
 def march(
     model: str,
-    stepper: str,
+    stepper: str | None,
     points: Sequence[dict[str, Any]],
     lanes: int,
     until: float,
@@ -83,26 +79,24 @@ def march(
     led : sequence of Transient
         What the runs take over from, one for each; none: they start by themselves.
     """
-    runs: list[Any] = []
-    failures: list[tuple[Status, str] | None] = []
+    runs: list[Run] = []
+    failures: list[Failure | None] = []
     seconds = simulated = 0.0
     for first in range(0, len(points), lanes):
-        batch = _module(model).batch(points[first : first + lanes], stepper)
+        batch = load_model(model).batch(points[first : first + lanes], stepper)
         if led:
             batch.take_over(led[first : first + lanes])
         begun = batch.done
-        samples = batch.samples if math.isinf(until) else min(batch.samples, round(until / batch.interval))
-        piece = samples if math.isinf(time_limit) else _FIRST_SLICE
-        started = time.process_time()
-        in_time = _advance(batch, samples, piece, started + time_limit)
-        seconds += time.process_time() - started
+        samples = batch.samples if math.isinf(until) else round(until / batch.interval)
+        needed, stopped = marching.march(batch, samples, _stop_after(time_limit))
+        seconds += needed
         runs += batch.runs
         simulated += sum(run.time - begun * batch.interval for run in batch.runs)
-        failures += [run.failure or (None if in_time else _TOO_LONG) for run in batch.runs]
+        failures += [run.failure or (_TOO_LONG if stopped else None) for run in batch.runs]
     return Marched(tuple(runs), tuple(failures), seconds, simulated)
 
 
-def lead(model: str, stepper: str, points: Sequence[dict[str, Any]], until: float) -> tuple[Any, ...]:
+def lead(model: str, stepper: str | None, points: Sequence[dict[str, Any]], until: float) -> tuple[Any, ...]:
     """Return runs that have been brought to a time, from where others can take over.
 
     Parameters
@@ -116,17 +110,9 @@ def lead(model: str, stepper: str, points: Sequence[dict[str, Any]], until: floa
     return march(model, stepper, points, lanes, until).runs
 
 
-def _advance(batch: Any, samples: int, piece: int, deadline: float) -> bool:
-    """March a batch, and return whether it came to its end in time."""
-    now = time.process_time()
-    while batch.running and batch.done < samples:
-        if now > deadline:
-            return False
-        batch.advance(min(piece, samples - batch.done))
-        before, now = now, time.process_time()
-        piece = 2 * piece if now - before < _SLICE else piece
-    return True
-
-
-def _module(model: str) -> ModuleType:
-    return import_module(MODELS[model] + ".transient")
+def _stop_after(seconds: float) -> Callable[[], str | None] | None:
+    """What tells a march that so much processor time is over; None where there is no limit."""
+    if math.isinf(seconds):
+        return None
+    end = time.process_time() + seconds
+    return lambda: _TOO_LONG[1] if time.process_time() > end else None

@@ -1,0 +1,55 @@
+"""Each model of the ladder beside its contract: nothing runs here, the type checker reads it."""
+
+from cvt_hpc.models import (
+    auto,
+    criterion,
+    elastic_belt,
+    linear_stability,
+    moving_string,
+    oscillator,
+    quasi_static_belt,
+    steady_variator,
+    strand,
+)
+from cvt_hpc.models.auto import record as auto_record
+from cvt_hpc.models.auto import transient as auto_transient
+from cvt_hpc.models.contract import Declaration, Recorded, Transient
+from cvt_hpc.models.criterion import record as criterion_record
+from cvt_hpc.models.elastic_belt import record as elastic_belt_record
+from cvt_hpc.models.elastic_belt import transient as elastic_belt_transient
+from cvt_hpc.models.linear_stability import record as linear_stability_record
+from cvt_hpc.models.moving_string import transient as moving_string_transient
+from cvt_hpc.models.oscillator import record as oscillator_record
+from cvt_hpc.models.oscillator import transient as oscillator_transient
+from cvt_hpc.models.quasi_static_belt import record as quasi_static_belt_record
+from cvt_hpc.models.quasi_static_belt import transient as quasi_static_belt_transient
+from cvt_hpc.models.steady_variator import record as steady_variator_record
+from cvt_hpc.models.strand import record as strand_record
+
+declared: Declaration
+declared = auto
+declared = criterion
+declared = elastic_belt
+declared = linear_stability
+declared = moving_string
+declared = oscillator
+declared = quasi_static_belt
+declared = steady_variator
+declared = strand
+
+recorded: Recorded
+recorded = auto_record
+recorded = criterion_record
+recorded = elastic_belt_record
+recorded = linear_stability_record
+recorded = oscillator_record
+recorded = quasi_static_belt_record
+recorded = steady_variator_record
+recorded = strand_record
+
+marched: Transient
+marched = auto_transient
+marched = elastic_belt_transient
+marched = moving_string_transient
+marched = oscillator_transient
+marched = quasi_static_belt_transient
