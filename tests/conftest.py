@@ -62,6 +62,12 @@ def check_run(parameters):
     return [("duration", "at most an hour", f"{duration:g} s")] if duration > 3600 else []
 
 
+def pytest_collection_modifyitems(items):
+    """Put files with slow tests first: begun last, one would keep one core waiting for another."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
+
+
 @pytest.fixture
 def toy(monkeypatch):
     """Register the model "toy" and the stepper "hop", and put a table [run] in the place of all shared ones."""

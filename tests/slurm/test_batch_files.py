@@ -4,7 +4,7 @@ serial run and nothing is done twice."""
 import getpass
 
 import pytest
-from cluster import wait_until
+from cluster import SPOILT, wait_until
 from recorded import assert_same_numbers, frames_written, recorded_runs, records
 
 from cvt_hpc import load_job, open_results, run
@@ -22,9 +22,7 @@ load = ["0 N m", "60 N m"]
 [run]
 duration = "0.1 s"
 """
-# Slurm's PMI takes a request of MPICH that arrives in two pieces, as on a busy machine, for two: the ranks then wait for
-# each other for ever, before the program begins.
-pytestmark = pytest.mark.flaky(reruns=2, only_rerun="mpi/pmi2: request not begin with")
+pytestmark = [pytest.mark.slow, pytest.mark.flaky(reruns=2, only_rerun=SPOILT)]
 RUNS = 12
 TWO_NODES = ("--nodes=2", "--ntasks=2")
 
@@ -49,6 +47,7 @@ def serial(job_file):
 @pytest.fixture(autouse=True)
 def free_nodes(cluster):
     """After each test no job is left, whatever became of it."""
+    cluster.begin_logs()
     yield
     cluster.ask("scancel", f"--user={getpass.getuser()}")
     wait_until(lambda: not cluster.ask("squeue", "--noheader"), "the end of all jobs", cluster.logs)
@@ -65,7 +64,7 @@ def start_again(cluster, job):
     wait_until(
         lambda: cluster.facts(job)["Restarts"] == "1" and cluster.facts(job)["JobState"] == "PENDING",
         f"job {job} back in the queue",
-        lambda: f"{cluster.facts(job)}\n{cluster.output(job)}",
+        lambda: f"{cluster.facts(job)}\n{cluster.output(job)}\n{cluster.logs()}",
     )
     # Not within the same second: a node tells a second start from the one that it has just ended by whole seconds.
     cluster.ask("scontrol", "update", f"JobId={job}", "StartTime=now+2")
@@ -110,7 +109,8 @@ def test_a_job_that_gains_nothing_is_not_requeued(cluster, tmp_path):
     endless = tmp_path / "endless.toml"
     endless.write_text(JOB.replace("0.1 s", "5 s"))
     job = cluster.submit("sweep.sbatch", endless, "--out", tmp_path / "out", options=("--ntasks=1",))
-    wait_until((tmp_path / "out" / "job.json").exists, "the start", lambda: cluster.output(job))
+    started = (tmp_path / "out" / "job.json").exists
+    wait_until(started, "the start", lambda: cluster.output(job) + cluster.logs())
     cluster.ask("scancel", "--batch", "--signal=USR1", job)
     facts = cluster.wait_for(job, "FAILED", "PENDING")
     assert (facts["JobState"], facts["ExitCode"], facts["Restarts"]) == ("FAILED", "98:0", "0")
@@ -130,7 +130,9 @@ def test_an_array_shares_a_folder(cluster, job_file, serial, tmp_path):
     tasks = [f"{array}_1", f"{array}_2"]
     first = Part(1, 2)  # one that has done nothing would not be put back
     wait_until(
-        lambda: first.holds(recorded_runs(out)).any(), "a record of part 1", lambda: cluster.output(array)
+        lambda: first.holds(recorded_runs(out)).any(),
+        "a record of part 1",
+        lambda: cluster.output(array) + cluster.logs(),
     )
     cluster.ask("scancel", "--batch", "--signal=USR1", tasks[0])
     start_again(cluster, tasks[0])
