@@ -1,15 +1,21 @@
 """For all tests: a model and a stepper without physics, which say what a job file may set and run nothing."""
 
+import os
 import sys
 from types import ModuleType
 
 import pytest
 from hypothesis import HealthCheck, settings
+from threadpoolctl import threadpool_limits
 
 from cvt_hpc.job import schema
 from cvt_hpc.models import MODELS
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers import STEPPERS
+
+# A worker is a core: threads of the linear algebra on top, here or in what tests start, would wait for each other.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+threadpool_limits(1)
 
 # No test depends on the clock: a busy machine, or the first loading of pint, takes longer than an example may.
 settings.register_profile(

@@ -25,5 +25,4 @@ install_slurm() {
 
 prepare_environment mpich,test
 install_slurm
-export OMP_NUM_THREADS=1 # a worker is a core: no threads of the linear algebra library on top
 exec .venv/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder "$@"

@@ -4,27 +4,14 @@ serial run and nothing is done twice."""
 import getpass
 
 import pytest
-from cluster import SPOILT, wait_until
+from cluster import JOB, SPOILT, TWO_NODES, wait_until
 from recorded import assert_same_numbers, frames_written, recorded_runs, records
 
 from cvt_hpc import load_job, open_results, run
 from cvt_hpc.study.part import Part
 
-# Runs with different meshes cannot be done as one batch: records come one after another.
-JOB = """
-name = "meshes"
-model = "elastic_belt"
-
-[axes]
-stations = { from = 48, to = 68, step = 4 }
-load = ["0 N m", "60 N m"]
-
-[run]
-duration = "0.1 s"
-"""
 pytestmark = [pytest.mark.slow, pytest.mark.flaky(reruns=2, only_rerun=SPOILT)]
 RUNS = 12
-TWO_NODES = ("--nodes=2", "--ntasks=2")
 
 
 @pytest.fixture(scope="module")
@@ -59,17 +46,6 @@ def wait_for_records(cluster, job, out, count=1):
     )
 
 
-def start_again(cluster, job):
-    """Let a job that Slurm has put back into its queue start at once, not after its two minutes."""
-    wait_until(
-        lambda: cluster.facts(job)["Restarts"] == "1" and cluster.facts(job)["JobState"] == "PENDING",
-        f"job {job} back in the queue",
-        lambda: f"{cluster.facts(job)}\n{cluster.output(job)}\n{cluster.logs()}",
-    )
-    # Not within the same second: a node tells a second start from the one that it has just ended by whole seconds.
-    cluster.ask("scontrol", "update", f"JobId={job}", "StartTime=now+2")
-
-
 def assert_completed(cluster, job):
     facts = cluster.wait_for(job, "COMPLETED", "FAILED", "CANCELLED", "NODE_FAIL")
     assert (facts["JobState"], facts["ExitCode"]) == ("COMPLETED", "0:0"), cluster.output(job)
@@ -95,7 +71,7 @@ def test_a_warned_sweep_is_requeued_and_goes_on(cluster, job_file, serial, tmp_p
     job = cluster.submit("sweep.sbatch", job_file, "--out", out, options=TWO_NODES, CVT_HPC_LAUNCHER=launcher)
     wait_for_records(cluster, job, out)
     cluster.ask("scancel", "--batch", "--signal=USR1", job)
-    start_again(cluster, job)
+    cluster.start_again(job)
     assert "stopped early (SIGUSR1); the same command goes on" in cluster.output(job)
     assert "runs remain: back into the queue" in cluster.output(job)  # that is exit status 99
     with open_results(out) as gathered:
@@ -135,7 +111,7 @@ def test_an_array_shares_a_folder(cluster, job_file, serial, tmp_path):
         lambda: cluster.output(array) + cluster.logs(),
     )
     cluster.ask("scancel", "--batch", "--signal=USR1", tasks[0])
-    start_again(cluster, tasks[0])
+    cluster.start_again(tasks[0])
     for task in tasks:
         assert_completed(cluster, task)
     assert_same_as_serial(out, serial)
@@ -162,7 +138,7 @@ def test_the_loss_of_a_node_costs_no_record(cluster, job_file, serial, tmp_path)
     wait_for_records(cluster, job, out)
     cluster.lose_node(first)
     try:
-        start_again(cluster, job)  # Slurm has put it back into the queue
+        cluster.start_again(job)  # Slurm has put it back into the queue
         assert 0 < records(out) < RUNS
     finally:
         cluster.start_node(first)
