@@ -11,6 +11,10 @@ holds that of the kernel. The compiler tells kernels apart by an identity drawn 
 never find such code again: here it is the name, and the content that names the kernel's own folder. The
 compiler cannot read an index that names a type of a script that is not at hand: here it skips that entry.
 
+A kernel that only other kernels call gets no entry from Python, which for tuples of arrays takes long to
+compile. One that is called with lanes does not count who uses an array: it makes none, and the arrays that it
+is given outlast it.
+
 The folders lie below NUMBA_CACHE_DIR if that is set; else in the package where it is the user's own, else in
 the user's cache. Whoever can write to them can run any code as the user, so folders to which others can write
 are not used: without any, code is compiled in each process anew.
@@ -21,6 +25,7 @@ What takes long is told to the logger of this module: compiling as INFO, and tha
 from __future__ import annotations
 
 import ast
+import gc
 import hashlib
 import logging
 import os
@@ -30,6 +35,7 @@ import shutil
 import stat
 import sys
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -37,8 +43,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numba
+from numba import types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.event import Event, Listener, register
+from numba.core.registry import CPUDispatcher
+from numba.core.sigutils import normalize_signature
+from numba.core.targetconfig import ConfigStack
+
+from cvt_hpc.lanes.kinds import LaneArrayKind
 
 _PACKAGE = Path(__file__).parent
 _PREFIX = f"{_PACKAGE}{os.sep}"  # of the paths of its modules, as texts, since Path objects take long
@@ -50,28 +62,82 @@ _LONG = 3.0  # [s]: what compiles faster is not worth a line
 # Division by zero gives inf as in numpy, without a test for it. Every operation is rounded once, as written:
 # were products contracted with sums, the bits would depend on which kernels the compiler merges, and so on
 # whether their code is compiled or found in the folder.
-_OPTIONS = {"error_model": "numpy"}
+_OPTIONS = {"nopython": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 _logger = logging.getLogger(__name__)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function when it is first called."""
+    """Compile a function when it is first called; one that takes lanes can neither make nor return arrays."""
     return _compiled(function, _OPTIONS)
 
 
 def merged_kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function into its callers.
+    """Compile a function into its callers, as handing over many arrays costs more than a short loop.
 
-    A call that hands over a tuple of arrays counts references to each, which costs more than a short loop.
     Its call must not be its caller's last statement, nor that of another merged kernel unless it is straight
     lines: the compiler loses such calls (numba 0.68).
     """
-    return _compiled(function, {**_OPTIONS, "inline": "always"})
+    return _compiled(function, _OPTIONS | {"inline": "always"})
+
+
+class _Kernel(CPUDispatcher):
+    """A function and its machine code, with an entry from Python where Python has called it."""
+
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        super().__init__(*arguments, **named)
+        # of what is being compiled: whether another kernel calls it, whether with lanes
+        self._for_kernel = self._takes_lanes = False
+        self._without_entry: set[tuple] = set()  # types of arguments
+        self._compiler._customize_flags = self._customized
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Compile for a call from another kernel."""
+        before, self._for_kernel = self._for_kernel, True
+        try:
+            found = super().get_call_template(args, kws)
+        finally:
+            self._for_kernel = before
+        _, _, kinds, _ = found
+        caller = ConfigStack.top_or_none()
+        if caller and not caller.nrt and _holds(self.overloads[kinds].signature.return_type, types.Array):
+            raise TypeError(f"{self.__name__} returns an array: no kernel that takes lanes can call it")
+        return found
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for a call, or find the machine code of an earlier one."""
+        kinds, _ = normalize_signature(sig)
+        if not self._for_kernel and kinds in self._without_entry:
+            self._without_entry.remove(kinds)
+            del self.overloads[kinds]
+        self._takes_lanes = any(_holds(kind, LaneArrayKind) for kind in kinds)
+        return super().compile(sig)
+
+    def add_overload(self, cres: Any) -> None:
+        """Take machine code."""
+        if self._takes_lanes and _holds(cres.signature.return_type, types.Array):
+            raise TypeError(f"{self.__name__} takes lanes and returns an array, which nobody would keep")
+        if not self._for_kernel:
+            return super().add_overload(cres)
+        kinds = tuple(cres.signature.args)
+        self._without_entry.add(kinds)
+        self.overloads[kinds] = cres
+
+    def _customized(self, flags: Any) -> Any:
+        flags.no_cpython_wrapper = self._for_kernel
+        flags.nrt = not self._takes_lanes
+        return flags
+
+
+def _holds(kind: types.Type, wanted: type) -> bool:
+    """Whether a type is, or a tuple has, one of a wanted kind."""
+    if isinstance(kind, types.BaseTuple):
+        return any(_holds(part, wanted) for part in kind)
+    return isinstance(kind, wanted)
 
 
 def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    compiled = numba.njit(**options)(function)
+    compiled = _Kernel(function, {}, options)
     name = f"{function.__module__}.{function.__qualname__}"
     try:
         content = _content(os.path.abspath(function.__code__.co_filename))
@@ -80,7 +146,7 @@ def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
         content = _digest(repr((code.co_code, code.co_consts, code.co_names)).encode())
     else:
         if place := _place():
-            compiled._cache = _Cache(function, place / f"{function.__module__}-{content}")
+            compiled._cache = _Cache(compiled, place / f"{function.__module__}-{content}")
     compiled._set_uuid(f"{name}-{content}")
     return compiled
 
@@ -271,14 +337,18 @@ def _make(folder: Path) -> None:
 class _Cache(FunctionCache):
     """The machine code of a kernel on the disk; without what the disk refuses."""
 
-    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+    def __init__(self, compiled: _Kernel, folder: Path) -> None:
         _asked_for(folder)
-        self._py_func = function
+        self._kernel = weakref.ref(compiled)
+        self._py_func = function = compiled.py_func
         self._name = repr(function)
         self._impl = _Filing(function, folder)
         self._cache_path = str(folder)
         self._cache_file = _ForgivingIndex(self._cache_path, self._impl.filename_base, source_stamp="")
         self.enable()
+
+    def _index_key(self, sig: Any, codegen: Any) -> tuple:
+        return (*super()._index_key(sig, codegen), self._kernel()._for_kernel)
 
     @contextmanager
     def _guard_against_spurious_io_errors(self) -> Iterator[None]:
@@ -343,14 +413,20 @@ def _tell_not_kept(why: str) -> None:
 
 
 class _Waiting(Listener):
-    """Tells that a kernel is being compiled, not loaded, once that takes long, and how long it took."""
+    """Tells that a kernel is being compiled, not loaded, once that takes long, and how long it took.
+
+    Meanwhile no garbage is collected: hardly any memory becomes free, and looking for it takes a tenth of
+    the time.
+    """
 
     def __init__(self) -> None:
         self._depth = 0  # the kernels that a kernel calls are compiled within its own compilation
-        self._name, self._began, self._told = "", 0.0, False
+        self._name, self._began, self._told, self._collects = "", 0.0, False, False
 
     def on_start(self, event: Event) -> None:
         if self._depth == 0:
+            self._collects = gc.isenabled()
+            gc.disable()
             self._name = getattr(event.data["dispatcher"], "__name__", "a kernel")
             self._began, self._told = time.monotonic(), False
         self._depth += 1
@@ -360,6 +436,8 @@ class _Waiting(Listener):
 
     def on_end(self, event: Event) -> None:
         self._depth -= 1
+        if self._depth == 0 and self._collects:
+            gc.enable()
         if self._depth == 0 and self._elapsed() > _LONG:
             _logger.info("compiled %s in %.0f s", self._name, self._elapsed())
 

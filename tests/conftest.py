@@ -1,14 +1,20 @@
 """For all tests: a model and a stepper without physics, which say what a job file may set and run nothing."""
 
+import os
 import sys
 from types import ModuleType
 
 import pytest
 from hypothesis import HealthCheck, settings
+from threadpoolctl import threadpool_limits
 
 from cvt_hpc.job import schema
 from cvt_hpc.models import MODELS
 from cvt_hpc.parameters import Parameter
+
+# A worker is a core: threads of the linear algebra on top, here or in what tests start, would wait for each other.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+threadpool_limits(1)
 
 # No test depends on the clock: a busy machine, or the first loading of pint, takes longer than an example may.
 settings.register_profile(
@@ -59,6 +65,12 @@ def check_run(parameters):
     """Refuse runs that nobody has the time for."""
     duration = parameters["duration"]
     return [("duration", "at most an hour", f"{duration:g} s")] if duration > 3600 else []
+
+
+def pytest_collection_modifyitems(items):
+    """Put files with slow tests first: begun last, one would keep one core waiting for another."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Runs all tests from a fresh checkout, on two cores; arguments go to pytest (-n 0: on one). Needs Python 3.11 or later
-# and gcc.
+# Runs all tests from a fresh checkout, on two cores; arguments go to pytest (-n 0: on one; -m "not slow": those of daily
+# use). Needs Python 3.11 or later and gcc.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . jobs/environment.sh
@@ -11,9 +11,13 @@ install_slurm() {
     local packages=(slurmctld slurmd slurm-client munge)
     if PATH="$PATH:/usr/sbin:/sbin" type slurmctld slurmd sbatch munged > /dev/null 2>&1; then
         return
-    elif [ "$(id -u)" -ne 0 ] || ! command -v apt-get > /dev/null; then
+    fi
+    if [ "$(id -u)" -ne 0 ] || ! command -v apt-get > /dev/null; then
         echo "No Slurm here, and only root on Debian can install it: apt-get install ${packages[*]}"
-    elif ! { apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install --no-install-recommends \
+        return
+    fi
+    echo "Installing a Slurm for the tests of the batch files (once): apt-get install ${packages[*]}"
+    if ! { apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install --no-install-recommends \
         "${packages[@]}"; } > /dev/null; then
         echo "No Slurm here, and it could not be installed: apt-get install ${packages[*]}"
     fi
@@ -21,4 +25,4 @@ install_slurm() {
 
 prepare_environment mpich,test
 install_slurm
-exec .venv/bin/python -m pytest -n 2 --dist loadfile "$@"
+exec .venv/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder "$@"

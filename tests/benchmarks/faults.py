@@ -25,11 +25,10 @@ from pathlib import Path
 TESTS = Path(__file__).parents[1]
 sys.path[:0] = [str(TESTS), str(TESTS / "study"), str(TESTS / "slurm")]
 
-from cluster import Cluster, missing, wait_until  # noqa: E402
+from cluster import JOB, TWO_NODES, Cluster, missing, wait_until  # noqa: E402
 from fault_cases import Outcome, make_reference  # noqa: E402
 from fault_kinds import KINDS, NEED_MOUNT, NEED_MPI, can_mount, play  # noqa: E402
 from recorded import assert_same_numbers, records  # noqa: E402
-from test_batch_files import JOB, TWO_NODES, start_again  # noqa: E402
 
 from cvt_hpc import load_job, open_results, run  # noqa: E402
 from cvt_hpc.study.folder import StudyFolder  # noqa: E402
@@ -88,7 +87,7 @@ def lose_node(cluster: Cluster, job_file: Path, out: Path, number: int, serial) 
     cluster.lose_node(first)
     outcome.faults = 1
     before = recorded_bytes(out)
-    start_again(cluster, job)
+    cluster.start_again(job)
     cluster.start_node(first)
     state = cluster.wait_for(job, "COMPLETED", "FAILED", "CANCELLED", "NODE_FAIL")["JobState"]
     after = recorded_bytes(out)

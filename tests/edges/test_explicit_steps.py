@@ -2,23 +2,10 @@
 
 import numpy as np
 import pytest
-from small_systems import FACTS, begin, bisect, finished, scene
+from small_systems import FACTS, begin, bisect, finished
+from sticking import LOAD, MASS, MU, RATE, STUCK, WIDTH
 
 from cvt_hpc.variables import Status
-
-WIDTH, MU, LOAD, MASS = 1e-3, 0.6, 2.0, 0.5
-RATE = LOAD * MU / (MASS * WIDTH)  # of the decay of sliding at rest [1/s]
-STUCK = scene(
-    "oscillator",
-    mass=MASS,
-    normal_load=LOAD,
-    static_friction=MU,
-    friction_speed=WIDTH,
-    belt_speed=0.0,
-    initial_speed=1e-9,
-    duration=0.2,
-    sampling_rate=100.0,
-)
 
 
 def sliding(stepper, **changes):

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 from small_systems import FACTS, begin, bisect, finished, scene
-from test_explicit_steps import LOAD, MASS, MU, RATE, STUCK, WIDTH
+from sticking import LOAD, MASS, MU, RATE, STUCK, WIDTH
 
 from cvt_hpc.models.oscillator.constants import oscillator
 from cvt_hpc.models.oscillator.exact import exact

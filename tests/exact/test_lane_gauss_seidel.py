@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_lane_compliance import STATIONS, courses, random_wrap
+from wraps import STATIONS, courses, random_wrap
 
 from cvt_hpc.physics.compliance import contact_state, solve_contact
 from cvt_hpc.physics.lane_compliance import GAP, PUSH, SOLVES, lane_contact

@@ -7,7 +7,7 @@ import numpy as np
 from cvt_hpc.job import Job, build_job
 from cvt_hpc.models.elastic_belt.record import evaluate
 from cvt_hpc.models.elastic_belt.transient import Transient
-from cvt_hpc.simulation import run_point
+from cvt_hpc.simulation import record_variables, run_point
 
 # A coarse belt that is loaded within 10 ms, judged over the shortest part that is allowed: 0.1 s of computing.
 CHEAP = {"stations": 48, "duration": 0.04, "rise_time": 0.01}
@@ -59,3 +59,11 @@ def balance(run: Transient) -> dict:
 def mean(run: Transient, name: str) -> float:
     """Mean of a channel over the judged part."""
     return float(run.channel(name)[run.judged].mean())
+
+
+def assert_same_bits(record: dict, other: dict) -> None:
+    """Assert that two records have the same numbers, but for times of computing and the like."""
+    for variable in record_variables(job()):
+        if not variable.volatile:
+            one, two = np.asarray(record[variable.name]), np.asarray(other[variable.name])
+            assert one.tobytes() == two.tobytes(), variable.name

@@ -1,6 +1,7 @@
 """Where machine code is kept, by what content, in which folders; and what is told while it is compiled."""
 
 import ast
+import gc
 import importlib
 import importlib.util
 import logging
@@ -14,12 +15,14 @@ from pathlib import Path
 from types import CodeType, ModuleType
 
 import numba
+import numpy as np
 import pytest
 from numba.core import event
 from numba.core.dispatcher import Dispatcher
 
 import cvt_hpc
 from cvt_hpc import kernels
+from cvt_hpc.lanes import LaneArray
 
 PACKAGE = Path(kernels.__file__).parent
 SOURCES = sorted(PACKAGE.rglob("*.py"))
@@ -302,6 +305,62 @@ def test_a_kernel_typed_into_a_shell_is_compiled_without_a_file(tmp_path):
     assert output(program, tmp_path, PACKAGE.parent) == ["0.5", "None"]
 
 
+# Calls from Python and from kernels
+
+
+def twice(inner):
+    return lambda x: 2.0 * inner(x)
+
+
+def test_a_kernel_that_kernels_have_called_can_be_called_from_python(package, chosen):
+    for loaded in (False, True):
+        module = load(package)
+        inner = module.kernel(plus_one)
+        caller = module.kernel(twice(inner))
+        assert [caller(1.0), inner(1.0), caller(2.0), inner(2.0)] == [4.0, 2.0, 6.0, 3.0]
+        assert sum(inner.stats.cache_hits.values()) == 2 * loaded
+    inner_alone = load(package).kernel(plus_one)
+    assert [inner_alone(1.0), sum(inner_alone.stats.cache_hits.values())] == [2.0, 1]
+
+
+@kernels.kernel
+def fresh(x):
+    return np.full(2, x)
+
+
+@kernels.kernel
+def made_with_lanes(lanes, x):
+    return np.full(2, x)[0]
+
+
+@kernels.kernel
+def called_with_lanes(lanes, x):
+    return fresh(x)[0]
+
+
+@kernels.kernel
+def passed_with_lanes(lanes, x):
+    return 1, x
+
+
+def test_kernels_that_take_lanes_neither_make_nor_return_arrays():
+    lanes = LaneArray(1, 1, 1)
+    assert fresh(1.0).tolist() == [1.0, 1.0]
+    with pytest.raises(numba.TypingError):
+        made_with_lanes(lanes, 1.0)
+    with pytest.raises(TypeError, match="fresh returns an array: no kernel that takes lanes can call it"):
+        called_with_lanes(lanes, 1.0)
+    with pytest.raises(TypeError, match="passed_with_lanes takes lanes and returns an array"):
+        passed_with_lanes(lanes, np.ones(2))
+
+
+def test_garbage_is_collected_again_after_compiling():
+    assert gc.isenabled()
+    with pytest.raises(numba.TypingError):
+        kernels.kernel(lambda x: undefined)(1.0)  # noqa: F821
+    assert gc.isenabled()
+
+
 # Where it is kept
 
 
@@ -490,6 +549,7 @@ def test_what_takes_long_is_told_when_it_is_compiled_and_not_when_it_is_loaded(
     first, last = (record.getMessage() for record in caplog.records if record.name == module.__name__)
     assert first == "compiling outer, once ..."
     assert last.startswith("compiled outer in ")
+    inner(1.0)  # from Python: so far only a kernel has called it
     caplog.clear()
     assert load(package).kernel(plus_one)(1.0) == 2.0
     assert caplog.messages == []

@@ -5,8 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from marched import CHEAP, job, never
-from test_run_lanes import assert_same_bits
+from marched import CHEAP, assert_same_bits, job, never
 
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.general_run import GeneralTransient

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from fast_runs import FastRuns
-from marched import CHEAP, job, never
+from marched import CHEAP, assert_same_bits, job, never
 
 from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.models.elastic_belt.belt import DRIVEN_SPEED, N_RING, U, W, belt_constants, initial_state
@@ -14,7 +14,7 @@ from cvt_hpc.models.elastic_belt.grouping import ALONE_SHARE, cost, lane_key
 from cvt_hpc.models.elastic_belt.lane_belt import REPEATS, parts_of
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.physics.lane_compliance import UNSOLVED
-from cvt_hpc.simulation import lane_groups, record_variables, run_point, run_points
+from cvt_hpc.simulation import lane_groups, run_point, run_points
 from cvt_hpc.simulation.batches import MOST_TURNS
 from cvt_hpc.variables import Status, Vibrates
 
@@ -58,13 +58,6 @@ def points(method):
 def together(method):
     """Records of the batch."""
     return run_points(of(method), points(method), never)
-
-
-def assert_same_bits(record, other):
-    for variable in record_variables(job()):
-        if not variable.volatile:
-            one, two = np.asarray(record[variable.name]), np.asarray(other[variable.name])
-            assert one.tobytes() == two.tobytes(), variable.name
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -4,29 +4,14 @@ serial run and nothing is done twice."""
 import getpass
 
 import pytest
-from cluster import wait_until
+from cluster import JOB, SPOILT, TWO_NODES, wait_until
 from recorded import assert_same_numbers, frames_written, recorded_runs, records
 
 from cvt_hpc import load_job, open_results, run
 from cvt_hpc.study.part import Part
 
-# Runs with different meshes cannot be done as one batch: records come one after another.
-JOB = """
-name = "meshes"
-model = "elastic_belt"
-
-[axes]
-stations = { from = 48, to = 68, step = 4 }
-load = ["0 N m", "60 N m"]
-
-[run]
-duration = "0.1 s"
-"""
-# Slurm's PMI takes a request of MPICH that arrives in two pieces, as on a busy machine, for two: the ranks then wait for
-# each other for ever, before the program begins.
-pytestmark = pytest.mark.flaky(reruns=2, only_rerun="mpi/pmi2: request not begin with")
+pytestmark = [pytest.mark.slow, pytest.mark.flaky(reruns=2, only_rerun=SPOILT)]
 RUNS = 12
-TWO_NODES = ("--nodes=2", "--ntasks=2")
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +34,7 @@ def serial(job_file):
 @pytest.fixture(autouse=True)
 def free_nodes(cluster):
     """After each test no job is left, whatever became of it."""
+    cluster.begin_logs()
     yield
     cluster.ask("scancel", f"--user={getpass.getuser()}")
     wait_until(lambda: not cluster.ask("squeue", "--noheader"), "the end of all jobs", cluster.logs)
@@ -58,17 +44,6 @@ def wait_for_records(cluster, job, out, count=1):
     wait_until(
         lambda: records(out) >= count, f"{count} records", lambda: cluster.output(job) + cluster.logs()
     )
-
-
-def start_again(cluster, job):
-    """Let a job that Slurm has put back into its queue start at once, not after its two minutes."""
-    wait_until(
-        lambda: cluster.facts(job)["Restarts"] == "1" and cluster.facts(job)["JobState"] == "PENDING",
-        f"job {job} back in the queue",
-        lambda: f"{cluster.facts(job)}\n{cluster.output(job)}",
-    )
-    # Not within the same second: a node tells a second start from the one that it has just ended by whole seconds.
-    cluster.ask("scontrol", "update", f"JobId={job}", "StartTime=now+2")
 
 
 def assert_completed(cluster, job):
@@ -96,7 +71,7 @@ def test_a_warned_sweep_is_requeued_and_goes_on(cluster, job_file, serial, tmp_p
     job = cluster.submit("sweep.sbatch", job_file, "--out", out, options=TWO_NODES, CVT_HPC_LAUNCHER=launcher)
     wait_for_records(cluster, job, out)
     cluster.ask("scancel", "--batch", "--signal=USR1", job)
-    start_again(cluster, job)
+    cluster.start_again(job)
     assert "stopped early (SIGUSR1); the same command goes on" in cluster.output(job)
     assert "runs remain: back into the queue" in cluster.output(job)  # that is exit status 99
     with open_results(out) as gathered:
@@ -110,7 +85,8 @@ def test_a_job_that_gains_nothing_is_not_requeued(cluster, tmp_path):
     endless = tmp_path / "endless.toml"
     endless.write_text(JOB.replace("0.1 s", "5 s"))
     job = cluster.submit("sweep.sbatch", endless, "--out", tmp_path / "out", options=("--ntasks=1",))
-    wait_until((tmp_path / "out" / "job.json").exists, "the start", lambda: cluster.output(job))
+    started = (tmp_path / "out" / "job.json").exists
+    wait_until(started, "the start", lambda: cluster.output(job) + cluster.logs())
     cluster.ask("scancel", "--batch", "--signal=USR1", job)
     facts = cluster.wait_for(job, "FAILED", "PENDING")
     assert (facts["JobState"], facts["ExitCode"], facts["Restarts"]) == ("FAILED", "98:0", "0")
@@ -130,10 +106,12 @@ def test_an_array_shares_a_folder(cluster, job_file, serial, tmp_path):
     tasks = [f"{array}_1", f"{array}_2"]
     first = Part(1, 2)  # one that has done nothing would not be put back
     wait_until(
-        lambda: first.holds(recorded_runs(out)).any(), "a record of part 1", lambda: cluster.output(array)
+        lambda: first.holds(recorded_runs(out)).any(),
+        "a record of part 1",
+        lambda: cluster.output(array) + cluster.logs(),
     )
     cluster.ask("scancel", "--batch", "--signal=USR1", tasks[0])
-    start_again(cluster, tasks[0])
+    cluster.start_again(tasks[0])
     for task in tasks:
         assert_completed(cluster, task)
     assert_same_as_serial(out, serial)
@@ -160,7 +138,7 @@ def test_the_loss_of_a_node_costs_no_record(cluster, job_file, serial, tmp_path)
     wait_for_records(cluster, job, out)
     cluster.lose_node(first)
     try:
-        start_again(cluster, job)  # Slurm has put it back into the queue
+        cluster.start_again(job)  # Slurm has put it back into the queue
         assert 0 < records(out) < RUNS
     finally:
         cluster.start_node(first)
