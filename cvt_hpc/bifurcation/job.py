@@ -112,7 +112,7 @@ def load_diagram(path: str | Path, overrides: Assignments = ()) -> Diagram:
                 "a parameter or an axis",
                 "a key of [branch], read from the file alone",
             )
-    job = build_job(document, source, replaced)
+    job = build_job(document, source, replaced, "--set")
     if job.model != STEADY:
         raise mismatch(f"{source}: model", STEADY, job.model)
     if job.design:
@@ -153,4 +153,7 @@ def _runs(job: Job, place: dict[str, Any], settings: dict[str, Any], where: str)
     band = tables.pop("judgement")
     document = {"name": job.name, "model": TRANSIENT, **tables}
     kept = {key: band[key] for key in ("band_low", "band_high") if key in band}
-    return build_job(document, where, {**kept, **place, **settings}, "set")
+    runs = build_job(document, where, {**kept, **place, **settings}, "set")
+    if runs.axes:
+        raise mismatch(f"{where} set {runs.axes[0].name}", "one value", "an axis")
+    return runs

@@ -8,6 +8,7 @@ rule comes after those that give what it needs.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
@@ -76,6 +77,25 @@ def _read_link(name: str, raw: Any, axis: Axis, schema: Schema, where: str) -> R
     if len(values) != len(axis.values):
         raise mismatch(where, f"{len(axis.values)} values, one for each of {axis.name}", f"{len(values)}")
     return Rule(key, Link(axis.name, axis.values, values, axis.unit), where, schema.parameters[key])
+
+
+def relinked(rules: Iterable[Rule], axes: Iterable[Axis]) -> list[Rule]:
+    """Return rules whose links follow the values that overrides have left of their axes.
+
+    Raises
+    ------
+    InputError
+        If an axis has a value for which a link has none.
+    """
+    left = {axis.name: axis.values for axis in axes}
+    found = []
+    for rule in rules:
+        if isinstance(link := rule.source, Link) and link.axis in left:
+            at = left[link.axis]
+            values = tuple(rule.value({link.axis: value}) for value in at)
+            rule = replace(rule, source=replace(link, at=at, values=values))
+        found.append(rule)
+    return found
 
 
 def overridden(keys: Collection[str], schema: Schema) -> set[str]:

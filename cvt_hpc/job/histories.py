@@ -37,8 +37,8 @@ def read_histories(
     axes : tuple of Axis
         Its grid.
     replaced : mapping
-        Values by key that overrides have put in the place of an axis or of a value; a run that they have
-        taken off the grid is left out.
+        By key what overrides have put in the place of an axis or of a value: a value, or None for an axis of
+        their own. A run that they have taken off the grid is left out.
     source : str
         The job file, for the errors.
     samples : int, optional
@@ -74,6 +74,8 @@ def _index(
         values[key] = read_value(schema.parameters[key], raw, f"{where}, {name}")
     index = 0
     for axis in axes:
+        if axis.name in replaced and values.get(axis.name) not in axis.values:
+            return None
         if axis.name not in values:
             raise mismatch(where, "a value for each axis", f"none for {axis.name}")
         index = index * len(axis.values) + _place(axis, values.pop(axis.name), f"{where}, {axis.name}")

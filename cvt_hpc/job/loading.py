@@ -8,11 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
-from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignments
+from cvt_hpc.job.assignments import (
+    Assignments,
+    AxisEntry,
+    read_assignments,
+    split_assignments,
+    split_axes,
+    structured,
+)
 from cvt_hpc.job.axes import Axis, read_axis
 from cvt_hpc.job.crosscheck import check_grid, check_rules
 from cvt_hpc.job.definition import HEADER, Job
-from cvt_hpc.job.derivation import ordered_rules, overridden, read_derived, read_linked
+from cvt_hpc.job.derivation import ordered_rules, overridden, read_derived, read_linked, relinked
 from cvt_hpc.job.design import Design, read_design, resolve_spacing
 from cvt_hpc.job.document import read_document
 from cvt_hpc.job.for_model import answering_model, handed_to
@@ -21,7 +28,6 @@ from cvt_hpc.job.rules import Link, Rule, follow
 from cvt_hpc.job.sampling import sampled_axes
 from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.values import expectation, read_value
-from cvt_hpc.parameters import Parameter
 
 OF_COMMANDS = ("branch", "chart")  # tables that a command of the same name reads
 _OF_DESIGN = "design."
@@ -36,7 +42,8 @@ def load_job(path: str | Path, overrides: Assignments = ()) -> Job:
     path : str or Path
         A TOML file.
     overrides : mapping, or sequence of "KEY=VALUE"
-        Values that replace those of the file; one for an axis replaces the axis by that one value.
+        Values that replace those of the file. One value for an axis replaces the axis by that value; a list
+        or a range, as a table [axes] has it, makes an axis or replaces one.
 
     Returns
     -------
@@ -54,16 +61,20 @@ def load_job(path: str | Path, overrides: Assignments = ()) -> Job:
 
 
 def build_job(
-    document: Mapping[str, Any], source: str, overrides: Assignments = (), label: str | None = None
+    document: Mapping[str, Any],
+    source: str = "build_job",
+    overrides: Assignments = (),
+    label: str | None = None,
 ) -> Job:
-    """Validate the contents of a job file.
+    """Validate a job that is given as a dict.
 
     Parameters
     ----------
     document : mapping
-        Tables and values as TOML gives them.
+        Tables and values as TOML gives them. An axis may also be a 1-D numpy array of numbers, and a table of
+        coefficients a 2-D one.
     source : str
-        Where it is from, for the errors.
+        Where it is from, for the errors: for a job of a file its path.
     overrides : mapping, or sequence of "KEY=VALUE"
         See `load_job`.
     label : str, optional
@@ -86,14 +97,16 @@ def build_job(
     schema = load_schema(head.get("model"), head.get("stepper"), source)
     _check_top_level(document, schema, source)
     tables = _read_tables(document, schema, source)
-    of_design = {key: value for key, value in pairs.items() if key.startswith(_OF_DESIGN)}
+    of_design = {key: structured(value) for key, value in pairs.items() if key.startswith(_OF_DESIGN)}
     others = {key: value for key, value in pairs.items() if key not in (*HEADER, *of_design)}
+    put_axes, others = split_axes(others, schema, source, label)
     replaced = read_assignments(others, schema, source, label)
     changed = {key.removeprefix(_OF_DESIGN): value for key, value in of_design.items()}
     design = read_design({**document.get("design", {}), **changed}, source)
-    gone = {*replaced, *overridden(replaced, schema)}
+    put = {*replaced, *put_axes}
+    gone = {*put, *overridden(put, schema)}
     given = {key: value for key, value in tables.items() if key not in gone} | replaced
-    axes, rules = _read_axes_and_rules(document, design, gone, given, schema, source)
+    axes, rules = _read_axes_and_rules(document, design, gone, put_axes, given, schema, source)
     if "first_spacing" in design:
         design = resolve_spacing(design, axes, source)
     scene = _resolve({**{axis.name: axis.values[0] for axis in axes}, **given}, rules, schema, source)
@@ -126,14 +139,24 @@ def _read_axes_and_rules(
     document: Mapping[str, Any],
     design: Design,
     gone: Collection[str],
+    put: Mapping[str, AxisEntry],
     given: Collection[str],
     schema: Schema,
     source: str,
 ) -> tuple[tuple[Axis, ...], list[Rule]]:
-    """Return the axes and the rules in their order, without those that overrides have put out of force."""
-    axes = _read_axes(document.get("axes", {}), design, gone, schema, source)
-    stated = _read_rules(document, axes, design, schema, source)
-    axes = tuple(axis for axis in axes if axis.name not in gone)
+    """Return the axes and the rules in their order.
+
+    Those that overrides have put out of force are `gone`, and the axes that overrides `put` are in their
+    place, or come last.
+    """
+    of_file = _find_axes(document.get("axes", {}), schema, source)
+    kept = {key: entry for key, entry in of_file.items() if key not in gone or key in put} | put
+    if "runs" in design:
+        axes, stated = sampled_axes(kept, design, source), _read_rules(document, (), design, schema, source)
+    else:
+        axes = _read_grid(kept)
+        # links have a value for each of the file's axis, and keep those that are left of it
+        stated = relinked(_read_rules(document, _read_grid(of_file), design, schema, source), axes)
     stated = [rule for rule in stated if rule.key not in gone]
     return axes, ordered_rules(stated, {*given, *(axis.name for axis in axes)}, schema, source)
 
@@ -217,21 +240,20 @@ def _read_tables(document: Mapping[str, Any], schema: Schema, source: str) -> di
     return values
 
 
-def _read_axes(
-    table: Mapping[str, Any], design: Design, gone: Collection[str], schema: Schema, source: str
-) -> tuple[Axis, ...]:
-    """Return the axes of the file, of samples but those that are replaced by one value."""
-    found: dict[str, tuple[Parameter, Any, str]] = {}
+def _find_axes(table: Mapping[str, Any], schema: Schema, source: str) -> dict[str, AxisEntry]:
+    """Return what the file's table [axes] has for each key."""
+    found: dict[str, AxisEntry] = {}
     for name, raw in schema.flatten(table):
         where = f"{source}: [axes] {name}"
         key = schema.find(name, where)
         if key in found:
             raise mismatch(where, "one axis for a parameter", f"a second one for {key}")
         found[key] = (schema.parameters[key], raw, where)
-    if "runs" in design:
-        left = {key: entry for key, entry in found.items() if key not in gone}
-        return sampled_axes(left, design, source)
-    return tuple(read_axis(key, *entry) for key, entry in found.items())
+    return found
+
+
+def _read_grid(entries: Mapping[str, AxisEntry]) -> tuple[Axis, ...]:
+    return tuple(read_axis(key, *entry) for key, entry in entries.items())
 
 
 def _resolve(values: Mapping[str, Any], rules: Sequence[Rule], schema: Schema, source: str) -> dict[str, Any]:

@@ -6,6 +6,8 @@ import math
 import numbers
 from typing import Any
 
+import numpy as np
+
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
 from cvt_hpc.job.units import UnitError, to_si
 from cvt_hpc.parameters import Parameter
@@ -48,6 +50,29 @@ def read_value(parameter: Parameter, raw: Any, where: str) -> Any:
     return value
 
 
+def as_list(array: np.ndarray, where: str, dimensions: tuple[int, ...]) -> list:
+    """Return an array of numbers as a (nested) list.
+
+    Parameters
+    ----------
+    array : array
+        Of floats or integers of any width.
+    where : str
+        File and key, for the error.
+    dimensions : tuple of int
+        Numbers of dimensions that are legal.
+
+    Raises
+    ------
+    InputError
+        If it is none of numbers, or has another number of dimensions.
+    """
+    if array.ndim not in dimensions or array.dtype.kind not in "iuf":
+        shapes = " or ".join(f"{ndim}-D" for ndim in dimensions)
+        raise mismatch(where, f"a {shapes} array of numbers", f"{show(array)} of {array.dtype}")
+    return array.tolist()
+
+
 def kind_of(parameter: Parameter) -> type:
     """Return the type of a parameter's values: float, int, bool, str or tuple."""
     if parameter.default is None:
@@ -81,7 +106,8 @@ def in_words(value: Any, unit: str) -> str:
 
 def _read_number(parameter: Parameter, raw: Any, where: str) -> float:
     if isinstance(raw, bool) or not isinstance(raw, (numbers.Real, str)):
-        hint = "; what a study varies stands in [axes]" if isinstance(raw, (list, tuple)) else ""
+        listed = isinstance(raw, (list, tuple, np.ndarray))
+        hint = "; what a study varies stands in [axes]" if listed else ""
         raise mismatch(where, _number_in_words(parameter), show(raw) + hint)
     try:
         value = to_si(raw, parameter.unit) if isinstance(raw, str) else float(raw)
@@ -128,6 +154,8 @@ def _read_flag(parameter: Parameter, raw: Any, where: str) -> bool:
 
 
 def _read_table(parameter: Parameter, raw: Any, where: str) -> tuple:
+    if isinstance(raw, np.ndarray):
+        raw = as_list(raw, where, (1, 2))
     if not isinstance(raw, (list, tuple)):
         raise mismatch(where, expectation(parameter), show(raw))
     rows = []

@@ -3,11 +3,14 @@ import math
 import subprocess
 import sys
 import textwrap
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import cvt_hpc
 from cvt_hpc import errors
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job, crosscheck, known_keys, load_job
@@ -95,6 +98,47 @@ def test_overrides_replace_values_and_axes(write_job, overrides):
     assert job.given >= wanted.keys()
 
 
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ["load=[40, '0.06 kN m']", "thrust={from='20 kN', to=30e3, step='10 kN'}"],
+        {"load": [40, "0.06 kN m"], "thrust": {"from": "20 kN", "to": 30e3, "step": "10 kN"}},
+        {"load": np.array([40, 60]), "thrust": np.array([2e4, 3e4], np.float32)},
+    ],
+)
+def test_overrides_make_axes_and_replace_them_in_their_place(write_job, overrides):
+    job = load_job(write_job(GRID), overrides)
+    assert {axis.name: axis.values for axis in job.axes} == {
+        "load": (40.0, 60.0),
+        "load_history": ("ramp", "constant"),
+        "sheave_stiffness": (1.0, math.inf),
+        "thrust": (2e4, 3e4),
+    }
+    # those of the file come first
+    assert [axis.name for axis in job.axes] == ["load", "load_history", "sheave_stiffness", "thrust"]
+    assert "thrust" not in job.given
+    assert build_job(json.loads(json.dumps(job.resolved(), allow_nan=False))) == replace(
+        job, source="build_job"
+    )
+
+
+def test_a_job_of_a_dict_takes_arrays_as_axes_and_tables(toy):
+    document = {
+        "name": "x",
+        "model": "toy",
+        "scene": {"thrust": "20 kN"},
+        "belt": {"table": np.array([[1, 2], [3, 4]])},
+        "axes": {"load": np.linspace(20, 60, 3), "stations": np.array([32, 64], np.uint16)},
+    }
+    job = cvt_hpc.build_job(document)
+    assert [axis.values for axis in job.axes] == [(20.0, 40.0, 60.0), (32, 64)]
+    assert {type(value) for value in job.axes[1].values} == {int}
+    assert job.parameters["table"] == ((1.0, 2.0), (3.0, 4.0))
+    document["axes"] = {"laod": [1]}
+    with pytest.raises(InputError, match=r"^build_job: \[axes\] laod: unknown key; did you mean load"):
+        cvt_hpc.build_job(document)
+
+
 def test_overrides_reach_the_head_and_the_last_of_two_counts(write_job):
     job = load_job(write_job(), ["name=y", "load=1", "load=2"])
     assert (job.name, job.parameters["load"]) == ("y", 2.0)
@@ -112,7 +156,14 @@ def test_overrides_reach_the_head_and_the_last_of_two_counts(write_job):
             ["load=3 kg"],
             '--set load: expected a value in N m (such as "1 N m" or a bare number in N m), found "3 kg"',
         ),
-        (["table=3"], "--set table: expected a list of numbers in N/m, found 3"),
+        (["table=3"], '--set table: expected a list of numbers in N/m, found "3"'),
+        (["load=[1, 2"], '--set load: expected a value in N m (such as "1 N m" or a bare number in N m), found "[1, 2"'),
+        (["load=[1, 1]"], "--set load: expected distinct values, found 1 as value 1 and value 2"),
+        (["load={from=1, too=2, step=1}"], "--set load.too: unknown key; did you mean to?"),
+        ({"load": np.ones((2, 2))}, "override load: expected a 1-D array of numbers, found an array of shape (2, 2) of float64"),
+        ({"load": np.array([True])}, "override load: expected a 1-D array of numbers, found an array of shape (1,) of bool"),
+        ({"load": np.array([1.0, np.nan])}, "override load, value 2: expected a finite value in N m, found nan"),
+        ({"table": np.ones((1, 1, 1))}, "override table: expected a 1-D or 2-D array of numbers, found an array of shape (1, 1, 1) of float64"),
         (["table=[x"], '--set table: expected a list of numbers in N/m, found "[x"'),
         (["refined=yes"], '--set refined: expected true or false, found "yes"'),
         (["model=toi"], 'model: unknown model "toi"; did you mean toy?'),
@@ -121,7 +172,7 @@ def test_overrides_reach_the_head_and_the_last_of_two_counts(write_job):
             'override load: expected a value in N m (such as "1 N m" or a bare number in N m), found nothing',
         ),
     ],
-)
+)  # fmt: skip
 def test_what_is_wrong_with_an_override_is_said(write_job, overrides, message):
     with pytest.raises(InputError) as caught:
         load_job(write_job(), overrides)
