@@ -11,7 +11,6 @@ from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.job.axes import Axis, thinned
 from cvt_hpc.job.rules import Rule, follow, needed_rules, places, varied_by
 from cvt_hpc.job.schema import Schema
-from cvt_hpc.job.values import in_words
 
 MOST_CHECKED_POINTS, MOST_CHECKED_VALUES = 20_000, 5_000  # of runs, and of what follows from others
 
@@ -83,9 +82,10 @@ def check_point(
         With the first problem found.
     """
     for key, expected, found in schema.problems(parameters):
-        raise mismatch(
-            f"{source}: [{schema.section_of[key]}] {key}", expected, found + _place(schema, varied or {})
-        )
+        if key in schema.units and found == f"{parameters[key]:g} {schema.parameters[key].unit}".rstrip():
+            found = f"{found} ({schema.in_words(key, parameters[key])})"  # models tell SI values
+        where = f"{source}: [{schema.section_of[key]}] {key}"
+        raise mismatch(where, expected, found + _place(schema, varied or {}))
 
 
 def complete_point(
@@ -105,7 +105,7 @@ def complete_point(
 
 
 def _place(schema: Schema, varied: Mapping[str, Any]) -> str:
-    words = (f"{key} = {in_words(value, schema.parameters[key].unit)}" for key, value in varied.items())
+    words = (f"{key} = {schema.in_words(key, value)}" for key, value in varied.items())
     return f" (at {', '.join(words)})" if varied else ""
 
 

@@ -76,7 +76,8 @@ def _read_link(name: str, raw: Any, axis: Axis, schema: Schema, where: str) -> R
     values = read_values(schema.parameters[key], raw, where)
     if len(values) != len(axis.values):
         raise mismatch(where, f"{len(axis.values)} values, one for each of {axis.name}", f"{len(values)}")
-    return Rule(key, Link(axis.name, axis.values, values, axis.unit), where, schema.parameters[key])
+    link = Link(axis.name, axis.values, values, axis.unit, schema.units.get(axis.name, ""))
+    return Rule(key, link, where, schema.parameters[key])
 
 
 def relinked(rules: Iterable[Rule], axes: Iterable[Axis]) -> list[Rule]:
@@ -156,7 +157,7 @@ def _substituted(known: set[str], schema: Schema, source: str) -> dict[str, Rule
             raise mismatch(where, f"either {key} or {target}", "both")
         if not is_taken:
             names = (key, *(need for need in substitute.needs if need in schema.parameters and need != key))
-            gives = Substituted(key, names, parameter.unit, substitute)
+            gives = Substituted(key, names, parameter.unit, substitute, schema.units.get(key, ""))
             rules[target] = Rule(target, gives, where, schema.parameters[target])
     return rules
 

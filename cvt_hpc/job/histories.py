@@ -12,7 +12,7 @@ from typing import Any
 from cvt_hpc.errors import mismatch, show
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.schema import Schema
-from cvt_hpc.job.values import in_words, read_value
+from cvt_hpc.job.values import read_value
 
 KEY = ("record", "history")
 _FORMS = "a list of runs, each a table {axis = value, ...} with all axes, or a run index"
@@ -78,7 +78,9 @@ def _index(
             return None
         if axis.name not in values:
             raise mismatch(where, "a value for each axis", f"none for {axis.name}")
-        index = index * len(axis.values) + _place(axis, values.pop(axis.name), f"{where}, {axis.name}")
+        index = index * len(axis.values) + _place(
+            axis, values.pop(axis.name), schema, f"{where}, {axis.name}"
+        )
     for key in values.keys() - replaced.keys():
         raise mismatch(where, f"axes of this job ({', '.join(axis.name for axis in axes)})", key)
     return index if all(replaced[key] == value for key, value in values.items()) else None
@@ -90,12 +92,12 @@ def _numbered(entry: Any, size: int, where: str) -> int:
     return entry
 
 
-def _place(axis: Axis, value: Any, where: str) -> int:
+def _place(axis: Axis, value: Any, schema: Schema, where: str) -> int:
     if value in axis.values:
         return axis.values.index(value)
     if isinstance(value, str):
         raise mismatch(where, f"one of {', '.join(axis.values)}", show(value))
     below = max((v for v in axis.values if v < value), default=min(axis.values))
     above = min((v for v in axis.values if v > value), default=max(axis.values))
-    near = " or ".join(dict.fromkeys(in_words(v, axis.unit) for v in (below, above)))
-    raise mismatch(where, f"a value of the axis, such as {near}", in_words(value, axis.unit))
+    near = " or ".join(dict.fromkeys(schema.in_words(axis.name, v) for v in (below, above)))
+    raise mismatch(where, f"a value of the axis, such as {near}", schema.in_words(axis.name, value))

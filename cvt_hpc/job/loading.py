@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,8 @@ from cvt_hpc.job.histories import KEY, read_histories
 from cvt_hpc.job.rules import Link, Rule, follow
 from cvt_hpc.job.sampling import sampled_axes
 from cvt_hpc.job.schema import Schema, load_schema
-from cvt_hpc.job.values import expectation, read_value
+from cvt_hpc.job.units import unit_in
+from cvt_hpc.job.values import expectation, kind_of, read_value
 
 OF_COMMANDS = ("branch", "chart")  # tables that a command of the same name reads
 _OF_DESIGN = "design."
@@ -90,12 +92,34 @@ def build_job(
     InputError
         If anything is wrong with the document or an override.
     """
+    return _build(document, source, overrides, label)
+
+
+def rebuild_job(document: Mapping[str, Any], job: Job) -> Job:
+    """Return the job of a document that was made of what another job `resolved`, with the units of that one.
+
+    Raises
+    ------
+    InputError
+        If anything is wrong with the document.
+    """
+    return _build(document, job.source, units=job.units)
+
+
+def _build(
+    document: Mapping[str, Any],
+    source: str,
+    overrides: Assignments = (),
+    label: str | None = None,
+    units: Mapping[str, str] | None = None,
+) -> Job:
     label = label or ("override" if isinstance(overrides, Mapping) else "--set")
     pairs = split_assignments(overrides, source, label)
     head = {**document, **{key: value for key, value in pairs.items() if key in HEADER}}
     name, description = _read_name(head, source), _read_description(head, source)
     schema = load_schema(head.get("model"), head.get("stepper"), source)
     _check_top_level(document, schema, source)
+    schema = replace(schema, units=_written_units(document, pairs, schema) if units is None else units)
     tables = _read_tables(document, schema, source)
     of_design = {key: structured(value) for key, value in pairs.items() if key.startswith(_OF_DESIGN)}
     others = {key: value for key, value in pairs.items() if key not in (*HEADER, *of_design)}
@@ -130,9 +154,23 @@ def build_job(
         design,
         read_histories(histories, schema, axes, replacing, source, design.get("runs")),
         tuple(rule for rule in rules if rule.key not in settled),
+        schema.units,
     )
     answering = answering_model(job)
-    return job if answering is None else build_job(handed_to(job, *answering), source)
+    return job if answering is None else rebuild_job(handed_to(job, *answering), job)
+
+
+def _written_units(document: Mapping[str, Any], pairs: Mapping[str, Any], schema: Schema) -> dict[str, str]:
+    """Return the units other than SI in which a job gives its parameters, by key."""
+    links = document.get("linked", {}).values()
+    tables = [*(document.get(name, {}) for name in schema.sections), *links, document.get("axes", {}), pairs]
+    units = {}
+    for table in tables:  # what counts more comes later
+        for name, raw in schema.flatten(table) if isinstance(table, Mapping) else ():
+            key = name.rpartition(".")[2]
+            if key in schema.parameters and kind_of(schema.parameters[key]) in (float, tuple):
+                units[key] = unit_in(structured(raw))
+    return {key: unit for key, unit in units.items() if unit not in ("", schema.parameters[key].unit)}
 
 
 def _read_axes_and_rules(
@@ -151,13 +189,11 @@ def _read_axes_and_rules(
     """
     of_file = _find_axes(document.get("axes", {}), schema, source)
     kept = {key: entry for key, entry in of_file.items() if key not in gone or key in put} | put
-    if "runs" in design:
-        axes, stated = sampled_axes(kept, design, source), _read_rules(document, (), design, schema, source)
-    else:
-        axes = _read_grid(kept)
-        # links have a value for each of the file's axis, and keep those that are left of it
-        stated = relinked(_read_rules(document, _read_grid(of_file), design, schema, source), axes)
-    stated = [rule for rule in stated if rule.key not in gone]
+    sampled = "runs" in design
+    axes = sampled_axes(kept, design, source) if sampled else _read_grid(kept)
+    # a link has a value for each of the file's axis, and keeps those that are left of it
+    stated = _read_rules(document, () if sampled else _read_grid(of_file), design, schema, source)
+    stated = relinked([rule for rule in stated if rule.key not in gone], axes)
     return axes, ordered_rules(stated, {*given, *(axis.name for axis in axes)}, schema, source)
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
 from typing import Any
 
 from cvt_hpc import recording
 from cvt_hpc.errors import InputError, mismatch, nearest, show, unknown
+from cvt_hpc.job.values import in_words
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import Model, load_model
 from cvt_hpc.parameters import Parameter
@@ -42,6 +43,8 @@ class Schema:
         The checks that lie between parameters, the model's first: flat values -> list of problems.
     inert : callable
         Flat values -> the keys without effect on such a run, each with the setting that makes it so.
+    units : dict
+        By key the unit in which people read a parameter, where the job has it in another than the SI unit.
     """
 
     model: str
@@ -49,6 +52,15 @@ class Schema:
     sections: dict[str, dict[str, Parameter]]
     checks: tuple[Check, ...]
     inert: Inert
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def in_words(self, key: str, value: Any) -> str:
+        """Return a value [SI] of a parameter for people to read, in the unit of the job."""
+        return in_words(value, self.parameters[key].unit, self.units.get(key, ""))
+
+    def unit_in_words(self, key: str) -> str:
+        """Return the unit in which people read a parameter."""
+        return self.units.get(key, self.parameters[key].unit)
 
     @cached_property
     def section_of(self) -> dict[str, str]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
-from cvt_hpc.job.units import UnitError, to_si
+from cvt_hpc.job.units import UnitError, from_si, to_si, unit_in
 from cvt_hpc.parameters import Parameter
 
 
@@ -93,8 +93,10 @@ def expectation(parameter: Parameter) -> str:
     return _number_in_words(parameter)
 
 
-def in_words(value: Any, unit: str) -> str:
-    """Return a value with its unit for people to read, e.g. "50000 N"."""
+def in_words(value: Any, unit: str, wanted: str = "") -> str:
+    """Return a value [unit] for people to read, e.g. "50000 N"; in another unit where one is wanted."""
+    if wanted:
+        value, unit = _converted(value, unit, wanted), wanted
     if isinstance(value, tuple):
         text = f"[{', '.join(in_words(item, '') for item in value)}]"
     elif isinstance(value, bool):
@@ -102,6 +104,12 @@ def in_words(value: Any, unit: str) -> str:
     else:
         text = f"{value:.10g}" if isinstance(value, float) else str(value)
     return f"{text} {unit}".rstrip()
+
+
+def _converted(value: Any, unit: str, wanted: str) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_converted(item, unit, wanted) for item in value)
+    return from_si(value, unit, wanted) if isinstance(value, float) else value
 
 
 def _read_number(parameter: Parameter, raw: Any, where: str) -> float:
@@ -129,9 +137,11 @@ def _check_bounds(parameter: Parameter, value: float, raw: Any, where: str) -> N
     if inside or (parameter.allow_infinite and value in (low, high) and math.isinf(value)):
         return
     strict = "" if parameter.exclusive else "="
+    unit = unit_in(raw) or parameter.unit
+    low, high = (from_si(bound, parameter.unit, unit) for bound in (low, high))
     bounds = [f">{strict} {low:g}"] if low > -math.inf else []
     bounds += [f"<{strict} {high:g}"] if high < math.inf else []
-    raise mismatch(where, _with_unit(" and ".join(bounds), parameter), show(raw))
+    raise mismatch(where, f"{' and '.join(bounds)} {unit}".rstrip(), show(raw))
 
 
 def _read_text(parameter: Parameter, raw: Any, where: str) -> str:

@@ -41,7 +41,7 @@ def complaint(path="x.toml"):
         ("[scene]\nratio = 2", f"[scene] thrust: {IN_N} nothing"),
         ("[belt]\nelement_mass = -1", "[belt] element_mass: expected > 0 kg/m, found -1"),
         ("[belt]\nelement_mass = 0", "[belt] element_mass: expected > 0 kg/m, found 0"),
-        ("[belt]\nelement_mass = '-1 g/m'", '[belt] element_mass: expected > 0 kg/m, found "-1 g/m"'),
+        ("[belt]\nelement_mass = '-1 g/m'", '[belt] element_mass: expected > 0 g/m, found "-1 g/m"'),
         ("[belt]\nhalf_wedge_angle = 11", "[belt] half_wedge_angle: expected >= 0 and <= 1 rad, found 11"),
         ("[belt]\nfriction_gradient = 0.5", "[belt] friction_gradient: expected <= 0 s/m, found 0.5"),
         ("[belt]\nsheave_stiffness = -inf", "[belt] sheave_stiffness: expected > 0, found -inf"),

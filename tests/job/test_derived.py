@@ -190,7 +190,7 @@ def test_a_check_shows_what_follows_from_what(write_job):
         "half_wedge_angle 0.1 rad 2 * element_mass / 10 the same in all runs",
         "load 10 to 40 N m 0.001 * thrust * ratio varies with ratio",
         "load_history ramp, constant linked to ratio varies with ratio",
-        "thrust 10000 to 20000 N linked to ratio varies with ratio",
+        "thrust 10 to 20 kN linked to ratio varies with ratio",
     ]
 
 

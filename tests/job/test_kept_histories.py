@@ -70,6 +70,10 @@ def test_a_run_that_an_override_takes_off_the_grid_is_left_out(write):
             "[0, {load = 60, sheave_stiffness = 1}]",
             "run 2, load: expected a value of the axis, such as 50 N m or 75 N m, found 60 N m",
         ),
+        (
+            "[{load = '0.06 kN m', sheave_stiffness = 1}]",
+            "run 1, load: expected a value of the axis, such as 50 N m or 75 N m, found 60 N m",
+        ),
         ("[{load = 150, sheave_stiffness = 1}]", "such as 100 N m, found 150 N m"),
         ("[{laod = 50, sheave_stiffness = 1}]", "run 1, laod: unknown key; did you mean load in [scene]?"),
         (
