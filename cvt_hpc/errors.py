@@ -18,6 +18,13 @@ class InputError(ValueError):
     """
 
 
+class UnitWarning(UserWarning):
+    """A number without a unit that is far from usual: it may be meant in another unit.
+
+    The command line prints it on stderr.
+    """
+
+
 def mismatch(where: str, expected: str, found: str) -> InputError:
     """Return the error for a value that is not what was expected.
 

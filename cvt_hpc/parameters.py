@@ -54,6 +54,9 @@ class Parameter:
         Another parameter, in whose place a job may give this one; a job that gives both is refused. Runs know
         it only where the other one follows from it: where the job gives it, or where the job gives neither
         and this one has a default.
+    sensible : tuple of float or None
+        Smallest and largest magnitude [unit] that users give, with room: a number without a unit beyond them,
+        other than 0, draws a warning that it may be in another unit. Every parameter with a unit has them.
     """
 
     default: Any
@@ -66,13 +69,18 @@ class Parameter:
     choices: tuple[str, ...] = ()
     compared_only: bool = False
     gives: Substitute | None = None
+    sensible: tuple[float, float] | None = None
 
 
-def positive(default: float, unit: str, description: str) -> Parameter:
+def positive(
+    default: float, unit: str, description: str, sensible: tuple[float, float] | None = None
+) -> Parameter:
     """Return a number above 0."""
-    return Parameter(default, unit, description, minimum=0.0, exclusive=True)
+    return Parameter(default, unit, description, minimum=0.0, exclusive=True, sensible=sensible)
 
 
-def not_negative(default: float, unit: str, description: str) -> Parameter:
+def not_negative(
+    default: float, unit: str, description: str, sensible: tuple[float, float] | None = None
+) -> Parameter:
     """Return a number of 0 or more."""
-    return Parameter(default, unit, description, minimum=0.0)
+    return Parameter(default, unit, description, minimum=0.0, sensible=sensible)

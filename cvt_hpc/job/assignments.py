@@ -8,6 +8,7 @@ from typing import Any
 
 from cvt_hpc.errors import mismatch, show, unknown
 from cvt_hpc.job.axes import is_axis
+from cvt_hpc.job.plausibility import warn_of_bare_numbers
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.values import kind_of, read_value
 from cvt_hpc.parameters import Parameter
@@ -66,6 +67,14 @@ def read_assignments(assignments: Assignments, schema: Schema, source: str, labe
         parameter = schema.parameters[key]
         values[key] = read_value(parameter, _plain(parameter, raw), where)
     return values
+
+
+def warn_of_bare_assignments(assignments: Assignments, schema: Schema, source: str, label: str) -> None:
+    """Warn of numbers without a unit that are far from usual, in what `read_assignments` has read."""
+    for name, raw in split_assignments(assignments, source, label).items():
+        where = f"{source}: {label} {name}"
+        parameter = schema.parameters[schema.find(name, where)]
+        warn_of_bare_numbers(parameter, _plain(parameter, raw), where)
 
 
 def split_axes(

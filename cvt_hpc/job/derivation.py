@@ -35,7 +35,9 @@ def read_derived(table: Mapping[str, Any], schema: Schema, source: str) -> list[
         parameter = schema.parameters[key]
         if kind_of(parameter) not in (int, float):
             raise mismatch(where, "a parameter that is a number", key)
-        rules.append(Rule(key, read_formula(raw, schema.parameters, where), where, parameter))
+        formula = read_formula(raw, schema.parameters, where)
+        # a formula gives SI values: none is a number that may be meant in another unit
+        rules.append(Rule(key, formula, where, replace(parameter, sensible=None)))
     return rules
 
 

@@ -25,6 +25,7 @@ from cvt_hpc.job.design import Design, read_design, resolve_spacing
 from cvt_hpc.job.document import read_document
 from cvt_hpc.job.for_model import answering_model, handed_to
 from cvt_hpc.job.histories import KEY, read_histories
+from cvt_hpc.job.plausibility import warn_of_bare_numbers
 from cvt_hpc.job.rules import Link, Rule, follow
 from cvt_hpc.job.sampling import sampled_axes
 from cvt_hpc.job.schema import Schema, load_schema
@@ -95,15 +96,28 @@ def build_job(
     return _build(document, source, overrides, label)
 
 
-def rebuild_job(document: Mapping[str, Any], job: Job) -> Job:
-    """Return the job of a document that was made of what another job `resolved`, with the units of that one.
+def rebuild_job(
+    document: Mapping[str, Any],
+    source: str,
+    units: Mapping[str, str],
+    overrides: Assignments = (),
+    label: str | None = None,
+) -> Job:
+    """Return the job of a document whose numbers are SI values of another job, and draw no warning.
+
+    Parameters
+    ----------
+    document, source, overrides, label
+        As of `build_job`.
+    units : mapping
+        In which people read parameters: those of the other job.
 
     Raises
     ------
     InputError
-        If anything is wrong with the document.
+        If anything is wrong with the document or an override.
     """
-    return _build(document, job.source, units=job.units)
+    return _build(document, source, overrides, label, units)
 
 
 def _build(
@@ -119,7 +133,11 @@ def _build(
     name, description = _read_name(head, source), _read_description(head, source)
     schema = load_schema(head.get("model"), head.get("stepper"), source)
     _check_top_level(document, schema, source)
-    schema = replace(schema, units=_written_units(document, pairs, schema) if units is None else units)
+    written = _written(document, pairs, schema, source, label) if units is None else {}
+    found = {key: unit_in(raw) for key, (raw, _) in written.items()}
+    if units is None:
+        units = {key: unit for key, unit in found.items() if unit not in ("", schema.parameters[key].unit)}
+    schema = replace(schema, units=units)
     tables = _read_tables(document, schema, source)
     of_design = {key: structured(value) for key, value in pairs.items() if key.startswith(_OF_DESIGN)}
     others = {key: value for key, value in pairs.items() if key not in (*HEADER, *of_design)}
@@ -131,6 +149,8 @@ def _build(
     gone = {*put, *overridden(put, schema)}
     given = {key: value for key, value in tables.items() if key not in gone} | replaced
     axes, rules = _read_axes_and_rules(document, design, gone, put_axes, given, schema, source)
+    for key, entry in written.items():
+        warn_of_bare_numbers(schema.parameters[key], *entry)
     if "first_spacing" in design:
         design = resolve_spacing(design, axes, source)
     scene = _resolve({**{axis.name: axis.values[0] for axis in axes}, **given}, rules, schema, source)
@@ -157,20 +177,25 @@ def _build(
         schema.units,
     )
     answering = answering_model(job)
-    return job if answering is None else rebuild_job(handed_to(job, *answering), job)
+    return job if answering is None else rebuild_job(handed_to(job, *answering), source, job.units)
 
 
-def _written_units(document: Mapping[str, Any], pairs: Mapping[str, Any], schema: Schema) -> dict[str, str]:
-    """Return the units other than SI in which a job gives its parameters, by key."""
-    links = document.get("linked", {}).values()
-    tables = [*(document.get(name, {}) for name in schema.sections), *links, document.get("axes", {}), pairs]
-    units = {}
-    for table in tables:  # what counts more comes later
+def _written(
+    document: Mapping[str, Any], pairs: Mapping[str, Any], schema: Schema, source: str, label: str
+) -> dict[str, tuple[Any, str]]:
+    """Return what stands for each parameter in the tables, the axes or the overrides, and where.
+
+    Where there are several the one that counts most. Nothing is checked.
+    """
+    links = [(f"[linked.{axis}]", table) for axis, table in document.get("linked", {}).items()]
+    tables = [(f"[{name}]", document.get(name, {})) for name in schema.sections]
+    found = {}
+    for place, table in [*tables, *links, ("[axes]", document.get("axes", {})), (label, pairs)]:
         for name, raw in schema.flatten(table) if isinstance(table, Mapping) else ():
             key = name.rpartition(".")[2]
             if key in schema.parameters and kind_of(schema.parameters[key]) in (float, tuple):
-                units[key] = unit_in(structured(raw))
-    return {key: unit for key, unit in units.items() if unit not in ("", schema.parameters[key].unit)}
+                found[key] = structured(raw), f"{source}: {place} {name}"
+    return found
 
 
 def _read_axes_and_rules(

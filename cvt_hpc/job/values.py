@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
+from cvt_hpc.job.plausibility import meant
 from cvt_hpc.job.units import UnitError, from_si, to_si, unit_in
 from cvt_hpc.parameters import Parameter
 
@@ -141,7 +142,9 @@ def _check_bounds(parameter: Parameter, value: float, raw: Any, where: str) -> N
     low, high = (from_si(bound, parameter.unit, unit) for bound in (low, high))
     bounds = [f">{strict} {low:g}"] if low > -math.inf else []
     bounds += [f"<{strict} {high:g}"] if high < math.inf else []
-    raise mismatch(where, f"{' and '.join(bounds)} {unit}".rstrip(), show(raw))
+    other = meant(raw, parameter) if value > 0.0 or parameter.minimum < 0.0 else ""
+    hint = f"; did you mean {other}?" if other else ""
+    raise mismatch(where, f"{' and '.join(bounds)} {unit}".rstrip(), show(raw) + hint)
 
 
 def _read_text(parameter: Parameter, raw: Any, where: str) -> str:

@@ -76,7 +76,7 @@ def ladder(job: Job) -> tuple[tuple[Rung, ...], dict[str, str]]:
             rungs.append(Rung(name, answers, _handed(job, model, table)))
         except InputError as error:
             refusals[name] = str(error)
-    reference = rebuild_job(_refined(job), job)
+    reference = rebuild_job(_refined(job), job.source, job.units)
     return (*rungs, Rung(MODEL, QUESTIONS, job), Rung(REFERENCE, (), reference)), refusals
 
 
@@ -109,7 +109,7 @@ def _handed(job: Job, model: str, table: dict[str, Any]) -> Job:
     document = handed_to(fewer, model, "a rung of its ladder")
     if table:
         document[model] = table
-    return rebuild_job(document, job)
+    return rebuild_job(document, job.source, job.units)
 
 
 def _refined(job: Job) -> dict[str, Any]:

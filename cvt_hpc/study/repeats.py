@@ -130,7 +130,7 @@ def built(job: Job, document: dict[str, Any]) -> Job:
     """Return the job of a document of the same runs; of the whole grid where the first one traces it."""
     if "first_spacing" in job.design:
         document = {key: table for key, table in document.items() if key != "design"}
-    return rebuild_job(document, job)
+    return rebuild_job(document, job.source, job.units)
 
 
 def interval(count: int, runs: int) -> tuple[float, float]:

@@ -33,13 +33,36 @@ from cvt_hpc.parameters import Parameter
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "vibration": {
-        "band_low": Parameter(300.0, "Hz", "lowest frequency of a vibration", minimum=0.0, exclusive=True),
-        "band_high": Parameter(1500.0, "Hz", "highest frequency of a vibration", minimum=0.0, exclusive=True),
+        "band_low": Parameter(
+            300.0,
+            "Hz",
+            "lowest frequency of a vibration",
+            minimum=0.0,
+            exclusive=True,
+            sensible=(1.0, 20000.0),
+        ),
+        "band_high": Parameter(
+            1500.0,
+            "Hz",
+            "highest frequency of a vibration",
+            minimum=0.0,
+            exclusive=True,
+            sensible=(1.0, 20000.0),
+        ),
         "amplitude_threshold": Parameter(
-            5e-6, "m", "peak amplitude from which a strand vibrates", minimum=0.0, exclusive=True
+            5e-6,
+            "m",
+            "peak amplitude from which a strand vibrates",
+            minimum=0.0,
+            exclusive=True,
+            sensible=(1e-09, 0.1),
         ),
         "negligible_amplitude": Parameter(
-            1e-8, "m", "peak amplitude below which a strand is quiet whatever its trend", minimum=0.0
+            1e-8,
+            "m",
+            "peak amplitude below which a strand is quiet whatever its trend",
+            minimum=0.0,
+            sensible=(1e-12, 0.01),
         ),
         "judged_fraction": Parameter(
             0.5,
@@ -49,7 +72,12 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             maximum=1.0,
         ),
         "window_length": Parameter(
-            0.04, "s", "length of the windows in which the amplitude is taken", minimum=0.0, exclusive=True
+            0.04,
+            "s",
+            "length of the windows in which the amplitude is taken",
+            minimum=0.0,
+            exclusive=True,
+            sensible=(0.0001, 10.0),
         ),
         "decay_tolerance": Parameter(
             0.25,

@@ -55,6 +55,16 @@ def test_defaults_are_legal(model, stepper):
         assert parameter.description
 
 
+@both
+def test_what_has_a_unit_has_a_sensible_range_around_its_default(model, stepper):
+    for key, parameter in load_schema(model, stepper, "x").parameters.items():
+        assert (parameter.sensible is None) == (not parameter.unit), f"{key}: unit {parameter.unit!r}"
+        if parameter.sensible is not None:
+            low, high = parameter.sensible
+            assert 0.0 < low < high, key
+            assert not parameter.default or low <= abs(parameter.default) <= high, key
+
+
 @pytest.mark.parametrize(("model", "stepper"), PAIRS)
 @pytest.mark.parametrize(
     ("tables", "message"),

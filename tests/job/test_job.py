@@ -275,7 +275,7 @@ def test_people_read_values_in_the_units_of_the_job(write_job):
     assert "driving_speed" not in load_job("x.toml", ["driving_speed=[100, 200]", "element_mass=1"]).units
     assert job.resolved()["axes"]["load"] == [20.0, 30.0, 40.0]
     assert build_job(job.resolved(), "x.toml").units == {}
-    assert rebuild_job(job.resolved(), job).units == job.units
+    assert rebuild_job(job.resolved(), "x.toml", job.units).units == job.units
 
 
 def test_errors_are_in_the_units_of_the_job(write_job):

@@ -17,6 +17,7 @@ PARAMETERS = elastic_belt.PARAMETERS | {
             "splines of a higher own frequency, and all longitudinal motion, follow their forces with a lag",
             minimum=0.0,
             exclusive=True,
+            sensible=(10.0, 1000000.0),
         ),
     },
 }
