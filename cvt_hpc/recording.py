@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cvt_hpc.parameters import Parameter, not_negative
+from cvt_hpc.vibration.ramped import ramped
 
 LONGEST = 4  # times the duration
 LEAST_SAMPLES_PER_PERIOD = 4  # of the band's highest frequency: amplitudes need 2, spectra and pictures more
@@ -77,6 +78,12 @@ def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         expected = f"band_high = {parameters['band_high']:g} Hz or less"
         problems.append(("spectrum_step", expected, f"{parameters['spectrum_step']:g} Hz"))
     return problems
+
+
+def inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+    """Parameters without effect on a run, each with the setting that makes it so."""
+    found = {} if "step" in parameters else {"most_refinements": "a stepper that chooses its step"}
+    return found | ({"longest_duration": f"{ramped(parameters)}_history ramp"} if ramped(parameters) else {})
 
 
 def sample_count(parameters: Mapping[str, Any]) -> int:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.errors import InputError, mismatch, show, unknown
+from cvt_hpc.errors import InputError, did_you_mean, mismatch, show, unknown
 from cvt_hpc.job.values import as_list, kind_of, read_value
 from cvt_hpc.parameters import Parameter
 
@@ -173,7 +173,8 @@ def read_spacing(raw: dict[str, Any], start: float, stop: float, where: str) -> 
     """Return the spacing of a range from `start` to `stop`: "linear", or "log" if that can be."""
     spacing = raw.get("spacing", "linear")
     if spacing not in _SPACINGS:
-        raise unknown(f"{where}.spacing", f"spacing {show(spacing)}", str(spacing), _SPACINGS)
+        found = show(spacing) + did_you_mean(str(spacing), _SPACINGS)
+        raise mismatch(f"{where}.spacing", f"one of {', '.join(_SPACINGS)}", found)
     if start == stop:
         raise mismatch(where, "a range with from and to apart", f"{start:g} for both")
     if spacing == "log" and (start <= 0 or stop <= 0):

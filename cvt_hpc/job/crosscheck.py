@@ -135,6 +135,25 @@ def check_rules(
             complete_point(schema, needed, parameters, varied)
 
 
+def without_effect(
+    schema: Schema,
+    parameters: Mapping[str, Any],
+    axes: tuple[Axis, ...],
+    rules: Sequence[Rule],
+    *,
+    sampled: bool = False,
+) -> dict[str, str]:
+    """Return the parameters without effect on any run, each with the setting that makes it so.
+
+    All runs are asked: of a huge grid the axes should be `thinned`. Arguments as of `check_grid`.
+    """
+    found: dict[str, str] | None = None
+    for varied in places(axes, [axis.name for axis in axes], sampled=sampled and bool(axes)):
+        inert = _inert(schema, rules, follow(rules, {**parameters, **varied}))
+        found = inert if found is None else {key: found[key] for key in found if key in inert}
+    return found or {}
+
+
 def _inert(schema: Schema, rules: Sequence[Rule], point: dict[str, Any]) -> dict[str, str]:
     """Return the parameters without effect: what others follow from is of effect as far as these are."""
     inert = dict(schema.inert(point))

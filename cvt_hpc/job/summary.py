@@ -6,12 +6,16 @@ import math
 from typing import Any
 
 from cvt_hpc.job.axes import Axis
+from cvt_hpc.job.crosscheck import without_effect
 from cvt_hpc.job.definition import Derived, Job
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.values import in_words
+from cvt_hpc.models import MODELS
+from cvt_hpc.models.contract import load_model
 
 _FEW = 8
-_MOST_EVALUATED = 2_000
+_MOST_EVALUATED = 2_000  # values of what follows from others
+_MOST_ASKED = 500  # runs, for what has no effect
 
 
 def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
@@ -34,6 +38,7 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
     stepper = "no transient" if job.stepper is None else f"stepper {job.stepper}"
     lines = [f"job {job.name} ({job.source}): model {job.model}, {stepper}"]
     lines += [job.description] if job.description else []
+    lines += ["", *_choices(job)]
     schema = job.schema
     for section, rows in _tables(job, schema).items():
         lines += ["", f"[{section}]", *_columns(rows)]
@@ -57,12 +62,21 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
     return "\n".join(lines)
 
 
+def _choices(job: Job) -> list[str]:
+    """Return what else the model and the stepper may be."""
+    steppers = load_model(job.model).steppers
+    words = [f"models: {', '.join(MODELS)}"]
+    return words + ([f"steppers of {job.model}: {', '.join(steppers)}"] if steppers else [])
+
+
 def _tables(job: Job, schema: Schema) -> dict[str, list[tuple[str, ...]]]:
     kinds = {
         **dict.fromkeys(job.given, "given"),
         **{axis.name: "axis" for axis in job.axes},
         **{rule.key: "derived" for rule in job.rules},
     }
+    axes = job.thinned(_MOST_ASKED).axes
+    inert = without_effect(schema, job.parameters, axes, job.rules, sampled=job.is_sampled)
     elsewhere = {"axis": "see [axes]", "derived": "see [derived]"}
     tables: dict[str, list[tuple[str, ...]]] = {}
     for section, table in schema.sections.items():
@@ -70,7 +84,10 @@ def _tables(job: Job, schema: Schema) -> dict[str, list[tuple[str, ...]]]:
         for key, parameter in table.items():
             kind = kinds.get(key, "default")
             value = schema.in_words(key, job.parameters[key]) if key in job.parameters else "none"
-            rows.append((key, elsewhere.get(kind, value), kind, parameter.description))
+            text = parameter.description
+            text += f" ({', '.join(parameter.choices)})" if parameter.choices else ""
+            text = f"without effect with {inert[key]}: {text}" if key in inert else text
+            rows.append((key, elsewhere.get(kind, value), kind, text))
         tables[section] = rows
     return tables
 

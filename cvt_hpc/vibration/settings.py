@@ -30,6 +30,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cvt_hpc.parameters import Parameter
+from cvt_hpc.vibration.ramped import ramped
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "vibration": {
@@ -130,3 +131,8 @@ def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         expected = f"{SHORTEST_SEGMENT} samples or more in a window of {length:g} s"
         problems.append(("sampling_rate", expected, f"{rate:g} Hz"))
     return problems
+
+
+def inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+    """Parameters without effect on a run, each with the setting that makes it so."""
+    return {"decay_tolerance": f"{ramped(parameters)}_history ramp"} if ramped(parameters) else {}

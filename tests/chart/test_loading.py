@@ -210,7 +210,7 @@ WHERE = "c.toml: [chart.scenes.ringing"
         ('reference = "exact"', 'reference = { stepper = "hard", step = "2 us", coarser = "x" }',
          f'{WHERE}] reference coarser: expected a value in s (such as "1 s" or a bare number in s), found "x"'),
         ('reference = "exact"', 'reference = { stepper = "hart", step = "2 us" }',
-         f'{WHERE}] reference: stepper: unknown stepper "hart"; did you mean hard?'),
+         f'{WHERE}] reference: stepper: expected one of soft, hard, clever, found "hart"; did you mean hard?'),
         ("amplitude =", "amplitde =", f"{WHERE}.quantities] amplitde: unknown quantity; did you mean amplitude?"),
         ('until = "10 ms", tol', "tol",
          f'{WHERE}.quantities] trajectory until: expected a value in s (such as "1 s" or a bare number in s), '

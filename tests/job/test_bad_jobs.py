@@ -91,12 +91,15 @@ def test_tables(write_job, text, message):
             'name = "x"',
             f"model: expected one of {', '.join(MODELS)}, toy, found nothing",
         ),
-        ('name = "x"\nmodel = "toi"', 'model: unknown model "toi"; did you mean toy?'),
+        (
+            'name = "x"\nmodel = "toi"',
+            f'model: expected one of {", ".join(MODELS)}, toy, found "toi"; did you mean toy?',
+        ),
         (
             'name = "x"\nmodel = 5',
             f"model: expected one of {', '.join(MODELS)}, toy, found 5",
         ),
-        (f'{HEAD}stepper = "hopp"', 'stepper: unknown stepper "hopp"; did you mean hop?'),
+        (f'{HEAD}stepper = "hopp"', 'stepper: expected one of hop, found "hopp"; did you mean hop?'),
         (f"{HEAD}description = 5", "description: expected a text, found 5"),
         (f"{HEAD}thrust = 5", "thrust: belongs in [scene], found above all tables"),
         (f"{HEAD}thurst = 5", "thurst: unknown key; did you mean thrust in [scene]?"),

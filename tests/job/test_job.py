@@ -15,6 +15,7 @@ from cvt_hpc import errors
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job, crosscheck, known_keys, load_job, rebuild_job
 from cvt_hpc.job.summary import summarize
+from cvt_hpc.models import MODELS
 from cvt_hpc.printing import point_lines
 
 GRID = """
@@ -168,7 +169,7 @@ def test_overrides_reach_the_head_and_the_last_of_two_counts(write_job):
         ({"table": np.ones((1, 1, 1))}, "override table: expected a 1-D or 2-D array of numbers, found an array of shape (1, 1, 1) of float64"),
         (["table=[x"], '--set table: expected a list of numbers in N/m, found "[x"'),
         (["refined=yes"], '--set refined: expected true or false, found "yes"'),
-        (["model=toi"], 'model: unknown model "toi"; did you mean toy?'),
+        (["model=toi"], f'model: expected one of {", ".join(MODELS)}, toy, found "toi"; did you mean toy?'),
         (
             {"load": None},
             'override load: expected a value in N m (such as "1 N m" or a bare number in N m), found nothing',

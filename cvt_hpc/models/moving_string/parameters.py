@@ -57,3 +57,9 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         expected = f"strand_probes + 1 = {p['strand_probes'] + 1} or more"
         problems.append(("cells", expected, f"{p['cells']}"))
     return problems
+
+
+def inert(parameters: dict[str, Any]) -> dict[str, str]:
+    """Parameters without effect on a run, each with the setting that makes it so."""
+    shape = parameters["shape"]
+    return {"pulse_width" if shape == "mode" else "mode": f"shape {shape}"}
