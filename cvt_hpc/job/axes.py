@@ -119,6 +119,8 @@ def read_values(parameter: Parameter, raw: Any, where: str) -> tuple:
     """Return the values [parameter.unit] of a list or a range; arguments and errors as of `read_axis`."""
     if kind_of(parameter) is tuple:
         raise mismatch(where, "a parameter with a single value", "one that takes a list")
+    if parameter.file is not None:
+        raise mismatch(where, "one file for all runs", "an axis of files")
     if isinstance(raw, dict):
         values = _read_range(parameter, raw, where)
     elif isinstance(raw, np.ndarray):

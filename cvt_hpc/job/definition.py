@@ -189,6 +189,9 @@ class Job:
         """
         schema = self.schema
         values = read_assignments(at, schema, self.source, label)
+        for key in values:
+            if schema.parameters[key].file is not None:
+                raise mismatch(f"{self.source}: {label} {key}", "one file for all runs", "another one")
         if not self.rules and not overridden(values, schema):
             point = {**self.parameters, **values}
         else:

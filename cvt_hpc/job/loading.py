@@ -19,6 +19,7 @@ from cvt_hpc.job.assignments import (
 )
 from cvt_hpc.job.axes import Axis, read_axis
 from cvt_hpc.job.crosscheck import check_grid, check_rules
+from cvt_hpc.job.csv_files import read_csv
 from cvt_hpc.job.definition import HEADER, Job
 from cvt_hpc.job.derivation import ordered_rules, overridden, read_derived, read_linked, relinked
 from cvt_hpc.job.design import Design, read_design, resolve_spacing
@@ -146,8 +147,10 @@ def _build(
     changed = {key.removeprefix(_OF_DESIGN): value for key, value in of_design.items()}
     design = read_design({**document.get("design", {}), **changed}, source)
     put = {*replaced, *put_axes}
+    put |= {given for key in replaced if (file := schema.parameters[key].file) for given in file.gives}
     gone = {*put, *overridden(put, schema)}
     given = {key: value for key, value in tables.items() if key not in gone} | replaced
+    given = _with_files(given, schema, source)
     axes, rules = _read_axes_and_rules(document, design, gone, put_axes, given, schema, source)
     for key, entry in written.items():
         warn_of_bare_numbers(schema.parameters[key], *entry)
@@ -195,6 +198,21 @@ def _written(
             key = name.rpartition(".")[2]
             if key in schema.parameters and kind_of(schema.parameters[key]) in (float, tuple):
                 found[key] = structured(raw), f"{source}: {place} {name}"
+    return found
+
+
+def _with_files(given: Mapping[str, Any], schema: Schema, source: str) -> dict[str, Any]:
+    """Return given values with what files give in the place of their names."""
+    found = dict(given)
+    for key in given:
+        if (file := schema.parameters[key].file) is None:
+            continue
+        name, where = found.pop(key), f"{source}: [{schema.section_of[key]}] {key}"
+        for one in file.gives if name else ():
+            if one in given:
+                raise mismatch(where, f"either {key} or {one}", "both")
+        raw = read_csv(file, name, source, where) if name else {}
+        found |= {one: read_value(schema.parameters[one], value, where) for one, value in raw.items()}
     return found
 
 
@@ -326,7 +344,7 @@ def _resolve(values: Mapping[str, Any], rules: Sequence[Rule], schema: Schema, s
         where = f"{source}: [{schema.section_of[key]}] {key}"
         if key in values:
             resolved[key] = values[key]
-        elif key in follows or (parameter.gives and key not in giving):
+        elif key in follows or parameter.file or (parameter.gives and key not in giving):
             continue
         elif parameter.default is None:
             raise mismatch(where, expectation(parameter), "nothing")

@@ -83,13 +83,22 @@ def _tables(job: Job, schema: Schema) -> dict[str, list[tuple[str, ...]]]:
         rows = []
         for key, parameter in table.items():
             kind = kinds.get(key, "default")
-            value = schema.in_words(key, job.parameters[key]) if key in job.parameters else "none"
+            value = _value_in_words(schema, key, job.parameters[key]) if key in job.parameters else "none"
             text = parameter.description
             text += f" ({', '.join(parameter.choices)})" if parameter.choices else ""
             text = f"without effect with {inert[key]}: {text}" if key in inert else text
             rows.append((key, elsewhere.get(kind, value), kind, text))
         tables[section] = rows
     return tables
+
+
+def _value_in_words(schema: Schema, key: str, value: Any) -> str:
+    """Return a value for people; a long list as its length and its ends."""
+    if not isinstance(value, tuple) or len(value) <= _FEW:
+        return schema.in_words(key, value)
+    if isinstance(value[0], tuple):
+        return f"{len(value)} rows of {len(value[0])}"
+    return f"{len(value)} values from {schema.in_words(key, value[0])} to {schema.in_words(key, value[-1])}"
 
 
 def _rules(job: Job, schema: Schema) -> list[tuple[str, ...]]:

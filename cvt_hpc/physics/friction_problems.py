@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 _OF_FORMULAS = ("friction_gradient", "kinetic_friction", "stribeck_velocity")
-_OF_TABLES = ("table_force", "table_speed", "table_mu")
+_OF_TABLES = ("table_file", "table_force", "table_speed", "table_mu")
 
 
 def friction_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:

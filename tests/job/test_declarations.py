@@ -160,9 +160,9 @@ FILE = {"table_force": [1, 2], "table_speed": [1, 2], "table_mu": [[1, 1], [1, 1
 @pytest.mark.parametrize(
     ("model", "stepper", "overrides", "setting", "keys"),
     [
-        ("elastic_belt", "imex", {}, "friction_law stribeck", {"table_force", "table_speed", "table_mu"}),
+        ("elastic_belt", "imex", {}, "friction_law stribeck", {"table_file", "table_force", "table_speed", "table_mu"}),
         ("elastic_belt", "imex", {"friction_law": "coulomb", "friction_gradient": 0}, "friction_law coulomb",
-         {"table_force", "table_speed", "table_mu"}),
+         {"table_file", "table_force", "table_speed", "table_mu"}),
         ("elastic_belt", "imex", {"friction_law": "table", **FILE}, "friction_law table",
          {"friction_gradient", "kinetic_friction", "stribeck_velocity"}),
         ("elastic_belt", "imex", {"load_history": "ramp"}, "load_history ramp", {"longest_duration", "decay_tolerance"}),

@@ -15,6 +15,7 @@ import numpy as np
 from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
 from cvt_hpc.physics import capacity
 from cvt_hpc.physics.friction_problems import friction_inert, friction_problems
+from cvt_hpc.physics.friction_table import friction_file
 from cvt_hpc.physics.geometry import driven_radius, variator, variator_problems
 
 
@@ -199,6 +200,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "friction_memory": not_negative(
             0.3e-3, "s", "time constant of the filtered sliding speed; 0: no memory", sensible=(1e-07, 0.1)
         ),
+        "table_file": friction_file("N/m"),
         "table_force": Parameter(
             (), "N/m", "normal line forces of a friction table, ascending", sensible=(1.0, 100000000.0)
         ),

@@ -6,6 +6,7 @@ from typing import Any
 
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_problems import friction_inert, friction_problems
+from cvt_hpc.physics.friction_table import friction_file
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {
@@ -67,6 +68,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "regularisation speed of friction at rest; moreau does without",
             sensible=(1e-09, 5.0),
         ),
+        "table_file": friction_file("N"),
         "table_force": Parameter(
             (), "N", "normal loads of a friction table, ascending", sensible=(1e-06, 10000000.0)
         ),
