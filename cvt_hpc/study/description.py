@@ -41,7 +41,7 @@ class Study:
     derived : tuple of DerivedCoordinate
         Parameters that follow from the axes.
     units : dict
-        By axis the unit in which people read it, where it is not the SI unit.
+        By axis the unit in which the job at work gives it, where it is not the SI unit; not kept in a folder.
     """
 
     name: str
@@ -157,7 +157,6 @@ class Study:
             "variables": [_variable_to_json(variable) for variable in self.variables],
             "coordinates": [dimension.to_json() for dimension in self.coordinates],
             "derived": [coordinate.to_json() for coordinate in self.derived],
-            "units": dict(self.units),
         }
 
     @classmethod
@@ -172,7 +171,6 @@ class Study:
             tuple(_variable_from_json(variable) for variable in entry["variables"]),
             tuple(Dimension.from_json(dimension) for dimension in entry["coordinates"]),
             tuple(DerivedCoordinate.from_json(derived) for derived in entry.get("derived", ())),
-            entry.get("units", {}),
         )
 
 

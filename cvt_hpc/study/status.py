@@ -165,7 +165,7 @@ def _latest_session(records: Records, running: bool) -> tuple[np.ndarray, float]
 def _predicted_costs(study: Study, folder: StudyFolder) -> np.ndarray:
     """Return the predicted duration of each run, in some unit; all alike where there is no such model."""
     try:
-        job = rebuild_job(study.job, str(folder.job_file), study.units)
+        job = rebuild_job(study.job, str(folder.job_file), {})
         return default_simulator().run_costs(job)
     except InputError:
         return np.ones(study.size)

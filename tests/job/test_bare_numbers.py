@@ -48,6 +48,7 @@ def test_what_is_meant_is_guessed_by_the_units_that_would_be_usual(parameter, ra
     [
         (SPEED, 800.0),
         (SPEED, 0),
+        (SPEED, -300),
         (SPEED, "9000 rad/s"),
         (SPEED, ["9000 rpm", 1]),
         (SPEED, {"from": 1, "to": 2, "step": 0.01}),
