@@ -1,6 +1,6 @@
 """Vibration-occurrence maps of metal pushbelt CVTs: thousands of transient runs under MPI.
 
-`load_job`, `simulate`, `run` and `open_results`; what they need is imported at their first use.
+`build_job`, `load_job`, `simulate`, `run` and `open_results`; what they need is imported at their first use.
 """
 
 from __future__ import annotations
@@ -9,9 +9,10 @@ from importlib import import_module
 from typing import Any
 
 __version__ = "0.1.0"
-__all__ = ["load_job", "open_results", "run", "simulate"]
+__all__ = ["build_job", "load_job", "open_results", "run", "simulate"]
 
 _EXPORTS = {
+    "build_job": "cvt_hpc.job",
     "load_job": "cvt_hpc.job",
     "open_results": "cvt_hpc.study",
     "run": "cvt_hpc.study",

@@ -18,6 +18,13 @@ class InputError(ValueError):
     """
 
 
+class UnitWarning(UserWarning):
+    """A number without a unit that is far from usual: it may be meant in another unit.
+
+    The command line prints it on stderr.
+    """
+
+
 def mismatch(where: str, expected: str, found: str) -> InputError:
     """Return the error for a value that is not what was expected.
 
@@ -81,7 +88,10 @@ def few_of(texts: Sequence[str], most: int) -> str:
 
 
 def show(value: Any) -> str:
-    """Return a found value in the words of a job file: quoted texts, "a table", "a list", "nothing"."""
+    """Return a found value in the words of a job file: quoted texts, "a table", "a list", "nothing".
+
+    An array is shown by its shape.
+    """
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -90,6 +100,8 @@ def show(value: Any) -> str:
         return "a table"
     if isinstance(value, (list, tuple)):
         return "a list" if value else "an empty list"
+    if shape := getattr(value, "shape", ()):  # of numpy, which this module need not import
+        return f"an array of shape {shape}"
     if isinstance(value, int) and abs(value) >= 10**_LONGEST_QUOTE:
         return "a number of too many digits"
     if isinstance(value, str):

@@ -27,6 +27,52 @@ class Substitute:
     value: Callable[[Mapping[str, Any]], float]
 
 
+class RowError(ValueError):
+    """What is wrong with one row of a file.
+
+    Parameters
+    ----------
+    row : int
+        Counted from 0, without the header.
+    expected, found : str
+        What should stand there, and what does.
+    """
+
+    def __init__(self, row: int, expected: str, found: str) -> None:
+        super().__init__(f"expected {expected}, found {found}")
+        self.row, self.expected, self.found = row, expected, found
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a file: values [unit], of which `unit` is the SI unit of the file's own one."""
+
+    unit: str
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class FromFile:
+    """How a CSV file gives other parameters.
+
+    Attributes
+    ----------
+    columns : mapping
+        By name the SI units of which a column has one; "" for dimensionless numbers.
+    required : tuple of str
+        Columns that have to be there.
+    gives : tuple of str
+        The parameters.
+    arrange : callable
+        Column by name -> raw value by parameter. It raises RowError for a row, ValueError else.
+    """
+
+    columns: Mapping[str, tuple[str, ...]]
+    required: tuple[str, ...]
+    gives: tuple[str, ...]
+    arrange: Callable[[Mapping[str, Column]], dict[str, Any]]
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One quantity that a job file may set.
@@ -54,6 +100,11 @@ class Parameter:
         Another parameter, in whose place a job may give this one; a job that gives both is refused. Runs know
         it only where the other one follows from it: where the job gives it, or where the job gives neither
         and this one has a default.
+    sensible : tuple of float or None
+        Smallest and largest magnitude [unit] that users give, with room: a number without a unit beyond them,
+        other than 0, draws a warning that it may be in another unit. Every parameter with a unit has them.
+    file : FromFile or None
+        For a text that is the path of a file: what the file gives. Runs do not know such a parameter.
     """
 
     default: Any
@@ -66,13 +117,19 @@ class Parameter:
     choices: tuple[str, ...] = ()
     compared_only: bool = False
     gives: Substitute | None = None
+    sensible: tuple[float, float] | None = None
+    file: FromFile | None = None
 
 
-def positive(default: float, unit: str, description: str) -> Parameter:
+def positive(
+    default: float, unit: str, description: str, sensible: tuple[float, float] | None = None
+) -> Parameter:
     """Return a number above 0."""
-    return Parameter(default, unit, description, minimum=0.0, exclusive=True)
+    return Parameter(default, unit, description, minimum=0.0, exclusive=True, sensible=sensible)
 
 
-def not_negative(default: float, unit: str, description: str) -> Parameter:
+def not_negative(
+    default: float, unit: str, description: str, sensible: tuple[float, float] | None = None
+) -> Parameter:
     """Return a number of 0 or more."""
-    return Parameter(default, unit, description, minimum=0.0)
+    return Parameter(default, unit, description, minimum=0.0, sensible=sensible)

@@ -159,8 +159,8 @@ def _deviation_lines(found: Comparison) -> Iterator[str]:
 def trouble_lines(report: RunReport) -> Iterator[str]:
     """Yield the lines that name the failed runs of a sweep, ten at most, and say why it stopped early."""
     for run in report.failed[:MOST_FAILURES_NAMED]:
-        place = ", ".join(f"{name} = {in_words(value, '')}" for name, value in run.at.items())
-        yield f"run {run.index}{f' ({place})' if place else ''}: {run.status}: {run.reason}"
+        place = f" ({run.place})" if run.place else ""
+        yield f"run {run.index}{place}: {run.status}: {run.reason}"
     unnamed = len(report.failed) - MOST_FAILURES_NAMED
     if unnamed > 0:
         yield f"{unnamed} more runs failed; `status` and `reason` in the results tell which"
@@ -227,7 +227,8 @@ def point_lines(job: Job, at: Mapping[str, Any]) -> Iterator[str]:
     point = job.point_at(at)
     # a load that is given leaves no share of which it would follow
     keys = dict.fromkeys([*(varied.name for varied in (*job.axes, *job.derived)), *at])
-    words = [f"{key} {in_words(point[key], job.schema.parameters[key].unit)}" for key in keys if key in point]
+    schema = job.schema
+    words = [f"{key} {schema.in_words(key, point[key])}" for key in keys if key in point]
     if words:
         yield f"at      {', '.join(words)}"
 

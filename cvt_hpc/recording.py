@@ -6,15 +6,21 @@ from collections.abc import Mapping
 from typing import Any
 
 from cvt_hpc.parameters import Parameter, not_negative
+from cvt_hpc.vibration.ramped import ramped
 
 LONGEST = 4  # times the duration
 LEAST_SAMPLES_PER_PERIOD = 4  # of the band's highest frequency: amplitudes need 2, spectra and pictures more
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "run": {
-        "duration": Parameter(0.3, "s", "simulated time of a run", minimum=0.0, exclusive=True),
+        "duration": Parameter(
+            0.3, "s", "simulated time of a run", minimum=0.0, exclusive=True, sensible=(0.001, 200.0)
+        ),
         "longest_duration": not_negative(
-            0.0, "s", "up to which a run goes on while it is undecided; 0: four times the duration"
+            0.0,
+            "s",
+            "up to which a run goes on while it is undecided; 0: four times the duration",
+            sensible=(0.001, 1000.0),
         ),
     },
     "numerics": {
@@ -28,14 +34,24 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     },
     "record": {
         "sampling_rate": Parameter(
-            20e3, "Hz", "rate at which displacement and forces are recorded", minimum=0.0, exclusive=True
+            20e3,
+            "Hz",
+            "rate at which displacement and forces are recorded",
+            minimum=0.0,
+            exclusive=True,
+            sensible=(50.0, 10000000.0),
         ),
         "strand_probes": Parameter(
             5, "", "probes on each strand, equally spaced between its ends", minimum=2, maximum=99
         ),
         "arc_probes": Parameter(3, "", "probes on each arc, equally spaced", minimum=1, maximum=99),
         "spectrum_step": Parameter(
-            10.0, "Hz", "spacing of the spectrum's frequencies", minimum=0.1, maximum=500.0
+            10.0,
+            "Hz",
+            "spacing of the spectrum's frequencies",
+            minimum=0.1,
+            maximum=500.0,
+            sensible=(0.1, 500.0),
         ),
     },
 }
@@ -62,6 +78,12 @@ def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         expected = f"band_high = {parameters['band_high']:g} Hz or less"
         problems.append(("spectrum_step", expected, f"{parameters['spectrum_step']:g} Hz"))
     return problems
+
+
+def inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+    """Parameters without effect on a run, each with the setting that makes it so."""
+    found = {} if "step" in parameters else {"most_refinements": "a stepper that chooses its step"}
+    return found | ({"longest_duration": f"{ramped(parameters)}_history ramp"} if ramped(parameters) else {})
 
 
 def sample_count(parameters: Mapping[str, Any]) -> int:

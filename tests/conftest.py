@@ -25,14 +25,16 @@ settings.load_profile("untimed")
 TOY_PARAMETERS = {
     "scene": {
         "ratio": Parameter(2.5, "", "speed ratio", minimum=0.0, exclusive=True),
-        "driving_speed": Parameter(300.0, "rad/s", "speed of the driving pulley"),
+        "driving_speed": Parameter(300.0, "rad/s", "speed of the driving pulley", sensible=(1.0, 800.0)),
         "thrust": Parameter(None, "N", "axial force on the driven pulley", minimum=0.0, exclusive=True),
         "load": Parameter(0.0, "N m", "torque at the driving pulley"),
         "load_history": Parameter("constant", "", "how the load is applied", choices=("constant", "ramp")),
     },
     "belt": {
         "element_mass": Parameter(1.0, "kg/m", "mass per length", minimum=0.0, exclusive=True),
-        "half_wedge_angle": Parameter(0.2, "rad", "half wedge angle", minimum=0.0, maximum=1.0),
+        "half_wedge_angle": Parameter(
+            0.2, "rad", "half wedge angle", minimum=0.0, maximum=1.0, sensible=(0.02, 0.8)
+        ),
         "sheave_stiffness": Parameter(1.0, "", "stiffness", minimum=0.0, exclusive=True, allow_infinite=True),
         "friction_gradient": Parameter(-0.8, "s/m", "slope of the friction law", maximum=0.0),
         "table": Parameter((), "N/m", "rows of line forces"),

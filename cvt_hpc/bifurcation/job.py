@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cvt_hpc.errors import mismatch
-from cvt_hpc.job import Job, build_job
+from cvt_hpc.job import Job, build_job, rebuild_job
 from cvt_hpc.job.assignments import Assignments, split_assignments
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.document import read_document
@@ -19,9 +19,14 @@ from cvt_hpc.parameters import Parameter, positive
 STEADY, TRANSIENT = "linear_stability", "elastic_belt"
 BRANCH = {
     "disturbance": Parameter(
-        (1e-6, 3e-4), "m", "of the runs from the steady state and from the large start; []: no runs"
+        (1e-6, 3e-4),
+        "m",
+        "of the runs from the steady state and from the large start; []: no runs",
+        sensible=(1e-12, 0.01),
     ),
-    "resolution": positive(1.0, "N m", "spacing of the runs where vibration begins or ends"),
+    "resolution": positive(
+        1.0, "N m", "spacing of the runs where vibration begins or ends", sensible=(0.01, 100.0)
+    ),
 }
 
 
@@ -112,7 +117,7 @@ def load_diagram(path: str | Path, overrides: Assignments = ()) -> Diagram:
                 "a parameter or an axis",
                 "a key of [branch], read from the file alone",
             )
-    job = build_job(document, source, replaced)
+    job = build_job(document, source, replaced, "--set")
     if job.model != STEADY:
         raise mismatch(f"{source}: model", STEADY, job.model)
     if job.design:
@@ -153,4 +158,7 @@ def _runs(job: Job, place: dict[str, Any], settings: dict[str, Any], where: str)
     band = tables.pop("judgement")
     document = {"name": job.name, "model": TRANSIENT, **tables}
     kept = {key: band[key] for key in ("band_low", "band_high") if key in band}
-    return build_job(document, where, {**kept, **place, **settings}, "set")
+    runs = rebuild_job(document, where, job.units, {**kept, **place, **settings}, "set")
+    if runs.axes:
+        raise mismatch(f"{where} set {runs.axes[0].name}", "one value", "an axis")
+    return runs

@@ -10,7 +10,6 @@ import numpy as np
 from cvt_hpc.bifurcation.attractors import FROM, Attractor
 from cvt_hpc.bifurcation.job import Asked, Diagram
 from cvt_hpc.errors import few_of
-from cvt_hpc.job.values import in_words
 from cvt_hpc.models.linear_stability.branch import Onset
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Criticality, Kind
@@ -37,10 +36,10 @@ def branch_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
 
 def place_text(diagram: Diagram, asked: Asked) -> str:
     """Values of the axes other than the load, and of what a branch depends on most."""
-    declared = diagram.job.schema.parameters
+    schema = diagram.job.schema
     values = {name: asked.parameters[name] for name in NAMED} | asked.place
     return ", ".join(
-        f"{name.replace('_', ' ')} {in_words(value, declared[name].unit)}" for name, value in values.items()
+        f"{name.replace('_', ' ')} {schema.in_words(name, value)}" for name, value in values.items()
     )
 
 

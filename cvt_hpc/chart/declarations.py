@@ -9,12 +9,19 @@ from cvt_hpc.parameters import Parameter
 CHART = {
     "repeats": Parameter(3, "", "how often a quick run is timed; the shortest time counts", minimum=1),
     "time_limit": Parameter(
-        300.0, "s", "core-seconds after which a run is given up", minimum=0.0, exclusive=True
+        300.0,
+        "s",
+        "core-seconds after which a run is given up",
+        minimum=0.0,
+        exclusive=True,
+        sensible=(0.01, 100000.0),
     ),
 }
 LEAD = {
     "stepper": Parameter(None, "", "stepper"),
-    "until": Parameter(None, "s", "when the methods take over", minimum=0.0, exclusive=True),
+    "until": Parameter(
+        None, "s", "when the methods take over", minimum=0.0, exclusive=True, sensible=(1e-05, 1000.0)
+    ),
 }
 SCENE = {
     "time_limit": Parameter(
@@ -24,6 +31,7 @@ SCENE = {
         minimum=0.0,
         exclusive=True,
         allow_infinite=True,
+        sensible=(0.01, 100000.0),
     ),
     "title": Parameter("", "", "heading of the scene's picture"),
     "model": Parameter(

@@ -10,7 +10,6 @@ from enum import Enum
 from typing import Any
 
 from cvt_hpc.job import Job
-from cvt_hpc.job.values import in_words
 
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
@@ -154,9 +153,9 @@ class Point:
         """The same for people, such as "3 µs"; "" where there is none."""
         if not self.key:
             return ""
-        unit = self.job.schema.parameters[self.key].unit
-        if unit != "s":
-            return in_words(self.setting, unit)
+        schema = self.job.schema
+        if schema.parameters[self.key].unit != "s":
+            return schema.in_words(self.key, self.setting)
         factor, prefix = next((pair for pair in _PREFIXES if abs(self.setting) >= pair[0]), _PREFIXES[-1])
         return f"{self.setting / factor:.4g}\u00a0{prefix}s"  # no line break between the two
 

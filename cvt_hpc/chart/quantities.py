@@ -142,6 +142,7 @@ def _push_force(history: History, quantity: Quantity) -> Array:
     return np.array([history.channel(name)[history.judged].mean() for name in PUSH_FORCE_CHANNELS])
 
 
+_TIMES = (1e-6, 1e3)  # [s]
 KINDS: dict[str, Kind] = {
     "trajectory": Kind("m", "trajectory", _trajectory, takes_part=True, needs_part=True),
     "amplitude": Kind("m", "amplitude", _amplitude),
@@ -178,9 +179,17 @@ def read_quantity(name: str, raw: Any, where: str) -> Quantity:
     }
     if kind.takes_part:
         end = None if kind.needs_part else math.inf
-        declared["since"] = Parameter(0.0, "s", "start of the part that is looked at", minimum=0.0)
+        declared["since"] = Parameter(
+            0.0, "s", "start of the part that is looked at", minimum=0.0, sensible=_TIMES
+        )
         declared["until"] = Parameter(
-            end, "s", "end of it", minimum=0.0, exclusive=True, allow_infinite=end is not None
+            end,
+            "s",
+            "end of it",
+            minimum=0.0,
+            exclusive=True,
+            allow_infinite=end is not None,
+            sensible=_TIMES,
         )
     if name == "onset":
         declared["channel"] = Parameter("load", "", "recorded channel whose value is the onset")

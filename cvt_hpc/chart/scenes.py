@@ -59,6 +59,8 @@ class Stage:
         values = {key: value for key, value in values.items() if value is not None}
         document = {**self.document, "model": model} if model else self.document
         job = build_job(document, where, {**self.values, **values}, "set")
+        if job.axes:
+            raise mismatch(f"{where}: set {job.axes[0].name}", "one value in a chart", "an axis")
         if job.stepper is None:
             raise mismatch(f"{where}: model", "one with a transient", job.model)
         return job

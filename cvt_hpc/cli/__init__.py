@@ -10,14 +10,15 @@ import logging
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from cvt_hpc import __version__
 from cvt_hpc.cli import checking, experiments, results, single_run, sweep
 from cvt_hpc.cli.parts import BAD_INPUT, DONE, INTERRUPTED, complain, speaks
-from cvt_hpc.errors import CRASHED, InputError
+from cvt_hpc.errors import CRASHED, InputError, UnitWarning
 
 __all__ = ["main"]
 
@@ -39,7 +40,7 @@ def main(arguments: list[str] | None = None) -> int:
     logging.basicConfig(format="cvt-hpc: %(message)s")
     try:
         parsed = _parser().parse_args(arguments)
-        with _compiling_told():
+        with _compiling_told(), _unit_warnings_told():
             status = parsed.command(parsed)
         sys.stdout.flush()
         return status
@@ -69,6 +70,26 @@ def _compiling_told() -> Iterator[None]:
     finally:
         logger.setLevel(before)
         logger.removeFilter(_by_one_rank)
+
+
+@contextmanager
+def _unit_warnings_told() -> Iterator[None]:
+    """Print warnings of numbers without a unit on stderr, each once."""
+    told, shown = set(), warnings.showwarning
+
+    def show(message: Warning, category: type[Warning], *rest: Any, **more: Any) -> None:
+        if not issubclass(category, UnitWarning):
+            shown(message, category, *rest, **more)
+            return
+        _, _, text = str(message).rpartition("] ")  # many points of a chart have one value of its job
+        if text not in told:
+            told.add(text)
+            complain(f"warning: {message}")
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UnitWarning)
+        warnings.showwarning = show
+        yield
 
 
 def _by_one_rank(record: logging.LogRecord) -> bool:

@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 PICTURES = (".png", ".svg", ".pdf")
-REPLACE = "replace a value of the job, or an axis by one value"  # what --set does
+# what --set does
+REPLACE = (
+    "replace a value of the job, or an axis by one value, a list [40, 60] or a range {from=, to=, step=}"
+)
 _SUBJECTS = {
     "JOB": "job file (TOML)",
     "DIR": "output folder of a run",

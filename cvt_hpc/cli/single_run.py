@@ -47,7 +47,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
 
     if arguments.out is not None and arguments.out.exists() and not is_history(arguments.out):
         raise mismatch(str(arguments.out), "a new file, or a history written by cvt_hpc", "another file")
-    dataset = simulate(job, at).assign_attrs(history=history_line(command()))
+    dataset = simulate(job, arguments.at).assign_attrs(history=history_line(command()))
     # files first: whoever reads the lines may close the pipe
     written = []
     if arguments.out is not None:

@@ -7,11 +7,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cvt_hpc.errors import mismatch, show, unknown
+from cvt_hpc.job.axes import is_axis
+from cvt_hpc.job.plausibility import warn_of_bare_numbers
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.values import kind_of, read_value
 from cvt_hpc.parameters import Parameter
 
 Assignments = Mapping[str, Any] | Sequence[str]
+AxisEntry = tuple[Parameter, Any, str]  # what declares an axis, its list or range, and file and key
 
 
 def split_assignments(assignments: Assignments, source: str, label: str) -> dict[str, Any]:
@@ -62,9 +65,53 @@ def read_assignments(assignments: Assignments, schema: Schema, source: str, labe
         where = f"{source}: {label} {name}"
         key = schema.find(name, where)
         parameter = schema.parameters[key]
-        raw = _list_in(raw) if kind_of(parameter) is tuple and isinstance(raw, str) else raw
-        values[key] = read_value(parameter, raw, where)
+        values[key] = read_value(parameter, _plain(parameter, raw), where)
     return values
+
+
+def warn_of_bare_assignments(assignments: Assignments, schema: Schema, source: str, label: str) -> None:
+    """Warn of numbers without a unit that are far from usual, in what `read_assignments` has read."""
+    for name, raw in split_assignments(assignments, source, label).items():
+        where = f"{source}: {label} {name}"
+        parameter = schema.parameters[schema.find(name, where)]
+        warn_of_bare_numbers(parameter, _plain(parameter, raw), where)
+
+
+def split_axes(
+    assignments: Mapping[str, Any], schema: Schema, source: str, label: str
+) -> tuple[dict[str, AxisEntry], dict[str, Any]]:
+    """Return the assignments that are axes, and the others by the names that the user wrote.
+
+    An axis is a list or a range, as a table [axes] has it, of a parameter with a single value.
+
+    Parameters
+    ----------
+    assignments, schema, source, label
+        As of `read_assignments`.
+
+    Returns
+    -------
+    axes : dict
+        By key what the parameter declares, the list or the range, and the place for errors.
+    others : dict
+        Raw value by name.
+
+    Raises
+    ------
+    InputError
+        If a key is unknown.
+    """
+    axes, others = {}, {}
+    for name, raw in assignments.items():
+        where = f"{source}: {label} {name}"
+        key = schema.find(name, where)
+        parameter = schema.parameters[key]
+        plain = _plain(parameter, raw)
+        if kind_of(parameter) is not tuple and is_axis(plain):
+            axes[key] = (parameter, plain, where)
+        else:
+            others[name] = raw
+    return axes, others
 
 
 def read_coordinates(
@@ -96,9 +143,15 @@ def read_coordinates(
     return values
 
 
-def _list_in(text: str) -> Any:
-    """Return the list that a text on the command line holds, or the text as it is."""
+def structured(raw: Any) -> Any:
+    """Return the list or the table that a text of the command line holds, or the value as it is."""
+    if not isinstance(raw, str) or not raw.startswith(("[", "{")):
+        return raw
     try:
-        return tomllib.loads(f"list = {text}")["list"]
-    except ValueError:
-        return text
+        return tomllib.loads(f"value = {raw}")["value"]
+    except (ValueError, RecursionError):
+        return raw
+
+
+def _plain(parameter: Parameter, raw: Any) -> Any:
+    return raw if kind_of(parameter) is str and parameter.choices == () else structured(raw)

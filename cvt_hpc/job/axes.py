@@ -7,8 +7,10 @@ from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Any
 
-from cvt_hpc.errors import InputError, mismatch, show, unknown
-from cvt_hpc.job.values import kind_of, read_value
+import numpy as np
+
+from cvt_hpc.errors import InputError, did_you_mean, mismatch, show, unknown
+from cvt_hpc.job.values import as_list, kind_of, read_value
 from cvt_hpc.parameters import Parameter
 
 LARGEST_AXIS = 100_000
@@ -88,7 +90,8 @@ def read_axis(name: str, parameter: Parameter, raw: Any, where: str) -> Axis:
     parameter : Parameter
         What it declares.
     raw : Any
-        A list of values, or a table with from, to and either count (and spacing) or step.
+        A list of values, a 1-D array of numbers, or a table with from, to and either count (and spacing) or
+        step.
     where : str
         File and key, for the error.
 
@@ -107,12 +110,21 @@ def read_axis(name: str, parameter: Parameter, raw: Any, where: str) -> Axis:
     return Axis(name, read, parameter.unit, parameter.description)
 
 
+def is_axis(raw: Any) -> bool:
+    """Whether a value has the form of an axis: a list, an array or a range."""
+    return isinstance(raw, (list, tuple, dict, np.ndarray))
+
+
 def read_values(parameter: Parameter, raw: Any, where: str) -> tuple:
     """Return the values [parameter.unit] of a list or a range; arguments and errors as of `read_axis`."""
     if kind_of(parameter) is tuple:
         raise mismatch(where, "a parameter with a single value", "one that takes a list")
+    if parameter.file is not None:
+        raise mismatch(where, "one file for all runs", "an axis of files")
     if isinstance(raw, dict):
         values = _read_range(parameter, raw, where)
+    elif isinstance(raw, np.ndarray):
+        values = as_list(raw, where, (1,))
     elif isinstance(raw, (list, tuple)):
         values = raw
     else:
@@ -163,7 +175,8 @@ def read_spacing(raw: dict[str, Any], start: float, stop: float, where: str) -> 
     """Return the spacing of a range from `start` to `stop`: "linear", or "log" if that can be."""
     spacing = raw.get("spacing", "linear")
     if spacing not in _SPACINGS:
-        raise unknown(f"{where}.spacing", f"spacing {show(spacing)}", str(spacing), _SPACINGS)
+        found = show(spacing) + did_you_mean(str(spacing), _SPACINGS)
+        raise mismatch(f"{where}.spacing", f"one of {', '.join(_SPACINGS)}", found)
     if start == stop:
         raise mismatch(where, "a range with from and to apart", f"{start:g} for both")
     if spacing == "log" and (start <= 0 or stop <= 0):

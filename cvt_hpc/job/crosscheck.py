@@ -11,7 +11,6 @@ from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.job.axes import Axis, thinned
 from cvt_hpc.job.rules import Rule, follow, needed_rules, places, varied_by
 from cvt_hpc.job.schema import Schema
-from cvt_hpc.job.values import in_words
 
 MOST_CHECKED_POINTS, MOST_CHECKED_VALUES = 20_000, 5_000  # of runs, and of what follows from others
 
@@ -83,9 +82,10 @@ def check_point(
         With the first problem found.
     """
     for key, expected, found in schema.problems(parameters):
-        raise mismatch(
-            f"{source}: [{schema.section_of[key]}] {key}", expected, found + _place(schema, varied or {})
-        )
+        if key in schema.units and found == f"{parameters[key]:g} {schema.parameters[key].unit}".rstrip():
+            found = f"{found} ({schema.in_words(key, parameters[key])})"  # models tell SI values
+        where = f"{source}: [{schema.section_of[key]}] {key}"
+        raise mismatch(where, expected, found + _place(schema, varied or {}))
 
 
 def complete_point(
@@ -105,7 +105,7 @@ def complete_point(
 
 
 def _place(schema: Schema, varied: Mapping[str, Any]) -> str:
-    words = (f"{key} = {in_words(value, schema.parameters[key].unit)}" for key, value in varied.items())
+    words = (f"{key} = {schema.in_words(key, value)}" for key, value in varied.items())
     return f" (at {', '.join(words)})" if varied else ""
 
 
@@ -133,6 +133,25 @@ def check_rules(
         few = thinned(varying, MOST_CHECKED_VALUES, sampled=sampled)
         for varied in places(few, along, sampled=sampled):
             complete_point(schema, needed, parameters, varied)
+
+
+def without_effect(
+    schema: Schema,
+    parameters: Mapping[str, Any],
+    axes: tuple[Axis, ...],
+    rules: Sequence[Rule],
+    *,
+    sampled: bool = False,
+) -> dict[str, str]:
+    """Return the parameters without effect on any run, each with the setting that makes it so.
+
+    All runs are asked: of a huge grid the axes should be `thinned`. Arguments as of `check_grid`.
+    """
+    found: dict[str, str] | None = None
+    for varied in places(axes, [axis.name for axis in axes], sampled=sampled and bool(axes)):
+        inert = _inert(schema, rules, follow(rules, {**parameters, **varied}))
+        found = inert if found is None else {key: found[key] for key in found if key in inert}
+    return found or {}
 
 
 def _inert(schema: Schema, rules: Sequence[Rule], point: dict[str, Any]) -> dict[str, str]:

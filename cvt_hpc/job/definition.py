@@ -83,6 +83,8 @@ class Job:
         Indices of the runs whose history a sweep keeps; without effect on any number.
     rules : tuple of Rule
         How parameters follow from others, in an order in which each finds what it needs.
+    units : dict
+        By key the unit in which people read a parameter, where the job has it in another than the SI unit.
     """
 
     name: str
@@ -96,6 +98,7 @@ class Job:
     design: Design = field(default_factory=dict)
     histories: tuple[int, ...] = field(default=(), compare=False)
     rules: tuple[Rule, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     @property
     def is_sampled(self) -> bool:
@@ -121,7 +124,7 @@ class Job:
     @property
     def schema(self) -> Schema:
         """What the model and the stepper declare."""
-        return load_schema(self.model, self.stepper, self.source)
+        return replace(load_schema(self.model, self.stepper, self.source), units=self.units)
 
     @cached_property
     def derived(self) -> tuple[Derived, ...]:
@@ -186,6 +189,9 @@ class Job:
         """
         schema = self.schema
         values = read_assignments(at, schema, self.source, label)
+        for key in values:
+            if schema.parameters[key].file is not None:
+                raise mismatch(f"{self.source}: {label} {key}", "one file for all runs", "another one")
         if not self.rules and not overridden(values, schema):
             point = {**self.parameters, **values}
         else:

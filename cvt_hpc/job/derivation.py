@@ -8,6 +8,7 @@ rule comes after those that give what it needs.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
@@ -34,7 +35,9 @@ def read_derived(table: Mapping[str, Any], schema: Schema, source: str) -> list[
         parameter = schema.parameters[key]
         if kind_of(parameter) not in (int, float):
             raise mismatch(where, "a parameter that is a number", key)
-        rules.append(Rule(key, read_formula(raw, schema.parameters, where), where, parameter))
+        formula = read_formula(raw, schema.parameters, where)
+        # a formula gives SI values: none is a number that may be meant in another unit
+        rules.append(Rule(key, formula, where, replace(parameter, sensible=None)))
     return rules
 
 
@@ -75,7 +78,27 @@ def _read_link(name: str, raw: Any, axis: Axis, schema: Schema, where: str) -> R
     values = read_values(schema.parameters[key], raw, where)
     if len(values) != len(axis.values):
         raise mismatch(where, f"{len(axis.values)} values, one for each of {axis.name}", f"{len(values)}")
-    return Rule(key, Link(axis.name, axis.values, values, axis.unit), where, schema.parameters[key])
+    link = Link(axis.name, axis.values, values, axis.unit, schema.units.get(axis.name, ""))
+    return Rule(key, link, where, schema.parameters[key])
+
+
+def relinked(rules: Iterable[Rule], axes: Iterable[Axis]) -> list[Rule]:
+    """Return rules whose links follow the values that overrides have left of their axes.
+
+    Raises
+    ------
+    InputError
+        If an axis has a value for which a link has none.
+    """
+    left = {axis.name: axis.values for axis in axes}
+    found = []
+    for rule in rules:
+        if isinstance(link := rule.source, Link) and link.axis in left:
+            at = left[link.axis]
+            values = tuple(rule.value({link.axis: value}) for value in at)
+            rule = replace(rule, source=replace(link, at=at, values=values))
+        found.append(rule)
+    return found
 
 
 def overridden(keys: Collection[str], schema: Schema) -> set[str]:
@@ -136,7 +159,7 @@ def _substituted(known: set[str], schema: Schema, source: str) -> dict[str, Rule
             raise mismatch(where, f"either {key} or {target}", "both")
         if not is_taken:
             names = (key, *(need for need in substitute.needs if need in schema.parameters and need != key))
-            gives = Substituted(key, names, parameter.unit, substitute)
+            gives = Substituted(key, names, parameter.unit, substitute, schema.units.get(key, ""))
             rules[target] = Rule(target, gives, where, schema.parameters[target])
     return rules
 

@@ -12,7 +12,7 @@ from typing import Any
 from cvt_hpc.errors import mismatch, show
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.schema import Schema
-from cvt_hpc.job.values import in_words, read_value
+from cvt_hpc.job.values import read_value
 
 KEY = ("record", "history")
 _FORMS = "a list of runs, each a table {axis = value, ...} with all axes, or a run index"
@@ -37,8 +37,8 @@ def read_histories(
     axes : tuple of Axis
         Its grid.
     replaced : mapping
-        Values by key that overrides have put in the place of an axis or of a value; a run that they have
-        taken off the grid is left out.
+        By key what overrides have put in the place of an axis or of a value: a value, or None for an axis of
+        their own. A run that they have taken off the grid is left out.
     source : str
         The job file, for the errors.
     samples : int, optional
@@ -74,9 +74,13 @@ def _index(
         values[key] = read_value(schema.parameters[key], raw, f"{where}, {name}")
     index = 0
     for axis in axes:
+        if axis.name in replaced and values.get(axis.name) not in axis.values:
+            return None
         if axis.name not in values:
             raise mismatch(where, "a value for each axis", f"none for {axis.name}")
-        index = index * len(axis.values) + _place(axis, values.pop(axis.name), f"{where}, {axis.name}")
+        index = index * len(axis.values) + _place(
+            axis, values.pop(axis.name), schema, f"{where}, {axis.name}"
+        )
     for key in values.keys() - replaced.keys():
         raise mismatch(where, f"axes of this job ({', '.join(axis.name for axis in axes)})", key)
     return index if all(replaced[key] == value for key, value in values.items()) else None
@@ -88,12 +92,12 @@ def _numbered(entry: Any, size: int, where: str) -> int:
     return entry
 
 
-def _place(axis: Axis, value: Any, where: str) -> int:
+def _place(axis: Axis, value: Any, schema: Schema, where: str) -> int:
     if value in axis.values:
         return axis.values.index(value)
     if isinstance(value, str):
         raise mismatch(where, f"one of {', '.join(axis.values)}", show(value))
     below = max((v for v in axis.values if v < value), default=min(axis.values))
     above = min((v for v in axis.values if v > value), default=max(axis.values))
-    near = " or ".join(dict.fromkeys(in_words(v, axis.unit) for v in (below, above)))
-    raise mismatch(where, f"a value of the axis, such as {near}", in_words(value, axis.unit))
+    near = " or ".join(dict.fromkeys(schema.in_words(axis.name, v) for v in (below, above)))
+    raise mismatch(where, f"a value of the axis, such as {near}", schema.in_words(axis.name, value))

@@ -4,24 +4,34 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
-from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignments
+from cvt_hpc.job.assignments import (
+    Assignments,
+    AxisEntry,
+    read_assignments,
+    split_assignments,
+    split_axes,
+    structured,
+)
 from cvt_hpc.job.axes import Axis, read_axis
 from cvt_hpc.job.crosscheck import check_grid, check_rules
+from cvt_hpc.job.csv_files import read_csv
 from cvt_hpc.job.definition import HEADER, Job
-from cvt_hpc.job.derivation import ordered_rules, overridden, read_derived, read_linked
+from cvt_hpc.job.derivation import ordered_rules, overridden, read_derived, read_linked, relinked
 from cvt_hpc.job.design import Design, read_design, resolve_spacing
 from cvt_hpc.job.document import read_document
 from cvt_hpc.job.for_model import answering_model, handed_to
 from cvt_hpc.job.histories import KEY, read_histories
+from cvt_hpc.job.plausibility import warn_of_bare_numbers
 from cvt_hpc.job.rules import Link, Rule, follow
 from cvt_hpc.job.sampling import sampled_axes
 from cvt_hpc.job.schema import Schema, load_schema
-from cvt_hpc.job.values import expectation, read_value
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.job.units import unit_in
+from cvt_hpc.job.values import expectation, kind_of, read_value
 
 OF_COMMANDS = ("branch", "chart")  # tables that a command of the same name reads
 _OF_DESIGN = "design."
@@ -36,7 +46,8 @@ def load_job(path: str | Path, overrides: Assignments = ()) -> Job:
     path : str or Path
         A TOML file.
     overrides : mapping, or sequence of "KEY=VALUE"
-        Values that replace those of the file; one for an axis replaces the axis by that one value.
+        Values that replace those of the file. One value for an axis replaces the axis by that value; a list
+        or a range, as a table [axes] has it, makes an axis or replaces one.
 
     Returns
     -------
@@ -54,16 +65,20 @@ def load_job(path: str | Path, overrides: Assignments = ()) -> Job:
 
 
 def build_job(
-    document: Mapping[str, Any], source: str, overrides: Assignments = (), label: str | None = None
+    document: Mapping[str, Any],
+    source: str = "build_job",
+    overrides: Assignments = (),
+    label: str | None = None,
 ) -> Job:
-    """Validate the contents of a job file.
+    """Validate a job that is given as a dict.
 
     Parameters
     ----------
     document : mapping
-        Tables and values as TOML gives them.
+        Tables and values as TOML gives them. An axis may also be a 1-D numpy array of numbers, and a table of
+        coefficients a 2-D one.
     source : str
-        Where it is from, for the errors.
+        Where it is from, for the errors: for a job of a file its path.
     overrides : mapping, or sequence of "KEY=VALUE"
         See `load_job`.
     label : str, optional
@@ -79,21 +94,66 @@ def build_job(
     InputError
         If anything is wrong with the document or an override.
     """
+    return _build(document, source, overrides, label)
+
+
+def rebuild_job(
+    document: Mapping[str, Any],
+    source: str,
+    units: Mapping[str, str],
+    overrides: Assignments = (),
+    label: str | None = None,
+) -> Job:
+    """Return the job of a document whose numbers are SI values of another job, and draw no warning.
+
+    Parameters
+    ----------
+    document, source, overrides, label
+        As of `build_job`.
+    units : mapping
+        In which people read parameters: those of the other job.
+
+    Raises
+    ------
+    InputError
+        If anything is wrong with the document or an override.
+    """
+    return _build(document, source, overrides, label, units)
+
+
+def _build(
+    document: Mapping[str, Any],
+    source: str,
+    overrides: Assignments = (),
+    label: str | None = None,
+    units: Mapping[str, str] | None = None,
+) -> Job:
     label = label or ("override" if isinstance(overrides, Mapping) else "--set")
     pairs = split_assignments(overrides, source, label)
     head = {**document, **{key: value for key, value in pairs.items() if key in HEADER}}
     name, description = _read_name(head, source), _read_description(head, source)
     schema = load_schema(head.get("model"), head.get("stepper"), source)
     _check_top_level(document, schema, source)
+    written = _written(document, pairs, schema, source, label) if units is None else {}
+    found = {key: unit_in(raw) for key, (raw, _) in written.items()}
+    if units is None:
+        units = {key: unit for key, unit in found.items() if unit not in ("", schema.parameters[key].unit)}
+    schema = replace(schema, units=units)
     tables = _read_tables(document, schema, source)
-    of_design = {key: value for key, value in pairs.items() if key.startswith(_OF_DESIGN)}
+    of_design = {key: structured(value) for key, value in pairs.items() if key.startswith(_OF_DESIGN)}
     others = {key: value for key, value in pairs.items() if key not in (*HEADER, *of_design)}
+    put_axes, others = split_axes(others, schema, source, label)
     replaced = read_assignments(others, schema, source, label)
     changed = {key.removeprefix(_OF_DESIGN): value for key, value in of_design.items()}
     design = read_design({**document.get("design", {}), **changed}, source)
-    gone = {*replaced, *overridden(replaced, schema)}
+    put = {*replaced, *put_axes}
+    put |= {given for key in replaced if (file := schema.parameters[key].file) for given in file.gives}
+    gone = {*put, *overridden(put, schema)}
     given = {key: value for key, value in tables.items() if key not in gone} | replaced
-    axes, rules = _read_axes_and_rules(document, design, gone, given, schema, source)
+    given = _with_files(given, schema, source)
+    axes, rules = _read_axes_and_rules(document, design, gone, put_axes, given, schema, source)
+    for key, entry in written.items():
+        warn_of_bare_numbers(schema.parameters[key], *entry)
     if "first_spacing" in design:
         design = resolve_spacing(design, axes, source)
     scene = _resolve({**{axis.name: axis.values[0] for axis in axes}, **given}, rules, schema, source)
@@ -117,24 +177,66 @@ def build_job(
         design,
         read_histories(histories, schema, axes, replacing, source, design.get("runs")),
         tuple(rule for rule in rules if rule.key not in settled),
+        schema.units,
     )
     answering = answering_model(job)
-    return job if answering is None else build_job(handed_to(job, *answering), source)
+    return job if answering is None else rebuild_job(handed_to(job, *answering), source, job.units)
+
+
+def _written(
+    document: Mapping[str, Any], pairs: Mapping[str, Any], schema: Schema, source: str, label: str
+) -> dict[str, tuple[Any, str]]:
+    """Return what stands for each parameter in the tables, the axes or the overrides, and where.
+
+    Where there are several the one that counts most. Nothing is checked.
+    """
+    links = [(f"[linked.{axis}]", table) for axis, table in document.get("linked", {}).items()]
+    tables = [(f"[{name}]", document.get(name, {})) for name in schema.sections]
+    found = {}
+    for place, table in [*tables, *links, ("[axes]", document.get("axes", {})), (label, pairs)]:
+        for name, raw in schema.flatten(table) if isinstance(table, Mapping) else ():
+            key = name.rpartition(".")[2]
+            if key in schema.parameters and kind_of(schema.parameters[key]) in (float, tuple):
+                found[key] = structured(raw), f"{source}: {place} {name}"
+    return found
+
+
+def _with_files(given: Mapping[str, Any], schema: Schema, source: str) -> dict[str, Any]:
+    """Return given values with what files give in the place of their names."""
+    found = dict(given)
+    for key in given:
+        if (file := schema.parameters[key].file) is None:
+            continue
+        name, where = found.pop(key), f"{source}: [{schema.section_of[key]}] {key}"
+        for one in file.gives if name else ():
+            if one in given:
+                raise mismatch(where, f"either {key} or {one}", "both")
+        raw = read_csv(file, name, source, where) if name else {}
+        found |= {one: read_value(schema.parameters[one], value, where) for one, value in raw.items()}
+    return found
 
 
 def _read_axes_and_rules(
     document: Mapping[str, Any],
     design: Design,
     gone: Collection[str],
+    put: Mapping[str, AxisEntry],
     given: Collection[str],
     schema: Schema,
     source: str,
 ) -> tuple[tuple[Axis, ...], list[Rule]]:
-    """Return the axes and the rules in their order, without those that overrides have put out of force."""
-    axes = _read_axes(document.get("axes", {}), design, gone, schema, source)
-    stated = _read_rules(document, axes, design, schema, source)
-    axes = tuple(axis for axis in axes if axis.name not in gone)
-    stated = [rule for rule in stated if rule.key not in gone]
+    """Return the axes and the rules in their order.
+
+    Those that overrides have put out of force are `gone`, and the axes that overrides `put` are in their
+    place, or come last.
+    """
+    of_file = _find_axes(document.get("axes", {}), schema, source)
+    kept = {key: entry for key, entry in of_file.items() if key not in gone or key in put} | put
+    sampled = "runs" in design
+    axes = sampled_axes(kept, design, source) if sampled else _read_grid(kept)
+    # a link has a value for each of the file's axis, and keeps those that are left of it
+    stated = _read_rules(document, () if sampled else _read_grid(of_file), design, schema, source)
+    stated = relinked([rule for rule in stated if rule.key not in gone], axes)
     return axes, ordered_rules(stated, {*given, *(axis.name for axis in axes)}, schema, source)
 
 
@@ -217,21 +319,20 @@ def _read_tables(document: Mapping[str, Any], schema: Schema, source: str) -> di
     return values
 
 
-def _read_axes(
-    table: Mapping[str, Any], design: Design, gone: Collection[str], schema: Schema, source: str
-) -> tuple[Axis, ...]:
-    """Return the axes of the file, of samples but those that are replaced by one value."""
-    found: dict[str, tuple[Parameter, Any, str]] = {}
+def _find_axes(table: Mapping[str, Any], schema: Schema, source: str) -> dict[str, AxisEntry]:
+    """Return what the file's table [axes] has for each key."""
+    found: dict[str, AxisEntry] = {}
     for name, raw in schema.flatten(table):
         where = f"{source}: [axes] {name}"
         key = schema.find(name, where)
         if key in found:
             raise mismatch(where, "one axis for a parameter", f"a second one for {key}")
         found[key] = (schema.parameters[key], raw, where)
-    if "runs" in design:
-        left = {key: entry for key, entry in found.items() if key not in gone}
-        return sampled_axes(left, design, source)
-    return tuple(read_axis(key, *entry) for key, entry in found.items())
+    return found
+
+
+def _read_grid(entries: Mapping[str, AxisEntry]) -> tuple[Axis, ...]:
+    return tuple(read_axis(key, *entry) for key, entry in entries.items())
 
 
 def _resolve(values: Mapping[str, Any], rules: Sequence[Rule], schema: Schema, source: str) -> dict[str, Any]:
@@ -243,7 +344,7 @@ def _resolve(values: Mapping[str, Any], rules: Sequence[Rule], schema: Schema, s
         where = f"{source}: [{schema.section_of[key]}] {key}"
         if key in values:
             resolved[key] = values[key]
-        elif key in follows or (parameter.gives and key not in giving):
+        elif key in follows or parameter.file or (parameter.gives and key not in giving):
             continue
         elif parameter.default is None:
             raise mismatch(where, expectation(parameter), "nothing")

@@ -68,8 +68,8 @@ class Rule:
         except ValueError as error:
             if isinstance(self.source, Formula):
                 raise mismatch(self.where, "a finite value", f"{show(self.words)} ({error})") from None
-            blamed, unit = self.source.names[0], self.source.unit
-            raise mismatch(self.where, str(error), in_words(parameters[blamed], unit)) from None
+            blamed, unit, wanted = self.source.names[0], self.source.unit, self.source.wanted
+            raise mismatch(self.where, str(error), in_words(parameters[blamed], unit, wanted)) from None
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,7 @@ class Link:
     at: tuple
     values: tuple
     unit: str  # of the axis
+    wanted: str = field(default="", compare=False)  # its unit in the job
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -95,7 +96,7 @@ class Link:
         """Return the value that belongs to the axis' value; ValueError if that one is not on the axis."""
         place = parameters[self.axis]
         if place not in self.at:
-            known = few_of([in_words(value, "") for value in self.at], _MOST_NAMED)
+            known = few_of([in_words(value, self.unit, self.wanted) for value in self.at], _MOST_NAMED)
             raise ValueError(f"a value of {self.axis} that it is linked to ({known})")
         return self.values[self.at.index(place)]
 
@@ -106,8 +107,9 @@ class Substituted:
 
     by: str
     names: tuple[str, ...]
-    unit: str
+    unit: str  # of `by`
     substitute: Substitute = field(compare=False, repr=False)
+    wanted: str = field(default="", compare=False)  # its unit in the job
 
     @property
     def text(self) -> str:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from importlib import import_module
 from typing import Any
 
 from cvt_hpc import recording
-from cvt_hpc.errors import InputError, mismatch, nearest, show, unknown
+from cvt_hpc.errors import InputError, did_you_mean, mismatch, nearest, show
+from cvt_hpc.job.values import in_words
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import Model, load_model
 from cvt_hpc.parameters import Parameter
@@ -42,6 +43,8 @@ class Schema:
         The checks that lie between parameters, the model's first: flat values -> list of problems.
     inert : callable
         Flat values -> the keys without effect on such a run, each with the setting that makes it so.
+    units : dict
+        By key the unit in which people read a parameter, where the job has it in another than the SI unit.
     """
 
     model: str
@@ -49,6 +52,15 @@ class Schema:
     sections: dict[str, dict[str, Parameter]]
     checks: tuple[Check, ...]
     inert: Inert
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def in_words(self, key: str, value: Any) -> str:
+        """Return a value [SI] of a parameter for people to read, in the unit of the job."""
+        return in_words(value, self.parameters[key].unit, self.units.get(key, ""))
+
+    def unit_in_words(self, key: str) -> str:
+        """Return the unit in which people read a parameter."""
+        return self.units.get(key, self.parameters[key].unit)
 
     @cached_property
     def section_of(self) -> dict[str, str]:
@@ -145,11 +157,12 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     """
     loaded = load_model(_known(model, MODELS, "model", source))
     stepper = loaded.default_stepper if stepper is None else stepper
-    tables, checks = [loaded.parameters], [loaded.check]
+    tables, checks, inert = [loaded.parameters], [loaded.check], [loaded.inert]
     if stepper is not None:
         modules = [import_module(_stepper(loaded, stepper, source)), *SHARED]
         tables += [module.PARAMETERS for module in modules]
         checks += [module.check for module in modules if hasattr(module, "check")]
+        inert += [module.inert for module in modules if hasattr(module, "inert")]
     sections: dict[str, dict[str, Parameter]] = {}
     for sectioned in tables:
         for section, table in sectioned.items():
@@ -157,12 +170,16 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     for key, substitute in loaded.gives.get(stepper, {}).items():
         section = next(name for name, table in sections.items() if key in table)
         sections[section][key] = replace(sections[section][key], gives=substitute)
-    return Schema(loaded.name, stepper, sections, tuple(checks), loaded.inert)
+    return Schema(loaded.name, stepper, sections, tuple(checks), partial(_all_inert, inert))
 
 
 def known_keys(model: str, stepper: str | None = None) -> tuple[str, ...]:
     """Return every key that a job of a model and a stepper may set or vary."""
     return tuple(load_schema(model, stepper, "known_keys").parameters)
+
+
+def _all_inert(found: Sequence[Inert], parameters: dict[str, Any]) -> dict[str, str]:
+    return {key: setting for inert in found for key, setting in inert(parameters).items()}
 
 
 def _stepper(model: Model, stepper: Any, source: str) -> str:
@@ -171,7 +188,7 @@ def _stepper(model: Model, stepper: Any, source: str) -> str:
     if isinstance(stepper, str) and stepper in model.steppers:
         return model.steppers[stepper]
     owners = {name: other for other in MODELS for name in load_model(other).steppers if name not in STEPPERS}
-    _known(stepper, STEPPERS | owners, "stepper", source)
+    _known(stepper, STEPPERS | owners, "stepper", source, told=model.steppers)
     if not model.steppers:
         raise mismatch(where, f"none, since {model.name} has no transient", show(stepper))
     reason = model.refused.get(stepper) or f"it is {owners[stepper]}'s own step"
@@ -179,9 +196,12 @@ def _stepper(model: Model, stepper: Any, source: str) -> str:
     raise mismatch(where, expected, f"{show(stepper)}: {reason}")
 
 
-def _known(name: Any, registry: Mapping[str, Any], what: str, source: str) -> str:
-    if not isinstance(name, str):
-        raise mismatch(f"{source}: {what}", f"one of {', '.join(registry)}", show(name))
-    if name not in registry:
-        raise unknown(f"{source}: {what}", f"{what} {show(name)}", name, registry)
+def _known(
+    name: Any, registry: Mapping[str, Any], what: str, source: str, told: Mapping[str, Any] | None = None
+) -> str:
+    """Return a name of the registry; the error names those `told`, by default all."""
+    if not isinstance(name, str) or name not in registry:
+        expected = f"one of {', '.join(registry if told is None else told) or 'none'}"
+        hint = did_you_mean(name, registry) if isinstance(name, str) else ""
+        raise mismatch(f"{source}: {what}", expected, show(name) + hint)
     return name

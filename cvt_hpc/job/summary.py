@@ -6,11 +6,16 @@ import math
 from typing import Any
 
 from cvt_hpc.job.axes import Axis
+from cvt_hpc.job.crosscheck import without_effect
 from cvt_hpc.job.definition import Derived, Job
+from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.values import in_words
+from cvt_hpc.models import MODELS
+from cvt_hpc.models.contract import load_model
 
 _FEW = 8
-_MOST_EVALUATED = 2_000
+_MOST_EVALUATED = 2_000  # values of what follows from others
+_MOST_ASKED = 500  # runs, for what has no effect
 
 
 def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
@@ -33,15 +38,17 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
     stepper = "no transient" if job.stepper is None else f"stepper {job.stepper}"
     lines = [f"job {job.name} ({job.source}): model {job.model}, {stepper}"]
     lines += [job.description] if job.description else []
-    for section, rows in _tables(job).items():
+    lines += ["", *_choices(job)]
+    schema = job.schema
+    for section, rows in _tables(job, schema).items():
         lines += ["", f"[{section}]", *_columns(rows)]
     if job.axes:
         noun = "samples" if job.is_sampled else "values"
         in_short = _range_in_words if job.is_sampled else _values_in_words
-        axes = [(axis.name, in_short(axis), f"{len(axis.values)} {noun}") for axis in job.axes]
+        axes = [(axis.name, in_short(axis, schema), f"{len(axis.values)} {noun}") for axis in job.axes]
         lines += ["", "[axes]", *_columns(axes)]
     if job.rules:
-        lines += ["", "[derived]", *_columns(_rules(job))]
+        lines += ["", "[derived]", *_columns(_rules(job, schema))]
     if job.design:
         design = [(key, _setting_in_words(value)) for key, value in job.design.items()]
         lines += ["", "[design]", *_columns(design)]
@@ -55,25 +62,46 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
     return "\n".join(lines)
 
 
-def _tables(job: Job) -> dict[str, list[tuple[str, ...]]]:
+def _choices(job: Job) -> list[str]:
+    """Return what else the model and the stepper may be."""
+    steppers = load_model(job.model).steppers
+    words = [f"models: {', '.join(MODELS)}"]
+    return words + ([f"steppers of {job.model}: {', '.join(steppers)}"] if steppers else [])
+
+
+def _tables(job: Job, schema: Schema) -> dict[str, list[tuple[str, ...]]]:
     kinds = {
         **dict.fromkeys(job.given, "given"),
         **{axis.name: "axis" for axis in job.axes},
         **{rule.key: "derived" for rule in job.rules},
     }
+    axes = job.thinned(_MOST_ASKED).axes
+    inert = without_effect(schema, job.parameters, axes, job.rules, sampled=job.is_sampled)
     elsewhere = {"axis": "see [axes]", "derived": "see [derived]"}
     tables: dict[str, list[tuple[str, ...]]] = {}
-    for section, table in job.schema.sections.items():
+    for section, table in schema.sections.items():
         rows = []
         for key, parameter in table.items():
             kind = kinds.get(key, "default")
-            value = in_words(job.parameters[key], parameter.unit) if key in job.parameters else "none"
-            rows.append((key, elsewhere.get(kind, value), kind, parameter.description))
+            value = _value_in_words(schema, key, job.parameters[key]) if key in job.parameters else "none"
+            text = parameter.description
+            text += f" ({', '.join(parameter.choices)})" if parameter.choices else ""
+            text = f"without effect with {inert[key]}: {text}" if key in inert else text
+            rows.append((key, elsewhere.get(kind, value), kind, text))
         tables[section] = rows
     return tables
 
 
-def _rules(job: Job) -> list[tuple[str, ...]]:
+def _value_in_words(schema: Schema, key: str, value: Any) -> str:
+    """Return a value for people; a long list as its length and its ends."""
+    if not isinstance(value, tuple) or len(value) <= _FEW:
+        return schema.in_words(key, value)
+    if isinstance(value[0], tuple):
+        return f"{len(value)} rows of {len(value[0])}"
+    return f"{len(value)} values from {schema.in_words(key, value[0])} to {schema.in_words(key, value[-1])}"
+
+
+def _rules(job: Job, schema: Schema) -> list[tuple[str, ...]]:
     """Return for each parameter that follows from others its values, how it follows, and along which axes.
 
     Of a huge grid the values are those at places all over it.
@@ -82,10 +110,10 @@ def _rules(job: Job) -> list[tuple[str, ...]]:
     rows = []
     for rule in job.rules:
         if rule.key in varied and len(set(varied[rule.key].values)) > 1:
-            values = _range_in_words(varied[rule.key])
+            values = _range_in_words(varied[rule.key], schema)
             along = f"varies with {', '.join(varied[rule.key].axes)}"
         else:
-            values, along = in_words(job.parameters[rule.key], rule.parameter.unit), "the same in all runs"
+            values, along = schema.in_words(rule.key, job.parameters[rule.key]), "the same in all runs"
         rows.append((rule.key, values, rule.words, along))
     return rows
 
@@ -99,17 +127,22 @@ def _columns(rows: list[tuple[str, ...]]) -> list[str]:
     ]
 
 
-def _values_in_words(axis: Axis) -> str:
-    words = [in_words(value, "") for value in axis.values]
-    if len(words) > _FEW:
-        words = [*words[:3], "...", words[-1]]
-    return f"{', '.join(words)} {axis.unit}".rstrip()
+def _values_in_words(axis: Axis, schema: Schema) -> str:
+    values = axis.values if len(axis.values) <= _FEW else (*axis.values[:3], axis.values[-1])
+    words = [schema.in_words(axis.name, value) for value in values]
+    unit = schema.unit_in_words(axis.name)
+    words = [word.removesuffix(unit).rstrip() for word in words]
+    if len(axis.values) > _FEW:
+        words.insert(3, "...")
+    return f"{', '.join(words)} {unit}".rstrip()
 
 
-def _range_in_words(axis: Axis | Derived) -> str:
+def _range_in_words(axis: Axis | Derived, schema: Schema) -> str:
     if isinstance(axis.values[0], str):
         return ", ".join(dict.fromkeys(axis.values))
-    return f"{in_words(min(axis.values), '')} to {in_words(max(axis.values), '')} {axis.unit}".rstrip()
+    unit = schema.unit_in_words(axis.name)
+    low, high = (schema.in_words(axis.name, value) for value in (min(axis.values), max(axis.values)))
+    return f"{low.removesuffix(unit).rstrip()} to {high}"
 
 
 def _setting_in_words(value: Any) -> str:

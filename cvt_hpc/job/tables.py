@@ -7,6 +7,7 @@ from typing import Any
 
 from cvt_hpc.errors import mismatch, show, unknown
 from cvt_hpc.job.definition import HEADER
+from cvt_hpc.job.plausibility import warn_of_bare_numbers
 from cvt_hpc.job.values import expectation, read_value
 from cvt_hpc.parameters import Parameter
 
@@ -41,6 +42,7 @@ def read_table(
     for key, parameter in declared.items():
         if key in raw:
             values[key] = read_value(_typed(parameter), raw[key], f"{where} {key}")
+            warn_of_bare_numbers(parameter, raw[key], f"{where} {key}")
         elif parameter.default is None:
             raise mismatch(f"{where} {key}", expectation(_typed(parameter)), "nothing")
         else:

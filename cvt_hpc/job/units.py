@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from decimal import Decimal
 from functools import lru_cache
 from typing import Any
@@ -53,6 +54,29 @@ def to_si(text: str, unit: str) -> float:
     factor_free = not math.isfinite(float(number))
     magnitude = _convert(Decimal(1) if factor_free else Decimal(number), given, unit)
     return float(number) if factor_free else float(magnitude)
+
+
+def from_si(value: float, unit: str, wanted: str) -> float:
+    """Convert a number [unit], an SI unit, to another unit; errors as of `to_si`."""
+    if wanted == unit or not math.isfinite(value):
+        return value
+    return float(_convert(Decimal(repr(float(value))), unit, wanted))
+
+
+def unit_in(raw: Any) -> str:
+    """Return the unit that a value of a job file is written with, of a list or a range the first one.
+
+    Returns
+    -------
+    str
+        As it stands there; "" where there is none.
+    """
+    if isinstance(raw, str):
+        match = _QUANTITY.fullmatch(raw)
+        return match["unit"] if match else ""
+    if isinstance(raw, Mapping):
+        raw = [raw.get(key) for key in ("from", "to", "step")]
+    return next(filter(None, map(unit_in, raw)), "") if isinstance(raw, (list, tuple)) else ""
 
 
 def _convert(number: Decimal, given: str, unit: str) -> Decimal:

@@ -6,8 +6,11 @@ import math
 import numbers
 from typing import Any
 
+import numpy as np
+
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
-from cvt_hpc.job.units import UnitError, to_si
+from cvt_hpc.job.plausibility import meant
+from cvt_hpc.job.units import UnitError, from_si, to_si, unit_in
 from cvt_hpc.parameters import Parameter
 
 
@@ -48,6 +51,29 @@ def read_value(parameter: Parameter, raw: Any, where: str) -> Any:
     return value
 
 
+def as_list(array: np.ndarray, where: str, dimensions: tuple[int, ...]) -> list:
+    """Return an array of numbers as a (nested) list.
+
+    Parameters
+    ----------
+    array : array
+        Of floats or integers of any width.
+    where : str
+        File and key, for the error.
+    dimensions : tuple of int
+        Numbers of dimensions that are legal.
+
+    Raises
+    ------
+    InputError
+        If it is none of numbers, or has another number of dimensions.
+    """
+    if array.ndim not in dimensions or array.dtype.kind not in "iuf":
+        shapes = " or ".join(f"{ndim}-D" for ndim in dimensions)
+        raise mismatch(where, f"a {shapes} array of numbers", f"{show(array)} of {array.dtype}")
+    return array.tolist()
+
+
 def kind_of(parameter: Parameter) -> type:
     """Return the type of a parameter's values: float, int, bool, str or tuple."""
     if parameter.default is None:
@@ -68,8 +94,10 @@ def expectation(parameter: Parameter) -> str:
     return _number_in_words(parameter)
 
 
-def in_words(value: Any, unit: str) -> str:
-    """Return a value with its unit for people to read, e.g. "50000 N"."""
+def in_words(value: Any, unit: str, wanted: str = "") -> str:
+    """Return a value [unit] for people to read, e.g. "50000 N"; in another unit where one is wanted."""
+    if wanted:
+        value, unit = _converted(value, unit, wanted), wanted
     if isinstance(value, tuple):
         text = f"[{', '.join(in_words(item, '') for item in value)}]"
     elif isinstance(value, bool):
@@ -79,9 +107,16 @@ def in_words(value: Any, unit: str) -> str:
     return f"{text} {unit}".rstrip()
 
 
+def _converted(value: Any, unit: str, wanted: str) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_converted(item, unit, wanted) for item in value)
+    return from_si(value, unit, wanted) if isinstance(value, float) else value
+
+
 def _read_number(parameter: Parameter, raw: Any, where: str) -> float:
     if isinstance(raw, bool) or not isinstance(raw, (numbers.Real, str)):
-        hint = "; what a study varies stands in [axes]" if isinstance(raw, (list, tuple)) else ""
+        listed = isinstance(raw, (list, tuple, np.ndarray))
+        hint = "; what a study varies stands in [axes]" if listed else ""
         raise mismatch(where, _number_in_words(parameter), show(raw) + hint)
     try:
         value = to_si(raw, parameter.unit) if isinstance(raw, str) else float(raw)
@@ -103,9 +138,13 @@ def _check_bounds(parameter: Parameter, value: float, raw: Any, where: str) -> N
     if inside or (parameter.allow_infinite and value in (low, high) and math.isinf(value)):
         return
     strict = "" if parameter.exclusive else "="
+    unit = unit_in(raw) or parameter.unit
+    low, high = (from_si(bound, parameter.unit, unit) for bound in (low, high))
     bounds = [f">{strict} {low:g}"] if low > -math.inf else []
     bounds += [f"<{strict} {high:g}"] if high < math.inf else []
-    raise mismatch(where, _with_unit(" and ".join(bounds), parameter), show(raw))
+    other = meant(raw, parameter) if value > 0.0 or parameter.minimum < 0.0 else ""
+    hint = f"; did you mean {other}?" if other else ""
+    raise mismatch(where, f"{' and '.join(bounds)} {unit}".rstrip(), show(raw) + hint)
 
 
 def _read_text(parameter: Parameter, raw: Any, where: str) -> str:
@@ -128,6 +167,8 @@ def _read_flag(parameter: Parameter, raw: Any, where: str) -> bool:
 
 
 def _read_table(parameter: Parameter, raw: Any, where: str) -> tuple:
+    if isinstance(raw, np.ndarray):
+        raw = as_list(raw, where, (1, 2))
     if not isinstance(raw, (list, tuple)):
         raise mismatch(where, expectation(parameter), show(raw))
     rows = []

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from cvt_hpc.errors import InputError, mismatch
-from cvt_hpc.job import Job, build_job, known_keys
+from cvt_hpc.job import Job, known_keys, rebuild_job
 from cvt_hpc.job.for_model import handed_to
 from cvt_hpc.vibration.ramped import QUANTITIES
 
@@ -76,7 +76,7 @@ def ladder(job: Job) -> tuple[tuple[Rung, ...], dict[str, str]]:
             rungs.append(Rung(name, answers, _handed(job, model, table)))
         except InputError as error:
             refusals[name] = str(error)
-    reference = build_job(_refined(job), job.source)
+    reference = rebuild_job(_refined(job), job.source, job.units)
     return (*rungs, Rung(MODEL, QUESTIONS, job), Rung(REFERENCE, (), reference)), refusals
 
 
@@ -109,7 +109,7 @@ def _handed(job: Job, model: str, table: dict[str, Any]) -> Job:
     document = handed_to(fewer, model, "a rung of its ladder")
     if table:
         document[model] = table
-    return build_job(document, job.source)
+    return rebuild_job(document, job.source, job.units)
 
 
 def _refined(job: Job) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 _OF_FORMULAS = ("friction_gradient", "kinetic_friction", "stribeck_velocity")
+_OF_TABLES = ("table_file", "table_force", "table_speed", "table_mu")
 
 
 def friction_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
@@ -37,7 +38,9 @@ def friction_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
     p = parameters
     cases = (
         (p["friction_law"] == "table", _OF_FORMULAS, "friction_law table"),
+        (p["friction_law"] != "table", _OF_TABLES, f"friction_law {p['friction_law']}"),
         (p["friction_law"] == "hyperbolic", ("stribeck_velocity",), "friction_law hyperbolic"),
+        (p["friction_law"] == "coulomb", ("stribeck_velocity",), "friction_law coulomb"),
         (p["friction_gradient"] == 0.0, ("stribeck_velocity",), "friction_gradient 0"),
     )
     return {key: setting for holds, keys, setting in cases if holds for key in keys}

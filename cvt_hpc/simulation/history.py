@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.job.assignments import read_assignments
+from cvt_hpc.job.assignments import Assignments, read_assignments, warn_of_bare_assignments
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.simulation.record import record_coordinates, record_variables
 from cvt_hpc.simulation.running import do
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
 
-def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
+def simulate(job: Job, at: Assignments | None = None) -> xr.Dataset:
     """Do one run and keep its history.
 
     Where `lanes` is not given, its stations fill the lanes of the registers: it is done sooner than in a
@@ -30,7 +30,7 @@ def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
     ----------
     job : Job
         A validated job.
-    at : mapping, optional
+    at : mapping, or sequence of "KEY=VALUE", optional
         Values [SI, or texts with units] by key where the run departs from the base scene.
 
     Returns
@@ -44,7 +44,9 @@ def simulate(job: Job, at: Mapping[str, Any] | None = None) -> xr.Dataset:
     InputError
         If a value is not fit for its key.
     """
-    at = read_assignments(at or {}, job.schema, job.source, "at")
+    given, schema = at or {}, job.schema
+    at = read_assignments(given, schema, job.source, "at")
+    warn_of_bare_assignments(given, schema, job.source, "at")
     point = job.point_at(at)
     if "lanes" in point and "lanes" not in {*at, *job.given, *(axis.name for axis in job.axes)}:
         point["lanes"] = "stations"

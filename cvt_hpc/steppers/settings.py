@@ -14,6 +14,7 @@ STEP = Parameter(
     "largest time step; a whole number of steps makes a sampling interval",
     minimum=0.0,
     exclusive=True,
+    sensible=(1e-10, 0.5),
 )
 TOLERANCE = Parameter(
     1e-6,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from enum import IntEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.errors import InputError
+from cvt_hpc.job.values import in_words
 from cvt_hpc.study.dimensions import DerivedCoordinate, Dimension, axis_dimension, derived_coordinate
 from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.variables import Status, Variable
@@ -39,6 +40,8 @@ class Study:
         Dimensions of the variables beside the grid.
     derived : tuple of DerivedCoordinate
         Parameters that follow from the axes.
+    units : dict
+        By axis the unit in which the job at work gives it, where it is not the SI unit; not kept in a folder.
     """
 
     name: str
@@ -49,6 +52,7 @@ class Study:
     variables: tuple[Variable, ...]
     coordinates: tuple[Dimension, ...]
     derived: tuple[DerivedCoordinate, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def design(self) -> dict[str, Any]:
@@ -95,6 +99,14 @@ class Study:
         position = np.unravel_index(index, self.shape) if self.axes else ()
         position = [index] * len(self.axes) if self.is_sampled else position
         return {axis.name: axis.values[i] for axis, i in zip(self.axes, position, strict=True)}
+
+    def place_in_words(self, index: int) -> str:
+        """Return the axes' values of run `index` for people; "" without axes."""
+        units = {axis.name: "" if axis.units == "1" else axis.units for axis in self.axes}
+        return ", ".join(
+            f"{name} = {in_words(value, units[name], self.units.get(name, ''))}"
+            for name, value in self.place(index).items()
+        )
 
     def blank_rows(self, shape: int | tuple[int, ...] = ()) -> np.ndarray:
         """Return records of runs without results: NaN, zero, no text, and flags that say so."""
@@ -173,7 +185,8 @@ def describe(job: Job, simulator: Simulator) -> Study:
     axes = tuple(axis_dimension(axis) for axis in job.axes)
     derived = tuple(derived_coordinate(one, sampled="runs" in job.design) for one in job.derived)
     head = job.name, job.description, job.fingerprint(), job.resolved()
-    return Study(*head, axes, variables, coordinates, derived)
+    units = {axis.name: job.units[axis.name] for axis in job.axes if axis.name in job.units}
+    return Study(*head, axes, variables, coordinates, derived, units)
 
 
 def check_names(job: Job, simulator: Simulator) -> None:

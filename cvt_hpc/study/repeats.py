@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from cvt_hpc.errors import mismatch, show
-from cvt_hpc.job import build_job
+from cvt_hpc.job import rebuild_job
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.index import Records
@@ -130,7 +130,7 @@ def built(job: Job, document: dict[str, Any]) -> Job:
     """Return the job of a document of the same runs; of the whole grid where the first one traces it."""
     if "first_spacing" in job.design:
         document = {key: table for key, table in document.items() if key != "design"}
-    return build_job(document, job.source)
+    return rebuild_job(document, job.source, job.units)
 
 
 def interval(count: int, runs: int) -> tuple[float, float]:

@@ -27,6 +27,8 @@ class FailedRun:
         Its place in the grid, in C order, or among the samples.
     at : dict
         Values of the axes there, by name [SI].
+    place : str
+        The same for people, in the units of the job.
     status : str
         How it failed, e.g. "failed_numerics".
     reason : str
@@ -35,6 +37,7 @@ class FailedRun:
 
     index: int
     at: dict[str, Any]
+    place: str
     status: str
     reason: str
 
@@ -105,6 +108,7 @@ def build_report(
         FailedRun(
             index=int(index),
             at=study.place(int(index)),
+            place=study.place_in_words(int(index)),
             status=Status(status[index]).name.lower(),
             reason=reason.decode(errors="replace"),
         )

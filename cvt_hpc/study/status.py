@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.job import build_job
+from cvt_hpc.job import rebuild_job
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.index import Records
@@ -165,7 +165,7 @@ def _latest_session(records: Records, running: bool) -> tuple[np.ndarray, float]
 def _predicted_costs(study: Study, folder: StudyFolder) -> np.ndarray:
     """Return the predicted duration of each run, in some unit; all alike where there is no such model."""
     try:
-        job = build_job(study.job, str(folder.job_file))
+        job = rebuild_job(study.job, str(folder.job_file), {})
         return default_simulator().run_costs(job)
     except InputError:
         return np.ones(study.size)

@@ -30,16 +30,40 @@ from collections.abc import Mapping
 from typing import Any
 
 from cvt_hpc.parameters import Parameter
+from cvt_hpc.vibration.ramped import ramped
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "vibration": {
-        "band_low": Parameter(300.0, "Hz", "lowest frequency of a vibration", minimum=0.0, exclusive=True),
-        "band_high": Parameter(1500.0, "Hz", "highest frequency of a vibration", minimum=0.0, exclusive=True),
+        "band_low": Parameter(
+            300.0,
+            "Hz",
+            "lowest frequency of a vibration",
+            minimum=0.0,
+            exclusive=True,
+            sensible=(1.0, 20000.0),
+        ),
+        "band_high": Parameter(
+            1500.0,
+            "Hz",
+            "highest frequency of a vibration",
+            minimum=0.0,
+            exclusive=True,
+            sensible=(1.0, 20000.0),
+        ),
         "amplitude_threshold": Parameter(
-            5e-6, "m", "peak amplitude from which a strand vibrates", minimum=0.0, exclusive=True
+            5e-6,
+            "m",
+            "peak amplitude from which a strand vibrates",
+            minimum=0.0,
+            exclusive=True,
+            sensible=(1e-09, 0.1),
         ),
         "negligible_amplitude": Parameter(
-            1e-8, "m", "peak amplitude below which a strand is quiet whatever its trend", minimum=0.0
+            1e-8,
+            "m",
+            "peak amplitude below which a strand is quiet whatever its trend",
+            minimum=0.0,
+            sensible=(1e-12, 0.01),
         ),
         "judged_fraction": Parameter(
             0.5,
@@ -49,7 +73,12 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             maximum=1.0,
         ),
         "window_length": Parameter(
-            0.04, "s", "length of the windows in which the amplitude is taken", minimum=0.0, exclusive=True
+            0.04,
+            "s",
+            "length of the windows in which the amplitude is taken",
+            minimum=0.0,
+            exclusive=True,
+            sensible=(0.0001, 10.0),
         ),
         "decay_tolerance": Parameter(
             0.25,
@@ -102,3 +131,8 @@ def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         expected = f"{SHORTEST_SEGMENT} samples or more in a window of {length:g} s"
         problems.append(("sampling_rate", expected, f"{rate:g} Hz"))
     return problems
+
+
+def inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+    """Parameters without effect on a run, each with the setting that makes it so."""
+    return {"decay_tolerance": f"{ramped(parameters)}_history ramp"} if ramped(parameters) else {}

@@ -109,6 +109,7 @@ def test_a_run_begins_in_the_steady_state(tmp_path):
         ("[mesh]", "[branch]\nresolutoin = 1\n[mesh]", "did you mean resolution?"),
         ("[mesh]", '[branch]\ndisturbance = ["1 mm", "1 um"]\n[mesh]', "[branch] disturbance: expected a small"),
         ("[mesh]", "[branch]\nset = { durration = 1 }\n[mesh]", "did you mean duration"),
+        ("[mesh]", "[branch]\nset = { seed = [1, 2] }\n[mesh]", "[branch] set seed: expected one value, found an axis"),
         (
             '["90 N m", "105 N m", "120 N m"]',
             '{ from = 10, to = 90, step = 10 }\n[design]\nkind = "trace"',

@@ -83,6 +83,7 @@ def test_values_from_the_command_line_count_more_than_those_of_scenes(write_char
     ("override", "message"),
     [
         ("loudnes=1", "--set loudnes: unknown key; did you mean loudness in [scene]?"),
+        ("loudness=[1, 2]", "--set loudness: expected a value in m (such as \"1 m\" or a bare number in m), found a list; what a study varies stands in [axes]"),
         ("loudness=1 kg", '--set loudness: expected a value in m (such as "1 m" or a bare number in m), found "1 kg"'),
         ("scene.pitch=0", '--set scene.pitch: expected > 0 Hz, found "0"'),
         ("tolerance=-1", '--set tolerance: expected > 0, found "-1"'),  # of a stepper that is not the default
@@ -196,6 +197,7 @@ WHERE = "c.toml: [chart.scenes.ringing"
          'found "ring/ing"'),
         ('loudness = "20 um"', 'loudnes = "20 um"',
          f"{WHERE}] reference: set loudnes: unknown key; did you mean loudness in [scene]?"),
+        ('loudness = "20 um"', "loudness = [1, 2]", f"{WHERE}] reference: set loudness: expected one value in a chart, found an axis"),
         ('loudness = "20 um"', 'model = "bell"', f"{WHERE}] set model: expected a parameter, found the job's model"),
         ('reference = "exact"', 'reference = "exakt"',
          f'{WHERE}] reference: expected "exact", or a table with a stepper and its step or tolerance, found "exakt"'),
@@ -208,7 +210,7 @@ WHERE = "c.toml: [chart.scenes.ringing"
         ('reference = "exact"', 'reference = { stepper = "hard", step = "2 us", coarser = "x" }',
          f'{WHERE}] reference coarser: expected a value in s (such as "1 s" or a bare number in s), found "x"'),
         ('reference = "exact"', 'reference = { stepper = "hart", step = "2 us" }',
-         f'{WHERE}] reference: stepper: unknown stepper "hart"; did you mean hard?'),
+         f'{WHERE}] reference: stepper: expected one of soft, hard, clever, found "hart"; did you mean hard?'),
         ("amplitude =", "amplitde =", f"{WHERE}.quantities] amplitde: unknown quantity; did you mean amplitude?"),
         ('until = "10 ms", tol', "tol",
          f'{WHERE}.quantities] trajectory until: expected a value in s (such as "1 s" or a bare number in s), '

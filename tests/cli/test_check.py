@@ -5,6 +5,7 @@ import sys
 import pytest
 from toy_jobs import GRID, TRACED
 
+from cvt_hpc.models import MODELS
 from cvt_hpc.variables import Status, Variable
 
 pytestmark = pytest.mark.usefixtures("mechanics")
@@ -15,18 +16,22 @@ def test_check_prints_every_parameter_with_its_origin_the_axes_and_the_cost(writ
     overrides = ("--set", "element_mass=1500 g/m", "--set", "table=[[1, 2.5], [3]]")
     status, out, err = call("check", "x.toml", *overrides)
     assert (status, err) == (0, [])
-    assert out[:8] == [
+    assert out[:11] == [
         "job x (x.toml): model toy, stepper hop",
         "a study",
+        "",
+        f"models: {', '.join(MODELS)}",
+        "steppers of toy: hop",
         "",
         "[scene]",
         "  ratio          2.5         default  speed ratio",
         "  driving_speed  300 rad/s   default  speed of the driving pulley",
-        "  thrust         20000 N     given    axial force on the driven pulley",
+        "  thrust         20 kN       given    axial force on the driven pulley",
         "  load           see [axes]  axis     torque at the driving pulley",
     ]
-    assert "  element_mass       1.5 kg/m             given    mass per length" in out
+    assert "  element_mass       1500 g/m             given    mass per length" in out
     assert "  table              [[1, 2.5], [3]] N/m  given    rows of line forces" in out
+    assert "  load_history   constant    default  how the load is applied (constant, ramp)" in out
     assert "  refined   false  default  finer on the arcs" in out
     assert out[-6:] == [
         "[axes]",

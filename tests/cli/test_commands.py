@@ -71,9 +71,17 @@ def test_run_names_failed_runs_and_ends_with_1(write_job, call):
     assert out == ["5 runs: 0 done, 5 failed, 0 left", "results: out/x/results.nc"]
     named = [line for line in err if line.startswith("cvt-hpc:")]
     assert named == [
-        f"cvt-hpc: run {i} (load = {load}): failed_numerics: step 3: too stiff"
+        f"cvt-hpc: run {i} (load = {load} N m): failed_numerics: step 3: too stiff"
         for i, load in enumerate((0, 25, 50, 75, 100))
     ]
+
+
+def test_failed_runs_are_named_in_the_units_of_the_job(write_job, call):
+    write_job('[scene]\nthrust = 2e4\n[belt]\nsheave_stiffness = inf\n[axes]\ndriving_speed = ["3000 rpm"]\n')
+    named = [line for line in call("run", "x.toml")[2] if line.startswith("cvt-hpc:")]
+    assert named == ["cvt-hpc: run 0 (driving_speed = 3000 rpm): failed_numerics: step 3: too stiff"]
+    # and so they are by a start that finds the folder
+    assert [line for line in call("run", "x.toml")[2] if line.startswith("cvt-hpc:")] == named
 
 
 def test_ten_failed_runs_are_named_and_the_rest_counted(write_job, call):
@@ -86,14 +94,18 @@ def test_ten_failed_runs_are_named_and_the_rest_counted(write_job, call):
 
 def test_a_stopped_sweep_ends_with_99(write_job, call, monkeypatch, tmp_path):
     write_job(GRID)
-    failed = (FailedRun(3, {"load": 5.0, "law": "coulomb"}, "failed_error", "ValueError: x"),)
+    failed = (
+        FailedRun(
+            3, {"load": 5.0, "law": "coulomb"}, "load = 5 N m, law = coulomb", "failed_error", "ValueError: x"
+        ),
+    )
     report = RunReport(tmp_path, tmp_path / "results.nc", 10, 4, failed, 5, "SIGTERM", 1)
     monkeypatch.setattr("cvt_hpc.study.run", lambda job, out, **options: report)
     status, out, err = call("run", "x.toml")
     assert status == 99
     assert out[0] == "10 runs: 4 done, 1 failed, 5 left"
     assert err == [
-        "cvt-hpc: run 3 (load = 5, law = coulomb): failed_error: ValueError: x",
+        "cvt-hpc: run 3 (load = 5 N m, law = coulomb): failed_error: ValueError: x",
         "cvt-hpc: stopped early (SIGTERM); the same command goes on from here",
     ]
 

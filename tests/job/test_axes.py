@@ -131,7 +131,7 @@ def test_minus_zero_is_zero():
         (
             {"from": 0, "to": 1, "count": 3, "spacing": "lgo"},
             LOAD,
-            '.spacing: unknown spacing "lgo"; did you mean log?',
+            '.spacing: expected one of linear, log, found "lgo"; did you mean log?',
         ),
         (
             {"from": 0, "to": 1, "count": 3, "spacing": "log"},

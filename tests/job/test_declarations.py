@@ -55,6 +55,16 @@ def test_defaults_are_legal(model, stepper):
         assert parameter.description
 
 
+@both
+def test_what_has_a_unit_has_a_sensible_range_around_its_default(model, stepper):
+    for key, parameter in load_schema(model, stepper, "x").parameters.items():
+        assert (parameter.sensible is None) == (not parameter.unit), f"{key}: unit {parameter.unit!r}"
+        if parameter.sensible is not None:
+            low, high = parameter.sensible
+            assert 0.0 < low < high, key
+            assert not parameter.default or low <= abs(parameter.default) <= high, key
+
+
 @pytest.mark.parametrize(("model", "stepper"), PAIRS)
 @pytest.mark.parametrize(
     ("tables", "message"),
@@ -142,3 +152,39 @@ def test_a_model_without_records_is_no_model_of_a_study(model, tmp_path):
     with pytest.raises(InputError, match=f"found {model}"):
         simulate(job)
     assert "estimated cost: not known for this model" in summarize(job, estimate_cost(job))
+
+
+FILE = {"table_force": [1, 2], "table_speed": [1, 2], "table_mu": [[1, 1], [1, 1]]}
+
+
+@pytest.mark.parametrize(
+    ("model", "stepper", "overrides", "setting", "keys"),
+    [
+        ("elastic_belt", "imex", {}, "friction_law stribeck", {"table_file", "table_force", "table_speed", "table_mu"}),
+        ("elastic_belt", "imex", {"friction_law": "coulomb", "friction_gradient": 0}, "friction_law coulomb",
+         {"table_file", "table_force", "table_speed", "table_mu"}),
+        ("elastic_belt", "imex", {"friction_law": "table", **FILE}, "friction_law table",
+         {"friction_gradient", "kinetic_friction", "stribeck_velocity"}),
+        ("elastic_belt", "imex", {"load_history": "ramp"}, "load_history ramp", {"longest_duration", "decay_tolerance"}),
+        ("quasi_static_belt", "scipy_bdf", {"speed_history": "ramp"}, "speed_history ramp", {"longest_duration", "decay_tolerance"}),
+        ("quasi_static_belt", "scipy_bdf", {}, "a stepper that chooses its step", {"most_refinements"}),
+        ("elastic_belt", "theta", {}, "a stepper that chooses its step", set()),
+        ("moving_string", None, {}, "shape mode", {"pulse_width"}),
+        ("moving_string", None, {"shape": "pulse"}, "shape pulse", {"mode"}),
+        # of effect on some runs
+        ("moving_string", None, {"shape": ["mode", "pulse"]}, "shape mode", set()),
+        ("strand", None, {}, "strand_forces formulas", {"ring_tension_t1", "push_force_t1", "ring_tension_t2", "push_force_t2"}),
+    ],
+)  # fmt: skip
+def test_what_has_no_effect_is_named_in_a_check(model, stepper, overrides, setting, keys):
+    document = {"name": "x", "model": model} | ({"stepper": stepper} if stepper else {})
+    lines = summarize(build_job(document, "x", overrides), 1.0).splitlines()
+    assert {line.split()[0] for line in lines if f"  without effect with {setting}: " in line} == keys
+
+
+def test_an_axis_without_effect_under_the_law_is_refused():
+    document = {"name": "x", "model": "elastic_belt", "friction": {"friction_law": "table", **FILE}}
+    with pytest.raises(
+        InputError, match="expected one value, since it has no effect with friction_law table, found 2"
+    ):
+        build_job(document, "x", {"kinetic_friction": [0.1, 0.2]})

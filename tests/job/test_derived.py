@@ -53,6 +53,17 @@ def test_each_run_has_what_follows_from_its_values(write_job):
     assert list(job.parameters) == list(job.schema.parameters)
 
 
+def test_what_is_linked_to_an_axis_follows_the_values_that_an_override_leaves(write_job):
+    job = load_job(write_job(JOB), ["ratio=[2, 0.5]"])
+    found = [[job.point(i)[key] for key in ("ratio", "thrust", "load_history")] for i in range(0, 4, 2)]
+    assert found == [[2.0, 20e3, "constant"], [0.5, 20e3, "ramp"]]
+    assert build_job(json.loads(json.dumps(job.resolved())), "x.toml") == job
+    told = "[linked.ratio] thrust: expected a value of ratio that it is linked to (0.5, 1, 2), found 3"
+    assert refusal("x.toml", ["ratio=[2, 3]"]) == told
+    # an axis in the place of a formula
+    assert "load" not in {rule.key for rule in load_job("x.toml", ["load=[1, 2]"]).rules}
+
+
 def test_what_varies_is_told_along_its_axes_alone(write_job):
     job = load_job(write_job(JOB))
     told = {one.name: (one.axes, one.values, one.unit, one.words) for one in job.derived}
@@ -179,7 +190,7 @@ def test_a_check_shows_what_follows_from_what(write_job):
         "half_wedge_angle 0.1 rad 2 * element_mass / 10 the same in all runs",
         "load 10 to 40 N m 0.001 * thrust * ratio varies with ratio",
         "load_history ramp, constant linked to ratio varies with ratio",
-        "thrust 10000 to 20000 N linked to ratio varies with ratio",
+        "thrust 10 to 20 kN linked to ratio varies with ratio",
     ]
 
 

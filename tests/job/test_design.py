@@ -77,6 +77,9 @@ def test_an_axis_that_is_replaced_by_one_value_is_no_dimension_of_the_samples(wr
     job = load_job(write_job(SAMPLED.format(kind="sobol")), ["sheave_stiffness=2"])
     assert [axis.name for axis in job.axes] == ["load"]
     assert {job.point(i)["sheave_stiffness"] for i in range(32)} == {2.0}
+    other = load_job("x.toml", ["load={from=20, to=30}", "ratio={from=1, to=2}"])
+    assert [axis.name for axis in other.axes] == ["load", "sheave_stiffness", "ratio"]
+    assert all(20 <= load < 30 for load in other.axes[0].values)
 
 
 def test_every_sample_is_checked_and_the_first_bad_one_is_named(write_job):
@@ -92,6 +95,7 @@ def test_a_trace_is_along_the_long_axes_of_numbers(write_job):
     path = write_job(TRACED)
     assert load_job(path).design == {"kind": "trace", "first_spacing": {"load": 4}}
     assert load_job(path, ["design.first_spacing=3"]).design["first_spacing"] == {"load": 3}
+    assert load_job(path, ["design.first_spacing={load=2}"]).design["first_spacing"] == {"load": 2}
     named = TRACED.replace('"trace"', '"trace"\nfirst_spacing = { ratio = 1, load = 2 }')
     assert load_job(write_job(named)).design["first_spacing"] == {"ratio": 1, "load": 2}
     # a whole grid is a trace by command

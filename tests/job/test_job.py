@@ -3,14 +3,20 @@ import math
 import subprocess
 import sys
 import textwrap
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import cvt_hpc
 from cvt_hpc import errors
 from cvt_hpc.errors import InputError
-from cvt_hpc.job import build_job, crosscheck, known_keys, load_job
+from cvt_hpc.job import build_job, crosscheck, known_keys, load_job, rebuild_job
+from cvt_hpc.job.summary import summarize
+from cvt_hpc.models import MODELS
+from cvt_hpc.printing import point_lines
 
 GRID = """
 [scene]
@@ -95,6 +101,47 @@ def test_overrides_replace_values_and_axes(write_job, overrides):
     assert job.given >= wanted.keys()
 
 
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ["load=[40, '0.06 kN m']", "thrust={from='20 kN', to=30e3, step='10 kN'}"],
+        {"load": [40, "0.06 kN m"], "thrust": {"from": "20 kN", "to": 30e3, "step": "10 kN"}},
+        {"load": np.array([40, 60]), "thrust": np.array([2e4, 3e4], np.float32)},
+    ],
+)
+def test_overrides_make_axes_and_replace_them_in_their_place(write_job, overrides):
+    job = load_job(write_job(GRID), overrides)
+    assert {axis.name: axis.values for axis in job.axes} == {
+        "load": (40.0, 60.0),
+        "load_history": ("ramp", "constant"),
+        "sheave_stiffness": (1.0, math.inf),
+        "thrust": (2e4, 3e4),
+    }
+    # those of the file come first
+    assert [axis.name for axis in job.axes] == ["load", "load_history", "sheave_stiffness", "thrust"]
+    assert "thrust" not in job.given
+    assert build_job(json.loads(json.dumps(job.resolved(), allow_nan=False))) == replace(
+        job, source="build_job"
+    )
+
+
+def test_a_job_of_a_dict_takes_arrays_as_axes_and_tables(toy):
+    document = {
+        "name": "x",
+        "model": "toy",
+        "scene": {"thrust": "20 kN"},
+        "belt": {"table": np.array([[1, 2], [3, 4]])},
+        "axes": {"load": np.linspace(20, 60, 3), "stations": np.array([32, 64], np.uint16)},
+    }
+    job = cvt_hpc.build_job(document)
+    assert [axis.values for axis in job.axes] == [(20.0, 40.0, 60.0), (32, 64)]
+    assert {type(value) for value in job.axes[1].values} == {int}
+    assert job.parameters["table"] == ((1.0, 2.0), (3.0, 4.0))
+    document["axes"] = {"laod": [1]}
+    with pytest.raises(InputError, match=r"^build_job: \[axes\] laod: unknown key; did you mean load"):
+        cvt_hpc.build_job(document)
+
+
 def test_overrides_reach_the_head_and_the_last_of_two_counts(write_job):
     job = load_job(write_job(), ["name=y", "load=1", "load=2"])
     assert (job.name, job.parameters["load"]) == ("y", 2.0)
@@ -112,16 +159,23 @@ def test_overrides_reach_the_head_and_the_last_of_two_counts(write_job):
             ["load=3 kg"],
             '--set load: expected a value in N m (such as "1 N m" or a bare number in N m), found "3 kg"',
         ),
-        (["table=3"], "--set table: expected a list of numbers in N/m, found 3"),
+        (["table=3"], '--set table: expected a list of numbers in N/m, found "3"'),
+        (["load=[1, 2"], '--set load: expected a value in N m (such as "1 N m" or a bare number in N m), found "[1, 2"'),
+        (["load=[1, 1]"], "--set load: expected distinct values, found 1 as value 1 and value 2"),
+        (["load={from=1, too=2, step=1}"], "--set load.too: unknown key; did you mean to?"),
+        ({"load": np.ones((2, 2))}, "override load: expected a 1-D array of numbers, found an array of shape (2, 2) of float64"),
+        ({"load": np.array([True])}, "override load: expected a 1-D array of numbers, found an array of shape (1,) of bool"),
+        ({"load": np.array([1.0, np.nan])}, "override load, value 2: expected a finite value in N m, found nan"),
+        ({"table": np.ones((1, 1, 1))}, "override table: expected a 1-D or 2-D array of numbers, found an array of shape (1, 1, 1) of float64"),
         (["table=[x"], '--set table: expected a list of numbers in N/m, found "[x"'),
         (["refined=yes"], '--set refined: expected true or false, found "yes"'),
-        (["model=toi"], 'model: unknown model "toi"; did you mean toy?'),
+        (["model=toi"], f'model: expected one of {", ".join(MODELS)}, toy, found "toi"; did you mean toy?'),
         (
             {"load": None},
             'override load: expected a value in N m (such as "1 N m" or a bare number in N m), found nothing',
         ),
     ],
-)
+)  # fmt: skip
 def test_what_is_wrong_with_an_override_is_said(write_job, overrides, message):
     with pytest.raises(InputError) as caught:
         load_job(write_job(), overrides)
@@ -183,18 +237,74 @@ def test_checks_between_parameters_name_the_run(write_job):
         load_job(write_job(GRID + 'thrust = ["20 kN", "9 kN"]\n'))
     assert str(caught.value) == (
         "x.toml: [scene] load: expected at most 90 N m at this thrust, found 100 N m "
-        "(at load = 100 N m, load_history = ramp, sheave_stiffness = 1, thrust = 9000 N)"
+        "(at load = 100 N m, load_history = ramp, sheave_stiffness = 1, thrust = 9 kN)"
     )
     with pytest.raises(InputError) as caught:
         load_job(write_job("[scene]\nthrust = 100\nload = 5\n"))
     assert str(caught.value) == "x.toml: [scene] load: expected at most 1 N m at this thrust, found 5 N m"
 
 
+IN_UNITS = """
+[scene]
+thrust = "20 kN"
+[belt]
+half_wedge_angle = "11 deg"
+table = ["1 kN/m", 2000]
+[axes]
+driving_speed = ["1000 rpm", "3000 rpm"]
+load = { from = "0.02 kN m", to = 40, step = 10 }
+[linked.driving_speed]
+element_mass = ["900 g/m", 1.0]
+"""
+
+
+def test_people_read_values_in_the_units_of_the_job(write_job):
+    job = load_job(write_job(IN_UNITS))
+    assert job.units == {
+        "thrust": "kN", "half_wedge_angle": "deg", "table": "kN/m", "driving_speed": "rpm", "load": "kN m", "element_mass": "g/m",
+    }  # fmt: skip
+    told = [" ".join(line.split()) for line in summarize(job, 1.0).splitlines()]
+    assert "half_wedge_angle 11 deg given half wedge angle" in told
+    assert "table [1, 2] kN/m given rows of line forces" in told
+    assert "driving_speed 1000, 3000 rpm 2 values" in told
+    assert "load 0.02, 0.03, 0.04 kN m 3 values" in told
+    assert "element_mass 900 to 1000 g/m linked to driving_speed varies with driving_speed" in told
+    assert list(point_lines(job, {"driving_speed": 100 * math.pi})) == [
+        "at      driving_speed 3000 rpm, load 0.02 kN m, element_mass 1000 g/m"
+    ]
+    # what counts more has the unit
+    assert "driving_speed" not in load_job("x.toml", ["driving_speed=[100, 200]", "element_mass=1"]).units
+    assert job.resolved()["axes"]["load"] == [20.0, 30.0, 40.0]
+    assert build_job(job.resolved(), "x.toml").units == {}
+    assert rebuild_job(job.resolved(), "x.toml", job.units).units == job.units
+
+
+def test_errors_are_in_the_units_of_the_job(write_job):
+    def refusal(*overrides):
+        with pytest.raises(InputError) as caught:
+            load_job("x.toml", overrides)
+        return str(caught.value).removeprefix("x.toml: ")
+
+    job = load_job(write_job(IN_UNITS))
+    place = "(at driving_speed = 1000 rpm, load = 0.03 kN m)"
+    told = "[scene] load: expected at most 25 N m at this thrust, found 30 N m (0.03 kN m)"
+    assert refusal("thrust=2.5 kN") == f"{told} {place}"
+    told = "[linked.driving_speed] element_mass: expected a value of driving_speed that it is linked to"
+    assert refusal("driving_speed=2000 rpm") == f"{told} (1000 rpm, 3000 rpm), found 2000 rpm"
+    assert refusal("half_wedge_angle=80 deg") == (
+        '--set half_wedge_angle: expected >= 0 and <= 57.2958 deg, found "80 deg"'
+    )
+    with pytest.raises(
+        InputError, match=r"found 30 N m \(0.03 kN m\) \(at load = 0.03 kN m, thrust = 2.5 kN\)"
+    ):
+        job.point_at(["load=30", "thrust=2.5 kN"])
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("[run]\nduration = 0.1\n[numerics]\nstep = 0.2\n", "[numerics] step: expected at most duration = 0.1 s, found 0.2 s"),
-        ("[run]\nduration = '2 h'\n", "[run] duration: expected at most an hour, found 7200 s"),
+        ("[run]\nduration = '2 h'\n", "[run] duration: expected at most an hour, found 7200 s (2 h)"),
     ],
 )  # fmt: skip
 def test_stepper_and_shared_tables_have_their_checks(write_job, text, message):

@@ -70,6 +70,10 @@ def test_a_run_that_an_override_takes_off_the_grid_is_left_out(write):
             "[0, {load = 60, sheave_stiffness = 1}]",
             "run 2, load: expected a value of the axis, such as 50 N m or 75 N m, found 60 N m",
         ),
+        (
+            "[{load = '0.06 kN m', sheave_stiffness = 1}]",
+            "run 1, load: expected a value of the axis, such as 50 N m or 75 N m, found 60 N m",
+        ),
         ("[{load = 150, sheave_stiffness = 1}]", "such as 100 N m, found 150 N m"),
         ("[{laod = 50, sheave_stiffness = 1}]", "run 1, laod: unknown key; did you mean load in [scene]?"),
         (
@@ -91,3 +95,9 @@ def test_samples_are_named_by_their_index(write):
     for entry, found in (("32", "32"), ("{load = 100}", "a table"), ("true", "true")):
         with pytest.raises(InputError, match=f"run 1: expected an index from 0 to 31, found {found}"):
             load_job(write(samples.format(entry)))
+
+
+def test_a_run_that_an_axis_of_an_override_takes_off_the_grid_is_left_out(write):
+    history = "[{load = 50, sheave_stiffness = 3}, {load = 75, sheave_stiffness = 1}]"
+    assert load(write, history, ["load=[75, 80]"]).histories == (0,)
+    assert load(write, history, ["ratio=[1, 2]"]).histories == ()

@@ -56,6 +56,7 @@ class Job:
     histories: tuple[int, ...] = ()
     rules: tuple = ()
     derived: tuple = ()
+    units: dict[str, str] = field(default_factory=dict)
 
     def point(self, index: int) -> dict[str, Any]:
         shape = tuple(len(axis.values) for axis in self.axes)

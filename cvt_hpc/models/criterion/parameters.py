@@ -16,19 +16,31 @@ _BELT, _SHEAVES = elastic_belt.PARAMETERS["belt"], elastic_belt.PARAMETERS["shea
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {
-        "contact_force": positive(1.8e5, "N/m", "axial line force of one flank, in steady sliding"),
-        "radial_speed": Parameter(0.1, "m/s", "radial sliding speed of the elements, inward positive"),
-        "tangential_speed": Parameter(0.0, "m/s", "tangential sliding speed of the elements"),
+        "contact_force": positive(
+            1.8e5, "N/m", "axial line force of one flank, in steady sliding", sensible=(10.0, 100000000.0)
+        ),
+        "radial_speed": Parameter(
+            0.1, "m/s", "radial sliding speed of the elements, inward positive", sensible=(1e-06, 50.0)
+        ),
+        "tangential_speed": Parameter(
+            0.0, "m/s", "tangential sliding speed of the elements", sensible=(1e-06, 50.0)
+        ),
     },
     "belt": {
         **{key: _BELT[key] for key in ("element_mass", "ring_mass", "transverse_damping")},
         "belt_stiffness": not_negative(
-            0.0, "N/m^2", "the belt's own radial stiffness per length, that of the contact apart"
+            0.0,
+            "N/m^2",
+            "the belt's own radial stiffness per length, that of the contact apart",
+            sensible=(1.0, 10000000000000.0),
         ),
     },
     "sheaves": {
         "contact_stiffness": not_negative(
-            1.8e8, "N/m^2", "axial stiffness of elements and sheaves together, per length"
+            1.8e8,
+            "N/m^2",
+            "axial stiffness of elements and sheaves together, per length",
+            sensible=(10000.0, 100000000000000.0),
         ),
         "half_wedge_angle": _SHEAVES["half_wedge_angle"],
     },

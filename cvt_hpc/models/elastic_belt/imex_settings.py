@@ -34,6 +34,7 @@ PARAMETERS = {
             "largest time step; a whole number of steps makes a sampling interval",
             minimum=1e-9,
             maximum=1e-3,
+            sensible=(1e-09, 0.001),
         ),
         "precision": Parameter(
             "single",

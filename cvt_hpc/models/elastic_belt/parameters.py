@@ -7,6 +7,7 @@ are those of a common passenger-car belt; every other default is an assumption, 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,14 @@ import numpy as np
 from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
 from cvt_hpc.physics import capacity
 from cvt_hpc.physics.friction_problems import friction_inert, friction_problems
+from cvt_hpc.physics.friction_table import friction_file
 from cvt_hpc.physics.geometry import driven_radius, variator, variator_problems
 
 
-def _stiffness(default: float, unit: str, description: str) -> Parameter:
-    return Parameter(default, unit, description, minimum=0.0, exclusive=True, allow_infinite=True)
+def _stiffness(
+    default: float, unit: str, description: str, sensible: tuple[float, float] | None = None
+) -> Parameter:
+    return replace(positive(default, unit, description, sensible), allow_infinite=True)
 
 
 def _closing_radius(parameters: Mapping[str, Any]) -> float:
@@ -28,7 +32,7 @@ def _closing_radius(parameters: Mapping[str, Any]) -> float:
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {
         "ratio": positive(2.52, "", "speed ratio, driven radius / driving radius (Lebrecht 2004: LOW stop)"),
-        "driven_radius": positive(0.075, "m", "pitch radius on the driven pulley"),
+        "driven_radius": positive(0.075, "m", "pitch radius on the driven pulley", sensible=(0.01, 0.5)),
         "belt_length": Parameter(
             None,
             "m",
@@ -36,14 +40,21 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             minimum=0.0,
             exclusive=True,
             gives=Substitute("driven_radius", ("ratio", "centre_distance"), _closing_radius),
+            sensible=(0.1, 5.0),
         ),
-        "centre_distance": positive(0.155, "m", "distance of the shafts"),
+        "centre_distance": positive(0.155, "m", "distance of the shafts", sensible=(0.03, 2.0)),
         "driving_speed": positive(
-            3000.0 * np.pi / 30.0, "rad/s", "speed of the driving pulley, prescribed; at the end of a ramp"
+            3000.0 * np.pi / 30.0,
+            "rad/s",
+            "speed of the driving pulley, prescribed; at the end of a ramp",
+            sensible=(1.0, 800.0),
         ),
-        "thrust": positive(50e3, "N", "axial force on the driven pulley"),
+        "thrust": positive(50e3, "N", "axial force on the driven pulley", sensible=(500.0, 2000000.0)),
         "load": Parameter(
-            0.0, "N m", "torque at the driving pulley; the driven one is loaded by ratio x load"
+            0.0,
+            "N m",
+            "torque at the driving pulley; the driven one is loaded by ratio x load",
+            sensible=(0.5, 2000.0),
         ),
         "load_share": Parameter(
             None,
@@ -57,7 +68,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "load is reached within rise_time and kept, or rises from load_start over the whole run",
             choices=("constant", "ramp"),
         ),
-        "load_start": Parameter(0.0, "N m", "load at the start of a ramp"),
+        "load_start": Parameter(0.0, "N m", "load at the start of a ramp", sensible=(0.5, 2000.0)),
         "speed_history": Parameter(
             "constant",
             "",
@@ -65,34 +76,59 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             choices=("constant", "ramp"),
         ),
         "speed_start": positive(
-            1000.0 * np.pi / 30.0, "rad/s", "speed of the driving pulley at the start of a ramp"
+            1000.0 * np.pi / 30.0,
+            "rad/s",
+            "speed of the driving pulley at the start of a ramp",
+            sensible=(1.0, 800.0),
         ),
         "rise_time": positive(
-            0.03, "s", "start-up: load rises smoothly, extra damping of the belt fades out"
+            0.03,
+            "s",
+            "start-up: load rises smoothly, extra damping of the belt fades out",
+            sensible=(0.0001, 10.0),
         ),
         "disturbance": not_negative(
-            1e-6, "m", "largest random displacement of the strands, given to them at rise_time"
+            1e-6,
+            "m",
+            "largest random displacement of the strands, given to them at rise_time",
+            sensible=(1e-12, 0.01),
         ),
         "seed": Parameter(1, "", "seed of that disturbance", minimum=0),
     },
     "belt": {
-        "element_mass": positive(1.0, "kg/m", "mass per length of the elements"),
-        "ring_mass": positive(0.3, "kg/m", "mass per length of the rings"),
-        "element_stiffness": positive(4e7, "N", "longitudinal stiffness EA of the pressed elements"),
-        "ring_stiffness": positive(7.7e6, "N", "longitudinal stiffness EA of all rings"),
+        "element_mass": positive(1.0, "kg/m", "mass per length of the elements", sensible=(0.05, 20.0)),
+        "ring_mass": positive(0.3, "kg/m", "mass per length of the rings", sensible=(0.01, 10.0)),
+        "element_stiffness": positive(
+            4e7, "N", "longitudinal stiffness EA of the pressed elements", sensible=(10000.0, 10000000000.0)
+        ),
+        "ring_stiffness": positive(
+            7.7e6, "N", "longitudinal stiffness EA of all rings", sensible=(10000.0, 10000000000.0)
+        ),
         "bending_stiffness": not_negative(
-            0.5, "N m^2", "EI of the belt against leaving its path's curvature"
+            0.5, "N m^2", "EI of the belt against leaving its path's curvature", sensible=(0.0001, 1000.0)
         ),
-        "play": Parameter(0.3e-3, "m", "sum of the gaps between elements on the reference path"),
+        "play": Parameter(
+            0.3e-3, "m", "sum of the gaps between elements on the reference path", sensible=(1e-07, 0.05)
+        ),
         "reference_tension": not_negative(
-            5.3e3, "N", "ring tension at which the rings fit the reference path"
+            5.3e3, "N", "ring tension at which the rings fit the reference path", sensible=(10.0, 1000000.0)
         ),
-        "ring_offset": Parameter(1e-3, "m", "radial offset of the rings' neutral line from the pitch line"),
+        "ring_offset": Parameter(
+            1e-3, "m", "radial offset of the rings' neutral line from the pitch line", sensible=(1e-06, 0.05)
+        ),
         "ring_friction": not_negative(0.08, "", "friction coefficient between rings and elements"),
-        "ring_friction_speed": positive(0.01, "m/s", "regularisation speed of that friction"),
-        "transverse_damping": not_negative(500.0, "N s/m^2", "viscous damping of the transverse motion"),
-        "element_damping": not_negative(20.0, "N s", "longitudinal damping of the pressed elements"),
-        "ring_damping": not_negative(4.0, "N s", "longitudinal damping of the rings"),
+        "ring_friction_speed": positive(
+            0.01, "m/s", "regularisation speed of that friction", sensible=(1e-05, 5.0)
+        ),
+        "transverse_damping": not_negative(
+            500.0, "N s/m^2", "viscous damping of the transverse motion", sensible=(0.1, 1000000.0)
+        ),
+        "element_damping": not_negative(
+            20.0, "N s", "longitudinal damping of the pressed elements", sensible=(0.001, 100000.0)
+        ),
+        "ring_damping": not_negative(
+            4.0, "N s", "longitudinal damping of the rings", sensible=(0.001, 100000.0)
+        ),
         "longitudinal_mass": positive(
             1.0, "", "factor on the layers' inertia along the path; other than 1 it is another belt"
         ),
@@ -102,11 +138,24 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             1.0, "", "stiffness of the sheaves, multiple of the reference; inf: rigid"
         ),
         "tilt_stiffness": _stiffness(
-            3e5, "N m/rad", "reference stiffness against tilting, shaft bending included"
+            3e5,
+            "N m/rad",
+            "reference stiffness against tilting, shaft bending included",
+            sensible=(100.0, 1000000000.0),
         ),
-        "local_stiffness": positive(4e9, "N/m^2", "reference stiffness against local bending, per length"),
-        "local_length": positive(0.012, "m", "decay length of local bending"),
-        "flank_stiffness": positive(3e10, "N/m^2", "axial stiffness of the elements, per length"),
+        "local_stiffness": positive(
+            4e9,
+            "N/m^2",
+            "reference stiffness against local bending, per length",
+            sensible=(100000.0, 100000000000000.0),
+        ),
+        "local_length": positive(0.012, "m", "decay length of local bending", sensible=(0.0001, 0.3)),
+        "flank_stiffness": positive(
+            3e10,
+            "N/m^2",
+            "axial stiffness of the elements, per length",
+            sensible=(1000000.0, 100000000000000.0),
+        ),
         "half_wedge_angle": Parameter(
             np.deg2rad(11.0),
             "rad",
@@ -114,11 +163,20 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             minimum=0.0,
             maximum=1.0,
             exclusive=True,
+            sensible=(0.02, 0.8),
         ),
-        "driving_position": Parameter(0.0, "m", "axial opening of the driving pulley, prescribed (LOW stop)"),
-        "sheave_lag": positive(2e-3, "s", "time constant T1 of the driven sheave's axial motion"),
-        "lag_stiffness": positive(2e8, "N/m", "stiffness that scales that lag"),
-        "driven_inertia": positive(0.02, "kg m^2", "moment of inertia of the driven pulley"),
+        "driving_position": Parameter(
+            0.0, "m", "axial opening of the driving pulley, prescribed (LOW stop)", sensible=(1e-07, 0.1)
+        ),
+        "sheave_lag": positive(
+            2e-3, "s", "time constant T1 of the driven sheave's axial motion", sensible=(1e-06, 1.0)
+        ),
+        "lag_stiffness": positive(
+            2e8, "N/m", "stiffness that scales that lag", sensible=(10000.0, 1000000000000.0)
+        ),
+        "driven_inertia": positive(
+            0.02, "kg m^2", "moment of inertia of the driven pulley", sensible=(1e-05, 100.0)
+        ),
     },
     "friction": {
         "friction_law": Parameter(
@@ -132,15 +190,21 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "s/m",
             "slope dmu/dv of the friction law at v -> 0+, its steepest fall, without regularisation",
             maximum=0.0,
+            sensible=(0.001, 100.0),
         ),
         "kinetic_friction": positive(0.1, "", "the level that does not change with the gradient"),
-        "stribeck_velocity": positive(0.05, "m/s", "speed scale of the fall"),
-        "friction_speed": positive(0.03, "m/s", "regularisation speed of the flanks' friction"),
-        "friction_memory": not_negative(
-            0.3e-3, "s", "time constant of the filtered sliding speed; 0: no memory"
+        "stribeck_velocity": positive(0.05, "m/s", "speed scale of the fall", sensible=(0.0001, 10.0)),
+        "friction_speed": positive(
+            0.03, "m/s", "regularisation speed of the flanks' friction", sensible=(1e-06, 5.0)
         ),
-        "table_force": Parameter((), "N/m", "normal line forces of a friction table, ascending"),
-        "table_speed": Parameter((), "m/s", "speeds of a friction table, ascending"),
+        "friction_memory": not_negative(
+            0.3e-3, "s", "time constant of the filtered sliding speed; 0: no memory", sensible=(1e-07, 0.1)
+        ),
+        "table_file": friction_file("N/m"),
+        "table_force": Parameter(
+            (), "N/m", "normal line forces of a friction table, ascending", sensible=(1.0, 100000000.0)
+        ),
+        "table_speed": Parameter((), "m/s", "speeds of a friction table, ascending", sensible=(1e-07, 100.0)),
         "table_mu": Parameter((), "", "friction table: a row of coefficients for each force"),
     },
     "mesh": {

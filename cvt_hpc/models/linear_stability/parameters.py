@@ -11,10 +11,15 @@ LEAST_MEMORY = 1e-4  # [s]: what has been held against transients, see README.md
 
 PARAMETERS: dict[str, dict[str, Parameter]] = steady_variator.PARAMETERS | {
     "judgement": {
-        "band_low": positive(300.0, "Hz", "lowest frequency of a mode that counts as vibration"),
-        "band_high": positive(1500.0, "Hz", "highest such frequency"),
+        "band_low": positive(
+            300.0, "Hz", "lowest frequency of a mode that counts as vibration", sensible=(1.0, 20000.0)
+        ),
+        "band_high": positive(1500.0, "Hz", "highest such frequency", sensible=(1.0, 20000.0)),
         "undecided_growth": not_negative(
-            50.0, "1/s", "growth or decay of the fastest growing mode up to which nothing is decided"
+            50.0,
+            "1/s",
+            "growth or decay of the fastest growing mode up to which nothing is decided",
+            sensible=(0.001, 100000.0),
         ),
     },
 }

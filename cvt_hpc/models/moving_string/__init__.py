@@ -6,7 +6,7 @@ m its mass per length, T its tension, v its speed, c = sqrt(T / m). Eigenfrequen
 from v = c on it holds no shape (critical speed).
 """
 
-from cvt_hpc.models.moving_string.parameters import PARAMETERS, check
+from cvt_hpc.models.moving_string.parameters import PARAMETERS, check, inert
 from cvt_hpc.steppers import taken
 
 DEFAULT_STEPPER = "runge_kutta_4"
@@ -15,4 +15,4 @@ REFUSED = {
 }
 STEPPERS = taken(REFUSED)
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check"]
+__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]

@@ -10,7 +10,7 @@ from cvt_hpc.parameters import Parameter, positive
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {
-        "belt_speed": Parameter(9.4, "m/s", "speed of the string", minimum=0.0),
+        "belt_speed": Parameter(9.4, "m/s", "speed of the string", minimum=0.0, sensible=(0.001, 200.0)),
         "shape": Parameter(
             "mode",
             "",
@@ -19,12 +19,14 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "mode": Parameter(1, "", "number of the eigenmode", minimum=1, maximum=1000),
         "pulse_width": positive(0.1, "", "width of the pulse, relative to the length of its way and back"),
-        "largest_displacement": positive(1e-5, "m", "largest displacement at the start, nearly"),
+        "largest_displacement": positive(
+            1e-5, "m", "largest displacement at the start, nearly", sensible=(1e-12, 0.1)
+        ),
     },
     "string": {
-        "length": positive(0.15, "m", "length between the eyes"),
-        "tension": positive(5000.0, "N", "tension T"),
-        "line_mass": positive(1.3, "kg/m", "mass per length"),
+        "length": positive(0.15, "m", "length between the eyes", sensible=(0.001, 10.0)),
+        "tension": positive(5000.0, "N", "tension T", sensible=(0.01, 10000000.0)),
+        "line_mass": positive(1.3, "kg/m", "mass per length", sensible=(0.0001, 100.0)),
     },
     "mesh": {
         "cells": Parameter(64, "", "cells between the eyes", minimum=4, maximum=4096),
@@ -55,3 +57,9 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         expected = f"strand_probes + 1 = {p['strand_probes'] + 1} or more"
         problems.append(("cells", expected, f"{p['cells']}"))
     return problems
+
+
+def inert(parameters: dict[str, Any]) -> dict[str, str]:
+    """Parameters without effect on a run, each with the setting that makes it so."""
+    shape = parameters["shape"]
+    return {"pulse_width" if shape == "mode" else "mode": f"shape {shape}"}

@@ -6,26 +6,42 @@ from typing import Any
 
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_problems import friction_inert, friction_problems
+from cvt_hpc.physics.friction_table import friction_file
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {
-        "belt_speed": not_negative(0.2, "m/s", "speed of the belt under the mass"),
-        "normal_load": positive(1.0, "N", "force that presses the mass on the belt"),
-        "preload": Parameter(0.0, "N", "constant force on the mass, in the belt's direction"),
+        "belt_speed": not_negative(0.2, "m/s", "speed of the belt under the mass", sensible=(1e-06, 100.0)),
+        "normal_load": positive(
+            1.0, "N", "force that presses the mass on the belt", sensible=(1e-06, 10000000.0)
+        ),
+        "preload": Parameter(
+            0.0, "N", "constant force on the mass, in the belt's direction", sensible=(1e-06, 10000000.0)
+        ),
         "start": Parameter(
             "given",
             "",
             "as given, or initial_displacement away from steady sliding: at rest, or carried by the belt",
             choices=("given", "sliding", "sticking"),
         ),
-        "initial_displacement": Parameter(0.0, "m", "displacement of the mass at the start"),
-        "initial_speed": Parameter(0.2, "m/s", "speed of the mass at the start; belt_speed: it sticks"),
+        "initial_displacement": Parameter(
+            0.0, "m", "displacement of the mass at the start", sensible=(1e-12, 100.0)
+        ),
+        "initial_speed": Parameter(
+            0.2, "m/s", "speed of the mass at the start; belt_speed: it sticks", sensible=(1e-09, 100.0)
+        ),
     },
     "oscillator": {
-        "mass": positive(1.0, "kg", "the mass"),
-        "stiffness": positive(1.0, "N/m", "stiffness of its spring"),
-        "normal_stiffness": not_negative(0.0, "N/m", "fall of the normal load per displacement of the mass"),
-        "damping": not_negative(0.0, "N s/m", "viscous damping of its spring"),
+        "mass": positive(1.0, "kg", "the mass", sensible=(1e-06, 100000.0)),
+        "stiffness": positive(1.0, "N/m", "stiffness of its spring", sensible=(1e-06, 1000000000000.0)),
+        "normal_stiffness": not_negative(
+            0.0,
+            "N/m",
+            "fall of the normal load per displacement of the mass",
+            sensible=(1e-06, 1000000000000.0),
+        ),
+        "damping": not_negative(
+            0.0, "N s/m", "viscous damping of its spring", sensible=(1e-06, 1000000000.0)
+        ),
     },
     "friction": {
         "friction_law": Parameter(
@@ -39,17 +55,24 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "s/m",
             "slope dmu/dv of the friction law at v -> 0+, its steepest fall, without regularisation",
             maximum=0.0,
+            sensible=(0.001, 100.0),
         ),
         "kinetic_friction": positive(0.6, "", "the level that does not change with the gradient"),
         "static_friction": Parameter(
             1.0, "", "level at rest, of the coulomb law alone; the others have theirs by the law", minimum=0.0
         ),
-        "stribeck_velocity": positive(0.05, "m/s", "speed scale of the fall"),
+        "stribeck_velocity": positive(0.05, "m/s", "speed scale of the fall", sensible=(0.0001, 10.0)),
         "friction_speed": positive(
-            1e-3, "m/s", "regularisation speed of friction at rest; moreau does without"
+            1e-3,
+            "m/s",
+            "regularisation speed of friction at rest; moreau does without",
+            sensible=(1e-09, 5.0),
         ),
-        "table_force": Parameter((), "N", "normal loads of a friction table, ascending"),
-        "table_speed": Parameter((), "m/s", "speeds of a friction table, ascending"),
+        "table_file": friction_file("N"),
+        "table_force": Parameter(
+            (), "N", "normal loads of a friction table, ascending", sensible=(1e-06, 10000000.0)
+        ),
+        "table_speed": Parameter((), "m/s", "speeds of a friction table, ascending", sensible=(1e-07, 100.0)),
         "table_mu": Parameter((), "", "friction table: a row of coefficients for each load"),
     },
 }

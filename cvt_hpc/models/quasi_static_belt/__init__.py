@@ -5,7 +5,7 @@ keeps and what it drops. Importing this package is cheap.
 """
 
 from cvt_hpc.models import elastic_belt
-from cvt_hpc.models.elastic_belt import check
+from cvt_hpc.models.elastic_belt import check, inert
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers import taken
 
@@ -17,6 +17,7 @@ PARAMETERS = elastic_belt.PARAMETERS | {
             "splines of a higher own frequency, and all longitudinal motion, follow their forces with a lag",
             minimum=0.0,
             exclusive=True,
+            sensible=(10.0, 1000000.0),
         ),
     },
 }
@@ -26,4 +27,4 @@ REFUSED = elastic_belt.REFUSED | dict.fromkeys(
     elastic_belt.OWN_STEPPERS, "it is a step for the belt with all its inertia"
 )
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check"]
+__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]

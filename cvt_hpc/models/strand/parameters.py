@@ -37,13 +37,23 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     },
     "strands": {
         "ring_tension_t1": not_negative(
-            7000.0, "N", "ring tension of the strand that leaves the driving pulley"
+            7000.0,
+            "N",
+            "ring tension of the strand that leaves the driving pulley",
+            sensible=(10.0, 1000000.0),
         ),
-        "push_force_t1": not_negative(0.0, "N", "push force between the elements of that strand"),
+        "push_force_t1": not_negative(
+            0.0, "N", "push force between the elements of that strand", sensible=(1.0, 1000000.0)
+        ),
         "ring_tension_t2": not_negative(
-            7000.0, "N", "ring tension of the strand that enters the driving pulley"
+            7000.0,
+            "N",
+            "ring tension of the strand that enters the driving pulley",
+            sensible=(10.0, 1000000.0),
         ),
-        "push_force_t2": not_negative(0.0, "N", "push force between the elements of that strand"),
+        "push_force_t2": not_negative(
+            0.0, "N", "push force between the elements of that strand", sensible=(1.0, 1000000.0)
+        ),
     },
     "belt": {key: _BELT["belt"][key] for key in ("element_mass", "ring_mass", "bending_stiffness")},
     "sheaves": {"half_wedge_angle": _BELT["sheaves"]["half_wedge_angle"]},

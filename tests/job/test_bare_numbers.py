@@ -1,0 +1,104 @@
+"""Numbers without a unit that are far from usual draw a warning, in Python and in the commands."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cvt_hpc import models
+from cvt_hpc.cli import main
+from cvt_hpc.errors import UnitWarning
+from cvt_hpc.job import build_job, load_job, rebuild_job
+from cvt_hpc.job.plausibility import warn_of_bare_numbers
+from cvt_hpc.parameters import Parameter
+
+SPEED = Parameter(300.0, "rad/s", "", sensible=(1.0, 800.0))
+LENGTH = Parameter(0.1, "m", "", sensible=(1e-3, 1.0), allow_infinite=True)
+FORCE = Parameter(1.0, "N", "")
+
+
+def warned(call, *arguments, **more):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        call(*arguments, **more)
+    assert {one.category for one in caught} <= {UnitWarning}
+    return [str(one.message) for one in caught]
+
+
+@pytest.mark.parametrize(
+    ("parameter", "raw", "told"),
+    [
+        (SPEED, 3000, '3000 is read as 3000 rad/s, far from the usual 1 to 800 rad/s; write "3000 rpm" if that is meant, or "3000 rad/s"'),
+        (SPEED, "3000", '3000 is read as 3000 rad/s, far from the usual 1 to 800 rad/s; write "3000 rpm" if that is meant, or "3000 rad/s"'),
+        (SPEED, -1e6, '-1000000.0 is read as -1000000.0 rad/s, far from the usual 1 to 800 rad/s; if that is meant write "-1000000.0 rad/s"'),
+        (LENGTH, 20, '20 is read as 20 m, far from the usual 0.001 to 1 m; write "20 mm" if that is meant, or "20 m"'),
+        (LENGTH, 1e3, '1000.0 is read as 1000.0 m, far from the usual 0.001 to 1 m; write "1000.0 mm" or "1000.0 um" if that is meant, or "1000.0 m"'),
+        (SPEED, [1.5, [2, 900.0], 5000], '900.0 is read as 900.0 rad/s, far from the usual 1 to 800 rad/s; write "900.0 rpm" if that is meant, or "900.0 rad/s"'),
+        (SPEED, {"from": 10, "to": "900", "step": 1e4}, '900 is read as 900 rad/s, far from the usual 1 to 800 rad/s; write "900 rpm" if that is meant, or "900 rad/s"'),
+        (SPEED, np.array([1, 900]), '900 is read as 900 rad/s, far from the usual 1 to 800 rad/s; write "900 rpm" if that is meant, or "900 rad/s"'),
+    ],
+)  # fmt: skip
+def test_what_is_meant_is_guessed_by_the_units_that_would_be_usual(parameter, raw, told):
+    assert warned(warn_of_bare_numbers, parameter, raw, "x") == [f"x: {told}"]
+
+
+@pytest.mark.parametrize(
+    ("parameter", "raw"),
+    [
+        (SPEED, 800.0),
+        (SPEED, 0),
+        (SPEED, -300),
+        (SPEED, "9000 rad/s"),
+        (SPEED, ["9000 rpm", 1]),
+        (SPEED, {"from": 1, "to": 2, "step": 0.01}),
+        (LENGTH, float("inf")),
+        (SPEED, True),
+        (SPEED, "much"),
+        (FORCE, 1e99),
+    ],
+)
+def test_what_is_usual_or_has_its_unit_draws_none(parameter, raw):
+    assert warned(warn_of_bare_numbers, parameter, raw, "x") == []
+
+
+def test_every_place_of_a_job_is_looked_at_and_what_counts_most_is_told(write_job):
+    tables = "[scene]\nthrust = 2e4\ndriving_speed = 3000\n"
+    meant = 'read as 3000 rad/s, far from the usual 1 to 800 rad/s; write "3000 rpm" if that is meant, or "3000 rad/s"'
+    assert warned(load_job, write_job(tables)) == [f"x.toml: [scene] driving_speed: 3000 is {meant}"]
+    assert warned(load_job, "x.toml", ["driving_speed=3000 rpm"]) == []
+    assert warned(load_job, "x.toml", ["driving_speed=[3000, 2]"]) == [
+        f"x.toml: --set driving_speed: 3000 is {meant}"
+    ]
+    axis = {"driving_speed": [3000]}
+    document = {"name": "x", "model": "toy", "scene": {"thrust": 2e4}, "axes": axis}
+    assert warned(build_job, document) == [f"build_job: [axes] driving_speed: 3000 is {meant}"]
+    linked = {"linked": {"ratio": {"driving_speed": [3000]}}, "axes": {"ratio": [1]}}
+    assert warned(build_job, document | linked) == [
+        f"build_job: [linked.ratio] driving_speed: 3000 is {meant}"
+    ]
+    # a number that is an SI value of another job is what it is
+    assert warned(rebuild_job, document, "x", {}) == []
+
+
+def test_commands_say_it_once_on_stderr(write_job, capsys):
+    write_job("[scene]\nthrust = 2e4\ndriving_speed = [3000]\n".replace("driving", "[axes]\ndriving"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a warning that Python would not show is none that a command hides
+        main(["check", "x.toml"])
+    told = [line for line in capsys.readouterr().err.splitlines() if "warning" in line]
+    assert len(told) == 1
+    assert told[0].startswith("cvt-hpc: warning: x.toml: [axes] driving_speed: 3000 is read as 3000 rad/s")
+
+
+@pytest.mark.parametrize(
+    "path", sorted((Path(models.__file__).parents[2] / "jobs").glob("*.toml")), ids=lambda path: path.stem
+)
+def test_jobs_that_are_shipped_draw_none(path):
+    if path.stem.startswith("chart_") and path.stem != "chart_ladder":
+        from cvt_hpc.chart import load_chart as load
+    elif path.stem == "branch":
+        from cvt_hpc.bifurcation import load_diagram as load
+    else:
+        load = load_job
+    assert warned(load, path) == []
