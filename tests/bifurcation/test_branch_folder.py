@@ -42,7 +42,7 @@ def branch(tmp_path, monkeypatch):
 
 
 def names(folder):
-    return sorted(path.name for path in folder.iterdir())
+    return sorted(path.name for path in folder.iterdir() if path.name != ".branch.lock")
 
 
 def stability(folder):
@@ -54,7 +54,7 @@ def test_another_job_is_refused_and_fresh_leaves_none_of_its_pictures(branch, tm
     out = tmp_path / "out"
     assert branch() == 0
     (out / "branch_notes.png").write_text("mine")
-    assert names(out) == ["branch.nc", "branch_1.png", "branch_2.png", "branch_notes.png"]
+    assert names(out) == ["branch.json", "branch.nc", "branch_1.png", "branch_2.png", "branch_notes.png"]
     before = (out / "branch.nc").read_bytes()
     assert branch("--set", "friction_gradient=-0.6") == 2
     error = capsys.readouterr().err
@@ -65,7 +65,7 @@ def test_another_job_is_refused_and_fresh_leaves_none_of_its_pictures(branch, tm
     )
     assert (out / "branch.nc").read_bytes() == before
     assert branch("--set", "friction_gradient=-0.6", "--fresh") == 0
-    assert names(out) == ["branch.nc", "branch.png", "branch_notes.png"]
+    assert names(out) == ["branch.json", "branch.nc", "branch.png", "branch_notes.png"]
     (tmp_path / "x.toml").write_text(JOB + "[branch]\nresolution = 2\n")
     assert branch("--set", "friction_gradient=-0.6") == 2
     assert "branch.resolution is 1.0 there, 2.0 here" in capsys.readouterr().err

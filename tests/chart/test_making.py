@@ -229,7 +229,7 @@ def test_without_its_job_file_a_chart_is_known_by_its_points(write_chart, undraw
     assert (told, job_file.read_bytes()) == ([], whole)
     damage()
     changed = write_chart(("20 um", "21 um"))
-    with pytest.raises(InputError, match="or --fresh to throw away its points, which are of another job"):
+    with pytest.raises(InputError, match="or --fresh to throw away its results, which are of another job"):
         made(changed)
     assert made(changed, fresh=True, tell=told.append).table.read_bytes() != before
     assert len(told) == 13
