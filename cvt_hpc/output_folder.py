@@ -342,7 +342,9 @@ def _make_way(path: Path, kinds: tuple[str, ...], fresh: bool) -> None:
     if found is None or found in kinds:
         return
     if not fresh:
-        raise InputError(f"{path}: expected {kinds[0]} of this folder, found {found}; --fresh removes it")
+        raise InputError(
+            f"{path}: expected {kinds[0]}, found {found}; remove it, or --fresh with all results"
+        )
     remove_own(path)
 
 
