@@ -48,7 +48,7 @@ kinetic_friction = 2.0
 friction_gradient = "-40 s/m"
 stribeck_velocity = "0.1 m/s"
 [numerics]
-step = "20 us"
+step = "100 us"
 [run]
 duration = "2.5 s"
 [record]
@@ -237,7 +237,8 @@ class Case:
                 assert_same_numbers(found, self._reference.dataset)
             for index, expected in self._reference.histories.items():
                 with xr.open_dataset(StudyFolder(self.out).history(index)) as history:
-                    assert_same_numbers(history, expected)
+                    timings = {"core_seconds"} & {*history.variables}
+                    assert_same_numbers(history.drop_vars(timings), expected.drop_vars(timings))
         except (AssertionError, OSError) as error:
             self.outcome.wrong.append(f"{error!r}")
             return False
