@@ -8,23 +8,25 @@ import sys
 import threading
 import time
 import zlib
+from types import SimpleNamespace
 
-import numpy as np
 import pytest
+import xarray as xr
 from recorded import assert_same_numbers
-from study_double import Axis, Job, Simulator
+from study_double import Job, Simulator
 from study_processes import wait_until
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.history_files import write_history
 from cvt_hpc.job import load_job
+from cvt_hpc.ladder.making import run_ladder
 from cvt_hpc.locks import BusyError, locked
 from cvt_hpc.output_folder import checksum
 from cvt_hpc.study import gather, open_results, read_status, run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.frames import FORMAT_VERSION, PREAMBLE, RECORD, RecordFormat
-from cvt_hpc.study.record.recovery import read_records
+from cvt_hpc.study.repeats import Repeat
 
 JOB = Job(histories=(3,))
 GATHERING = sys.modules["cvt_hpc.study.gather"]  # whose name is that of its function
@@ -209,7 +211,7 @@ class TestLinks:
         monkeypatch.setattr("cvt_hpc.files.os.replace", lambda aside, path: names.append(aside.name))
         for _ in range(2):
             monkeypatch.setattr("cvt_hpc.netcdf.write_netcdf", lambda dataset, path: None)
-            write_history(xr_dataset(), tmp_path / "h.nc")
+            write_history(xr.Dataset(), tmp_path / "h.nc")
         assert len(set(names)) == 2
 
     def test_crash_log(self, start, tmp_path, mine):
@@ -232,10 +234,14 @@ class TestLinks:
             assert (found["status"] == 1).all()
 
 
-def xr_dataset():
-    import xarray as xr
-
-    return xr.Dataset({"x": ("time", np.zeros(2))})
+@pytest.mark.parametrize("linked", ["audit", "rung"])
+def test_a_folder_within_that_is_a_link_is_refused_before_anything_is_run(out, mine, linked):
+    (out / linked).symlink_to(mine)
+    with pytest.raises(InputError, match=f"{linked}: expected a folder of its own, found a link"):
+        if linked == "rung":
+            run_ladder([SimpleNamespace(name="rung", job=JOB)], out, tell=None)
+        else:
+            Repeat("audit", "in full", JOB, out, "audit", JOB, 0.5, None, None).check(fresh=False)
 
 
 class TestHeldGatherLock:
@@ -436,11 +442,3 @@ class TestNotRegular:
         assert not thread.is_alive()
         assert all("\n" not in end for end in ends)
         assert sweep(out, fresh=True).gained == 12
-
-
-def test_a_folder_of_somebody_elses_job_has_no_say_in_what_is_removed(out, mine):
-    before = read_records(out / "records", StudyFolder(out).load()).recorded.sum()
-    other = Job((Axis("load", (1, 2)),))
-    with pytest.raises(InputError, match="found that of another"):
-        sweep(out, other)
-    assert read_records(out / "records", StudyFolder(out).load()).recorded.sum() == before
