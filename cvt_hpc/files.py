@@ -93,9 +93,9 @@ def open_regular(path: Path, flags: int = os.O_RDONLY) -> int:
 def read_regular(path: Path, limit: int) -> bytes:
     """Return the content of a regular file of at most `limit` bytes; OSError as of `open_regular`."""
     with os.fdopen(open_regular(path), "rb") as file:
-        if os.fstat(file.fileno()).st_size > limit:
+        if (size := os.fstat(file.fileno()).st_size) > limit:
             raise OSError(errno.EFBIG, f"a file of more than {limit >> 20} MiB")
-        return file.read(limit)
+        return file.read(size)
 
 
 def append_text(path: Path, text: str) -> None:

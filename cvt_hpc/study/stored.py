@@ -13,7 +13,7 @@ _DTYPE = re.compile(r"f[48]|[iu][1248]|S[1-9]\d{0,3}")
 _FINGERPRINT = re.compile(r"[0-9a-f]{64}")
 _MOST_RUNS = 10**8
 _LARGEST_RECORD = 1 << 26  # [bytes]
-_NEEDED = {"status": "i1", "vibrates": "i1"}  # beside `reason`, a text of any length
+_NEEDED = {"status": "i1", "vibrates": "i1"}  # `reason`, where there is one, is a text
 
 
 def check_stored(entry: Mapping[str, Any]) -> None:
@@ -112,7 +112,7 @@ def _check_variables(entries: list[Mapping[str, Any]], lengths: Mapping[str, int
             _need(len({*values}) == len(values), name, "different flags")
     types = {entry["name"]: entry["dtype"] for entry in entries if not entry["dims"]}
     _need([*types][:1] == ["status"] and types.items() >= _NEEDED.items(), "variables", "how runs have ended")
-    _need(types.get("reason", "")[:1] == "S", "variables", "why runs have failed")
+    _need(types.get("reason", "S")[0] == "S", "variables", "why runs have failed")
     _need(size <= _LARGEST_RECORD, "variables", f"records of {_LARGEST_RECORD >> 20} MiB at most")
 
 

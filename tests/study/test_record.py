@@ -83,7 +83,7 @@ def assert_recorded(records, rows, indices):
 
 def test_records_come_back_bitwise(tmp_path, study, rows):
     write_log(tmp_path / "r", study, rows, [3, 0, 7])
-    write_log(tmp_path / "r", study, rows, [1], {"id": "b", "started": 0.5})
+    write_log(tmp_path / "r", study, rows, [1], {**SESSION, "id": "b", "started": 0.5})
     records = read_records(tmp_path / "r", study)
     assert_recorded(records, rows, [0, 1, 3, 7])
     assert [session["id"] for session in records.sessions] == ["b", "a"]
