@@ -51,7 +51,7 @@ def kind_of(path: Path) -> str | None:
     """Return what stands at a path, such as "a file" or "a link", without following it; None for nothing."""
     try:
         return _kind(os.lstat(path).st_mode)
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return None
 
 
