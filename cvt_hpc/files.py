@@ -1,15 +1,31 @@
-"""Files that are there whole or not at all, and the one error for a system that refuses to keep them."""
+"""Files that are there whole or not at all, never written through a link, and one error for what goes wrong.
+
+A folder may come from somebody else. What is opened in it by a fixed name has to be a regular file: a link
+would lead elsewhere, and a pipe or a device may never answer.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import errno
 import os
-import platform
+import secrets
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 
 from cvt_hpc.errors import InputError
+
+_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+_KINDS = {
+    stat.S_IFLNK: "a link",
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFREG: "a file",
+}
 
 
 class StorageError(InputError):
@@ -31,6 +47,96 @@ def naming_refusals(path: Path, expected: str) -> Iterator[None]:
         raise StorageError(f"{path}: expected {expected}, found: {error.strerror or error}") from error
 
 
+def kind_of(path: Path) -> str | None:
+    """Return what stands at a path, such as "a file" or "a link", without following it; None for nothing."""
+    try:
+        return _kind(os.lstat(path).st_mode)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+
+
+def refuse_link(path: Path) -> None:
+    """Raise InputError where a link stands in the place of a folder within an output folder."""
+    if kind_of(path) == "a link":
+        raise InputError(f"{path}: expected a folder of its own, found a link, which may lead anywhere")
+
+
+def open_regular(path: Path, flags: int = os.O_RDONLY) -> int:
+    """Return the descriptor of a regular file, which is neither a link nor, for writing, linked twice.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    flags : int
+        As of `os.open`.
+
+    Raises
+    ------
+    OSError
+        If something else stands there, or the system refuses. Nothing is waited for.
+    """
+    # Before it is opened, since that alone may move a device; and after, for what was put there meanwhile.
+    if (found := kind_of(path)) not in (None, "a file"):
+        raise OSError(errno.EINVAL, f"{found} in the place of a file")
+    descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+    opened = os.fstat(descriptor)
+    if not stat.S_ISREG(opened.st_mode):
+        os.close(descriptor)
+        raise OSError(errno.EINVAL, f"{_kind(opened.st_mode)} in the place of a file")
+    if opened.st_nlink > 1 and flags & (os.O_WRONLY | os.O_RDWR):
+        os.close(descriptor)
+        raise OSError(errno.EMLINK, "a file that has a second name elsewhere")
+    return descriptor
+
+
+def read_regular(path: Path, limit: int) -> bytes:
+    """Return the content of a regular file of at most `limit` bytes; OSError as of `open_regular`."""
+    with os.fdopen(open_regular(path), "rb") as file:
+        if (size := os.fstat(file.fileno()).st_size) > limit:
+            raise OSError(errno.EFBIG, f"a file of more than {limit >> 20} MiB")
+        return file.read(size)
+
+
+def append_text(path: Path, text: str) -> None:
+    """Append to a regular file, which is made where there is none; OSError as of `open_regular`."""
+    with os.fdopen(open_regular(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT), "a") as file:
+        file.write(text)
+
+
+def make_own_folder(path: Path) -> None:
+    """Make a folder within an output folder, or see that it is one: a link would lead out of it.
+
+    Raises
+    ------
+    OSError
+        If something else stands there, or the system refuses.
+    """
+    with contextlib.suppress(FileExistsError):
+        path.mkdir()
+    if (found := kind_of(path)) != "a folder":
+        raise OSError(errno.ENOTDIR, f"{found} in the place of a folder")
+
+
+def remove_own(path: Path) -> None:
+    """Remove a file or a link, not what it leads to, or an empty folder; OSError if the system refuses."""
+    if kind_of(path) == "a folder":
+        path.rmdir()
+    else:
+        path.unlink(missing_ok=True)
+
+
+def try_to_write(folder: Path) -> None:
+    """Write a file to a folder and remove it; OSError if the system refuses."""
+    probe = folder / f".probe-{secrets.token_hex(8)}"
+    descriptor = os.open(probe, _NEW, 0o666)
+    try:
+        os.write(descriptor, b"x")
+    finally:
+        os.close(descriptor)
+        discard(probe)
+
+
 @contextlib.contextmanager
 def written_aside(path: Path, *, parents: bool = False, advice: str = "") -> Iterator[Path]:
     """Give a path beside `path` to write to, and put what stands there in the end in its place in one step.
@@ -38,7 +144,7 @@ def written_aside(path: Path, *, parents: bool = False, advice: str = "") -> Ite
     Parameters
     ----------
     path : Path
-        The file to be written or replaced.
+        The file to be written or replaced; a link is replaced, and what it leads to is left alone.
     parents : bool
         Whether to make its folder, where there is none.
     advice : str
@@ -49,11 +155,12 @@ def written_aside(path: Path, *, parents: bool = False, advice: str = "") -> Ite
     StorageError
         If the system refuses; what stood at `path` is then untouched.
     """
-    # A name that no other process uses; `StudyFolder.leftovers` knows it.
-    aside = path.with_name(f".{path.name}.{platform.node()}-{os.getpid()}.part")
+    # A name that nobody can guess, and a file that is new: `OutputFolder.leftovers` knows such names.
+    aside = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
     try:
         if parents:
             path.parent.mkdir(parents=True, exist_ok=True)
+        os.close(os.open(aside, _NEW, 0o666))
         yield aside
         _sync(aside)
         os.replace(aside, path)
@@ -77,6 +184,10 @@ def discard(path: Path) -> None:
     """Remove a file that was not finished, if it is there and the system lets us."""
     with contextlib.suppress(OSError):
         path.unlink()
+
+
+def _kind(mode: int) -> str:
+    return _KINDS.get(stat.S_IFMT(mode), "something that is no file")
 
 
 def _sync(path: Path) -> None:

@@ -64,6 +64,8 @@ def is_history(path: Path) -> bool:
 
 def holds(path: Path, content: str) -> bool:
     """Whether a file is a dataset of this program with such content: HISTORY or DIAGRAM."""
+    if not Path(path).is_file():  # a pipe would be waited for
+        return False
     try:
         with xr.open_dataset(path, engine="netcdf4", decode_cf=False) as dataset:
             return dataset.attrs.get(CONTENT) == content

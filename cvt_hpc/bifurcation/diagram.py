@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from cvt_hpc.bifurcation.attractors import Attractor, Start, attractors
 from cvt_hpc.bifurcation.dataset import diagram_dataset
 from cvt_hpc.bifurcation.drawing import draw_branch
-from cvt_hpc.bifurcation.folder import DATASET, claim_folder, picture_names
+from cvt_hpc.bifurcation.folder import DiagramFolder, picture_names
 from cvt_hpc.bifurcation.followed import Followed
 from cvt_hpc.bifurcation.job import Asked, Diagram
 from cvt_hpc.files import written_aside
@@ -75,21 +75,22 @@ def make_diagram(
     Raises
     ------
     InputError
-        If the folder holds the diagram of another job, or the system refuses.
+        If the folder holds the diagram of another job or is in use, or the system refuses.
     """
-    held = claim_folder(diagram, out, fresh)
-    dataset, pictures = out / DATASET, picture_names(len(diagram.branches))
+    folder, pictures = DiagramFolder(out), [out / name for name in picture_names(len(diagram.branches))]
     followed: list[Followed] = []
-    for number, asked in enumerate(diagram.branches, 1):
-        # matrices are small: threads of the linear algebra would wait for each other in loops
-        with threadpool_limits(1):
-            followed.append(_follow(diagram, asked))
-        if number >= held:
-            with written_aside(dataset, parents=True) as aside:
-                write_netcdf(diagram_dataset(diagram, followed), aside)
-        draw_branch(diagram, followed[-1], out / pictures[number - 1])
-        tell(f"branch {number}/{len(diagram.branches)}: {len(followed[-1].onsets)} Hopf points")
-    return DiagramReport(tuple(followed), dataset, tuple(out / name for name in pictures))
+    with folder.claimed(diagram, fresh=fresh):
+        held = folder.branches()
+        for number, asked in enumerate(diagram.branches, 1):
+            # matrices are small: threads of the linear algebra would wait for each other in loops
+            with threadpool_limits(1):
+                followed.append(_follow(diagram, asked))
+            if number >= held:
+                with written_aside(folder.dataset) as aside:
+                    write_netcdf(diagram_dataset(diagram, followed), aside)
+            draw_branch(diagram, followed[-1], pictures[number - 1])
+            tell(f"branch {number}/{len(diagram.branches)}: {len(followed[-1].onsets)} Hopf points")
+    return DiagramReport(tuple(followed), folder.dataset, tuple(pictures))
 
 
 def _follow(diagram: Diagram, asked: Asked) -> Followed:

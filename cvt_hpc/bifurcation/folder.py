@@ -1,23 +1,31 @@
-"""The output folder of a bifurcation diagram: whose it is."""
+"""The output folder of a bifurcation diagram: what lies where, and how its dataset tells whose it is."""
 
 from __future__ import annotations
 
+import hashlib
 import json
+import logging
+import re
+from collections.abc import Callable, Iterator
 from math import prod
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from cvt_hpc.bifurcation.dataset import Stability
 from cvt_hpc.bifurcation.job import Diagram
-from cvt_hpc.errors import mismatch
-from cvt_hpc.files import naming_refusals
+from cvt_hpc.files import kind_of
 from cvt_hpc.history_files import DIAGRAM, holds
+from cvt_hpc.output_folder import Kind, OutputFolder
 from cvt_hpc.study.job_difference import another_job
 
 DATASET = "branch.nc"
 LABELS = ("name", "description")  # of a job, without effect on any number
+_PICTURE = re.compile(r"branch(?:_([1-9]\d{0,8}))?\.png", re.ASCII)
+_DAMAGE = (AttributeError, KeyError, OSError, RecursionError, RuntimeError, TypeError, ValueError)
+_logger = logging.getLogger(__name__)
 
 
 def picture_names(branches: int) -> list[str]:
@@ -25,46 +33,96 @@ def picture_names(branches: int) -> list[str]:
     return [f"branch_{number}.png" for number in range(1, branches + 1)] if branches > 1 else ["branch.png"]
 
 
-def claim_folder(diagram: Diagram, out: Path, fresh: bool) -> int:
-    """See that the folder is that of a diagram, or free.
+class DiagramFolder(OutputFolder[Diagram]):
+    """The output folder of a bifurcation diagram, which may lie beside a study.
 
     Parameters
     ----------
-    diagram : Diagram
-        What is to be made in it.
-    out : Path
+    path : Path
         The folder; it need not exist.
-    fresh : bool
-        Throw away what another diagram, or an earlier start, has left.
-
-    Returns
-    -------
-    int
-        Number of branches that its dataset holds.
-
-    Raises
-    ------
-    InputError
-        If it holds a file that is no diagram, or without `fresh` that of another job.
     """
-    path = out / DATASET
-    if not path.exists():
-        return 0
-    if not holds(path, DIAGRAM):
-        raise mismatch(str(path), "a new file, or a bifurcation diagram of cvt_hpc", "another file")
-    with xr.open_dataset(path, engine="netcdf4", decode_cf=False) as dataset:
-        found = json.loads(dataset.attrs["job"])
-        computed = (dataset["stability"] != Stability.NOT_COMPUTED).all("load")
-        held = int(np.count_nonzero(computed))
-    if fresh:
-        branches = prod(len(values) for name, values in found["axes"].items() if name != "load")
-        with naming_refusals(out, "a folder in which files can be removed"):
-            for name in (*picture_names(branches), DATASET):
-                (out / name).unlink(missing_ok=True)
-        return 0
-    there, here = (
-        {key: value for key, value in job.items() if key not in LABELS} for job in (found, diagram.resolved())
-    )
-    if there != here:
-        raise another_job(out, there, here)
-    return held
+
+    kind = Kind("bifurcation diagram", "branch.json", ".branch.lock", "cvt_hpc bifurcation 1")
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.dataset = self.path / DATASET
+
+    def branches(self) -> int:
+        """Return how many branches the dataset holds, 0 where none can be read."""
+        if kind_of(self.dataset) is None:
+            return 0
+        try:
+            with xr.open_dataset(self._diagram(), engine="netcdf4", decode_cf=False) as dataset:
+                computed = (dataset["stability"] != Stability.NOT_COMPUTED).all("load")
+                return int(np.count_nonzero(computed))
+        except _DAMAGE as error:
+            _logger.warning("%s: damaged (%s); made again", self.dataset, error)
+            return 0
+
+    def read_job(self) -> dict[str, Any] | None:
+        """Return what branch.json says, or the dataset of an earlier version, which had no such file."""
+        found = super().read_job()
+        if found is None and kind_of(self.dataset) is not None:
+            self.is_signed = False
+            found = self._job_of_dataset()
+        return found
+
+    def document(self, content: Diagram) -> dict[str, Any]:
+        """Return what branch.json says of a diagram."""
+        numbers = json.dumps(_numbers(content.resolved()), sort_keys=True)
+        return {"fingerprint": hashlib.sha256(numbers.encode()).hexdigest(), "job": content.resolved()}
+
+    def accept(self, entry: dict[str, Any]) -> dict[str, Any]:
+        """Return a sound branch.json."""
+        if not isinstance(entry["fingerprint"], str) or not entry["job"]["axes"].keys():
+            raise ValueError("no axes")
+        return entry
+
+    def refuse_other(self, found: dict[str, Any], asked: Diagram) -> None:
+        """Raise InputError unless the folder is that of the diagram."""
+        there, here = _numbers(found["job"]), _numbers(asked.resolved())
+        if there != here:
+            raise another_job(self.path, there, here)
+
+    def unexplained(self) -> str | None:
+        """Return what is here that a dataset which is no diagram does not explain."""
+        return f"{DATASET}, which is no such diagram" if kind_of(self.dataset) else None
+
+    def results_tell(self) -> Callable[[Diagram], bool] | None:
+        """Return what tells whether the dataset is that of a diagram; None if it is none, of whatever job."""
+        found = self._job_of_dataset()
+        if found is None:
+            return None
+        return lambda diagram: _numbers(found["job"]) == _numbers(diagram.resolved())
+
+    def written(self, found: dict[str, Any] | None) -> Iterator[Path]:
+        """Yield what a diagram has left: the dataset, and the pictures of as many branches as it has."""
+        axes = found["job"]["axes"] if found else {}
+        branches = prod(len(values) for name, values in axes.items() if name != "load")
+        yield self.dataset
+        for path in self.path.iterdir():
+            if (name := _PICTURE.fullmatch(path.name)) and int(name[1] or 1) <= branches:
+                yield path
+
+    def leftovers(self) -> list[Path]:
+        """Return the half-written files of processes that died while they wrote."""
+        return [*self.path.glob(f".{DATASET}.*.part"), *super().leftovers()]
+
+    def _diagram(self) -> Path:
+        """Return the dataset; ValueError if it is no diagram."""
+        if not holds(self.dataset, DIAGRAM):
+            raise ValueError("no bifurcation diagram")
+        return self.dataset
+
+    def _job_of_dataset(self) -> dict[str, Any] | None:
+        try:
+            with xr.open_dataset(self._diagram(), engine="netcdf4", decode_cf=False) as dataset:
+                return self.accept({"fingerprint": "", "job": json.loads(dataset.attrs["job"])})
+        except _DAMAGE:
+            return None
+
+
+def _numbers(job: dict[str, Any]) -> dict[str, Any]:
+    """Return a resolved job without what has no effect on any number."""
+    return {key: value for key, value in job.items() if key not in LABELS}

@@ -81,7 +81,7 @@ def make_chart(
     """
     check_prospects(chart)
     folder = ChartFolder(Path(out) if out is not None else Path("out") / chart.name, chart)
-    with folder.occupied(fresh):
+    with folder.claimed(chart, fresh=fresh):
         measurements = _fill(chart, folder, processes or len(os.sched_getaffinity(0)), tell)
         comparisons = compare(chart, measurements)
         with written_aside(folder.table) as aside:
@@ -97,12 +97,12 @@ def _fill(
     chart: Chart, folder: ChartFolder, processes: int, tell: Callable[[str], None]
 ) -> dict[str, Measurement]:
     """Measure the points that the folder does not hold yet, and return all by name."""
-    loaded = {point.name: folder.load(point.name) for point in chart.points}
+    loaded = {point.name: folder.load_point(point.name) for point in chart.points}
     folder.warn_of_others()
     measurements = {name: found for name, found in loaded.items() if found is not None}
     missing = [point for point in chart.points if point.name not in measurements]
     for point, measurement in _measure_all(chart, missing, processes):
-        folder.save(point.name, measurement)
+        folder.save_point(point.name, measurement)
         measurements[point.name] = measurement
         ended = (
             f"failed: {measurement.reason}"

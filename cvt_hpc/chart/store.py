@@ -5,10 +5,11 @@ from __future__ import annotations
 import io
 import json
 import logging
+import re
+import struct
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -16,22 +17,24 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.chart.measuring import Measurement
-from cvt_hpc.chart.plan import Chart
-from cvt_hpc.errors import InputError
-from cvt_hpc.files import naming_refusals, written_aside
-from cvt_hpc.study.folder import CHART_FILE, DamagedJobError
+from cvt_hpc.chart.plan import Chart, fingerprint_of
+from cvt_hpc.files import StorageError, kind_of, read_regular, written_aside
+from cvt_hpc.output_folder import CHART_FILE, Kind, OutputFolder
 from cvt_hpc.study.job_difference import another_job
-from cvt_hpc.study.lock import locked
 from cvt_hpc.study.provenance import git_revision, machine, versions
 
-FORMAT = "cvt_hpc chart 2"
+_LIMIT = 1 << 26  # [bytes] of the file of a point, and of what it holds unpacked
+_NAME = re.compile(r"[\w-][\w.-]*")
 _PLAIN = tuple(f.name for f in fields(Measurement) if f.name != "values")
 # what an archive raises depends on the byte that is damaged
-_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, KeyError, OSError, RuntimeError, ValueError)
+_DAMAGE = (
+    *(ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError),
+    *(struct.error, SyntaxError, TypeError, ValueError, zipfile.BadZipFile, zlib.error),
+)
 _logger = logging.getLogger(__name__)
 
 
-class ChartFolder:
+class ChartFolder(OutputFolder[Chart]):
     """The output folder of a chart, and the places in it.
 
     Parameters
@@ -47,14 +50,14 @@ class ChartFolder:
         Versions, revision and machine by which the points that were loaded or saved have been measured.
     """
 
+    kind = Kind("chart", CHART_FILE, ".chart.lock", "cvt_hpc chart 2", ("points",))
+
     def __init__(self, path: Path, chart: Chart) -> None:
-        self.path = path
-        self.job_file = path / CHART_FILE
+        super().__init__(path)
         self.points = path / "points"
         self.table = path / "chart.csv"
         self.dataset = path / "chart.nc"
         self.makers: list[dict[str, Any]] = []
-        self._lock_file = path / ".chart.lock"
         self._chart = chart
         self._fingerprint = chart.fingerprint()
         self._maker = {"versions": versions(), "git_revision": git_revision(), "machine": machine()}
@@ -63,51 +66,77 @@ class ChartFolder:
         """Return where the picture of a scene goes, or "budget"."""
         return self.path / f"{name}.png"
 
-    @contextmanager
-    def occupied(self, fresh: bool) -> Iterator[None]:
-        """Be at work in the folder for the time of a `with`, alone.
+    def document(self, content: Chart) -> dict[str, Any]:
+        """Return what chart.json says of a chart."""
+        return {"fingerprint": content.fingerprint(), "job": content.resolved()}
 
-        Raises
-        ------
-        InputError
-            If it holds another chart or other files and is not to be used afresh, if another process is at
-            work in it, or the system refuses.
-        """
-        expected = "a folder for the results of a chart"
-        with naming_refusals(self.path, expected):
-            self._check_free(fresh)
-            self.path.mkdir(parents=True, exist_ok=True)
-        with locked(self._lock_file):
-            with naming_refusals(self.path, expected):
-                found = self._check_free(fresh)  # again: another may have been there before the lock
-                if fresh:
-                    self._clear(found["job"]["scenes"] if found else (s.name for s in self._chart.scenes))
-            if found is None or fresh:
-                entry = {"format": FORMAT, "fingerprint": self._fingerprint, "job": self._chart.resolved()}
-                with written_aside(self.job_file) as aside:
-                    aside.write_text(json.dumps(entry, indent=1))
-            with naming_refusals(self.path, expected):
-                self.points.mkdir(exist_ok=True)
-            yield
+    def accept(self, entry: dict[str, Any]) -> dict[str, Any]:
+        """Return a sound chart.json."""
+        if not isinstance(entry["fingerprint"], str):
+            raise ValueError("no fingerprint")
+        if not all(_NAME.fullmatch(name) for name in entry["job"]["scenes"].keys()):
+            raise ValueError("scenes without a name")  # of which names of files are made
+        return entry
 
-    def load(self, name: str) -> Measurement | None:
+    def check_unsigned(self, entry: dict[str, Any]) -> None:
+        """Raise ValueError unless the job of an earlier version gives the fingerprint that stands there."""
+        if fingerprint_of(entry["job"]) != entry["fingerprint"]:
+            raise ValueError("it has no checksum, and its job does not give its fingerprint")
+
+    def refuse_other(self, found: dict[str, Any], asked: Chart) -> None:
+        """Raise InputError unless the folder is that of the chart."""
+        if found["fingerprint"] != asked.fingerprint():
+            raise another_job(self.path, found["job"], asked.resolved())
+
+    def unexplained(self) -> str | None:
+        """Return what is here that no start of a chart leaves without a chart.json."""
+        own = {self.lock_file, *self.leftovers()}
+        if kind_of(self.points) == "a folder" and not any(
+            path.name[0] != "." for path in self.points.iterdir()
+        ):
+            own.add(self.points)
+        return None if own.issuperset(self.path.iterdir()) else f"one without a {self.job_file.name}"
+
+    def results_tell(self) -> Callable[[Chart], bool] | None:
+        """Return what tells whether the points are of a chart; None if there are none, of whatever chart."""
+        fingerprints = set()
+        for path in self._points():
+            try:
+                fingerprints.add(_unpack(read_regular(path, _LIMIT))[1])
+            except _DAMAGE:
+                continue
+        return (lambda chart: chart.fingerprint() in fingerprints) if fingerprints else None
+
+    def written(self, found: dict[str, Any] | None) -> Iterator[Path]:
+        """Yield what a chart has left: points, table, dataset, and the pictures of its scenes."""
+        scenes = found["job"]["scenes"] if found else (scene.name for scene in self._chart.scenes)
+        pictures = (self.picture(name) for name in (*scenes, "budget"))
+        yield from (*self._points(), self.table, self.dataset, *pictures)
+
+    def _points(self) -> list[Path]:
+        """Return the files of points; none where a link stands in the place of their folder."""
+        return [*self.points.glob("*.npz")] if kind_of(self.points) == "a folder" else []
+
+    def load_point(self, name: str) -> Measurement | None:
         """Return what was measured at a point, None if nothing was, or nothing that can be read."""
         path = self.points / f"{name}.npz"
-        if not path.exists():
+        if kind_of(path) is None:
             return None
-        with naming_refusals(path, "a file that can be read"):
-            data = path.read_bytes()
         try:
-            measurement, fingerprint, maker = _unpack(data)
+            measurement, fingerprint, maker = _unpack(read_regular(path, _LIMIT))
             if fingerprint != self._fingerprint:
                 raise ValueError("of another chart")
+        except PermissionError as error:
+            raise StorageError(
+                f"{path}: expected a file that can be read, found: {error.strerror}"
+            ) from error
         except _DAMAGE as error:
             _logger.warning("%s: damaged (%s); measured again", path, error or "it is empty")
             return None
         self._remember(maker)
         return measurement
 
-    def save(self, name: str, measurement: Measurement) -> None:
+    def save_point(self, name: str, measurement: Measurement) -> None:
         """Keep what was measured at a point."""
         plain = {key: getattr(measurement, key) for key in _PLAIN}
         head = json.dumps({"plain": plain, "fingerprint": self._fingerprint, "maker": self._maker})
@@ -130,65 +159,32 @@ class ChartFolder:
         if maker not in self.makers:
             self.makers.append(maker)
 
-    def _check_free(self, fresh: bool) -> dict[str, Any] | None:
-        """Return chart.json, None if it is missing or damaged; raise unless the folder may be used."""
-        if not self.path.exists():
-            return None
-        if not self.path.is_dir():
-            raise InputError(f"{self.path}: expected a folder for the results, found a file")
-        try:
-            found = self._read_job()
-        except DamagedJobError as error:
-            self._ask_points(fresh, str(error))
-            return None
-        if found is None and any(path != self._lock_file for path in self.path.iterdir()):
-            expected = "an empty folder or that of an earlier chart"
-            self._ask_points(
-                fresh, f"{self.path}: expected {expected}, found one without a {self.job_file.name}"
-            )
-        if found is not None and not fresh and found["fingerprint"] != self._fingerprint:
-            raise another_job(self.path, found["job"], self._chart.resolved())
-        return found
 
-    def _read_job(self) -> dict[str, Any] | None:
-        """Return what chart.json holds, None if there is none."""
-        if not self.job_file.exists():
-            return None
-        expected = f"{self.job_file}: expected the job of a chart, found damage"
-        try:
-            entry = json.loads(self.job_file.read_bytes())
-        except ValueError as error:
-            raise DamagedJobError(f"{expected} ({error})") from error
-        if not isinstance(entry, dict) or entry.get("format") != FORMAT:
-            raise InputError(
-                f'{self.job_file}: expected format "{FORMAT}", found another; choose another --out'
-            )
-        if not {"fingerprint", "job"} <= entry.keys():
-            raise DamagedJobError(f"{expected} (no job in it)")
-        return entry
-
-    def _ask_points(self, fresh: bool, complaint: str) -> None:
-        """Raise the complaint unless points make up for chart.json: they are to go, or are of this chart."""
-        fingerprints = set()
-        for path in self.points.glob("*.npz"):
-            try:
-                fingerprints.add(_unpack(path.read_bytes())[1])
-            except _DAMAGE:
-                continue
-        if not fingerprints or not (fresh or self._fingerprint in fingerprints):
-            advice = ", or --fresh to throw away its points, which are of another job" if fingerprints else ""
-            raise InputError(f"{complaint}; choose another --out{advice}")
-
-    def _clear(self, scenes: Iterable[str]) -> None:
-        """Remove what a chart of these scenes has written, and last the file that vouches for it."""
-        pictures = [self.picture(name) for name in (*scenes, "budget")]
-        for path in [*self.points.glob("*.npz"), self.table, self.dataset, *pictures, self.job_file]:
-            path.unlink(missing_ok=True)
+def _is_maker(maker: Any) -> bool:
+    """Whether these are the versions, the revision and the machine by which a point was measured."""
+    own = {"versions": dict, "git_revision": str, "machine": dict}
+    return all(isinstance(maker[key], kind) for key, kind in own.items())
 
 
 def _unpack(data: bytes) -> tuple[Measurement, str, dict[str, Any]]:
     """Return what the file of a point holds: the measurement, the chart's fingerprint, and its maker."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        if sum(entry.file_size for entry in archive.infolist()) > _LIMIT:
+            raise ValueError("it holds more than a point")
     with np.load(io.BytesIO(data)) as file:
         head = json.loads(str(file["head"]))
         values = {key.removeprefix("values "): file[key] for key in file.files if key != "head"}
-    return Measurement(values=values, **head["plain"]), head["fingerprint"], head["maker"]
+    measurement, maker = Measurement(values=values, **head["plain"]), head["maker"]
+    numbers = [
+        measurement.cost,
+        measurement.core_seconds,
+        measurement.simulated,
+        *measurement.counters.values(),
+    ]
+    if not isinstance(measurement.reason, str) or not all(
+        isinstance(number, (int, float)) for number in numbers
+    ):
+        raise ValueError("no measurement")
+    if any(array.dtype.kind != "f" for array in values.values()) or not _is_maker(maker):
+        raise ValueError("no measurement")
+    return measurement, str(head["fingerprint"]), maker

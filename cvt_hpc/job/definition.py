@@ -258,12 +258,15 @@ class Job:
 
     def fingerprint(self) -> str:
         """Return the SHA-256 [hex] of what determines the numbers; name and description do not count."""
-        document = self.resolved()
-        del document["name"], document["description"]
-        document["axes"] = list(
-            document["axes"].items()
-        )  # the order of the axes counts, that of tables does not
-        return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
+        return fingerprint_of(self.resolved())
+
+
+def fingerprint_of(resolved: Mapping[str, Any]) -> str:
+    """Return the fingerprint of a job by what `Job.resolved` returns of it."""
+    document = {key: value for key, value in resolved.items() if key not in ("name", "description")}
+    # the order of the axes counts, that of tables does not
+    document["axes"] = list(document["axes"].items())
+    return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 
 def _to_json(value: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from threadpoolctl import threadpool_limits
 
-from cvt_hpc.files import written_aside
+from cvt_hpc.files import refuse_link, written_aside
 from cvt_hpc.job import Job
 from cvt_hpc.ladder.comparing import Finding, compare
 from cvt_hpc.ladder.drawing import draw_ladder
@@ -65,6 +65,7 @@ def run_ladder(
     status = 0
     begins = {rung.name: fresh or not (out / rung.name).exists() for rung in rungs}
     for rung in rungs:
+        refuse_link(out / rung.name)
         check_start(rung.job, out / rung.name, fresh=fresh)
     for rung in rungs:
         # threads of the linear algebra wait for each other in loops, which would count as a rung's own time

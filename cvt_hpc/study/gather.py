@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import json
 import logging
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.files import discard, naming_refusals, written_aside
+from cvt_hpc.files import discard, kind_of, naming_refusals, written_aside
+from cvt_hpc.locks import locked
 from cvt_hpc.netcdf import write_netcdf
 from cvt_hpc.study.chunks import chunk_shape, fill
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.dimensions import DerivedCoordinate, Dimension
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.lock import locked
 from cvt_hpc.study.provenance import command, git_revision, history_line, versions
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.record.log import KEPT
@@ -37,6 +38,7 @@ _INFERRED = Variable(
     "class of the run; where status is not_run, the class of the runs around it, which is inferred",
     OccurrenceClass,
 )
+PATIENCE = 600.0  # [s]; 10^6 runs are gathered within a minute
 _Coordinate = tuple[tuple[str, ...], np.ndarray, dict[str, str]]
 _logger = logging.getLogger(__name__)
 
@@ -65,12 +67,28 @@ def gather(out: str | Path) -> Path:
     return folder.results
 
 
-def gather_records(folder: StudyFolder, study: Study) -> Records:
+def gather_records(
+    folder: StudyFolder, study: Study, interrupt: Callable[[], str | None] = lambda: None
+) -> Records:
     """Write the dataset of all runs recorded so far, and return their records.
 
     One process at a time reads and writes, so that of several the last one's dataset holds most.
+
+    Parameters
+    ----------
+    folder, study
+        What is gathered.
+    interrupt : callable
+        Tells why not to wait for another process that gathers, None if to wait.
+
+    Raises
+    ------
+    BusyError
+        If another process has gathered for longer than PATIENCE.
+    StorageError
+        If the system refuses.
     """
-    with locked(folder.gather_lock, patience=float("inf")):
+    with locked(folder.gather_lock, patience=PATIENCE, interrupt=interrupt):
         for leftover in folder.leftovers():
             discard(leftover)
         records = read_records(folder.records, study)
@@ -104,11 +122,14 @@ def open_results(path: str | Path) -> xr.Dataset:
         if found.is_dir():
             folder = StudyFolder(found)
             found = folder.results
-            if not found.exists():
+            if not found.exists() or kind_of(folder.job_file) is not None:
                 folder.load()
+            if not found.exists():
                 raise InputError(
                     f"{found}: expected a dataset, found nothing; `cvt-hpc gather {path}` writes it"
                 )
+        if found.exists() and not found.is_file():
+            raise InputError(f"{found}: expected a netCDF dataset, found {kind_of(found)}")
         try:
             # Quantities in seconds are numbers, not dates.
             return xr.open_dataset(found, engine="netcdf4", decode_times=False, chunks={})

@@ -26,6 +26,7 @@ def keep_histories(folder: StudyFolder, histories: Iterable[tuple[int, xr.Datase
     for index, history in histories:
         from cvt_hpc.history_files import store_history  # late: most sweeps keep none
 
+        folder.make_histories()
         store_history(history, folder.history(index))
 
 

@@ -63,16 +63,11 @@ def prepare(
 ) -> Plan:
     """Take the folder into possession and find what is left to do; on rank 0 alone."""
     study = task.study
-    folder.check_free_for(study, fresh)
-    folder.create()
-    held.enter_context(folder.occupied(part))
-    folder.check_free_for(study, fresh)  # again: another process may have been there before the lock
+    inner = None if part is None else folder.part_lock(part)
+    held.enter_context(folder.claimed(study, fresh=fresh, inner=inner))
     if part is None:
         for leftover in folder.half_histories():
             discard(leftover)
-    if fresh:
-        folder.clear()
-    folder.save(study)
     records = read_records(folder.records, study)
     session = new_session(ranks)
     for warning in records.warnings + _other_versions(records, session):

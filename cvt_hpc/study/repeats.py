@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from cvt_hpc.errors import mismatch, show
+from cvt_hpc.files import refuse_link
 from cvt_hpc.job import rebuild_job
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
@@ -105,10 +106,12 @@ class Repeat:
 
     def check(self, fresh: bool) -> None:
         """Raise the InputError that `run` would raise before it computes anything; touches nothing."""
+        refuse_link(self.place)
         check_start(self.job, self.place, fresh=fresh)
 
     def run(self, **options: Any) -> RunReport:
         """Do the runs of the sample again; on all ranks, with the options of `cvt_hpc.study.run`."""
+        refuse_link(self.place)
         return run(
             self.job,
             self.place,

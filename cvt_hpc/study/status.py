@@ -166,6 +166,7 @@ def _predicted_costs(study: Study, folder: StudyFolder) -> np.ndarray:
     """Return the predicted duration of each run, in some unit; all alike where there is no such model."""
     try:
         job = rebuild_job(study.job, str(folder.job_file), {})
-        return default_simulator().run_costs(job)
+        costs = default_simulator().run_costs(job) if job.shape == study.shape else np.ones(study.size)
     except InputError:
-        return np.ones(study.size)
+        costs = np.ones(study.size)
+    return costs

@@ -17,6 +17,7 @@ from threadpoolctl import threadpool_limits
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import StorageError
+from cvt_hpc.locks import BusyError
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.forecast.cost_model import CostModel
@@ -150,7 +151,7 @@ def run(
                             break
                         more = partial(next_round, folder, task, plan, team.size, counter, display)
                         plan = team.on_root(more)
-            return team.on_root(lambda: _conclude(folder, task, share, plan, stopped, held))
+            return team.on_root(lambda: _conclude(folder, task, share, plan, stopped, held, signals))
 
     with SignalWatch() as signals, assembled_team(folder.crash_log) as team:
         return outlive(team, sweep)
@@ -230,12 +231,23 @@ def _conclude(
     plan: Plan,
     stopped: str | None,
     held: ExitStack,
+    signals: SignalWatch,
 ) -> RunReport:
     """Gather the dataset, unless other parts are at work, and report; on rank 0 alone."""
     if part is not None:
         held.close()  # before the look around: of parts that end together the last one sees nobody
     gathers = part is None or not folder.is_in_use()
-    records = gather_records(folder, task.study) if gathers else read_records(folder.records, task.study)
+    records = None
+    if gathers:
+        try:
+            records = gather_records(folder, task.study, lambda: signals.noted)
+        except BusyError as error:
+            if not signals.noted:
+                raise
+            stopped = stopped or signals.noted
+            _logger.warning("%s; not gathered", error)
+    gathers = records is not None
+    records = records if gathers else read_records(folder.records, task.study)
     records.written[missing_histories(task.job, folder, records)] = np.nan
     asked = asked_runs(task, records, part)
     gained = int(records.recorded[asked].sum()) - plan.recorded

@@ -1,11 +1,11 @@
 """The fault campaign: sweeps are struck at random moments, and must lose nothing, change nothing and never hang.
 
-    python tests/benchmarks/faults.py TABLE.csv [--kills 200] [--seed 0] [--slurm 3] [--only KIND]
+    python tests/benchmarks/faults.py TABLE.csv [--kills 200] [--seed 0] [--slurm 3] [--only KIND] [--model]
 
 About 3 s a kill on a crowded core. Kinds of faults and what is looked at: tests/study/fault_kinds.py. The table has
 a line for each kind: cases, faults that struck, starts, acknowledged records, those of them that were lost, datasets that
 differ from the undisturbed one, starts that hung, processes left behind, the longest start [s]. The last line is the
-sum. With --slurm, nodes of a Slurm of its own are lost as well, slurmd first; there the records on disk when the node was
+sum. With --model, oscillators of the program's own are swept instead of a double without mechanics. With --slurm, nodes of a Slurm of its own are lost as well, slurmd first; there the records on disk when the node was
 lost count as acknowledged. Full disk and read-only folder need the right to mount a tmpfs. Status 1 if anything is
 wrong; the case is printed with its seed, `--only KIND --seed SEED` repeats it.
 """
@@ -39,9 +39,9 @@ COUNTS = ("faults", "starts", "acknowledged", "lost", "different", "hangs", "lef
 EVERY = 3  # rounds between cases under mpirun, which take three times as long
 
 
-def make_outcomes(folder: Path, kills: int, seed: int, only: str | None) -> Iterator[Outcome]:
+def make_outcomes(folder: Path, kills: int, seed: int, only: str | None, model: bool) -> Iterator[Outcome]:
     """Yield what came of case after case, until so many faults have struck."""
-    reference = make_reference(folder / "reference")
+    reference = make_reference(folder / "reference", model)
     kinds = [only] if only else list(KINDS)
     if not can_mount(folder):
         print(f"left out, since no tmpfs can be mounted here: {', '.join(NEED_MOUNT)}", file=sys.stderr)
@@ -132,10 +132,11 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--slurm", type=int, default=0, help="nodes to lose under a Slurm of its own")
     parser.add_argument("--only", choices=KINDS)
+    parser.add_argument("--model", action="store_true", help="sweep oscillators instead of a double")
     arguments = parser.parse_args()
     folder = Path(tempfile.mkdtemp(prefix="faults-"))
     outcomes: list[Outcome] = []
-    cases = make_outcomes(folder, arguments.kills, arguments.seed, arguments.only)
+    cases = make_outcomes(folder, arguments.kills, arguments.seed, arguments.only, arguments.model)
     nodes = lose_nodes(folder, arguments.slurm) if arguments.slurm else ()
     for outcome in itertools.chain(cases, nodes):
         outcomes.append(outcome)

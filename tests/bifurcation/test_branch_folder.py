@@ -8,6 +8,7 @@ from cvt_hpc.bifurcation.attractors import Attractor
 from cvt_hpc.bifurcation.dataset import Stability
 from cvt_hpc.bifurcation.followed import Followed
 from cvt_hpc.cli import main
+from cvt_hpc.locks import locked
 from cvt_hpc.models.linear_stability.branch import Branch
 from cvt_hpc.vibration.classes import OccurrenceClass
 
@@ -42,7 +43,7 @@ def branch(tmp_path, monkeypatch):
 
 
 def names(folder):
-    return sorted(path.name for path in folder.iterdir())
+    return sorted(path.name for path in folder.iterdir() if path.name != ".branch.lock")
 
 
 def stability(folder):
@@ -54,7 +55,7 @@ def test_another_job_is_refused_and_fresh_leaves_none_of_its_pictures(branch, tm
     out = tmp_path / "out"
     assert branch() == 0
     (out / "branch_notes.png").write_text("mine")
-    assert names(out) == ["branch.nc", "branch_1.png", "branch_2.png", "branch_notes.png"]
+    assert names(out) == ["branch.json", "branch.nc", "branch_1.png", "branch_2.png", "branch_notes.png"]
     before = (out / "branch.nc").read_bytes()
     assert branch("--set", "friction_gradient=-0.6") == 2
     error = capsys.readouterr().err
@@ -65,7 +66,7 @@ def test_another_job_is_refused_and_fresh_leaves_none_of_its_pictures(branch, tm
     )
     assert (out / "branch.nc").read_bytes() == before
     assert branch("--set", "friction_gradient=-0.6", "--fresh") == 0
-    assert names(out) == ["branch.nc", "branch.png", "branch_notes.png"]
+    assert names(out) == ["branch.json", "branch.nc", "branch.png", "branch_notes.png"]
     (tmp_path / "x.toml").write_text(JOB + "[branch]\nresolution = 2\n")
     assert branch("--set", "friction_gradient=-0.6") == 2
     assert "branch.resolution is 1.0 there, 2.0 here" in capsys.readouterr().err
@@ -102,3 +103,55 @@ def test_keys_of_the_table_branch_are_not_set_on_the_command_line(key, branch, t
     assert branch("--set", f"{key}=-1") == 2
     told = f"--set {key}: expected a parameter or an axis, found a key of [branch]"
     assert told in capsys.readouterr().err and not (tmp_path / "out").exists()
+
+
+def test_one_process_at_a_time_and_no_lock_through_a_link(branch, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert branch() == 0
+    with locked(out / ".branch.lock"):
+        assert branch() == 2
+    assert "expected a folder that no run is at work in, found process" in capsys.readouterr().err
+    (tmp_path / "mine").write_text("mine")
+    (out / ".branch.lock").unlink()
+    (out / ".branch.lock").symlink_to(tmp_path / "mine")
+    assert branch() == 2
+    assert ".branch.lock: expected a file, found a link; remove it" in capsys.readouterr().err
+    assert branch("--fresh") == 0
+    assert (tmp_path / "mine").read_text() == "mine"
+
+
+def test_a_diagram_of_an_earlier_version_has_no_job_file(branch, tmp_path, capsys):
+    assert branch() == 0
+    (tmp_path / "out" / "branch.json").unlink()
+    assert branch("--set", "friction_gradient=-0.6") == 2
+    assert "found that of another (" in capsys.readouterr().err
+    assert branch() == 0
+    assert (tmp_path / "out" / "branch.json").exists()
+
+
+def test_a_changed_job_file_is_mended_by_its_own_job_alone(branch, tmp_path, capsys):
+    assert branch() == 0
+    path = tmp_path / "out" / "branch.json"
+    whole = path.read_text()
+    path.write_text(whole.replace("105.0", "104.0"))
+    assert path.read_text() != whole
+    assert branch("--set", "friction_gradient=-0.6") == 2
+    assert "does not fit its checksum" in capsys.readouterr().err
+    assert branch() == 0
+    assert path.read_text() == whole
+
+
+@pytest.mark.parametrize("left", ["damaged", "foreign"])
+def test_a_dataset_that_cannot_be_read_is_made_again_where_the_job_file_vouches(
+    branch, tmp_path, capsys, left
+):
+    assert branch() == 0
+    (tmp_path / "out" / "branch.nc").write_text("mine")
+    if left == "foreign":
+        (tmp_path / "out" / "branch.json").unlink()
+        assert branch() == 2
+        assert branch("--fresh") == 2
+        assert (tmp_path / "out" / "branch.nc").read_text() == "mine"
+    else:
+        assert branch() == 0
+        assert stability(tmp_path / "out") == [[Stability.NOT_FOUND] * 2] * 2

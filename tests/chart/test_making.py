@@ -17,6 +17,7 @@ from cvt_hpc.chart import load_chart, make_chart
 from cvt_hpc.chart.making import _tell_compiling
 from cvt_hpc.chart.table import table_lines
 from cvt_hpc.errors import InputError
+from cvt_hpc.output_folder import checksum
 from cvt_hpc.study.provenance import git_revision, machine
 
 DAMAGE = {
@@ -229,7 +230,7 @@ def test_without_its_job_file_a_chart_is_known_by_its_points(write_chart, undraw
     assert (told, job_file.read_bytes()) == ([], whole)
     damage()
     changed = write_chart(("20 um", "21 um"))
-    with pytest.raises(InputError, match="or --fresh to throw away its points, which are of another job"):
+    with pytest.raises(InputError, match="or --fresh to throw away its results, which are of another job"):
         made(changed)
     assert made(changed, fresh=True, tell=told.append).table.read_bytes() != before
     assert len(told) == 13
@@ -290,3 +291,45 @@ def test_one_of_several_processes_tells_what_it_compiles():
         levels.append(logger.level)
     logger.setLevel(before)
     assert levels == [logging.INFO, logging.ERROR]
+
+
+def test_with_fresh_names_of_scenes_in_a_made_up_job_file_remove_nothing_outside(
+    write_chart, undrawn, tmp_path
+):
+    report = made(write_chart())
+    (tmp_path / "out/mine.png").write_text("mine")
+    path = tmp_path / "out/bells/chart.json"
+    entry = json.loads(path.read_text())
+    del entry["checksum"]
+    entry["job"]["scenes"]["../mine"] = {}
+    path.write_text(json.dumps({**entry, "checksum": checksum(entry)}))
+    made("c.toml", fresh=True)
+    assert (tmp_path / "out/mine.png").read_text() == "mine"
+    assert report.table.exists()
+
+
+@pytest.mark.parametrize("name", [".chart.lock", "points", "chart.json"])
+def test_links_in_the_folder_of_a_chart_lead_nowhere(write_chart, undrawn, tmp_path, name):
+    made(write_chart())
+    path, mine = tmp_path / "out/bells" / name, tmp_path / "mine"
+    mine.mkdir()
+    (mine / "a.npz").write_text("mine")
+    if path.is_dir():
+        path.rename(tmp_path / "out/bells_points")
+    else:
+        path.unlink()
+    path.symlink_to(mine)
+    if name != "chart.json":  # which the points tell
+        with pytest.raises(InputError, match=f"{name}: expected .* found a link; remove it"):
+            made("c.toml")
+    made("c.toml", fresh=True)
+    assert [(path.name, path.read_text()) for path in mine.iterdir()] == [("a.npz", "mine")]
+
+
+def test_a_point_that_unpacks_to_more_than_a_point_is_measured_again(write_chart, undrawn, tmp_path, caplog):
+    job = write_chart()
+    before = made(job).table.read_bytes()
+    point = tmp_path / "out/bells/points/ringing-soft-3.npz"
+    np.savez_compressed(point, head=np.zeros(1 << 25))  # 256 MiB in 300 kB
+    assert made(job).table.read_bytes() == before
+    assert "ringing-soft-3.npz: damaged (it holds more than a point)" in caplog.text

@@ -12,15 +12,16 @@ import signal
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from fault_child import ACKNOWLEDGED
 from fault_starts import Forked, Hang, Launched
 from recorded import assert_same_numbers
-from study_double import Axis, Job, Simulator, logistic_numbers
+from study_double import Axis, Job, Simulator
 
+from cvt_hpc.job import load_job
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.recovery import read_records
@@ -28,8 +29,47 @@ from cvt_hpc.study.record.recovery import read_records
 RUNS = 40
 HISTORIES = (5, 23)
 JOB = Job((Axis("load", tuple(range(RUNS))),), histories=HISTORIES)
+OSCILLATORS = """
+name = "oscillators"
+model = "oscillator"
+[axes]
+start = ["sliding", "sticking"]
+belt_speed = { from = "0.18 m/s", to = "0.275 m/s", step = "5 mm/s" }
+[scene]
+normal_load = "1 N"
+initial_displacement = "0.1 mm"
+[oscillator]
+mass = "0.538 kg"
+stiffness = "6957 N/m"
+damping = "5.946 N s/m"
+[friction]
+friction_law = "stribeck"
+kinetic_friction = 2.0
+friction_gradient = "-40 s/m"
+stribeck_velocity = "0.1 m/s"
+[numerics]
+step = "100 us"
+[run]
+duration = "2.5 s"
+[record]
+sampling_rate = "2 kHz"
+history = [{ start = "sliding", belt_speed = "0.205 m/s" }, { start = "sticking", belt_speed = "0.195 m/s" }]
+[vibration]
+band_low = "5 Hz"
+band_high = "100 Hz"
+window_length = "0.4 s"
+amplitude_threshold = "50 um"
+"""
 _MOST_STARTS = 5  # after the last fault
 _GATHERING = 0.15  # [s], about
+
+
+class Reference(NamedTuple):
+    """An undisturbed sweep: options of `fault_child` for the same one, its dataset and histories by run."""
+
+    options: dict[str, Any]
+    dataset: xr.Dataset
+    histories: dict[int, xr.Dataset]
 
 
 @dataclass
@@ -78,11 +118,11 @@ class Case:
         Which case it is.
     folder : Path
         For all its files, `out` among them.
-    reference : xarray.Dataset
-        Of the undisturbed sweep.
+    reference : Reference
+        The undisturbed sweep.
     """
 
-    def __init__(self, kind: str, seed: str, folder: Path, reference: xr.Dataset) -> None:
+    def __init__(self, kind: str, seed: str, folder: Path, reference: Reference) -> None:
         self.random = random.Random(f"{seed} {kind}")
         self.outcome = Outcome(kind, seed)
         self.out = folder / "disk" / "out"
@@ -97,10 +137,8 @@ class Case:
         every = {
             "out": str(self.out),
             "acknowledged": str(self._told),
-            "runs": RUNS,
-            "histories": HISTORIES,
             "lanes": self.random.choice((1, 1, 3, 7)),
-            "parameters": {"pause": 0.008},
+            **self._reference.options,
             **options,
         }
         every["sweep"] = {"progress": False, **options.get("sweep", {})}
@@ -168,8 +206,8 @@ class Case:
         try:
             with open_results(self.out) as found:
                 done = found["status"].values == 1
-                there = found["spectrum"].values[done].tobytes()
-                same = there == self._reference["spectrum"].values[done].tobytes()
+                there = found["amplitude"].values[done].tobytes()
+                same = there == self._reference.dataset["amplitude"].values[done].tobytes()
         except Exception as error:
             self.outcome.wrong.append(f"the dataset that was there: {error!r}")
         else:
@@ -196,10 +234,11 @@ class Case:
     def _is_same(self) -> bool:
         try:
             with open_results(self.out) as found:
-                assert_same_numbers(found, self._reference)
-            for index in HISTORIES:
+                assert_same_numbers(found, self._reference.dataset)
+            for index, expected in self._reference.histories.items():
                 with xr.open_dataset(StudyFolder(self.out).history(index)) as history:
-                    assert (history["x"].values == logistic_numbers(JOB.point(index), JOB)).all()
+                    timings = {"core_seconds"} & {*history.variables}
+                    assert_same_numbers(history.drop_vars(timings), expected.drop_vars(timings))
         except (AssertionError, OSError) as error:
             self.outcome.wrong.append(f"{error!r}")
             return False
@@ -209,8 +248,18 @@ class Case:
         return self._output.read_text()[-2000:] if self._output.exists() else ""
 
 
-def make_reference(folder: Path) -> xr.Dataset:
-    """Return the dataset of an undisturbed sweep."""
-    run(JOB, folder, simulator=Simulator(), progress=False)
-    with open_results(folder) as dataset:
-        return dataset.load()
+def make_reference(folder: Path, model: bool = False) -> Reference:
+    """Sweep without disturbance: the double, or oscillators by the program's own simulator."""
+    folder.mkdir(exist_ok=True)
+    if model:
+        job_file = folder / "oscillators.toml"
+        job_file.write_text(OSCILLATORS)
+        out, options = run(load_job(job_file), folder / "out", progress=False).out, {"job": str(job_file)}
+    else:
+        options = {"runs": RUNS, "histories": HISTORIES, "parameters": {"pause": 0.008}}
+        out = run(JOB, folder / "out", simulator=Simulator(), progress=False).out
+    histories = {int(path.stem.split("-")[1]): xr.load_dataset(path) for path in out.glob("histories/*.nc")}
+    assert len(histories) == len(HISTORIES)
+    with open_results(out) as dataset:
+        assert dataset["status"].size == RUNS and (dataset["status"] == 1).all()
+        return Reference(options, dataset.load(), histories)

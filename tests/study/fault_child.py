@@ -19,7 +19,9 @@ import numpy as np
 import study_double
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.study import gather
+from cvt_hpc.job import load_job
+from cvt_hpc.study import gather, run
+from cvt_hpc.study.ranks.launch import end_process
 from cvt_hpc.study.record import log
 from cvt_hpc.study.record.log import Record, RecordLog
 
@@ -32,7 +34,7 @@ _JUMP = 3e8  # [s], ten years
 def main(options: dict[str, Any]) -> int:
     """Sweep or gather.
 
-    Further options: `acknowledged`, a file that is told of each record; `gathers` instead of sweeping; `torn`, after
+    Further options: `job`, the file of one that is swept in the place of the double; `acknowledged`, a file that is told of each record; `gathers` instead of sweeping; `torn`, after
     how many bytes written to a log the process dies, or where it `turns_read_only`, its file system refuses all
     changes; `clock`, the seed of a clock that jumps.
     """
@@ -41,9 +43,11 @@ def main(options: dict[str, Any]) -> int:
         log.os = TornWrites(options["torn"], options.get("turns_read_only", False))
     if "clock" in options:
         let_clock_jump(options["clock"])
-    if not options.get("gathers"):
+    if not options.get("gathers") and "job" not in options:
         return study_double.main(options)
     try:
+        if not options.get("gathers"):
+            return end_process(run(load_job(options["job"]), options["out"], **options["sweep"]).exit_status)
         gather(options["out"])
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)

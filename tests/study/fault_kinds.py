@@ -8,13 +8,13 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-import xarray as xr
-from fault_cases import RUNS, Case, Outcome
+from fault_cases import RUNS, Case, Outcome, Reference
+from fault_damage import DAMAGE
 
 _LOG = 20_000  # [bytes], about
 
 
-def play(kind: str, seed: str, folder: Path, reference: xr.Dataset) -> Outcome:
+def play(kind: str, seed: str, folder: Path, reference: Reference) -> Outcome:
     """Return what came of a case; its files stay if something is to be complained of."""
     case = Case(kind, seed, folder, reference)
     try:
@@ -101,6 +101,24 @@ def _lose_power(case: Case) -> Outcome:
         case.strike(start)
         case.cut_last_log()
     return case.finish()
+
+
+def _damage_folder(case: Case) -> Outcome:
+    """Kill, let somebody else have the folder, see that it is refused or read as it was, and go on."""
+    start = case.start()
+    case.wait_for_a_moment(start, case.random.randint(1, RUNS))
+    case.strike(start)
+    damage = case.random.choice([*DAMAGE])
+    outside = case.out.parent.parent / "outside"
+    outside.write_text("mine")
+    with DAMAGE[damage](case.out, outside, case.random) as refused:
+        case.outcome.faults += 1
+        if (status := case.end(case.start(gathers=True))) != (2 if refused else 0):
+            case.outcome.wrong.append(f"{damage}: gather ended with {status}")
+    finished = case.finish()
+    if outside.read_text() != "mine":
+        case.outcome.wrong.append(f"{damage}: a file outside was written to")
+    return finished
 
 
 def _turn_read_only(case: Case) -> Outcome:
@@ -198,6 +216,7 @@ KINDS: dict[str, Callable[[Case], Outcome]] = {
     "kill -9 at the end of a sweep": _kill_last_gather,
     "kill -9 in mid-write": _tear_write,
     "kill -9 and a log cut short": _lose_power,
+    "kill -9 and a folder damaged or made up": _damage_folder,
     "full disk": _fill_disk,
     "read-only folder": _make_read_only,
     "folder turns read-only": _turn_read_only,

@@ -13,6 +13,7 @@ CASES = {
     "kill -9 of gather": "49",
     "kill -9 in mid-write": "6",
     "kill -9 and a log cut short": "6",
+    "kill -9 and a folder damaged or made up": "0",
     "full disk": "15",
     "read-only folder": "1",
     "folder turns read-only": "0",
@@ -22,7 +23,7 @@ CASES = {
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
-    """Return the dataset of an undisturbed sweep."""
+    """The undisturbed sweep."""
     return make_reference(tmp_path_factory.mktemp("reference"))
 
 

@@ -8,8 +8,8 @@ from study_double import Axis, Job, Simulator
 from study_processes import wait_until
 
 from cvt_hpc.errors import InputError
+from cvt_hpc.locks import is_locked, locked
 from cvt_hpc.study import gather, open_results, read_status, run
-from cvt_hpc.study.lock import is_locked, locked
 
 JOB = Job()
 OTHER = Job(parameters={"thrust": 2.0})
@@ -126,7 +126,7 @@ class TestDamagedJobFile:
     def test_another_job_is_refused(self, tmp_path):
         before = content(tmp_path)
         with pytest.raises(
-            InputError, match="or --fresh to throw away its logs, which hold no record of this job"
+            InputError, match="or --fresh to throw away its results, which are of another job"
         ):
             sweep(OTHER, tmp_path)
         assert content(tmp_path) == before

@@ -13,9 +13,9 @@ from study_double import Axis, Job, Simulator
 from study_processes import PATIENCE, wait_until
 
 from cvt_hpc.errors import InputError
+from cvt_hpc.locks import locked
 from cvt_hpc.study import gather, open_results, read_status, run
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.lock import locked
 from cvt_hpc.study.part import Part, read_part
 
 RUNS = 60

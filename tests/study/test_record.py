@@ -14,7 +14,15 @@ from cvt_hpc.study.record.log import RecordLog
 from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.variables import Status
 
-SESSION = {"id": "a", "started": 1.0}
+SESSION = {
+    "id": "a",
+    "started": 1.0,
+    "command": "cvt-hpc run",
+    "host": "here",
+    "ranks": 1,
+    "versions": {"numpy": "2"},
+    "git_revision": "",
+}
 RUNS = 8
 
 
@@ -75,7 +83,7 @@ def assert_recorded(records, rows, indices):
 
 def test_records_come_back_bitwise(tmp_path, study, rows):
     write_log(tmp_path / "r", study, rows, [3, 0, 7])
-    write_log(tmp_path / "r", study, rows, [1], {"id": "b", "started": 0.5})
+    write_log(tmp_path / "r", study, rows, [1], {**SESSION, "id": "b", "started": 0.5})
     records = read_records(tmp_path / "r", study)
     assert_recorded(records, rows, [0, 1, 3, 7])
     assert [session["id"] for session in records.sessions] == ["b", "a"]
@@ -152,7 +160,7 @@ def test_a_folder_among_the_logs_is_named(tmp_path, study, rows):
     (tmp_path / "r" / "sub").mkdir()
     records = read_records(tmp_path / "r", study)
     assert_recorded(records, rows, [2])
-    assert "sub: left out: Is a directory" in records.warnings[0]
+    assert "sub: left out: a folder in the place of a file" in records.warnings[0]
 
 
 def test_a_log_of_another_version_is_named(tmp_path, study, rows, monkeypatch):

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from cvt_hpc.errors import CRASHED, InputError
+from cvt_hpc.files import append_text
 from cvt_hpc.study.ranks.survival import RankDied, noticing_deaths
 
 if TYPE_CHECKING:
@@ -229,8 +230,8 @@ def _abort_on_uncaught(world: MPI.Intracomm, crash_log: Path) -> None:
 def _abort(world: MPI.Intracomm, text: str, crash_log: Path) -> None:
     message = f"rank {world.rank}: {text}\nrank {world.rank}: ends all {world.size} ranks\n"
     try:
-        with suppress(OSError), crash_log.open("a") as log:  # no folder, no space: stderr has to do
-            log.write(f"{time.strftime('%Y-%m-%dT%H:%M:%S%z')} {message}")
+        with suppress(OSError):  # no folder, no space, a link: stderr has to do
+            append_text(crash_log, f"{time.strftime('%Y-%m-%dT%H:%M:%S%z')} {message}")
         sys.stdout.flush()
         print(message, end="", file=sys.stderr, flush=True)
         time.sleep(0.5)  # mpirun, once told to abort, drops output that it has not yet passed on

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from io import FileIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.files import StorageError, naming_refusals
+from cvt_hpc.files import StorageError, naming_refusals, open_regular
 from cvt_hpc.study.batches import Batch
 from cvt_hpc.study.description import Study
 
@@ -116,12 +117,17 @@ def read_rows(study: Study, logs: Sequence[Path], entries: np.ndarray, name: str
     flat = np.reshape(entries, -1)
     for number in np.unique(flat["log"][flat["log"] >= 0]):
         path = logs[number]
-        with naming_refusals(path, "a record log that can be read"), path.open("rb", buffering=0) as file:
+        with naming_refusals(path, "a record log that can be read"), open_log(path) as file:
             for i in np.flatnonzero(flat["log"] == number):
                 # Read, not mapped: to touch a mapped file that a full disk has cut short ends the process.
                 if os.preadv(file.fileno(), [targets[i]], flat["place"][i] + offset) < dtype.itemsize:
                     raise StorageError(f"{path}: expected run {flat['run'][i]}, found the file cut short")
     return rows
+
+
+def open_log(path: Path) -> FileIO:
+    """Open a record log for reading, without a buffer; OSError as of `open_regular`."""
+    return open(path, "rb", buffering=0, opener=lambda name, flags: open_regular(path))
 
 
 def choose(study: Study, logs: Sequence[Path], found: np.ndarray, marked: np.ndarray) -> Records:

@@ -139,7 +139,13 @@ class RecordLog:
         return before
 
     def _open(self) -> None:
-        self._descriptor = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o666)
+        # The folder itself, and no link that may stand in its place.
+        folder = os.open(self.path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+        try:
+            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | os.O_CLOEXEC
+            self._descriptor = os.open(self.path.name, flags, 0o666, dir_fd=folder)
+        finally:
+            os.close(folder)
         self._write(self._preamble)
         sync_folder(self.path.parent)
         self._synced = time.monotonic()

@@ -16,7 +16,9 @@ from cvt_hpc.study.record.frames import (
     AGAIN,
     ALONE,
     HEAD,
+    LATEST,
     MAGIC,
+    MOST_ATTEMPTS,
     PLACE,
     PREAMBLE_LIMIT,
     RECORD,
@@ -26,7 +28,10 @@ from cvt_hpc.study.record.frames import (
     RecordFormat,
     read_preamble,
 )
-from cvt_hpc.study.record.index import ENTRY, Records, Timing, choose
+from cvt_hpc.study.record.index import ENTRY, Records, Timing, choose, open_log
+from cvt_hpc.variables import Status
+
+_ENDED = [int(status) for status in Status if status != Status.NOT_RUN]
 
 
 class _Death(NamedTuple):
@@ -54,7 +59,7 @@ def read_records(folder: Path, study: Study) -> Records:
     reader = _Reader(study)
     for number, path in enumerate(logs):
         try:
-            with path.open("rb", buffering=0) as file:
+            with open_log(path) as file:
                 reader.read(number, file)
         except (OSError, ForeignLog) as error:
             text = error.strerror if isinstance(error, OSError) else error
@@ -130,14 +135,22 @@ class _Reader:
 
     def _sound_frames(self, file: FileIO, start: int, flaws: list[str]) -> Iterator[tuple[int, Frame]]:
         """Yield place and content of the frames that name runs of the study; the rest goes to `flaws`."""
-        size, runs = os.fstat(file.fileno()).st_size, self._study.size
+        size = os.fstat(file.fileno()).st_size
         for begin, end, frame in self._layout.frames(file, start, size):
-            if frame is not None and all(0 <= index < runs for index, _ in frame.places):
+            if frame is not None and self._is_sound(frame):
                 yield begin, frame
             elif end == size and end - begin < self._layout.record_size:
                 flaws.append(f"the last {end - begin} bytes are an unfinished record")
             else:
                 flaws.append(f"bytes {begin} to {end} are damaged")
+
+    def _is_sound(self, frame: Frame) -> bool:
+        """Whether a frame, though its checksum is right, says what a sweep may have written."""
+        places = all(
+            0 <= run < self._study.size and 0 < attempt <= MOST_ATTEMPTS for run, attempt in frame.places
+        )
+        ended = frame.kind != RECORD or frame.row[self._status] in _ENDED
+        return places and ended and 0.0 <= frame.written < LATEST
 
     def _entries(
         self, frames: Iterable[tuple[int, Frame]], number: int, trace: _Trace

@@ -1,0 +1,365 @@
+"""An output folder: whose it is, who is at work in it, and what of it may be removed.
+
+Studies, charts and bifurcation diagrams have one each, with a job file that vouches for all else. The folder
+may come from somebody else, damaged or made up: what is read is checked, and nothing is written or removed
+outside.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import logging
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from pathlib import Path
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
+
+from cvt_hpc.errors import InputError
+from cvt_hpc.files import (
+    StorageError,
+    kind_of,
+    make_own_folder,
+    naming_refusals,
+    read_regular,
+    remove_own,
+    try_to_write,
+    written_aside,
+)
+from cvt_hpc.locks import is_locked, locked
+
+CHECKSUM = "checksum"  # key of the job file
+CHART_FILE = "chart.json"  # its folder holds nothing else, while studies and diagrams may share one
+_LIMIT = 1 << 29  # [bytes] of a job file; 10^6 samples of ten parameters are 400 MB
+_DEEPEST = 40  # levels of tables and lists; a job has six
+
+_logger = logging.getLogger(__name__)
+
+Content = TypeVar("Content")
+
+
+class DamagedJobError(InputError):
+    """The file that says whose an output folder is cannot be believed; what lies beside it may tell.
+
+    Attributes
+    ----------
+    entry : dict
+        What could be read of it.
+    """
+
+    def __init__(self, text: str, entry: dict[str, Any] | None = None) -> None:
+        super().__init__(text)
+        self.entry = entry or {}
+
+
+class Kind(NamedTuple):
+    """What tells one kind of output folder from another.
+
+    Attributes
+    ----------
+    what : str
+        What is made in it, for people.
+    job_file, lock_file : str
+        Names of these files.
+    format : str
+        First entry of the job file.
+    folders : tuple of str
+        Names of the folders in it.
+    """
+
+    what: str
+    job_file: str
+    lock_file: str
+    format: str
+    folders: tuple[str, ...] = ()
+
+
+class OutputFolder(ABC, Generic[Content]):
+    """An output folder of some kind.
+
+    Parameters
+    ----------
+    path : str or Path
+        The folder; it need not exist.
+
+    Attributes
+    ----------
+    is_signed : bool
+        Whether the job file, when it was read last, had a checksum; those of earlier versions have none.
+    """
+
+    kind: ClassVar[Kind]
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self.job_file = self.path / self.kind.job_file
+        self.lock_file = self.path / self.kind.lock_file
+        self.is_signed = False
+
+    @abstractmethod
+    def document(self, content: Content) -> dict[str, Any]:
+        """Return what the job file says of a content, as JSON types, its fingerprint among them."""
+
+    @abstractmethod
+    def accept(self, entry: dict[str, Any]) -> Any:
+        """Return what a sound job file says, in the form in which `refuse_other` takes it.
+
+        Raises
+        ------
+        ValueError, TypeError, KeyError
+            If it is not what `document` returns.
+        """
+
+    @abstractmethod
+    def refuse_other(self, found: Any, asked: Content) -> None:
+        """Raise InputError unless the content that was found is the one that is asked for."""
+
+    def agrees(self, found: Any, asked: Content) -> bool:
+        """Return whether a content that was found, and is not refused, agrees in all else."""
+        return True
+
+    @abstractmethod
+    def unexplained(self) -> str | None:
+        """Return what lies here that only a job file explains, in words; None for nothing."""
+
+    @abstractmethod
+    def results_tell(self) -> Callable[[Content], bool] | None:
+        """Return what tells whether the results here are of a content; None if there are no results."""
+
+    @abstractmethod
+    def written(self, found: Any) -> Iterator[Path]:
+        """Yield the files that work in this folder has left, by what a sound job file says."""
+
+    def read_job(self) -> Any:
+        """Return what the job file says, as of `accept`; None if there is no such file.
+
+        Raises
+        ------
+        DamagedJobError
+            If it cannot be believed.
+        InputError
+            If it is the file of something else, or cannot be read.
+        """
+        expected = f"{self.job_file}: expected the job of a {self.kind.what}, found"
+        if (kind := kind_of(self.job_file)) is None:
+            return None
+        if kind != "a file":
+            raise DamagedJobError(f"{expected} {kind}")
+        try:
+            data = read_regular(self.job_file, _LIMIT)
+        except OSError as error:
+            if error.errno == errno.EFBIG:
+                raise DamagedJobError(f"{expected} {error.strerror}") from error
+            raise StorageError(f"{expected}: {error.strerror}") from error
+        try:
+            entry = json.loads(data.decode(), parse_constant=_refuse_constant)
+            if not isinstance(entry, dict):
+                raise ValueError("it is no table")
+        except (ValueError, RecursionError) as error:
+            raise DamagedJobError(f"{expected} damage ({error})") from error
+        if entry.get("format") != self.kind.format:
+            found = entry.get("format")
+            quoted = json.dumps(found[:60]) if isinstance(found, str) else "none"
+            raise InputError(f'{self.job_file}: expected format "{self.kind.format}", found {quoted}')
+        try:
+            _check_depth(entry)
+            stated = entry.pop(CHECKSUM, None)
+            self.is_signed = stated is not None
+            if not self.is_signed:
+                self.check_unsigned(entry)
+            elif stated != checksum(entry):
+                raise ValueError("its content does not fit its checksum")
+            return self.accept(entry)
+        except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+            words = f"no {error}" if isinstance(error, KeyError) else error
+            raise DamagedJobError(f"{expected} damage ({words})", entry) from error
+
+    def check_unsigned(self, entry: dict[str, Any]) -> None:
+        """Raise ValueError unless a job file of an earlier version, without checksum, fits itself."""
+
+    def check_free_for(self, asked: Content, fresh: bool) -> Any:
+        """Make sure that the folder may be used for a content; touches nothing.
+
+        Parameters
+        ----------
+        asked : Content
+            What is to be made in it.
+        fresh : bool
+            Whether earlier results may be thrown away.
+
+        Returns
+        -------
+        object
+            What a sound job file says, None if there is none.
+
+        Raises
+        ------
+        InputError
+            If the folder is a file or that of something else, holds another job, or results that neither a
+            job file nor they themselves explain.
+        """
+        what = self.kind.what
+        with naming_refusals(self.path, "a folder that can be read"):
+            if not self.path.is_dir():
+                if (kind := kind_of(self.path)) is not None:
+                    raise InputError(f"{self.path}: expected a folder for the results, found {kind}")
+                return None
+            expected = f"{self.path}: expected an empty folder or that of an earlier {what}, found"
+            if self.kind.job_file != CHART_FILE and kind_of(self.path / CHART_FILE):
+                raise InputError(f"{expected} that of a chart; choose another --out")
+            # In this order: another start writes its job file before any results.
+            unexplained = self.unexplained()
+            try:
+                found = self.read_job()
+            except DamagedJobError as error:
+                self._ask_results(asked, fresh, str(error), error.entry)
+                return None
+            if found is None and unexplained is not None:
+                self._ask_results(asked, fresh, f"{expected} {unexplained}", {})
+            if found is not None and not fresh:
+                self.refuse_other(found, asked)
+            return found
+
+    @contextmanager
+    def claimed(
+        self, asked: Content, *, fresh: bool = False, inner: AbstractContextManager | None = None
+    ) -> Iterator[None]:
+        """Be at work in the folder, which is made if needed, for the time of a `with`.
+
+        Parameters
+        ----------
+        asked : Content
+            What is made in it.
+        fresh : bool
+            Throw away what earlier work has left.
+        inner : context manager, optional
+            The lock of a part: the folder's own lock is shared then with other parts.
+
+        Raises
+        ------
+        InputError
+            As of `check_free_for`, if another process is at work here, or the system refuses.
+        """
+        self.check_free_for(asked, fresh)
+        self.create(fresh)
+        with locked(self.lock_file, shared=inner is not None), inner or nullcontext():
+            found = self.check_free_for(asked, fresh)  # again: another may have been there before the lock
+            if fresh:
+                self.clear(found)
+                found = None
+            self.save(asked)
+            yield
+
+    def create(self, fresh: bool = False) -> None:
+        """Make the folder and those in it, and try that files can be written there.
+
+        Parameters
+        ----------
+        fresh : bool
+            Remove what stands in their place, or in that of a lock, and is no folder or file: links, pipes.
+
+        Raises
+        ------
+        InputError
+            If the system refuses.
+        """
+        with naming_refusals(self.path, "a folder that results can be written to"):
+            self.path.mkdir(parents=True, exist_ok=True)
+            folders = [self.path / name for name in self.kind.folders]
+            for place in folders:
+                _make_way(place, ("a folder", "a file"), fresh)
+                make_own_folder(place)
+            for place in self.locks():
+                _make_way(place, ("a file",), fresh)
+            try_to_write((folders or [self.path])[0])
+
+    def locks(self) -> list[Path]:
+        """Return the lock files that are, or may be, in the folder."""
+        return [self.lock_file]
+
+    def is_in_use(self) -> bool:
+        """Return whether a process is at work in the folder."""
+        return any(map(is_locked, self.locks()))
+
+    def save(self, asked: Content) -> None:
+        """Write the job file, unless a sound one that agrees is there."""
+        try:
+            found = self.read_job()
+        except DamagedJobError:
+            found = None
+        agrees = found is not None and self.agrees(found, asked)
+        if agrees and self.is_signed:
+            return
+        if found is not None and not agrees:
+            _logger.warning("%s: does not fit its job; written anew", self.job_file)
+        elif found is None and self.results_tell() is not None:
+            _logger.warning(
+                "%s: damaged or gone; written anew, since the results are of this job", self.job_file
+            )
+        entry = {"format": self.kind.format, **self.document(asked)}
+        text = json.dumps({**entry, CHECKSUM: checksum(entry)}, indent=1, allow_nan=False)
+        with written_aside(self.job_file) as aside:
+            aside.write_text(text)
+
+    def clear(self, found: Any) -> None:
+        """Remove what work in the folder has left, and last the job file that vouches for it.
+
+        Parameters
+        ----------
+        found : object
+            What a sound job file says.
+        """
+        with naming_refusals(self.path, "a folder that results can be removed from"):
+            for path in [*self.written(found), *self.leftovers(), self.job_file]:
+                remove_own(path)
+
+    def leftovers(self) -> list[Path]:
+        """Return the half-written files of processes that died while they wrote."""
+        return [*self.path.glob(f".{self.job_file.name}.*.part")]
+
+    def _ask_results(self, asked: Content, fresh: bool, complaint: str, entry: dict[str, Any]) -> None:
+        """Raise the complaint unless results make up for the job file: they are to go, or are of this job."""
+        tell = self.results_tell()
+        is_own = isinstance(entry.get("fingerprint"), str)  # a job file of this program, if not as it was
+        if is_own and (fresh or entry["fingerprint"] == self.document(asked)["fingerprint"]):
+            return
+        if tell is not None and (fresh or tell(asked)):
+            return
+        advice = ", or --fresh to throw away its results, which are of another job" if is_own or tell else ""
+        raise InputError(f"{complaint}; choose another --out{advice}")
+
+
+def checksum(entry: dict[str, Any]) -> str:
+    """Return the SHA-256 [hex] of a document in JSON types, in which the order of keys counts."""
+    return hashlib.sha256(json.dumps(entry).encode()).hexdigest()
+
+
+def _make_way(path: Path, kinds: tuple[str, ...], fresh: bool) -> None:
+    """Remove what is none of these kinds, if results may be thrown away, or else raise InputError."""
+    found = kind_of(path)
+    if found is None or found in kinds:
+        return
+    if not fresh:
+        raise InputError(
+            f"{path}: expected {kinds[0]}, found {found}; remove it, or --fresh with all results"
+        )
+    remove_own(path)
+
+
+def _check_depth(entry: Any) -> None:
+    level, depth = [entry], 0
+    while level:
+        if (depth := depth + 1) > _DEEPEST:
+            raise ValueError("tables or lists nested too deep")
+        level = [
+            value
+            for part in level
+            for value in (part.values() if isinstance(part, dict) else part)
+            if isinstance(value, (dict, list))
+        ]
+
+
+def _refuse_constant(word: str) -> None:
+    raise ValueError(f"{word} is no number")
