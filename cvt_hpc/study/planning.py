@@ -23,8 +23,8 @@ from cvt_hpc.study.forecast.cost_model import Fit
 from cvt_hpc.study.histories import missing_histories
 from cvt_hpc.study.part import Part
 from cvt_hpc.study.provenance import new_session
+from cvt_hpc.study.ranks.counter import Counter
 from cvt_hpc.study.ranks.progress import Progress
-from cvt_hpc.study.ranks.schedule import Counter
 from cvt_hpc.study.ranks.time_limit import TimeLimit
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.record.recovery import read_records

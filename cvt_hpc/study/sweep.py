@@ -25,9 +25,10 @@ from cvt_hpc.study.gather import gather_records
 from cvt_hpc.study.histories import keep_histories, missing_histories
 from cvt_hpc.study.part import Part, read_part
 from cvt_hpc.study.planning import Plan, asked_runs, next_round, prepare
+from cvt_hpc.study.ranks.counter import Counter
 from cvt_hpc.study.ranks.launch import Team, assembled_team
 from cvt_hpc.study.ranks.progress import Progress
-from cvt_hpc.study.ranks.schedule import Counter, claimed_batches, open_counter
+from cvt_hpc.study.ranks.schedule import claimed_batches, open_counter
 from cvt_hpc.study.ranks.stopping import ELSEWHERE, SignalWatch, Stop
 from cvt_hpc.study.ranks.survival import outlive
 from cvt_hpc.study.ranks.time_limit import find_time_limit

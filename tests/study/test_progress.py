@@ -15,8 +15,8 @@ from study_processes import wait_until
 
 from cvt_hpc.study import read_status, run
 from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.ranks.counter import SerialCounter
 from cvt_hpc.study.ranks.progress import Progress, show_duration
-from cvt_hpc.study.ranks.schedule import SerialCounter
 from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.log import RecordLog
 

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from cvt_hpc.errors import CRASHED, InputError
 from cvt_hpc.files import append_text
-from cvt_hpc.study.ranks.survival import RankDied, noticing_deaths
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -87,6 +86,30 @@ def end_process(status: int) -> int:
         sys.stderr.flush()
         os._exit(status)
     return status
+
+
+class RankDied(Exception):
+    """MPI could not do something, most likely because a rank of the team is dead."""
+
+
+@contextmanager
+def noticing_deaths() -> Iterator[None]:
+    """Raise `RankDied` in the place of MPI's errors, where deaths are tolerated."""
+    try:
+        yield
+    except Exception as error:
+        mpi = sys.modules.get("mpi4py.MPI")  # a serial run never imports it
+        if mpi is None or not isinstance(error, mpi.Exception):
+            raise
+        # Not by its class: of a barrier that a death broke off, Open MPI 5.0.11 may say MPI_ERR_OTHER.
+        if not is_tolerated():
+            raise
+        raise RankDied(str(error)) from error
+
+
+def is_tolerated(environment: Mapping[str, str] = os.environ) -> bool:
+    """Return whether the launcher was asked to leave the other ranks alive when one dies."""
+    return environment.get("OMPI_MCA_mpi_ft_enable", "").lower() in ("1", "true", "yes")
 
 
 class Team:

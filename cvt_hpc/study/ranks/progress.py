@@ -8,7 +8,7 @@ from contextlib import ExitStack
 
 import numpy as np
 
-from cvt_hpc.study.ranks.schedule import Counter
+from cvt_hpc.study.ranks.counter import Counter
 
 _BAR_INTERVAL = 0.5  # [s]
 _FIRST_LINE = 5.0  # [s]; lines then come less and less often, so that a day's output stays readable

@@ -9,9 +9,9 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any, Self
 
+from cvt_hpc.study.ranks.counter import Counter
+from cvt_hpc.study.ranks.launch import RankDied
 from cvt_hpc.study.ranks.progress import show_duration
-from cvt_hpc.study.ranks.schedule import Counter
-from cvt_hpc.study.ranks.survival import RankDied
 from cvt_hpc.study.ranks.time_limit import TimeLimit
 
 # What a person at the terminal, Slurm at the end of a job, and Slurm as a warning before that send.

@@ -6,41 +6,13 @@ Elsewhere the launcher ends all ranks when one dies, and the same command goes o
 from __future__ import annotations
 
 import logging
-import os
-import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, TypeVar
+from collections.abc import Callable
+from typing import TypeVar
 
-if TYPE_CHECKING:
-    from cvt_hpc.study.ranks.launch import Team
+from cvt_hpc.study.ranks.launch import RankDied, Team, is_tolerated
 
 Result = TypeVar("Result")
 _logger = logging.getLogger(__name__)
-
-
-class RankDied(Exception):
-    """MPI could not do something, most likely because a rank of the team is dead."""
-
-
-@contextmanager
-def noticing_deaths() -> Iterator[None]:
-    """Raise `RankDied` in the place of MPI's errors, where deaths are tolerated."""
-    try:
-        yield
-    except Exception as error:
-        mpi = sys.modules.get("mpi4py.MPI")  # a serial run never imports it
-        if mpi is None or not isinstance(error, mpi.Exception):
-            raise
-        # Not by its class: of a barrier that a death broke off, Open MPI 5.0.11 may say MPI_ERR_OTHER.
-        if not is_tolerated():
-            raise
-        raise RankDied(str(error)) from error
-
-
-def is_tolerated(environment: Mapping[str, str] = os.environ) -> bool:
-    """Return whether the launcher was asked to leave the other ranks alive when one dies."""
-    return environment.get("OMPI_MCA_mpi_ft_enable", "").lower() in ("1", "true", "yes")
 
 
 def outlive(team: Team, work: Callable[[Team], Result]) -> Result:
