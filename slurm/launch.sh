@@ -24,9 +24,15 @@ set -u
 export PATH="$PWD/.venv/bin:$PATH"
 # One rank a core: threads of numerical libraries would only get in each other's way.
 export OMP_NUM_THREADS=1
-# Machine code is kept on a disk of the node: caches on network file systems are slow, and not always sound. A folder
-# that somebody else has made or can write to is not used, and one line says so.
-export NUMBA_CACHE_DIR="${NUMBA_CACHE_DIR:-${TMPDIR:-/tmp}/cvt_hpc-numba-$(id -u)}"
+# Machine code is kept on a disk of each node, in a folder of this job alone, which is removed at its end: caches on
+# network file systems are slow, and not always sound. A NUMBA_CACHE_DIR that is set at submission is used instead and
+# stays, so that further jobs need not compile again.
+own_cache=
+if [ -z "${NUMBA_CACHE_DIR:-}" ]; then
+    own_cache=$(mktemp -d "${TMPDIR:-/tmp}/cvt_hpc-numba-XXXXXXXXXX") || exit 2
+    trap 'rm -rf -- "$own_cache"' EXIT
+    export NUMBA_CACHE_DIR=$own_cache
+fi
 
 launch() {
     local launcher status
@@ -50,6 +56,9 @@ launch() {
         wait "$launcher"
         status=$?
     done
+    if [ -n "$own_cache" ] && [ "${SLURM_NNODES:-1}" -gt 1 ]; then # the trap removes that of this node alone
+        srun --mpi=none --ntasks="$SLURM_NNODES" --ntasks-per-node=1 rm -rf -- "$own_cache"
+    fi
     if [ "$status" -eq 99 ]; then
         echo "runs remain: back into the queue"
         scontrol requeue "$SLURM_JOB_ID" || echo "to go on, submit the same command again"

@@ -1,0 +1,60 @@
+"""slurm/launch.sh by itself, with programs of its own in the place of Slurm's."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+# Stands in for srun: the command ends with the status that is its name, and tells the folder of machine code and who
+# may look into it; what is to be removed is written down.
+SRUN = """#!/bin/bash
+case "$*" in
+    *"rm -rf"*) echo "$*" >> removed ;;
+    *) echo "$NUMBA_CACHE_DIR $(stat -c %a "$NUMBA_CACHE_DIR")" >> folders
+       touch "$NUMBA_CACHE_DIR/kernel"
+       exit "${@: -1}" ;;
+esac
+"""
+
+
+@pytest.fixture
+def launch(tmp_path):
+    """Return a function that launches a command which ends with a status, and returns the shell's own."""
+    srun = tmp_path / "bin" / "srun"
+    srun.parent.mkdir()
+    srun.write_text(SRUN)
+    srun.chmod(0o755)
+    (tmp_path / "tmp").mkdir()
+
+    def run(status, **environment):
+        known = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+        path = f"{srun.parent}:{known['PATH']}"
+        known |= {"TMPDIR": str(tmp_path / "tmp"), "PATH": path, "SLURM_NTASKS": "1", **environment}
+        command = f". {ROOT}/slurm/launch.sh && launch {status}"
+        return subprocess.run(["bash", "-c", command], cwd=tmp_path, env=known, timeout=60).returncode
+
+    return run
+
+
+def test_machine_code_has_a_folder_of_each_job_alone_that_is_gone_at_its_end(launch, tmp_path):
+    assert [launch(0), launch(1)] == [0, 1]
+    folders = [line.split() for line in (tmp_path / "folders").read_text().splitlines()]
+    assert len({folder for folder, _ in folders}) == 2  # nobody can make it beforehand
+    assert [rights for _, rights in folders] == ["700", "700"]
+    assert list((tmp_path / "tmp").iterdir()) == []
+
+
+def test_the_folders_of_other_nodes_are_removed_by_slurm(launch, tmp_path):
+    assert launch(0, SLURM_NNODES="2") == 0
+    folder = (tmp_path / "folders").read_text().split()[0]
+    assert (tmp_path / "removed").read_text().split("rm -rf -- ")[1].strip() == folder
+
+
+def test_a_folder_that_the_user_names_stays(launch, tmp_path):
+    named = tmp_path / "named"
+    named.mkdir()
+    assert launch(0, NUMBA_CACHE_DIR=str(named), SLURM_NNODES="2") == 0
+    assert [path.name for path in named.iterdir()] == ["kernel"]
+    assert not (tmp_path / "removed").exists()
