@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import difflib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 CRASHED = 70  # exit status after a defect of this program; EX_SOFTWARE of sysexits.h
+LONGEST_KEY = 100  # letters
 _LONGEST_QUOTE = 60
+_LONGEST_LINE = 4000  # a list of all keys fits
+_LINE_END = 500  # letters of a longer one that stay
 
 
 class InputError(ValueError):
     """Bad input: the text names the place, what was expected, what was found, and the nearest known key.
 
-    The command line prints it and ends with exit status 2.
+    The command line prints it and ends with exit status 2. It is one line, whatever the names and texts in it
+    hold.
     """
+
+    def __init__(self, text: str) -> None:
+        super().__init__(one_line(text))
 
 
 class UnitWarning(UserWarning):
@@ -75,6 +82,8 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """Return the known name nearest to `word`, whatever its case; None if none is near."""
+    if len(word) > LONGEST_KEY:  # it would be compared letter by letter
+        return None
     lowered = {name.lower(): name for name in known}
     near = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
     return lowered[near[0]] if near else None
@@ -106,5 +115,33 @@ def show(value: Any) -> str:
         return "a number of too many digits"
     if isinstance(value, str):
         text = value if len(value) <= _LONGEST_QUOTE else value[: _LONGEST_QUOTE - 3] + "..."
-        return json.dumps(text, ensure_ascii=False)
+        return one_line(json.dumps(text, ensure_ascii=False))
     return str(value)
+
+
+def one_line(text: str) -> str:
+    """Return a text as a line for a terminal: what does not print is escaped, a very long line cut.
+
+    Names, keys and descriptions of files may hold anything: line ends, escape sequences, bytes that are no
+    text.
+    """
+    if len(text) > _LONGEST_LINE:
+        text = f"{text[: _LONGEST_LINE - _LINE_END]} ... {text[-_LINE_END:]}"
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def check_keys(entry: Any, where: str) -> None:
+    """Raise InputError if a key in nested tables is not a word of printable letters.
+
+    Keys stand in errors, tables and pictures as they are.
+    """
+    if isinstance(entry, (list, tuple)):
+        for item in entry:
+            check_keys(item, where)
+    elif isinstance(entry, Mapping):
+        for key, value in entry.items():
+            if len(key) > LONGEST_KEY or not key.isprintable():
+                raise mismatch(where, f"keys of at most {LONGEST_KEY} printable characters", show(key))
+            check_keys(value, where)

@@ -26,6 +26,8 @@ _KINDS = {
     stat.S_IFBLK: "a device",
     stat.S_IFREG: "a file",
 }
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+_PROBE = bytes(1 << 20)
 
 
 class StorageError(InputError):
@@ -34,8 +36,14 @@ class StorageError(InputError):
 
 def storage_error(path: Path, error: Exception, advice: str = "") -> StorageError:
     """Return the error to raise when the system refuses to write `path`; `advice` is added to its text."""
-    found = getattr(error, "strerror", None) or error
+    found = _reason(error)
     return StorageError(f"{path}: expected to be able to write, found: {found}{advice and f'. {advice}'}")
+
+
+def _reason(error: Exception) -> str:
+    """Return what the system says, without what HDF5 makes of it."""
+    text = getattr(error, "strerror", None) or str(error)
+    return os.strerror(error.errno) if "errno = " in text and error.errno else text
 
 
 @contextlib.contextmanager
@@ -44,7 +52,9 @@ def naming_refusals(path: Path, expected: str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise StorageError(f"{path}: expected {expected}, found: {error.strerror or error}") from error
+        if error.errno in _FULL:
+            raise storage_error(path, error) from error
+        raise StorageError(f"{path}: expected {expected}, found: {_reason(error)}") from error
 
 
 def kind_of(path: Path) -> str | None:
@@ -165,8 +175,8 @@ def written_aside(path: Path, *, parents: bool = False, advice: str = "") -> Ite
         _sync(aside)
         os.replace(aside, path)
         sync_folder(path.parent)
-    except (OSError, RuntimeError) as error:  # RuntimeError: what the netCDF library makes of a full disk
-        raise storage_error(path, error, advice) from error
+    except (OSError, RuntimeError) as error:
+        raise storage_error(path, _refusal(aside, error), advice) from error
     finally:
         discard(aside)
 
@@ -188,6 +198,23 @@ def discard(path: Path) -> None:
 
 def _kind(mode: int) -> str:
     return _KINDS.get(stat.S_IFMT(mode), "something that is no file")
+
+
+def _refusal(aside: Path, error: Exception) -> Exception:
+    """Return why a file could not be written: libraries for netCDF do not always pass on what they were told.
+
+    The system is asked once more, by a write of some size to what there is of the file.
+    """
+    if getattr(error, "errno", None):
+        return error
+    try:
+        with aside.open("ab", buffering=0) as file:
+            if file.write(_PROBE) < len(_PROBE):
+                file.write(_PROBE)
+            os.fsync(file.fileno())
+    except OSError as refusal:
+        return refusal
+    return error
 
 
 def _sync(path: Path) -> None:

@@ -21,8 +21,6 @@ WIDTH = 6.4  # [inch]: letters of 10 points stay readable across a page and on a
 RESOLUTION = 170  # dots per inch
 FORMATS = (".png", ".svg", ".pdf")
 
-# Applied around the drawing with matplotlib.rc_context: a user's settings do not change the picture, nor the
-# picture the user's settings.
 STYLE = {
     "font.family": "DejaVu Sans",
     "font.size": 10,
@@ -69,7 +67,9 @@ def headline(attributes: Mapping[str, Any]) -> str:
 def draw(compose: Callable[[], Figure], out: Path) -> Path:
     """Compose a figure in the style of all pictures and write it as `save_figure` does, or refuse before."""
     check_format(Path(out))
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context():  # a user's settings do not change the picture, nor the picture these
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(STYLE)
         return save_figure(compose(), out)
 
 

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cvt_hpc.analysis.error_axes import COLOURS, LEGEND, MARGIN, set_error_axis
-from cvt_hpc.analysis.figures import STYLE, WIDTH, save_figure
+from cvt_hpc.analysis.figures import WIDTH, draw
 from cvt_hpc.chart.comparing import Comparison, Result
 from cvt_hpc.chart.plan import Quantity
 from cvt_hpc.chart.scene_drawing import error_label
@@ -24,8 +23,7 @@ _ROW_HEIGHT = 0.24  # [inch], of the budget
 
 def draw_budget(comparison: Comparison, out: Path) -> Path:
     """Draw the error of each choice against the base; otherwise as `draw_scene`."""
-    with matplotlib.rc_context(STYLE):
-        return save_figure(budget_figure(comparison), out)
+    return draw(lambda: budget_figure(comparison), out)
 
 
 def budget_figure(comparison: Comparison) -> Figure:

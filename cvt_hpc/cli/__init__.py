@@ -11,14 +11,14 @@ import os
 import sys
 import traceback
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
 from cvt_hpc import __version__
 from cvt_hpc.cli import checking, experiments, results, single_run, sweep
 from cvt_hpc.cli.parts import BAD_INPUT, DONE, INTERRUPTED, complain, speaks
-from cvt_hpc.errors import CRASHED, InputError, UnitWarning
+from cvt_hpc.errors import CRASHED, InputError, UnitWarning, mismatch, one_line, show
 
 __all__ = ["main"]
 
@@ -37,8 +37,11 @@ def main(arguments: list[str] | None = None) -> int:
         Exit status: 0 done, 1 some runs failed, 2 bad input, 70 a defect of this program, 99 stopped early
         and to be gone on with, 98 the same without any gain.
     """
-    logging.basicConfig(format="cvt-hpc: %(message)s")
+    told = logging.StreamHandler()
+    told.setFormatter(_OneLine("cvt-hpc: %(message)s"))
+    logging.basicConfig(handlers=[told])
     try:
+        _check_readable(sys.argv[1:] if arguments is None else arguments)
         parsed = _parser().parse_args(arguments)
         with _compiling_told(), _unit_warnings_told():
             status = parsed.command(parsed)
@@ -94,6 +97,22 @@ def _unit_warnings_told() -> Iterator[None]:
 
 def _by_one_rank(record: logging.LogRecord) -> bool:
     return speaks()
+
+
+class _OneLine(logging.Formatter):
+    """What is logged names files, whose names may hold anything."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return one_line(super().format(record))
+
+
+def _check_readable(arguments: Sequence[str]) -> None:
+    """Refuse bytes that are no text: a dataset cannot be written to a file of such a name."""
+    for argument in arguments:
+        try:
+            argument.encode()
+        except UnicodeEncodeError:
+            raise mismatch("command line", "names and values in UTF-8", show(argument)) from None
 
 
 class _Parser(argparse.ArgumentParser):

@@ -14,6 +14,7 @@ from cvt_hpc.cli.parts import (
     add_command,
     check_output,
     output_folder,
+    say,
     speaks,
 )
 from cvt_hpc.errors import mismatch
@@ -53,13 +54,13 @@ def _check(arguments: argparse.Namespace) -> int:
         ranks = [*arguments.ranks, *(CURVE if arguments.plot else ())]
         expected = expect(job, output_folder(None, job), ranks, arguments.pilots)
         asked, curve = expected.forecasts[: len(arguments.ranks)], expected.forecasts[len(arguments.ranks) :]
-        print("", *forecast_lines(asked, job, expected.basis), sep="\n")
-        print(disk_line(expected.disk, len(job.histories)))
+        say("", *forecast_lines(asked, job, expected.basis))
+        say(disk_line(expected.disk, len(job.histories)))
         if arguments.plot is not None:
             from cvt_hpc.analysis.efficiency import draw_efficiency
 
             title = f"{job.name}: {job.size} runs"
-            print(f"picture: {draw_efficiency(curve, title, expected.basis, arguments.plot)}")
+            say(f"picture: {draw_efficiency(curve, title, expected.basis, arguments.plot)}")
     return DONE
 
 
@@ -73,7 +74,7 @@ def show_job(job: Job, out: Path | None) -> None:
     if speaks():
         from cvt_hpc.study.status import expected_cost
 
-        print(summarize(job, *expected_cost(job, output_folder(out, job))))
+        say(*summarize(job, *expected_cost(job, output_folder(out, job))).split("\n"))
 
 
 def _check_ranks(ranks: list[int]) -> None:

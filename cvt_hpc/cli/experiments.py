@@ -16,6 +16,7 @@ from cvt_hpc.cli.parts import (
     complain,
     output_folder,
     refuse_ranks,
+    say,
     speaks,
 )
 
@@ -43,9 +44,9 @@ def _chart(arguments: argparse.Namespace) -> int:
     chart = load_chart(arguments.path, arguments.set)
     report = make_chart(chart, arguments.out, fresh=arguments.fresh, tell=complain)
     for comparison in report.comparisons:
-        print(*table_lines(comparison), "", sep="\n")
-    print(f"table: {report.table}", f"dataset: {report.dataset}", sep="\n")
-    print(*(f"picture: {picture}" for picture in report.pictures), sep="\n")
+        say(*table_lines(comparison), "")
+    say(f"table: {report.table}", f"dataset: {report.dataset}")
+    say(*(f"picture: {picture}" for picture in report.pictures))
     return DONE
 
 
@@ -70,8 +71,8 @@ def _ladder(arguments: argparse.Namespace) -> int:
     )
     if status < STALLED and speaks():
         report = report_ladder(job, rungs, out)
-        print(*ladder_lines(report.findings), sep="\n")
-        print(f"table: {report.table}", f"dataset: {report.dataset}", f"picture: {report.picture}", sep="\n")
+        say(*ladder_lines(report.findings))
+        say(f"table: {report.table}", f"dataset: {report.dataset}", f"picture: {report.picture}")
     return end_process(status)
 
 
@@ -88,6 +89,6 @@ def _branch(arguments: argparse.Namespace) -> int:
     failures = [line for followed in report.followed for line in failure_lines(diagram, followed)]
     complain(*failures)
     for followed in report.followed:
-        print(*branch_lines(diagram, followed), "", sep="\n")
-    print(f"dataset: {report.dataset}", *(f"picture: {picture}" for picture in report.pictures), sep="\n")
+        say(*branch_lines(diagram, followed), "")
+    say(f"dataset: {report.dataset}", *(f"picture: {picture}" for picture in report.pictures))
     return SOME_FAILED if failures else DONE

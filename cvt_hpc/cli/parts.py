@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cvt_hpc.errors import mismatch
+from cvt_hpc.errors import mismatch, one_line
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
@@ -89,7 +89,13 @@ def complain(*lines: str) -> None:
     """Print lines on stderr, on the rank that talks to the user."""
     if speaks():
         for line in lines:
-            print(f"cvt-hpc: {line}", file=sys.stderr)
+            print(f"cvt-hpc: {one_line(line)}", file=sys.stderr)
+
+
+def say(*lines: str) -> None:
+    """Print lines on stdout."""
+    for line in lines:
+        print(one_line(line))
 
 
 def speaks() -> bool:

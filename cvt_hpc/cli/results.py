@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cvt_hpc.cli.parts import DONE, add_assignments, add_command, complain, folder_of
+from cvt_hpc.cli.parts import DONE, add_assignments, add_command, complain, folder_of, say
 
 if TYPE_CHECKING:
     from cvt_hpc.analysis.comparison import Comparison
@@ -34,14 +34,14 @@ def _status(arguments: argparse.Namespace) -> int:
 
     status = read_status(arguments.path)
     complain(*status.warnings)
-    print(*status_lines(status), sep="\n")
+    say(*status_lines(status))
     return DONE
 
 
 def _gather(arguments: argparse.Namespace) -> int:
     from cvt_hpc.study import gather
 
-    print(f"results: {gather(arguments.path)}")
+    say(f"results: {gather(arguments.path)}")
     return DONE
 
 
@@ -59,8 +59,8 @@ def _map(arguments: argparse.Namespace) -> int:
             dataset, arguments.out or folder_of(arguments.path) / "map.png", at, str(arguments.path)
         )
         if has_starts(dataset, at):
-            print(start_line(dataset, at, str(arguments.path)))
-        print(f"map: {picture}")
+            say(start_line(dataset, at, str(arguments.path)))
+        say(f"map: {picture}")
     return DONE
 
 
@@ -73,7 +73,7 @@ def _compare(arguments: argparse.Namespace) -> int:
     with open_results(arguments.path) as a, open_results(arguments.other) as b:
         found = compare(a, b, sources)
     written = leave_comparison(found, arguments.out or folder_of(arguments.other), sources)
-    print(*comparison_lines(found, sources), *written, sep="\n")
+    say(*comparison_lines(found, sources), *written)
     return CONTRADICTING if found.contradicts.any() else DONE
 
 

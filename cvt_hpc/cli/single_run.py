@@ -15,6 +15,7 @@ from cvt_hpc.cli.parts import (
     add_command,
     check_output,
     complain,
+    say,
 )
 from cvt_hpc.errors import mismatch
 
@@ -56,7 +57,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
         written.append(f"picture: {draw_history(dataset, arguments.plot)}")
     elif arguments.plot is not None:
         written.append("picture: none, the run has no history")
-    print(*point_lines(job, at), *outcome_lines(dataset), *written, sep="\n")
+    say(*point_lines(job, at), *outcome_lines(dataset), *written)
     status = Status(int(dataset["status"]))
     if status != Status.DONE:
         complain(f"the run failed: {status.name.lower()}: {dataset['reason'].item()}")

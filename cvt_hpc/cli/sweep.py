@@ -16,6 +16,7 @@ from cvt_hpc.cli.parts import (
     add_folder,
     complain,
     output_folder,
+    say,
     speaks,
 )
 from cvt_hpc.cli.results import leave_comparison
@@ -95,13 +96,13 @@ def _run(arguments: argparse.Namespace) -> int:
         show_job(job, arguments.out)
         if speaks():
             for repeat, _ in repeats:
-                print(repeat_line(repeat))
+                say(repeat_line(repeat))
         return DONE
     started = time.monotonic()
     report = run(job, arguments.out, part=arguments.part, **options)
     complain(*trouble_lines(report))
     if speaks():
-        print(*report_lines(report), sep="\n")
+        say(*report_lines(report))
     statuses = [report.exit_status]
     for repeat, show in repeats:
         if not report.remaining:
@@ -150,7 +151,7 @@ def _show_audit(audit: Repeat) -> None:
     from cvt_hpc.ladder.audit import report_audit
     from cvt_hpc.printing import audit_lines
 
-    print(*audit_lines(report_audit(audit)), sep="\n")
+    say(*audit_lines(report_audit(audit)))
 
 
 def _show_step_check(check: Repeat) -> None:
@@ -162,4 +163,4 @@ def _show_step_check(check: Repeat) -> None:
     with open_results(check.out) as a, open_results(check.place) as b:
         found = compare(a, only(b, check.sample), sources)
     written = leave_comparison(found, check.place, sources)
-    print(*step_check_lines(check, found), *written, sep="\n")
+    say(*step_check_lines(check, found), *written)

@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cvt_hpc.errors import mismatch, show, unknown
+from cvt_hpc.errors import check_keys, mismatch, show, unknown
 from cvt_hpc.job.axes import is_axis
 from cvt_hpc.job.plausibility import warn_of_bare_numbers
 from cvt_hpc.job.schema import Schema
@@ -40,6 +40,7 @@ def split_assignments(assignments: Assignments, source: str, label: str) -> dict
         if not equals or not key.strip():
             raise mismatch(f"{source}: {label}", "KEY=VALUE", show(text))
         pairs[key.strip()] = value.strip()
+    check_keys(pairs, f"{source}: {label}")
     return pairs
 
 

@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.errors import InputError, did_you_mean, mismatch
+from cvt_hpc.errors import InputError, check_keys, did_you_mean, mismatch
 
 _POSITION = re.compile(r"(?P<what>.*?) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)")
 
@@ -33,7 +33,9 @@ def read_document(path: Path) -> dict[str, Any]:
         raise mismatch(str(path), "a job file", str(error.strerror)) from None
     except UnicodeDecodeError:
         raise mismatch(str(path), "a text file (TOML in UTF-8)", "binary data") from None
-    return _parse(text, str(path))
+    document = _parse(text, str(path))
+    check_keys(document, str(path))
+    return document
 
 
 def _parse(text: str, source: str) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from cvt_hpc.errors import one_line
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.crosscheck import without_effect
 from cvt_hpc.job.definition import Derived, Job
@@ -12,8 +13,10 @@ from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.values import in_words
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
+from cvt_hpc.tables import columns
 
 _FEW = 8
+_MOST_DESCRIBED = 20  # lines
 _MOST_EVALUATED = 2_000  # values of what follows from others
 _MOST_ASKED = 500  # runs, for what has no effect
 
@@ -36,22 +39,22 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
         Lines of at most one parameter each.
     """
     stepper = "no transient" if job.stepper is None else f"stepper {job.stepper}"
-    lines = [f"job {job.name} ({job.source}): model {job.model}, {stepper}"]
-    lines += [job.description] if job.description else []
+    lines = [f"job {job.name} ({one_line(job.source)}): model {job.model}, {stepper}"]
+    lines += job.description.splitlines()[:_MOST_DESCRIBED]
     lines += ["", *_choices(job)]
     schema = job.schema
     for section, rows in _tables(job, schema).items():
-        lines += ["", f"[{section}]", *_columns(rows)]
+        lines += ["", f"[{section}]", *columns(rows)]
     if job.axes:
         noun = "samples" if job.is_sampled else "values"
         in_short = _range_in_words if job.is_sampled else _values_in_words
         axes = [(axis.name, in_short(axis, schema), f"{len(axis.values)} {noun}") for axis in job.axes]
-        lines += ["", "[axes]", *_columns(axes)]
+        lines += ["", "[axes]", *columns(axes)]
     if job.rules:
-        lines += ["", "[derived]", *_columns(_rules(job, schema))]
+        lines += ["", "[derived]", *columns(_rules(job, schema))]
     if job.design:
         design = [(key, _setting_in_words(value)) for key, value in job.design.items()]
-        lines += ["", "[design]", *_columns(design)]
+        lines += ["", "[design]", *columns(design)]
     product = f" = {' x '.join(map(str, job.shape))}" if len(job.shape) > 1 else ""
     at_most = "at most " if "first_spacing" in job.design else ""
     basis = f" (by what {measured} runs on record took)" if measured else ""
@@ -116,15 +119,6 @@ def _rules(job: Job, schema: Schema) -> list[tuple[str, ...]]:
             values, along = schema.in_words(rule.key, job.parameters[rule.key]), "the same in all runs"
         rows.append((rule.key, values, rule.words, along))
     return rows
-
-
-def _columns(rows: list[tuple[str, ...]]) -> list[str]:
-    """Return rows as lines with aligned columns."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
 
 
 def _values_in_words(axis: Axis, schema: Schema) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.variables import Status
@@ -30,7 +32,12 @@ def keep_histories(folder: StudyFolder, histories: Iterable[tuple[int, xr.Datase
         store_history(history, folder.history(index))
 
 
-def missing_histories(job: Job, folder: StudyFolder, records: Records) -> list[int]:
-    """Return the runs that are done, but whose history is wanted and not there: it was asked for later."""
+def leave_out_missing(job: Job, folder: StudyFolder, records: Records) -> None:
+    """Count runs as not recorded that are done, but whose history is wanted and not there; the logs stay.
+
+    It was asked for later, or has been removed.
+    """
     done = records.status == Status.DONE
-    return [index for index in job.histories if done[index] and not folder.history(index).exists()]
+    missing = [index for index in job.histories if done[index] and not folder.history(index).exists()]
+    records.written[missing] = np.nan
+    records.status[missing] = Status.NOT_RUN

@@ -20,7 +20,7 @@ from cvt_hpc.study.attempts import (
 from cvt_hpc.study.batches import Assignment
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.forecast.cost_model import Fit
-from cvt_hpc.study.histories import missing_histories
+from cvt_hpc.study.histories import leave_out_missing
 from cvt_hpc.study.part import Part
 from cvt_hpc.study.provenance import new_session
 from cvt_hpc.study.ranks.counter import Counter
@@ -76,7 +76,7 @@ def prepare(
     if refine is None:
         refine = untried_factor(task.job, records, runs_to_repeat(records, asked, retry), retry)
     records = enter_attempts(folder, study, records, asked, retry, session, refine)
-    records.written[missing_histories(task.job, folder, records)] = np.nan  # done again; the record stays
+    leave_out_missing(task.job, folder, records)
     done = records.status == Status.DONE
     recorded = int((records.recorded & asked).sum())
     steps = refined_steps(task.job, records, task.asked_steps() if task.asked_steps else {})

@@ -22,7 +22,7 @@ from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.forecast.cost_model import CostModel
 from cvt_hpc.study.gather import gather_records
-from cvt_hpc.study.histories import keep_histories, missing_histories
+from cvt_hpc.study.histories import keep_histories, leave_out_missing
 from cvt_hpc.study.part import Part, read_part
 from cvt_hpc.study.planning import Plan, asked_runs, next_round, prepare
 from cvt_hpc.study.ranks.counter import Counter
@@ -249,7 +249,7 @@ def _conclude(
             _logger.warning("%s; not gathered", error)
     gathers = records is not None
     records = records if gathers else read_records(folder.records, task.study)
-    records.written[missing_histories(task.job, folder, records)] = np.nan
+    leave_out_missing(task.job, folder, records)
     asked = asked_runs(task, records, part)
     gained = int(records.recorded[asked].sum()) - plan.recorded
     return build_report(folder, task.study, records, asked, gathers, gained, stopped)

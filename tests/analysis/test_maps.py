@@ -1,7 +1,9 @@
 """Maps of made-up studies: what the picture shows where."""
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -11,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 from studies import GRADIENTS, LOADS, STIFFNESSES, flags, study, two_flags
 
+import cvt_hpc
 from cvt_hpc.analysis.arrangement import arrange
 from cvt_hpc.analysis.cells import AMPLITUDE_COLOURS, FREQUENCY_COLOURS, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, occurrence_classes
@@ -254,3 +257,43 @@ def test_results_read_back_from_a_file_give_the_same_map(tmp_path):
 def test_flags_of_the_made_up_study_are_those_of_results():
     _, values, attributes = flags([1], ("load",), Status, "")
     assert values.dtype == np.int8 and attributes["flag_meanings"].split()[values[0]] == "done"
+
+
+DRAW = """
+import sys
+from pathlib import Path
+import cvt_hpc.bifurcation, cvt_hpc.chart, cvt_hpc.ladder.making
+import xarray as xr
+from pathlib import Path
+from cvt_hpc.analysis.maps import draw_map
+print(*(draw_map(xr.open_dataset(sys.argv[1]), Path(f"map.{suffix}")) for suffix in ("png", "svg", "pdf")))
+"""
+
+
+@pytest.mark.parametrize(
+    ("settings", "backend"),
+    [
+        (b"backend: nonsense\nfont.size: 30\n", "nonsense"),
+        (
+            b"text.usetex: True\nfont.family: Nowhere\nsvg.fonttype: none\nlines.linewidth: 9\nimage.lut: 3\n",
+            "QtAgg",
+        ),
+        (b"font.family: \xff\xfe\n", "agg"),
+    ],
+)
+def test_a_users_matplotlibrc_changes_nothing(tmp_path, settings, backend):
+    study().to_netcdf(tmp_path / "results.nc")
+    for folder in ("plain", "set"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "set" / "matplotlibrc").write_bytes(settings)
+    for folder, more in (("plain", {}), ("set", {"MPLBACKEND": backend})):
+        command = [sys.executable, "-c", DRAW, str(tmp_path / "results.nc")]
+        environment = {**os.environ, "PYTHONPATH": str(Path(cvt_hpc.__file__).parents[1]), **more}
+        finished = subprocess.run(
+            command, cwd=tmp_path / folder, env=environment, capture_output=True, text=True
+        )
+        assert finished.returncode == 0, finished.stderr
+        assert finished.stderr == ""
+    for suffix in ("png", "svg", "pdf"):
+        plain, other = (tmp_path / folder / f"map.{suffix}" for folder in ("plain", "set"))
+        assert plain.read_bytes() == other.read_bytes()

@@ -99,3 +99,16 @@ def test_fresh_removes_histories(tmp_path):
     (tmp_path / "histories" / "mine.nc").write_text("mine")
     run(Job(AXES), tmp_path, simulator=Simulator(), progress=False, fresh=True)
     assert kept(tmp_path) == ["mine.nc"]
+
+
+def test_runs_whose_histories_were_removed_are_left_and_not_failed(tmp_path, capfd):
+    sweep(tmp_path, (2, 3, 9))
+    for index in (2, 3):
+        StudyFolder(tmp_path).history(index).unlink()
+    job = Job(AXES, histories=(2, 3, 9))
+    stopped = run(job, tmp_path, simulator=Simulator(lanes=4), time_limit=0.0)
+    assert (stopped.done, stopped.remaining, stopped.slipping) == (RUNS - 2, 2, 0)
+    assert "10/12 runs (83.3%), 0 failed" in capfd.readouterr().err
+    report = run(job, tmp_path, simulator=Simulator(lanes=4))
+    assert (report.done, report.remaining, report.failed) == (RUNS, 0, ())
+    assert "12/12 runs (100.0%), 0 failed" in capfd.readouterr().err
