@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PatchCollection
+from matplotlib.collections import LineCollection
 from matplotlib.colors import Colormap, ListedColormap, Normalize, to_rgba
 from matplotlib.figure import FigureBase
+from matplotlib.image import PcolorImage
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.arrangement import Ruler
@@ -120,23 +123,33 @@ def draw_cells(
     scale : Scale
         How it colours them.
     """
+    fills = np.zeros((*classes.shape, 4))
+    hatched = {}
     for kind, style in ALL_STYLES.items():
         inside = classes == kind
-        cells = [_cell(x, y, row, column) for row, column in np.argwhere(inside)]
-        fills = fills_of(kind, values[inside], scale)
+        fills[inside] = fills_of(kind, values[inside], scale)
         if kind is OccurrenceClass.VIBRATING:
-            fills[inferred[inside]] = to_rgba(INFERRED_VIBRATION)
-        # Cells and marks are pixels even in a vector format: thousands of shapes would make megabytes of it.
-        axes.add_collection(
-            PatchCollection(cells, facecolors=fills, edgecolors="white", linewidths=0.3, rasterized=True)
-        )
-        if style.hatch:
-            lines = {"facecolors": "none", "edgecolors": style.ink, "linewidths": 0, "hatch": style.hatch}
-            axes.add_collection(PatchCollection(cells, rasterized=True, **lines))
-    cells = [_cell(x, y, row, column) for row, column in np.argwhere(inferred)]
-    axes.add_collection(PatchCollection(cells, rasterized=True, **LINES))
+            fills[inside & inferred] = to_rgba(INFERRED_VIBRATION)
+        if style.hatch and inside.any():
+            hatched[style.hatch] = inside, {**LINES, "edgecolor": style.ink, "hatch": style.hatch}
+    if inferred.any():
+        hatched[LINES["hatch"]] = inferred, LINES
+    # Cells and marks are pixels even in a vector format: thousands of shapes would make megabytes of it.
+    shades = (255 * fills).round().astype(np.uint8)
+    # the axes have the same place with and without it
+    axes.add_image(PcolorImage(axes, x.edges, y.edges, shades, rasterized=True, in_layout=False))
+    for inside, lines in hatched.values():
+        axes.add_patch(PathPatch(_area(x, y, inside), rasterized=True, **lines))
     axes.add_collection(LineCollection(_borders(x, y, classes), colors="#202020", linewidths=1.0))
     axes.set(xlim=x.edges[[0, -1]], ylim=y.edges[[0, -1]])
+
+
+def draw_grid(axes: Axes, x: Ruler, y: Ruler) -> None:
+    """Draw thin lines between all cells; arguments as for `draw_cells`."""
+    upright = _segments(x.edges, x.edges, y.edges[0], y.edges[-1])
+    level = _segments(x.edges[0], x.edges[-1], y.edges, y.edges)
+    lines = {"colors": "white", "linewidths": 0.3, "zorder": 0.5}  # below borders and hatching
+    axes.add_collection(LineCollection([*upright, *level], rasterized=True, **lines))
 
 
 def draw_marks(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], marked: Mask, size: float) -> None:
@@ -214,9 +227,15 @@ def class_legend(
     )
 
 
-def _cell(x: Ruler, y: Ruler, row: int, column: int) -> Rectangle:
-    corner = x.edges[column], y.edges[row]
-    return Rectangle(corner, x.edges[column + 1] - corner[0], y.edges[row + 1] - corner[1])
+def _area(x: Ruler, y: Ruler, inside: Mask) -> Path:
+    """The outline of some cells: a rectangle around those that follow each other in a row."""
+    turns = np.diff(np.pad(inside, ((0, 0), (1, 1))).astype(np.int8))
+    (rows, first), (_, end) = np.nonzero(turns == 1), np.nonzero(turns == -1)
+    left, right, low, high = x.edges[first], x.edges[end], y.edges[rows], y.edges[rows + 1]
+    corners = [(left, low), (right, low), (right, high), (left, high), (left, low)]
+    vertices = np.moveaxis(np.array(corners), -1, 0).reshape(-1, 2)
+    codes = [Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY]
+    return Path(vertices, np.tile(np.array(codes, Path.code_type), rows.size))
 
 
 def fills_of(kind: IntEnum, values: Array, scale: Scale) -> Array:
@@ -233,14 +252,15 @@ def _ink_on(fill: Array, ink: str) -> str:
     return "#ffffff" if fill[:3] @ (0.299, 0.587, 0.114) < 0.45 else ink
 
 
-def _borders(x: Ruler, y: Ruler, classes: NDArray[np.int8]) -> list[list[tuple[float, float]]]:
-    """Sides between cells of different classes."""
-    upright = [
-        [(x.edges[column + 1], y.edges[row]), (x.edges[column + 1], y.edges[row + 1])]
-        for row, column in np.argwhere(classes[:, 1:] != classes[:, :-1])
-    ]
-    level = [
-        [(x.edges[column], y.edges[row + 1]), (x.edges[column + 1], y.edges[row + 1])]
-        for row, column in np.argwhere(classes[1:] != classes[:-1])
-    ]
-    return upright + level
+def _borders(x: Ruler, y: Ruler, classes: NDArray[np.int8]) -> Array:
+    """Sides between cells of different classes, shape (side, end, coordinate)."""
+    rows, columns = np.nonzero(classes[:, 1:] != classes[:, :-1])
+    upright = _segments(x.edges[columns + 1], x.edges[columns + 1], y.edges[rows], y.edges[rows + 1])
+    rows, columns = np.nonzero(classes[1:] != classes[:-1])
+    level = _segments(x.edges[columns], x.edges[columns + 1], y.edges[rows + 1], y.edges[rows + 1])
+    return np.concatenate((upright, level))
+
+
+def _segments(x0: Any, x1: Any, y0: Any, y1: Any) -> Array:
+    """Lines from (x0, y0) to (x1, y1), numbers or arrays, as shape (line, end, coordinate)."""
+    return np.moveaxis(np.stack(np.broadcast_arrays(x0, y0, x1, y1)), 0, -1).reshape(-1, 2, 2)

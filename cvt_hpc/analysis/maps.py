@@ -39,6 +39,7 @@ from cvt_hpc.analysis.starts import has_starts, join_starts
 from cvt_hpc.variables import Vibrates
 
 MOST_STACKED = 5  # panels in one column; more go into two
+SMALLEST_APART = 3.0  # [point]: on smaller cells marks, and the lines between, would hide the classes
 TITLE_HEIGHT = 0.42  # [inch], of a panel with the space around it
 ONE_ROW = Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
 
@@ -195,13 +196,16 @@ def draw_block(
 ) -> None:
     """One set of panels, their vibrating cells coloured by `values`, and the colour bar."""
     mark = float(np.clip(0.35 * min(sheet.smallest_cell), 1.5, 5.0))
+    apart = min(sheet.smallest_cell) >= SMALLEST_APART
     for panel, ax in enumerate(axes.flat):
         if panel >= sheet.panels:
             ax.set_axis_off()
             continue
         classes, inferred = sheet.classes[panel], sheet.inferred[panel]
         cells.draw_cells(ax, sheet.x, sheet.y, classes, inferred, values[panel], scale)
-        cells.draw_marks(ax, sheet.x, sheet.y, classes, ~inferred, mark)
+        if apart:
+            cells.draw_grid(ax, sheet.x, sheet.y)
+            cells.draw_marks(ax, sheet.x, sheet.y, classes, ~inferred, mark)
         _label_panel(ax, sheet, panel)
     if np.isfinite(values).any():
         bar = figure.colorbar(

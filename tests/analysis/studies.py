@@ -1,5 +1,8 @@
 """Made-up results of studies, in the form of results.nc."""
 
+from collections import Counter
+
+import matplotlib
 import numpy as np
 import xarray as xr
 
@@ -79,3 +82,10 @@ def two_flags(status, vibrates):
     return xr.Dataset(
         {"status": (dims, status), "vibrates": (dims, vibrates)}, {"load": np.arange(float(len(status)))}
     )
+
+
+def fills_of(axes):
+    """How many cells have which colour."""
+    (image,) = axes.images
+    cells = image.get_array().reshape(-1, 4) / 255
+    return Counter(matplotlib.colors.to_hex(colour) for colour in cells)

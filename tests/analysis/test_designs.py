@@ -3,9 +3,8 @@
 import matplotlib
 import numpy as np
 import pytest
-from matplotlib.colors import to_rgba
 from PIL import Image
-from studies import GRADIENTS, LOADS, sampled, study, traced
+from studies import GRADIENTS, LOADS, fills_of, sampled, study, traced
 
 from cvt_hpc.analysis.arrangement import arrange
 from cvt_hpc.analysis.cells import INFERRED_VIBRATION, LINES, STYLES
@@ -40,19 +39,21 @@ def test_only_runs_are_marked_and_inferred_cells_have_lines():
     figure, axes, _ = trace_panel()
     marked = {x for line in axes.lines for x in line.get_xdata()}
     assert marked == set(LOADS[::3])
-    (lined,) = [cells for cells in axes.collections if cells.get_hatch() == LINES["hatch"]]
-    assert len(lined.get_paths()) == len(GRADIENTS) * 6
+    (lined,) = [cells for cells in axes.patches if cells.get_hatch() == LINES["hatch"]]
+    inside = {x for x in LOADS for y in GRADIENTS if lined.get_path().contains_point((x, y))}
+    assert inside == set(LOADS) - marked
+    assert len(lined.get_path().vertices) == 5 * 3 * len(GRADIENTS)  # a rectangle around two cells each
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
     assert texts[-2:] == ["inferred", "inferred, vibrating"]
 
 
 def test_inferred_vibration_has_a_colour_of_its_own():
     _, axes, classes = trace_panel()
-    fills = [fill for cells in axes.collections for fill in np.atleast_2d(cells.get_facecolor())]
+    fills = fills_of(axes)
     expected = np.count_nonzero(classes[:, np.arange(len(LOADS)) % 3 > 0] == VIBRATING)
     assert expected > 5
-    assert sum(np.allclose(fill, to_rgba(INFERRED_VIBRATION)) for fill in fills) == expected
-    assert not any(np.allclose(fill, to_rgba(STYLES[VIBRATING].fill)) for fill in fills)
+    assert fills[INFERRED_VIBRATION] == expected
+    assert fills[STYLES[VIBRATING].fill] == 0
 
 
 def test_runs_and_inferred_cells_are_counted_apart():

@@ -6,7 +6,7 @@ import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
-from studies import study, traced
+from studies import fills_of, study, traced
 
 from cvt_hpc.analysis.arrangement import arrange
 from cvt_hpc.analysis.cells import OF_STARTS, STYLES
@@ -105,9 +105,7 @@ def test_the_map_has_one_panel_for_both_starts_and_counts_cells():
     assert "disturbance 0.001 mm and 0.3 mm" in title
     (legend,) = figure.legends
     assert legend.get_texts()[-1].get_text() == "vibrates from a large start only"
-    fill = matplotlib.colors.to_rgba(OF_STARTS[ONLY].fill)
-    drawn = [cells for axes in panels for cells in axes.collections if len(cells.get_facecolor())]
-    assert sum((cells.get_facecolor() == fill).all(axis=1).sum() for cells in drawn) == only
+    assert sum(fills_of(axes)[OF_STARTS[ONLY].fill] for axes in panels) == only
 
 
 def test_a_map_of_one_start_is_as_without_the_axis(tmp_path):
