@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cvt_hpc.job import Job
     from cvt_hpc.ladder.audit import AuditReport
     from cvt_hpc.study import RunReport, StudyStatus
+    from cvt_hpc.study.forecast.needs import Needs
     from cvt_hpc.study.forecast.resources import Disk
     from cvt_hpc.study.forecast.simulate import Forecast
     from cvt_hpc.study.repeats import Repeat
@@ -205,6 +206,13 @@ def forecast_lines(forecasts: Sequence[Forecast], job: Job, basis: str) -> Itera
             f"  {forecast.ranks:>6}  {median:>9}  {f'{low} to {high}':<20}  {forecast.efficiency[0]:>10.0%}  "
             f"{forecast.core_seconds / 3600:>10.3g}  {slurm_time(suggested_time(forecast, job.size))}"
         )
+
+
+def needs_line(needed: Needs) -> str:
+    """Return the line that says what memory and disk a sweep needs."""
+    return (
+        f"needed: {_in_megabytes(needed.memory)} of memory, {_in_megabytes(needed.disk)} of disk for records"
+    )
 
 
 def disk_line(disk: Disk, histories: int) -> str:

@@ -67,14 +67,18 @@ def _check(arguments: argparse.Namespace) -> int:
 def show_job(job: Job, out: Path | None) -> None:
     """Print what a job runs."""
     from cvt_hpc.job.summary import summarize
+    from cvt_hpc.printing import needs_line
     from cvt_hpc.study.description import check_names
+    from cvt_hpc.study.forecast.needs import refuse_too_large
     from cvt_hpc.study.simulator import default_simulator
 
     check_names(job, default_simulator())
+    needed = refuse_too_large(job, default_simulator(), output_folder(out, job))
     if speaks():
         from cvt_hpc.study.status import expected_cost
 
         say(*summarize(job, *expected_cost(job, output_folder(out, job))).split("\n"))
+        say(needs_line(needed))
 
 
 def _check_ranks(ranks: list[int]) -> None:

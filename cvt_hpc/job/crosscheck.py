@@ -24,7 +24,10 @@ def check_grid(
     rules: Sequence[Rule] = (),
     sampled: bool = False,
 ) -> None:
-    """Check the base scene and every run, and that axes are of effect; of a huge grid, the axes' extremes.
+    """Check the base scene and every run, and that axes are of effect; of a huge study, some runs.
+
+    Of a grid these are the extremes of its axes; of samples those with an extreme value, and others from all
+    over them.
 
     Parameters
     ----------
@@ -49,7 +52,7 @@ def check_grid(
     check_point(schema, parameters, source)
     sizes = {axis.name: len(axis.values) for axis in axes}
     idle = {name: "" for name, size in sizes.items() if size > 1}
-    for values in zip(*(axis.values for axis in axes), strict=True) if sampled else _points_to_check(axes):
+    for values in _samples_to_check(axes) if sampled else _points_to_check(axes):
         varied = dict(zip(sizes, values, strict=True))
         point = follow(rules, {**parameters, **varied})
         check_point(schema, point, source, varied)
@@ -170,6 +173,15 @@ def _points_to_check(axes: tuple[Axis, ...]) -> Iterable[tuple]:
     size = math.prod(len(axis.values) for axis in axes)
     thin = size > MOST_CHECKED_POINTS
     return itertools.product(*(_extremes(axis.values) if thin else axis.values for axis in axes))
+
+
+def _samples_to_check(axes: tuple[Axis, ...]) -> Iterable[tuple]:
+    few = thinned(axes, MOST_CHECKED_VALUES, sampled=True)
+    if len(axes[0].values) <= MOST_CHECKED_POINTS:
+        few = axes
+    samples = zip(*(axis.values for axis in few), strict=True)
+    ends = {axis.values.index(end) for axis in axes for end in (min(axis.values), max(axis.values))}
+    return itertools.chain(samples, (tuple(axis.values[place] for axis in axes) for place in sorted(ends)))
 
 
 def _extremes(values: tuple) -> tuple:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from enum import IntEnum
 from functools import cached_property
@@ -19,6 +19,9 @@ from cvt_hpc.variables import Status, Variable
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
+
+
+MOST_DERIVED = 200_000  # values of a parameter that follows from axes: these take some seconds
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ class Study:
     coordinates : tuple of Dimension
         Dimensions of the variables beside the grid.
     derived : tuple of DerivedCoordinate
-        Parameters that follow from the axes.
+        Parameters that follow from the axes, but for those of more than `MOST_DERIVED` values.
     units : dict
         By axis the unit in which the job at work gives it, where it is not the SI unit; not kept in a folder.
     """
@@ -86,13 +89,8 @@ class Study:
 
     @cached_property
     def record_dtype(self) -> np.dtype:
-        """Structured type of one record: packed and little-endian, so that logs move between machines."""
-        lengths = {dimension.name: len(dimension.values) for dimension in self.coordinates}
-        fields = [
-            (v.name, np.dtype(v.dtype).newbyteorder("<"), tuple(lengths[d] for d in v.dims))
-            for v in self.variables
-        ]
-        return np.dtype(fields)
+        """Structured type of one record."""
+        return record_type(self.variables, self.coordinates)
 
     def place(self, index: int) -> dict[str, Any]:
         """Return the axes' values of run `index`, by axis name."""
@@ -177,16 +175,38 @@ class Study:
 def describe(job: Job, simulator: Simulator) -> Study:
     """Return the study of a job; errors as of `check_names`."""
     check_names(job, simulator)
-    variables = tuple(simulator.record_variables(job))
-    coordinates = tuple(
-        Dimension(name, tuple(np.asarray(c.values).tolist()), c.units, c.long_name)
-        for name, c in simulator.record_coordinates(job).items()
-    )
+    variables, coordinates = record_layout(job, simulator)
     axes = tuple(axis_dimension(axis) for axis in job.axes)
-    derived = tuple(derived_coordinate(one, sampled="runs" in job.design) for one in job.derived)
+    few = (one for one in job.derived if runs_along(job, one.axes) <= MOST_DERIVED)
+    derived = tuple(derived_coordinate(one, sampled="runs" in job.design) for one in few)
     head = job.name, job.description, job.fingerprint(), job.resolved()
     units = {axis.name: job.units[axis.name] for axis in job.axes if axis.name in job.units}
     return Study(*head, axes, variables, coordinates, derived, units)
+
+
+def runs_along(job: Job, names: Collection[str]) -> int:
+    """Return the number of combinations of values on some axes of a job; of samples their number."""
+    if "runs" in job.design:
+        return job.design["runs"]
+    return math.prod(len(axis.values) for axis in job.axes if axis.name in names)
+
+
+def record_layout(job: Job, simulator: Simulator) -> tuple[tuple[Variable, ...], tuple[Dimension, ...]]:
+    """Return the quantities of a record, and their dimensions beside the grid's."""
+    coordinates = (
+        Dimension(name, tuple(np.asarray(c.values).tolist()), c.units, c.long_name)
+        for name, c in simulator.record_coordinates(job).items()
+    )
+    return tuple(simulator.record_variables(job)), tuple(coordinates)
+
+
+def record_type(variables: Iterable[Variable], coordinates: Iterable[Dimension]) -> np.dtype:
+    """Return the structured type of one record: packed, little-endian, so that logs move between machines."""
+    lengths = {dimension.name: len(dimension.values) for dimension in coordinates}
+    fields = [
+        (v.name, np.dtype(v.dtype).newbyteorder("<"), tuple(lengths[d] for d in v.dims)) for v in variables
+    ]
+    return np.dtype(fields)
 
 
 def check_names(job: Job, simulator: Simulator) -> None:

@@ -21,6 +21,7 @@ from cvt_hpc.locks import BusyError
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.forecast.cost_model import CostModel
+from cvt_hpc.study.forecast.needs import refuse_too_large
 from cvt_hpc.study.gather import gather_records
 from cvt_hpc.study.histories import keep_histories, leave_out_missing
 from cvt_hpc.study.part import Part, read_part
@@ -31,7 +32,7 @@ from cvt_hpc.study.ranks.progress import Progress
 from cvt_hpc.study.ranks.schedule import claimed_batches, open_counter
 from cvt_hpc.study.ranks.stopping import ELSEWHERE, SignalWatch, Stop
 from cvt_hpc.study.ranks.survival import outlive
-from cvt_hpc.study.ranks.time_limit import find_time_limit
+from cvt_hpc.study.ranks.time_limit import find_time_limit, planning_within
 from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.log import RecordLog
 from cvt_hpc.study.record.recovery import read_records
@@ -84,8 +85,8 @@ def run(
     progress : bool
         Whether rank 0 shows on stderr how far the sweep is.
     time_limit : float, optional
-        Time [s] after which no run computes; the dataset is gathered after it. Within a Slurm job, that until
-        its end by default. Runs that are not expected to end in time are not started.
+        Time [s] in which the sweep is to end; some of it is kept for gathering the dataset. Within a Slurm
+        job, that until its end by default. Runs that are not expected to end in time are not started.
     run_limit : float, optional
         Time [s] that a run may take; runs that take longer are recorded as timed out.
     retry : collection of Status, optional
@@ -113,10 +114,12 @@ def run(
     InputError
         If the folder holds another job, is in use or cannot be written to, if ranks are not connected, or if
         there is no such part, or it is to start over: the other parts would lose their runs; or if steps
-        cannot be shortened so.
+        cannot be shortened so; or if memory, disk or time do not suffice for so many runs.
     """
     started = time.monotonic()
     simulator = simulator or default_simulator()
+    if chosen is None:
+        refuse_too_large(job, simulator, _place(job, out))
     study, share, folder = _accept(job, out, part, fresh, simulator)
     if refine is not None:
         check_refinement(job, refine, retry)
@@ -129,9 +132,12 @@ def run(
 
         def find_plan() -> Plan:
             again = retry if begins else ()
-            plan = prepare(folder, task, share, fresh and begins, again, team.size, held, refine)
             asked = None if time_limit is None else time_limit - (time.monotonic() - started)
-            return plan._replace(limit=find_time_limit(asked, study.size))
+            limit, began = find_time_limit(asked, study.size), time.monotonic()
+            with planning_within(limit.seconds, study.size):
+                plan = prepare(folder, task, share, fresh and begins, again, team.size, held, refine)
+            left = limit.seconds - (time.monotonic() - began)
+            return plan._replace(limit=limit._replace(seconds=left))
 
         with ExitStack() as held:
             plan = team.on_root(find_plan)
@@ -162,6 +168,7 @@ def check_start(
     job: Job, out: str | Path | None = None, *, part: str | None = None, fresh: bool = False
 ) -> None:
     """Raise the InputError that `run` would raise before it computes anything; touches nothing."""
+    refuse_too_large(job, default_simulator(), _place(job, out))
     study, _, folder = _accept(job, out, part, fresh, default_simulator())
     folder.check_free_for(study, fresh)
 
@@ -176,7 +183,11 @@ def _accept(
     study = describe(job, simulator)
     if share is not None and study.is_traced:
         raise mismatch("part", "a whole study, since a trace goes by the runs of all parts", f"part {share}")
-    return study, share, StudyFolder(out if out is not None else Path("out") / job.name)
+    return study, share, StudyFolder(_place(job, out))
+
+
+def _place(job: Job, out: str | Path | None) -> Path:
+    return Path(out) if out is not None else Path("out") / job.name
 
 
 def _compute(

@@ -143,7 +143,10 @@ def test_the_end_of_the_slurm_job_is_a_limit(start, tmp_path):
 
 def test_no_limit_without_slurm():
     assert find_time_limit(None, 10, {}).seconds == math.inf
-    assert find_time_limit(60.0, 10, {"SLURM_JOB_ID": "1", "SLURM_JOB_END_TIME": "5"}) == (60.0, "time limit")
+    assert find_time_limit(60.0, 10, {"SLURM_JOB_ID": "1", "SLURM_JOB_END_TIME": "5"}) == (
+        59.998,
+        "time limit",
+    )
 
 
 def test_the_end_is_read_from_the_environment(monkeypatch):

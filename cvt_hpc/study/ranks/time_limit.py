@@ -6,13 +6,21 @@ import logging
 import math
 import os
 import re
+import signal
 import subprocess
+import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from types import FrameType
 from typing import NamedTuple
+
+from cvt_hpc.errors import mismatch
 
 _SQUEUE = ("squeue", "--noheader", "--format=%L")  # %L: time left, as days-hours:minutes:seconds
 _PATIENCE = 20.0  # [s] with a busy controller
+_GATHERING = 2e-4  # [s] a run
+_SHORTEST_PLANNING = 10.0  # [s]: a plan takes so long on a busy machine, whatever its size
 _TIME_LEFT = re.compile(r"(?:(\d+)-)?(?:(\d+):)?(?:(\d+):)?(\d+)")
 _logger = logging.getLogger(__name__)
 
@@ -32,12 +40,12 @@ def find_time_limit(asked: float | None, runs: int, environment: Mapping[str, st
     asked : float or None
         Time [s] that the user has given; without it that of the Slurm job counts, if there is one.
     runs : int
-        Number of runs of the study, which have to be gathered before a Slurm job ends.
+        Number of runs of the study, which have to be gathered before the end.
     environment : mapping
         Of this process.
     """
     if asked is not None:
-        return TimeLimit(asked)
+        return TimeLimit(asked - _GATHERING * runs)
     left = _left_to_slurm_job(environment)
     return (
         TimeLimit(left - gathering_margin(runs), "end of the Slurm job") if left < math.inf else TimeLimit()
@@ -50,7 +58,48 @@ def gathering_margin(runs: int) -> float:
     It is longer than that between Slurm's warning and the end, 30 s by slurm/*.sbatch, up to 90 s:
     no batch that is expected to end in time is broken off by the warning.
     """
-    return 90.0 + 2e-4 * runs
+    return 90.0 + _GATHERING * runs
+
+
+class _TimeUp(BaseException):
+    """Raised wherever the process is when an alarm goes off; no handler of errors takes it for one."""
+
+
+@contextmanager
+def planning_within(seconds: float, runs: int) -> Iterator[None]:
+    """End what a `with` does when its time is up: a plan of very many runs can take longer than their limit.
+
+    Parameters
+    ----------
+    seconds : float
+        Time [s] that is left; infinite for no limit. Some seconds are always left.
+    runs : int
+        Number of runs, for the error.
+
+    Raises
+    ------
+    InputError
+        If the time is up. In a thread, where Python has no signals, it never is.
+    """
+    if seconds == math.inf or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(number: int, frame: FrameType | None) -> None:
+        raise _TimeUp
+
+    limit, began = max(seconds, _SHORTEST_PLANNING), time.monotonic()
+    handler = signal.signal(signal.SIGALRM, end)
+    before, _ = signal.setitimer(signal.ITIMER_REAL, limit)
+    try:
+        yield
+    except _TimeUp:
+        expected = f"more than {limit:.3g} s, which the plan of {runs} runs takes before the first one begins"
+        raise mismatch("time limit", expected, f"{max(seconds, 0.0):.3g} s left") from None
+    finally:
+        left = max(before - (time.monotonic() - began), 1e-3) if before else 0.0
+        signal.setitimer(signal.ITIMER_REAL, left)
+        signal.signal(signal.SIGALRM, handler)
 
 
 def _left_to_slurm_job(environment: Mapping[str, str]) -> float:

@@ -1,0 +1,139 @@
+"""Studies of very many runs: what cannot be is refused at once, and what can begins in time."""
+
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from study_double import Axis, Job, Simulator
+
+from cvt_hpc.errors import InputError
+from cvt_hpc.job import build_job
+from cvt_hpc.study import check_start, description, open_results, run
+from cvt_hpc.study.forecast import needs as needs_module
+from cvt_hpc.study.forecast.needs import needs, refuse_too_large
+from cvt_hpc.study.ranks.time_limit import find_time_limit, planning_within
+
+MANY = (Axis("load", tuple(range(1000))), Axis("speed", tuple(range(1000))), Axis("x", tuple(range(1000))))
+
+
+def test_more_runs_than_memory_are_refused_before_anything_is_made(tmp_path):
+    out = tmp_path / "out"
+    message = r"^double.toml: 1000000000 runs: expected 400 GB of memory for their plan, found [\d.]+ GB in this machine$"
+    with pytest.raises(InputError, match=message):
+        run(Job(MANY), out, simulator=Simulator(), progress=False)
+    assert not out.exists()
+
+
+def test_more_records_than_the_disk_holds_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(needs_module.shutil, "disk_usage", lambda path: SimpleNamespace(free=5000))
+    job, simulator = Job(), Simulator()
+    with pytest.raises(
+        InputError, match="12 runs: expected .* GB on the disk for their records, found 5e-06 GB at "
+    ):
+        refuse_too_large(job, simulator, tmp_path)
+    refuse_too_large(Job(design={"first_spacing": {}}), simulator, tmp_path)  # runs part of them
+    (tmp_path / "records").mkdir()
+    (tmp_path / "records" / "rank-0.log").write_bytes(bytes(needs(job, simulator).disk))
+    assert refuse_too_large(job, simulator, tmp_path) == needs(job, simulator)  # they are there
+
+
+def test_the_disk_that_is_told_is_that_of_the_records(tmp_path):
+    run(Job(), tmp_path, simulator=Simulator(lanes=4), progress=False)
+    (log,) = (tmp_path / "records").iterdir()
+    expected = needs(Job(), Simulator()).disk
+    # beside the records a log has its header, some 2 kB, and a mark for each batch
+    assert expected < log.stat().st_size < expected + 3000
+
+
+def test_a_plan_that_takes_longer_than_its_limit_is_given_up(tmp_path, monkeypatch):
+    monkeypatch.setattr("cvt_hpc.study.ranks.time_limit._SHORTEST_PLANNING", 0.2)
+
+    class Slow(Simulator):
+        def run_costs(self, job):
+            try:
+                time.sleep(30)
+            except Exception:  # as code that goes on after an error of one run
+                time.sleep(30)
+
+    began = time.monotonic()
+    with pytest.raises(
+        InputError, match="^time limit: expected more than 0[.]4[0-9]+ s, which the plan of 12 runs takes"
+    ):
+        run(Job(), tmp_path, simulator=Slow(), progress=False, time_limit=0.5)
+    assert time.monotonic() - began < 20
+    assert run(Job(), tmp_path, simulator=Simulator(), progress=False).done == 12  # the folder is free again
+
+
+def test_the_alarm_of_another_goes_off_after_it():
+    import signal
+
+    heard = []
+    handler = signal.signal(signal.SIGALRM, lambda *_: heard.append(time.monotonic()))
+    before = signal.setitimer(signal.ITIMER_REAL, 0.3)
+    try:
+        with planning_within(100.0, 12):
+            pass
+        signal.pause()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, *before)
+        signal.signal(signal.SIGALRM, handler)
+    assert len(heard) == 1
+
+
+def test_a_time_limit_keeps_time_for_gathering():
+    # 10^6 runs take 51 s to gather, by the README of this room
+    assert 1000.0 - find_time_limit(1000.0, 1_000_000, {}).seconds > 100.0
+
+
+def test_parameters_that_follow_at_very_many_places_are_no_coordinates(tmp_path, monkeypatch):
+    def many():
+        raise AssertionError("evaluated")
+
+    class Costly(SimpleNamespace):
+        values = property(lambda self: many())
+
+    monkeypatch.setattr(description, "MOST_DERIVED", 11)
+    few = SimpleNamespace(name="f", axes=(), values=(1.0,), unit="N", description="few", words="x")
+    costly = Costly(name="m", axes=("load",), unit="N", description="many", words="x")
+    run(Job(derived=(few, costly)), tmp_path, simulator=Simulator(), progress=False)
+    with open_results(tmp_path) as results:
+        assert "f" in results.coords and "m" not in results.coords
+
+
+def test_samples_beyond_counting_are_read_in_seconds():
+    document = {
+        "name": "x",
+        "model": "criterion",
+        "design": {"kind": "sobol", "runs": 2**20},
+        "axes": {"contact_force": {"from": 1, "to": 100}},
+    }
+    began = time.process_time()
+    job = build_job(document, "x.toml")
+    # 2 s on an idle core; each sample checked takes 50 s and more
+    assert time.process_time() - began < 15.0
+    assert len(np.unique(job.axes[0].values)) == 2**20
+
+
+def test_of_very_many_samples_the_extreme_ones_are_checked(monkeypatch):
+    from cvt_hpc.job import crosscheck
+
+    monkeypatch.setattr(crosscheck, "MOST_CHECKED_POINTS", 50)
+    monkeypatch.setattr(crosscheck, "MOST_CHECKED_VALUES", 3)
+    values = tuple(np.random.default_rng(1).permutation(1000).tolist())
+    axes = (Axis("a", values), Axis("b", tuple(-value for value in values)))
+    checked = list(crosscheck._samples_to_check(axes))
+    assert {(0, 0), (999, -999)} <= set(checked)
+    assert len(checked) == 3 + 2  # the extremes of both axes are the same two samples
+
+
+def test_check_start_refuses_as_a_run(tmp_path):
+    document = {
+        "name": "x",
+        "model": "criterion",
+        "axes": {
+            name: {"from": 1, "to": 2, "count": 100_000} for name in ("contact_force", "tangential_speed")
+        },
+    }
+    with pytest.raises(InputError, match="^x.toml: 10000000000 runs: expected 4e.03 GB of memory"):
+        check_start(build_job(document, "x.toml"), tmp_path / "out")
