@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.job.summary import cost_in_words
 from cvt_hpc.job.values import in_words
+from cvt_hpc.tables import columns
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS, PairClass
 from cvt_hpc.vibration.classes import OccurrenceClass
@@ -127,11 +128,10 @@ def comparison_lines(found: Comparison, sources: tuple[str, str]) -> Iterator[st
 
 def _class_table(found: Comparison) -> Iterator[str]:
     counts = found.counts()
-    rows = {kind for (kind, _), count in counts.items() if count}
-    columns = sorted({kind for (_, kind), count in counts.items() if count})
-    yield "".join([f"  {'':<10}", *(f"{kind.label:>11}" for kind in columns)])
-    for row in sorted(rows):
-        yield "".join([f"  {row.label:<10}", *(f"{counts[row, column]:>11}" for column in columns)])
+    first = sorted({kind for (kind, _), count in counts.items() if count})
+    second = sorted({kind for (_, kind), count in counts.items() if count})
+    rows = [[kind.label, *(str(counts[kind, other]) for other in second)] for kind in first]
+    yield from columns([["", *(kind.label for kind in second)], *rows])
 
 
 def _cell_line(cell: Cell) -> str:
@@ -176,20 +176,20 @@ def status_lines(status: StudyStatus) -> Iterator[str]:
     """Yield the lines that say how far a study is."""
     from cvt_hpc.study.ranks.progress import show_duration
 
-    yield f"job     {status.name} ({'running' if status.running else 'not running'})"
-    yield f"runs    {status.total}"
+    rows = [("job", f"{status.name} ({'running' if status.running else 'not running'})")]
+    rows.append(("runs", f"{status.total}"))
     if status.unneeded:
-        yield f"grid    {status.total + status.unneeded} cells, {status.unneeded} not needed so far"
+        cells = status.total + status.unneeded
+        rows.append(("grid", f"{cells} cells, {status.unneeded} not needed so far"))
     words = _special_in_words(status)
-    yield f"done    {status.done} ({status.done / status.total:.1%})" + (
-        f", of these {words}" if words else ""
-    )
-    yield f"failed  {status.failed}"
-    yield f"left    {status.left}"
+    done = f"{status.done} ({status.done / status.total:.1%})"
+    rows += [("done", f"{done}, of these {words}" if words else done), ("failed", f"{status.failed}")]
+    rows.append(("left", f"{status.left}"))
     if status.rate is not None:
-        yield f"rate    {status.rate:.3g} runs/s"
+        rows.append(("rate", f"{status.rate:.3g} runs/s"))
     if status.left and status.time_to_go is not None:
-        yield f"to go   {show_duration(status.time_to_go)}"
+        rows.append(("to go", show_duration(status.time_to_go)))
+    yield from columns(rows, indent="")
 
 
 def forecast_lines(forecasts: Sequence[Forecast], job: Job, basis: str) -> Iterator[str]:
@@ -199,13 +199,13 @@ def forecast_lines(forecasts: Sequence[Forecast], job: Job, basis: str) -> Itera
 
     at_most = ", if all cells of the grid are run" if "first_spacing" in job.design else ""
     yield f"forecast of all {job.size} runs by {basis}{at_most}:"
-    yield f"  {'ranks':>6}  {'makespan':>9}  {'95 % of sweeps':<20}  efficiency  core-hours  --time"
+    rows = [("ranks", "makespan", "95 % of sweeps", "efficiency", "core-hours", "--time")]
     for forecast in forecasts:
         median, low, high = map(show_duration, forecast.makespan)
-        yield (
-            f"  {forecast.ranks:>6}  {median:>9}  {f'{low} to {high}':<20}  {forecast.efficiency[0]:>10.0%}  "
-            f"{forecast.core_seconds / 3600:>10.3g}  {slurm_time(suggested_time(forecast, job.size))}"
-        )
+        efficiency, hours = f"{forecast.efficiency[0]:.0%}", f"{forecast.core_seconds / 3600:.3g}"
+        limit = slurm_time(suggested_time(forecast, job.size))
+        rows.append((str(forecast.ranks), median, f"{low} to {high}", efficiency, hours, limit))
+    yield from columns(rows)
 
 
 def needs_line(needed: Needs) -> str:
@@ -254,11 +254,8 @@ def outcome_lines(dataset: xr.Dataset) -> Iterator[str]:
     if int(dataset["status"]) != Status.DONE:
         names = [name for name in names if name in _KNOWN_OF_FAILURES]
     names.sort(key=lambda name: name not in _FLAGS_FIRST)
-    width = max(map(len, names), default=0)
-    for name in names:
-        words = _array_in_words(dataset[name])
-        if words:
-            yield f"{name.ljust(width)}  {words}"
+    rows = [(name, words) for name in names if (words := _array_in_words(dataset[name]))]
+    yield from columns(rows, indent="")
 
 
 def _array_in_words(array: xr.DataArray) -> str:

@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterator, Sequence
 
 
-def columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+def columns(rows: Sequence[Sequence[str]], indent: str = "  ") -> Iterator[str]:
     """Yield rows as lines, their cells below each other; the last one is not padded."""
     widths = [max(map(len, column)) for column in zip(*(row[:-1] for row in rows), strict=True)]
     for row in rows:
         cells = [cell.ljust(width) for cell, width in zip(row[:-1], widths, strict=True)]
-        yield f"  {'  '.join([*cells, row[-1]])}".rstrip()
+        yield f"{indent}{'  '.join([*cells, row[-1]])}".rstrip()
 
 
 def short(value: float) -> str:

@@ -41,9 +41,7 @@ def add(commands: Any) -> None:
         help="only the K-th of N parts of the runs; parts may be at work in one folder at the same time",
     )
     run.add_argument("--dry-run", action="store_true", help="validate options, job and folder; runs nothing")
-    limit = (
-        "time after which no run computes, such as 2h30m (default: until the end of the Slurm job, if any)"
-    )
+    limit = "time in which the sweep ends, such as 2h30m (default: until the end of the Slurm job, if any)"
     run.add_argument("--time-limit", metavar="TIME", help=limit)
     run.add_argument("--run-limit", metavar="TIME", help="time that one run may take (default: any)")
     run.add_argument(

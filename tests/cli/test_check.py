@@ -33,13 +33,14 @@ def test_check_prints_every_parameter_with_its_origin_the_axes_and_the_cost(writ
     assert "  table              [[1, 2.5], [3]] N/m  given    rows of line forces" in out
     assert "  load_history   constant    default  how the load is applied (constant, ramp)" in out
     assert "  refined   false  default  finer on the arcs" in out
-    assert out[-6:] == [
+    assert out[-7:] == [
         "[axes]",
         "  load              0, 25, 50, 75, 100 N m  5 values",
         "  sheave_stiffness  1, 3                    2 values",
         "",
         "runs: 10 = 5 x 2",
         "estimated cost: 30 core-seconds per run, 300 core-seconds in all",
+        "needed: 0.004 MB of memory, 0.00274 MB of disk for records",
     ]
     assert call("run", "x.toml", *overrides, "--dry-run") == (0, out, [])
     assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
@@ -136,9 +137,10 @@ def test_a_forecast_that_makes_no_sense_is_refused(write_job, call, options, mes
 
 def test_check_shortens_long_axes_and_long_times(write_job, call):
     write_job("[scene]\nthrust = 2e4\n[axes]\nload = { from = 0, to = 120, step = 0.5 }\n")
-    assert call("check", "x.toml")[1][-4:] == [
+    assert call("check", "x.toml")[1][-5:] == [
         "  load  0, 0.5, 1, ..., 120 N m  241 values",
         "",
         "runs: 241",
         "estimated cost: 30 core-seconds per run, 2.01 core-hours in all",
+        "needed: 0.0964 MB of memory, 0.066 MB of disk for records",
     ]

@@ -15,8 +15,8 @@ from cvt_hpc.study.simulator import Simulator
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
-# [byte] of rank 0 for each run, for the plan and the index of the records: 207 were measured (10^6 runs, one rank),
-# and as much again is assumed for the plan on its way to other ranks.
+# [byte] of rank 0 for each run, for the plan and the index of the records: 207 were measured with 10^6 runs
+# on one rank, and about as much again is assumed for sending the plan.
 MEMORY_PER_RUN = 400
 
 
