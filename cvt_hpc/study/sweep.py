@@ -118,8 +118,6 @@ def run(
     """
     started = time.monotonic()
     simulator = simulator or default_simulator()
-    if chosen is None:
-        refuse_too_large(job, simulator, _place(job, out))
     study, share, folder = _accept(job, out, part, fresh, simulator)
     if refine is not None:
         check_refinement(job, refine, retry)
@@ -132,6 +130,8 @@ def run(
 
         def find_plan() -> Plan:
             again = retry if begins else ()
+            if begins and chosen is None:
+                refuse_too_large(job, simulator, folder.path)
             asked = None if time_limit is None else time_limit - (time.monotonic() - started)
             limit, began = find_time_limit(asked, study.size), time.monotonic()
             with planning_within(limit.seconds, study.size):
@@ -168,8 +168,8 @@ def check_start(
     job: Job, out: str | Path | None = None, *, part: str | None = None, fresh: bool = False
 ) -> None:
     """Raise the InputError that `run` would raise before it computes anything; touches nothing."""
-    refuse_too_large(job, default_simulator(), _place(job, out))
     study, _, folder = _accept(job, out, part, fresh, default_simulator())
+    refuse_too_large(job, default_simulator(), folder.path)
     folder.check_free_for(study, fresh)
 
 
@@ -183,11 +183,7 @@ def _accept(
     study = describe(job, simulator)
     if share is not None and study.is_traced:
         raise mismatch("part", "a whole study, since a trace goes by the runs of all parts", f"part {share}")
-    return study, share, StudyFolder(_place(job, out))
-
-
-def _place(job: Job, out: str | Path | None) -> Path:
-    return Path(out) if out is not None else Path("out") / job.name
+    return study, share, StudyFolder(out if out is not None else Path("out") / job.name)
 
 
 def _compute(
