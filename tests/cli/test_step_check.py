@@ -107,10 +107,11 @@ def test_each_run_is_done_at_half_of_the_step_that_it_took(checked, tmp_path):
 def test_a_dry_run_tells_what_the_check_will_cost(checked, tmp_path):
     status, out, _ = checked("0.1", "--dry-run")
     # the double's run takes 30 core-seconds, and twice that at half the step
-    assert (status, out[-2:]) == (
+    assert (status, out[-3:]) == (
         0,
         [
             "estimated cost: 30 core-seconds per run, 1.2e+03 core-seconds in all",
+            "needed: 0.016 MB of memory, 0.0126 MB of disk for records",
             "step check: about 4 runs again at half the step, estimated cost: 60 core-seconds per run, 240 core-seconds in all",
         ],
     )

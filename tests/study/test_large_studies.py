@@ -106,7 +106,7 @@ def test_samples_beyond_counting_are_read_in_seconds():
         "name": "x",
         "model": "criterion",
         "design": {"kind": "sobol", "runs": 2**20},
-        "axes": {"contact_force": {"from": 1, "to": 100}},
+        "axes": {"contact_force": {"from": 100, "to": 1000}},
     }
     began = time.process_time()
     job = build_job(document, "x.toml")
@@ -132,7 +132,8 @@ def test_check_start_refuses_as_a_run(tmp_path):
         "name": "x",
         "model": "criterion",
         "axes": {
-            name: {"from": 1, "to": 2, "count": 100_000} for name in ("contact_force", "tangential_speed")
+            "contact_force": {"from": 100, "to": 200, "count": 100_000},
+            "element_mass": {"from": 1, "to": 2, "count": 100_000},
         },
     }
     with pytest.raises(InputError, match="^x.toml: 10000000000 runs: expected 4e.03 GB of memory"):
