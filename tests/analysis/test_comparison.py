@@ -194,9 +194,9 @@ def test_the_report_says_both_counts_and_names_the_cells():
         "B: out/b",
         "differs: nothing that the datasets tell",
         "4 cells, by class in A (rows) and in B (columns):",
-        "                  quiet  vibrating  undecided",
-        "  quiet               0          1          0",
-        "  vibrating           1          1          1",
+        "             quiet  vibrating  undecided",
+        "  quiet      0      1          0",
+        "  vibrating  1      1          1",
         "2 of 4 cells contradict (quiet against vibrating), 1 of them beyond the threshold (larger amplitude "
         "not within 20% of it)",
         "  load = 0: vibrating 5.5 um 500 Hz | quiet 4.5 um 505 Hz, near the threshold",
