@@ -2,6 +2,7 @@
 
 import json
 import os
+from dataclasses import replace
 
 import pytest
 from toy_jobs import GRID
@@ -9,6 +10,7 @@ from toy_jobs import GRID
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError, one_line, show
 from cvt_hpc.job import load_job
+from cvt_hpc.study.folder import StudyFolder
 
 NASTY = "a\x1b[2J\nb\r\u202e\x9b"
 ESCAPED = r"a\x1b[2J\nb\r\u202e\x9b"
@@ -80,9 +82,10 @@ def test_the_name_in_a_folder(write_job, mechanics, call, tmp_path):
     write_job(GRID)
     call("run", "x.toml")
     folder = tmp_path / "out" / "x"
-    entry = json.loads((folder / "job.json").read_text())
-    (folder / "job.json").write_text(json.dumps({**entry, "name": NASTY}))
-    (folder / "records" / f"rank-{ESCAPED[:1]}\n.log").write_text("nothing")
+    study = StudyFolder(folder).load()
+    StudyFolder(folder).job_file.unlink()
+    StudyFolder(folder).save(replace(study, name=NASTY))
+    (folder / "records" / "rank-\n.log").write_text("nothing")
     status, out, err = call("status", folder)
     assert status == 0
     assert_clean(out)
