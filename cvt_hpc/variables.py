@@ -48,11 +48,13 @@ class Variable:
     units : str
         CF unit ("1" if dimensionless, "" for flags and texts).
     long_name : str
-        CF long_name.
+        CF long_name: a few words that fit an axis label.
     flags : type of IntEnum or None
         Meaning of the values of a flag variable.
     volatile : bool
         Depends on the machine and the hour (timings): exempt from bitwise reproducibility.
+    comment : str
+        CF comment: what the name leaves open, in a sentence.
     """
 
     name: str
@@ -62,11 +64,30 @@ class Variable:
     long_name: str
     flags: type[IntEnum] | None = None
     volatile: bool = False
+    comment: str = ""
+
+    @property
+    def blank(self) -> float | int | str:
+        """Value where nothing is known: NaN, 0, an empty text, and UNDECIDED of flags that have it."""
+        if self.flags is not None:
+            return int(self.flags.__members__.get("UNDECIDED", 0))
+        return {"f": np.nan, "S": ""}.get(np.dtype(self.dtype).kind, 0)
 
 
 class Coordinate(NamedTuple):
-    """A dimension of the record beside the grid's: values (n,), CF unit ("" for labels), CF long_name."""
+    """A dimension of the record beside the grid's.
+
+    Attributes
+    ----------
+    values : array, shape (n,)
+        Numbers [SI] or labels.
+    units : str
+        CF unit ("" for labels).
+    long_name, comment : str
+        As of a `Variable`.
+    """
 
     values: np.ndarray
     units: str
     long_name: str
+    comment: str = ""

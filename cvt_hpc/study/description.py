@@ -109,13 +109,10 @@ class Study:
         )
 
     def blank_rows(self, shape: int | tuple[int, ...] = ()) -> np.ndarray:
-        """Return records of runs without results: NaN, zero, no text, and flags that say so."""
+        """Return records of runs of which nothing is known."""
         rows = np.zeros(shape, self.record_dtype)
         for variable in self.variables:
-            if variable.flags is not None:
-                rows[variable.name] = variable.flags.__members__.get("UNDECIDED", 0)
-            elif np.dtype(variable.dtype).kind == "f":
-                rows[variable.name] = np.nan
+            rows[variable.name] = variable.blank
         return rows
 
     def pack(self, values: Mapping[str, Any]) -> np.ndarray:
