@@ -47,24 +47,29 @@ class Variable:
         numpy type: "f8", "i8", "i1", or "S240" for a text.
     units : str
         CF unit ("1" if dimensionless, "" for flags and texts).
-    long_name : str
-        CF long_name: a few words that fit an axis label.
+    comment : str
+        CF comment: what it is, in a sentence.
     flags : type of IntEnum or None
         Meaning of the values of a flag variable.
     volatile : bool
         Depends on the machine and the hour (timings): exempt from bitwise reproducibility.
-    comment : str
-        CF comment: what the name leaves open, in a sentence.
+    words : str
+        A few words for an axis label, where `name` does not say it.
     """
 
     name: str
     dims: tuple[str, ...]
     dtype: str
     units: str
-    long_name: str
+    comment: str
     flags: type[IntEnum] | None = None
     volatile: bool = False
-    comment: str = ""
+    words: str = ""
+
+    @property
+    def long_name(self) -> str:
+        """CF long_name, which fits an axis label."""
+        return self.words or self.name.replace("_", " ")
 
     @property
     def blank(self) -> float | int | str:
@@ -83,8 +88,10 @@ class Coordinate(NamedTuple):
         Numbers [SI] or labels.
     units : str
         CF unit ("" for labels).
-    long_name, comment : str
-        As of a `Variable`.
+    long_name : str
+        CF long_name: a few words for an axis label.
+    comment : str
+        CF comment.
     """
 
     values: np.ndarray

@@ -29,6 +29,7 @@ _COST = (
         "s",
         "processor time, all tries; of runs that advance together, their time divided by their number",
         volatile=True,
+        words="processor time",
     ),
 )
 _MARCH = (
@@ -37,7 +38,8 @@ _MARCH = (
         (),
         "f8",
         "s",
-        "simulated time: more than asked where a run was prolonged, less where it failed or slipped through",
+        "more than asked where a run was prolonged, less where it failed or slipped through",
+        words="simulated time",
     ),
     Variable("time_step", (), "f8", "s", "time step of the run that counts"),
     Variable("refinements", (), "i1", "1", "times that the run was done again at half the step"),

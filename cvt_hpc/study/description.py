@@ -176,7 +176,7 @@ def describe(job: Job, simulator: Simulator) -> Study:
     check_names(job, simulator)
     variables = tuple(simulator.record_variables(job))
     coordinates = tuple(
-        Dimension(name, tuple(np.asarray(c.values).tolist()), c.units, c.long_name)
+        Dimension(name, tuple(np.asarray(c.values).tolist()), c.units, c.long_name, comment=c.comment)
         for name, c in simulator.record_coordinates(job).items()
     )
     axes = tuple(axis_dimension(axis) for axis in job.axes)
@@ -220,4 +220,7 @@ def _variable_to_json(variable: Variable) -> dict[str, Any]:
 def _variable_from_json(entry: Mapping[str, Any]) -> Variable:
     meanings = entry["flags"]
     flags = meanings and IntEnum(meanings["name"], meanings["members"])
-    return Variable(**{**entry, "dims": tuple(entry["dims"]), "flags": flags})
+    entry = {**entry, "dims": tuple(entry["dims"]), "flags": flags}
+    if "long_name" in entry:  # folders of earlier versions have the sentence there
+        entry["comment"] = entry.pop("long_name")
+    return Variable(**entry)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from cvt_hpc.netcdf import store_history
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.variables import Status
@@ -24,8 +25,6 @@ def keep_histories(folder: StudyFolder, histories: Iterable[tuple[int, xr.Datase
         If the system refuses.
     """
     for index, history in histories:
-        from cvt_hpc.history_files import store_history  # late: most sweeps keep none
-
         folder.make_histories()
         store_history(history, folder.history(index))
 

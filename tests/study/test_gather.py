@@ -44,7 +44,11 @@ def test_axes_are_the_dimensions(dataset):
     assert dataset["friction_gradient"].values.tolist() == [-0.5, -0.25, 0.0]
     assert dataset["sheave_stiffness"].values.tolist() == [1.0, math.inf]
     assert dataset["friction_law"].values.tolist() == ["stribeck", "algebraic"]
-    assert dataset["friction_gradient"].attrs == {"units": "s/m", "long_name": "slope of the friction law"}
+    assert dataset["friction_gradient"].attrs == {
+        "units": "s/m",
+        "long_name": "friction gradient",
+        "comment": "slope of the friction law",
+    }
     assert dataset["sheave_stiffness"].attrs["units"] == "1"
     assert "units" not in dataset["friction_law"].attrs
 
