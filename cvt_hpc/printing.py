@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.job.summary import cost_in_words
 from cvt_hpc.job.values import in_words
-from cvt_hpc.variables import Status
+from cvt_hpc.variables import Status, flag_in_words
 from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS, PairClass
 from cvt_hpc.vibration.classes import OccurrenceClass
 
@@ -256,8 +256,7 @@ def outcome_lines(dataset: xr.Dataset) -> Iterator[str]:
 def _array_in_words(array: xr.DataArray) -> str:
     """Return the values of a small array, each with its place where there are several, and the unit."""
     if "flag_meanings" in array.attrs:
-        meanings = dict(zip(array.attrs["flag_values"], array.attrs["flag_meanings"].split(), strict=True))
-        return meanings[array.item()]
+        return flag_in_words(array)
     unit = array.attrs.get("units", "")
     unit = "" if unit == "1" else unit
     if array.ndim == 0:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class Status(IntEnum):
@@ -77,6 +80,12 @@ class Variable:
         if self.flags is not None:
             return int(self.flags.__members__.get("UNDECIDED", 0))
         return {"f": np.nan, "S": ""}.get(np.dtype(self.dtype).kind, 0)
+
+
+def flag_in_words(flag: xr.DataArray) -> str:
+    """Return the meaning of a scalar flag by the attributes that it has in a dataset."""
+    meanings = dict(zip(flag.attrs["flag_values"], flag.attrs["flag_meanings"].split(), strict=True))
+    return meanings[flag.item()]
 
 
 class Coordinate(NamedTuple):

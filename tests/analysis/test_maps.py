@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 from studies import GRADIENTS, LOADS, STIFFNESSES, flags, study, two_flags
 
-from cvt_hpc.analysis.arrangement import arrange
+import cvt_hpc
 from cvt_hpc.analysis.cells import AMPLITUDE_COLOURS, FREQUENCY_COLOURS, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, occurrence_classes
 from cvt_hpc.analysis.figures import STYLE
@@ -31,8 +31,7 @@ VERDICTS = {
 
 
 def figure_of(dataset, at=()):
-    with matplotlib.rc_context(STYLE):
-        return map_figure(arrange(dataset, dict(at), "out/x"))
+    return map_figure(dataset, dict(at), "out/x")
 
 
 def panels_of(figure):
@@ -254,3 +253,14 @@ def test_results_read_back_from_a_file_give_the_same_map(tmp_path):
 def test_flags_of_the_made_up_study_are_those_of_results():
     _, values, attributes = flags([1], ("load",), Status, "")
     assert values.dtype == np.int8 and attributes["flag_meanings"].split()[values[0]] == "done"
+
+
+def test_a_figure_for_a_notebook_has_the_style_of_the_picture_and_leaves_the_users():
+    with matplotlib.rc_context({"font.size": 31.0}):
+        figure = cvt_hpc.map_figure(study(), {"sheave_stiffness": 1.5})
+        assert matplotlib.rcParams["font.size"] == 31.0
+    (panel,) = panels_of(figure)
+    assert {label.get_fontsize() for label in panel.get_xticklabels()} == {STYLE["xtick.labelsize"]}
+    assert panel.get_xlabel() == "load [N m]" and "sheave stiffness = 1.5" in figure.get_suptitle()
+    with pytest.raises(InputError, match="results: at slip: "):
+        cvt_hpc.map_figure(study(), {"slip": 1.0})

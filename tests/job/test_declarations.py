@@ -8,6 +8,7 @@ import pint
 import pytest
 
 from cvt_hpc import recording, steppers
+from cvt_hpc.analysis.figures import LONGEST_NAME
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.job.schema import load_schema
@@ -72,8 +73,8 @@ def test_what_is_recorded_has_a_name_that_fits_an_axis_label(model):
     coordinates = record_coordinates(job).items()
     words = {v.name: v.long_name for v in variables} | {name: c.long_name for name, c in coordinates}
     for name, long_name in words.items():
-        # four inches in the letters of a picture; a clause is a sentence, and belongs into the comment
-        assert 0 < len(long_name) <= 26 and not set(long_name) & set(",;:()"), name
+        # a clause is a sentence, and belongs into the comment
+        assert 0 < len(long_name) <= LONGEST_NAME and not set(long_name) & set(",;:()"), name
     for variable in variables:
         assert variable.comment and variable.comment != variable.long_name, variable.name
 
