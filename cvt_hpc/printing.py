@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -52,8 +53,8 @@ def report_lines(report: RunReport) -> Iterator[str]:
 
 
 def _special_in_words(counted: RunReport | StudyStatus) -> str:
-    """Return how many runs slip or move irregularly, in words; empty if none."""
-    counts = {"slip": counted.slipping, "irregular": counted.irregular}
+    """Return how many runs are no plain yes or no, in words; empty if none."""
+    counts = {"undecided": counted.undecided, "slip": counted.slipping, "irregular": counted.irregular}
     return ", ".join(f"{count} {word}" for word, count in counts.items() if count)
 
 
@@ -175,7 +176,11 @@ def status_lines(status: StudyStatus) -> Iterator[str]:
     """Yield the lines that say how far a study is."""
     from cvt_hpc.study.ranks.progress import show_duration
 
-    yield f"job     {status.name} ({'running' if status.running else 'not running'})"
+    state = "running" if status.running else "not running"
+    if status.finished is not None:
+        when = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime(status.finished))
+        state = f"finished {when}, after {show_duration(status.time_at_work)} at work"
+    yield f"job     {status.name} ({state})"
     yield f"runs    {status.total}"
     if status.unneeded:
         yield f"grid    {status.total + status.unneeded} cells, {status.unneeded} not needed so far"

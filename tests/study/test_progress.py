@@ -19,6 +19,7 @@ from cvt_hpc.study.ranks.progress import Progress, show_duration
 from cvt_hpc.study.ranks.schedule import SerialCounter
 from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.log import RecordLog
+from cvt_hpc.variables import Vibrates
 
 
 @pytest.mark.parametrize(
@@ -69,6 +70,27 @@ def test_rate_is_that_of_the_latest_session(tmp_path):
     status = read_status(tmp_path)
     assert 0.01 < status.rate <= 9
     assert status.left == 3
+
+
+def test_a_finished_study_says_when_and_how_long_it_was_at_work(tmp_path):
+    run(Job(), tmp_path, simulator=Simulator(), progress=False, time_limit=0.0)
+    assert read_status(tmp_path).finished is None
+    study, now = StudyFolder(tmp_path).load(), time.time()
+    layout = RecordFormat(study.fingerprint, study.record_dtype)
+    undecided = Simulator().run_point(Job(), Job().point(0), lambda: None) | {"vibrates": Vibrates.UNDECIDED}
+    # records take the time at which their log begins, and what has passed since then
+    for began, indices in ((now - 5000.0, range(5)), (now - 100.0, range(5, 12))):
+        session = {"id": str(began), "started": began - 60.0}
+        with pytest.MonkeyPatch.context() as clock:
+            clock.setattr("cvt_hpc.study.record.log.time.time", lambda began=began: began)
+            with RecordLog(tmp_path / "records", layout, session, rank=0) as log:
+                log.append([(index, study.pack(undecided)) for index in indices])
+    status = read_status(tmp_path)
+    assert (status.done, status.failed, status.left, status.undecided) == (12, 0, 0, 12)
+    assert status.finished == pytest.approx(now - 100.0, abs=5.0)
+    assert status.time_at_work == pytest.approx(2 * 60.0, abs=10.0)  # a loaded machine writes late
+    with StudyFolder(tmp_path).occupied(None):
+        assert read_status(tmp_path).finished is None
 
 
 def test_time_left_is_by_predicted_costs(tmp_path, monkeypatch):
