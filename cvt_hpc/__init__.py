@@ -1,7 +1,7 @@
 """Vibration-occurrence maps of metal pushbelt CVTs: thousands of transient runs under MPI.
 
-`build_job`, `load_job`, `simulate`, `run`, `open_results`, `map_figure` and `history_figure`; what they need is
-imported at their first use.
+`build_job`, `load_job`, `simulate`, `run`, `open_results`, `map_figure` and `history_figure`; what they need
+is imported at their first use.
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from textwrap import fill
 
 import numpy as np
 import xarray as xr
@@ -216,7 +217,8 @@ def draw_course(axes: Axes, course: xr.DataArray) -> None:
     time = 1e3 * course["time"].values
     factor, unit = display_unit(course.attrs.get("units", ""))
     axes.plot(time, factor * course.values, color=_OTHER_COLOUR, linewidth=1.2)
-    axes.set(xlabel="time [ms]", ylabel=axis_label(course, unit), xlim=time[[0, -1]])
+    label = fill(axis_label(course, unit), 14)  # what the height of the panel holds
+    axes.set(xlabel="time [ms]", ylabel=label, xlim=time[[0, -1]])
 
 
 def draw_forces(axes: Axes, dataset: xr.Dataset) -> None:

@@ -169,7 +169,7 @@ def test_a_constant_load_is_not_drawn():
     ramp = run().assign(
         driving_speed=("time", np.linspace(100.0, 400.0, run().sizes["time"]), {"units": "rad s-1"})
     )
-    assert "driving speed [rpm]" in {axes.get_ylabel() for axes in history_figure(ramp).axes} - labels
+    assert "driving speed\n[rpm]" in {axes.get_ylabel() for axes in history_figure(ramp).axes} - labels
     scalar = run().drop_vars("load").assign(load=120.0)
     assert "load [N m]" not in {axes.get_ylabel() for axes in history_figure(scalar).axes}
 
@@ -215,9 +215,9 @@ def test_the_title_names_the_rung_by_what_the_dataset_says_of_it():
 @pytest.mark.parametrize(
     ("long_name", "label"),
     [
-        ("wheel speed", "wheel speed [rpm]"),
-        ("speed of the driving pulley, in a sentence", "driving speed [rpm]"),
-        ("", "driving speed [rpm]"),
+        ("wheel speed", "wheel speed\n[rpm]"),
+        ("speed of the driving pulley, in a sentence", "driving speed\n[rpm]"),
+        ("", "driving speed\n[rpm]"),
     ],
 )
 def test_a_name_that_fits_is_that_of_the_dataset(long_name, label):

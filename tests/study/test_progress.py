@@ -3,8 +3,10 @@
 import contextlib
 import json
 import logging
+import math
 import os
 import pty
+import re
 import termios
 import time
 
@@ -15,7 +17,7 @@ from study_processes import wait_until
 
 from cvt_hpc.study import read_status, run
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.ranks.progress import Progress, show_duration
+from cvt_hpc.study.ranks.progress import Progress, Steps, show_duration
 from cvt_hpc.study.ranks.schedule import SerialCounter
 from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.log import RecordLog
@@ -170,7 +172,31 @@ def test_a_bar_on_a_terminal(monkeypatch):
     shown = read_terminal(ours)
     assert "\rcompiling\r\n" in shown  # on a line of its own
     assert "7/10 [" in shown
-    assert "run/s, 5 failed]" in shown
+    assert re.search(r"run/s, 5 failed, 0:00:\d\d to go\]", shown)
+
+
+def test_steps_tell_what_is_left_by_their_costs(monkeypatch):
+    now, told = 1000.0, []
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    steps = Steps([6.0, math.nan, 2.0], 1, "point", told.append)  # one that is not known counts as 4
+    now += 60.0
+    steps.ended("first: failed", failed=True)
+    now += 60.0
+    steps.ended("second")
+    assert told == ["2/4 first: failed, 0:01:00 to go", "3/4 second, 0:00:24 to go"]
+
+
+def test_steps_stand_above_a_bar_on_a_terminal(monkeypatch):
+    ours, theirs = pty.openpty()
+    termios.tcsetwinsize(theirs, (25, 80))
+    with os.fdopen(theirs, "w") as terminal:
+        monkeypatch.setattr("sys.stderr", terminal)
+        steps = Steps([1.0, 1.0], 0, "branch", lambda line: print(line, file=terminal))
+        steps.ended("one: fine")
+        steps.close()
+    shown = read_terminal(ours)
+    assert re.search(r"\r1/2 one: fine, 0:00:\d\d to go\r\n", shown)
+    assert re.search(r"1/2 \[00:\d\d, .*0 failed, 0:00:\d\d to go\]", shown)
 
 
 def read_terminal(descriptor):
