@@ -1,12 +1,108 @@
-"""How datasets become netCDF files with CF conventions; used by all rooms that write some."""
+"""Datasets as netCDF files with CF conventions: their attributes, how they are stored, and whose they are."""
 
 from __future__ import annotations
 
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from enum import IntEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from cvt_hpc.errors import mismatch
+from cvt_hpc.files import written_aside
+from cvt_hpc.provenance import command, git_revision, history_line, merge_versions, versions
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from cvt_hpc.variables import Variable
+
+CONTENT = "cvt_hpc_content"  # global attribute by which this program knows its own files
+HISTORY = "history of one run"
+DIAGRAM = "bifurcation diagram"
+VOLATILE = "depends on the machine and the hour; not reproduced bitwise"
+
+
+class Named(Protocol):
+    """What a dataset is of: a job, a study or a chart."""
+
+    name: str
+    description: str
+
+
+def global_attributes(
+    named: Named,
+    job: Mapping[str, Any],
+    subject: str,
+    *,
+    makers: Sequence[Mapping[str, Any]] = (),
+    earlier: Sequence[str] = (),
+) -> dict[str, str]:
+    """Return the global attributes that all datasets of this program have.
+
+    Parameters
+    ----------
+    named : Named
+        Gives `title` and `job_name`.
+    job : mapping
+        The whole resolved job, as JSON types.
+    subject : str
+        What was computed, as the end of `source`: "model elastic_belt".
+    makers : sequence of mapping
+        `versions` and `git_revision` of all processes that have computed; those of this one by default.
+    earlier : sequence of str
+        Lines of `history` that precede that of this process, oldest first.
+
+    Returns
+    -------
+    dict
+        Conventions, title, source, history, command and host of this process, job_name, job, versions,
+        git_revision.
+    """
+    makers = makers or [{"versions": versions(), "git_revision": git_revision()}]
+    found = merge_versions([maker["versions"] for maker in makers])
+    revisions = dict.fromkeys(maker["git_revision"] for maker in makers)
+    revision = ", ".join(filter(None, revisions))
+    program = f"cvt_hpc {found.get('cvt_hpc', 'of unknown version')}"
+    here = history_line(f"{command()} (on {platform.node()})")
+    return {
+        "Conventions": "CF-1.11",
+        "title": named.description or named.name,
+        "source": ", ".join(filter(None, (program, revision and f"revision {revision}", subject))),
+        "history": "\n".join([*earlier, here]),
+        "command": command(),
+        "host": platform.node(),
+        "job_name": named.name,
+        "job": json.dumps(job),
+        "versions": json.dumps(found),
+        "git_revision": revision,
+    }
+
+
+def attributes(long_name: str, units: str = "", comment: str = "") -> dict[str, Any]:
+    """Return the attributes of a variable; without those that are empty."""
+    named = {"long_name": long_name, "units": units, "comment": comment}
+    return {key: text for key, text in named.items() if text}
+
+
+def flag_attributes(kind: type[IntEnum], dtype: Any = np.int8) -> dict[str, Any]:
+    """Return the attributes that tell the meaning of a flag variable of type `dtype`."""
+    return {
+        "flag_values": np.array([int(flag) for flag in kind], dtype),
+        "flag_meanings": " ".join(flag.name.lower() for flag in kind),
+    }
+
+
+def variable_attributes(variable: Variable) -> dict[str, Any]:
+    """Return the attributes of a quantity of a run's record."""
+    comment = "; ".join(filter(None, (variable.comment, VOLATILE if variable.volatile else "")))
+    named = attributes(variable.long_name, variable.units, comment)
+    if variable.flags is not None:
+        named |= flag_attributes(variable.flags, variable.dtype)
+    return named | ({"volatile": "yes"} if variable.volatile else {})
 
 
 def write_netcdf(dataset: xr.Dataset, path: Path) -> None:
@@ -37,3 +133,63 @@ def _encoding(variable: xr.Variable, is_coordinate: bool) -> dict[str, Any]:
     elif kind != "f" or is_coordinate:
         encoding["_FillValue"] = None
     return encoding
+
+
+def write_history(dataset: xr.Dataset, path: Path) -> Path:
+    """Write the history of one run as netCDF, where there is no other file.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        As `cvt_hpc.simulate` returns it.
+    path : Path
+        The file; its folder is made if needed.
+
+    Returns
+    -------
+    Path
+        `path`.
+
+    Raises
+    ------
+    InputError
+        `path` exists and is not a history that this program wrote, or the system refuses.
+    """
+    path = Path(path)
+    if path.exists() and not is_history(path):
+        raise mismatch(
+            str(path), "a new file, or a history written by cvt_hpc", "another file, left as it is"
+        )
+    store_history(dataset, path)
+    return path
+
+
+def store_history(dataset: xr.Dataset, path: Path) -> None:
+    """Write the history of one run aside, and put it in the place of whatever is at `path`.
+
+    Raises
+    ------
+    StorageError
+        If the system refuses.
+    """
+    marked = dataset.assign_attrs({CONTENT: HISTORY})
+    with written_aside(path, parents=True) as aside:
+        write_netcdf(marked, aside)
+
+
+def is_history(path: Path) -> bool:
+    """Whether a file is a history that this program wrote."""
+    return holds(path, HISTORY)
+
+
+def holds(path: Path, content: str) -> bool:
+    """Whether a file is a dataset of this program with such content: HISTORY or DIAGRAM."""
+    if not Path(path).is_file():  # a pipe would be waited for
+        return False
+    import xarray as xr
+
+    try:
+        with xr.open_dataset(path, engine="netcdf4", decode_cf=False) as dataset:
+            return dataset.attrs.get(CONTENT) == content
+    except (OSError, ValueError):
+        return False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from cvt_hpc.job.summary import cost_in_words
 from cvt_hpc.job.values import in_words
 from cvt_hpc.tables import columns
-from cvt_hpc.variables import Status
+from cvt_hpc.variables import Status, flag_in_words
 from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS, PairClass
 from cvt_hpc.vibration.classes import OccurrenceClass
 
@@ -54,8 +55,8 @@ def report_lines(report: RunReport) -> Iterator[str]:
 
 
 def _special_in_words(counted: RunReport | StudyStatus) -> str:
-    """Return how many runs slip or move irregularly, in words; empty if none."""
-    counts = {"slip": counted.slipping, "irregular": counted.irregular}
+    """Return how many runs are no plain yes or no, in words; empty if none."""
+    counts = {"undecided": counted.undecided, "slip": counted.slipping, "irregular": counted.irregular}
     return ", ".join(f"{count} {word}" for word, count in counts.items() if count)
 
 
@@ -176,8 +177,11 @@ def status_lines(status: StudyStatus) -> Iterator[str]:
     """Yield the lines that say how far a study is."""
     from cvt_hpc.study.ranks.progress import show_duration
 
-    rows = [("job", f"{status.name} ({'running' if status.running else 'not running'})")]
-    rows.append(("runs", f"{status.total}"))
+    state = "running" if status.running else "not running"
+    if status.finished is not None:
+        when = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime(status.finished))
+        state = f"finished {when}, after {show_duration(status.time_at_work)} at work"
+    rows = [("job", f"{status.name} ({state})"), ("runs", f"{status.total}")]
     if status.unneeded:
         cells = status.total + status.unneeded
         rows.append(("grid", f"{cells} cells, {status.unneeded} not needed so far"))
@@ -261,8 +265,7 @@ def outcome_lines(dataset: xr.Dataset) -> Iterator[str]:
 def _array_in_words(array: xr.DataArray) -> str:
     """Return the values of a small array, each with its place where there are several, and the unit."""
     if "flag_meanings" in array.attrs:
-        meanings = dict(zip(array.attrs["flag_values"], array.attrs["flag_meanings"].split(), strict=True))
-        return meanings[array.item()]
+        return flag_in_words(array)
     unit = array.attrs.get("units", "")
     unit = "" if unit == "1" else unit
     if array.ndim == 0:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class Status(IntEnum):
@@ -47,26 +50,60 @@ class Variable:
         numpy type: "f8", "i8", "i1", or "S240" for a text.
     units : str
         CF unit ("1" if dimensionless, "" for flags and texts).
-    long_name : str
-        CF long_name.
+    comment : str
+        CF comment: what it is, in a sentence.
     flags : type of IntEnum or None
         Meaning of the values of a flag variable.
     volatile : bool
         Depends on the machine and the hour (timings): exempt from bitwise reproducibility.
+    words : str
+        A few words for an axis label, where `name` does not say it.
     """
 
     name: str
     dims: tuple[str, ...]
     dtype: str
     units: str
-    long_name: str
+    comment: str
     flags: type[IntEnum] | None = None
     volatile: bool = False
+    words: str = ""
+
+    @property
+    def long_name(self) -> str:
+        """CF long_name, which fits an axis label."""
+        return self.words or self.name.replace("_", " ")
+
+    @property
+    def blank(self) -> float | int | str:
+        """Value where nothing is known: NaN, 0, an empty text, and UNDECIDED of flags that have it."""
+        if self.flags is not None:
+            return int(self.flags.__members__.get("UNDECIDED", 0))
+        return {"f": np.nan, "S": ""}.get(np.dtype(self.dtype).kind, 0)
+
+
+def flag_in_words(flag: xr.DataArray) -> str:
+    """Return the meaning of a scalar flag by the attributes that it has in a dataset."""
+    meanings = dict(zip(flag.attrs["flag_values"], flag.attrs["flag_meanings"].split(), strict=True))
+    return meanings[flag.item()]
 
 
 class Coordinate(NamedTuple):
-    """A dimension of the record beside the grid's: values (n,), CF unit ("" for labels), CF long_name."""
+    """A dimension of the record beside the grid's.
+
+    Attributes
+    ----------
+    values : array, shape (n,)
+        Numbers [SI] or labels.
+    units : str
+        CF unit ("" for labels).
+    long_name : str
+        CF long_name: a few words for an axis label.
+    comment : str
+        CF comment.
+    """
 
     values: np.ndarray
     units: str
     long_name: str
+    comment: str = ""

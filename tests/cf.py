@@ -1,8 +1,13 @@
-"""What the IOOS compliance checker finds in a netCDF file."""
+"""What the IOOS compliance checker finds in a netCDF file, and whether it says where it is from."""
 
 from pathlib import Path
 
+import netCDF4
+
+from cvt_hpc import __version__
+
 CONVENTIONS = "cf:1.11"
+TOLD = ("Conventions", "title", "source", "history", "command", "host", "job_name", "job", "versions")
 
 
 def cf_findings(path: Path) -> list[str]:
@@ -18,4 +23,7 @@ def cf_findings(path: Path) -> list[str]:
     assert len(results) > 20  # it has looked
     broken = [f"{check}: {error[0]}" for check, error in errors.items()]
     failed = (result for result in results if result.value[0] < result.value[1])  # points of how many
+    with netCDF4.Dataset(path) as file:
+        missing = [f"{name} is not told" for name in TOLD if not getattr(file, name, "").strip()]
+        broken += missing + ([] if __version__ in file.source else ["source has no version"])
     return broken + [f"{result.name}: {text}" for result in failed for text in result.msgs]

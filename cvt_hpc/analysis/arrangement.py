@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.figures import axis_label, display_unit
+from cvt_hpc.analysis.figures import axis_label, display_unit, in_words
 from cvt_hpc.errors import InputError, few_of, mismatch, unknown
 
 MOST_VALUES_NAMED = 12
@@ -66,7 +66,7 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> Arrangem
         if name not in axes:
             raise unknown(f"{source}: at {name}", "axis of the results", name, axes)
         index = _index_of(dataset[name], value, f"{source}: at {name}")
-        notes.append(f"{name.replace('_', ' ')} = {value_text(dataset[name], index)}")
+        notes.append(f"{in_words(dataset[name])} = {value_text(dataset[name], index)}")
         dataset = dataset.isel({name: index})
     free = [name for name in axes if name not in at]
     if not free:
@@ -82,7 +82,7 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> Arrangem
     panel = _take(rest, "sheave_stiffness")
     for name in rest:
         count = dataset.sizes[name]
-        notes.append(f"{name.replace('_', ' ')} = {value_text(dataset[name], 0)} (first of {count})")
+        notes.append(f"{in_words(dataset[name])} = {value_text(dataset[name], 0)} (first of {count})")
         dataset = dataset.isel({name: 0})
     for name in filter(None, (x, y, panel)):
         if dataset[name].dtype.kind in "iuf":
@@ -181,17 +181,17 @@ def ruler(coordinate: xr.DataArray) -> Ruler:
     values = coordinate.values
     if values.dtype.kind not in "iuf":
         centres = np.arange(float(values.size))
-        return Ruler(centres, _edges(centres), centres, tuple(map(str, values)), axis_label(name, ""))
+        return Ruler(centres, _edges(centres), centres, tuple(map(str, values)), axis_label(coordinate, ""))
     centres = values * factor
     finite = np.isfinite(centres)
     if np.all(finite):
-        return Ruler(centres, _edges(centres), *_exact_ticks(centres), axis_label(name, unit))
+        return Ruler(centres, _edges(centres), *_exact_ticks(centres), axis_label(coordinate, unit))
     labels = tuple(_number(c) if np.isfinite(c) else _infinity(name) for c in centres)
     known = centres[finite]
     gap = np.diff(known).mean() if known.size > 1 else 1.0
     start = known[-1] if known.size else 0.0
     centres = np.where(finite, centres, start + gap)
-    return Ruler(centres, _edges(centres), centres, labels, axis_label(name, unit))
+    return Ruler(centres, _edges(centres), centres, labels, axis_label(coordinate, unit))
 
 
 def _exact_ticks(centres: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.arrangement import Arrangement, arrange, ruler, value_text
-from cvt_hpc.analysis.figures import WIDTH
+from cvt_hpc.analysis.figures import WIDTH, axis_label, in_words
 
 COLOUR = "#1f4e8c"
 HEIGHT = 3.6  # [inch]
@@ -47,7 +47,7 @@ def eigenfrequency_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: st
         axes.set_xlabel(along.label)
         if along.ticks is not None:
             axes.set_xticks(along.ticks, along.tick_labels)
-    panels[0].set_ylabel("eigenfrequency [Hz]")
+    panels[0].set_ylabel(axis_label(dataset["eigenfrequency"], "Hz"))
     panels[0].set_ylim(bottom=0.0)
     headline = f"Eigenfrequencies: {dataset.attrs.get('job_name', '')}".rstrip(": ")
     lines = [headline, *notes, "beside the lines: half waves along the strand"]
@@ -60,7 +60,7 @@ def _along_x(arrangement: Arrangement) -> tuple[xr.Dataset, list[str]]:
     dataset, notes = arrangement.dataset, list(arrangement.notes)
     for name in filter(None, (arrangement.y, arrangement.panel)):
         count = dataset.sizes[name]
-        notes.append(f"{name.replace('_', ' ')} = {value_text(dataset[name], 0)} (first of {count})")
+        notes.append(f"{in_words(dataset[name])} = {value_text(dataset[name], 0)} (first of {count})")
         dataset = dataset.isel({name: 0})
     return dataset, notes
 

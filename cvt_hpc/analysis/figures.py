@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from functools import wraps
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import Any, ParamSpec
 
 import matplotlib
 import numpy as np
+import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
@@ -17,9 +19,12 @@ from PIL import Image
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import written_aside
 
+P = ParamSpec("P")
+
 WIDTH = 6.4  # [inch]: letters of 10 points stay readable across a page and on a telephone held sideways
 RESOLUTION = 170  # dots per inch
 FORMATS = (".png", ".svg", ".pdf")
+LONGEST_NAME = 26  # letters of a name on an axis
 
 STYLE = {
     "font.family": "DejaVu Sans",
@@ -52,10 +57,16 @@ def display_unit(unit: str) -> tuple[float, str]:
     return known if known is not None else (1.0, unit.replace("s m-1", "s/m").replace("N m-1", "N/m"))
 
 
-def axis_label(name: str, unit: str) -> str:
+def in_words(array: xr.DataArray) -> str:
+    """Name of a variable for people: its `long_name` if that is short, else `name` without underscores."""
+    words = str(array.attrs.get("long_name", ""))
+    # datasets of earlier versions have sentences there
+    return words if 0 < len(words) <= LONGEST_NAME else str(array.name).replace("_", " ")
+
+
+def axis_label(array: xr.DataArray, unit: str) -> str:
     """Name of a variable in words, with its display unit in brackets."""
-    words = name.replace("_", " ")
-    return f"{words} [{unit}]" if unit else words
+    return f"{in_words(array)} [{unit}]" if unit else in_words(array)
 
 
 def headline(attributes: Mapping[str, Any]) -> str:
@@ -71,6 +82,17 @@ def draw(compose: Callable[[], Figure], out: Path) -> Path:
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(STYLE)
         return save_figure(compose(), out)
+
+
+def styled(compose: Callable[P, Figure]) -> Callable[P, Figure]:
+    """Make a function compose its figure in the style of all pictures."""
+
+    @wraps(compose)
+    def within(*args: P.args, **options: P.kwargs) -> Figure:
+        with matplotlib.rc_context(STYLE):
+            return compose(*args, **options)
+
+    return within
 
 
 def balanced(line: str, width: int) -> str:

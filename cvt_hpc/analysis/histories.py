@@ -12,39 +12,42 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis import history_panels as panels
-from cvt_hpc.analysis.figures import WIDTH, balanced, draw
+from cvt_hpc.analysis.figures import WIDTH, balanced, draw, styled
 from cvt_hpc.errors import InputError
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.values import in_words
-from cvt_hpc.models.auto.rules import Rung
-from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.variables import Status, Vibrates, flag_in_words
 from cvt_hpc.vibration.settings import PARAMETERS
 
 LEFT, RIGHT, WHOLE = slice(0, 2), 2, slice(0, 3)  # columns of a panel
 
 
 def draw_history(dataset: xr.Dataset, out: Path) -> Path:
-    """Draw the history of one run; what the dataset does not hold is left out.
+    """Write the figure of `history_figure`, with its errors, as `save_figure` does."""
+    return draw(lambda: history_figure(dataset), out)
+
+
+@styled
+def history_figure(dataset: xr.Dataset) -> Figure:
+    """Draw the history of one run; nothing is written, and what the dataset does not hold is left out.
 
     Parameters
     ----------
     dataset : Dataset
-        `displacement` (time, probe) [m], `load` (time) [N m], `ring_tension` and `push_force` (position) [N],
-        `contact_force` and what feeds the fluctuations (position) [N/m, W/m], `region` (position), and the
-        run's verdict.
-    out : Path
-        As for `save_figure`, with what it returns.
+        As `simulate` returns it: `displacement` (time, probe) [m], `load` (time) [N m], `ring_tension` and
+        `push_force` (position) [N], `contact_force` and what feeds the fluctuations (position) [N/m, W/m],
+        `region` (position), and the run's verdict.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Unknown to pyplot; `figure.savefig(path)` writes it.
 
     Raises
     ------
     InputError
-        There is nothing to draw, or as `save_figure`.
+        There is nothing to draw.
     """
-    return draw(lambda: history_figure(dataset), out)
-
-
-def history_figure(dataset: xr.Dataset) -> Figure:
-    """Compose the picture of `draw_history`; to be called within STYLE."""
     settings = _vibration_settings(dataset)
     band = (settings["band_low"], settings["band_high"])
     judged = settings["judged_fraction"] if _is_judged(dataset) else 0.0
@@ -109,7 +112,7 @@ def _title(dataset: xr.Dataset) -> str:
     if place := _place(dataset.attrs):
         lines.append(place)
     if "rung" in dataset:
-        rung = Rung(int(dataset["rung"])).name.lower()
+        rung = flag_in_words(dataset["rung"])
         lines.append(f"answered by the {rung} run, of {float(dataset['simulated_seconds']):.3g} s")
     status = Status(int(dataset["status"])) if "status" in dataset else None
     reason = dataset["reason"].item() if "reason" in dataset else ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from textwrap import fill
 
 import numpy as np
 import xarray as xr
@@ -11,6 +12,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
+from cvt_hpc.analysis.figures import axis_label, display_unit, in_words
 from cvt_hpc.vibration.settings import SHORTEST_SEGMENT
 from cvt_hpc.vibration.signals import amplitude_spectrum, band_amplitude, dominant_frequency
 
@@ -21,7 +23,7 @@ CLOSE_UP = 0.01  # [s]: six periods at 600 Hz
 MOST_PEAKS = 3
 COLOURS = {"t1": "#b5460f", "t2": "#1f4e8c"}  # of like lightness, so line styles tell them apart in grey
 LINES = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))  # one for each probe of a strand, by default
-COURSES = {"driving_speed": "driving pulley [rad/s]", "load": "load [N m]"}  # what a run may change
+COURSES = ("driving_speed", "load")  # what a run may change
 FEEDS = {
     "flank_feed": ("friction of the flanks", "#b5460f", "-"),
     "stress_feed": ("push and tension", "#1f4e8c", "--"),
@@ -213,8 +215,10 @@ def _peaks(signal: Array, strand: Strand, bins: Array, spectrum: Array) -> list[
 def draw_course(axes: Axes, course: xr.DataArray) -> None:
     """One of COURSES over time."""
     time = 1e3 * course["time"].values
-    axes.plot(time, course.values, color=_OTHER_COLOUR, linewidth=1.2)
-    axes.set(xlabel="time [ms]", ylabel=COURSES[str(course.name)], xlim=time[[0, -1]])
+    factor, unit = display_unit(course.attrs.get("units", ""))
+    axes.plot(time, factor * course.values, color=_OTHER_COLOUR, linewidth=1.2)
+    label = fill(axis_label(course, unit), 14)  # what the height of the panel holds
+    axes.set(xlabel="time [ms]", ylabel=label, xlim=time[[0, -1]])
 
 
 def draw_forces(axes: Axes, dataset: xr.Dataset) -> None:
@@ -223,7 +227,7 @@ def draw_forces(axes: Axes, dataset: xr.Dataset) -> None:
     styles = {"ring_tension": ("-", "#1f4e8c"), "push_force": ("--", "#b5460f")}
     for name, (line, colour) in styles.items():
         if name in dataset:
-            label = name.replace("_", " ")
+            label = in_words(dataset[name])
             axes.plot(position, 1e-3 * dataset[name].values, line, color=colour, linewidth=1.4, label=label)
     axes.set(ylabel="force [kN]", ylim=(0, _HEADROOM * axes.dataLim.ymax))
     axes.legend(loc="upper right", ncols=2, frameon=False)

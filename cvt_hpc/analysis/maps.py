@@ -33,7 +33,7 @@ from cvt_hpc.analysis.classes import (
     occurrence_classes,
 )
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
-from cvt_hpc.analysis.figures import WIDTH, draw, headline
+from cvt_hpc.analysis.figures import WIDTH, draw, headline, in_words, styled
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 from cvt_hpc.analysis.starts import has_starts, join_starts
 from cvt_hpc.variables import Vibrates
@@ -47,37 +47,47 @@ ONE_ROW = Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
 def draw_map(
     dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None, source: str = "results"
 ) -> Path:
-    """Draw where vibration occurs.
+    """Write the figure of `map_figure`, with its arguments and errors, as `save_figure` does."""
+    return draw(lambda: map_figure(dataset, at, source), out)
+
+
+@styled
+def map_figure(dataset: xr.Dataset, at: Mapping[str, Any] | None = None, source: str = "results") -> Figure:
+    """Draw where vibration occurs; nothing is written.
 
     Parameters
     ----------
     dataset : Dataset
-        Results of a study: `status` and `vibrates` over the job's axes; `amplitude` [m] and `frequency`
-        [Hz], per strand, where known; `inferred_class` of a trace. The stronger strand is shown. Of a study
-        of samples the axes lie along `run`: each run is a mark, and there is a panel for each pair of axes.
-        Results that hold `eigenfrequency` are drawn as lines over the axis that else runs along x. Of a study
-        with the axis `disturbance` the runs from the smallest and the largest value make one cell.
-    out : Path
-        As for `save_figure`, with what it returns.
+        Results of a study, as `open_results` returns them: `status` and `vibrates` over the job's axes;
+        `amplitude` [m] and `frequency` [Hz], per strand, where known; `inferred_class` of a trace. The
+        stronger strand is shown. Of a study of samples the axes lie along `run`: each run is a mark, and
+        there is a panel for each pair of axes. Results that hold `eigenfrequency` are drawn as lines over
+        the axis that else runs along x. Of a study with the axis `disturbance` the runs from the smallest
+        and the largest value make one cell.
     at : mapping, optional
         Axes to fix: name -> value, as a number [SI] or a text.
     source : str, optional
         Where the results are from, for the errors.
 
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Unknown to pyplot; `figure.savefig(path)` writes it.
+
     Raises
     ------
     InputError
-        The dataset holds no results or a single run, `at` names no axis or no value on it or the results
-        are of samples, or as `save_figure`.
+        The dataset holds no results or a single run, `at` names no axis or no value on it, or the results
+        are of samples and `at` is not empty.
     """
     check_results(dataset, source)
     if is_sampled(dataset):
-        return draw(lambda: scatter_figure(dataset, at or {}, source), out)
+        return scatter_figure(dataset, at or {}, source)
     if "eigenfrequency" in dataset:
-        return draw(lambda: eigenfrequency_figure(dataset, at or {}, source), out)
+        return eigenfrequency_figure(dataset, at or {}, source)
     if has_starts(dataset, at or {}):
         dataset = join_starts(dataset)
-    return draw(lambda: map_figure(arrange(dataset, at or {}, source)), out)
+    return _grid_figure(arrange(dataset, at or {}, source))
 
 
 @dataclass(frozen=True)
@@ -133,8 +143,8 @@ class Sheet:
         return width >= 22 and height >= 22  # [point]
 
 
-def map_figure(arrangement: Arrangement) -> Figure:
-    """Compose the picture of `draw_map`; to be called within STYLE."""
+def _grid_figure(arrangement: Arrangement) -> Figure:
+    """Compose the map of a study over a grid; to be called within STYLE."""
     sheet = sheet_of(arrangement)
     has_frequency = bool(np.isfinite(sheet.frequency).any())
     written = has_frequency and sheet.has_room
@@ -219,7 +229,7 @@ def _label_panel(ax: Axes, sheet: Sheet, panel: int) -> None:
     name = sheet.arrangement.panel
     if name:
         text = value_text(sheet.arrangement.dataset[name], panel)
-        ax.set_title(f"{name.replace('_', ' ')}: {text}", loc="left", pad=3)
+        ax.set_title(f"{in_words(sheet.arrangement.dataset[name])}: {text}", loc="left", pad=3)
     if sheet.x.ticks is not None:
         ax.set_xticks(sheet.x.ticks, sheet.x.tick_labels)
     if sheet.y.ticks is not None:

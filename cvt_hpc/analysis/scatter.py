@@ -174,4 +174,4 @@ def _tick_logarithmic(axis: XAxis | YAxis) -> None:
 def _along(coordinate: xr.DataArray) -> tuple[NDArray[np.float64], str]:
     """Values of an axis in display units, and its label."""
     factor, unit = display_unit(coordinate.attrs.get("units", ""))
-    return coordinate.values * factor, axis_label(str(coordinate.name), unit)
+    return coordinate.values * factor, axis_label(coordinate, unit)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
@@ -11,28 +10,30 @@ import numpy as np
 import xarray as xr
 
 from cvt_hpc.bifurcation.job import Diagram
-from cvt_hpc.history_files import CONTENT, DIAGRAM
 from cvt_hpc.models.linear_stability.branch import Branch, tracks
 from cvt_hpc.models.linear_stability.modes import Mode
 from cvt_hpc.models.steady_variator.forces import quantities
 from cvt_hpc.models.steady_variator.record import VARIABLES, coordinates
-from cvt_hpc.study.provenance import command, history_line
+from cvt_hpc.netcdf import CONTENT, DIAGRAM, attributes, flag_attributes, global_attributes
+from cvt_hpc.study.dimensions import axis_dimension, derived_coordinate
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Kind
 
 if TYPE_CHECKING:
     from cvt_hpc.bifurcation.followed import Followed
 
-OF_MODES = {  # what is told of a mode: value, unit, name for people
-    "growth_rate": (lambda mode: mode.growth, "s-1", "growth rate of the mode"),
-    "frequency": (lambda mode: mode.frequency, "Hz", "frequency of the mode"),
-    "vibrating_strand": (
-        lambda mode: mode.strand + 1,
-        "1",
-        "strand in which it is largest: 1 is t1, 2 is t2",
-    ),
-    "half_waves": (lambda mode: mode.half_waves, "1", "its half waves along that strand"),
+STRAND = "strand in which the mode is largest: 1 is t1, 2 is t2"
+OF_MODES = {  # what is told of a mode: value, unit, name for people, comment
+    "growth_rate": (lambda mode: mode.growth, "s-1", "growth rate", "of the mode"),
+    "frequency": (lambda mode: mode.frequency, "Hz", "frequency", "of the mode"),
+    "vibrating_strand": (lambda mode: mode.strand + 1, "1", "vibrating strand", STRAND),
+    "half_waves": (lambda mode: mode.half_waves, "1", "half waves", "of the mode along its vibrating strand"),
 }
+BRANCH = "number of the branch in the grid of the axes, counted in C order"
+OF_KIND = "why the Hopf point is found to be of its kind"
+START = "0: near the steady state; 1: the large disturbance"
+LOAD = "torque at the driving pulley"
+REASON = "why the run failed, or was found to vibrate or not"
 
 
 class Stability(IntEnum):
@@ -69,28 +70,21 @@ def diagram_dataset(diagram: Diagram, followed: Sequence[Followed]) -> xr.Datase
         the grid of the axes, counted in C order.
     """
     axes = {
-        axis.name: (axis.name, list(axis.values), _attributes(axis.unit, axis.description))
-        for axis in diagram.axes
+        axis.name: (axis.name, list(axis.values), axis_dimension(axis).attributes) for axis in diagram.axes
     }
     lengths = {axis.name: len(axis.values) for axis in diagram.axes}
     for derived in diagram.job.derived:  # none of them along the load
         values = np.array(derived.values).reshape([lengths[name] for name in derived.axes])
-        axes[derived.name] = derived.axes, values, _attributes(derived.unit, derived.description)
-    axes["load"] = ("load", list(diagram.loads), _attributes("N m", "torque at the driving pulley"))
+        axes[derived.name] = derived.axes, values, derived_coordinate(derived, sampled=False).attributes
+    axes["load"] = ("load", list(diagram.loads), attributes("load", "N m", LOAD))
     labels = {
-        name: (name, c.values.astype(object), _attributes(c.units, c.long_name))
+        name: (name, c.values.astype(object), attributes(c.long_name, c.units, c.comment))
         for name, c in coordinates(diagram.job.parameters).items()
     }
-    attributes = {
-        "Conventions": "CF-1.11",
-        "title": diagram.job.description or diagram.job.name,
-        "job_name": diagram.job.name,
-        "job": json.dumps(diagram.resolved()),
-        "history": history_line(command()),
-        CONTENT: DIAGRAM,
-    }
+    subject = f"bifurcations of model {diagram.job.model}"
+    told = {**global_attributes(diagram.job, diagram.resolved(), subject), CONTENT: DIAGRAM}
     variables = _steady(diagram, followed) | _modes(diagram, followed) | _onsets(followed) | _runs(followed)
-    return xr.Dataset(variables, axes | labels, attributes)
+    return xr.Dataset(variables, axes | labels, told)
 
 
 def _steady(diagram: Diagram, followed: Sequence[Followed]) -> dict[str, Any]:
@@ -108,10 +102,10 @@ def _steady(diagram: Diagram, followed: Sequence[Followed]) -> dict[str, Any]:
                 values[name][place] = value
     told = {
         v.name: ((*dims, *v.dims), values[v.name].reshape(*grid, *values[v.name].shape[2:]),
-                 _attributes(v.units, v.long_name))
+                 attributes(v.long_name, v.units, v.comment))
         for v in VARIABLES
     }  # fmt: skip
-    flags = _flags(Stability, "whether the steady state is stable")
+    flags = attributes("stability", comment="of the steady state") | flag_attributes(Stability)
     return {"stability": (dims, stability.reshape(grid), flags)} | told
 
 
@@ -121,13 +115,13 @@ def _modes(diagram: Diagram, followed: Sequence[Followed]) -> dict[str, Any]:
     lines = [mode_lines(one.branch) for one in followed]
     most = max((len(of_one) for of_one in lines), default=0)
     told = {}
-    for name, (value, unit, long_name) in OF_MODES.items():
+    for name, (value, *named) in OF_MODES.items():
         array = np.full((len(diagram.branches), len(diagram.loads), most), np.nan)
         for row, of_one in enumerate(lines):
             for column, line in enumerate(of_one):
                 for load, mode in line.items():
                     array[row, diagram.loads.index(load), column] = value(mode)
-        told[name] = (*dims, "mode"), array.reshape(*grid, most), _attributes(unit, long_name)
+        told[name] = (*dims, "mode"), array.reshape(*grid, most), _named(*named)
     return told
 
 
@@ -149,32 +143,39 @@ def _onsets(followed: Sequence[Followed]) -> dict[str, Any]:
         for onset, kind in zip(one.onsets, one.kinds, strict=True)
     ]
     columns = {
-        "onset_branch": ([n for n, *_ in rows], np.int32, "1", "its branch in the grid of the axes"),
-        "onset_load": ([o.load for _, o, _ in rows], float, "N m", "load at the Hopf point"),
-        "onset_frequency": ([o.mode.frequency for _, o, _ in rows], float, "Hz", "frequency of its mode"),
-        "onset_strand": ([o.mode.strand + 1 for _, o, _ in rows], np.int8, "1", "strand: 1 is t1, 2 is t2"),
-        "onset_half_waves": ([o.mode.half_waves for _, o, _ in rows], np.int8, "1", "half waves there"),
-        "onset_others": ([o.others for _, o, _ in rows], np.int8, "1", "other modes that grow there; 0: "
-                         "stability is lost or regained"),
-        "hysteresis_width": ([k.width for *_, k in rows], float, "N m", "from the Hopf point to where "
-                             "vibration from the large start ends"),
-        "hysteresis_error": ([k.error for *_, k in rows], float, "N m", "half the spacing of runs there, "
-                             "and the Hopf point's own error"),
+        "onset_branch": ([n for n, *_ in rows], np.int32, "1", "branch", BRANCH),
+        "onset_load": ([o.load for _, o, _ in rows], float, "N m", "onset load", "load at the Hopf point"),
+        "onset_frequency": ([o.mode.frequency for _, o, _ in rows], float, "Hz", "onset frequency",
+                            "frequency of the mode whose growth rate is 0 at the Hopf point"),
+        "onset_strand": ([o.mode.strand + 1 for _, o, _ in rows], np.int8, "1", "vibrating strand", STRAND),
+        "onset_half_waves": ([o.mode.half_waves for _, o, _ in rows], np.int8, "1", "half waves",
+                             "of the mode along its vibrating strand"),
+        "onset_others": ([o.others for _, o, _ in rows], np.int8, "1", "other growing modes",
+                         "number of them; 0: stability is lost or regained at this Hopf point"),
+        "hysteresis_width": ([k.width for *_, k in rows], float, "N m", "hysteresis width",
+                             "from the Hopf point to where vibration from the large start ends"),
+        "hysteresis_error": ([k.error for *_, k in rows], float, "N m", "error of the hysteresis width",
+                             "half the spacing of runs there, and the Hopf point's own error"),
     }  # fmt: skip
     told = {
-        name: ("onset", np.array(values, dtype), _attributes(unit, long_name))
-        for name, (values, dtype, unit, long_name) in columns.items()
+        name: ("onset", np.array(values, dtype), _named(*named))
+        for name, (values, dtype, *named) in columns.items()
     }
     directions = [Direction.GROWS_ABOVE if o.rising else Direction.GROWS_BELOW for _, o, _ in rows]
     told["onset_direction"] = (
         "onset",
         np.array(directions, np.int8),
-        _flags(Direction, "whether the mode grows above or below that load"),
+        attributes("side of growth", comment="whether the mode grows above or below the Hopf point")
+        | flag_attributes(Direction),
     )
     kinds = np.array([kind.kind for *_, kind in rows], np.int8)
-    told["onset_kind"] = "onset", kinds, _flags(Kind, "super- or subcritical")
+    told["onset_kind"] = "onset", kinds, attributes("kind of Hopf point") | flag_attributes(Kind)
     reasons = np.array([kind.reason for *_, kind in rows], object)
-    told["onset_reason"] = "onset", reasons, {"long_name": "why it is found to be so"}
+    told["onset_reason"] = (
+        "onset",
+        reasons,
+        attributes("reason", comment=OF_KIND),
+    )
     return told
 
 
@@ -182,25 +183,24 @@ def _runs(followed: Sequence[Followed]) -> dict[str, Any]:
     """The runs of all branches, one after the other."""
     rows = [(number, run) for number, one in enumerate(followed) for run in one.runs]
     columns = {
-        "run_branch": ([n for n, _ in rows], np.int32, "1", "its branch in the grid of the axes"),
-        "run_load": ([run.value for _, run in rows], float, "N m", "load"),
-        "run_start": (
-            [run.start for _, run in rows],
-            np.int8,
-            "1",
-            "0: the steady state; 1: the large one",
-        ),
-        "run_amplitude": ([run.amplitude for _, run in rows], float, "m", "amplitude in the band"),
-        "run_frequency": ([run.frequency for _, run in rows], float, "Hz", "dominant frequency"),
+        "run_branch": ([n for n, _ in rows], np.int32, "1", "branch", BRANCH),
+        "run_load": ([run.value for _, run in rows], float, "N m", "load", LOAD),
+        "run_start": ([run.start for _, run in rows], np.int8, "1", "start", START),
+        "run_amplitude": ([run.amplitude for _, run in rows], float, "m", "amplitude", "in the band"),
+        "run_frequency": ([run.frequency for _, run in rows], float, "Hz", "dominant frequency", ""),
     }
     told = {
-        name: ("run", np.array(values, dtype), _attributes(unit, long_name))
-        for name, (values, dtype, unit, long_name) in columns.items()
+        name: ("run", np.array(values, dtype), _named(*named))
+        for name, (values, dtype, *named) in columns.items()
     }
     classes = np.array([run.occurrence for _, run in rows], np.int8)
-    told["run_occurrence"] = "run", classes, _flags(OccurrenceClass, "vibration occurrence")
+    told["run_occurrence"] = (
+        "run",
+        classes,
+        attributes("vibration occurrence") | flag_attributes(OccurrenceClass),
+    )
     reasons = np.array([run.reason for _, run in rows], object)
-    told["run_reason"] = "run", reasons, {"long_name": "why the run failed, or was found to vibrate or not"}
+    told["run_reason"] = "run", reasons, attributes("reason", comment=REASON)
     return told
 
 
@@ -211,13 +211,5 @@ def _grid(diagram: Diagram) -> tuple[tuple[int, ...], tuple[str, ...]]:
     return lengths, names
 
 
-def _flags(kind: type[IntEnum], long_name: str) -> dict[str, Any]:
-    return {
-        "long_name": long_name,
-        "flag_values": np.array(list(kind), np.int8),
-        "flag_meanings": " ".join(flag.name.lower() for flag in kind),
-    }
-
-
-def _attributes(unit: str, long_name: str) -> dict[str, str]:
-    return {"long_name": long_name, **({"units": unit} if unit else {})}
+def _named(units: str, long_name: str, comment: str) -> dict[str, str]:
+    return attributes(long_name, units, comment)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from cvt_hpc.bifurcation.attractors import Attractor, Start, attractors
+from cvt_hpc.bifurcation.costs import predicted_cost
 from cvt_hpc.bifurcation.dataset import diagram_dataset
 from cvt_hpc.bifurcation.drawing import draw_branch
 from cvt_hpc.bifurcation.folder import DiagramFolder, picture_names
@@ -22,6 +24,7 @@ from cvt_hpc.models.linear_stability.branch import CLOSE, Branch, Onset, branch,
 from cvt_hpc.models.linear_stability.modes import LOW
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 from cvt_hpc.netcdf import write_netcdf
+from cvt_hpc.study.ranks.progress import Steps
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Criticality, Kind, criticality
 
@@ -70,7 +73,7 @@ def make_diagram(
     fresh : bool
         Throw an earlier diagram of the folder away.
     tell : callable
-        Given a line when a branch is done.
+        Given a line when a branch is done, with the time to go.
 
     Raises
     ------
@@ -79,7 +82,8 @@ def make_diagram(
     """
     folder, pictures = DiagramFolder(out), [out / name for name in picture_names(len(diagram.branches))]
     followed: list[Followed] = []
-    with folder.claimed(diagram, fresh=fresh):
+    costs = [predicted_cost(diagram, asked).total for asked in diagram.branches]
+    with folder.claimed(diagram, fresh=fresh), closing(Steps(costs, 0, "branch", tell)) as steps:
         held = folder.branches()
         for number, asked in enumerate(diagram.branches, 1):
             # matrices are small: threads of the linear algebra would wait for each other in loops
@@ -89,7 +93,7 @@ def make_diagram(
                 with written_aside(folder.dataset) as aside:
                     write_netcdf(diagram_dataset(diagram, followed), aside)
             draw_branch(diagram, followed[-1], pictures[number - 1])
-            tell(f"branch {number}/{len(diagram.branches)}: {len(followed[-1].onsets)} Hopf points")
+            steps.ended(f"branches: {len(followed[-1].onsets)} Hopf points")
     return DiagramReport(tuple(followed), folder.dataset, tuple(pictures))
 
 

@@ -17,7 +17,7 @@ import xarray as xr
 from cvt_hpc.bifurcation.dataset import Stability
 from cvt_hpc.bifurcation.job import Diagram
 from cvt_hpc.files import kind_of
-from cvt_hpc.history_files import DIAGRAM, holds
+from cvt_hpc.netcdf import DIAGRAM, holds
 from cvt_hpc.output_folder import Kind, OutputFolder
 from cvt_hpc.study.job_difference import another_job
 

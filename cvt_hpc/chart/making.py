@@ -8,6 +8,7 @@ import multiprocessing
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import closing
 from dataclasses import dataclass
 from multiprocessing.synchronize import Lock
 from pathlib import Path
@@ -17,6 +18,7 @@ from threadpoolctl import threadpool_limits
 from cvt_hpc.chart.budget_drawing import draw_budget
 from cvt_hpc.chart.checks import check_prospects
 from cvt_hpc.chart.comparing import Comparison, compare
+from cvt_hpc.chart.costs import predicted_cost
 from cvt_hpc.chart.dataset import chart_dataset
 from cvt_hpc.chart.measuring import Measurement, measure
 from cvt_hpc.chart.plan import Chart, Point
@@ -25,6 +27,7 @@ from cvt_hpc.chart.store import ChartFolder
 from cvt_hpc.chart.table import write_table
 from cvt_hpc.files import written_aside
 from cvt_hpc.netcdf import write_netcdf
+from cvt_hpc.study.ranks.progress import Steps
 
 _COMPILING = "cvt_hpc.kernels"  # the logger that tells of it
 
@@ -71,7 +74,7 @@ def make_chart(
         How many runs that are not timed may go on together; as many as there are cores by default. Timed
         runs are always alone.
     tell : callable
-        Given a line for each point that was measured.
+        Given a line for each point that was measured, with the time to go.
 
     Raises
     ------
@@ -101,15 +104,16 @@ def _fill(
     folder.warn_of_others()
     measurements = {name: found for name, found in loaded.items() if found is not None}
     missing = [point for point in chart.points if point.name not in measurements]
-    for point, measurement in _measure_all(chart, missing, processes):
-        folder.save_point(point.name, measurement)
-        measurements[point.name] = measurement
-        ended = (
-            f"failed: {measurement.reason}"
-            if measurement.reason
-            else f"{measurement.core_seconds:.3g} core-s"
-        )
-        tell(f"{len(measurements)}/{len(chart.points)} {point.name}: {ended}")
+    missing.sort(key=lambda point: point.timed)  # the order in which they are done
+    together = min(processes, sum(not point.timed for point in missing)) or 1
+    costs = [predicted_cost(chart, point) / (1 if point.timed else together) for point in missing]
+    with closing(Steps(costs, len(measurements), "point", tell)) as steps:
+        for point, measurement in _measure_all(chart, missing, processes):
+            folder.save_point(point.name, measurement)
+            measurements[point.name] = measurement
+            cost = f"{measurement.core_seconds:.3g} core-s"
+            ended = f"failed: {measurement.reason}" if measurement.reason else cost
+            steps.ended(f"{point.name}: {ended}", failed=bool(measurement.reason))
     return measurements
 
 

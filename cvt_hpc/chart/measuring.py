@@ -15,7 +15,7 @@ from cvt_hpc.chart.timed_runs import Marched, lead, march, most_lanes, warm_up
 from cvt_hpc.models.contract import Failure, Run, load_model
 from cvt_hpc.variables import Status
 
-_LONG = 2.0  # [s] of processor time: beyond, a run is timed once, because noise averages out within it
+LONG = 2.0  # [s] of processor time: beyond, a run is timed once, because noise averages out within it
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def measure(point: Point, scene: Scene, repeats: int, time_limit: float) -> Meas
     reason, values = _outcome(point, scene, marched)
     cost = marched.cost if point.timed else math.nan
     if point.timed and not reason:
-        again = repeats if marched.core_seconds < _LONG * runs / lanes else 0
+        again = repeats if marched.core_seconds < LONG * runs / lanes else 0
         costs = [march(model, stepper, points, lanes, point.until, led=led).cost for _ in range(again)]
         cost = min([marched.cost, *costs])
     counters = _mean_counters(marched)

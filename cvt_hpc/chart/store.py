@@ -20,8 +20,8 @@ from cvt_hpc.chart.measuring import Measurement
 from cvt_hpc.chart.plan import Chart, fingerprint_of
 from cvt_hpc.files import StorageError, kind_of, read_regular, written_aside
 from cvt_hpc.output_folder import CHART_FILE, Kind, OutputFolder
+from cvt_hpc.provenance import git_revision, machine, versions
 from cvt_hpc.study.job_difference import another_job
-from cvt_hpc.study.provenance import git_revision, machine, versions
 
 _LIMIT = 1 << 26  # [bytes] of the file of a point, and of what it holds unpacked
 _NAME = re.compile(r"[\w-][\w.-]*")

@@ -1,8 +1,9 @@
-"""`check`: what a job would do, and what that costs."""
+"""`check`: what a job of any command would do, and what that costs."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,12 +33,26 @@ def add(commands: Any) -> None:
     pilots = "forecast by K batches that are done for it, shortened (default: by records, else by prediction)"
     check.add_argument("--pilots", type=int, default=0, metavar="K", help=pilots)
     check.add_argument("--plot", type=Path, metavar="PNG", help="picture of the forecast, 1 to 10 000 ranks")
+    command = "command that is to take the job (default: chart or branch by its table of that name, else run)"
+    check.add_argument("--for", dest="command_for", choices=(RUN, *_PLANS), help=command)
     add_assignments(check, "--set", REPLACE)
 
 
 def _check(arguments: argparse.Namespace) -> int:
     from cvt_hpc.job import load_job
+    from cvt_hpc.job.document import read_document
 
+    tables = read_document(arguments.path)
+    command = arguments.command_for or next((name for name in ("chart", "branch") if name in tables), RUN)
+    if command != RUN:
+        if arguments.ranks or arguments.pilots or arguments.plot:
+            raise mismatch(
+                "--ranks, --pilots, --plot", "a job of `cvt-hpc run`", f"one of `cvt-hpc {command}`"
+            )
+        lines = list(_PLANS[command](arguments))
+        if speaks():
+            print(*lines, sep="\n")
+        return DONE
     _check_ranks(arguments.ranks)
     if arguments.pilots < 0:
         raise mismatch("--pilots", "a number of batches", str(arguments.pilots))
@@ -62,6 +77,36 @@ def _check(arguments: argparse.Namespace) -> int:
             title = f"{job.name}: {job.size} runs"
             say(f"picture: {draw_efficiency(curve, title, expected.basis, arguments.plot)}")
     return DONE
+
+
+def _chart_lines(arguments: argparse.Namespace) -> Iterator[str]:
+    from cvt_hpc.chart import load_chart
+    from cvt_hpc.chart.checks import check_prospects
+    from cvt_hpc.chart.costs import plan_lines
+
+    chart = load_chart(arguments.path, arguments.set)
+    check_prospects(chart)
+    return plan_lines(chart)
+
+
+def _ladder_lines(arguments: argparse.Namespace) -> Iterator[str]:
+    from cvt_hpc.job import load_job
+    from cvt_hpc.ladder.costs import plan_lines
+    from cvt_hpc.ladder.rungs import ladder
+
+    job = load_job(arguments.path, arguments.set)
+    return plan_lines(job, *ladder(job), output_folder(None, job))
+
+
+def _branch_lines(arguments: argparse.Namespace) -> Iterator[str]:
+    from cvt_hpc.bifurcation import load_diagram
+    from cvt_hpc.bifurcation.costs import plan_lines
+
+    return plan_lines(load_diagram(arguments.path, arguments.set))
+
+
+RUN = "run"
+_PLANS = {"chart": _chart_lines, "ladder": _ladder_lines, "branch": _branch_lines}
 
 
 def show_job(job: Job, out: Path | None) -> None:

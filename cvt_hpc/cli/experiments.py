@@ -68,6 +68,7 @@ def _ladder(arguments: argparse.Namespace) -> int:
         out,
         fresh=arguments.fresh,
         tell=lambda rung, report: complain(*(f"{rung.name}: {line}" for line in trouble_lines(report))),
+        announce=complain,
     )
     if status < STALLED and speaks():
         report = report_ladder(job, rungs, out)

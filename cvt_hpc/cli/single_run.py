@@ -40,15 +40,14 @@ def _simulate(arguments: argparse.Namespace) -> int:
     check_output(arguments.out, (".nc",))
     check_output(arguments.plot, PICTURES)
     from cvt_hpc.analysis.histories import draw_history
-    from cvt_hpc.history_files import is_history, write_history
+    from cvt_hpc.netcdf import is_history, write_history
     from cvt_hpc.printing import outcome_lines, point_lines
     from cvt_hpc.simulation import simulate
-    from cvt_hpc.study.provenance import command, history_line
     from cvt_hpc.variables import Status
 
     if arguments.out is not None and arguments.out.exists() and not is_history(arguments.out):
         raise mismatch(str(arguments.out), "a new file, or a history written by cvt_hpc", "another file")
-    dataset = simulate(job, arguments.at).assign_attrs(history=history_line(command()))
+    dataset = simulate(job, arguments.at)
     # files first: whoever reads the lines may close the pipe
     written = []
     if arguments.out is not None:

@@ -149,6 +149,11 @@ def cost_in_words(core_seconds: float, runs: int) -> str:
     """Return what runs cost, each and in all; nan: not known."""
     if math.isnan(core_seconds):
         return "not known for this model"
-    total = core_seconds * runs
-    in_all = f"{total:.3g} core-seconds" if total < 3600 else f"{total / 3600:.3g} core-hours"
-    return f"{core_seconds:.3g} core-seconds per run, {in_all} in all"
+    return f"{core_seconds:.3g} core-seconds per run, {core_time_in_words(core_seconds * runs)} in all"
+
+
+def core_time_in_words(core_seconds: float) -> str:
+    """Return a processor time."""
+    return (
+        f"{core_seconds:.3g} core-seconds" if core_seconds < 3600 else f"{core_seconds / 3600:.3g} core-hours"
+    )

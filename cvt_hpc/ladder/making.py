@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -11,12 +12,15 @@ from threadpoolctl import threadpool_limits
 from cvt_hpc.files import refuse_link, written_aside
 from cvt_hpc.job import Job
 from cvt_hpc.ladder.comparing import Finding, compare
+from cvt_hpc.ladder.costs import cost_left
 from cvt_hpc.ladder.drawing import draw_ladder
 from cvt_hpc.ladder.rungs import Rung
 from cvt_hpc.ladder.table import ladder_dataset, write_ladder
 from cvt_hpc.netcdf import write_netcdf
 from cvt_hpc.simulation import simulate
 from cvt_hpc.study import RunReport, check_start, open_results, run
+from cvt_hpc.study.ranks.launch import detect_launch
+from cvt_hpc.study.ranks.progress import show_duration
 
 
 class LadderReport(NamedTuple):
@@ -37,7 +41,12 @@ class LadderReport(NamedTuple):
 
 
 def run_ladder(
-    rungs: Sequence[Rung], out: Path, *, fresh: bool = False, tell: Callable[[Rung, RunReport], None]
+    rungs: Sequence[Rung],
+    out: Path,
+    *,
+    fresh: bool = False,
+    tell: Callable[[Rung, RunReport], None],
+    announce: Callable[[str], None] = lambda line: None,
 ) -> int:
     """Do the runs of each rung, a study in a folder of its own; on all ranks.
 
@@ -51,6 +60,8 @@ def run_ladder(
         Throw earlier results away.
     tell : callable
         Given each rung whose runs have ended, and how.
+    announce : callable
+        Given a line before each rung that has runs left, with the time to go.
 
     Returns
     -------
@@ -67,13 +78,24 @@ def run_ladder(
     for rung in rungs:
         refuse_link(out / rung.name)
         check_start(rung.job, out / rung.name, fresh=fresh)
-    for rung in rungs:
+    left = {rung.name: cost_left(rung, None if fresh else out) for rung in rungs}
+    done, spent = 0.0, 0.0
+    for number, rung in enumerate(rungs, 1):
+        runs, cost = left[rung.name]
+        if runs:
+            to_go = sum(left[later.name][1] for later in rungs[number - 1 :])
+            # by what earlier rungs have taken, else by prediction alone
+            to_go *= spent / done if spent else 1.0 / detect_launch().size
+            expected = f"{runs} runs, {show_duration(to_go)} to go in all"
+            announce(f"rung {number}/{len(rungs)} {rung.name}: {expected}")
+        started = time.monotonic()
         # threads of the linear algebra wait for each other in loops, which would count as a rung's own time
         with threadpool_limits(1):
             if rung.job.stepper is None and begins[rung.name]:
                 simulate(rung.job)  # libraries loaded and kernels compiled would count as time of a first run
             report = run(rung.job, out / rung.name, fresh=fresh)
         tell(rung, report)
+        done, spent = done + cost, spent + (time.monotonic() - started if runs else 0.0)
         status = max(status, report.exit_status)
         if report.remaining:
             break

@@ -13,19 +13,29 @@ import xarray as xr
 from cvt_hpc.job import Job
 from cvt_hpc.ladder.comparing import Finding
 from cvt_hpc.ladder.rungs import QUESTIONS, Rung
-from cvt_hpc.study.provenance import command, git_revision, history_line, machine, versions
+from cvt_hpc.netcdf import attributes, global_attributes
+from cvt_hpc.provenance import machine
 from cvt_hpc.tables import columns, number, short
 
 UNITS = dict.fromkeys(QUESTIONS, "1") | {"onset": "N m"}
-# Column -> what it is; `error_unit` tells the unit of those of errors
+# Column -> its name and what it is; `error_unit` tells the unit of those of errors
 NUMBERS = {
-    "cells": "cells behind the errors; of onsets, pairs of them",
-    "error_median": "median error",
-    "error_95": "error that 95 % of the cells keep",
-    "wrong_share": "share of cells that are quiet here and vibrate in the reference, or the other way round",
-    "undecided_share": "share of cells, or of the reference's onsets, of which the rung says nothing",
-    "additional": "onsets that the reference does not have, though it decides below and above them",
-    "core_seconds": "processor time of a run, mean",
+    "cells": ("cells", "cells behind the errors; of onsets, pairs of them"),
+    "error_median": ("median error", "in the unit error_unit"),
+    "error_95": ("error of 95 %", "error that 95 % of the cells keep, in the unit error_unit"),
+    "wrong_share": (
+        "wrong cells",
+        "share of cells that are quiet here and vibrate in the reference, or the other way round",
+    ),
+    "undecided_share": (
+        "undecided cells",
+        "share of cells, or of the reference's onsets, of which the rung says nothing",
+    ),
+    "additional": (
+        "additional onsets",
+        "onsets that the reference does not have, though it decides below and above them",
+    ),
+    "core_seconds": ("processor time", "of a run, mean"),
 }
 
 
@@ -66,25 +76,18 @@ def ladder_dataset(job: Job, rungs: Sequence[Rung], findings: Sequence[Finding])
     for finding in findings:
         values[:, QUESTIONS.index(finding.question), names.index(finding.rung)] = _numbers(finding)
     variables = {
-        name: (("question", "rung"), array, {"long_name": text, **_units(name)})
-        for (name, text), array in zip(NUMBERS.items(), values, strict=True)
+        name: (("question", "rung"), array, attributes(words, _unit(name), text))
+        for (name, (words, text)), array in zip(NUMBERS.items(), values, strict=True)
     }
     texts = {"question": np.array(QUESTIONS, object), "rung": np.array(names, object)}
-    coordinates = {name: (name, labels, {"long_name": name}) for name, labels in texts.items()}
-    units = ("question", np.array(list(UNITS.values()), object), {"long_name": "unit of errors"})
-    attributes = {
-        "Conventions": "CF-1.11",
-        "title": job.description or job.name,
-        "source": f"cvt_hpc {versions()['cvt_hpc']}, accuracy against cost of the ladder of models",
-        "history": history_line(command()),
-        "job_name": job.name,
-        "job": json.dumps(job.resolved()),
+    coordinates = {name: (name, labels, attributes(name)) for name, labels in texts.items()}
+    units = ("question", np.array(list(UNITS.values()), object), attributes("unit of errors"))
+    told = {
+        **global_attributes(job, job.resolved(), "accuracy against cost of the ladder of models"),
         "rungs": json.dumps({rung.name: rung.job.resolved() for rung in rungs}),
-        "versions": json.dumps(versions()),
         "machine": json.dumps(machine()),
-        "git_revision": git_revision(),
     }
-    return xr.Dataset({"error_unit": units, **variables}, coordinates, attributes)
+    return xr.Dataset({"error_unit": units, **variables}, coordinates, told)
 
 
 def _numbers(finding: Finding) -> tuple[float, ...]:
@@ -92,10 +95,8 @@ def _numbers(finding: Finding) -> tuple[float, ...]:
     return (*finding.score, finding.core_seconds)
 
 
-def _units(name: str) -> dict[str, str]:
-    if name in ("error_median", "error_95"):
-        return {"comment": "in the unit error_unit"}
-    return {"units": "s" if name == "core_seconds" else "1"}
+def _unit(name: str) -> str:
+    return {"error_median": "", "error_95": "", "core_seconds": "s"}.get(name, "1")
 
 
 def _cells(finding: Finding) -> list[str]:

@@ -10,9 +10,9 @@ import numpy as np
 
 from cvt_hpc.job.assignments import Assignments, read_assignments, warn_of_bare_assignments
 from cvt_hpc.models.contract import load_model
+from cvt_hpc.netcdf import attributes, global_attributes, variable_attributes
 from cvt_hpc.simulation.record import record_coordinates, record_variables
 from cvt_hpc.simulation.running import do
-from cvt_hpc.variables import Variable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,34 +83,19 @@ def _history(job: Job, point: dict[str, Any], run: Any, record: dict[str, Any]) 
     import xarray as xr
 
     coordinates = {
-        name: (name, c.values, _attributes(c.long_name, c.units))
+        name: (name, c.values, attributes(c.long_name, c.units, c.comment))
         for name, c in record_coordinates(job).items()
     }
     variables: dict[str, Any] = {}
     for variable in record_variables(job):
         value = record[variable.name]
         value = value if variable.dtype.startswith("S") else np.asarray(value, variable.dtype)
-        variables[variable.name] = (variable.dims, value, _variable_attributes(variable))
-    attributes: dict[str, Any] = {
-        "Conventions": "CF-1.11",
-        "title": job.description or job.name,
-        "job_name": job.name,
-        "job": json.dumps(job.resolved()),
+        variables[variable.name] = (variable.dims, value, variable_attributes(variable))
+    told: dict[str, Any] = {
+        **global_attributes(job, job.resolved(), f"model {job.model}"),
         "point": json.dumps({key: repr(value) if value == np.inf else value for key, value in point.items()}),
     }
     if job.stepper is not None and run is not None:
-        attributes["judged_fraction"] = run.parameters["judged_fraction"]  # less than asked if prolonged
-    dataset = xr.Dataset(variables, coordinates, attributes)
+        told["judged_fraction"] = run.parameters["judged_fraction"]  # less than asked if prolonged
+    dataset = xr.Dataset(variables, coordinates, told)
     return dataset.merge(load_model(job.model).histories(run), combine_attrs="override")
-
-
-def _attributes(long_name: str, units: str) -> dict[str, str]:
-    return {"long_name": long_name, **({"units": units} if units else {})}
-
-
-def _variable_attributes(variable: Variable) -> dict[str, Any]:
-    attributes: dict[str, Any] = _attributes(variable.long_name, variable.units)
-    if variable.flags is not None:
-        attributes["flag_values"] = np.array([int(flag) for flag in variable.flags], variable.dtype)
-        attributes["flag_meanings"] = " ".join(flag.name.lower() for flag in variable.flags)
-    return attributes

@@ -29,6 +29,7 @@ _COST = (
         "s",
         "processor time, all tries; of runs that advance together, their time divided by their number",
         volatile=True,
+        words="processor time",
     ),
 )
 _MARCH = (
@@ -37,7 +38,8 @@ _MARCH = (
         (),
         "f8",
         "s",
-        "simulated time: more than asked where a run was prolonged, less where it failed or slipped through",
+        "more than asked where a run was prolonged, less where it failed or slipped through",
+        words="simulated time",
     ),
     Variable("time_step", (), "f8", "s", "time step of the run that counts"),
     Variable("refinements", (), "i1", "1", "times that the run was done again at half the step"),
@@ -143,13 +145,11 @@ def record_of_solution(job: Job, solution: Any, solving: float) -> dict[str, Any
 
 
 def _blank(job: Job) -> dict[str, Any]:
-    """A record in which nothing is known: numbers are not numbers, counts and flags 0."""
+    """A record in which nothing is known."""
     sizes = {name: len(c.values) for name, c in record_coordinates(job).items()}
-    blank: dict[str, Any] = {}
-    for variable in record_variables(job):
-        if variable.dtype.startswith("S"):
-            blank[variable.name] = ""
-        else:
-            shape = tuple(sizes[dim] for dim in variable.dims)
-            blank[variable.name] = np.full(shape, np.nan if variable.dtype == "f8" else 0, variable.dtype)
-    return blank
+    return {
+        v.name: v.blank
+        if v.dtype.startswith("S")
+        else np.full(tuple(sizes[dim] for dim in v.dims), v.blank, v.dtype)
+        for v in record_variables(job)
+    }

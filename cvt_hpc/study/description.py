@@ -107,13 +107,10 @@ class Study:
         )
 
     def blank_rows(self, shape: int | tuple[int, ...] = ()) -> np.ndarray:
-        """Return records of runs without results: NaN, zero, no text, and flags that say so."""
+        """Return records of runs of which nothing is known."""
         rows = np.zeros(shape, self.record_dtype)
         for variable in self.variables:
-            if variable.flags is not None:
-                rows[variable.name] = variable.flags.__members__.get("UNDECIDED", 0)
-            elif np.dtype(variable.dtype).kind == "f":
-                rows[variable.name] = np.nan
+            rows[variable.name] = variable.blank
         return rows
 
     def pack(self, values: Mapping[str, Any]) -> np.ndarray:
@@ -194,7 +191,7 @@ def runs_along(job: Job, names: Collection[str]) -> int:
 def record_layout(job: Job, simulator: Simulator) -> tuple[tuple[Variable, ...], tuple[Dimension, ...]]:
     """Return the quantities of a record, and their dimensions beside the grid's."""
     coordinates = (
-        Dimension(name, tuple(np.asarray(c.values).tolist()), c.units, c.long_name)
+        Dimension(name, tuple(np.asarray(c.values).tolist()), c.units, c.long_name, comment=c.comment)
         for name, c in simulator.record_coordinates(job).items()
     )
     return tuple(simulator.record_variables(job)), tuple(coordinates)
@@ -243,4 +240,7 @@ def _variable_to_json(variable: Variable) -> dict[str, Any]:
 def _variable_from_json(entry: Mapping[str, Any]) -> Variable:
     meanings = entry["flags"]
     flags = meanings and IntEnum(meanings["name"], meanings["members"])
-    return Variable(**{**entry, "dims": tuple(entry["dims"]), "flags": flags})
+    entry = {**entry, "dims": tuple(entry["dims"]), "flags": flags}
+    if "long_name" in entry:  # folders of earlier versions have the sentence there
+        entry["comment"] = entry.pop("long_name")
+    return Variable(**entry)

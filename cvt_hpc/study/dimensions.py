@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from cvt_hpc.netcdf import attributes
+
 if TYPE_CHECKING:
     from cvt_hpc.job import Axis
     from cvt_hpc.job.definition import Derived
@@ -30,6 +32,8 @@ class Dimension:
         CF long_name.
     spacing : str
         "log" for samples that are spread evenly by their logarithm.
+    comment : str
+        CF comment.
     """
 
     name: str
@@ -37,6 +41,13 @@ class Dimension:
     units: str
     long_name: str
     spacing: str = "linear"
+    comment: str = ""
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Those of its coordinate in a dataset."""
+        spacing = {"spacing": self.spacing} if self.spacing == "log" else {}
+        return attributes(self.long_name, self.units, self.comment) | spacing
 
     @property
     def holds_texts(self) -> bool:
@@ -79,19 +90,29 @@ class DerivedCoordinate(Dimension):
     dims: tuple[str, ...] = ()
     follows: str = ""
 
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Those of its coordinate in a dataset: with how it follows."""
+        return super().attributes | {"derived": self.follows}
+
 
 def axis_dimension(axis: Axis) -> Dimension:
     """Return the dimension of an axis of a job."""
-    return Dimension(axis.name, *_values_and_units(axis), axis.description, axis.spacing)
+    return Dimension(
+        axis.name, *_values_and_units(axis), _in_words(axis.name), axis.spacing, axis.description
+    )
 
 
 def derived_coordinate(derived: Derived, *, sampled: bool) -> DerivedCoordinate:
     """Return the coordinate of a parameter that follows from axes; of samples it lies along `run`."""
     dims = ("run",) if sampled else derived.axes
     values, units = _values_and_units(derived)
-    return DerivedCoordinate(
-        derived.name, values, units, derived.description, dims=dims, follows=derived.words
-    )
+    named = {"long_name": _in_words(derived.name), "comment": derived.description}
+    return DerivedCoordinate(derived.name, values, units, **named, dims=dims, follows=derived.words)
+
+
+def _in_words(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def _values_and_units(varied: Axis | Derived) -> tuple[tuple, str]:

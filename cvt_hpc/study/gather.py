@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Callable
 from pathlib import Path
@@ -13,12 +12,12 @@ import numpy as np
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import discard, kind_of, naming_refusals, written_aside
 from cvt_hpc.locks import locked
-from cvt_hpc.netcdf import write_netcdf
+from cvt_hpc.netcdf import global_attributes, variable_attributes, write_netcdf
+from cvt_hpc.provenance import history_line
 from cvt_hpc.study.chunks import chunk_shape, fill
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.dimensions import DerivedCoordinate, Dimension
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.provenance import command, git_revision, history_line, versions
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.record.log import KEPT
 from cvt_hpc.study.record.recovery import read_records
@@ -189,67 +188,34 @@ def _create(file: netCDF4.Dataset, study: Study, variable: Variable, chunk: tupl
         endian="native" if is_text else "little",  # as in the records
         fill_value=np.nan if dtype.kind == "f" else None,  # flags and counts have none
     )
-    stored.setncatts(_attributes(variable))
+    stored.setncatts(variable_attributes(variable))
+    if is_text:
+        stored._Encoding = "utf-8"  # the netCDF library's convention: readers return texts
     auxiliary = [d.name for d in (*(study.axes if study.is_sampled else ()), *study.derived)]
     if auxiliary:
         stored.coordinates = " ".join(auxiliary)  # by CF: these have no dimension of their own
     return stored
 
 
-def _attributes(variable: Variable) -> dict[str, Any]:
-    attributes: dict[str, Any] = {"long_name": variable.long_name}
-    if variable.flags is not None:
-        attributes["flag_values"] = np.array([int(flag) for flag in variable.flags], variable.dtype)
-        attributes["flag_meanings"] = " ".join(flag.name.lower() for flag in variable.flags)
-    elif variable.units:
-        attributes["units"] = variable.units
-    if np.dtype(variable.dtype).kind == "S":
-        attributes["_Encoding"] = "utf-8"  # the netCDF library's convention: readers return texts
-    if variable.volatile:
-        attributes["volatile"] = "yes"
-        attributes["comment"] = "depends on the machine and the hour; not reproduced bitwise"
-    return attributes
-
-
 def _derived_coordinate(derived: DerivedCoordinate, study: Study) -> _Coordinate:
-    along, values, attributes = _coordinate(derived, derived.dims)
+    along, values, named = _coordinate(derived, derived.dims)
     lengths = dict(zip(study.dims, study.shape, strict=True))
     shape = tuple(lengths[name] for name in derived.dims)
-    return along, values.reshape(shape), attributes | {"derived": derived.follows}
+    return along, values.reshape(shape), named
 
 
 def _coordinate(dimension: Dimension, along: tuple[str, ...]) -> _Coordinate:
-    attributes = {"long_name": dimension.long_name}
-    if dimension.units:
-        attributes["units"] = dimension.units
-    if dimension.spacing == "log":
-        attributes["spacing"] = dimension.spacing
     values = np.array(dimension.values, dtype=object if dimension.holds_texts else None)
-    return along, values, attributes
+    return along, values, dimension.attributes
 
 
 def _global_attributes(study: Study, records: Records) -> dict[str, str]:
     sessions = records.sessions
-    lines = [
+    earlier = [
         history_line(f"{s['command']} (on {s['host']}, {s['ranks']} rank(s))", s["started"]) for s in sessions
-    ] + [history_line(f"{command()} (gathered)")]
+    ]
+    model = study.job.get("model", "")
     return {
-        "Conventions": "CF-1.11",
-        "title": study.description or study.name,
-        "source": f"cvt_hpc, model {study.job.get('model', '')}".rstrip(),
-        "history": "\n".join(lines),
-        "job_name": study.name,
-        "job": json.dumps(study.job),
+        **global_attributes(study, study.job, f"model {model}", makers=sessions, earlier=earlier),
         "job_fingerprint": study.fingerprint,
-        "versions": json.dumps(merge_versions([s["versions"] for s in sessions] or [versions()])),
-        "git_revision": ", ".join(dict.fromkeys(s["git_revision"] for s in sessions)) or git_revision(),
     }
-
-
-def merge_versions(found: list[dict[str, str]]) -> dict[str, str]:
-    """Return the version of each package, several of them as "1.0, 1.1" where sessions differ."""
-    merged: dict[str, dict[str, None]] = {}
-    for versions_of_session in found:
-        for package, version in versions_of_session.items():
-            merged.setdefault(package, {})[version] = None
-    return {package: ", ".join(different) for package, different in merged.items()}

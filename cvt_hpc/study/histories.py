@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cvt_hpc.netcdf import store_history
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.variables import Status
@@ -26,8 +27,6 @@ def keep_histories(folder: StudyFolder, histories: Iterable[tuple[int, xr.Datase
         If the system refuses.
     """
     for index, history in histories:
-        from cvt_hpc.history_files import store_history  # late: most sweeps keep none
-
         folder.make_histories()
         store_history(history, folder.history(index))
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.files import discard
+from cvt_hpc.provenance import new_session
 from cvt_hpc.study.attempts import (
     enter_attempts,
     later_attempts,
@@ -22,7 +23,6 @@ from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.forecast.cost_model import Fit
 from cvt_hpc.study.histories import leave_out_missing
 from cvt_hpc.study.part import Part
-from cvt_hpc.study.provenance import new_session
 from cvt_hpc.study.ranks.counter import Counter
 from cvt_hpc.study.ranks.progress import Progress
 from cvt_hpc.study.ranks.time_limit import TimeLimit

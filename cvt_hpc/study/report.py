@@ -63,9 +63,9 @@ class RunReport:
         Number of runs recorded since this start.
     unneeded : int
         Number of cells of the grid that a trace does not run.
-    slipping, irregular : int
-        Number of runs with results under more load than friction carries, and of those whose motion is
-        irregular.
+    undecided, slipping, irregular : int
+        Number of runs with results that were too short to tell, under more load than friction carries, and
+        of irregular motion.
     """
 
     out: Path
@@ -77,6 +77,7 @@ class RunReport:
     stopped: str | None
     gained: int
     unneeded: int = 0
+    undecided: int = 0
     slipping: int = 0
     irregular: int = 0
 
@@ -129,9 +130,13 @@ def build_report(
 
 
 def count_special(records: Records, asked: np.ndarray | None = None) -> dict[str, int]:
-    """Return how many runs with results slip or move irregularly, of those that `asked` marks, or of all."""
+    """Return how many runs with results are no plain yes or no, of those that `asked` marks, or of all."""
     is_done = records.status == Status.DONE
     done = np.flatnonzero(is_done if asked is None else is_done & asked)
     verdicts = records.read(done, "vibrates")
-    kinds = {"slipping": Vibrates.SLIPS, "irregular": Vibrates.IRREGULAR}
+    kinds = {
+        "undecided": Vibrates.UNDECIDED,
+        "slipping": Vibrates.SLIPS,
+        "irregular": Vibrates.IRREGULAR,
+    }
     return {name: int((verdicts == verdict).sum()) for name, verdict in kinds.items()}

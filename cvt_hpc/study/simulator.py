@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from cvt_hpc.variables import Variable
+from cvt_hpc.variables import Coordinate, Variable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,8 +24,8 @@ class Simulator(Protocol):
     def record_variables(self, job: Job) -> tuple[Variable, ...]:
         """Return the quantities of a run's record, `status` first."""
 
-    def record_coordinates(self, job: Job) -> Mapping[str, Any]:
-        """Return the dimensions of the record beside the grid's: name -> (values, units, long_name)."""
+    def record_coordinates(self, job: Job) -> Mapping[str, Coordinate]:
+        """Return the dimensions of the record beside the grid's, by name."""
 
     def run_costs(self, job: Job) -> np.ndarray:
         """Return the predicted duration of each run, in any unit."""

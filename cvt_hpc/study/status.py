@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -46,9 +47,13 @@ class StudyStatus:
         One line for each record file that is not sound.
     unneeded : int
         Number of cells of the grid that a trace does not run, as far as is known.
-    slipping, irregular : int
-        Number of runs with results under more load than friction carries, and of those whose motion is
-        irregular.
+    undecided, slipping, irregular : int
+        Number of runs with results that were too short to tell, under more load than friction carries, and
+        of irregular motion.
+    finished : float or None
+        When the last run was recorded [s since 1970], if none is left and no sweep is at work.
+    time_at_work : float
+        For how long [s] sweeps have been at work, each until its last record.
     """
 
     name: str
@@ -61,8 +66,11 @@ class StudyStatus:
     time_to_go: float | None
     warnings: tuple[str, ...]
     unneeded: int = 0
+    undecided: int = 0
     slipping: int = 0
     irregular: int = 0
+    finished: float | None = None
+    time_at_work: float = 0.0
 
 
 def read_status(out: str | Path) -> StudyStatus:
@@ -101,6 +109,8 @@ def read_status(out: str | Path) -> StudyStatus:
         warnings=tuple(records.warnings),
         unneeded=int((~needed).sum()),
         **count_special(records),
+        finished=None if left.any() or running else float(np.nanmax(records.written)),
+        time_at_work=_time_at_work(records),
     )
 
 
@@ -160,6 +170,16 @@ def _latest_session(records: Records, running: bool) -> tuple[np.ndarray, float]
     if not chosen.any():
         return chosen, 0.0
     return chosen, max((time.time() if running else np.nanmax(records.written)) - started, 0.0)
+
+
+def _time_at_work(records: Records) -> float:
+    """Return for how long [s] sweeps have been at work, each until its last record before the next start."""
+    starts = [session["started"] for session in records.sessions]
+    worked = 0.0
+    for first, following in pairwise([*starts, np.inf]):
+        written = records.written[(records.written >= first) & (records.written < following)]
+        worked += written.max() - first if written.size else 0.0
+    return float(worked)
 
 
 def _predicted_costs(study: Study, folder: StudyFolder) -> np.ndarray:

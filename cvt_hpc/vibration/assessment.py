@@ -17,7 +17,7 @@ from cvt_hpc.vibration.settings import fitting_window
 
 VARIABLES = (
     Variable("amplitude", ("strand",), "f8", "m", "band-limited peak amplitude at the strongest probe"),
-    Variable("frequency", ("strand",), "f8", "Hz", "dominant frequency at the strongest probe"),
+    Variable("frequency", ("strand",), "f8", "Hz", "at the strongest probe", words="dominant frequency"),
     Variable("growth_rate", ("strand",), "f8", "s-1", "growth rate of the amplitude over the judged part"),
     Variable("growth_error", ("strand",), "f8", "s-1", "standard error of the growth rate"),
     Variable(

@@ -65,7 +65,7 @@ VARIABLES = (
 
 def coordinate() -> Coordinate:
     """The dimension `ramp_share`: middles of the parts of a ramp, as shares of it."""
-    return Coordinate((np.arange(BINS) + 0.5) / BINS, "1", "share of the ramp, after rise_time")
+    return Coordinate((np.arange(BINS) + 0.5) / BINS, "1", "share of the ramp", "after rise_time")
 
 
 @dataclass(frozen=True)

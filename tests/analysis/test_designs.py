@@ -1,15 +1,12 @@
 """Maps of traces and of samples: what is inferred never looks like a run, and each sample stands at its place."""
 
-import matplotlib
 import numpy as np
 import pytest
 from PIL import Image
 from studies import GRADIENTS, LOADS, fills_of, sampled, study, traced
 
-from cvt_hpc.analysis.arrangement import arrange
 from cvt_hpc.analysis.cells import INFERRED_VIBRATION, LINES, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, map_classes, occurrence_classes
-from cvt_hpc.analysis.figures import STYLE
 from cvt_hpc.analysis.maps import draw_map, map_figure
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 from cvt_hpc.errors import InputError
@@ -20,8 +17,7 @@ SOFT = {"sheave_stiffness": 1.0}
 
 def trace_panel():
     """The figure of one panel of a trace, the panel, and the classes of its cells."""
-    with matplotlib.rc_context(STYLE):
-        figure = map_figure(arrange(traced(), SOFT, "out/x"))
+    figure = map_figure(traced(), SOFT, "out/x")
     return figure, figure.axes[0], occurrence_classes(study().sel(SOFT)).values
 
 
@@ -68,8 +64,7 @@ def test_runs_and_inferred_cells_are_counted_apart():
 
 
 def test_a_full_grid_says_nothing_of_inference():
-    with matplotlib.rc_context(STYLE):
-        figure = map_figure(arrange(study(), SOFT, "out/x"))
+    figure = map_figure(study(), SOFT, "out/x")
     assert "inferred" not in figure.get_suptitle()
     assert "inferred" not in [text.get_text() for text in figure.legends[0].get_texts()]
 

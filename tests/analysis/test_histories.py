@@ -5,27 +5,21 @@ import os
 from itertools import combinations
 from textwrap import wrap
 
-import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
 from runs import PROBES, RATE, run
 
-from cvt_hpc.analysis.figures import STYLE, balanced
+from cvt_hpc.analysis.figures import balanced
 from cvt_hpc.analysis.histories import draw_history, history_figure
 from cvt_hpc.analysis.history_panels import read_strands
 from cvt_hpc.errors import InputError
-from cvt_hpc.history_files import is_history, write_history
 from cvt_hpc.job import load_job
+from cvt_hpc.netcdf import is_history, write_history
 from cvt_hpc.printing import point_lines
 from cvt_hpc.variables import Status
 
 BAND = (100.0, 1500.0)
-
-
-def figure_of(dataset):
-    with matplotlib.rc_context(STYLE):
-        return history_figure(dataset)
 
 
 def panel(figure, ylabel):
@@ -97,7 +91,7 @@ def test_a_system_that_refuses_leaves_the_old_one(tmp_path, monkeypatch):
 
 
 def test_everything_a_history_holds_is_drawn():
-    figure = figure_of(run())
+    figure = history_figure(run())
     whole, spectrum = panel(figure, "t1 [µm]"), panel(figure, "amplitude [µm]")
     assert whole.get_title(loc="left") == "displacement at t1 1/4, judged part shaded"  # 1/2 is a node
     values = whole.lines[0].get_ydata()
@@ -115,7 +109,7 @@ def test_everything_a_history_holds_is_drawn():
 
 
 def test_forces_lie_over_shaded_arcs():
-    figure = figure_of(run())
+    figure = history_figure(run())
     forces = panel(figure, "force [kN]")
     tension, push = (line.get_ydata().max() for line in forces.lines)
     assert (tension, push) == pytest.approx((9.1, 5.0), rel=1e-2)
@@ -127,7 +121,7 @@ def test_forces_lie_over_shaded_arcs():
 
 
 def test_what_feeds_lies_above_zero_and_what_takes_below():
-    fed = panel(figure_of(run()), "fed [W/m]")
+    fed = panel(history_figure(run()), "fed [W/m]")
     flanks, stresses, damping, zero = (np.asarray(line.get_ydata()) for line in fed.lines)
     assert (flanks.min(), flanks.max(), stresses.max()) == (-800.0, 100.0, 1500.0)
     assert np.all(damping == -1.0) and np.all(zero == 0.0)
@@ -139,7 +133,7 @@ def test_what_feeds_lies_above_zero_and_what_takes_below():
 
 
 def test_the_end_shows_all_probes_of_a_strand():
-    figure = figure_of(run())
+    figure = history_figure(run())
     close = [axes for axes in figure.axes if axes.get_legend() and len(axes.lines) == 3]
     labels = [[text.get_text() for text in axes.get_legend().get_texts()] for axes in close]
     assert labels == [["1/4", "1/2", "3/4"], ["1/6", "1/2", "5/6"]]
@@ -163,19 +157,21 @@ def test_the_end_shows_all_probes_of_a_strand():
 )
 def test_what_is_absent_is_left_out(missing, gone):
     everything, rest = (
-        {axes.get_ylabel() for axes in figure_of(dataset).axes}
+        {axes.get_ylabel() for axes in history_figure(dataset).axes}
         for dataset in (run(), run().drop_vars(missing))
     )
     assert (everything - rest) - {""} == gone  # the close-ups have no label
 
 
 def test_a_constant_load_is_not_drawn():
-    labels = {axes.get_ylabel() for axes in figure_of(run(ramp=False)).axes}
+    labels = {axes.get_ylabel() for axes in history_figure(run(ramp=False)).axes}
     assert "load [N m]" not in labels and "force [kN]" in labels
-    ramp = run().assign(driving_speed=("time", np.linspace(100.0, 400.0, run().sizes["time"])))
-    assert "driving pulley [rad/s]" in {axes.get_ylabel() for axes in figure_of(ramp).axes} - labels
+    ramp = run().assign(
+        driving_speed=("time", np.linspace(100.0, 400.0, run().sizes["time"]), {"units": "rad s-1"})
+    )
+    assert "driving speed\n[rpm]" in {axes.get_ylabel() for axes in history_figure(ramp).axes} - labels
     scalar = run().drop_vars("load").assign(load=120.0)
-    assert "load [N m]" not in {axes.get_ylabel() for axes in figure_of(scalar).axes}
+    assert "load [N m]" not in {axes.get_ylabel() for axes in history_figure(scalar).axes}
 
 
 def test_a_run_without_history_is_refused(tmp_path):
@@ -185,9 +181,9 @@ def test_a_run_without_history_is_refused(tmp_path):
 
 
 def test_the_title_says_what_became_of_the_run():
-    assert figure_of(run()).get_suptitle().startswith("One run: ramp\nvibrates: yes (t1 vibrates")
+    assert history_figure(run()).get_suptitle().startswith("One run: ramp\nvibrates: yes (t1 vibrates")
     failed = run().assign(status=np.int8(Status.FAILED_NUMERICS), reason=b"not a number at 0.02 s")
-    title = figure_of(failed).get_suptitle()
+    title = history_figure(failed).get_suptitle()
     assert title.endswith("failed numerics: not a number at 0.02\u00a0s")
     assert "vibrates" not in title
 
@@ -204,10 +200,30 @@ sheave_stiffness = [1, inf]
     point = job.point_at({"load": 50.0, "sheave_stiffness": np.inf, "ratio": 2.0})
     told = {key: repr(value) if value == np.inf else value for key, value in point.items()}
     attributes = {"job": json.dumps(job.resolved()), "point": json.dumps(told)}
-    lines = figure_of(run().assign_attrs(attributes)).get_suptitle().splitlines()
+    lines = history_figure(run().assign_attrs(attributes)).get_suptitle().splitlines()
     assert lines[1].replace("\u00a0", " ") == "load 50 N m, sheave_stiffness inf, ratio 2"
     (printed,) = point_lines(job, {"load": 50.0, "sheave_stiffness": np.inf, "ratio": 2.0})
     assert printed.endswith(lines[1].replace("\u00a0", " "))
+
+
+def test_the_title_names_the_rung_by_what_the_dataset_says_of_it():
+    flags = {"flag_values": np.array([0, 7], np.int8), "flag_meanings": "none guessed"}
+    rung = run().assign(rung=((), np.int8(7), flags), simulated_seconds=0.12)
+    assert "answered by the guessed run, of 0.12\u00a0s" in history_figure(rung).get_suptitle()
+
+
+@pytest.mark.parametrize(
+    ("long_name", "label"),
+    [
+        ("wheel speed", "wheel speed\n[rpm]"),
+        ("speed of the driving pulley, in a sentence", "driving speed\n[rpm]"),
+        ("", "driving speed\n[rpm]"),
+    ],
+)
+def test_a_name_that_fits_is_that_of_the_dataset(long_name, label):
+    speed = np.linspace(100.0, 400.0, run().sizes["time"])
+    ramp = run().assign(driving_speed=("time", speed, {"units": "rad s-1", "long_name": long_name}))
+    assert panel(history_figure(ramp), label).lines[0].get_ydata()[-1] == pytest.approx(400 * 30 / np.pi)
 
 
 @pytest.mark.parametrize("width", [20, 30, 45, 76])
@@ -228,7 +244,7 @@ def boxes(figure, artists):
 def test_labels_and_legends_cover_nothing():
     level = run()
     level["ring_tension"][:] = 9e3
-    figure = figure_of(level)
+    figure = history_figure(level)
     spectrum, forces = panel(figure, "amplitude [µm]"), panel(figure, "force [kN]")
     labels = boxes(figure, spectrum.texts)
     assert not any(a.overlaps(b) for a, b in combinations(labels, 2))
@@ -249,7 +265,7 @@ def test_labels_stay_within_the_spectrum(frequency):
     wave = 10e-6 * np.sin(2 * np.pi * frequency * at_the_edge["time"].values)
     at_the_edge["displacement"][:] = wave[:, np.newaxis]
     at_the_edge.attrs["job"] = json.dumps({"vibration": {"band_low": 100.0}})
-    figure = figure_of(at_the_edge)
+    figure = history_figure(at_the_edge)
     spectrum = panel(figure, "amplitude [µm]")
     assert len(spectrum.texts) == 2
     for box in boxes(figure, spectrum.texts):
@@ -268,7 +284,7 @@ def test_a_failed_run_is_drawn_up_to_where_it_failed():
 
 def test_nothing_of_a_failed_run_is_shown_as_judged():
     failed = run().assign(status=np.int8(Status.FAILED_NUMERICS), reason=b"not a number at 0.3 s")
-    figure = figure_of(failed)
+    figure = history_figure(failed)
     axes = panel(figure, "t1 [µm]")
     assert axes.get_title(loc="left") == "displacement at t1 1/4"
     assert len(axes.patches) == 0 and axes.lines
@@ -278,20 +294,20 @@ def test_nothing_of_a_failed_run_is_shown_as_judged():
 def test_the_judged_part_is_that_of_the_job():
     dataset = run()
     dataset.attrs["job"] = json.dumps({"vibration": {"judged_fraction": 0.2}})
-    shade = panel(figure_of(dataset), "t1 [µm]").patches[0]
+    shade = panel(history_figure(dataset), "t1 [µm]").patches[0]
     assert shade.get_x() == pytest.approx(240, abs=0.1)
 
 
 def test_short_or_coarse_records_have_no_spectrum():
     for dataset in (run(0.002), run().isel(time=slice(None, None, 10))):
-        labels = {axes.get_ylabel() for axes in figure_of(dataset).axes}
+        labels = {axes.get_ylabel() for axes in history_figure(dataset).axes}
         assert "amplitude [µm]" not in labels and "t1 [µm]" in labels
 
 
 def test_rest_is_drawn_without_peaks():
     still = run()
     still["displacement"][:] = 0.0
-    assert panel(figure_of(still), "amplitude [µm]").texts[:] == []
+    assert panel(history_figure(still), "amplitude [µm]").texts[:] == []
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])

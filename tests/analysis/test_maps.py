@@ -15,7 +15,6 @@ from PIL import Image
 from studies import GRADIENTS, LOADS, STIFFNESSES, fills_of, flags, study, two_flags
 
 import cvt_hpc
-from cvt_hpc.analysis.arrangement import arrange
 from cvt_hpc.analysis.cells import AMPLITUDE_COLOURS, FREQUENCY_COLOURS, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, occurrence_classes
 from cvt_hpc.analysis.figures import STYLE
@@ -35,8 +34,7 @@ VERDICTS = {
 
 
 def figure_of(dataset, at=()):
-    with matplotlib.rc_context(STYLE):
-        return map_figure(arrange(dataset, dict(at), "out/x"))
+    return map_figure(dataset, dict(at), "out/x")
 
 
 def panels_of(figure):
@@ -311,3 +309,14 @@ def test_a_large_map_is_drawn_in_a_second_and_its_small_cells_are_not_hidden():
         expected = axes.images[0].get_array()[place][:3].astype(int)
         found = pixel(figure, axes, large["loads"][place[1]], large["gradients"][place[0]])
         assert np.abs(found - expected).max() <= 2, (load, gradient)
+
+
+def test_a_figure_for_a_notebook_has_the_style_of_the_picture_and_leaves_the_users():
+    with matplotlib.rc_context({"font.size": 31.0}):
+        figure = cvt_hpc.map_figure(study(), {"sheave_stiffness": 1.5})
+        assert matplotlib.rcParams["font.size"] == 31.0
+    (panel,) = panels_of(figure)
+    assert {label.get_fontsize() for label in panel.get_xticklabels()} == {STYLE["xtick.labelsize"]}
+    assert panel.get_xlabel() == "load [N m]" and "sheave stiffness = 1.5" in figure.get_suptitle()
+    with pytest.raises(InputError, match="results: at slip: "):
+        cvt_hpc.map_figure(study(), {"slip": 1.0})

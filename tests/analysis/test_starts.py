@@ -2,16 +2,13 @@
 
 from itertools import product
 
-import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
 from studies import fills_of, study, traced
 
-from cvt_hpc.analysis.arrangement import arrange
 from cvt_hpc.analysis.cells import OF_STARTS, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, map_classes, occurrence_classes
-from cvt_hpc.analysis.figures import STYLE
 from cvt_hpc.analysis.maps import draw_map, map_figure
 from cvt_hpc.analysis.starts import has_starts, join_starts, start_line
 from cvt_hpc.variables import Status, Vibrates
@@ -41,8 +38,7 @@ def two_starts(make=study):
 
 
 def figure_of(dataset):
-    with matplotlib.rc_context(STYLE):
-        return map_figure(arrange(dataset, {}, "out/x"))
+    return map_figure(dataset, {}, "out/x")
 
 
 def test_class_of_every_pair_of_runs():

@@ -24,11 +24,11 @@ import numpy as np
 
 from cvt_hpc import simulation
 from cvt_hpc.job import build_job
+from cvt_hpc.provenance import new_session
 from cvt_hpc.study import gather, open_results, read_status
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.dimensions import Dimension
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.provenance import new_session
 from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.log import RecordLog
 from cvt_hpc.variables import Status

@@ -43,6 +43,7 @@ def made(tmp_path_factory):
 def test_it_finds_the_hopf_point_and_says_so(made):
     status, printed, folder = made
     assert status == 0
+    assert "cvt-hpc: 1/1 branches: 1 Hopf points, 0:00:00 to go" in printed
     (line,) = [line for line in printed if line.startswith("Hopf point")]
     assert "stability lost" in line and "critical" in line
     with xr.open_dataset(folder / "branch.nc") as dataset:
@@ -127,8 +128,24 @@ def test_bad_jobs_are_refused(old, new, told, tmp_path, capsys):
 
 def test_a_job_with_its_table_is_for_no_other_command(tmp_path, capsys):
     (tmp_path / "x.toml").write_text(JOB + RUNS)
-    assert main(["check", str(tmp_path / "x.toml")]) == 2
+    assert main(["run", str(tmp_path / "x.toml")]) == 2
     assert "found one for `cvt-hpc branch`" in capsys.readouterr().err
+
+
+def test_check_tells_branches_runs_and_cost(tmp_path, capsys):
+    (tmp_path / "x.toml").write_text(JOB + RUNS)
+    assert main(["check", str(tmp_path / "x.toml"), "--set", "sheave_stiffness=1.5"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == f"diagram x ({tmp_path / 'x.toml'}): 1 branches of 3 loads"
+    assert lines[-3].startswith("steady states: 3, ")
+    # two starts at three loads, and two between each pair of the two in which vibration begins or ends
+    assert lines[-2].startswith("runs: about 14, ")
+    (tmp_path / "x.toml").write_text(JOB + "[branch]\ndisturbance = []\n")
+    assert main(["check", str(tmp_path / "x.toml")]) == 0
+    assert "runs: none" in capsys.readouterr().out
+    (tmp_path / "x.toml").write_text(JOB)
+    assert main(["check", str(tmp_path / "x.toml"), "--for", "branch"]) == 0
+    assert capsys.readouterr().out.startswith("diagram x")
 
 
 def test_runs_have_the_scene_of_their_branch(tmp_path):

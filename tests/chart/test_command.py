@@ -1,5 +1,7 @@
 """`cvt-hpc chart` within this process."""
 
+import re
+
 import pytest
 
 from cvt_hpc.cli import main
@@ -14,8 +16,8 @@ def call(capsys, monkeypatch):
     for name in ("draw_scene", "draw_budget"):
         monkeypatch.setattr(f"cvt_hpc.chart.making.{name}", lambda comparison, out: out)
 
-    def run(*arguments):
-        status = main(["chart", *map(str, arguments)])
+    def run(*arguments, command="chart"):
+        status = main([command, *map(str, arguments)])
         out, err = capsys.readouterr()
         return status, out.splitlines(), err.splitlines()
 
@@ -33,11 +35,29 @@ def test_a_chart_prints_its_tables_and_where_it_left_its_files(write_chart, call
         "picture: out/bells/ringing.png",
         "picture: out/bells/budget.png",
     ]
-    assert err[0] == "cvt-hpc: 1/13 ringing-exact: 0 core-s" and len(err) == 13
+    assert (
+        re.fullmatch(r"cvt-hpc: 1/13 ringing-exact: 0 core-s, \d:\d\d:\d\d to go", err[0]) and len(err) == 13
+    )
+    assert err[-1].endswith(", 0:00:00 to go")
     assert call("c.toml") == (0, out, [])  # nothing is measured twice
     assert {path.name for path in (tmp_path / "out/bells").iterdir()} == {
         "chart.csv", "chart.nc", "chart.json", "points", ".chart.lock",
     }  # fmt: skip
+
+
+def test_check_tells_what_a_chart_measures_and_computes_nothing(write_chart, call, tmp_path):
+    status, out, err = call(write_chart(), command="check")
+    assert (status, err) == (0, [])
+    assert out[0] == "chart bells (c.toml): 1 scenes, 13 points"
+    (row,) = [line.split() for line in out if line.startswith("  ringing")]
+    assert row[:3] == ["ringing", "13", "13"] and row[-1] == "hard"
+    # a bell has no cost model, and its exact solution costs nothing
+    assert out[-1].startswith("estimated cost: 0 core-seconds") and "not known of 12 points" in out[-1]
+    assert [path.name for path in tmp_path.iterdir()] == ["c.toml"]
+    assert call("c.toml", "--ranks", "2", command="check")[0] == 2
+    assert call("c.toml", "--for", "run", command="check")[0] == 2
+    # what the command refuses is refused
+    assert call(write_chart(("occurrence = {}", "push_force = {}")), command="check")[0] == 2
 
 
 def test_values_are_set_and_another_job_needs_a_folder_or_fresh(write_chart, call, tmp_path):

@@ -11,8 +11,10 @@ from cf import cf_findings
 
 from cvt_hpc.cli import main
 from cvt_hpc.job import load_job
+from cvt_hpc.ladder.costs import cost_left
 from cvt_hpc.ladder.rungs import ladder
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
+from cvt_hpc.study import run
 
 JOB = """name = "small"
 model = "elastic_belt"
@@ -117,10 +119,32 @@ def test_what_a_ladder_cannot_go_over_is_refused(job, before, after, message, ca
     assert capsys.readouterr().err == f"cvt-hpc: {job}: {message}\n"
 
 
+def test_check_tells_the_runs_of_each_rung_and_what_is_left_of_them(job, capsys, monkeypatch):
+    monkeypatch.chdir(job.parent)
+    assert main(["check", str(job), "--for", "ladder", "--set", "friction_memory=0"]) == 0
+    first, *lines = capsys.readouterr().out.splitlines()
+    assert first == f"ladder small ({job}): 2 runs on 7 rungs"
+    rows = {line.split()[0]: line.split() for line in lines if line.startswith("  ")}
+    assert rows["criterion"][2:4] == ["1", "1"] and rows["coarse"][1:4] == ["auto", "2", "2"]
+    # twice the duration at 1.5 times the stations and steps: 4.5 times the cost, in two digits
+    assert float(rows["reference"][4]) == pytest.approx(4.5 * float(rows["elastic_belt"][4]), rel=0.1)
+    assert any(line.startswith("linear_stability left out: ") for line in lines)
+    assert not (job.parent / "out").exists()
+    cheapest = ladder(load_job(job))[0][0]
+    run(cheapest.job, "out/small/criterion", progress=False)
+    assert cost_left(cheapest, Path("out/small")) == (0, 0.0) and cost_left(cheapest, None)[0] == 1
+
+
 def test_a_ladder_leaves_its_studies_and_what_they_say(job, capsys):
     out = job.parent / "out"
     assert main(["ladder", str(job), "--out", str(out)]) == 0
-    printed = capsys.readouterr().out
+    printed, told = capsys.readouterr()
+    announced = [line for line in told.splitlines() if " to go in all" in line]
+    assert [line.split()[1:4] for line in announced[:2]] == [
+        ["rung", "1/8", "criterion:"],
+        ["rung", "2/8", "strand:"],
+    ]
+    assert len(announced) == 8
     assert printed.splitlines()[-3:] == [
         f"table: {out / 'ladder.csv'}",
         f"dataset: {out / 'ladder.nc'}",
@@ -147,7 +171,8 @@ def test_a_ladder_leaves_its_studies_and_what_they_say(job, capsys):
         assert dataset["status"].dims == ("load",)
     records = sum(path.stat().st_size for path in out.glob("*/records/*"))
     assert main(["ladder", str(job), "--out", str(out)]) == 0  # nothing is done twice
-    assert capsys.readouterr().out == printed
+    again = capsys.readouterr()
+    assert again.out == printed and "to go in all" not in again.err
     assert sum(path.stat().st_size for path in out.glob("*/records/*")) == records
     assert main(["ladder", str(job), "--out", str(out), "--set", "thrust=45 kN"]) == 2
     assert "expected the folder of this job" in capsys.readouterr().err

@@ -18,7 +18,7 @@ from cvt_hpc.chart.making import _tell_compiling
 from cvt_hpc.chart.table import table_lines
 from cvt_hpc.errors import InputError
 from cvt_hpc.output_folder import checksum
-from cvt_hpc.study.provenance import git_revision, machine
+from cvt_hpc.provenance import git_revision, machine
 
 DAMAGE = {
     "nothing left": lambda whole: b"",

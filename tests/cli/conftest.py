@@ -75,13 +75,12 @@ def mechanics(monkeypatch):
     )
     histories = ModuleType("cvt_hpc.analysis.histories")
     calls = {"written": [], "drawn": []}
-    files = ModuleType("cvt_hpc.history_files")
-    files.write_history = lambda dataset, path: calls["written"].append((dataset, path)) or path
-    files.is_history = lambda path: path.name == "history.nc"
     histories.draw_history = lambda dataset, path: calls["drawn"].append((dataset, path)) or path
     monkeypatch.setitem(sys.modules, "cvt_hpc.simulation", double)
     monkeypatch.setitem(sys.modules, "cvt_hpc.analysis.histories", histories)
-    monkeypatch.setitem(sys.modules, "cvt_hpc.history_files", files)
+    kept = lambda dataset, path: calls["written"].append((dataset, path)) or path  # noqa: E731
+    monkeypatch.setattr("cvt_hpc.netcdf.write_history", kept)
+    monkeypatch.setattr("cvt_hpc.netcdf.is_history", lambda path: path.name == "history.nc")
     return calls
 
 

@@ -1,5 +1,7 @@
 """The commands within this process, on the toy model and runs without mechanics."""
 
+import re
+
 import netCDF4
 import pytest
 from toy_jobs import GRID
@@ -19,8 +21,10 @@ def test_run_status_gather_and_map_of_one_study(write_job, call, tmp_path):
     assert not [line for line in err if line.startswith("cvt-hpc:")]
     status, out, err = call("status", "out/x")
     assert (status, err) == (0, [])
-    assert out[:5] == [
-        "job     x (not running)",
+    assert re.fullmatch(
+        r"job     x \(finished \d{4}-\d\d-\d\d \d\d:\d\d UTC, after 0:00:\d\d at work\)", out[0]
+    )
+    assert out[1:5] == [
         "runs    10",
         "done    10 (100.0%)",
         "failed  0",
@@ -170,9 +174,9 @@ def test_status_of_a_sweep_at_work(call, monkeypatch):
 
 
 def test_slipping_and_irregular_runs_are_counted(call, monkeypatch, tmp_path):
-    status = StudyStatus("x", 40, 30, 2, 8, False, None, None, (), slipping=3, irregular=1)
+    status = StudyStatus("x", 40, 30, 2, 8, False, None, None, (), slipping=3, irregular=1, undecided=2)
     monkeypatch.setattr("cvt_hpc.study.read_status", lambda path: status)
-    assert "done    30 (75.0%), of these 3 slip, 1 irregular" in call("status", "out/x")[1]
+    assert "done    30 (75.0%), of these 2 undecided, 3 slip, 1 irregular" in call("status", "out/x")[1]
     report = RunReport(tmp_path, tmp_path / "results.nc", 40, 40, (), 0, None, 40, slipping=3)
     assert list(report_lines(report))[:2] == ["40 runs: 40 done, 0 failed, 0 left", "of those done 3 slip"]
     assert report.exit_status == 0

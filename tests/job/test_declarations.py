@@ -8,6 +8,7 @@ import pint
 import pytest
 
 from cvt_hpc import recording, steppers
+from cvt_hpc.analysis.figures import LONGEST_NAME
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.job.schema import load_schema
@@ -16,7 +17,7 @@ from cvt_hpc.job.units import to_si
 from cvt_hpc.job.values import read_value
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
-from cvt_hpc.simulation import estimate_cost, simulate
+from cvt_hpc.simulation import estimate_cost, record_coordinates, record_variables, simulate
 from cvt_hpc.steppers import STEPPERS
 from cvt_hpc.steppers.facts import Facts
 from cvt_hpc.study import run
@@ -63,6 +64,19 @@ def test_what_has_a_unit_has_a_sensible_range_around_its_default(model, stepper)
             low, high = parameter.sensible
             assert 0.0 < low < high, key
             assert not parameter.default or low <= abs(parameter.default) <= high, key
+
+
+@pytest.mark.parametrize("model", sorted(set(MODELS) - {"moving_string"}))
+def test_what_is_recorded_has_a_name_that_fits_an_axis_label(model):
+    job = build_job({"name": "x", "model": model}, "x.toml")
+    variables = record_variables(job)
+    coordinates = record_coordinates(job).items()
+    words = {v.name: v.long_name for v in variables} | {name: c.long_name for name, c in coordinates}
+    for name, long_name in words.items():
+        # a clause is a sentence, and belongs into the comment
+        assert 0 < len(long_name) <= LONGEST_NAME and not set(long_name) & set(",;:()"), name
+    for variable in variables:
+        assert variable.comment and variable.comment != variable.long_name, variable.name
 
 
 @pytest.mark.parametrize(("model", "stepper"), PAIRS)

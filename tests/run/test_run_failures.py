@@ -1,9 +1,13 @@
 """Runs that cannot be trusted, or do not exist, never count as quiet nor as vibrating."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from marched import CHEAP, job, record
 
+from cvt_hpc import simulation
+from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.models.elastic_belt.lane_belt import POSITION, SPEED
 from cvt_hpc.models.elastic_belt.sampling import LEAST_SPEED, MOST_SPEED, Outcome
@@ -11,15 +15,28 @@ from cvt_hpc.models.elastic_belt.slip import GROSS_SLIP
 from cvt_hpc.models.elastic_belt.validity import FAILURES, LARGEST_POWER_RESIDUAL
 from cvt_hpc.physics.lane_compliance import ROUND_OFF
 from cvt_hpc.simulation import record_variables, run_point
+from cvt_hpc.simulation.record import record_of
+from cvt_hpc.study.description import describe
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration import ramp
 
 
 def assert_no_numbers(found):
-    assert found["vibrates"] != Vibrates.YES
+    assert found["vibrates"] == Vibrates.UNDECIDED
     for variable in record_variables(job()):
         if variable.dtype == "f8" and variable.name not in ("core_seconds", "simulated_seconds", "time_step"):
             assert np.all(np.isnan(found[variable.name])), variable.name
+
+
+def test_a_run_that_failed_on_its_way_is_as_blank_as_one_that_never_computed():
+    asked = build_job({"name": "test", "model": "auto", "axes": {}}, "test.toml")
+    numbers = {"time": 0.0, "step": np.nan, "steps": 0, "contact_solves": 0}
+    run = SimpleNamespace(failure=(Status.FAILED_ERROR, "why"), **numbers)
+    study = describe(asked, simulation)
+    found, never = study.pack(record_of(asked, run, 0.0)), study.pack_failure("why")
+    known = {"reason", "core_seconds", "simulated_seconds"}
+    for name in set(never.dtype.names) - known:
+        assert found[name].tobytes() == never[name].tobytes(), name
 
 
 @pytest.mark.parametrize("stations", [48, 160])

@@ -23,7 +23,7 @@ import numpy as np
 import xarray as xr
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.variables import Status, Variable, Vibrates
+from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 
 
 @dataclass(frozen=True)
@@ -72,13 +72,6 @@ class Job:
         # What steers only the pace is no part of the numbers.
         numbers = {**self.resolved(), "scene": {k: v for k, v in self.parameters.items() if k != "pause"}}
         return hashlib.sha256(json.dumps(numbers, sort_keys=True).encode()).hexdigest()
-
-
-@dataclass(frozen=True)
-class Coordinate:
-    values: np.ndarray
-    units: str
-    long_name: str
 
 
 class Interrupted(Exception):

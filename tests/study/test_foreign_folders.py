@@ -18,10 +18,10 @@ from study_processes import wait_until
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
-from cvt_hpc.history_files import write_history
 from cvt_hpc.job import load_job
 from cvt_hpc.ladder.making import run_ladder
 from cvt_hpc.locks import BusyError, locked
+from cvt_hpc.netcdf import write_history
 from cvt_hpc.output_folder import checksum
 from cvt_hpc.study import gather, open_results, read_status, run
 from cvt_hpc.study.folder import StudyFolder

@@ -15,7 +15,9 @@ from study_processes import HERE, clean_environment
 
 import cvt_hpc
 from cvt_hpc.errors import InputError
+from cvt_hpc.netcdf import variable_attributes
 from cvt_hpc.study import gather, open_results, run
+from cvt_hpc.study.description import Study, describe
 from cvt_hpc.variables import Status, Vibrates
 
 AXES = (
@@ -44,7 +46,11 @@ def test_axes_are_the_dimensions(dataset):
     assert dataset["friction_gradient"].values.tolist() == [-0.5, -0.25, 0.0]
     assert dataset["sheave_stiffness"].values.tolist() == [1.0, math.inf]
     assert dataset["friction_law"].values.tolist() == ["stribeck", "algebraic"]
-    assert dataset["friction_gradient"].attrs == {"units": "s/m", "long_name": "slope of the friction law"}
+    assert dataset["friction_gradient"].attrs == {
+        "units": "s/m",
+        "long_name": "friction gradient",
+        "comment": "slope of the friction law",
+    }
     assert dataset["sheave_stiffness"].attrs["units"] == "1"
     assert "units" not in dataset["friction_law"].attrs
 
@@ -207,3 +213,16 @@ def test_opening_what_is_no_dataset(tmp_path):
     (tmp_path / "results.nc").unlink()
     with pytest.raises(InputError, match="cvt-hpc gather"):
         open_results(tmp_path)
+
+
+def test_a_folder_of_an_earlier_version_has_its_sentences_as_comments():
+    entry = describe(JOB, Simulator()).to_json()
+    for variable in entry["variables"]:
+        variable["long_name"] = variable.pop("comment")
+        del variable["words"]
+    for axis in entry["axes"]:
+        axis["long_name"] = axis.pop("comment")
+    study = Study.from_json(entry)
+    status = variable_attributes(study.variables[0])
+    assert (status["long_name"], status["comment"]) == ("status", "how the run ended")
+    assert study.axes[0].attributes == {"long_name": "slope of the friction law", "units": "s/m"}

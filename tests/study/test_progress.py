@@ -3,8 +3,10 @@
 import contextlib
 import json
 import logging
+import math
 import os
 import pty
+import re
 import termios
 import time
 
@@ -16,9 +18,10 @@ from study_processes import wait_until
 from cvt_hpc.study import read_status, run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.ranks.counter import SerialCounter
-from cvt_hpc.study.ranks.progress import Progress, show_duration
+from cvt_hpc.study.ranks.progress import Progress, Steps, show_duration
 from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.log import RecordLog
+from cvt_hpc.variables import Vibrates
 
 
 @pytest.mark.parametrize(
@@ -69,6 +72,27 @@ def test_rate_is_that_of_the_latest_session(tmp_path):
     status = read_status(tmp_path)
     assert 0.01 < status.rate <= 9
     assert status.left == 3
+
+
+def test_a_finished_study_says_when_and_how_long_it_was_at_work(tmp_path):
+    run(Job(), tmp_path, simulator=Simulator(), progress=False, time_limit=0.0)
+    assert read_status(tmp_path).finished is None
+    study, now = StudyFolder(tmp_path).load(), time.time()
+    layout = RecordFormat(study.fingerprint, study.record_dtype)
+    undecided = Simulator().run_point(Job(), Job().point(0), lambda: None) | {"vibrates": Vibrates.UNDECIDED}
+    # records take the time at which their log begins, and what has passed since then
+    for began, indices in ((now - 5000.0, range(5)), (now - 100.0, range(5, 12))):
+        session = {"id": str(began), "started": began - 60.0}
+        with pytest.MonkeyPatch.context() as clock:
+            clock.setattr("cvt_hpc.study.record.log.time.time", lambda began=began: began)
+            with RecordLog(tmp_path / "records", layout, session, rank=0) as log:
+                log.append([(index, study.pack(undecided)) for index in indices])
+    status = read_status(tmp_path)
+    assert (status.done, status.failed, status.left, status.undecided) == (12, 0, 0, 12)
+    assert status.finished == pytest.approx(now - 100.0, abs=5.0)
+    assert status.time_at_work == pytest.approx(2 * 60.0, abs=10.0)  # a loaded machine writes late
+    with StudyFolder(tmp_path).occupied(None):
+        assert read_status(tmp_path).finished is None
 
 
 def test_time_left_is_by_predicted_costs(tmp_path, monkeypatch):
@@ -148,7 +172,31 @@ def test_a_bar_on_a_terminal(monkeypatch):
     shown = read_terminal(ours)
     assert "\rcompiling\r\n" in shown  # on a line of its own
     assert "7/10 [" in shown
-    assert "run/s, 5 failed]" in shown
+    assert re.search(r"run/s, 5 failed, 0:00:\d\d to go\]", shown)
+
+
+def test_steps_tell_what_is_left_by_their_costs(monkeypatch):
+    now, told = 1000.0, []
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    steps = Steps([6.0, math.nan, 2.0], 1, "point", told.append)  # one that is not known counts as 4
+    now += 60.0
+    steps.ended("first: failed", failed=True)
+    now += 60.0
+    steps.ended("second")
+    assert told == ["2/4 first: failed, 0:01:00 to go", "3/4 second, 0:00:24 to go"]
+
+
+def test_steps_stand_above_a_bar_on_a_terminal(monkeypatch):
+    ours, theirs = pty.openpty()
+    termios.tcsetwinsize(theirs, (25, 80))
+    with os.fdopen(theirs, "w") as terminal:
+        monkeypatch.setattr("sys.stderr", terminal)
+        steps = Steps([1.0, 1.0], 0, "branch", lambda line: print(line, file=terminal))
+        steps.ended("one: fine")
+        steps.close()
+    shown = read_terminal(ours)
+    assert re.search(r"\r1/2 one: fine, 0:00:\d\d to go\r\n", shown)
+    assert re.search(r"1/2 \[00:\d\d, .*0 failed, 0:00:\d\d to go\]", shown)
 
 
 def read_terminal(descriptor):

@@ -2,11 +2,12 @@
 
 import shutil
 import subprocess
+from pathlib import Path
 
 import pytest
 
-from cvt_hpc.study import provenance
-from cvt_hpc.study.gather import merge_versions
+from cvt_hpc import provenance
+from cvt_hpc.provenance import merge_versions, revision_of
 
 
 def git(folder, *arguments):
@@ -17,27 +18,26 @@ def git(folder, *arguments):
     return done.stdout.strip()
 
 
-def test_revision_is_that_of_the_source(tmp_path, monkeypatch):
+def test_revision_is_that_of_the_source(tmp_path):
     if shutil.which("git") is None:
         pytest.skip("git is not installed")
     source = tmp_path / "provenance.py"
-    monkeypatch.setattr(provenance, "__file__", str(source))
-    assert provenance.git_revision() == ""
+    assert revision_of(source) == ""
     git(tmp_path, "init", "-q")
     source.write_text("first")
     git(tmp_path, "commit", "-q", "--allow-empty", "-m", "another program")
-    assert provenance.git_revision() == ""  # only installed below another program's checkout
+    assert revision_of(source) == ""  # only installed below another program's checkout
     git(tmp_path, "add", ".")
     git(tmp_path, "commit", "-q", "-m", "this program")
     git(tmp_path, "tag", "-m", "x", "v1")
-    assert provenance.git_revision() == git(tmp_path, "rev-parse", "HEAD")
+    assert revision_of(source) == git(tmp_path, "rev-parse", "HEAD")
     source.write_text("second")
-    assert provenance.git_revision() == git(tmp_path, "rev-parse", "HEAD") + "-dirty"
+    assert revision_of(source) == git(tmp_path, "rev-parse", "HEAD") + "-dirty"
 
 
 def test_no_revision_without_git(monkeypatch):
     monkeypatch.setenv("PATH", "")
-    assert provenance.git_revision() == ""
+    assert revision_of(Path(provenance.__file__)) == ""
 
 
 def test_versions_of_several_sessions_stand_side_by_side():

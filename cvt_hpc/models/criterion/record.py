@@ -50,8 +50,8 @@ class Solution(NamedTuple):
 
 def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, whatever the parameters."""
-    long_name = "amplitude of the vibration's speed over the sliding speed"
-    return {"relative_amplitude": Coordinate(RELATIVE_AMPLITUDES, "1", long_name)}
+    text = "amplitude of the vibration's speed over the sliding speed"
+    return {"relative_amplitude": Coordinate(RELATIVE_AMPLITUDES, "1", "relative amplitude", text)}
 
 
 def cost(parameters: Mapping[str, Any], stepper: None) -> float:

@@ -54,21 +54,39 @@ VARIABLES = (
         "f8",
         "W",
         "power that friction of the flanks feeds into the fluctuation by arc part; negative: takes",
+        words="feed by flank friction",
     ),
     Variable(
-        "stress_fed", (), "f8", "W", "power that push and tension feed into it, where gaps open and close"
+        "stress_fed",
+        (),
+        "f8",
+        "W",
+        "power that push and tension feed into the fluctuation, where gaps open and close",
+        words="feed by push and tension",
     ),
-    Variable("belt_taken", (), "f8", "W", "power that the belt's transverse damping takes from it"),
-    Variable("ring_taken", (), "f8", "W", "power that friction between rings and elements takes from it"),
-    Variable("layer_taken", (), "f8", "W", "power that the layers' longitudinal dampers take from it"),
-    Variable("lag_taken", (), "f8", "W", "power that the driven sheave's lag takes from it"),
-    Variable("carried_power", (), "f8", "W", "power that goes from it to the mean motion"),
+    *(
+        Variable(f"{name}_taken", (), "f8", "W", f"power that {what} from the fluctuation", words=words)
+        for name, what, words in (
+            ("belt", "the belt's transverse damping takes", "taken by belt damping"),
+            ("ring", "friction between rings and elements takes", "taken by ring friction"),
+            ("layer", "the layers' longitudinal dampers take", "taken by layer dampers"),
+            ("lag", "the driven sheave's lag takes", "taken by sheave lag"),
+        )
+    ),
+    Variable(
+        "carried_power",
+        (),
+        "f8",
+        "W",
+        "power that goes from the fluctuation to the mean motion",
+        words="power to the mean motion",
+    ),
     Variable(
         "fluctuation_remainder",
         (),
         "f8",
         "W",
-        "what is fed less what is taken and carried",
+        "power that is fed into the fluctuation less what is taken and carried",
     ),
 )
 

@@ -51,12 +51,24 @@ VARIABLES = (
     *assessment.VARIABLES,
     *ramp.VARIABLES,
     Variable(
-        "mode", ("strand",), "i1", "1", "half waves of the strongest mode of the strand in the band; 0: none"
+        "mode",
+        ("strand",),
+        "i1",
+        "1",
+        "half waves of the strongest mode of the strand in the band; 0: none",
+        words="strongest mode",
     ),
     Variable(
         "modal_amplitude", ("strand", "half_waves"), "f8", "m", "amplitude of each sine mode in the band"
     ),
-    Variable("spectrum", ("strand", "frequency_bin"), "f8", "m", "amplitude spectrum at the strongest probe"),
+    Variable(
+        "spectrum",
+        ("strand", "frequency_bin"),
+        "f8",
+        "m",
+        "at the strongest probe",
+        words="amplitude spectrum",
+    ),
     Variable("mean_ring_tension", ("strand",), "f8", "N", "mean ring tension in the middle of the strand"),
     Variable("mean_push_force", ("strand",), "f8", "N", "mean push force in the middle of the strand"),
     Variable("axial_force", ("pulley",), "f8", "N", "mean axial force of the belt on a sheave"),
@@ -64,7 +76,7 @@ VARIABLES = (
         "slip", ("pulley",), "f8", "1", "mean tangential sliding over belt speed, weighted by contact force"
     ),
     SLIP_MARGIN,
-    Variable("open_share", ("pulley",), "f8", "1", "mean share of the wrap that is out of contact"),
+    Variable("open_share", ("pulley",), "f8", "1", "mean, out of contact", words="open share of the wrap"),
     Variable("flank_loss", ("pulley",), "f8", "W", "mean friction power of the flanks"),
     Variable("thrust_ratio", (), "f8", "1", "mean axial force of the driving over that of the driven pulley"),
     Variable("speed_loss", (), "f8", "1", "1 - ratio x driven speed / driving speed, mean"),
@@ -80,7 +92,7 @@ VARIABLES = (
     Variable(
         "seating_loss", (), "f8", "W", "mean elastic power carried out of the contact at the arcs' ends"
     ),
-    Variable("loss", (), "f8", "W", "mean of all losses"),
+    Variable("loss", (), "f8", "W", "mean of all losses", words="total loss"),
     Variable(
         "power_residual",
         (),
@@ -111,13 +123,13 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     step = parameters["spectrum_step"]
     bins = np.arange(0.0, parameters["band_high"] + step / 2, step)
     return {
-        "strand": Coordinate(np.array(STRANDS), "", "strand: t1 leaves the driving pulley, t2 enters it"),
+        "strand": Coordinate(np.array(STRANDS), "", "strand", "t1 leaves the driving pulley, t2 enters it"),
         "pulley": Coordinate(np.array(PULLEYS), "", "pulley"),
         "arc_part": Coordinate(
-            np.arange(1, fluctuation.ARC_PARTS + 1), "1", "part of the wrap, from its inlet to its outlet"
+            np.arange(1, fluctuation.ARC_PARTS + 1), "1", "part of the wrap", "from its inlet to its outlet"
         ),
         "ramp_share": ramp.coordinate(),
-        "half_waves": Coordinate(np.arange(1, MODES + 1), "1", "half waves along the strand"),
+        "half_waves": Coordinate(np.arange(1, MODES + 1), "1", "half waves", "along the strand"),
         "frequency_bin": Coordinate(bins, "Hz", "frequency"),
     }
 

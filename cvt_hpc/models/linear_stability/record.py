@@ -11,14 +11,27 @@ from cvt_hpc.models.steady_variator import record as steady_record
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 
 VARIABLES = (
-    Variable("growth_rate", (), "f8", "s-1", "growth rate of the mode that grows fastest; none found: nan"),
-    Variable("frequency", (), "f8", "Hz", "its frequency"),
+    Variable("growth_rate", (), "f8", "s-1", "of the mode that grows fastest; none found: nan"),
+    Variable("frequency", (), "f8", "Hz", "of the mode that grows fastest"),
     Variable(
-        "vibrating_strand", (), "i1", "1", "strand in which it is largest: 1 is t1, 2 is t2; 0: no mode"
+        "vibrating_strand",
+        (),
+        "i1",
+        "1",
+        "strand in which the mode that grows fastest is largest: 1 is t1, 2 is t2; 0: no mode",
     ),
-    Variable("mode", (), "i1", "1", "its half waves along that strand; 0: no mode"),
-    Variable("relative_amplitude", ("region",), "f8", "1", "its largest displacement by region"),
-    Variable("fed", ("region",), "f8", "s-1", "what friction in each region adds to its growth rate"),
+    Variable(
+        "mode", (), "i1", "1", "of that mode along its vibrating strand; 0: no mode", words="half waves"
+    ),
+    Variable("relative_amplitude", ("region",), "f8", "1", "largest displacement of that mode by region"),
+    Variable(
+        "fed",
+        ("region",),
+        "f8",
+        "s-1",
+        "what friction in each region adds to the growth rate of that mode",
+        words="feed by friction",
+    ),
     *steady_record.VARIABLES,
 )
 
@@ -48,7 +61,7 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, whatever the parameters."""
     from cvt_hpc.models.elastic_belt.belt import REGIONS
 
-    regions = {"region": Coordinate(np.array(REGIONS), "", "region of the path")}
+    regions = {"region": Coordinate(np.array(REGIONS), "", "region", "of the path")}
     return steady_record.coordinates(parameters) | regions
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from cvt_hpc.models.oscillator.cycles import cycle_starts, work_per_cycle
 from cvt_hpc.models.oscillator.steady import steady_sliding
+from cvt_hpc.netcdf import attributes
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.vibration import assessment
 
@@ -116,18 +117,15 @@ def histories(run: Transient) -> xr.Dataset:
     """
     import xarray as xr
 
-    def labelled(long_name: str, units: str) -> dict[str, str]:
-        return {"long_name": long_name, "units": units}
-
-    displacement = labelled("displacement of the mass, in the belt's direction", "m")
+    displacement = attributes("displacement", "m", "of the mass, in the belt's direction")
     return xr.Dataset(
         {
             "displacement": (("time", "probe"), run.displacement, displacement),
-            "speed": ("time", run.channel("speed"), labelled("speed of the mass", "m s-1")),
-            "friction_force": ("time", run.friction(), labelled("friction force on the mass", "N")),
+            "speed": ("time", run.channel("speed"), attributes("speed", "m s-1", "of the mass")),
+            "friction_force": ("time", run.friction(), attributes("friction force", "N", "on the mass")),
         },
         {
-            "time": ("time", run.times, labelled("simulated time", "s")),
-            "probe": ("probe", np.array([p.label for p in run.probes], object), {"long_name": "probe"}),
+            "time": ("time", run.times, attributes("time", "s")),
+            "probe": ("probe", np.array([p.label for p in run.probes], object), attributes("probe")),
         },
     )

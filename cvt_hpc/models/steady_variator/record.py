@@ -18,7 +18,7 @@ VARIABLES = (
     Variable("axial_force", ("pulley",), "f8", "N", "axial force of the belt on a sheave"),
     Variable("slip", ("pulley",), "f8", "1", "tangential sliding over belt speed, weighted by contact force"),
     SLIP_MARGIN,
-    Variable("open_share", ("pulley",), "f8", "1", "share of the wrap that is out of contact"),
+    Variable("open_share", ("pulley",), "f8", "1", "out of contact", words="open share of the wrap"),
     Variable("thrust_ratio", (), "f8", "1", "axial force of the driving over that of the driven pulley"),
     Variable("speed_loss", (), "f8", "1", "1 - ratio x driven speed / driving speed"),
     Variable("driven_position", (), "f8", "m", "axial opening of the driven pulley"),
@@ -28,7 +28,7 @@ VARIABLES = (
 def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, whatever the parameters."""
     return {
-        "strand": Coordinate(np.array(STRANDS), "", "strand: t1 leaves the driving pulley, t2 enters it"),
+        "strand": Coordinate(np.array(STRANDS), "", "strand", "t1 leaves the driving pulley, t2 enters it"),
         "pulley": Coordinate(np.array(PULLEYS), "", "pulley"),
     }
 

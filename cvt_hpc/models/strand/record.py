@@ -16,13 +16,13 @@ STRANDS = ("t1", "t2")
 MODES = 5  # that are recorded
 
 VARIABLES = (
-    Variable("eigenfrequency", ("strand", "half_waves"), "f8", "Hz", "eigenfrequency of the running strand"),
+    Variable("eigenfrequency", ("strand", "half_waves"), "f8", "Hz", "of the running strand"),
     Variable(
         "resting_frequency",
         ("strand", "half_waves"),
         "f8",
         "Hz",
-        "the same without the terms of the belt's speed",
+        "eigenfrequency without the terms of the belt's speed",
     ),
     Variable(
         "critical_speed", ("strand",), "f8", "m s-1", "speed from which the strand does not hold its shape"
@@ -43,8 +43,8 @@ class Solution(NamedTuple):
 def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, whatever the parameters."""
     return {
-        "strand": Coordinate(np.array(STRANDS), "", "strand: t1 leaves the driving pulley, t2 enters it"),
-        "half_waves": Coordinate(np.arange(1, MODES + 1), "1", "half waves along the strand"),
+        "strand": Coordinate(np.array(STRANDS), "", "strand", "t1 leaves the driving pulley, t2 enters it"),
+        "half_waves": Coordinate(np.arange(1, MODES + 1), "1", "half waves", "along the strand"),
     }
 
 

@@ -1,18 +1,22 @@
-"""How far a sweep is: a bar on a terminal, plain lines where the output goes to a file."""
+"""How far a sweep, chart or diagram is: a bar on a terminal, plain lines where the output goes to a file."""
 
 from __future__ import annotations
 
+import math
 import sys
 import time
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 
 import numpy as np
 
-from cvt_hpc.study.ranks.counter import Counter
+from cvt_hpc.study.ranks.counter import Counter, SerialCounter, Tally
 
 _BAR_INTERVAL = 0.5  # [s]
 _FIRST_LINE = 5.0  # [s]; lines then come less and less often, so that a day's output stays readable
 _LAST_LINE = 60.0  # [s]
+# without the time that tqdm expects by numbers alone: the longest come first
+_BAR = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}, {rate_fmt}{postfix}]"
 
 
 class Progress:
@@ -30,10 +34,19 @@ class Progress:
         Whether anything is shown at all.
     costs : numpy.ndarray
         Predicted durations of the runs to be done, in any unit and in the order in which they are started.
+    unit : str
+        What is counted.
     """
 
     def __init__(
-        self, counter: Counter, total: int, recorded: int, failed: int, visible: bool, costs: np.ndarray
+        self,
+        counter: Counter,
+        total: int,
+        recorded: int,
+        failed: int,
+        visible: bool,
+        costs: np.ndarray,
+        unit: str = "run",
     ) -> None:
         self._counter = counter
         self._total = total
@@ -42,13 +55,15 @@ class Progress:
         self._started = self._shown = time.monotonic()
         self._visible = visible
         self._work = np.cumsum(costs)
+        self._unit = unit
         self._bar = None
         self._lines_above = ExitStack()  # where what is logged goes while the bar is there
         if visible and sys.stderr.isatty():
             from tqdm import tqdm
             from tqdm.contrib.logging import logging_redirect_tqdm
 
-            self._bar = tqdm(total=total, initial=recorded, unit="run", dynamic_ncols=True)
+            options = {"unit": unit, "dynamic_ncols": True, "bar_format": _BAR}
+            self._bar = tqdm(total=total, initial=recorded, **options)
             self._lines_above.enter_context(logging_redirect_tqdm())
 
     def expect(self, costs: np.ndarray) -> None:
@@ -67,6 +82,23 @@ class Progress:
             self._shown = now
             self._show(elapsed)
 
+    def tell(self, line: str, tell: Callable[[str], None]) -> None:
+        """Tell a line, above the bar where there is one."""
+        if self._bar is None:
+            tell(line)
+            return
+        with self._bar.external_write_mode(sys.stderr):
+            tell(line)
+
+    def to_go(self) -> str:
+        """Return how long what is left will take, as ", 0:01:00 to go"; "" before anything has ended."""
+        done, elapsed = self._counter.tally().finished, time.monotonic() - self._started
+        if not done or elapsed <= 0.0:
+            return ""
+        # by their number alone, too long a time would be left
+        work = self._work[done - 1]
+        return f", {show_duration(elapsed * (self._work[-1] - work) / work)} to go"
+
     def close(self) -> None:
         """Show the state at the end."""
         if not self._visible:
@@ -81,19 +113,55 @@ class Progress:
         finished, failed = self._recorded + tally.finished, self._failed + tally.failed
         if self._bar is not None:
             self._bar.total = self._total
-            self._bar.set_postfix_str(f"{failed} failed", refresh=False)
+            self._bar.set_postfix_str(f"{failed} failed{self.to_go()}", refresh=False)
             self._bar.update(finished - self._bar.n)
             self._bar.refresh()
             return
         share = finished / self._total if self._total else 1.0
-        line = f"{finished}/{self._total} runs ({share:.1%}), {failed} failed"
+        line = f"{finished}/{self._total} {self._unit}s ({share:.1%}), {failed} failed"
         if tally.finished and elapsed > 0:
-            rate = tally.finished / elapsed
-            # The longest come first: by their number alone, too long a time would be left.
-            done = self._work[tally.finished - 1]
-            to_go = elapsed * (self._work[-1] - done) / done
-            line += f", {rate:.3g} runs/s, {show_duration(to_go)} to go"
+            line += f", {tally.finished / elapsed:.3g} {self._unit}s/s{self.to_go()}"
         print(line, file=sys.stderr, flush=True)
+
+
+class Steps:
+    """Tells of things done one after the other by one process: a line for each, and how long the rest takes.
+
+    On a terminal the lines stand above a bar.
+
+    Parameters
+    ----------
+    costs : sequence of float
+        Predicted durations of what is left to do, in any unit and in the order in which it is done; those
+        that are not known (nan) count as the mean of the others.
+    done : int
+        Number of things that were done before.
+    unit : str
+        What is counted.
+    tell : callable
+        Given each line.
+    """
+
+    def __init__(self, costs: Sequence[float], done: int, unit: str, tell: Callable[[str], None]) -> None:
+        known = [cost for cost in costs if not math.isnan(cost)] or [1.0]
+        mean = max(sum(known) / len(known), 1e-9)
+        filled = np.array([mean if math.isnan(cost) else max(cost, 1e-3 * mean) for cost in costs])
+        self._total, self._before, self._tell = done + len(costs), done, tell
+        self._counter = SerialCounter()
+        visible = bool(costs) and sys.stderr.isatty()
+        self._progress = Progress(self._counter, self._total, done, 0, visible, filled, unit)
+
+    def ended(self, line: str, *, failed: bool = False) -> None:
+        """Tell that the next thing has ended, and how."""
+        self._counter.report(1, int(failed))
+        tally: Tally = self._counter.tally()
+        count = f"{self._before + tally.finished}/{self._total}"
+        self._progress.tell(f"{count} {line}{self._progress.to_go()}", self._tell)
+        self._progress.show()
+
+    def close(self) -> None:
+        """Leave the bar, if any, as it is at the end."""
+        self._progress.close()
 
 
 def show_duration(seconds: float) -> str:

@@ -1,4 +1,4 @@
-"""Where numbers come from: the command, the host, the versions and the revision, kept in every log."""
+"""Where numbers come from: the command, the host, the versions and the revision, for all that is written."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import subprocess
 import sys
 import time
 import uuid
+from collections.abc import Sequence
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -72,9 +74,26 @@ def machine() -> dict[str, Any]:
     return {"processor": processor, "architecture": platform.machine(), "cores": os.cpu_count()}
 
 
+def merge_versions(found: Sequence[dict[str, str]]) -> dict[str, str]:
+    """Return the version of each package, several of them as "1.0, 1.1" where sessions differ."""
+    merged: dict[str, dict[str, None]] = {}
+    for versions_of_session in found:
+        for package, version in versions_of_session.items():
+            merged.setdefault(package, {})[version] = None
+    return {package: ", ".join(different) for package, different in merged.items()}
+
+
+@cache
 def git_revision() -> str:
-    """Return the revision of this source, "-dirty" appended if it was changed; "" outside a git checkout."""
-    source = Path(__file__)
+    """Return the revision of the source that this process runs, as `revision_of` does."""
+    return revision_of(Path(__file__))
+
+
+def revision_of(source: Path) -> str:
+    """Return the revision of a source file's checkout; "" if git does not keep the file there.
+
+    "-dirty" is appended if anything in the checkout was changed.
+    """
     # A package installed below somebody else's checkout must not be given that checkout's revision.
     if _git(source, "ls-files", "--error-unmatch", source.name) is None:
         return ""

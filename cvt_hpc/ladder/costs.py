@@ -1,0 +1,52 @@
+"""What the rungs of a ladder are expected to cost, by the cost models of their models."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from cvt_hpc.job import Job
+from cvt_hpc.job.summary import core_time_in_words
+from cvt_hpc.ladder.rungs import Rung
+from cvt_hpc.simulation import run_costs
+from cvt_hpc.study.status import find_records
+from cvt_hpc.tables import columns, short
+
+
+def cost_left(rung: Rung, out: Path | None) -> tuple[int, float]:
+    """Return how many runs of a rung are not on record, and their predicted core-seconds.
+
+    Parameters
+    ----------
+    rung : Rung
+        The rung.
+    out : Path or None
+        The folder of its ladder; None: all runs are left.
+    """
+    records = None if out is None else find_records(out / rung.name, rung.job)
+    left = np.ones(rung.job.size, bool) if records is None else ~records.recorded
+    return int(left.sum()), float(run_costs(rung.job)[left].sum())
+
+
+def plan_lines(job: Job, rungs: Sequence[Rung], refusals: Mapping[str, str], out: Path) -> Iterator[str]:
+    """Yield the lines that say which runs a ladder does on each rung, and what they are expected to cost."""
+    yield f"ladder {job.name} ({job.source}): {job.size} runs on {len(rungs)} rungs"
+    if job.description:
+        yield job.description
+    left = {rung.name: cost_left(rung, out) for rung in rungs}
+    heads = ["rung", "model", "runs", "left", "core-s left", "answers"]
+    yield from columns(
+        [
+            heads,
+            *(
+                [r.name, r.job.model, str(r.job.size), str(left[r.name][0]), short(left[r.name][1])]
+                + [", ".join(r.answers)]
+                for r in rungs
+            ),
+        ]
+    )
+    yield from (f"{name} left out: {why}" for name, why in refusals.items())
+    total = sum(core_seconds for _, core_seconds in left.values())
+    yield f"estimated cost of what is left: {core_time_in_words(total)}, shared by all ranks"
