@@ -234,13 +234,15 @@ def fit_text(text: str, size: int) -> bytes:
 def _variable_to_json(variable: Variable) -> dict[str, Any]:
     flags = variable.flags
     meanings = flags and {"name": flags.__name__, "members": {m.name: int(m) for m in flags}}
-    return {**asdict(variable), "dims": list(variable.dims), "flags": meanings}
+    entry = {**asdict(variable), "dims": list(variable.dims), "flags": meanings}
+    del entry["words"]
+    return {**entry, "long_name": variable.long_name}
 
 
 def _variable_from_json(entry: Mapping[str, Any]) -> Variable:
     meanings = entry["flags"]
     flags = meanings and IntEnum(meanings["name"], meanings["members"])
     entry = {**entry, "dims": tuple(entry["dims"]), "flags": flags}
-    if "long_name" in entry:  # folders of earlier versions have the sentence there
-        entry["comment"] = entry.pop("long_name")
-    return Variable(**entry)
+    # folders of earlier versions have the sentence in the place of the name
+    name = "words" if "comment" in entry else "comment"
+    return Variable(**{name: entry.pop("long_name")}, **entry)

@@ -58,7 +58,7 @@ def check_stored(entry: Mapping[str, Any]) -> None:
 def _check_dimension(entry: Mapping[str, Any]) -> None:
     name, values = entry["name"], entry["values"]
     _need(all(isinstance(entry[key], str) for key in ("name", "units", "long_name")), str(name)[:40], "texts")
-    _need(isinstance(entry.get("spacing", ""), str), name, "a text")
+    _need(all(isinstance(entry.get(key, ""), str) for key in ("spacing", "comment")), name, "texts")
     _need(isinstance(values, list) and len(values) > 0, name, "values")
     if entry["texts"] is True:
         _need(all(isinstance(value, str) and "\0" not in value for value in values), name, "texts")
@@ -94,7 +94,8 @@ def _check_variables(entries: list[Mapping[str, Any]], lengths: Mapping[str, int
     size = 0
     for entry in entries:
         name, dims, dtype, flags = (entry[key] for key in ("name", "dims", "dtype", "flags"))
-        _need(all(isinstance(entry[key], str) for key in ("units", "long_name")), name, "texts")
+        texts = entry["units"], entry["long_name"], entry.get("comment", "")
+        _need(all(isinstance(text, str) for text in texts), name, "texts")
         _need(isinstance(entry["volatile"], bool), name, "true or false")
         _need(_matches(_DTYPE, dtype), name, "a type of numbers or texts")
         _need(

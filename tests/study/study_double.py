@@ -58,9 +58,12 @@ class Job:
     derived: tuple = ()
     units: dict[str, str] = field(default_factory=dict)
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return tuple(len(axis.values) for axis in self.axes)
+
     def point(self, index: int) -> dict[str, Any]:
-        shape = tuple(len(axis.values) for axis in self.axes)
-        place = np.unravel_index(index, shape) if shape else ()
+        place = np.unravel_index(index, self.shape) if self.shape else ()
         return {**self.parameters, **{a.name: a.values[i] for a, i in zip(self.axes, place, strict=True)}}
 
     def resolved(self) -> dict[str, Any]:

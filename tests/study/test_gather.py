@@ -219,7 +219,6 @@ def test_a_folder_of_an_earlier_version_has_its_sentences_as_comments():
     entry = describe(JOB, Simulator()).to_json()
     for variable in entry["variables"]:
         variable["long_name"] = variable.pop("comment")
-        del variable["words"]
     for axis in entry["axes"]:
         axis["long_name"] = axis.pop("comment")
     study = Study.from_json(entry)

@@ -15,6 +15,8 @@ import pytest
 from study_double import Job, Simulator
 from study_processes import wait_until
 
+from cvt_hpc.locks import locked
+from cvt_hpc.provenance import new_session
 from cvt_hpc.study import read_status, run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.ranks.counter import SerialCounter
@@ -63,7 +65,7 @@ def test_rate_is_that_of_the_latest_session(tmp_path):
     study = StudyFolder(tmp_path).load()
     now = time.time()
     for started, indices in ((now - 1e6, range(3)), (now - 1.0, range(3, 9))):
-        session = {"id": str(started), "started": started}
+        session = new_session(1) | {"started": started}
         layout = RecordFormat(study.fingerprint, study.record_dtype)
         with RecordLog(tmp_path / "records", layout, session, rank=0) as log:
             for index in indices:
@@ -82,7 +84,7 @@ def test_a_finished_study_says_when_and_how_long_it_was_at_work(tmp_path):
     undecided = Simulator().run_point(Job(), Job().point(0), lambda: None) | {"vibrates": Vibrates.UNDECIDED}
     # records take the time at which their log begins, and what has passed since then
     for began, indices in ((now - 5000.0, range(5)), (now - 100.0, range(5, 12))):
-        session = {"id": str(began), "started": began - 60.0}
+        session = new_session(1) | {"started": began - 60.0}
         with pytest.MonkeyPatch.context() as clock:
             clock.setattr("cvt_hpc.study.record.log.time.time", lambda began=began: began)
             with RecordLog(tmp_path / "records", layout, session, rank=0) as log:
@@ -91,19 +93,19 @@ def test_a_finished_study_says_when_and_how_long_it_was_at_work(tmp_path):
     assert (status.done, status.failed, status.left, status.undecided) == (12, 0, 0, 12)
     assert status.finished == pytest.approx(now - 100.0, abs=5.0)
     assert status.time_at_work == pytest.approx(2 * 60.0, abs=10.0)  # a loaded machine writes late
-    with StudyFolder(tmp_path).occupied(None):
+    with locked(StudyFolder(tmp_path).lock_file):
         assert read_status(tmp_path).finished is None
 
 
 def test_time_left_is_by_predicted_costs(tmp_path, monkeypatch):
     run(Job(), tmp_path, simulator=Simulator(), progress=False, time_limit=0.0)
     study = StudyFolder(tmp_path).load()
-    session = {"id": "a", "started": time.time() - 100.0}
+    session = new_session(1) | {"started": time.time() - 100.0}
     with RecordLog(
         tmp_path / "records", RecordFormat(study.fingerprint, study.record_dtype), session, rank=0
     ) as log:
         log.append([(0, study.pack_failure("none"))])
-    monkeypatch.setattr("cvt_hpc.study.status.build_job", lambda document, source: Job())
+    monkeypatch.setattr("cvt_hpc.study.status.rebuild_job", lambda document, source, overrides: Job())
     simulator = Simulator()
     simulator.run_costs = lambda job: np.array([2.0] + [1.0] * 11)
     monkeypatch.setattr("cvt_hpc.study.status.default_simulator", lambda: simulator)
