@@ -84,7 +84,7 @@ def test_another_file_in_its_place_is_left_alone(tmp_path, capsys):
     xr.Dataset({"mine": 1.0}).to_netcdf(tmp_path / "branch.nc")
     before = (tmp_path / "branch.nc").read_bytes()
     assert main(["branch", str(tmp_path / "x.toml"), "--out", str(tmp_path)]) == 2
-    assert "expected a new file, or a bifurcation diagram" in capsys.readouterr().err
+    assert "found branch.nc, which is no such diagram" in capsys.readouterr().err
     assert (tmp_path / "branch.nc").read_bytes() == before
 
 
