@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Any
 
 import matplotlib
@@ -74,7 +73,7 @@ OF_PAIRS: dict[CellClass, ClassStyle] = {
 ALL_STYLES = STYLES | OF_STARTS | OF_PAIRS
 
 # Inferred cells: level lines, no mark. Of vibrating ones the amplitude is not known: a colour of no scale.
-LINES = {"facecolor": "none", "edgecolor": "#8a8a8a", "linewidth": 0, "hatch": "---"}
+LINES: dict[str, Any] = {"facecolor": "none", "edgecolor": "#8a8a8a", "linewidth": 0, "hatch": "---"}
 INFERRED_VIBRATION = "#d795ab"
 
 
