@@ -43,7 +43,9 @@ def storage_error(path: Path, error: Exception, advice: str = "") -> StorageErro
 def _reason(error: Exception) -> str:
     """Return what the system says, without what HDF5 makes of it."""
     text = getattr(error, "strerror", None) or str(error)
-    return os.strerror(error.errno) if "errno = " in text and error.errno else text
+    if isinstance(error, OSError) and error.errno and "errno = " in text:
+        return os.strerror(error.errno)
+    return text
 
 
 @contextlib.contextmanager

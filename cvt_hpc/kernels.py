@@ -348,7 +348,7 @@ class _Cache(FunctionCache):
         self.enable()
 
     def _index_key(self, sig: Any, codegen: Any) -> tuple:
-        return (*super()._index_key(sig, codegen), self._kernel()._for_kernel)
+        return (*super()._index_key(sig, codegen), self._kernel()._for_kernel)  # type: ignore[union-attr]  # it lives as long as its cache
 
     @contextmanager
     def _guard_against_spurious_io_errors(self) -> Iterator[None]:

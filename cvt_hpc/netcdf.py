@@ -29,8 +29,13 @@ VOLATILE = "depends on the machine and the hour; not reproduced bitwise"
 class Named(Protocol):
     """What a dataset is of: a job, a study or a chart."""
 
-    name: str
-    description: str
+    @property
+    def name(self) -> str:
+        """In one word."""
+
+    @property
+    def description(self) -> str:
+        """In a line; may be empty."""
 
 
 def global_attributes(

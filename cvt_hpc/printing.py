@@ -238,7 +238,7 @@ def point_lines(job: Job, at: Mapping[str, Any]) -> Iterator[str]:
     """Yield the line that says where on the axes of its job a run stands."""
     point = job.point_at(at)
     # a load that is given leaves no share of which it would follow
-    keys = dict.fromkeys([*(varied.name for varied in (*job.axes, *job.derived)), *at])
+    keys = dict.fromkeys([*(axis.name for axis in job.axes), *(value.name for value in job.derived), *at])
     schema = job.schema
     words = [f"{key} {schema.in_words(key, point[key])}" for key in keys if key in point]
     if words:

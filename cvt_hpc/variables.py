@@ -79,7 +79,8 @@ class Variable:
         """Value where nothing is known: NaN, 0, an empty text, and UNDECIDED of flags that have it."""
         if self.flags is not None:
             return int(self.flags.__members__.get("UNDECIDED", 0))
-        return {"f": np.nan, "S": ""}.get(np.dtype(self.dtype).kind, 0)
+        blanks: dict[str, float | str] = {"f": np.nan, "S": ""}
+        return blanks.get(np.dtype(self.dtype).kind, 0)
 
 
 def flag_in_words(flag: xr.DataArray) -> str:

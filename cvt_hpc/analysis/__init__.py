@@ -12,7 +12,7 @@ def _import_matplotlib() -> None:
 
     Its own settings are found by the first place in which it looks for any, the current folder.
     """
-    (package,) = importlib.util.find_spec("matplotlib").submodule_search_locations
+    (package,) = importlib.util.find_spec("matplotlib").submodule_search_locations  # type: ignore[union-attr, misc]  # it is required
     backend = os.environ.pop("MPLBACKEND", None)
     try:
         with contextlib.chdir(Path(package) / "mpl-data"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,10 +61,10 @@ def align(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str]) -> Aligned:
     sizes = a["status"].size, b["status"].size
     reduced = []
     notes: list[str] = []
-    for one, other, label, source in ((a, b, "AB", sources), (b, a, "BA", sources[::-1])):
+    for one, other, labels, places in ((a, b, "AB", sources), (b, a, "BA", sources[::-1])):
         one = one[[name for name in COMPARED if name in one]]
-        reduced.append(_reduced(one, other, label, source, notes))
-    one, other = (_at_common_samples if is_sampled(a) else _on_common_grid)(*reduced, sources)
+        reduced.append(_reduced(one, other, labels, places, notes))
+    one, other = (_at_common_samples if is_sampled(a) else _on_common_grid)(reduced[0], reduced[1], sources)
     common = one["status"].size
     return Aligned(one.load(), other.load(), (sizes[0] - common, sizes[1] - common), tuple(notes))
 
@@ -128,7 +128,7 @@ def _at_common_samples(
     return a.isel(run=in_a), b.isel(run=in_b)
 
 
-def _common_places(a: Sequence[Hashable], b: Sequence[Hashable]) -> tuple[list[int], list[int]]:
+def _common_places(a: Iterable[Hashable], b: Iterable[Hashable]) -> tuple[list[int], list[int]]:
     """Places of the common entries in either sequence, in the order of the first."""
     known = {key: place for place, key in enumerate(b)}
     pairs = [(place, known[key]) for place, key in enumerate(a) if key in known]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Any
 
 import matplotlib
@@ -27,6 +26,7 @@ from cvt_hpc.vibration.hysteresis import StartClass
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+CellClass = OccurrenceClass | StartClass | PairClass
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class ClassStyle:
 
 # Lightness falls from not run (white) over quiet to undecided; vibrating cells follow below. Failed ones are
 # white under the densest hatching, which no other class comes near in any print.
-STYLES = {
+STYLES: dict[CellClass, ClassStyle] = {
     OccurrenceClass.QUIET: ClassStyle("#e9eef2", "#7c8a96", "#7c8a96", "", "o", 0.5),
     OccurrenceClass.VIBRATING: ClassStyle("#e8703a", "#ffffff", "#000000", "", "o", 1.0),
     OccurrenceClass.UNDECIDED: ClassStyle("#bccde0", "#23405f", "#23405f", "///", "$?$", 2.0),
@@ -56,11 +56,13 @@ LEGEND_COLUMNS = 5
 IF_PRESENT = (OccurrenceClass.SLIPPING, OccurrenceClass.IRREGULAR)  # in the legend where they occur
 
 # Of maps from two starts: lighter than any vibration, and hatched the other way than what is undecided.
-OF_STARTS = {StartClass.LARGE_START_ONLY: ClassStyle("#d8c5ea", "#5b2a86", "#ffffff", "\\\\\\", "D", 1.0)}
+OF_STARTS: dict[CellClass, ClassStyle] = {
+    StartClass.LARGE_START_ONLY: ClassStyle("#d8c5ea", "#5b2a86", "#ffffff", "\\\\\\", "D", 1.0)
+}
 
 # Of comparisons: contradictions are blue, which nobody takes for the orange of vibration, dark beyond the
 # threshold and light near it; the mark points up where B alone vibrates.
-OF_PAIRS = {
+OF_PAIRS: dict[CellClass, ClassStyle] = {
     PairClass.FAILED_IN_ONE: ClassStyle("#ffffff", "#a01010", "#a01010", "++", "+", 1.4),
     PairClass.OTHERWISE: ClassStyle("#f6f0c4", "#6b6420", "#6b6420", "...", "d", 1.0),
     PairClass.A_ONLY_NEAR: ClassStyle("#7fb0dc", "#123a6b", "#ffffff", "", "v", 1.4),
@@ -68,10 +70,10 @@ OF_PAIRS = {
     PairClass.A_ONLY: ClassStyle("#123a6b", "#ffffff", "#000000", "", "v", 1.8),
     PairClass.B_ONLY: ClassStyle("#123a6b", "#ffffff", "#000000", "", "^", 1.8),
 }
-ALL_STYLES: dict[IntEnum, ClassStyle] = STYLES | OF_STARTS | OF_PAIRS
+ALL_STYLES = STYLES | OF_STARTS | OF_PAIRS
 
 # Inferred cells: level lines, no mark. Of vibrating ones the amplitude is not known: a colour of no scale.
-LINES = {"facecolor": "none", "edgecolor": "#8a8a8a", "linewidth": 0, "hatch": "---"}
+LINES: dict[str, Any] = {"facecolor": "none", "edgecolor": "#8a8a8a", "linewidth": 0, "hatch": "---"}
 INFERRED_VIBRATION = "#d795ab"
 
 
@@ -199,7 +201,7 @@ def write_values(
 
 
 def class_legend(
-    figure: FigureBase, styles: Mapping[IntEnum, ClassStyle], columns: int, *, with_inferred: bool = False
+    figure: FigureBase, styles: Mapping[CellClass, ClassStyle], columns: int, *, with_inferred: bool = False
 ) -> None:
     """Legend of some classes below the panels: fill, hatching, mark; and of inferred cells."""
     handles, labels = [], []
@@ -238,7 +240,7 @@ def _area(x: Ruler, y: Ruler, inside: Mask) -> Path:
     return Path(vertices, np.tile(np.array(codes, Path.code_type), rows.size))
 
 
-def fills_of(kind: IntEnum, values: Array, scale: Scale) -> Array:
+def fills_of(kind: CellClass, values: Array, scale: Scale) -> Array:
     """Colours (cell, rgba) of cells of one class."""
     fills = np.tile(to_rgba(ALL_STYLES[kind].fill), (len(values), 1))
     if kind is OccurrenceClass.VIBRATING:

@@ -30,8 +30,15 @@ from cvt_hpc.vibration.agreement import (
 )
 from cvt_hpc.vibration.classes import OccurrenceClass
 
-_HEAD = ("class_a", "class_b", "pair", "amplitude_a [um]", "amplitude_b [um]", "frequency_a [Hz]")
-_HEAD += ("frequency_b [Hz]",)
+_HEAD = (
+    "class_a",
+    "class_b",
+    "pair",
+    "amplitude_a [um]",
+    "amplitude_b [um]",
+    "frequency_a [Hz]",
+    "frequency_b [Hz]",
+)
 
 
 class Deviation(NamedTuple):

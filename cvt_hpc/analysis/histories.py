@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +53,7 @@ def history_figure(dataset: xr.Dataset) -> Figure:
     judged = settings["judged_fraction"] if _is_judged(dataset) else 0.0
     strands = panels.read_strands(dataset, judged, band)
     with_spectrum = [strand for strand in strands if strand.has_spectrum]
-    rows = [
+    rows: list[tuple[float, list[tuple[Any, Callable[..., None], Any]]]] = [
         (1.6, [(LEFT, panels.draw_displacement, strand), (RIGHT, panels.draw_close_up, strand)])
         for strand in strands
     ]

@@ -156,8 +156,9 @@ def _grid_figure(arrangement: Arrangement) -> Figure:
     texts = [(OccurrenceClass.IRREGULAR, sheet.irregular)] if sheet.has_room else []
     texts += [(OccurrenceClass.VIBRATING, sheet.frequency)] if written else []
     for kind, values in texts:
-        for ax, *shown in zip(axes.flat, sheet.classes, values, sheet.amplitude, strict=False):
-            cells.write_values(ax, sheet.x, sheet.y, kind, *shown, amplitude)
+        panels = zip(axes.flat, sheet.classes, values, sheet.amplitude, strict=False)
+        for ax, classes, numbers, fills in panels:
+            cells.write_values(ax, sheet.x, sheet.y, kind, classes, numbers, fills, amplitude)
     if has_frequency and not written:
         frequency = cells.Scale(
             cells.FREQUENCY_COLOURS, cells.norm_over(sheet.frequency), "dominant frequency [Hz]"

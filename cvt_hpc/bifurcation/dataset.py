@@ -69,7 +69,7 @@ def diagram_dataset(diagram: Diagram, followed: Sequence[Followed]) -> xr.Datase
         the next; along `onset` the Hopf points and along `run` the runs, with the number of their branch in
         the grid of the axes, counted in C order.
     """
-    axes = {
+    axes: dict[str, Any] = {
         axis.name: (axis.name, list(axis.values), axis_dimension(axis).attributes) for axis in diagram.axes
     }
     lengths = {axis.name: len(axis.values) for axis in diagram.axes}

@@ -130,8 +130,8 @@ def _draw_attractors(axes: Axes, followed: Followed) -> None:
             clip_on=False,
             zorder=6,
         )
-    for onset, kind in zip(followed.onsets, followed.kinds, strict=True):
-        axes.plot(onset.load, 0.0, color=HOPF, clip_on=False, zorder=6, **KINDS[kind.kind])
+    for onset, criticality in zip(followed.onsets, followed.kinds, strict=True):
+        axes.plot(onset.load, 0.0, color=HOPF, clip_on=False, zorder=6, **KINDS[criticality.kind])
     axes.set_ylabel("amplitude [µm]")
     axes.set_ylim(bottom=0.0)
 
@@ -191,8 +191,8 @@ def _legend(followed: Followed) -> list[Line2D | Patch]:
         open_mark = {"marker": "o", "markerfacecolor": "none", "markeredgecolor": "black", "linestyle": ""}
         handles.append(Line2D([], [], markersize=MARK, label="undecided", **open_mark))
         if any(run.occurrence == OccurrenceClass.IRREGULAR for run in followed.runs):
-            mark = open_mark | {"markerfacecolor": IRREGULAR}
-            handles.append(Line2D([], [], markersize=MARK, label="irregular", **mark))
+            filled = open_mark | {"markerfacecolor": IRREGULAR}
+            handles.append(Line2D([], [], markersize=MARK, label="irregular", **filled))
     for kind, start in sorted({(run.occurrence, run.start) for run in _at_edge(followed)}):
         mark, words = AT_EDGE[kind]
         style = {"color": STARTS[start][1], "marker": mark, "markersize": MARK + 2.0, "linestyle": ""}

@@ -157,7 +157,7 @@ def _runs(job: Job, place: dict[str, Any], settings: dict[str, Any], where: str)
     tables = job.tables(job.complete(place), {"load", *alternatives})
     band = tables.pop("judgement")
     document = {"name": job.name, "model": TRANSIENT, **tables}
-    kept = {key: band[key] for key in ("band_low", "band_high") if key in band}
+    kept: dict[str, Any] = {key: band[key] for key in ("band_low", "band_high") if key in band}
     runs = rebuild_job(document, where, job.units, {**kept, **place, **settings}, "set")
     if runs.axes:
         raise mismatch(f"{where} set {runs.axes[0].name}", "one value", "an axis")

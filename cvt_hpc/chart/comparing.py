@@ -249,7 +249,7 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _ratio(difference: float, size: float) -> float:
+def _ratio(difference: float | np.floating, size: float | np.floating) -> float:
     if size > 0.0:
         return float(difference / size)
     return 0.0 if difference == 0.0 else math.inf

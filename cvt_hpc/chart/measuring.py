@@ -144,9 +144,9 @@ def _history(run: Any) -> History:
 
 
 def _columns(run: Any) -> tuple[list[int], tuple[str, ...]]:
-    strands = [strand_of(probe.label) for probe in run.probes]
-    columns = [k for k, strand in enumerate(strands) if strand is not None]
-    return columns, tuple(strands[k] for k in columns)
+    strands = enumerate(strand_of(probe.label) for probe in run.probes)
+    judged = {column: strand for column, strand in strands if strand is not None}
+    return list(judged), tuple(judged.values())
 
 
 def _doubt(name: str, run: Run) -> Failure | None:

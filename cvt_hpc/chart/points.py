@@ -47,16 +47,18 @@ def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
     key = _setting_key(raw, where)
     stepper, others = raw["stepper"], read_set(raw, where)
     fine = stage.setting(stepper, key, raw[key], where, f"{where} {key}")
-    job = stage.job(where, stepper=stepper, **others, **{key: fine})
+    setting: dict[str, Any] = {key: fine}
+    job = stage.job(where, stepper=stepper, **others, **setting)
     _check_starts(stage, job)
     _check_quantities(stage, job)
     coarse = raw.get("coarser", fine * _COARSER[key])
     coarser = stage.setting(stepper, key, coarse, where, f"{where} coarser")
     if coarser <= fine:
         raise mismatch(f"{where} coarser", f"more than {key} = {fine:g}", f"{coarse}")
-    coarser_job = stage.job(where, stepper=stepper, **others, **{key: coarser})
+    setting = {key: coarser}
+    coarser_job = stage.job(where, stepper=stepper, **others, **setting)
     label = in_words(stepper)
-    both = {"starts": starts, "until": stage.until}
+    both: dict[str, Any] = {"starts": starts, "until": stage.until}
     yield Point(f"{name}-reference", name, Role.REFERENCE, stepper, label, key, job, **both)
     yield Point(f"{name}-coarser", name, Role.COARSER, stepper, label, key, coarser_job, **both)
 
@@ -86,8 +88,10 @@ def method_points(name: str, raw: Any, stages: list[Stage], where: str) -> Itera
         raise mismatch(f"{where} {key}", "a list of values", show(raw[key]))
     for stage in _chosen_stages(raw.get("scenes"), stages, where):
         for i, value in enumerate(raw[key], 1):
-            setting = stage.setting(own["stepper"], key, value, where, f"{where} {key}, value {i}")
-            job = stage.job(where, stepper=own["stepper"], **read_set(raw, where), **{key: setting})
+            setting: dict[str, Any] = {
+                key: stage.setting(own["stepper"], key, value, where, f"{where} {key}, value {i}")
+            }
+            job = stage.job(where, stepper=own["stepper"], **read_set(raw, where), **setting)
             yield Point(
                 f"{stage.scene.name}-{name}-{i}",
                 stage.scene.name,

@@ -100,7 +100,7 @@ def read_stage(name: str, raw: Any, document: dict[str, Any], replaced: dict[str
     own = read_table(SCENE, raw, where, ("set", "quantities", "reference", "lead"))
     base = document
     if own["model"]:
-        head = {key: document[key] for key in ("name", "description") if key in document}
+        head: dict[str, Any] = {key: document[key] for key in ("name", "description") if key in document}
         base = {**head, "model": own["model"]}
     if replaced:
         _check_replaced(replaced, base.get("model"), where, source)

@@ -140,7 +140,7 @@ class ChartFolder(OutputFolder[Chart]):
         """Keep what was measured at a point."""
         plain = {key: getattr(measurement, key) for key in _PLAIN}
         head = json.dumps({"plain": plain, "fingerprint": self._fingerprint, "maker": self._maker})
-        arrays = {f"values {key}": array for key, array in measurement.values.items()}
+        arrays: dict[str, Any] = {f"values {key}": array for key, array in measurement.values.items()}
         with written_aside(self.points / f"{name}.npz") as aside, aside.open("wb") as file:
             np.savez_compressed(file, head=np.array(head), **arrays)
         self._remember(self._maker)

@@ -81,7 +81,7 @@ def _head(result: Result) -> list[str]:
         point.scene,
         "refinement" if point.refines else point.role.value,
         point.label,
-        "" if point.series == "exact" else point.job.stepper,
+        "" if point.series == "exact" else point.job.stepper or "",
         point.key,
         number(point.setting),
         "yes" if result.chosen else "",

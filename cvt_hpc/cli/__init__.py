@@ -78,9 +78,10 @@ def _compiling_told() -> Iterator[None]:
 @contextmanager
 def _unit_warnings_told() -> Iterator[None]:
     """Print warnings of numbers without a unit on stderr, each once."""
-    told, shown = set(), warnings.showwarning
+    told: set[str] = set()
+    shown = warnings.showwarning
 
-    def show(message: Warning, category: type[Warning], *rest: Any, **more: Any) -> None:
+    def show(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
         if not issubclass(category, UnitWarning):
             shown(message, category, *rest, **more)
             return

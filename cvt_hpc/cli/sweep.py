@@ -118,7 +118,8 @@ def _repeats(job: Job, arguments: argparse.Namespace) -> list[tuple[Repeat, Call
     from cvt_hpc.study.repeats import check_fraction
     from cvt_hpc.study.step_check import step_check
 
-    out, repeats = output_folder(arguments.out, job), []
+    out = output_folder(arguments.out, job)
+    repeats: list[tuple[Repeat, Callable[[Repeat], None]]] = []
     if arguments.audit is not None:
         check_fraction("--audit", arguments.audit, arguments.part)
         repeats.append((audit_of(job, out, arguments.audit), _show_audit))

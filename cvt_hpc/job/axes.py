@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Any
@@ -77,7 +78,8 @@ def _spread(axis: Axis, most: float) -> Axis:
     size = len(axis.values)
     if size <= most:
         return axis
-    return replace(axis, values=tuple(axis.values[k * (size - 1) // (most - 1)] for k in range(most)))
+    count = int(most)
+    return replace(axis, values=tuple(axis.values[k * (size - 1) // (count - 1)] for k in range(count)))
 
 
 def read_axis(name: str, parameter: Parameter, raw: Any, where: str) -> Axis:
@@ -122,7 +124,7 @@ def read_values(parameter: Parameter, raw: Any, where: str) -> tuple:
     if parameter.file is not None:
         raise mismatch(where, "one file for all runs", "an axis of files")
     if isinstance(raw, dict):
-        values = _read_range(parameter, raw, where)
+        values: Sequence[Any] = _read_range(parameter, raw, where)
     elif isinstance(raw, np.ndarray):
         values = as_list(raw, where, (1,))
     elif isinstance(raw, (list, tuple)):

@@ -41,9 +41,9 @@ def read_csv(file: FromFile, name: str, source: str, where: str) -> dict[str, An
         not legal.
     """
     path = Path(source).parent / name
-    lines = enumerate(_text(path, where).splitlines(), 1)
-    cells = ((number, line.split(",")) for number, line in lines if not line.lstrip().startswith("#"))
-    rows = [(number, row) for number, row in cells if "".join(row).strip()]
+    numbered = enumerate(_text(path, where).splitlines(), 1)
+    told = ((number, line.split(",")) for number, line in numbered if not line.lstrip().startswith("#"))
+    rows = [(number, row) for number, row in told if "".join(row).strip()]
     if len(rows) < 2:
         raise mismatch(f"{where}: {path}", "a line of column names and lines of numbers", "fewer lines")
     (first, names), *lines = rows

@@ -103,7 +103,7 @@ def relinked(rules: Iterable[Rule], axes: Iterable[Axis]) -> list[Rule]:
 
 def overridden(keys: Collection[str], schema: Schema) -> set[str]:
     """Return what values of these keys put out of force: what they give, and what else would give them."""
-    given = {schema.parameters[key].gives.key for key in keys if schema.parameters[key].gives}
+    given = {gives.key for key in keys if (gives := schema.parameters[key].gives)}
     return given | {key for key, p in schema.parameters.items() if p.gives and p.gives.key in keys}
 
 

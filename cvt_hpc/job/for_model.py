@@ -21,7 +21,7 @@ def answering_model(job: Job) -> tuple[str, str] | None:
     answered_by = load_model(job.model).answered_by
     if any(axis.name == "question" for axis in job.axes):
         raise mismatch(f"{job.source}: [axes] question", "one question for all runs", "several")
-    return answered_by.get(job.parameters.get("question"))
+    return answered_by.get(job.parameters.get("question", ""))
 
 
 def handed_to(job: Job, model: str, why: str) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import ast
 import math
 import operator
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,7 +24,7 @@ _OF_ONE = {name: getattr(math, name) for name in ("sqrt", "sin", "cos", "tan", "
 _OF_ONE |= {"abs": abs, "round": round}
 _OF_SEVERAL = {"min": min, "max": max}
 FUNCTIONS = (*_OF_ONE, *_OF_SEVERAL)
-_OPERATORS = {
+_OPERATORS: dict[type[ast.AST], Callable[..., float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
@@ -167,7 +167,7 @@ def _is_number(parameter: Parameter) -> bool:
 
 def _evaluate(node: ast.AST, parameters: Mapping[str, Any]) -> float:
     match node:
-        case ast.Constant(value=value):
+        case ast.Constant(value=int() | float() as value):
             return float(value)
         case ast.Name(id=name):
             return float(CONSTANTS[name] if name in CONSTANTS else parameters[name])

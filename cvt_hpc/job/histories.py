@@ -57,7 +57,7 @@ def read_histories(
             sorted({_numbered(entry, samples, f"{where}, run {i}") for i, entry in enumerate(raw, 1)})
         )
     found = {_index(entry, schema, axes, replaced, f"{where}, run {i}") for i, entry in enumerate(raw, 1)}
-    return tuple(sorted(found - {None}))
+    return tuple(sorted(index for index in found if index is not None))
 
 
 def _index(

@@ -20,7 +20,7 @@ from cvt_hpc.job.assignments import (
 from cvt_hpc.job.axes import Axis, read_axis
 from cvt_hpc.job.crosscheck import check_grid, check_rules
 from cvt_hpc.job.csv_files import read_csv
-from cvt_hpc.job.definition import HEADER, Job
+from cvt_hpc.job.definition import HEADER, Derived, Job
 from cvt_hpc.job.derivation import ordered_rules, overridden, read_derived, read_linked, relinked
 from cvt_hpc.job.design import Design, read_design, resolve_spacing
 from cvt_hpc.job.document import read_document
@@ -231,7 +231,8 @@ def _read_axes_and_rules(
     place, or come last.
     """
     of_file = _find_axes(document.get("axes", {}), schema, source)
-    kept = {key: entry for key, entry in of_file.items() if key not in gone or key in put} | put
+    kept = {key: entry for key, entry in of_file.items() if key not in gone or key in put}
+    kept |= put
     sampled = "runs" in design
     axes = sampled_axes(kept, design, source) if sampled else _read_grid(kept)
     # a link has a value for each of the file's axis, and keeps those that are left of it
@@ -259,7 +260,8 @@ def _settled(rules: Sequence[Rule], axes: tuple[Axis, ...]) -> set[str]:
 
 
 def _refuse_what_is_compared_only(job: Job) -> None:
-    varied = {axis.name: axis for axis in (*job.axes, *job.derived)}
+    varied: dict[str, Axis | Derived] = {axis.name: axis for axis in job.axes}
+    varied |= {derived.name: derived for derived in job.derived}
     for key, parameter in job.schema.parameters.items():
         if not parameter.compared_only:
             continue

@@ -118,7 +118,7 @@ class Schema:
 
     def nearest(self, name: str, section: str | None = None) -> str:
         """Return "; did you mean KEY?" for the nearest key, with its table where that is another one."""
-        near = nearest(name, self.sections.get(section, {})) or nearest(name, self.parameters)
+        near = nearest(name, self.sections.get(section or "", {})) or nearest(name, self.parameters)
         if near is None:
             return ""
         home = self.section_of[near]
@@ -127,7 +127,7 @@ class Schema:
     def _unknown_key(self, name: str, where: str, section: str | None) -> InputError:
         hint = self.nearest(name, section)
         if not hint:
-            known = self.sections.get(section, {}) or self.parameters
+            known = self.sections.get(section or "", {}) or self.parameters
             hint = f"; known: {', '.join(known)}"
         return InputError(f"{where}: unknown key{hint}")
 
@@ -167,7 +167,7 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     for sectioned in tables:
         for section, table in sectioned.items():
             sections.setdefault(section, {}).update(table)
-    for key, substitute in loaded.gives.get(stepper, {}).items():
+    for key, substitute in loaded.gives.get(stepper or "", {}).items():
         section = next(name for name, table in sections.items() if key in table)
         sections[section][key] = replace(sections[section][key], gives=substitute)
     return Schema(loaded.name, stepper, sections, tuple(checks), partial(_all_inert, inert))

@@ -83,7 +83,7 @@ def _tables(job: Job, schema: Schema) -> dict[str, list[tuple[str, ...]]]:
     elsewhere = {"axis": "see [axes]", "derived": "see [derived]"}
     tables: dict[str, list[tuple[str, ...]]] = {}
     for section, table in schema.sections.items():
-        rows = []
+        rows: list[tuple[str, ...]] = []
         for key, parameter in table.items():
             kind = kinds.get(key, "default")
             value = _value_in_words(schema, key, job.parameters[key]) if key in job.parameters else "none"
@@ -110,7 +110,7 @@ def _rules(job: Job, schema: Schema) -> list[tuple[str, ...]]:
     Of a huge grid the values are those at places all over it.
     """
     varied = {derived.name: derived for derived in job.thinned(_MOST_EVALUATED).derived}
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for rule in job.rules:
         if rule.key in varied and len(set(varied[rule.key].values)) > 1:
             values = _range_in_words(varied[rule.key], schema)

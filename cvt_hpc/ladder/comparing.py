@@ -160,7 +160,7 @@ def _frequency(found: xr.Dataset, true: xr.Dataset) -> Score:
     own = at_strongest_strand(true, "frequency")
     if "eigenfrequency" in found:  # a strand alone has no strongest mode: the nearest one of the same strand
         known = found["eigenfrequency"]
-        nearest = known.isel(half_waves=np.abs(known - own).fillna(np.inf).argmin("half_waves"))
+        nearest = known.isel(half_waves=abs(known - own).fillna(np.inf).argmin("half_waves"))
         said = at_strongest_strand(true.assign(nearest=nearest.reset_coords(drop=True)), "nearest").values
     elif "amplitude" in found:
         said = _where_vibrating(found, at_strongest_strand(found, "frequency"))
@@ -205,7 +205,8 @@ def _score(errors: Array, asked: int) -> Score:
     undecided = 1.0 - known.size / asked if asked else math.nan
     if not known.size:
         return Score(0, undecided=undecided)
-    return Score(known.size, *(float(np.quantile(known, q)) for q in (0.5, 0.95)), undecided=undecided)
+    median, high = (float(np.quantile(known, q)) for q in (0.5, 0.95))
+    return Score(known.size, median, high, undecided=undecided)
 
 
 SCORES: dict[str, Callable[[xr.Dataset, xr.Dataset], Score]] = {

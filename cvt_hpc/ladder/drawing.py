@@ -49,7 +49,8 @@ def ladder_figure(findings: Sequence[Finding], name: str) -> Figure:
     """Compose the picture of `draw_ladder`; to be called within STYLE."""
     costs = {f.rung: f.core_seconds for f in findings if f.rung != REFERENCE}
     styles = {
-        rung: {**line_style(k), "ls": "", "ms": 6.5} for k, rung in enumerate(sorted(costs, key=costs.get))
+        rung: {**line_style(k), "ls": "", "ms": 6.5}
+        for k, rung in enumerate(sorted(costs, key=lambda rung: costs[rung]))
     }
     styles[REFERENCE] = {"color": "black", "marker": "*", "ls": "", "ms": 8}
     figure = Figure((WIDTH, HEIGHT), layout="constrained")

@@ -85,7 +85,7 @@ def _check(job: Job) -> None:
     if job.model != MODEL:
         raise mismatch(f"{where}: model", f"{MODEL}, the top of the ladder", job.model)
     if job.stepper != STEPPER:
-        raise mismatch(f"{where}: stepper", f"{STEPPER}, as all transients below have it", job.stepper)
+        raise mismatch(f"{where}: stepper", f"{STEPPER}, as all transients below have it", str(job.stepper))
     if job.design:
         raise mismatch(f"{where}: [design]", "none: a ladder goes over the whole grid", job.design["kind"])
     if "load" not in axes:

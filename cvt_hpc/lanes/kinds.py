@@ -16,6 +16,7 @@ from numba.extending import (
     typeof_impl,
     unbox,
 )
+from numpy.typing import DTypeLike
 
 ALIGNMENT = 64  # bytes: the widest register, so that no access crosses a line of the cache
 
@@ -41,15 +42,16 @@ class LaneArray:
     """
 
     def __init__(
-        self, rows: int, fields: int, lanes: int, dtype: type = np.float64, linked: bool = False
+        self, rows: int, fields: int, lanes: int, dtype: DTypeLike = np.float64, linked: bool = False
     ) -> None:
         self.linked = linked
         size = rows * fields * lanes * np.dtype(dtype).itemsize
         memory = np.zeros(size + ALIGNMENT, dtype=np.uint8)
         first = -memory.ctypes.data % ALIGNMENT
-        self.data = memory[first : first + size].view(dtype).reshape(rows, fields, lanes)
+        self.data: np.ndarray = memory[first : first + size].view(dtype).reshape(rows, fields, lanes)
 
     if TYPE_CHECKING:  # what kernels see of it
+        rows: int
 
         def __getitem__(self, place: tuple[int, int]) -> Any: ...
 

@@ -34,13 +34,10 @@ class Marched:
         The stepper at work on the model's equations.
     failure : (Status, str) or None
         Why the run does not go on.
-    contact_solves : int
-        Solves of a contact problem so far.
     """
 
     marching: Marching
     failure: tuple[Status, str] | None = None
-    contact_solves: int = 0
 
     @property
     def time(self) -> float:
@@ -56,6 +53,11 @@ class Marched:
     def step(self) -> float:
         """Mean time step so far [s]."""
         return self.marching.step
+
+    @property
+    def contact_solves(self) -> int:
+        """Solves of a contact problem so far."""
+        return 0
 
     def counters(self) -> dict[str, int]:
         """Work done so far: steps, rejected, rates, jacobians, factorisations, solves."""

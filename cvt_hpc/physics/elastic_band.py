@@ -87,14 +87,14 @@ def elastic_band(
         pull = mass * flow * flow
         bent = pull * stiffness / (stiffness - pull)
         stretches = driving_radius * driving_speed / flow, driven_radius * driven_speed / flow
-        forces = [stiffness * (stretch - 1.0) for stretch in stretches]
-        slip = float(np.log((forces[0] - bent) / (forces[1] - bent))) / wedged
+        driving, driven = (stiffness * (stretch - 1.0) for stretch in stretches)
+        slip = float(np.log((driving - bent) / (driven - bent))) / wedged
         wraps = 2.0 * np.pi - driven_wrap, driven_wrap
         thrusts = [
-            thrust(wrap, stretch, forces[0] - forces[1], slip, pull)
+            thrust(wrap, stretch, driving - driven, slip, pull)
             for wrap, stretch in zip(wraps, stretches, strict=True)
         ]
-        return Band(flow, driven_speed, *forces, slip, *thrusts)
+        return Band(flow, driven_speed, driving, driven, slip, *thrusts)
 
     def left(unknown: np.ndarray) -> list[float]:
         found = band(unknown)

@@ -125,7 +125,7 @@ def _bracket(grid: np.ndarray, value: float) -> tuple[int, float]:
     """Interval of an ascending grid and the position in it, 0..1; held at both ends."""
     last = grid.size - 2
     i = min(max(np.searchsorted(grid, value) - 1, 0), last)
-    return i, min(max((value - grid[i]) / (grid[i + 1] - grid[i]), 0.0), 1.0)
+    return i, min(max((value - grid[i]) / (grid[i + 1] - grid[i]), 0.0), 1.0)  # type: ignore[return-value, index, operator]  # i is an int to the compiler
 
 
 @kernel

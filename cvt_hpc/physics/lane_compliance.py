@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, anywhere, fma, like, select
@@ -55,7 +56,7 @@ class LaneContact(NamedTuple):
     sweeps: int
 
 
-def lane_contact(wraps: list[Sheaves], dtype: type, sweeps: int = 0) -> LaneContact:
+def lane_contact(wraps: list[Sheaves], dtype: DTypeLike, sweeps: int = 0) -> LaneContact:
     """All stations closed, for wraps of the same stations, one for each lane.
 
     Parameters

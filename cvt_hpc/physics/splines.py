@@ -61,15 +61,15 @@ def hierarchical_splines(
     Splines
         Level by level.
     """
-    centres, spacings, levels = [], [], []
+    found, widths, levels = [], [], []
     for level, intervals in enumerate([[(0.0, length)], *zones]):
         spacing = length / coarse / 2**level
         offered = np.arange(coarse * 2**level)
         offered = spacing * (offered if level == 0 else offered[1::2])
         kept = [c for c in offered if any((c - start) % length <= end - start for start, end in intervals)]
-        centres += kept
-        spacings += [spacing] * len(kept)
+        found += kept
+        widths += [spacing] * len(kept)
         levels += [level] * len(kept)
-    centres, spacings = np.array(centres), np.array(spacings)
+    centres, spacings = np.array(found), np.array(widths)
     apart = (position[:, None] - centres + 0.5 * length) % length - 0.5 * length
     return Splines(cubic_spline(apart / spacings), centres, spacings, np.array(levels))

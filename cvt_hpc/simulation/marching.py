@@ -93,7 +93,7 @@ def march_runs(
         groups = in_lanes(model, job.stepper, left, lambda run: run.next, lambda run: run.paused is None)
         for group in groups:
             _march_together(job, group, interrupt)
-    return [(run.run, run.record) for run in runs]
+    return [(run.run, run.record) for run in runs]  # type: ignore[misc]  # each has its record now
 
 
 def _march_together(job: Job, group: Sequence[OpenRun], interrupt: Callable[[], str | None]) -> None:

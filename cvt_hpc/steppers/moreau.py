@@ -83,10 +83,9 @@ def work(system: SetValuedSystem) -> Work:
     contacts, n = system.directions.shape
     moves = np.ones(n, dtype=bool)
     moves[system.position_of[system.position_of >= 0]] = False
-    spaces = [np.zeros(contacts) for _ in range(6)]
-    return Work(
-        np.zeros(n), moves, np.zeros(contacts, dtype=bool), *spaces, system.directions @ system.response
-    )
+    speed, low, high, restitution, target, impulse = (np.zeros(contacts) for _ in range(6))
+    held, coupling = np.zeros(contacts, dtype=bool), system.directions @ system.response
+    return Work(np.zeros(n), moves, held, speed, low, high, restitution, target, impulse, coupling)
 
 
 @kernel

@@ -53,7 +53,7 @@ class Work:
 
     def __init__(self) -> None:
         self.options: dict[str, Any] = {}
-        self.solver: OdeSolver | None = None
+        self.solver: Any = None
         self.time, self.state = 0.0, np.zeros(0)
         self.counted = np.zeros(3, dtype=np.int64)
         self.evaluations, self.known = 0, True
@@ -136,7 +136,7 @@ def march_by(
 
 def _sample(work: Work, control: Tolerance, end: float, y: np.ndarray, counts: np.ndarray) -> Result:
     """Step until `end` is passed, and interpolate there."""
-    solver: Any = work.solver
+    solver = work.solver
     for _ in range(control.most_steps):
         if solver.t >= end:
             y[:] = solver.dense_output()(end) if solver.t > end else solver.y

@@ -40,7 +40,7 @@ Kind = TypeVar("Kind", bound=NamedTuple)
 
 def from_parameters(kind: type[Kind], parameters: Mapping[str, Any]) -> Kind:
     """Control whose fields are numbers named as the flat parameters [SI]."""
-    return kind(*(float(parameters[key]) for key in kind._fields))
+    return kind._make(float(parameters[key]) for key in kind._fields)
 
 
 class FixedStep(NamedTuple):

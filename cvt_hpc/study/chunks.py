@@ -63,7 +63,7 @@ def fill(path: Path, study: Study, records: Records) -> None:
     with h5py.File(path, "r+") as file, ThreadPoolExecutor() as pool:
         for block in _parts(study.shape, contiguous_part(study.shape, block_length(study))):
             rows = records.read(runs[block])
-            for name in study.record_dtype.names:
+            for name in study.record_names:
                 _fill_block(file[name], block, rows[name], pool)
 
 
@@ -91,7 +91,7 @@ def _pack(values: np.ndarray, shape: tuple[int, ...]) -> bytes:
     shuffled = chunk.view(np.uint8).reshape(-1, chunk.itemsize).T
     # Runs of equal bytes are all that floating-point numbers repeat.
     deflate = zlib.compressobj(strategy=zlib.Z_RLE)
-    return deflate.compress(np.ascontiguousarray(shuffled)) + deflate.flush()
+    return deflate.compress(np.ascontiguousarray(shuffled).data) + deflate.flush()
 
 
 def _parts(shape: tuple[int, ...], part: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import IntEnum
 from functools import cached_property
@@ -92,9 +92,14 @@ class Study:
         """Structured type of one record."""
         return record_type(self.variables, self.coordinates)
 
+    @property
+    def record_names(self) -> tuple[str, ...]:
+        """What a record holds, by its names in `record_dtype`."""
+        return self.record_dtype.names or ()
+
     def place(self, index: int) -> dict[str, Any]:
         """Return the axes' values of run `index`, by axis name."""
-        position = np.unravel_index(index, self.shape) if self.axes else ()
+        position: Sequence[Any] = np.unravel_index(index, self.shape) if self.axes else ()
         position = [index] * len(self.axes) if self.is_sampled else position
         return {axis.name: axis.values[i] for axis, i in zip(self.axes, position, strict=True)}
 
@@ -123,8 +128,8 @@ class Study:
             not run.
         """
         row = self.blank_rows()
-        if values.keys() != set(row.dtype.names):
-            raise ValueError(f"a record needs {sorted(row.dtype.names)}, found {sorted(values)}")
+        if values.keys() != set(self.record_names):
+            raise ValueError(f"a record needs {sorted(self.record_names)}, found {sorted(values)}")
         for name, value in values.items():
             field = row.dtype[name]
             if np.shape(value) != field.shape:

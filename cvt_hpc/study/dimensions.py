@@ -66,9 +66,10 @@ class Dimension:
         if not entry.pop("texts"):
             entry["values"] = [float(v) if isinstance(v, str) else v for v in entry["values"]]
         # folders of earlier versions have fewer keys, and those that are left out have defaults
-        return cls(
-            **{key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
-        )
+        fields: dict[str, Any] = {
+            key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()
+        }
+        return cls(**fields)
 
 
 @dataclass(frozen=True)

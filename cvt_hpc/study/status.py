@@ -141,7 +141,7 @@ def read_machine_factor(out: Path, job: Job) -> tuple[float, int]:
         A validated job.
     """
     records = find_records(out, job)
-    if records is None or "core_seconds" not in records.study.record_dtype.names:
+    if records is None or "core_seconds" not in records.study.record_names:
         return 1.0, 0
     done = np.flatnonzero(records.status == Status.DONE)
     done = done[records.read(done, "vibrates") != Vibrates.SLIPS]  # they end early

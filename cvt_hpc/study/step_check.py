@@ -61,7 +61,7 @@ def step_check(job: Job, out: Path, fraction: float, way: str = "half") -> Repea
     words, folder = WAYS[way]
     if way == EXPLICIT:
         other = built(job, _explicit(job))
-        own = {"core_seconds": lambda: expected_cost(other, out / folder)[0]}
+        own: dict[str, Any] = {"core_seconds": lambda: expected_cost(other, out / folder)[0]}
     else:
         # each run has a step of its own to be halved
         other = built(job, _halved(job))
@@ -75,7 +75,7 @@ def halved_steps(records: Records, runs: NDArray[np.intp]) -> Mapping[int, float
     As recorded, so that it holds for runs whose step was shortened, or chosen for their scene.
     """
     steps = 0.5 * records.read(runs, "time_step")
-    if "rung" in records.study.record_dtype.names:  # of auto, whose parameter is the step of the full run
+    if "rung" in records.study.record_names:  # of auto, whose parameter is the step of the full run
         steps = np.where(records.read(runs, "rung") == Rung.COARSE, COARSENESS * steps, steps)
     return dict(zip(runs.tolist(), steps.tolist(), strict=True))
 
@@ -104,7 +104,8 @@ def _explicit(job: Job) -> dict[str, Any]:
     """The same runs by the explicit step with its own defaults, in full where the job climbs a ladder."""
     model = FULL_MODEL if job.model == AUDITED else job.model
     document = handed_to(job, model, "by the explicit step, to check the step")
-    own = import_module(load_model(job.model).steppers[job.stepper]).PARAMETERS[_section(job)]
+    stepper = load_model(job.model).steppers[job.stepper]  # type: ignore[index]  # with a step there is one
+    own = import_module(stepper).PARAMETERS[_section(job)]
     return _without(document, _section(job), own) | {"stepper": EXPLICIT}
 
 

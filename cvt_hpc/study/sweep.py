@@ -255,7 +255,8 @@ def _conclude(
             stopped = stopped or signals.noted
             _logger.warning("%s; not gathered", error)
     gathers = records is not None
-    records = records if gathers else read_records(folder.records, task.study)
+    if records is None:
+        records = read_records(folder.records, task.study)
     leave_out_missing(task.job, folder, records)
     asked = asked_runs(task, records, part)
     gained = int(records.recorded[asked].sum()) - plan.recorded

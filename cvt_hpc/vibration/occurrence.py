@@ -31,8 +31,8 @@ LONGEST_REASON = 240  # bytes that a record keeps of the reason
 
 def classify(
     amplitudes: ArrayLike,
-    growth_rate: ArrayLike,
-    growth_error: ArrayLike,
+    growth_rate: Sequence[float] | NDArray[np.float64],
+    growth_error: Sequence[float] | NDArray[np.float64],
     *,
     judged_time: float,
     record_time: float,

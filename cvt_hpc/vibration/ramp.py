@@ -103,7 +103,7 @@ def assess_ramp(
     rate: float,
     strands: Sequence[str],
     quantity: str,
-    values: ArrayLike,
+    values: Array,
     samples: int,
     parameters: Mapping[str, Any],
 ) -> RampOccurrence | None:

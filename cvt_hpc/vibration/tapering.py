@@ -73,5 +73,5 @@ def fine_spectrum(segments: Array, rate: float, finest: float = np.inf) -> tuple
     vibration, window = _windowed(segments)
     padded = max(ZERO_PADDING * window.size, int(np.ceil(rate / finest)))
     padded = 1 << (padded - 1).bit_length()
-    magnitudes = 2 * np.abs(np.fft.rfft(vibration, padded)) / window.sum()
-    return np.fft.rfftfreq(padded, 1 / rate), magnitudes
+    frequencies = np.asarray(np.fft.rfftfreq(padded, 1 / rate), dtype=np.float64)
+    return frequencies, 2 * np.abs(np.fft.rfft(vibration, padded)) / window.sum()

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray, split
 from cvt_hpc.models.elastic_belt.belt import W, belt_constants, initial_state, random_strands
-from cvt_hpc.models.elastic_belt.explicit import explicit_work
+from cvt_hpc.models.elastic_belt.explicit import ExplicitWork, explicit_work
 from cvt_hpc.models.elastic_belt.grouping import LANES, lanes
-from cvt_hpc.models.elastic_belt.imex_work import imex_work
-from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state, parted, parted_state, parts_of
+from cvt_hpc.models.elastic_belt.imex_work import ImexWork, imex_work
+from cvt_hpc.models.elastic_belt.lane_belt import (
+    LaneState,
+    lane_belt,
+    lane_state,
+    parted,
+    parted_state,
+    parts_of,
+)
 from cvt_hpc.models.elastic_belt.lane_forces import derive
 from cvt_hpc.models.elastic_belt.lane_run import LaneRun, Paused, lane_arrays
 from cvt_hpc.models.elastic_belt.march import Sampled, march_explicit, march_imex
@@ -20,7 +27,8 @@ from cvt_hpc.models.elastic_belt.recorded_run import recording
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, ENDED_AT, OUTCOME, PROFILES, Outcome
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
-STEPS = {"imex": (imex_work, march_imex), "explicit": (explicit_work, march_explicit)}
+Step = tuple[Callable[[LaneState], ImexWork | ExplicitWork], Callable[..., None]]  # work space, march
+STEPS: dict[str, Step] = {"imex": (imex_work, march_imex), "explicit": (explicit_work, march_explicit)}
 
 
 class Batch:
@@ -52,7 +60,9 @@ class Batch:
         Sampling interval and time step [s].
     """
 
-    def __init__(self, points: Sequence[dict[str, Any]], stepper: str, paused: Sequence[Paused] = ()) -> None:
+    def __init__(
+        self, points: Sequence[Mapping[str, Any]], stepper: str, paused: Sequence[Paused] = ()
+    ) -> None:
         p = points[0]
         most = lanes(p, stepper)
         if not 0 < len(points) <= most:

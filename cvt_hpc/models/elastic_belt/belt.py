@@ -8,6 +8,7 @@ left face of cell j); the content n_i, the strains and the forces in cells. Rows
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -104,8 +105,8 @@ class State(NamedTuple):
 class Mesh(NamedTuple):
     """Cells of the closed path: number per region, first station of each region, cell lengths (N,) [m]."""
 
-    counts: tuple[int, int, int, int]
-    starts: tuple[int, int, int, int]
+    counts: tuple[int, ...]
+    starts: tuple[int, ...]
     cell: np.ndarray
     path: Variator
 
@@ -120,7 +121,7 @@ class Mesh(NamedTuple):
         return np.repeat(np.arange(4), self.counts)
 
 
-def mesh(parameters: dict[str, Any]) -> Mesh:
+def mesh(parameters: Mapping[str, Any]) -> Mesh:
     """Cut the path into `stations` cells, equal within a region and nearly equal over all.
 
     Parameters
@@ -141,7 +142,7 @@ def mesh(parameters: dict[str, Any]) -> Mesh:
     return Mesh(tuple(map(int, counts)), tuple(map(int, starts)), np.repeat(lengths / counts, counts), path)
 
 
-def belt_constants(parameters: dict[str, Any]) -> Belt:
+def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     """Constants of one run.
 
     Parameters
@@ -242,7 +243,7 @@ def bending_bands(cell: np.ndarray, dual: np.ndarray, stiffness: float) -> np.nd
     return np.array([[force[j, (j + k) % n] for k in range(-2, 3)] for j in range(n)])
 
 
-def initial_state(parameters: dict[str, Any], belt: Belt) -> State:
+def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     """Start near the steady state without load.
 
     Parameters

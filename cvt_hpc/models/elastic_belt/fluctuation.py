@@ -31,6 +31,7 @@ hum of gaps too, and a trend of the mean state would: along a ramp of load or sp
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -112,7 +113,7 @@ class Fluctuation(NamedTuple):
     mean_layers: float
 
 
-def fluctuation(means: dict[str, np.ndarray], grid: Mesh, parameters: dict[str, Any]) -> Fluctuation:
+def fluctuation(means: dict[str, np.ndarray], grid: Mesh, parameters: Mapping[str, Any]) -> Fluctuation:
     """Power of the fluctuations around the belt.
 
     Parameters
@@ -145,12 +146,12 @@ def fluctuation(means: dict[str, np.ndarray], grid: Mesh, parameters: dict[str, 
     return Fluctuation(*(_steadiness(p) * power for power in powers))
 
 
-def _steadiness(parameters: dict[str, Any]) -> float:
+def _steadiness(parameters: Mapping[str, Any]) -> float:
     """1, or not a number along a ramp: its trend would count as a fluctuation."""
     return np.nan if ramped(parameters) else 1.0
 
 
-def _lifting(m: dict[str, np.ndarray], grid: Mesh, p: dict[str, Any]) -> np.ndarray:
+def _lifting(m: dict[str, np.ndarray], grid: Mesh, p: Mapping[str, Any]) -> np.ndarray:
     """Power of the cells' mean stresses in the mean transverse motion [W], (N,)."""
     path, speed = grid.path, p["driving_speed"] * grid.path.driving_radius
     curvature = np.array([1.0 / path.driving_radius, 0.0, 1.0 / path.driven_radius, 0.0])[grid.region]

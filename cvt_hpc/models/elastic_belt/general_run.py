@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -53,7 +53,7 @@ class Form:
         The equations.
     """
 
-    def __init__(self, belt: Belt, grid: Mesh, parameters: dict[str, Any]) -> None:
+    def __init__(self, belt: Belt, grid: Mesh, parameters: Mapping[str, Any]) -> None:
         self._flat = one_system.flat_belt(belt)
         self.system = one_system.system(self._flat)
 
@@ -85,9 +85,10 @@ class GeneralTransient(Marched, RecordedRun):
         Name of a general stepper that the model does not refuse.
     """
 
-    form = Form
+    form: type[Any] = Form  # what a model has instead has the same methods
+    done: int
 
-    def __init__(self, parameters: dict[str, Any], stepper: str) -> None:
+    def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
         p = parameters
         self.done = 0
         self.prolong(p)
@@ -109,7 +110,7 @@ class GeneralTransient(Marched, RecordedRun):
             self.marching.tell(**self._form.hints(stepper))
         self.failure: tuple[Status, str] | None = None
 
-    def prolong(self, parameters: dict[str, Any]) -> None:
+    def prolong(self, parameters: Mapping[str, Any]) -> None:
         """Make room for the samples of a longer duration, whose judged part has yet to come.
 
         Parameters

@@ -49,8 +49,8 @@ def histories(run: RecordedRun) -> xr.Dataset:
     }
     for name, named in over_time.items():
         variables[name] = ("time", run.channel(name), attributes(*named))
-    for name, (values, *named) in _profiles(run).items():
-        variables[name] = ("position", values, attributes(*named))
+    for name, (values, *words) in _profiles(run).items():
+        variables[name] = ("position", values, attributes(*words))
     coordinates = {
         "time": ("time", time, attributes("time", "s")),
         "probe": ("probe", np.array([probe.label for probe in run.probes], object), attributes("probe")),

@@ -8,9 +8,10 @@ strains and sliding speeds in them.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from cvt_hpc.lanes import LaneArray, split
 from cvt_hpc.models.elastic_belt.belt import (
@@ -189,7 +190,7 @@ class LaneState(NamedTuple):
     contacts: tuple[LaneContact, LaneContact]
 
 
-def lane_belt(belts: list[Belt], dtype: type) -> LaneBelt:
+def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
     """Constants of several runs on the same mesh.
 
     Parameters
@@ -207,29 +208,29 @@ def lane_belt(belts: list[Belt], dtype: type) -> LaneBelt:
     stations = np.arange(cell.size)
     law = first.law
     tables = (law.table_force.astype(dtype), law.table_speed.astype(dtype), law.table_mu.astype(dtype))
-    shared = (
-        cell,
-        dual,
-        first.per_cell,
-        first.per_dual,
-        first.per_span,
-        kappa,
-        first.arc_curvature,
-        first.arc_share,
-        _ring_curvature(first),
-        bending_bands(cell, dual, 1.0),
-        stations >= first.driven_start,
-        (stations == 0) | (stations == first.driven_start),
-    )
+    shared = {
+        "cell": cell,
+        "dual": dual,
+        "per_cell": first.per_cell,
+        "per_dual": first.per_dual,
+        "per_span": first.per_span,
+        "curvature": kappa,
+        "arc_curvature": first.arc_curvature,
+        "arc_share": first.arc_share,
+        "ring_curvature": _ring_curvature(first),
+        "bending": bending_bands(cell, dual, 1.0),
+        "on_driven": stations >= first.driven_start,
+        "enters": (stations == 0) | (stations == first.driven_start),
+    }
     return LaneBelt(
-        *(array.astype(dtype) for array in shared),
-        constants,
-        first.driven_start,
-        first.friction_memory > 0.0,
-        FrictionLaw(law.kind, 0.0, 0.0, 0.0, *tables),
-        first.rise_time,
-        first.ramp_end,
-        any(belt.speed_start != belt.driving_speed for belt in belts),
+        **{name: array.astype(dtype) for name, array in shared.items()},
+        constants=constants,
+        driven_start=first.driven_start,
+        memory=first.friction_memory > 0.0,
+        law=FrictionLaw(law.kind, 0.0, 0.0, 0.0, *tables),
+        rise_time=first.rise_time,
+        ramp_end=first.ramp_end,
+        speed_ramps=any(belt.speed_start != belt.driving_speed for belt in belts),
     )
 
 
@@ -314,7 +315,7 @@ def parted(belt: LaneBelt, parts: int) -> LaneBelt:
     parts : int
         Their number, a power of 2 that divides that of the stations.
     """
-    arrays = {
+    arrays: dict[str, Any] = {
         name: split(_one_lane(array), parts)
         for name, array in belt._asdict().items()
         if isinstance(array, np.ndarray)

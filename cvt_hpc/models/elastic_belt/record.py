@@ -152,12 +152,10 @@ def assess(run: RecordedRun) -> assessment.Occurrence:
     """Whether and how a run vibrates that has reached its end; its probes are columns of the displacement."""
     p = run.parameters
     if ramped(p):
-        found = _assess_ramp(run)
-    else:
-        columns, strands = _on_strands(run)
-        found = assessment.assess(run.displacement[:, columns], p["sampling_rate"], strands, p)
-        found = replace(found, strongest_probe=columns[found.strongest_probe])
-    return with_slip(run, found)
+        return with_slip(run, _assess_ramp(run))  # type: ignore[arg-type]  # None is of a run before its end
+    columns, strands = _on_strands(run)
+    found = assessment.assess(run.displacement[:, columns], p["sampling_rate"], strands, p)
+    return with_slip(run, replace(found, strongest_probe=columns[found.strongest_probe]))
 
 
 def _assess_ramp(run: RecordedRun) -> ramp.RampOccurrence | None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -46,7 +47,7 @@ class Recording(NamedTuple):
     first_judged: int
 
 
-def recording(parameters: dict[str, Any], dtype: type) -> Recording:
+def recording(parameters: Mapping[str, Any], dtype: type) -> Recording:
     """Plan of a run's recording.
 
     Parameters
@@ -95,13 +96,29 @@ class RecordedRun:
         Samples recorded so far, up to the one at which the run failed; of who marches it.
     failure : (Status, str) or None
         Why the run does not go on: what has gone wrong, or a result, with the status done; of who marches it.
+    time : float
+        Simulated time [s]; of who marches it.
     """
 
-    rows: np.ndarray
-    done: int
-    failure: tuple[Status, str] | None
+    if TYPE_CHECKING:  # of who marches the run
 
-    def __init__(self, parameters: dict[str, Any], plan: Recording, sums: np.ndarray) -> None:
+        @property
+        def rows(self) -> np.ndarray:
+            """Sensors, modes and CHANNELS."""
+
+        @property
+        def done(self) -> int:
+            """Samples."""
+
+        @property
+        def failure(self) -> tuple[Status, str] | None:
+            """Why the run does not go on."""
+
+        @property
+        def time(self) -> float:
+            """Simulated time [s]."""
+
+    def __init__(self, parameters: Mapping[str, Any], plan: Recording, sums: np.ndarray) -> None:
         self.parameters = parameters
         self.mesh, self.probes = plan.mesh, plan.probes
         self.interval, self.samples, self.kick = plan.interval, plan.samples, plan.kick

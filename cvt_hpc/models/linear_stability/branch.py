@@ -190,14 +190,14 @@ def _onsets(
     is_close = high - low <= CLOSE
     # of states so close none is left without a partner, however much a cell that opens changes its shape
     pairs = _pairs(before, after, 0.0 if is_close else ALIKE)
-    grows = [tuple(mode is not None and mode.growth > 0.0 for mode in pair) for pair in pairs]
-    crossing = [k for k, (one, other) in enumerate(grows) if one != other]
+    growing = [[mode for mode in pair if mode is not None and mode.growth > 0.0] for pair in pairs]
+    crossing = [k for k, grown in enumerate(growing) if len(grown) == 1]
     if not crossing:
         return []
     load = 0.5 * (low + high)
     if is_close:
-        others = sum(one and other for one, other in grows)
-        return [Onset(load, pairs[k][grows[k].index(True)], grows[k][1], others) for k in crossing]
+        others = sum(len(grown) == 2 for grown in growing)
+        return [Onset(load, growing[k][0], growing[k][0] is pairs[k][1], others) for k in crossing]
     steady = belt.at(load, before.steady)
     middle = Point(steady, modes(steady, grid, band))
     return [*_onsets(belt, grid, before, middle, band), *_onsets(belt, grid, middle, after, band)]

@@ -54,8 +54,8 @@ def oscillator(parameters: Mapping[str, Any]) -> Oscillator:
     """Constants from flat parameters [SI]."""
     p = parameters
     at_rest = p["static_friction"] - p["kinetic_friction"] if p["friction_law"] == "coulomb" else 0.0
-    mechanics = (float(p[key]) for key in _MECHANICS)
-    return Oscillator(*mechanics, given_law(p), float(at_rest), float(p["friction_speed"]))
+    mechanics = {key: float(p[key]) for key in _MECHANICS}
+    return Oscillator(**mechanics, law=given_law(p), excess=float(at_rest), width=float(p["friction_speed"]))
 
 
 @kernel

@@ -92,7 +92,8 @@ def phases(parameters: Mapping[str, Any], end: float) -> list[Piece]:
         p["normal_load"] * p[key] / p["stiffness"] for key in ("kinetic_friction", "static_friction")
     )
     belt = p["belt_speed"]
-    pieces = [_phase(0.0, *map(float, initial_state(p)), belt, slide, stick)]
+    x, v = map(float, initial_state(p))
+    pieces = [_phase(0.0, x, v, belt, slide, stick)]
     while True:
         last = pieces[-1]
         if np.isnan(last.centre):

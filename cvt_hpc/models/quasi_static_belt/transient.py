@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ TAKES_OVER = True  # runs go on from where others stand
 class QuasiStaticForm:
     """As `cvt_hpc.models.elastic_belt.general_run.Form`, of the split model."""
 
-    def __init__(self, belt: Belt, grid: Mesh, parameters: dict[str, Any]) -> None:
+    def __init__(self, belt: Belt, grid: Mesh, parameters: Mapping[str, Any]) -> None:
         self._model = equations.quasi_static_belt(belt, grid, parameters["limit_frequency"])
         self.system = equations.system(self._model)
 

@@ -54,12 +54,14 @@ def largest_load(
     """
     curve = _Curve(equations, load, tolerance)
     z = np.append(x, start)
-    tangent = curve.tangent(curve.factors(z, curve.upwards)[0], curve.upwards)
+    known = curve.factors(z, curve.upwards)
+    if known is None:
+        return None
+    tangent = curve.tangent(known[0], curve.upwards)
     step = first = FIRST / LOAD_SIZE / tangent[-1]
     for _ in range(MOST):
         found = curve.ahead(z, tangent, step)
-        turned = None if found is None else curve.tangent(found[1], tangent)
-        if turned is None or turned @ tangent < SHARPEST:
+        if found is None or (turned := curve.tangent(found[1], tangent)) @ tangent < SHARPEST:
             step *= 0.5
             if step < SHORTEST * first:
                 return None

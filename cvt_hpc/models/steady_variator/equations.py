@@ -19,6 +19,7 @@ is 10 to 50 nm.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,7 @@ class Equations:
         Strain over which the corner of the push force is rounded off [1]; 0: not.
     """
 
-    def __init__(self, parameters: dict[str, Any], belt: Belt) -> None:
+    def __init__(self, parameters: Mapping[str, Any], belt: Belt) -> None:
         self.belt = belt._replace(bridging_stiffness=belt.element_stiffness)
         self.rounding = 0.0
         self._flat = flat_belt(self.belt, LATE)

@@ -9,7 +9,7 @@ are sharp; each state begins at the one before, and a step that fails is made ag
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,8 +64,8 @@ class SteadyBelt:
         Resolved parameters of the run [SI]; those of its course are not used, the load among them.
     """
 
-    def __init__(self, parameters: dict[str, Any]) -> None:
-        p = parameters | OF_THE_COURSE | {"load": 0.0}
+    def __init__(self, parameters: Mapping[str, Any]) -> None:
+        p = {**parameters, **OF_THE_COURSE, "load": 0.0}
         belt = belt_constants(p)
         self._law, self._widths = belt.law, (belt.friction_speed, belt.ring_friction_speed)
         self._equations = Equations(p, belt)

@@ -161,4 +161,5 @@ def least_makespan(seconds: np.ndarray, ranks: int) -> float:
 
 
 def _summary(values: np.ndarray) -> tuple[float, float, float]:
-    return (float(np.median(values)), *map(float, np.quantile(values, _INTERVAL)))
+    low, high = np.quantile(values, _INTERVAL)
+    return float(np.median(values)), float(low), float(high)

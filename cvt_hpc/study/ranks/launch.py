@@ -122,7 +122,7 @@ class Team:
     """
 
     def __init__(self, communicator: MPI.Intracomm | None = None) -> None:
-        self.communicator = communicator
+        self.communicator: Any = communicator
         self.rank = communicator.rank if communicator else 0
         self.size = communicator.size if communicator else 1
 

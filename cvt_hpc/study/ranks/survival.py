@@ -29,7 +29,7 @@ def outlive(team: Team, work: Callable[[Team], Result]) -> Result:
     if team.communicator is None or not is_tolerated():
         return work(team)
     while True:
-        result, death = None, None
+        death = None
         try:
             result = work(team)
         except RankDied as caught:

@@ -109,7 +109,7 @@ class Records:
 
 def read_rows(study: Study, logs: Sequence[Path], entries: np.ndarray, name: str | None = None) -> np.ndarray:
     """Return what lies at some places in the logs; see `Records.read`."""
-    dtype, offset = study.record_dtype.fields[name][:2] if name else (study.record_dtype, 0)
+    dtype, offset = study.record_dtype.fields[name][:2] if name else (study.record_dtype, 0)  # type: ignore[index]  # it has fields
     blank = study.blank_rows()
     rows = np.empty(np.shape(entries), dtype)
     rows[...] = blank[name] if name else blank

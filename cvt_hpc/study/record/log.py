@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import platform
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from cvt_hpc.study.record.frames import AGAIN, ALONE, BEGUN, Place, RecordFormat
 
 KEPT = "The runs recorded so far are kept, and the same command goes on from them"
 SYNC_INTERVAL = 5.0  # [s]; a dead process loses nothing, a power failure at most this much
+_CLOSED = -1  # no descriptor of a file
 
 Record = tuple[int, np.ndarray]  # run index, and the record of that run, shape ()
 
@@ -55,7 +56,7 @@ class RecordLog:
         self._layout = layout
         self._preamble = layout.preamble(session, rank)
         self._attempts = attempts or {}
-        self._descriptor: int | None = None
+        self._descriptor = _CLOSED
         # A clock that is set right meanwhile must not make a batch look as if it had taken hours.
         self._clock_lead = time.time() - time.monotonic()
         self._synced = 0.0
@@ -79,7 +80,7 @@ class RecordLog:
         mark = self._layout.mark(ALONE if alone else BEGUN, self._places(batch), self._now())
         self._open_mark = self._append(mark)
 
-    def begin_again(self, indices: Sequence[int]) -> None:
+    def begin_again(self, indices: Iterable[int]) -> None:
         """Write that the earlier records of some runs count no more; errors as for `begin`."""
         self._append(self._layout.mark(AGAIN, self._places(indices), self._now()))
 
@@ -99,7 +100,7 @@ class RecordLog:
 
     def close(self) -> None:
         """Take back the mark of runs that were broken off, bring the rest to the disk, and close the file."""
-        if self._descriptor is None:
+        if self._descriptor == _CLOSED:
             return
         try:
             if self._open_mark is not None:
@@ -111,7 +112,7 @@ class RecordLog:
             raise storage_error(self.path, error, KEPT) from error
         finally:
             os.close(self._descriptor)
-            self._descriptor = None
+            self._descriptor = _CLOSED
 
     def __enter__(self) -> RecordLog:
         return self
@@ -119,7 +120,7 @@ class RecordLog:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _places(self, indices: Sequence[int]) -> list[Place]:
+    def _places(self, indices: Iterable[int]) -> list[Place]:
         return [(int(index), self._attempts.get(int(index), 1)) for index in indices]
 
     def _now(self) -> float:
@@ -129,7 +130,7 @@ class RecordLog:
     def _append(self, data: bytes) -> int:
         """Write and now and then bring to the disk; return where in the file the data begin."""
         try:
-            if self._descriptor is None:
+            if self._descriptor == _CLOSED:
                 self._open()
             before = self._write(data)
             if time.monotonic() - self._synced > SYNC_INTERVAL:

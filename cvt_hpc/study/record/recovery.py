@@ -37,7 +37,7 @@ _ENDED = [int(status) for status in Status if status != Status.NOT_RUN]
 class _Death(NamedTuple):
     """A mark without records after it; equal ones, as in a copied file, are one."""
 
-    index: int
+    run: int
     attempt: int
     alone: bool
     begun: float
@@ -83,7 +83,7 @@ class _Reader:
         self._layout = RecordFormat(study.fingerprint, study.record_dtype)
         self._found = [np.zeros(0, ENTRY)]
         self._attempts = np.ones(study.size, np.int64)
-        self._status = study.record_dtype.fields["status"][1]  # where it is in a record [byte]
+        self._status = study.record_dtype.fields["status"][1]  # type: ignore[index]  # where it is in a record [byte]
         self._deaths: set[_Death] = set()
         self._refinements: dict[Place, float] = {}
         self._timings: list[Timing] = []
@@ -122,9 +122,9 @@ class _Reader:
         """Return what all logs hold."""
         records = choose(self._study, logs, np.concatenate(self._found), self._attempts)
         for death in self._deaths:
-            if death.attempt == records.attempts[death.index] and not records.recorded[death.index]:
-                records.died[death.index] += 1
-                records.died_alone[death.index] += death.alone
+            if death.attempt == records.attempts[death.run] and not records.recorded[death.run]:
+                records.died[death.run] += 1
+                records.died_alone[death.run] += death.alone
         for (index, attempt), factor in self._refinements.items():
             if attempt == records.attempts[index]:
                 records.refinements[index] = factor
@@ -198,7 +198,8 @@ class _Trace:
         self.followed += 1
         if frame.kind == RECORD:
             ((index, _),) = frame.places
-            if self._at_work.pop(index, None) is not None and not self._at_work:
+            was_at_work = self._at_work.pop(index, None) is not None
+            if self._mark is not None and was_at_work and not self._at_work:
                 batch = tuple(index for index, _ in self._mark.places)
                 self.timings.append(Timing(batch, frame.written - self._mark.written))
         elif frame.kind == AGAIN:
@@ -208,6 +209,8 @@ class _Trace:
 
     def deaths(self) -> set[_Death]:
         """Return a death at each run that the process was at in the end."""
+        if self._mark is None:
+            return set()
         return {
             _Death(index, attempt, self._mark.kind == ALONE, self._mark.written)
             for index, attempt in self._at_work.items()
