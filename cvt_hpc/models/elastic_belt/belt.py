@@ -24,9 +24,6 @@ TIME, DRIVEN_SPEED, DRIVEN_POSITION, LAYER_WORK = range(len(SCALARS))
 
 REGIONS = ("driving arc", "t1", "driven arc", "t2")
 MODES = 5  # half waves along a strand that are told apart
-START_DAMPING = (
-    1e4  # [N s/m^2], fades out over rise_time: lets the belt settle in the grooves without ringing
-)
 
 
 class Belt(NamedTuple):

@@ -48,7 +48,6 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     RING_RELIEF,
     RING_STIFFNESS,
     SINE,
-    TRANSVERSE_DAMPING,
     LaneBelt,
     LaneState,
 )
@@ -63,11 +62,12 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     SADDLE,
     SLIDING_T,
     lane_acceleration,
+    lane_damping,
     lane_speed_share,
     lane_transverse,
     ring_grip,
-    start_damping,
 )
+from cvt_hpc.physics.flank import flank_shares
 
 
 @merged_kernel
@@ -105,7 +105,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
     ring_relief = c[0, RING_RELIEF] * speed_share * speed_share
     centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
     half_gyroscopic = -0.5 * gyroscopic
-    damping = c[0, TRANSVERSE_DAMPING] + start_damping(belt, state.time[0])
+    damping = lane_damping(belt, state.time[0])
     base_mass = fma(mass, per_step, 0.5 * damping)
     element_rate = element_mass * per_step
     zero = like(0.0, sine)
@@ -149,13 +149,13 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
                 # by the secant friction stops, and never turns the sliding about
                 stiff = select(stations[j, RING_REVERSING] > 0.5, drag / stations[j, SADDLE], stiff)
 
-            # Bullinger et al. 2005, eqs 37-39, with the slopes of friction along and across the sliding
+            # with the slopes of friction along and across the sliding
             mu = coefficient * factor
             climb, run = meridian * per_speed, v_tangential * per_speed
-            upward = mu * climb
-            per_normal, per_stiff = reciprocals(fma(upward, sine, cosine), fma(2.0, stiff, 12.0 * ring))
+            axial_share, radial_share = flank_shares(mu, climb, sine, cosine)
+            per_normal, per_stiff = reciprocals(axial_share, fma(2.0, stiff, 12.0 * ring))
             twice_normal = (2.0 * share) * force * per_normal
-            outward += twice_normal * fma(-upward, cosine, sine)
+            outward += twice_normal * radial_share
             friction = twice_normal * mu
             tangential = -friction * run
             across = friction * per_speed

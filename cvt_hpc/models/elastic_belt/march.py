@@ -64,12 +64,7 @@ def march_imex(
         for taken in range(steps):
             note_speeds(belt, state, work.stations, taken, steps)
             step_imex(belt, state, work, step)
-        _gather(state, work.stations, sampled, FIELDS_OF_FORCES)
-        sample(sampled.belt, sampled.state, sampled.stations, sensing, rows, k, profiles, ended)
-        # a sample takes it to its end
-        state.scalars[0, LAYER_WORK] = like(
-            sampled.state.scalars[0, LAYER_WORK], state.scalars[0, LAYER_WORK]
-        )
+        _take_sample(state, work.stations, sampled, sensing, rows, k, profiles, ended)
     _gather(state, work.stations, sampled, work.stations.data.shape[1])
 
 
@@ -93,13 +88,26 @@ def march_explicit(
         for taken in range(steps):
             note_speeds(belt, state, work.stations, taken, steps)
             step_explicit(belt, state, work, step)
-        _gather(state, work.stations, sampled, FIELDS_OF_FORCES)
-        sample(sampled.belt, sampled.state, sampled.stations, sensing, rows, k, profiles, ended)
-        # a sample takes it to its end
-        state.scalars[0, LAYER_WORK] = like(
-            sampled.state.scalars[0, LAYER_WORK], state.scalars[0, LAYER_WORK]
-        )
+        _take_sample(state, work.stations, sampled, sensing, rows, k, profiles, ended)
     _gather(state, work.stations, sampled, work.stations.data.shape[1])
+
+
+@kernel
+def _take_sample(
+    state: LaneState,
+    stations: LaneArray,
+    sampled: Sampled,
+    sensing: Sensors,
+    rows: LaneArray,
+    k: int,
+    profiles: LaneArray,
+    ended: LaneArray,
+) -> None:
+    """Sample what is marched, which may be in parts."""
+    _gather(state, stations, sampled, FIELDS_OF_FORCES)
+    sample(sampled.belt, sampled.state, sampled.stations, sensing, rows, k, profiles, ended)
+    # a sample takes it to its end
+    state.scalars[0, LAYER_WORK] = like(sampled.state.scalars[0, LAYER_WORK], state.scalars[0, LAYER_WORK])
 
 
 @kernel

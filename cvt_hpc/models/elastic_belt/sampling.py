@@ -13,7 +13,6 @@ from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, sele
 from cvt_hpc.models.elastic_belt.belt import MODES, REGIONS, V_ELEMENT, Mesh, W
 from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
-    DRIVEN_RADIUS,
     DRIVING_SPEED,
     ELEMENT_STIFFNESS,
     MASS,
@@ -29,13 +28,14 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     EPS_0,
     EPS_1,
     FORCE,
-    driving_surface,
     lane_load,
+    lane_pulleys,
     lane_speed_share,
     step_ripple,
 )
 from cvt_hpc.models.elastic_belt.moments import MOMENTS, add
 from cvt_hpc.models.elastic_belt.power import POWERS, audit
+from cvt_hpc.physics.flank import tangential_sliding
 from cvt_hpc.physics.lane_compliance import SOLVES, UNSOLVED
 
 SCALARS = (
@@ -223,20 +223,17 @@ def sample(
             least = minimum(net, least)
     rows[k, sensed + 13] = least - centrifugal
     rows[k, sensed + 14] = like(c[0, DRIVING_SPEED], speed) * lane_speed_share(belt, state.time[0], speed)
-    driven_speed = like(speed, zero)
-    driven_surface = like(speed * like(c[0, DRIVEN_RADIUS], speed) - like(belt_speed, speed), zero)
+    turnings, surfaces = lane_pulleys(belt, share, speed)
     axial = zero
     for wrap in range(2):
         weight = state.contacts[1].weight if wrap else state.contacts[0].weight
         first = belt.driven_start if wrap else 0
-        surface, turning = driving_surface(belt, share), share * c[0, DRIVING_SPEED]
-        if wrap:
-            surface, turning = driven_surface, driven_speed
+        turning, surface = turnings[wrap], surfaces[wrap]
         axial = sliding = open_length = zero
         length = 0.0
         for i in range(weight.size):
             force = stations[first + i, FORCE]
-            slides = fields[first + i, V_ELEMENT] - fma(turning, fields[first + i, W], surface)
+            slides = tangential_sliding(fields[first + i, V_ELEMENT], fields[first + i, W], turning, surface)
             axial += weight[i] * force
             sliding += weight[i] * force * slides
             open_length += select(force > 0.0, zero, weight[i])
