@@ -137,51 +137,63 @@ def _table_lookup(law: FrictionLaw, speed: float, force: float) -> tuple[float, 
 # `lane_law` prepares, mu_k, g v_s, 1 / v_s and -g / mu_k, and v.
 
 
-def _coulomb(kinetic, gradient, scale, speed):
+def _coulomb(numbers, speed):
+    kinetic, gradient, scale = numbers
     return kinetic, 0.0
 
 
-def _lane_coulomb(kinetic, fall, per_scale, decline, speed):
+def _lane_coulomb(numbers, speed):
+    kinetic, fall, per_scale, decline = numbers
     return kinetic
 
 
-def _linear(kinetic, gradient, scale, speed):
+def _linear(numbers, speed):
+    kinetic, gradient, scale = numbers
+    mu, slope = kinetic, 0.0
     if speed < scale:
-        return kinetic + gradient * (speed - scale), gradient
-    return kinetic, 0.0
+        mu, slope = kinetic + gradient * (speed - scale), gradient
+    return mu, slope
 
 
-def _lane_linear(kinetic, fall, per_scale, decline, speed):
+def _lane_linear(numbers, speed):
+    kinetic, fall, per_scale, decline = numbers
     return fma(fall, minimum(speed * per_scale - 1.0, 0.0), kinetic)
 
 
-def _stribeck(kinetic, gradient, scale, speed):
+def _stribeck(numbers, speed):
+    kinetic, gradient, scale = numbers
     fall = gradient * np.exp(-speed / scale)
     return kinetic - scale * fall, fall
 
 
-def _lane_stribeck(kinetic, fall, per_scale, decline, speed):
+def _lane_stribeck(numbers, speed):
+    kinetic, fall, per_scale, decline = numbers
     return fma(-fall, decay(speed * per_scale), kinetic)
 
 
-def _hyperbolic(kinetic, gradient, scale, speed):
+def _hyperbolic(numbers, speed):
+    kinetic, gradient, scale = numbers
     denominator = 1.0 - gradient / kinetic * speed
     return kinetic / denominator, gradient / (denominator * denominator)
 
 
-def _lane_hyperbolic(kinetic, fall, per_scale, decline, speed):
+def _lane_hyperbolic(numbers, speed):
+    kinetic, fall, per_scale, decline = numbers
     return kinetic / fma(decline, speed, 1.0)
 
 
-def _cubic(kinetic, gradient, scale, speed):
+def _cubic(numbers, speed):
+    kinetic, gradient, scale = numbers
     x = speed / scale
     span = -2.0 / 3.0 * gradient * scale
+    mu, slope = kinetic + span, 0.0
     if x * x < 3.0:
-        return kinetic + span * (1.0 - 1.5 * (x - x * x * x / 3.0)), gradient * (1.0 - x * x)
-    return kinetic + span, 0.0
+        mu, slope = kinetic + span * (1.0 - 1.5 * (x - x * x * x / 3.0)), gradient * (1.0 - x * x)
+    return mu, slope
 
 
-def _lane_cubic(kinetic, fall, per_scale, decline, speed):
+def _lane_cubic(numbers, speed):
+    kinetic, fall, per_scale, decline = numbers
     x = minimum(speed * per_scale, 1.7320508075688772)
     return kinetic - fall * (2.0 / 3.0) * (1.0 - 1.5 * (x - x * x * x * (1.0 / 3.0)))
 
@@ -204,32 +216,39 @@ if missing := set(Law) - {Law.TABLE} - set(FORMULAS):
     raise NotImplementedError(f"friction laws without a formula: {missing}")
 
 
-def _unknown(kind, kinetic, gradient, scale, speed):
-    raise ValueError("unknown friction law")
+# `friction_law` refuses what is no law. Should a kernel meet one, the run ends, since its state is not a
+# number: an exception would cost each station a test for it.
 
 
-def _lane_unknown(kind, kinetic, fall, per_scale, decline, speed):
-    # an exception would cost each station a test for it: the run ends, since its state is not a number
+def _unknown(kind, numbers, speed):
+    return np.nan, np.nan
+
+
+def _lane_unknown(kind, numbers, speed):
     return like(np.nan, speed)
 
 
-def _formula_of(kind: Law, formula: Callable[..., Any], otherwise: Callable[..., Any]) -> Callable[..., Any]:
-    """What takes a kind and a formula's arguments: the formula for that kind, for others something else."""
-    own, formula = int(kind), register_jitable(formula)
+def _by_kind(formulas: list[tuple[Law, Any]], otherwise: Any, inline: str = "never") -> Any:
+    """What takes a kind and a formula's numbers: the formula of that kind, for others `otherwise`."""
+    if not formulas:
+        return register_jitable(inline=inline)(otherwise)
+    own, formula = int(formulas[0][0]), register_jitable(inline=inline)(formulas[0][1])
+    others = _by_kind(formulas[1:], otherwise, inline)
 
-    @register_jitable
-    def find(kind, *arguments):
+    @register_jitable(inline=inline)
+    def find(kind, numbers, speed):
         if kind == own:
-            return formula(*arguments)
-        return otherwise(kind, *arguments)
+            found = formula(numbers, speed)
+        else:
+            found = others(kind, numbers, speed)
+        return found
 
     return find
 
 
-_of_kind, _lanes_of_kind = register_jitable(_unknown), register_jitable(_lane_unknown)
-for _kind, _formula in reversed(FORMULAS.items()):
-    _of_kind = _formula_of(_kind, _formula.plain, _of_kind)
-    _lanes_of_kind = _formula_of(_kind, _formula.lanes, _lanes_of_kind)
+_plain = _by_kind([(law, formula.plain) for law, formula in FORMULAS.items()], _unknown)
+# a call from an inner loop costs more than the formula
+_lanes = _by_kind([(law, formula.lanes) for law, formula in FORMULAS.items()], _lane_unknown, inline="always")
 
 
 @kernel
@@ -239,13 +258,9 @@ def formula_coefficient(
     """`friction_coefficient` of the laws that are formulas, from plain numbers.
 
     Kernels call this one in their inner loops: handing over a `FrictionLaw` costs more than the law itself.
-
-    Raises
-    ------
-    ValueError
-        If there is no law of that kind.
+    Not a number comes of a kind that is no such law.
     """
-    return _of_kind(kind, kinetic, gradient, scale, speed)
+    return _plain(kind, (kinetic, gradient, scale), speed)
 
 
 @merged_kernel
@@ -318,8 +333,8 @@ def lane_law(kinetic, gradient, scale):
 
 
 @merged_kernel
-def lane_coefficient(kind: int, coefficients, table, speed, force):
-    """Coefficient of friction in steady sliding, in lanes.
+def lane_coefficient(kind: int, coefficients, speed):
+    """Coefficient of friction in steady sliding by a law that is a formula, in lanes.
 
     Parameters
     ----------
@@ -327,26 +342,21 @@ def lane_coefficient(kind: int, coefficients, table, speed, force):
         One of `Law`, the same in all lanes; not a number comes of any other.
     coefficients
         What `lane_law` made of the law's numbers.
-    table : tuple of three arrays
-        The table that all lanes share, as `FrictionLaw` has it.
     speed
         Sliding speed, >= 0 [m/s].
-    force
-        Normal line force [N/m]; only a table reads it.
     """
-    kinetic, fall, per_scale, decline = coefficients
-    if kind == Law.TABLE:
-        mu = _lane_table(table, speed, force)
-    else:
-        mu = _lanes_of_kind(kind, kinetic, fall, per_scale, decline, speed)
+    mu = _lanes(kind, coefficients, speed)
     return mu
 
 
 @kernel
-def _lane_table(table: tuple[np.ndarray, np.ndarray, np.ndarray], speed, force):
-    """Coefficient by a table: bilinear, held constant outside.
+def lane_table(table: tuple[np.ndarray, np.ndarray, np.ndarray], speed, force):
+    """Coefficient by a table that all lanes share: bilinear, held constant outside.
 
-    Written as a sum over its intervals, of which each lane fills those below its place.
+    `table` holds forces (nf,) [N/m], speeds (nv,) [m/s] and coefficients (nf, nv). Kernels choose between it
+    and `lane_coefficient` themselves: handing over the table in an inner loop counts references to its
+    arrays, which costs a fifth of all that is done of sliding. Written as a sum over its intervals, of which
+    each lane fills those below its place.
     """
     table_force, table_speed, table_mu = table
     mu = mu_below = like(0.0, speed)

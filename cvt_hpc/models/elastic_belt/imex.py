@@ -21,9 +21,7 @@ from __future__ import annotations
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import anywhere, around, behind, decay, fma, from_ahead, like, minimum, select
 from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, N_RING, V_ELEMENT, V_FILTERED, V_RING, U, W
-from cvt_hpc.models.elastic_belt.imex_stations import assemble
-from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
-from cvt_hpc.models.elastic_belt.imex_work import (
+from cvt_hpc.models.elastic_belt.imex_stations import (
     DV_0,
     DV_1,
     FLANK,
@@ -37,7 +35,9 @@ from cvt_hpc.models.elastic_belt.imex_work import (
     RING_REVERSING,
     SLOPE,
     ImexWork,
+    assemble,
 )
+from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
 from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
     COSINE,

@@ -68,7 +68,8 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneState,
 )
 from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
-from cvt_hpc.physics.friction import lane_coefficient, lane_law
+from cvt_hpc.physics.friction import lane_coefficient, lane_law, lane_table
+from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.lane_compliance import CLOSED, FORCED, GAP, solve_lane_contact
 from cvt_hpc.physics.lane_compliance import PUSH as PUSHED
 from cvt_hpc.physics.lane_gauss_seidel import sweep_lane_contact
@@ -374,7 +375,10 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
             belt, j, pulleys, per_cosine, v_radial, fields[j, V_ELEMENT], fields[j, W]
         )
         v_law = fields[j, V_FILTERED] if memory else speed
-        coefficient = lane_coefficient(kind, law, table, v_law, stations[j, FORCE] * per_cosine)
+        if kind == Law.TABLE:
+            coefficient = lane_table(table, v_law, stations[j, FORCE] * per_cosine)
+        else:
+            coefficient = lane_coefficient(kind, law, v_law)
         # tanh(x) = (1 - e^-2x) / (1 + e^-2x) for flanks and rings
         speed = maximum(speed, least)
         saddle = fma(fma(offset, belt.arc_curvature[j], 1.0), full_speed, -(belt_speed + fields[j, V_RING]))

@@ -8,7 +8,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, like, merge_parts
 from cvt_hpc.models.elastic_belt.explicit import ExplicitWork, step_explicit
 from cvt_hpc.models.elastic_belt.imex import step_imex
-from cvt_hpc.models.elastic_belt.imex_work import ImexWork
+from cvt_hpc.models.elastic_belt.imex_stations import ImexWork
 from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK, LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES, derive, note_speeds
 from cvt_hpc.models.elastic_belt.sampling import Sensors, sample

@@ -75,7 +75,8 @@ from cvt_hpc.models.elastic_belt.moments import (
     add_stresses,
 )
 from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
-from cvt_hpc.physics.friction import lane_coefficient, lane_law, lane_saturation
+from cvt_hpc.physics.friction import lane_coefficient, lane_law, lane_saturation, lane_table
+from cvt_hpc.physics.friction_laws import Law
 
 POWERS = (
     "driving_power",
@@ -203,7 +204,10 @@ def audit(
         sliding, meridian = flank_sliding(v_radial, v_tangential, per_cosine)
         sliding = maximum(sliding, least)
         v_law = fields[j, V_FILTERED] if belt.memory else sliding
-        mu = lane_coefficient(kind, law, table, v_law, force * per_cosine)
+        if kind == Law.TABLE:
+            mu = lane_table(table, v_law, force * per_cosine)
+        else:
+            mu = lane_coefficient(kind, law, v_law)
         mu *= lane_saturation(sliding, per_width)
         upward = mu * meridian / sliding
         twice_normal = 2.0 * force / fma(upward, sine, cosine)
