@@ -74,9 +74,11 @@ def select(context, mask, yes, no):
 
 @intrinsic
 def like(context, x, pattern):
-    """A number, or lanes of another precision, as lanes of `pattern`'s type."""
+    """A number, or lanes of another precision, in `pattern`'s type, which may be a plain number's."""
 
     def build(context, builder, sig, arguments):
+        if not isinstance(pattern, Lanes):
+            return context.cast(builder, arguments[0], sig.args[0], sig.return_type)
         return converted(context, builder, arguments[0], sig.args[0], sig.return_type)
 
     return pattern(x, pattern), build

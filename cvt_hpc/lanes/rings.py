@@ -230,23 +230,33 @@ def _reduction(distance: int):
         z0, z1 = fma(i00, f0, i01 * f1), fma(i01, f0, i11 * f1)
         # the coupling ahead is the transposed one of the part there
         r00, r10, r01, r11 = fore(l00), fore(l01), fore(l10), fore(l11)
-        j00, j01, j11, y0, y1 = back(i00), back(i01), back(i11), back(z0), back(z1)
-        m00, m01 = fma(l00, j00, l01 * j01), fma(l00, j01, l01 * j11)
-        m10, m11 = fma(l10, j00, l11 * j01), fma(l10, j01, l11 * j11)
-        p, q = fma(-m00, l00, fma(-m01, l01, p)), fma(-m00, l10, fma(-m01, l11, q))
-        r = fma(-m10, l10, fma(-m11, l11, r))
-        f0, f1 = fma(-l00, y0, fma(-l01, y1, f0)), fma(-l10, y0, fma(-l11, y1, f1))
+        p, q, r, f0, f1, m00, m01, m10, m11 = _without(
+            (p, q, r, f0, f1), (l00, l01, l10, l11), back(i00), back(i01), back(i11), back(z0), back(z1)
+        )
         b00, b01, b10, b11 = back(l00), back(l01), back(l10), back(l11)
         l00, l01 = -fma(m00, b00, m01 * b10), -fma(m00, b01, m01 * b11)
         l10, l11 = -fma(m10, b00, m11 * b10), -fma(m10, b01, m11 * b11)
-        j00, j01, j11, y0, y1 = fore(i00), fore(i01), fore(i11), fore(z0), fore(z1)
-        m00, m01 = fma(r00, j00, r01 * j01), fma(r00, j01, r01 * j11)
-        m10, m11 = fma(r10, j00, r11 * j01), fma(r10, j01, r11 * j11)
-        p, q = fma(-m00, r00, fma(-m01, r01, p)), fma(-m00, r10, fma(-m01, r11, q))
-        r = fma(-m10, r10, fma(-m11, r11, r))
-        f0, f1 = fma(-r00, y0, fma(-r01, y1, f0)), fma(-r10, y0, fma(-r11, y1, f1))
+        p, q, r, f0, f1, m00, m01, m10, m11 = _without(
+            (p, q, r, f0, f1), (r00, r01, r10, r11), fore(i00), fore(i01), fore(i11), fore(z0), fore(z1)
+        )
         l00, l01 = (l00 + faded) - faded, (l01 + faded) - faded
         l10, l11 = (l10 + faded) - faded, (l11 + faded) - faded
         return p, q, r, f0, f1, l00, l01, l10, l11
 
     return reduced
+
+
+@register_jitable
+def _without(own, coupling, i00, i01, i11, z0, z1):
+    """A part's own block and right side without a neighbour, and its coupling to it times `i`.
+
+    `i` is the inverse of the neighbour's block, `z` that times the neighbour's right side.
+    """
+    p, q, r, f0, f1 = own
+    l00, l01, l10, l11 = coupling
+    m00, m01 = fma(l00, i00, l01 * i01), fma(l00, i01, l01 * i11)
+    m10, m11 = fma(l10, i00, l11 * i01), fma(l10, i01, l11 * i11)
+    p, q = fma(-m00, l00, fma(-m01, l01, p)), fma(-m00, l10, fma(-m01, l11, q))
+    r = fma(-m10, l10, fma(-m11, l11, r))
+    f0, f1 = fma(-l00, z0, fma(-l01, z1, f0)), fma(-l10, z0, fma(-l11, z1, f1))
+    return p, q, r, f0, f1, m00, m01, m10, m11

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cvt_hpc.kernels import merged_kernel
+from cvt_hpc.lanes import fma, sqrt
 from cvt_hpc.physics.friction import saturation
 
 LEAST_SPEED = 1e-9  # [m/s]: below it the direction of sliding is of no effect, friction is linear there
@@ -71,3 +72,43 @@ def flank_forces(
     radial = twice_normal * (sine - share * cosine)
     tangential = -twice_normal * mu * v_tangential / speed
     return radial, tangential, twice_normal * coefficient * slope, twice_normal * mu / speed
+
+
+@merged_kernel
+def tangential_sliding(v_element, w, turning, surface):
+    """Speed of an element against the sheave along the belt [m/s], in lanes.
+
+    Parameters
+    ----------
+    v_element
+        Element's speed less the belt speed [m/s].
+    w
+        Its displacement [m].
+    turning, surface
+        Pulley's speed [rad/s] and that of its surface at the pitch radius, less the belt speed [m/s].
+    """
+    return v_element - fma(turning, w, surface)
+
+
+@merged_kernel
+def flank_sliding(v_radial, v_tangential, per_cosine):
+    """`sliding` in lanes, from the reciprocal of the cosine; the speed has no least value here."""
+    meridian = v_radial * per_cosine
+    return sqrt(fma(meridian, meridian, v_tangential * v_tangential)), meridian
+
+
+@merged_kernel
+def flank_shares(mu, climb, sine, cosine):
+    """Axial and radial force of a flank over its normal force (Bullinger et al. 2005, eqs 37-38), in lanes.
+
+    Parameters
+    ----------
+    mu
+        Coefficient of friction, with its regularisation [1].
+    climb
+        Share of the meridian in the sliding speed [1].
+    sine, cosine
+        Of the half wedge angle.
+    """
+    upward = mu * climb
+    return fma(upward, sine, cosine), fma(-upward, cosine, sine)

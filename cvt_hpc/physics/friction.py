@@ -23,28 +23,22 @@ table         bilinear in (normal force, speed), held constant outside          
 The cubic law (Thomsen and Fidlin 2003) has mu_s = mu_k - 2/3 g v_s; beyond x = sqrt(3), where the cubic is
 back at mu_s, it is held there. For a table the gradient is the slope of its first interval at the lowest
 force.
+
+Kernels of lanes take mu alone, from coefficients prepared once (`lane_law`), so that a formula has no
+division; plain ones take its slope too. The two differ by round-off.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from enum import IntEnum
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel, merged_kernel
-
-
-class Law(IntEnum):
-    """The laws, as kernels know them."""
-
-    COULOMB = 0
-    LINEAR = 1
-    STRIBECK = 2
-    HYPERBOLIC = 3
-    CUBIC = 4
-    TABLE = 5
+from cvt_hpc.lanes import decay, fma, like, maximum, minimum
+from cvt_hpc.physics.friction_laws import FORMULA_PARAMETERS, FRICTION_LAWS, TABLE_PARAMETERS, Law
 
 
 class FrictionLaw(NamedTuple):
@@ -101,7 +95,14 @@ def friction_law(
     -------
     FrictionLaw
         Ready for `friction_coefficient`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such law.
     """
+    if kind not in FRICTION_LAWS:
+        raise ValueError(f"friction law: expected one of {', '.join(FRICTION_LAWS)}; found {kind}")
     tables = [np.ascontiguousarray(a, dtype=np.float64) for a in (table_force, table_speed, table_mu)]
     tables[2] = tables[2].reshape(tables[0].size, tables[1].size)
     return FrictionLaw(int(Law[kind.upper()]), float(kinetic), float(gradient), float(speed), *tables)
@@ -109,14 +110,7 @@ def friction_law(
 
 def given_law(parameters: Mapping[str, Any]) -> FrictionLaw:
     """Return the law that flat parameters [SI] of a run declare, by the keys of its table [friction]."""
-    keys = (
-        "kinetic_friction",
-        "friction_gradient",
-        "stribeck_velocity",
-        "table_force",
-        "table_speed",
-        "table_mu",
-    )
+    keys = (*FORMULA_PARAMETERS, *TABLE_PARAMETERS)
     return friction_law(parameters["friction_law"], *(parameters[key] for key in keys))
 
 
@@ -139,6 +133,124 @@ def _table_lookup(law: FrictionLaw, speed: float, force: float) -> tuple[float, 
     return (1.0 - b) * low + b * high, slope
 
 
+# Each formula twice. In plain numbers: mu and its slope from mu_k, g, v_s and v. In lanes: mu from what
+# `lane_law` prepares, mu_k, g v_s, 1 / v_s and -g / mu_k, and v.
+
+
+def _coulomb(numbers, speed):
+    kinetic, gradient, scale = numbers
+    return kinetic, 0.0
+
+
+def _lane_coulomb(numbers, speed):
+    kinetic, fall, per_scale, decline = numbers
+    return kinetic
+
+
+def _linear(numbers, speed):
+    kinetic, gradient, scale = numbers
+    mu, slope = kinetic, 0.0
+    if speed < scale:
+        mu, slope = kinetic + gradient * (speed - scale), gradient
+    return mu, slope
+
+
+def _lane_linear(numbers, speed):
+    kinetic, fall, per_scale, decline = numbers
+    return fma(fall, minimum(speed * per_scale - 1.0, 0.0), kinetic)
+
+
+def _stribeck(numbers, speed):
+    kinetic, gradient, scale = numbers
+    fall = gradient * np.exp(-speed / scale)
+    return kinetic - scale * fall, fall
+
+
+def _lane_stribeck(numbers, speed):
+    kinetic, fall, per_scale, decline = numbers
+    return fma(-fall, decay(speed * per_scale), kinetic)
+
+
+def _hyperbolic(numbers, speed):
+    kinetic, gradient, scale = numbers
+    denominator = 1.0 - gradient / kinetic * speed
+    return kinetic / denominator, gradient / (denominator * denominator)
+
+
+def _lane_hyperbolic(numbers, speed):
+    kinetic, fall, per_scale, decline = numbers
+    return kinetic / fma(decline, speed, 1.0)
+
+
+def _cubic(numbers, speed):
+    kinetic, gradient, scale = numbers
+    x = speed / scale
+    span = -2.0 / 3.0 * gradient * scale
+    mu, slope = kinetic + span, 0.0
+    if x * x < 3.0:
+        mu, slope = kinetic + span * (1.0 - 1.5 * (x - x * x * x / 3.0)), gradient * (1.0 - x * x)
+    return mu, slope
+
+
+def _lane_cubic(numbers, speed):
+    kinetic, fall, per_scale, decline = numbers
+    x = minimum(speed * per_scale, 1.7320508075688772)
+    return kinetic - fall * (2.0 / 3.0) * (1.0 - 1.5 * (x - x * x * x * (1.0 / 3.0)))
+
+
+class Formula(NamedTuple):
+    """A law's formula in plain numbers and in lanes."""
+
+    plain: Callable[..., Any]
+    lanes: Callable[..., Any]
+
+
+FORMULAS = {
+    Law.STRIBECK: Formula(_stribeck, _lane_stribeck),
+    Law.COULOMB: Formula(_coulomb, _lane_coulomb),
+    Law.LINEAR: Formula(_linear, _lane_linear),
+    Law.HYPERBOLIC: Formula(_hyperbolic, _lane_hyperbolic),
+    Law.CUBIC: Formula(_cubic, _lane_cubic),
+}
+if missing := set(Law) - {Law.TABLE} - set(FORMULAS):
+    raise NotImplementedError(f"friction laws without a formula: {missing}")
+
+
+# `friction_law` refuses what is no law. Should a kernel meet one, the run ends, since its state is not a
+# number: an exception would cost each station a test for it.
+
+
+def _unknown(kind, numbers, speed):
+    return np.nan, np.nan
+
+
+def _lane_unknown(kind, numbers, speed):
+    return like(np.nan, speed)
+
+
+def _by_kind(formulas: list[tuple[Law, Any]], otherwise: Any, inline: str = "never") -> Any:
+    """What takes a kind and a formula's numbers: the formula of that kind, for others `otherwise`."""
+    if not formulas:
+        return register_jitable(inline=inline)(otherwise)
+    own, formula = int(formulas[0][0]), register_jitable(inline=inline)(formulas[0][1])
+    others = _by_kind(formulas[1:], otherwise, inline)
+
+    @register_jitable(inline=inline)
+    def find(kind, numbers, speed):
+        if kind == own:
+            found = formula(numbers, speed)
+        else:
+            found = others(kind, numbers, speed)
+        return found
+
+    return find
+
+
+_plain = _by_kind([(law, formula.plain) for law, formula in FORMULAS.items()], _unknown)
+# a call from an inner loop costs more than the formula
+_lanes = _by_kind([(law, formula.lanes) for law, formula in FORMULAS.items()], _lane_unknown, inline="always")
+
+
 @kernel
 def formula_coefficient(
     kind: int, kinetic: float, gradient: float, scale: float, speed: float
@@ -146,24 +258,9 @@ def formula_coefficient(
     """`friction_coefficient` of the laws that are formulas, from plain numbers.
 
     Kernels call this one in their inner loops: handing over a `FrictionLaw` costs more than the law itself.
+    Not a number comes of a kind that is no such law.
     """
-    if kind == 2:
-        fall = gradient * np.exp(-speed / scale)
-        return kinetic - scale * fall, fall
-    if kind == 0:
-        return kinetic, 0.0
-    if kind == 1:
-        if speed < scale:
-            return kinetic + gradient * (speed - scale), gradient
-        return kinetic, 0.0
-    if kind == 3:
-        denominator = 1.0 - gradient / kinetic * speed
-        return kinetic / denominator, gradient / (denominator * denominator)
-    x = speed / scale
-    span = -2.0 / 3.0 * gradient * scale
-    if x * x < 3.0:
-        return kinetic + span * (1.0 - 1.5 * (x - x * x * x / 3.0)), gradient * (1.0 - x * x)
-    return kinetic + span, 0.0
+    return _plain(kind, (kinetic, gradient, scale), speed)
 
 
 @merged_kernel
@@ -186,7 +283,7 @@ def friction_coefficient(law: FrictionLaw, speed: float, force: float) -> tuple[
     slope : float
         dmu/dspeed [s/m].
     """
-    if law.kind == 5:
+    if law.kind == Law.TABLE:
         return _table_lookup(law, speed, force)
     return formula_coefficient(law.kind, law.kinetic, law.gradient, law.speed, speed)
 
@@ -220,3 +317,59 @@ def saturation(speed: float, width: float) -> tuple[float, float]:
     decay = np.exp(-2.0 * abs(speed) / width)
     factor = (1.0 - decay) / (1.0 + decay)
     return np.copysign(factor, speed), (1.0 - factor * factor) / width
+
+
+@merged_kernel
+def lane_saturation(speed, per_width):
+    """tanh(speed / width) of speeds >= 0 [m/s], from 1 / width [s/m], in lanes."""
+    left = decay(speed * (2.0 * per_width))
+    return (1.0 - left) / (1.0 + left)
+
+
+@merged_kernel
+def lane_law(kinetic, gradient, scale):
+    """Coefficients of a law as `lane_coefficient` takes them, from mu_k [1], g [s/m] and v_s [m/s]."""
+    return kinetic, gradient * scale, 1.0 / scale, -gradient / kinetic
+
+
+@merged_kernel
+def lane_coefficient(kind: int, coefficients, speed):
+    """Coefficient of friction in steady sliding by a law that is a formula, in lanes.
+
+    Parameters
+    ----------
+    kind : int
+        One of `Law`, the same in all lanes; not a number comes of any other.
+    coefficients
+        What `lane_law` made of the law's numbers.
+    speed
+        Sliding speed, >= 0 [m/s].
+    """
+    mu = _lanes(kind, coefficients, speed)
+    return mu
+
+
+@kernel
+def lane_table(table: tuple[np.ndarray, np.ndarray, np.ndarray], speed, force):
+    """Coefficient by a table that all lanes share: bilinear, held constant outside.
+
+    `table` holds forces (nf,) [N/m], speeds (nv,) [m/s] and coefficients (nf, nv). Kernels choose between it
+    and `lane_coefficient` themselves: handing over the table in an inner loop counts references to its
+    arrays, which costs a fifth of all that is done of sliding. Written as a sum over its intervals, of which
+    each lane fills those below its place.
+    """
+    table_force, table_speed, table_mu = table
+    mu = mu_below = like(0.0, speed)
+    for i in range(table_force.size):
+        row = like(table_mu[i, 0], speed)
+        for j in range(table_speed.size - 1):
+            width = table_speed[j + 1] - table_speed[j]
+            filled = minimum(maximum(speed - table_speed[j], 0.0), width)
+            row += filled * ((table_mu[i, j + 1] - table_mu[i, j]) / width)
+        if i == 0:
+            mu = row
+        else:
+            span = table_force[i] - table_force[i - 1]
+            mu += (row - mu_below) * minimum(maximum((force - table_force[i - 1]) / span, 0.0), 1.0)
+        mu_below = row
+    return mu

@@ -19,11 +19,11 @@ from cvt_hpc import lanes
 from cvt_hpc.job import build_job
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, fma, like, rings
-from cvt_hpc.models.elastic_belt import imex, imex_stations, imex_system, lane_forces
+from cvt_hpc.models.elastic_belt import course, imex, imex_stations, imex_system, lane_forces
 from cvt_hpc.models.elastic_belt.batch import PRECISIONS, Batch
 from cvt_hpc.models.elastic_belt.lane_belt import REPEATS
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP as STEP
-from cvt_hpc.physics import lane_compliance, lane_friction
+from cvt_hpc.physics import flank, friction, lane_compliance
 
 CALLS = 15
 STATIONS = 160
@@ -167,7 +167,8 @@ def count(step: float, precision: str) -> collections.Counter:
     batch.advance(700)
     functions = _counting_functions(7 if precision == "single" else 13)
     kept = []
-    for module in (imex, imex_stations, imex_system, lane_forces, lane_compliance, lane_friction, rings):
+    of_belt = imex, imex_stations, imex_system, lane_forces, course
+    for module in (*of_belt, lane_compliance, flank, friction, rings):
         for name, thing in list(vars(module).items()):
             plain = functions.get(name) or getattr(thing, "py_func", None)
             if plain is not None:

@@ -1,11 +1,26 @@
-"""Friction laws against their formulas, written here once more and differentiated by a complex step."""
+"""Friction laws against their formulas, written here once more and differentiated by a complex step.
+
+In lanes against the plain ones.
+"""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cvt_hpc.physics.friction import formula_coefficient, friction_coefficient, friction_law, saturation
+from cvt_hpc.kernels import kernel
+from cvt_hpc.lanes import LaneArray
+from cvt_hpc.physics.friction import (
+    formula_coefficient,
+    friction_coefficient,
+    friction_law,
+    lane_coefficient,
+    lane_law,
+    lane_saturation,
+    lane_table,
+    saturation,
+)
+from cvt_hpc.physics.friction_laws import FRICTION_LAWS, Law, friction_inert, friction_problems
 
 # mu(v) of the module's table, for complex v too: mu_k, g, v_s, v
 FORMULAS = {
@@ -138,3 +153,123 @@ def test_saturation(speed, width):
     # 1 - tanh^2 is formed by a difference: absolute, not relative, in units of 1 / width
     assert slope == pytest.approx(exact.imag / tiny, abs=ROUND_OFF / width)
     assert saturation(-speed, width) == pytest.approx((-factor, slope), abs=0.0)
+
+
+WIDTHS = {np.float64: 8, np.float32: 16}
+# A formula of some ten operations and an exponential on numbers of order 1, of which it may take differences.
+LANE_ROUND_OFF = {np.float64: 2e-14, np.float32: 1e-5}
+MU, GRADIENT, SCALE, SPEED, FORCE, FOUND = range(6)
+TABLE = (
+    (1e4, 3e4, 2e5),
+    (0.0, 0.05, 0.1, 0.8),
+    ((0.10, 0.20, 0.15, 0.08), (0.5, 0.3, 0.2, 0.1), (0.07, 0.09, 0.3, 0.2)),
+)
+ONE_SPEED = ((1e4, 3e4), (0.1, 0.3), ((0.1, 0.2), (0.3, 0.2)))
+
+
+@kernel
+def coefficients(kind: int, table: tuple[np.ndarray, np.ndarray, np.ndarray], a: LaneArray) -> None:
+    for j in range(a.rows):
+        law = lane_law(a[j, MU], a[j, GRADIENT], a[j, SCALE])
+        if kind == Law.TABLE:
+            a[j, FOUND] = lane_table(table, a[j, SPEED], a[j, FORCE])
+        else:
+            a[j, FOUND] = lane_coefficient(kind, law, a[j, SPEED])
+
+
+@kernel
+def saturations(a: LaneArray) -> None:
+    for j in range(a.rows):
+        a[j, FOUND] = lane_saturation(a[j, SPEED], 1.0 / a[j, SCALE])
+
+
+def arguments(dtype, rows=500):
+    """Coefficients and speeds of each lane, at rest and at the laws' kinks too."""
+    random, lanes = np.random.default_rng(1), WIDTHS[dtype]
+    a = LaneArray(rows, 6, lanes, dtype)
+    shape = rows, lanes
+    a.data[:, MU] = random.uniform(0.01, 0.3, shape)
+    a.data[:, GRADIENT] = random.uniform(-5.0, 0.0, shape)
+    a.data[:, SCALE] = random.uniform(1e-3, 1.0, shape)
+    share = random.uniform(0.0, 3.0, shape)
+    share[:, 0], share[0], share[1] = 0.0, 1.0, np.sqrt(3.0)
+    a.data[:, SPEED] = share * a.data[:, SCALE]
+    a.data[:, FORCE] = random.uniform(0.0, 3e5, shape)
+    return a
+
+
+def no_table(dtype):
+    return tuple(np.zeros(shape, dtype) for shape in (0, 0, (0, 0)))
+
+
+def each(a):
+    """All places of the array, one after the other, in double precision."""
+    return a.data.astype(float).transpose(0, 2, 1).reshape(-1, 6)
+
+
+@pytest.mark.parametrize("dtype", WIDTHS)
+@pytest.mark.parametrize("law", [law for law in Law if law is not Law.TABLE], ids=lambda law: law.name)
+def test_laws_in_lanes_are_the_plain_ones(law, dtype):
+    a = arguments(dtype)
+    coefficients(int(law), no_table(dtype), a)
+    for mu, gradient, scale, speed, force, found in each(a):
+        kept = friction_law(law.name.lower(), mu, gradient, scale)
+        expected, _ = friction_coefficient(kept, speed, force)
+        # parts as large as g v_s x^3 are subtracted from each other
+        third = min(speed / scale, 2.0) ** 3
+        assert found == pytest.approx(
+            expected, abs=LANE_ROUND_OFF[dtype] * (mu - gradient * scale * (1.0 + third))
+        )
+
+
+@pytest.mark.parametrize("dtype", WIDTHS)
+@pytest.mark.parametrize("table", [TABLE, ONE_SPEED], ids=["table", "table from a speed on"])
+def test_tables_in_lanes_are_the_plain_ones(table, dtype):
+    a = arguments(dtype)
+    # at every knot, and outside
+    knots = [(speed, force) for speed in (*table[1], 0.0, 99.0) for force in (*table[0], 0.0, 1e9)]
+    for j, (speed, force) in enumerate(knots):
+        a.data[j, SPEED, 0], a.data[j, FORCE, 0] = speed, force
+    coefficients(int(Law.TABLE), tuple(np.array(part, dtype) for part in table), a)
+    law = friction_law("table", 0.08, 0.0, 0.05, *table)
+    for _, _, _, speed, force, found in each(a):
+        expected, _ = friction_coefficient(law, speed, force)
+        # sums over intervals; single precision knows knots to 6e-8, on slopes of 6 s/m
+        assert found == pytest.approx(expected, abs=LANE_ROUND_OFF[dtype])
+
+
+@pytest.mark.parametrize("dtype", WIDTHS)
+def test_saturation_in_lanes_is_the_plain_one(dtype):
+    a = arguments(dtype)
+    a.data[1, SPEED] = 1e6  # what is left there is held within the exponent's range
+    saturations(a)
+    for _, _, width, speed, _, factor in each(a):
+        assert factor == pytest.approx(saturation(speed, width)[0], abs=LANE_ROUND_OFF[dtype])
+
+
+def test_every_law_that_a_job_may_name_has_all_its_parts():
+    """A law is declared in `friction_laws`, and has its formula in `friction`: nothing else knows of it."""
+    values = {"kinetic_friction": 0.08, "friction_gradient": -0.8, "stribeck_velocity": 0.05}
+    values |= {"table_force": (0.0, 1.0), "table_speed": (0.0, 1.0), "table_mu": ((0.1, 0.1), (0.1, 0.1))}
+    for name in FRICTION_LAWS:
+        p = values | {"friction_law": name}
+        assert [key for key, *_ in friction_problems(p)] == ["friction_gradient"] * (name == "coulomb")
+        idle = friction_inert(p)
+        law = friction_law(name, *values.values())
+        for key in ("friction_gradient", "stribeck_velocity"):
+            other = friction_law(name, *(values | {key: 1.1 * values[key]}).values())
+            moved = friction_coefficient(law, 0.03, 0.5) != friction_coefficient(other, 0.03, 0.5)
+            assert moved == (key not in idle) or (name, key) == ("coulomb", "friction_gradient"), (name, key)
+        a = arguments(np.float64, rows=2)
+        coefficients(law.kind, (law.table_force, law.table_speed, law.table_mu), a)
+        assert np.isfinite(a.data[:, FOUND]).all(), name
+
+
+def test_a_law_that_is_none_is_an_error_and_never_another_law():
+    none = max(Law) + 1
+    with pytest.raises(ValueError, match="expected one of coulomb, .*; found viscous"):
+        friction_law("viscous", 0.08, -0.8, 0.05)
+    assert np.isnan(formula_coefficient(none, 0.08, -0.8, 0.05, 0.1)).all()
+    a = arguments(np.float64, rows=2)
+    coefficients(none, no_table(np.float64), a)
+    assert np.isnan(a.data[:, FOUND]).all()

@@ -8,8 +8,8 @@ import pytest
 from marched import CHEAP, assert_same_bits, job, never
 
 from cvt_hpc.job import build_job
+from cvt_hpc.models.elastic_belt.batch import LaneRun
 from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
-from cvt_hpc.models.elastic_belt.lane_run import LaneRun
 from cvt_hpc.models.marched import BatchOfOne
 from cvt_hpc.models.oscillator.transient import Transient as Oscillator
 from cvt_hpc.simulation import Interrupted, run_point, run_points, simulate

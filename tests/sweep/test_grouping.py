@@ -9,7 +9,7 @@ from recorded import assert_same_numbers
 from cvt_hpc import simulation
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt import grouping
-from cvt_hpc.models.elastic_belt.lane_run import LaneRun
+from cvt_hpc.models.elastic_belt.batch import LaneRun
 from cvt_hpc.simulation import batches
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status, Vibrates

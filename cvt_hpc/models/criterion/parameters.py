@@ -10,7 +10,7 @@ from typing import Any
 
 from cvt_hpc.models import elastic_belt
 from cvt_hpc.parameters import Parameter, not_negative, positive
-from cvt_hpc.physics.friction_problems import friction_inert, friction_problems
+from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 
 _BELT, _SHEAVES = elastic_belt.PARAMETERS["belt"], elastic_belt.PARAMETERS["sheaves"]
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray, split
-from cvt_hpc.models.elastic_belt.belt import W, belt_constants, initial_state, random_strands
+from cvt_hpc.models.elastic_belt.belt import State, W, belt_constants, initial_state, random_strands
 from cvt_hpc.models.elastic_belt.explicit import ExplicitWork, explicit_work
 from cvt_hpc.models.elastic_belt.grouping import LANES, lanes
-from cvt_hpc.models.elastic_belt.imex_work import ImexWork, imex_work
+from cvt_hpc.models.elastic_belt.imex_stations import ImexWork, imex_work
 from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneState,
     lane_belt,
@@ -19,16 +19,55 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     parted,
     parted_state,
     parts_of,
+    take_lane,
 )
 from cvt_hpc.models.elastic_belt.lane_forces import derive
-from cvt_hpc.models.elastic_belt.lane_run import LaneRun, Paused, lane_arrays
 from cvt_hpc.models.elastic_belt.march import Sampled, march_explicit, march_imex
-from cvt_hpc.models.elastic_belt.recorded_run import recording
-from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, ENDED_AT, OUTCOME, PROFILES, Outcome
+from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, recording
+from cvt_hpc.models.elastic_belt.sampling import (
+    CHANNELS,
+    CONTACT_SOLVES,
+    ENDED,
+    ENDED_AT,
+    OUTCOME,
+    PROFILES,
+    REPEATED,
+    Outcome,
+)
+from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
+from cvt_hpc.models.elastic_belt.validity import FAILURES, step_doubt
+from cvt_hpc.variables import Status
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
 Step = tuple[Callable[[LaneState], ImexWork | ExplicitWork], Callable[..., None]]  # work space, march
 STEPS: dict[str, Step] = {"imex": (imex_work, march_imex), "explicit": (explicit_work, march_explicit)}
+
+
+class Paused(NamedTuple):
+    """A run at its end, as another batch goes on with it; a copy, which keeps no batch alive.
+
+    Attributes
+    ----------
+    time : float
+        Simulated time [s].
+    lane : tuple of (rows, fields) arrays
+        Its lane of all that a batch keeps by lanes, in the order of `lane_arrays`.
+    rows : (done, S + C) array
+        Its history, as `LaneRun.rows`.
+    """
+
+    time: float
+    lane: tuple[np.ndarray, ...]
+    rows: np.ndarray
+
+
+def lane_arrays(*parts: Any) -> Iterator[LaneArray]:
+    """Yield the arrays of lanes in nested tuples, such as a LaneState or a step's work space."""
+    for part in parts:
+        if isinstance(part, LaneArray):
+            yield part
+        elif isinstance(part, tuple):
+            yield from lane_arrays(*part)
 
 
 class Batch:
@@ -193,3 +232,87 @@ class Batch:
                 ordered[k, :, : self._recorded] = earlier.T
             self._ordered = ordered
         return self._ordered[lane].T
+
+
+class LaneRun(RecordedRun):
+    """One run of a batch; attributes as of `RecordedRun`.
+
+    Parameters
+    ----------
+    batch : Batch
+        Which it belongs to.
+    lane : int
+        Its lane there.
+
+    Attributes
+    ----------
+    batch : Batch
+        As given.
+    step : float
+        Time step [s].
+    """
+
+    def __init__(self, batch: Batch, lane: int) -> None:
+        super().__init__(batch.points[lane], batch.plan, batch.profiles[1].data[:, :, lane])
+        self.batch, self.step = batch, batch.step
+        self._lane = lane
+
+    @property
+    def failure(self) -> tuple[Status, str] | None:
+        """What has gone wrong, where the run cannot go on."""
+        outcome = int(self._ended(OUTCOME))
+        return FAILURES[Outcome(outcome)] if outcome else None
+
+    def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
+        """Whether a run that reached its end is not to be trusted, as `RecordedRun` has it; or its step."""
+        found = super().numerical_doubt(record)
+        if found is None and self.batch.stepper == "imex":
+            found = step_doubt(self.step, transverse_limit(self.parameters))
+        return found
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._ended(ENDED_AT)
+
+    @property
+    def state(self) -> State:
+        """The present state; a copy."""
+        return take_lane(self.batch.state, self._lane, self.batch.belts[self._lane])
+
+    def paused(self) -> Paused:
+        """What a batch of the same point over a longer time goes on from."""
+        kept = lane_arrays(self.batch.state, self.batch.work, self.batch.ended)
+        lane = tuple(array.data[:, :, self._lane].copy() for array in kept)
+        return Paused(float(self.batch.state.time[0]), lane, self.rows.copy(order="K"))
+
+    @property
+    def done(self) -> int:
+        """Samples recorded so far, up to the one at which the run failed."""
+        taken = round(self.time / self.interval)
+        return taken if self.failure is None else taken - 1
+
+    @property
+    def steps(self) -> int:
+        """Steps taken so far."""
+        return round((self.time - self.batch.begun) / self.step)
+
+    @property
+    def contact_solves(self) -> int:
+        """Linear solves of the contact problem so far."""
+        return int(self._ended(CONTACT_SOLVES))
+
+    def counters(self) -> dict[str, int]:
+        """Work done so far, by its name."""
+        counts = {"steps": self.steps, "contact_solves": self.contact_solves}
+        if self.batch.stepper == "imex":
+            counts["repeats"] = int(self._ended(REPEATED))
+        return counts
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C)."""
+        return self.batch.history(self._lane)[: self.done]
+
+    def _ended(self, what: int) -> float:
+        return float(self.batch.ended.data[0, what, self._lane])

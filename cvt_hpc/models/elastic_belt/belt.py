@@ -25,9 +25,6 @@ TIME, DRIVEN_SPEED, DRIVEN_POSITION, LAYER_WORK = range(len(SCALARS))
 
 REGIONS = ("driving arc", "t1", "driven arc", "t2")
 MODES = 5  # half waves along a strand that are told apart
-START_DAMPING = (
-    1e4  # [N s/m^2], fades out over rise_time: lets the belt settle in the grooves without ringing
-)
 
 
 class Belt(NamedTuple):
@@ -177,7 +174,7 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     ]
     law = given_law(p)
     quantity = ramped(p)
-    return Belt(
+    computed = dict(
         cell=cell,
         dual=dual,
         per_cell=1.0 / cell,
@@ -191,38 +188,22 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
         ring_relief=ring_mass * belt_speed * belt_speed,
         element_mass=p["longitudinal_mass"] * p["element_mass"],
         mass=p["element_mass"] + p["ring_mass"],
-        bending_stiffness=p["bending_stiffness"],
         belt_speed=belt_speed,
-        element_stiffness=p["element_stiffness"],
-        ring_stiffness=p["ring_stiffness"],
-        element_damping=p["element_damping"],
         bridging_stiffness=np.inf,
-        ring_damping=p["ring_damping"],
-        transverse_damping=p["transverse_damping"],
-        ring_offset=p["ring_offset"],
-        ring_friction=p["ring_friction"],
-        ring_friction_speed=p["ring_friction_speed"],
         law=law,
-        friction_speed=p["friction_speed"],
-        friction_memory=p["friction_memory"],
-        half_wedge_angle=p["half_wedge_angle"],
         driving=wraps[0],
         driven=wraps[1],
         driven_start=grid.starts[2],
         driving_radius=path.driving_radius,
         driven_radius=path.driven_radius,
-        driving_speed=p["driving_speed"],
-        driving_position=p["driving_position"],
-        driven_inertia=p["driven_inertia"],
         axial_damping=p["sheave_lag"] * p["lag_stiffness"],
-        thrust=p["thrust"],
-        ratio=p["ratio"],
-        load=p["load"],
         load_start=p["load_start"] if quantity == "load" else p["load"],
         speed_start=p["speed_start"] if quantity == "speed" else p["driving_speed"],
-        rise_time=p["rise_time"],
         ramp_end=p["duration"] if quantity else p["rise_time"],
     )
+    # all else is a parameter of the run, by the same name
+    given = {key: p[key] for key in Belt._fields if key not in computed}
+    return Belt(**computed, **given)
 
 
 def _pair(values: np.ndarray) -> np.ndarray:

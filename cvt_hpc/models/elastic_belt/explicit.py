@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from cvt_hpc.kernels import kernel
+from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import (
     LaneArray,
     ahead,
@@ -23,7 +23,6 @@ from cvt_hpc.lanes import (
     minimum,
     reciprocals,
     select,
-    sqrt,
 )
 from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_FILTERED, V_RING, U, W
 from cvt_hpc.models.elastic_belt.lane_belt import (
@@ -35,7 +34,6 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     DRIVEN_RADIUS,
     DRIVING_CARRY,
     DRIVING_CELL,
-    DRIVING_SPEED,
     ELEMENT_DAMPING,
     ELEMENT_MASS,
     ELEMENT_STIFFNESS,
@@ -50,7 +48,6 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     RING_STIFFNESS,
     SINE,
     SPEED,
-    TRANSVERSE_DAMPING,
     LaneBelt,
     LaneState,
 )
@@ -67,17 +64,19 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     SLIDING_R,
     SLIDING_T,
     advance_pulley,
+    arc_sliding,
     derive,
-    driving_surface,
     lane_acceleration,
     lane_belt_speed,
     lane_carry,
+    lane_damping,
+    lane_pulleys,
     lane_sliding,
     lane_speed_share,
     lane_transverse,
     ring_grip,
-    start_damping,
 )
+from cvt_hpc.physics.flank import flank_shares
 
 # fields of ExplicitWork.stations, after those of `lane_forces`
 SLOPE, DU, DV_0, DV_1, DAMPED_0, DAMPED_1 = range(FIELDS_OF_FORCES, FIELDS_OF_FORCES + 6)
@@ -138,7 +137,7 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
     ring_relief = c[0, RING_RELIEF] * speed_share * speed_share
     acceleration = lane_acceleration(belt, state.time[0], step)
     centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
-    damping = c[0, TRANSVERSE_DAMPING] + start_damping(belt, state.time[0])
+    damping = lane_damping(belt, state.time[0])
     mobility, element_mobility, ring_mobility = step / mass, step / c[0, ELEMENT_MASS], step / ring_mass
     rise, zero = acceleration * step, like(0.0, sine)
     moment = net_left = ring_left = stress_left_0 = stress_left_1 = zero
@@ -174,12 +173,12 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
                 lever = fma(offset, belt.arc_curvature[j], 1.0)
                 grip = ring_grip(belt, j, ring_left, ring_right, ring_relief * longer, ring_friction)
                 drag = grip * stations[j, RING_FACTOR]
-                # Bullinger et al. 2005, eqs 37-39
                 mu, per_speed = stations[j, COEFFICIENT] * stations[j, FACTOR], stations[j, PER_SPEED]
-                upward = mu * (stations[j, SLIDING_R] * per_cosine * per_speed)
-                per_normal, per_ring = reciprocals(fma(upward, sine, cosine), longer * ring_mass)
+                climb = stations[j, SLIDING_R] * per_cosine * per_speed
+                axial_share, radial_share = flank_shares(mu, climb, sine, cosine)
+                per_normal, per_ring = reciprocals(axial_share, longer * ring_mass)
                 twice_normal = (2.0 * share) * stations[j, FORCE] * per_normal
-                outward = fma(twice_normal, fma(-upward, cosine, sine), outward)
+                outward = fma(twice_normal, radial_share, outward)
                 tangential = -twice_normal * (mu * (stations[j, SLIDING_T] * per_speed))
                 is_driven = belt.on_driven[j] > 0.5
                 if anywhere(is_driven):
@@ -236,35 +235,36 @@ def _advance_across(belt: LaneBelt, state: LaneState, stations: LaneArray, step:
     n, fields, c = state.fields.rows, state.fields, belt.constants
     speed_share = lane_speed_share(belt, state.time[0], c[0, BELT_SPEED])
     per_cosine, belt_speed = 1.0 / c[0, COSINE], speed_share * c[0, BELT_SPEED]
-    forget, driven_speed = step * c[0, FORGET], state.scalars[0, SPEED]
+    forget, pulleys = step * c[0, FORGET], lane_pulleys(belt, speed_share, state.scalars[0, SPEED])
     carries = (
         step * lane_carry(belt, DRIVING_CELL, DRIVING_CARRY, belt_speed),
         step * lane_carry(belt, DRIVEN_CELL, DRIVEN_CARRY, belt_speed),
     )
-    turnings = speed_share * c[0, DRIVING_SPEED], driven_speed
-    surfaces = driving_surface(belt, speed_share), driven_speed * c[0, DRIVEN_RADIUS] - belt_speed
     # an arc's second station takes what its first becomes, which may be the last of the part behind
     last = n - 1
-    v0, u = fields[last, V_ELEMENT], fields[last, U] + stations[last, DU]
-    surface = select(belt.on_driven[last] > 0.5, surfaces[1], surfaces[0])
-    turning = select(belt.on_driven[last] > 0.5, turnings[1], turnings[0])
-    v_tangential = v0 - fma(turning, fields[last, W], surface)
-    meridian = fma(belt_speed + v0, stations[last, SLOPE], u) * per_cosine
-    speed = sqrt(fma(meridian, meridian, v_tangential * v_tangential))
+    u = fields[last, U] + stations[last, DU]
+    speed = _sliding_speed(belt, fields, stations, last, pulleys, per_cosine, belt_speed, u)
     before = from_behind(select(belt.enters[last] > 0.5, speed, fields[last, V_FILTERED]))
     for j in range(n):
         u, w = fields[j, U] + stations[j, DU], fields[j, W]
         share = belt.arc_share[j]
         if belt.memory and anywhere(share > 0.0):
-            is_driven = belt.on_driven[j] > 0.5
-            surface = select(is_driven, surfaces[1], surfaces[0])
-            v0, remembered = fields[j, V_ELEMENT], fields[j, V_FILTERED]
-            v_tangential = v0 - fma(select(is_driven, turnings[1], turnings[0]), w, surface)
-            meridian = fma(belt_speed + v0, stations[j, SLOPE], u) * per_cosine
-            speed = sqrt(fma(meridian, meridian, v_tangential * v_tangential))
-            carry = select(is_driven, carries[1], carries[0])
+            remembered = fields[j, V_FILTERED]
+            speed = _sliding_speed(belt, fields, stations, j, pulleys, per_cosine, belt_speed, u)
+            carry = select(belt.on_driven[j] > 0.5, carries[1], carries[0])
             change = fma(carry, before - remembered, forget * (speed - remembered))
             filtered = select(belt.enters[j] > 0.5, speed, remembered + change)
             fields[j, V_FILTERED] = select(share > 0.0, filtered, 0.0)
             before = select(belt.enters[j] > 0.5, speed, remembered)
         fields[j, U], fields[j, W] = u, fma(step, u, w)
+
+
+@merged_kernel
+def _sliding_speed(
+    belt: LaneBelt, fields: LaneArray, stations: LaneArray, j: int, pulleys, per_cosine, belt_speed, u
+):
+    """Sliding speed of station j of an arc at the new velocities [m/s], `u` the transverse one."""
+    v_element = fields[j, V_ELEMENT]
+    v_radial = fma(belt_speed + v_element, stations[j, SLOPE], u)
+    speed, along = arc_sliding(belt, j, pulleys, per_cosine, v_radial, v_element, fields[j, W])
+    return speed

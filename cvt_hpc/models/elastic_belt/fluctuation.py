@@ -32,16 +32,13 @@ hum of gaps too, and a trend of the mean state would: along a ramp of load or sp
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Mesh
 from cvt_hpc.variables import Variable
 from cvt_hpc.vibration.ramped import ramped
-
-if TYPE_CHECKING:
-    from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
 
 ARC_PARTS = 4  # of each wrap, of equal length, from its inlet to its outlet
 
@@ -143,10 +140,10 @@ def fluctuation(means: dict[str, np.ndarray], grid: Mesh, parameters: Mapping[st
         m["stress_power"] - mean_stresses,
         mean_rings - m["push_damping"] @ opening,
     )
-    return Fluctuation(*(_steadiness(p) * power for power in powers))
+    return Fluctuation(*(steadiness(p) * power for power in powers))
 
 
-def _steadiness(parameters: Mapping[str, Any]) -> float:
+def steadiness(parameters: Mapping[str, Any]) -> float:
     """1, or not a number along a ramp: its trend would count as a fluctuation."""
     return np.nan if ramped(parameters) else 1.0
 
@@ -190,27 +187,3 @@ def part_shares(grid: Mesh) -> np.ndarray:
         inside = np.diff(np.clip(edges, borders[:-1, None], borders[1:, None]), axis=1)
         shares[pulley, :, first : first + count + 1] = inside / np.diff(edges)
     return shares
-
-
-def record(run: RecordedRun) -> dict[str, Any]:
-    """Values of VARIABLES from a finished run.
-
-    Parameters
-    ----------
-    run : RecordedRun
-        With all samples recorded.
-    """
-    p, judged, found = run.parameters, run.judged, run.fluctuation
-    shares, dual = part_shares(run.mesh), at_stations(run.mesh.cell)
-    fed = {"flank_fed": shares @ found.flanks, "stress_fed": found.stresses.sum()}
-    lag = run.channel("axial_force driven")[judged].var() / (p["sheave_lag"] * p["lag_stiffness"])
-    taken = {
-        "belt_taken": -found.belt.sum(),
-        "ring_taken": -found.rings.sum(),
-        "layer_taken": run.channel("layer_loss")[judged].mean() - found.mean_layers,
-        "lag_taken": _steadiness(p) * lag,
-        "carried_power": -found.carried.sum(),
-    }
-    remainder = fed["flank_fed"].sum() + fed["stress_fed"] - sum(taken.values())
-    values = fed | taken | {"fluctuation_remainder": remainder}
-    return {"part_flank_loss": -(shares * dual) @ run.means["flank_power"], **values}

@@ -19,11 +19,9 @@ c dt / h about 5, and the transverse contact and bending.
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import anywhere, around, behind, decay, fma, from_ahead, like, minimum, select, sqrt
+from cvt_hpc.lanes import anywhere, around, behind, decay, fma, from_ahead, like, minimum, select
 from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, N_RING, V_ELEMENT, V_FILTERED, V_RING, U, W
-from cvt_hpc.models.elastic_belt.imex_stations import assemble
-from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
-from cvt_hpc.models.elastic_belt.imex_work import (
+from cvt_hpc.models.elastic_belt.imex_stations import (
     DV_0,
     DV_1,
     FLANK,
@@ -37,7 +35,9 @@ from cvt_hpc.models.elastic_belt.imex_work import (
     RING_REVERSING,
     SLOPE,
     ImexWork,
+    assemble,
 )
+from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
 from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
     COSINE,
@@ -46,7 +46,6 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     DRIVEN_RADIUS,
     DRIVING_CARRY,
     DRIVING_CELL,
-    DRIVING_SPEED,
     ELEMENT_DAMPING,
     ELEMENT_STIFFNESS,
     FORGET,
@@ -63,10 +62,11 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     SHORT_0,
     SHORT_1,
     advance_pulley,
+    arc_sliding,
     cell_strains,
-    driving_surface,
     lane_carry,
     lane_contact_forces,
+    lane_pulleys,
     lane_sliding,
     lane_speed_share,
 )
@@ -122,12 +122,9 @@ def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
     speed_share = lane_speed_share(belt, state.time[0], c[0, BELT_SPEED])
     belt_speed, forget, offset = speed_share * c[0, BELT_SPEED], c[0, FORGET], c[0, RING_OFFSET]
     stiffness, damper_0, damper_1 = c[0, ELEMENT_STIFFNESS], c[0, ELEMENT_DAMPING], c[0, RING_DAMPING]
-    driven_speed = state.scalars[0, SPEED]
-    driven_base = driven_speed * like(c[0, DRIVEN_RADIUS], driven_speed) - like(belt_speed, driven_speed)
-    zero = like(0.0, forget)
-    moment = like(0.0, driven_speed)
-    radius, turnings = c[0, DRIVEN_RADIUS], (speed_share * c[0, DRIVING_SPEED], like(driven_speed, zero))
-    surfaces = driving_surface(belt, speed_share), like(driven_base, zero)
+    driven_speed, radius = state.scalars[0, SPEED], c[0, DRIVEN_RADIUS]
+    pulleys = lane_pulleys(belt, speed_share, driven_speed)
+    zero, moment = like(0.0, forget), like(0.0, driven_speed)
     carries = (
         lane_carry(belt, DRIVING_CELL, DRIVING_CARRY, belt_speed),
         lane_carry(belt, DRIVEN_CELL, DRIVEN_CARRY, belt_speed),
@@ -182,10 +179,8 @@ def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
                 tangential = (stations[j, FLANK] - slopes) * (belt.dual[j] * (radius + w))
                 moment = moment - like(select(is_driven, tangential, zero), moment)
             if belt.memory:
-                surface = select(is_driven, surfaces[1], surfaces[0])
-                v_tangential = new_0 - fma(select(is_driven, turnings[1], turnings[0]), w, surface)
-                meridian = fma(belt_speed + new_0, stations[j, SLOPE], u) * per_cosine
-                speed = sqrt(fma(meridian, meridian, v_tangential * v_tangential))
+                v_radial = fma(belt_speed + new_0, stations[j, SLOPE], u)
+                speed, along = arc_sliding(belt, j, pulleys, per_cosine, v_radial, new_0, w)
                 before = fields[j - 1, V_FILTERED] if j > 0 else last_filtered
                 target = fma(select(is_driven, carries[1], carries[0]), before, forget * speed)
                 target = target * select(is_driven, per_rates[1], per_rates[0])

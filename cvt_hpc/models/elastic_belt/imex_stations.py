@@ -1,6 +1,11 @@
-"""The fast step at each station: forces, and slopes with the speeds, without the stresses T and P."""
+"""The fast step at each station: forces, and slopes with the speeds, without the stresses T and P.
+
+And the step's work space: what it keeps at each station beside the state.
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import (
@@ -17,22 +22,6 @@ from cvt_hpc.lanes import (
     select,
 )
 from cvt_hpc.models.elastic_belt.belt import V_ELEMENT, V_RING, U, W
-from cvt_hpc.models.elastic_belt.imex_work import (
-    D_00,
-    D_01,
-    D_11,
-    FLANK,
-    FLANK_CROSS,
-    FLANK_SLOPE,
-    LAG,
-    PUSH,
-    REVERSING,
-    RING_REVERSING,
-    SLOPE,
-    Y_0,
-    Y_1,
-    ImexWork,
-)
 from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
     BENDING_STIFFNESS,
@@ -48,7 +37,6 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     RING_RELIEF,
     RING_STIFFNESS,
     SINE,
-    TRANSVERSE_DAMPING,
     LaneBelt,
     LaneState,
 )
@@ -57,17 +45,50 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     EPS_0,
     EPS_1,
     FACTOR,
+    FIELDS_OF_FORCES,
     FORCE,
     PER_SPEED,
     RING_FACTOR,
     SADDLE,
     SLIDING_T,
     lane_acceleration,
+    lane_damping,
     lane_speed_share,
     lane_transverse,
     ring_grip,
-    start_damping,
 )
+from cvt_hpc.physics.flank import flank_shares
+
+# fields of ImexWork.stations, after those of `lane_forces`
+PUSH, LAG, SLOPE, FLANK, FLANK_SLOPE, FLANK_CROSS = range(FIELDS_OF_FORCES, 23)
+REVERSING, RING_REVERSING, MEETING, AHEAD = range(23, 27)
+D_00, D_01, D_11, Y_0, Y_1 = range(27, 32)
+I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(32, 43)
+FIELDS_OF_WORK = 43
+
+
+class ImexWork(NamedTuple):
+    """Work space of the step.
+
+    Attributes
+    ----------
+    stations : (N, 43) LaneArray
+        The fields of `lane_forces`. Of the step: pending increment of u, its sensitivity to v_element's,
+        slope w_s, of the driven pulley's stations the flanks' tangential force and its slopes, whether (1)
+        linearised friction would turn the sliding of the flanks, or of the saddle, about, whether (1) the
+        elements of the cell ahead of a station meet within the step, and, where they are apart, their strain
+        at its end with the speeds that it begins with; the blocks of the system and its right side;
+        the eliminated system: inverse pivots, the increments of v_element and v_ring, the border, the
+        stresses' slopes with the speeds' differences.
+    """
+
+    stations: LaneArray
+
+
+def imex_work(state: LaneState) -> ImexWork:
+    """Work space for a state; `derive` has to be called before the first step."""
+    rows, _, lanes = state.fields.data.shape
+    return ImexWork(LaneArray(rows, FIELDS_OF_WORK, lanes, state.fields.data.dtype))
 
 
 @merged_kernel
@@ -105,7 +126,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
     ring_relief = c[0, RING_RELIEF] * speed_share * speed_share
     centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
     half_gyroscopic = -0.5 * gyroscopic
-    damping = c[0, TRANSVERSE_DAMPING] + start_damping(belt, state.time[0])
+    damping = lane_damping(belt, state.time[0])
     base_mass = fma(mass, per_step, 0.5 * damping)
     element_rate = element_mass * per_step
     zero = like(0.0, sine)
@@ -149,13 +170,13 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
                 # by the secant friction stops, and never turns the sliding about
                 stiff = select(stations[j, RING_REVERSING] > 0.5, drag / stations[j, SADDLE], stiff)
 
-            # Bullinger et al. 2005, eqs 37-39, with the slopes of friction along and across the sliding
+            # with the slopes of friction along and across the sliding
             mu = coefficient * factor
             climb, run = meridian * per_speed, v_tangential * per_speed
-            upward = mu * climb
-            per_normal, per_stiff = reciprocals(fma(upward, sine, cosine), fma(2.0, stiff, 12.0 * ring))
+            axial_share, radial_share = flank_shares(mu, climb, sine, cosine)
+            per_normal, per_stiff = reciprocals(axial_share, fma(2.0, stiff, 12.0 * ring))
             twice_normal = (2.0 * share) * force * per_normal
-            outward += twice_normal * fma(-upward, cosine, sine)
+            outward += twice_normal * radial_share
             friction = twice_normal * mu
             tangential = -friction * run
             across = friction * per_speed

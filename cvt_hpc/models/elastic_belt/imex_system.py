@@ -19,7 +19,7 @@ from cvt_hpc.lanes import (
     select,
 )
 from cvt_hpc.models.elastic_belt.belt import V_ELEMENT, V_RING, U
-from cvt_hpc.models.elastic_belt.imex_work import (
+from cvt_hpc.models.elastic_belt.imex_stations import (
     AHEAD,
     D_00,
     D_01,

@@ -6,8 +6,6 @@ ones each step's own.
 
 from __future__ import annotations
 
-import numpy as np
-
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import (
     LaneArray,
@@ -31,13 +29,13 @@ from cvt_hpc.lanes import (
 from cvt_hpc.models.elastic_belt.belt import (
     N_ELEMENT,
     N_RING,
-    START_DAMPING,
     V_ELEMENT,
     V_FILTERED,
     V_RING,
     U,
     W,
 )
+from cvt_hpc.models.elastic_belt.course import load_course, speed_course, start_damping
 from cvt_hpc.models.elastic_belt.lane_belt import (
     AXIAL_DAMPING,
     BELT_SPEED,
@@ -64,17 +62,16 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     SPEED,
     START_SHARE,
     THRUST,
+    TRANSVERSE_DAMPING,
     WEDGE,
     LaneBelt,
     LaneState,
 )
+from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
+from cvt_hpc.physics.friction import lane_coefficient, lane_law, lane_table
+from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.lane_compliance import CLOSED, FORCED, GAP, solve_lane_contact
 from cvt_hpc.physics.lane_compliance import PUSH as PUSHED
-from cvt_hpc.physics.lane_friction import (
-    lane_coefficient,
-    lane_law,
-    lane_table,
-)
 from cvt_hpc.physics.lane_gauss_seidel import sweep_lane_contact
 
 MOST_CONTACT_ROUNDS = 200
@@ -138,22 +135,19 @@ def step_ripple(belt: LaneBelt, state: LaneState, stations: LaneArray):
 def lane_load(belt: LaneBelt, time: float, pattern):
     """Torque at the driving pulley [N m], as `rhs.load_at` has it, in lanes like `pattern`."""
     c = belt.constants
-    load, start = like(c[0, LOAD], pattern), like(c[0, LOAD_START], pattern)
-    if time < belt.rise_time:
-        return start * (0.5 * (1.0 - np.cos(np.pi * time / belt.rise_time)))
-    if time < belt.ramp_end:
-        return start + (load - start) * ((time - belt.rise_time) / (belt.ramp_end - belt.rise_time))
-    return load
+    start, load = like(c[0, LOAD_START], pattern), like(c[0, LOAD], pattern)
+    torque = load_course(time, belt.rise_time, belt.ramp_end, start, load)
+    return torque
 
 
 @merged_kernel
 def lane_speed_share(belt: LaneBelt, time: float, pattern):
     """Speed of the driving pulley over `driving_speed`, as `rhs.speed_share_at`, in lanes like `pattern`."""
-    if not belt.speed_ramps or time >= belt.ramp_end:
-        return like(1.0, pattern)
-    start = like(belt.constants[0, START_SHARE], pattern)
-    share = (time - belt.rise_time) / (belt.ramp_end - belt.rise_time)
-    return start + (1.0 - start) * max(share, 0.0)
+    share = like(1.0, pattern)
+    if belt.speed_ramps:
+        start = like(belt.constants[0, START_SHARE], pattern)
+        share = speed_course(time, belt.rise_time, belt.ramp_end, start)
+    return share
 
 
 @merged_kernel
@@ -174,10 +168,30 @@ def lane_acceleration(belt: LaneBelt, time: float, step: float):
 
 
 @merged_kernel
-def driving_surface(belt: LaneBelt, share):
-    """Speed of the driving pulley's surface less the belt speed [m/s], at a share of their nominal values."""
+def lane_pulleys(belt: LaneBelt, share, driven_speed):
+    """Speeds of both pulleys [rad/s], and of their surfaces less the belt speed [m/s], driving and driven.
+
+    `share` is what `lane_speed_share` gives, whose precision they take; `driven_speed` is [rad/s].
+    """
     c = belt.constants
-    return share * (c[0, DRIVING_SPEED] * c[0, DRIVING_RADIUS] - c[0, BELT_SPEED])
+    belt_speed = like(share * c[0, BELT_SPEED], driven_speed)
+    driving = share * (c[0, DRIVING_SPEED] * c[0, DRIVING_RADIUS] - c[0, BELT_SPEED])
+    driven = driven_speed * like(c[0, DRIVEN_RADIUS], driven_speed) - belt_speed
+    return (share * c[0, DRIVING_SPEED], like(driven_speed, share)), (driving, like(driven, share))
+
+
+@merged_kernel
+def arc_sliding(belt: LaneBelt, j: int, pulleys, per_cosine, v_radial, v_element, w):
+    """Sliding speed of station j of an arc [m/s], and the part of it along the belt.
+
+    `pulleys` are those of `lane_pulleys`, `v_radial`, `v_element`, `w` the station's own.
+    """
+    turnings, surfaces = pulleys
+    is_driven = belt.on_driven[j] > 0.5
+    turning = select(is_driven, turnings[1], turnings[0])
+    v_tangential = tangential_sliding(v_element, w, turning, select(is_driven, surfaces[1], surfaces[0]))
+    speed, meridian = flank_sliding(v_radial, v_tangential, per_cosine)
+    return speed, v_tangential
 
 
 @merged_kernel
@@ -196,10 +210,10 @@ def lane_carry(belt: LaneBelt, cell: int, nominal: int, belt_speed):
 
 
 @merged_kernel
-def start_damping(belt: LaneBelt, time: float) -> float:
-    """What the start-up adds to the transverse damping [N s/m^2]."""
-    left = max(1.0 - time / belt.rise_time, 0.0)
-    return START_DAMPING * left * left
+def lane_damping(belt: LaneBelt, time: float):
+    """Transverse damping [N s/m^2], as `rhs.damping_at`."""
+    damping = belt.constants[0, TRANSVERSE_DAMPING] + start_damping(time, belt.rise_time)
+    return damping
 
 
 @kernel
@@ -251,14 +265,21 @@ def lane_transverse(belt: LaneBelt, fields: LaneArray, j: int, net_left, net_rig
 
 
 @merged_kernel
-def ring_grip(belt: LaneBelt, j: int, ring_left, ring_right, relief, friction):
-    """Largest friction of the saddles on the rings at station j of an arc [N/m].
+def saddle_pressure(belt: LaneBelt, j: int, ring_left, ring_right, relief):
+    """Twice the force of the rings on the saddles at station j of an arc [N].
 
     `ring_left`, `ring_right` are T in the cells beside it [N], `relief` what the rings' own weight takes.
     """
     pressure = maximum(ring_right - relief, 0.0) * (belt.cell[j] * belt.curvature[j])
     bent = behind(belt.cell, j, 0) * behind(belt.curvature, j, 0)
     pressure += maximum(ring_left - relief, 0.0) * bent
+    return pressure
+
+
+@merged_kernel
+def ring_grip(belt: LaneBelt, j: int, ring_left, ring_right, relief, friction):
+    """Largest friction of the saddles on the rings at station j of an arc [N/m]; as `saddle_pressure`."""
+    pressure = saddle_pressure(belt, j, ring_left, ring_right, relief)
     return friction * (0.5 * belt.per_dual[j]) * pressure
 
 
@@ -276,9 +297,7 @@ def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -
         row, part = first % n, first // n
         for k in range(contact.weight.size):
             pushed[k, GAP] = fma(slope, at_station(fields, row, part, W), opening)
-            row += 1
-            if row == n:
-                row, part = 0, part + 1
+            row, part = _next_station(n, row, part)
         if contact.sweeps > 0:
             sweep_lane_contact(contact)
         else:
@@ -288,9 +307,16 @@ def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -
             force = select(pushed[k, CLOSED] > 0.5, maximum(pushed[k, PUSHED], 0.0), 0.0)
             pushed[k, FORCED] = force
             set_station(stations, row, part, FORCE, force)
-            row += 1
-            if row == n:
-                row, part = 0, part + 1
+            row, part = _next_station(n, row, part)
+
+
+@merged_kernel
+def _next_station(rows: int, row: int, part: int) -> tuple[int, int]:
+    """Row and part of the station ahead."""
+    row += 1
+    if row == rows:
+        row, part = 0, part + 1
+    return row, part
 
 
 @kernel
@@ -333,34 +359,26 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     n, fields, c = state.fields.rows, state.fields, belt.constants
     kind, memory = belt.law.kind, belt.memory
     table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
-    kinetic, fall, per_scale = lane_law(
-        kind, c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED]
-    )
+    law = lane_law(c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED])
     share = lane_speed_share(belt, state.time[0], c[0, BELT_SPEED])
     per_cosine, belt_speed, offset = 1.0 / c[0, COSINE], share * c[0, BELT_SPEED], c[0, RING_OFFSET]
     least = LEAST_SHARE_OF_WIDTH * c[0, FRICTION_SPEED]
     per_width, per_ring_width = 1.0 / c[0, FRICTION_SPEED], 1.0 / c[0, RING_FRICTION_SPEED]
-    driven_speed = state.scalars[0, SPEED]
-    driven_base = driven_speed * like(c[0, DRIVEN_RADIUS], driven_speed) - like(belt_speed, driven_speed)
-    turnings = share * c[0, DRIVING_SPEED], like(driven_speed, least)
-    surfaces = driving_surface(belt, share), like(driven_base, least)
+    pulleys = lane_pulleys(belt, share, state.scalars[0, SPEED])
     for j in range(n):
         if not anywhere(belt.arc_share[j] > 0.0):
             continue
-        is_driven = belt.on_driven[j] > 0.5
-        surface = select(is_driven, surfaces[1], surfaces[0])
-        turning = select(is_driven, turnings[1], turnings[0])
         full_speed = belt_speed + fields[j, V_ELEMENT]
         slope = (ahead(fields, j, W) - behind(fields, j, W)) * belt.per_span[j]
         v_radial = fma(full_speed, slope, fields[j, U])
-        v_tangential = fields[j, V_ELEMENT] - fma(turning, fields[j, W], surface)
-        meridian = v_radial * per_cosine
-        speed = sqrt(fma(meridian, meridian, v_tangential * v_tangential))
+        speed, v_tangential = arc_sliding(
+            belt, j, pulleys, per_cosine, v_radial, fields[j, V_ELEMENT], fields[j, W]
+        )
         v_law = fields[j, V_FILTERED] if memory else speed
-        if kind == 5:
+        if kind == Law.TABLE:
             coefficient = lane_table(table, v_law, stations[j, FORCE] * per_cosine)
         else:
-            coefficient = lane_coefficient(kind, kinetic, fall, per_scale, v_law)
+            coefficient = lane_coefficient(kind, law, v_law)
         # tanh(x) = (1 - e^-2x) / (1 + e^-2x) for flanks and rings
         speed = maximum(speed, least)
         saddle = fma(fma(offset, belt.arc_curvature[j], 1.0), full_speed, -(belt_speed + fields[j, V_RING]))

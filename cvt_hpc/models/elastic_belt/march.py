@@ -8,7 +8,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, like, merge_parts
 from cvt_hpc.models.elastic_belt.explicit import ExplicitWork, step_explicit
 from cvt_hpc.models.elastic_belt.imex import step_imex
-from cvt_hpc.models.elastic_belt.imex_work import ImexWork
+from cvt_hpc.models.elastic_belt.imex_stations import ImexWork
 from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK, LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES, derive, note_speeds
 from cvt_hpc.models.elastic_belt.sampling import Sensors, sample
@@ -64,12 +64,7 @@ def march_imex(
         for taken in range(steps):
             note_speeds(belt, state, work.stations, taken, steps)
             step_imex(belt, state, work, step)
-        _gather(state, work.stations, sampled, FIELDS_OF_FORCES)
-        sample(sampled.belt, sampled.state, sampled.stations, sensing, rows, k, profiles, ended)
-        # a sample takes it to its end
-        state.scalars[0, LAYER_WORK] = like(
-            sampled.state.scalars[0, LAYER_WORK], state.scalars[0, LAYER_WORK]
-        )
+        _take_sample(state, work.stations, sampled, sensing, rows, k, profiles, ended)
     _gather(state, work.stations, sampled, work.stations.data.shape[1])
 
 
@@ -93,13 +88,26 @@ def march_explicit(
         for taken in range(steps):
             note_speeds(belt, state, work.stations, taken, steps)
             step_explicit(belt, state, work, step)
-        _gather(state, work.stations, sampled, FIELDS_OF_FORCES)
-        sample(sampled.belt, sampled.state, sampled.stations, sensing, rows, k, profiles, ended)
-        # a sample takes it to its end
-        state.scalars[0, LAYER_WORK] = like(
-            sampled.state.scalars[0, LAYER_WORK], state.scalars[0, LAYER_WORK]
-        )
+        _take_sample(state, work.stations, sampled, sensing, rows, k, profiles, ended)
     _gather(state, work.stations, sampled, work.stations.data.shape[1])
+
+
+@kernel
+def _take_sample(
+    state: LaneState,
+    stations: LaneArray,
+    sampled: Sampled,
+    sensing: Sensors,
+    rows: LaneArray,
+    k: int,
+    profiles: LaneArray,
+    ended: LaneArray,
+) -> None:
+    """Sample what is marched, which may be in parts."""
+    _gather(state, stations, sampled, FIELDS_OF_FORCES)
+    sample(sampled.belt, sampled.state, sampled.stations, sensing, rows, k, profiles, ended)
+    # a sample takes it to its end
+    state.scalars[0, LAYER_WORK] = like(sampled.state.scalars[0, LAYER_WORK], state.scalars[0, LAYER_WORK])
 
 
 @kernel

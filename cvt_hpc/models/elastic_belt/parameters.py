@@ -14,7 +14,7 @@ import numpy as np
 
 from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
 from cvt_hpc.physics import capacity
-from cvt_hpc.physics.friction_problems import friction_inert, friction_problems
+from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
 from cvt_hpc.physics.friction_table import friction_file
 from cvt_hpc.physics.geometry import driven_radius, variator, variator_problems
 
@@ -183,7 +183,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "stribeck",
             "",
             "friction of the flanks over sliding speed",
-            choices=("coulomb", "linear", "stribeck", "hyperbolic", "cubic", "table"),
+            choices=FRICTION_LAWS,
         ),
         "friction_gradient": Parameter(
             -0.8,

@@ -21,7 +21,7 @@ distance of two stations alone.
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, sqrt, with_sign_of
+from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, with_sign_of
 from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_FILTERED, V_RING, U, W
 from cvt_hpc.models.elastic_belt.lane_belt import (
     AXIAL_DAMPING,
@@ -32,7 +32,6 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     DRIVEN_RADIUS,
     DRIVING_POSITION,
     DRIVING_RADIUS,
-    DRIVING_SPEED,
     ELEMENT_DAMPING,
     ELEMENT_MASS,
     ELEMENT_STIFFNESS,
@@ -53,7 +52,6 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     SINE,
     SPEED,
     THRUST,
-    TRANSVERSE_DAMPING,
     WEDGE,
     LaneBelt,
     LaneState,
@@ -63,10 +61,11 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     EPS_1,
     FORCE,
     LEAST_SHARE_OF_WIDTH,
-    driving_surface,
+    lane_damping,
     lane_load,
+    lane_pulleys,
     lane_speed_share,
-    start_damping,
+    saddle_pressure,
 )
 from cvt_hpc.models.elastic_belt.moments import (
     add_flanks,
@@ -75,7 +74,9 @@ from cvt_hpc.models.elastic_belt.moments import (
     add_speeds,
     add_stresses,
 )
-from cvt_hpc.physics.lane_friction import lane_coefficient, lane_law, lane_saturation, lane_table
+from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
+from cvt_hpc.physics.friction import lane_coefficient, lane_law, lane_saturation, lane_table
+from cvt_hpc.physics.friction_laws import Law
 
 POWERS = (
     "driving_power",
@@ -137,30 +138,28 @@ def audit(
     n, fields, c, scalars = belt.cell.size, state.fields, belt.constants, state.scalars
     speed = scalars[0, SPEED]
     zero = like(0.0, axial)
-    omega_driven = like(speed, zero)
     speed_share = lane_speed_share(belt, state.time[0], zero)
     belt_speed, sine, cosine, wedge = speed_share * c[0, BELT_SPEED], c[0, SINE], c[0, COSINE], c[0, WEDGE]
     per_cosine, width = 1.0 / cosine, c[0, FRICTION_SPEED]
     per_width, per_ring_width = 1.0 / width, 1.0 / c[0, RING_FRICTION_SPEED]
     kind = belt.law.kind
     table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
-    kinetic, fall, per_scale = lane_law(
-        kind, c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED]
-    )
+    law = lane_law(c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED])
     least = LEAST_SHARE_OF_WIDTH * width
-    damping = c[0, TRANSVERSE_DAMPING] + start_damping(belt, state.time[0])
+    damping = lane_damping(belt, state.time[0])
     element_mass, ring_mass, mass, offset = c[0, ELEMENT_MASS], c[0, RING_MASS], c[0, MASS], c[0, RING_OFFSET]
     ring_stiffness, element_stiffness = c[0, RING_STIFFNESS], c[0, ELEMENT_STIFFNESS]
     element_damping, centrifugal = c[0, ELEMENT_DAMPING], mass * belt_speed * belt_speed
-    driven_base = like(speed * like(c[0, DRIVEN_RADIUS], speed) - like(belt_speed, speed), zero)
-    omega, radius, opening_0 = speed_share * c[0, DRIVING_SPEED], c[0, DRIVING_RADIUS], c[0, DRIVING_POSITION]
-    surface, ring_relief = driving_surface(belt, speed_share), c[0, RING_RELIEF] * speed_share * speed_share
+    turnings, surfaces = lane_pulleys(belt, speed_share, speed)
+    omega, surface = turnings[0], surfaces[0]
+    radius, opening_0 = c[0, DRIVING_RADIUS], c[0, DRIVING_POSITION]
+    ring_relief = c[0, RING_RELIEF] * speed_share * speed_share
     summed = profiles.rows > 0
     driving = driving_rub = rub = ring_loss = belt_loss = seating = zero
-    stored = 0.5 * c[0, DRIVEN_INERTIA] * omega_driven * omega_driven
+    stored = 0.5 * c[0, DRIVEN_INERTIA] * turnings[1] * turnings[1]
     for j in range(n):
         if j == belt.driven_start:
-            surface, omega, radius = driven_base, omega_driven, c[0, DRIVEN_RADIUS]
+            omega, surface, radius = turnings[1], surfaces[1], c[0, DRIVEN_RADIUS]
             opening_0 = like(scalars[0, POSITION], zero)
             driving_rub, rub = rub, zero
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
@@ -201,14 +200,14 @@ def audit(
                 add_forces(profiles, j, across, u, across * slope, v_element)
             continue
         force = stations[j, FORCE]
-        v_tangential = v_element - fma(omega, w, surface)
-        meridian = v_radial * per_cosine
-        sliding = maximum(sqrt(fma(meridian, meridian, v_tangential * v_tangential)), least)
+        v_tangential = tangential_sliding(v_element, w, omega, surface)
+        sliding, meridian = flank_sliding(v_radial, v_tangential, per_cosine)
+        sliding = maximum(sliding, least)
         v_law = fields[j, V_FILTERED] if belt.memory else sliding
-        if kind == 5:
+        if kind == Law.TABLE:
             mu = lane_table(table, v_law, force * per_cosine)
         else:
-            mu = lane_coefficient(kind, kinetic, fall, per_scale, v_law)
+            mu = lane_coefficient(kind, law, v_law)
         mu *= lane_saturation(sliding, per_width)
         upward = mu * meridian / sliding
         twice_normal = 2.0 * force / fma(upward, sine, cosine)
@@ -226,11 +225,8 @@ def audit(
             add_flanks(profiles, j, radial, tangential, v_radial, v_tangential)
         lever = fma(offset, belt.arc_curvature[j], 1.0)
         saddle = fma(lever, v0, -v1)
-        relief = ring_relief * longer
-        pressure = maximum(ring_stiffness * stretched - relief, 0.0) * (right * belt.curvature[j])
-        pressure += maximum(ring_stiffness * stations[a, EPS_1] - relief, 0.0) * (
-            belt.cell[a] * belt.curvature[a]
-        )
+        ring_left = ring_stiffness * stations[a, EPS_1]
+        pressure = saddle_pressure(belt, j, ring_left, tension, ring_relief * longer)
         grip = c[0, RING_FRICTION] * 0.5 * pressure
         drag = with_sign_of(grip * lane_saturation(absolute(saddle), per_ring_width), saddle)
         ring_loss += drag * saddle

@@ -238,6 +238,30 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
         "loss": loss,
         "power_residual": open_power / max(abs(mean("driving_power")), loss),
         "step_ripple": np.sqrt(np.mean(run.channel("step_ripple")[judged] ** 2)),
-        **fluctuation.record(run),
+        **fluctuation_record(run),
         "least_strand_force": run.channel("least_strand_force")[judged].min(),
     }
+
+
+def fluctuation_record(run: RecordedRun) -> dict[str, Any]:
+    """Values from a finished run of `fluctuation.VARIABLES`.
+
+    Parameters
+    ----------
+    run : RecordedRun
+        With all samples recorded.
+    """
+    p, judged, found = run.parameters, run.judged, run.fluctuation
+    shares, dual = fluctuation.part_shares(run.mesh), fluctuation.at_stations(run.mesh.cell)
+    fed = {"flank_fed": shares @ found.flanks, "stress_fed": found.stresses.sum()}
+    lag = run.channel("axial_force driven")[judged].var() / (p["sheave_lag"] * p["lag_stiffness"])
+    taken = {
+        "belt_taken": -found.belt.sum(),
+        "ring_taken": -found.rings.sum(),
+        "layer_taken": run.channel("layer_loss")[judged].mean() - found.mean_layers,
+        "lag_taken": fluctuation.steadiness(p) * lag,
+        "carried_power": -found.carried.sum(),
+    }
+    remainder = fed["flank_fed"].sum() + fed["stress_fed"] - sum(taken.values())
+    values = fed | taken | {"fluctuation_remainder": remainder}
+    return {"part_flank_loss": -(shares * dual) @ run.means["flank_power"], **values}

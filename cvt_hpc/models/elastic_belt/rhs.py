@@ -30,7 +30,6 @@ from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_SPEED,
     N_ELEMENT,
     N_RING,
-    START_DAMPING,
     TIME,
     V_ELEMENT,
     V_FILTERED,
@@ -40,6 +39,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     U,
     W,
 )
+from cvt_hpc.models.elastic_belt.course import load_course, speed_course, start_damping
 from cvt_hpc.physics.compliance import ContactState, solve_contact
 from cvt_hpc.physics.flank import flank_forces, sliding
 from cvt_hpc.physics.friction import friction_coefficient, saturation
@@ -49,22 +49,15 @@ from cvt_hpc.physics.sheaves import Sheaves
 @merged_kernel
 def load_at(belt: Belt, time: float) -> float:
     """Torque at the driving pulley [N m]: a smooth rise to load_start, then linear to load."""
-    if time < belt.rise_time:
-        return belt.load_start * 0.5 * (1.0 - np.cos(np.pi * time / belt.rise_time))
-    if time < belt.ramp_end:
-        share = (time - belt.rise_time) / (belt.ramp_end - belt.rise_time)
-        return belt.load_start + (belt.load - belt.load_start) * share
-    return belt.load
+    load = load_course(time, belt.rise_time, belt.ramp_end, belt.load_start, belt.load)
+    return load
 
 
 @merged_kernel
 def speed_share_at(belt: Belt, time: float) -> float:
     """Speed of the driving pulley over driving_speed [1]: that of speed_start, from rise_time linear to 1."""
-    if time >= belt.ramp_end:
-        return 1.0
-    start = belt.speed_start / belt.driving_speed
-    share = (time - belt.rise_time) / (belt.ramp_end - belt.rise_time)
-    return start + (1.0 - start) * max(share, 0.0)
+    share = speed_course(time, belt.rise_time, belt.ramp_end, belt.speed_start / belt.driving_speed)
+    return share
 
 
 @merged_kernel
@@ -79,8 +72,8 @@ def belt_acceleration_at(belt: Belt, time: float) -> float:
 @merged_kernel
 def damping_at(belt: Belt, time: float) -> float:
     """Transverse damping [N s/m^2]: the belt's own, and the start-up's until rise_time."""
-    left = max(1.0 - time / belt.rise_time, 0.0)
-    return belt.transverse_damping + START_DAMPING * left * left
+    damping = belt.transverse_damping + start_damping(time, belt.rise_time)
+    return damping
 
 
 @merged_kernel

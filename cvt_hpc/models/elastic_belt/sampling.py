@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from enum import IntEnum
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, select
-from cvt_hpc.models.elastic_belt.belt import MODES, REGIONS, V_ELEMENT, Mesh, W
+from cvt_hpc.models.elastic_belt.belt import FIELDS, MODES, REGIONS, V_ELEMENT, Mesh, W
 from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
-    DRIVEN_RADIUS,
     DRIVING_SPEED,
     ELEMENT_STIFFNESS,
     MASS,
@@ -29,13 +28,14 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     EPS_0,
     EPS_1,
     FORCE,
-    driving_surface,
     lane_load,
+    lane_pulleys,
     lane_speed_share,
     step_ripple,
 )
 from cvt_hpc.models.elastic_belt.moments import MOMENTS, add
 from cvt_hpc.models.elastic_belt.power import POWERS, audit
+from cvt_hpc.physics.flank import tangential_sliding
 from cvt_hpc.physics.lane_compliance import SOLVES, UNSOLVED
 
 SCALARS = (
@@ -55,8 +55,11 @@ SCALARS = (
     "least_strand_force",
     "driving_speed",
 )
+Scalar: Any = IntEnum("Scalar", [name.upper().replace(" ", "_") for name in SCALARS], start=0)
 CHANNELS = (*SCALARS, *POWERS, "step_ripple")
+STEP_RIPPLE = CHANNELS.index("step_ripple")
 PROFILES = (*MOMENTS, "contact_force", "mean_displacement")
+CONTACT_FORCE, MEAN_DISPLACEMENT = range(len(MOMENTS), len(PROFILES))
 
 LARGEST_DISPLACEMENT = 10e-3  # [m]: the belt has left its grooves
 LARGEST_STRAIN = 0.05  # of the rings, which break at 1 %
@@ -208,48 +211,48 @@ def sample(
     speed = state.scalars[0, SPEED]
     share = lane_speed_share(belt, state.time[0], zero)
     belt_speed = share * c[0, BELT_SPEED]
-    rows[k, sensed] = lane_load(belt, state.time[0], speed)
-    rows[k, sensed + 1], rows[k, sensed + 2] = speed, state.scalars[0, POSITION]
+    rows[k, sensed + Scalar.LOAD] = lane_load(belt, state.time[0], speed)
+    rows[k, sensed + Scalar.DRIVEN_SPEED] = speed
+    rows[k, sensed + Scalar.DRIVEN_POSITION] = state.scalars[0, POSITION]
     element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
     centrifugal = c[0, MASS] * belt_speed * belt_speed
     least = like(np.inf, zero)
     for strand in range(2):
         middle = sensing.middles[strand]
-        rows[k, sensed + 3 + strand] = ring_stiffness * stations[middle, EPS_1]
-        rows[k, sensed + 5 + strand] = maximum(-element_stiffness * stations[middle, EPS_0], 0.0)
+        rows[k, sensed + Scalar.RING_TENSION_T1 + strand] = ring_stiffness * stations[middle, EPS_1]
+        rows[k, sensed + Scalar.PUSH_FORCE_T1 + strand] = maximum(
+            -element_stiffness * stations[middle, EPS_0], 0.0
+        )
         for j in range(sensing.starts[strand], sensing.stops[strand]):
             net = ring_stiffness * stations[j, EPS_1]
             net = fma(element_stiffness, minimum(stations[j, EPS_0], 0.0), net)
             least = minimum(net, least)
-    rows[k, sensed + 13] = least - centrifugal
-    rows[k, sensed + 14] = like(c[0, DRIVING_SPEED], speed) * lane_speed_share(belt, state.time[0], speed)
-    driven_speed = like(speed, zero)
-    driven_surface = like(speed * like(c[0, DRIVEN_RADIUS], speed) - like(belt_speed, speed), zero)
+    rows[k, sensed + Scalar.LEAST_STRAND_FORCE] = least - centrifugal
+    driving_speed = like(c[0, DRIVING_SPEED], speed) * lane_speed_share(belt, state.time[0], speed)
+    rows[k, sensed + Scalar.DRIVING_SPEED] = driving_speed
+    turnings, surfaces = lane_pulleys(belt, share, speed)
     axial = zero
     for wrap in range(2):
         weight = state.contacts[1].weight if wrap else state.contacts[0].weight
         first = belt.driven_start if wrap else 0
-        surface, turning = driving_surface(belt, share), share * c[0, DRIVING_SPEED]
-        if wrap:
-            surface, turning = driven_surface, driven_speed
+        turning, surface = turnings[wrap], surfaces[wrap]
         axial = sliding = open_length = zero
         length = 0.0
         for i in range(weight.size):
             force = stations[first + i, FORCE]
-            slides = fields[first + i, V_ELEMENT] - fma(turning, fields[first + i, W], surface)
+            slides = tangential_sliding(fields[first + i, V_ELEMENT], fields[first + i, W], turning, surface)
             axial += weight[i] * force
             sliding += weight[i] * force * slides
             open_length += select(force > 0.0, zero, weight[i])
             length += weight[i]
-        rows[k, sensed + 7 + wrap] = axial
-        rows[k, sensed + 9 + wrap] = sliding / (maximum(axial, 1e-9) * belt_speed)
-        rows[k, sensed + 11 + wrap] = open_length / length
+        rows[k, sensed + Scalar.AXIAL_FORCE_DRIVING + wrap] = axial
+        rows[k, sensed + Scalar.SLIP_DRIVING + wrap] = sliding / (maximum(axial, 1e-9) * belt_speed)
+        rows[k, sensed + Scalar.OPEN_SHARE_DRIVING + wrap] = open_length / length
     audit(belt, state, stations, axial, sensing.interval, rows, k, sensed + len(SCALARS), profiles)
-    rows[k, sensed + len(CHANNELS) - 1] = step_ripple(belt, state, stations)
-    column = len(MOMENTS)
+    rows[k, sensed + STEP_RIPPLE] = step_ripple(belt, state, stations)
     for j in range(profiles.rows):
-        add(profiles, j, column, stations[j, FORCE])
-        add(profiles, j, column + 1, fields[j, W])
+        add(profiles, j, CONTACT_FORCE, stations[j, FORCE])
+        add(profiles, j, MEAN_DISPLACEMENT, fields[j, W])
 
 
 @kernel
@@ -258,7 +261,7 @@ def _watch(belt: LaneBelt, state: LaneState, stations: LaneArray, ended: LaneArr
     n, fields = belt.cell.size, state.fields
     content = largest = strain = element_strain = like(0.0, fields[0, W])
     for j in range(n):
-        for field in range(7):
+        for field in range(len(FIELDS)):
             # 0 times what is not a number or infinite is not a number
             content = fma(fields[j, field], 0.0, content)
         largest = maximum(absolute(fields[j, W]), largest)
@@ -268,16 +271,16 @@ def _watch(belt: LaneBelt, state: LaneState, stations: LaneArray, ended: LaneArr
     total = fma(speed, 0.0, fma(state.scalars[0, POSITION], 0.0, like(content, speed)))
     nominal = like(c[0, DRIVING_SPEED] / c[0, RATIO], speed)
     nominal = nominal * lane_speed_share(belt, state.time[0], speed)
-    code = like(0.0, speed)
+    code = like(Outcome.OK.value, speed)
     beyond = maximum(like(element_strain, speed) - LARGEST_ELEMENT_STRAIN, 0.0)
     beyond = maximum(like(strain, speed) - LARGEST_STRAIN, beyond)
-    code = select(beyond > 0.0, 4.0, code)
+    code = select(beyond > 0.0, Outcome.OVERSTRAINED.value, code)
     unsolved = state.contacts[0].scalars[0, UNSOLVED] + state.contacts[1].scalars[0, UNSOLVED]
-    code = select(like(unsolved, speed) > 0.0, 1.0, code)
-    code = select(speed < LEAST_SPEED * nominal, 5.0, code)
-    code = select(speed > MOST_SPEED * nominal, 6.0, code)
-    code = select(like(largest, speed) > LARGEST_DISPLACEMENT, 3.0, code)
-    code = select(total <= 0.0, code, 2.0)
+    code = select(like(unsolved, speed) > 0.0, Outcome.NO_CONTACT_SOLUTION.value, code)
+    code = select(speed < LEAST_SPEED * nominal, Outcome.SLIPPED_THROUGH.value, code)
+    code = select(speed > MOST_SPEED * nominal, Outcome.RAN_AWAY.value, code)
+    code = select(like(largest, speed) > LARGEST_DISPLACEMENT, Outcome.LEFT_THE_GROOVES.value, code)
+    code = select(total <= 0.0, code, Outcome.NOT_FINITE.value)
     running = ended[0, OUTCOME] < 0.5
     ended[0, ENDED_AT] = select(running, like(state.time[0], speed), ended[0, ENDED_AT])
     solves = state.contacts[0].scalars[0, SOLVES] + state.contacts[1].scalars[0, SOLVES]

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cvt_hpc.models.elastic_belt import OWN_STEPPERS
-from cvt_hpc.models.elastic_belt.batch import Batch
-from cvt_hpc.models.elastic_belt.lane_run import LaneRun
+from cvt_hpc.models.elastic_belt.batch import Batch, LaneRun
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS
 from cvt_hpc.models.marched import BatchOfOne, batches_of_one
 from cvt_hpc.variables import Status

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from cvt_hpc.parameters import Parameter, not_negative, positive
-from cvt_hpc.physics.friction_problems import friction_inert, friction_problems
+from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
 from cvt_hpc.physics.friction_table import friction_file
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
@@ -48,7 +48,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "coulomb",
             "",
             "friction of the mass over sliding speed",
-            choices=("coulomb", "linear", "stribeck", "hyperbolic", "cubic", "table"),
+            choices=FRICTION_LAWS,
         ),
         "friction_gradient": Parameter(
             0.0,

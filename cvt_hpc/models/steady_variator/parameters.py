@@ -7,7 +7,7 @@ from typing import Any
 from cvt_hpc.models import elastic_belt
 from cvt_hpc.models.elastic_belt.parameters import shape_problems
 from cvt_hpc.parameters import Parameter
-from cvt_hpc.physics.friction_problems import friction_problems
+from cvt_hpc.physics.friction_laws import friction_problems
 
 OF_THE_COURSE = {
     "load_history": "constant",
