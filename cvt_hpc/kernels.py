@@ -44,6 +44,7 @@ from typing import Any, NamedTuple
 
 import numba
 from numba import types
+from numba.core import compiler_lock
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.event import Event, Listener, register
 from numba.core.registry import CPUDispatcher
@@ -93,11 +94,12 @@ class _Kernel(CPUDispatcher):
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Compile for a call from another kernel."""
-        before, self._for_kernel = self._for_kernel, True
-        try:
-            found = super().get_call_template(args, kws)
-        finally:
-            self._for_kernel = before
+        with compiler_lock.global_compiler_lock:  # another thread may call it from Python
+            before, self._for_kernel = self._for_kernel, True
+            try:
+                found = super().get_call_template(args, kws)
+            finally:
+                self._for_kernel = before
         _, _, kinds, _ = found
         caller = ConfigStack.top_or_none()
         if caller and not caller.nrt and _holds(self.overloads[kinds].signature.return_type, types.Array):
@@ -107,11 +109,12 @@ class _Kernel(CPUDispatcher):
     def compile(self, sig: Any) -> Any:
         """Compile for a call, or find the machine code of an earlier one."""
         kinds, _ = normalize_signature(sig)
-        if not self._for_kernel and kinds in self._without_entry:
-            self._without_entry.remove(kinds)
-            del self.overloads[kinds]
-        self._takes_lanes = any(_holds(kind, LaneArrayKind) for kind in kinds)
-        return super().compile(sig)
+        with compiler_lock.global_compiler_lock:
+            if not self._for_kernel and kinds in self._without_entry:
+                self._without_entry.remove(kinds)
+                del self.overloads[kinds]
+            self._takes_lanes = any(_holds(kind, LaneArrayKind) for kind in kinds)
+            return super().compile(sig)
 
     def add_overload(self, cres: Any) -> None:
         """Take machine code."""

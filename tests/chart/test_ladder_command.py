@@ -135,6 +135,7 @@ def test_check_tells_the_runs_of_each_rung_and_what_is_left_of_them(job, capsys,
     assert cost_left(cheapest, Path("out/small")) == (0, 0.0) and cost_left(cheapest, None)[0] == 1
 
 
+@pytest.mark.slow
 def test_a_ladder_leaves_its_studies_and_what_they_say(job, capsys):
     out = job.parent / "out"
     assert main(["ladder", str(job), "--out", str(out)]) == 0

@@ -55,6 +55,7 @@ def by_formula(case, values):
     return 2.0 * np.tan(belt.half_wedge_angle) * np.sqrt(belt.driven.element_stiffness / belt.mass)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_the_limit_is_that_of_formula_and_eigenvalue(case):
     values = CASES[case]

@@ -5,6 +5,7 @@ not make them part of a sound model: runs look orderly and depend on the mesh (j
 """
 
 import numpy as np
+import pytest
 from belts import eigenvalues
 
 STEEP = {"friction_gradient": -1.2}
@@ -17,6 +18,7 @@ def growing(memory, stations):
     return found.real, found.imag / (2.0 * np.pi)
 
 
+@pytest.mark.slow
 def test_without_memory_what_grows_is_the_mesh_s():
     highest = []
     for stations in (48, 96):
@@ -28,6 +30,7 @@ def test_without_memory_what_grows_is_the_mesh_s():
     assert highest[1] > 1.5 * highest[0]
 
 
+@pytest.mark.slow
 def test_with_memory_what_grows_is_a_vibration_of_strands_or_nothing():
     for stations in (48, 96):
         rates, frequencies = growing(0.3e-3, stations)

@@ -142,6 +142,7 @@ def most_moment(driven_wrap):
     return step * RADII[1], small
 
 
+@pytest.mark.slow
 def test_the_most_that_the_band_carries():
     wrap = band_of_the_belt(96)[0].path.driven_wrap
     moment, _ = most_moment(wrap)

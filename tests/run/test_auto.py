@@ -128,6 +128,7 @@ def test_half_of_what_rigid_pulleys_carry_is_carried(scene):
     assert scene == {"ratio": 1.2} or found[3]["vibrates"] == Vibrates.SLIPS
 
 
+@pytest.mark.slow
 def test_each_cell_is_answered_by_the_cheapest_rung_that_can():
     found = records("auto")
     assert [record["rung"] for record in found] == [Rung.COARSE, Rung.COARSE, Rung.FULL]

@@ -150,6 +150,7 @@ UNTIL, FAILS = {2: 2 * T, 3: 9.0, 7: 2 * T}, {4: STEPS, 5: 1000, 7: 2 * STEPS}
 POINTS = [{"seed": seed} | ({"load": 500.0} if seed == 6 else {}) for seed in range(1, 8)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_neighbours_that_are_refined_or_prolonged_change_nothing(script, precision):
     script[0].update(UNTIL)

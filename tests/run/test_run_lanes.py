@@ -60,6 +60,7 @@ def together(method):
     return run_points(of(method), points(method), never)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_records_are_those_of_the_runs_alone(method):
     records = together(method)

@@ -78,6 +78,7 @@ def test_forces_along_a_rising_ramp_are_those_of_constant_speeds():
         assert extra == pytest.approx(more, rel=0.2)
 
 
+@pytest.mark.slow
 def test_onset_and_end_are_where_constant_speeds_have_them():
     inside, outside = (2100.0, 3900.0), (1980.0, 4000.0)
     for speeds, expected in ((inside, Vibrates.YES), (outside, Vibrates.NO)):

@@ -4,6 +4,7 @@ import json
 import signal
 
 import numpy as np
+import pytest
 import xarray as xr
 from study_double import Axis, Job, Simulator, logistic_numbers
 from study_processes import wait_until
@@ -68,6 +69,7 @@ def test_a_failed_run_is_not_repeated_for_its_history(tmp_path):
     assert simulator.runs == RUNS
 
 
+@pytest.mark.slow
 def test_a_system_that_refuses_a_history_ends_the_sweep_with_one_error(start, tmp_path):
     (tmp_path / "histories").write_text("in the way")
     options = {"out": tmp_path, "runs": RUNS, "histories": [5], "parameters": {"pause": 0.02}}

@@ -1,6 +1,7 @@
 """Model auto as a sweep: the same on two ranks as on one, CF conventions kept, drawn as any map, and checked."""
 
 import numpy as np
+import pytest
 from cf import cf_findings
 from sweeps import call
 
@@ -23,6 +24,7 @@ duration = "0.3 s"
 CHECKED = ("--audit", "0.7", "--check-step", "0.9")
 
 
+@pytest.mark.slow
 def test_two_ranks_their_audit_and_the_check_of_their_step(tmp_path):
     (tmp_path / "a.toml").write_text(JOB)
     printed, datasets = [], []

@@ -128,6 +128,7 @@ def test_costs_are_estimated_by_what_is_on_record(serial):
     assert "record" not in estimate["other"]
 
 
+@pytest.mark.slow
 def test_two_ranks_give_the_same_bits(serial, folder):
     done = call("run", "small.toml", "--out", "two", cwd=folder, ranks=2)
     assert done.returncode == 0, done.stderr
@@ -135,6 +136,7 @@ def test_two_ranks_give_the_same_bits(serial, folder):
     assert_same_numbers(load_results(folder / "two"), load_results(serial))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [0, 2])
 def test_kill_9_at_any_moment_and_resume(meshes, tmp_path, ranks):
     (tmp_path / "meshes.toml").write_text(MESHES)
@@ -156,6 +158,7 @@ def test_kill_9_at_any_moment_and_resume(meshes, tmp_path, ranks):
     assert frames_written(out) == meshes["status"].size
 
 
+@pytest.mark.slow
 def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):
     at = ("--at", "load=120 N m", "--at", "lanes=runs")
     done = call("simulate", "small.toml", *at, "--out", "h.nc", "--plot", "h.png", cwd=folder)
@@ -183,6 +186,7 @@ def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):
         assert len(picture.convert("RGB").getcolors(1 << 20)) > 20
 
 
+@pytest.mark.slow
 def test_simulate_of_a_run_that_fails_ends_with_1_and_still_draws(folder):
     bare = ["--set", "most_refinements=0"]  # else the run is done again at half the step, and well
     done = call("simulate", "small.toml", "--at", "step=20 us", *bare, "--plot", "f.png", cwd=folder)
@@ -199,6 +203,7 @@ def ink(picture, colour, tolerance=12):
     return int((np.abs(pixels - wanted).max(axis=2) <= tolerance).sum())
 
 
+@pytest.mark.slow
 def test_runs_with_a_step_too_long_are_failed_on_the_map_not_quiet(folder):
     job = JOB.replace("sheave_stiffness = [1.0, inf]", 'step = ["2.5 us", "50 us"]').replace(
         ', "500 N m"', ""

@@ -1,6 +1,7 @@
 """The elastic belt checked by its explicit step, and compared with itself at a coarse one."""
 
 import numpy as np
+import pytest
 
 from cvt_hpc.cli import main
 from cvt_hpc.study import open_results
@@ -23,6 +24,7 @@ duration = "40 ms"
 EXPLICITLY = ("--check-step", "1", "--check-step-by", "explicit")
 
 
+@pytest.mark.slow
 def test_a_study_is_checked_by_the_explicit_step_and_compared_with_it(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "b.toml").write_text(JOB)
