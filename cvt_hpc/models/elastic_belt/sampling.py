@@ -55,7 +55,14 @@ SCALARS = (
     "least_strand_force",
     "driving_speed",
 )
-Scalar: Any = IntEnum("Scalar", [name.upper().replace(" ", "_") for name in SCALARS], start=0)
+
+
+def _places(names: tuple[str, ...]) -> Any:
+    """Place of each name, by the name in capitals."""
+    return IntEnum("Scalar", [name.upper().replace(" ", "_") for name in names], start=0)
+
+
+Scalar = _places(SCALARS)
 CHANNELS = (*SCALARS, *POWERS, "step_ripple")
 STEP_RIPPLE = CHANNELS.index("step_ripple")
 PROFILES = (*MOMENTS, "contact_force", "mean_displacement")
