@@ -32,7 +32,7 @@ def test_a_chart_is_fit_to_be_made(path):
         assert all(setting > reference.setting for setting in finest)
 
 
-@pytest.mark.parametrize("command", ["check", "run", "simulate"])
+@pytest.mark.parametrize("command", ["run", "simulate"])
 def test_a_chart_is_no_job_of_runs(command, capsys):
     assert main([command, str(CHARTS[0])]) == 2
     error = capsys.readouterr().err

@@ -104,6 +104,7 @@ def test_one_rank_tells_what_is_compiled(tmp_path, rank, told):
             logging.getLogger("cvt_hpc.kernels").info("compiling")
             raise InputError("and ended")
         cvt_hpc.job.load_job = load_job
+        open("job.toml", "w").close()
         os.environ.update(PMI_SIZE="2", PMI_RANK="{rank}")
         main(["check", "job.toml"])
         logging.getLogger("cvt_hpc.kernels").info("compiling")  # of a library's user, who has not asked

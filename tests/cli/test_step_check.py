@@ -77,7 +77,9 @@ def loads(path):
 def test_contradictions_deviations_and_failures_are_reported(checked, tmp_path):
     status, out, err = checked()
     assert status == 1  # a run has failed
-    assert [line for line in err if line.startswith("cvt-hpc: step check: run 6 (load = 7): failed_numerics")]
+    assert [
+        line for line in err if line.startswith("cvt-hpc: step check: run 6 (load = 7 N m): failed_numerics")
+    ]
     # all but the run without steps; with 97.5 % of confidence each the ends are those of beta quantiles
     assert out[2:] == [
         "step check: 39 of 39 runs that took steps done again at half the step",

@@ -8,7 +8,7 @@ import pytest
 from marched import CHEAP, assert_same_bits, job, never
 
 from cvt_hpc.job import build_job
-from cvt_hpc.models.elastic_belt.batch import LaneRun
+from cvt_hpc.models.elastic_belt.batch import Batch, LaneRun
 from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
 from cvt_hpc.models.marched import BatchOfOne
 from cvt_hpc.models.oscillator.transient import Transient as Oscillator
@@ -187,13 +187,18 @@ def test_runs_that_are_left_share_lanes(script, monkeypatch):
     assert sorted(sizes[4:]) == [(1, 1, False), (2, 4, True)]
 
 
-def test_an_interrupt_in_a_later_try_ends_all(script):
+def test_an_interrupt_in_a_later_try_ends_all(script, monkeypatch):
     script[0][1] = 9.0
-    polls = []
-    run_point(asked(), point(), lambda: polls.append(None))
-    answers = iter([None] * (len(polls) - 1) + ["SIGTERM"])
+    begun, begin = [], Batch.__init__
+
+    def noted(batch, *arguments):
+        begun.append(batch)
+        begin(batch, *arguments)
+
+    monkeypatch.setattr(Batch, "__init__", noted)
     with pytest.raises(Interrupted, match="^SIGTERM$"):
-        run_point(asked(), point(), lambda: next(answers))
+        run_point(asked(), point(), lambda: "SIGTERM" if len(begun) > 1 else None)
+    assert len(begun) == 2
 
 
 def marched(run, samples):

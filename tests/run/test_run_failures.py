@@ -139,7 +139,7 @@ def poisoned(monkeypatch, spoil, when=300, **values):
     def spoiling(batch, samples):
         if batch.done >= when:
             spoil(batch)
-        return advance(batch, samples)
+        return advance(batch, min(samples, 50))  # however fast the machine is
 
     monkeypatch.setattr(Batch, "advance", spoiling)
     asked = job(**CHEAP, load=60.0, **values)

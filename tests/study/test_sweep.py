@@ -1,7 +1,7 @@
 """Sweeps: the same numbers on any number of ranks, failures as rows, orderly ends."""
 
 import json
-import math
+import time
 
 import pytest
 from recorded import assert_same_numbers
@@ -109,7 +109,8 @@ def test_time_limit_ends_claiming_and_the_rest_comes_later(tmp_path, monkeypatch
     class Late(Simulator):
         def run_point(self, job, point, interrupt):
             if point["load"] == 4:
-                monkeypatch.setattr("cvt_hpc.study.ranks.stopping.time.monotonic", lambda: math.inf)
+                late = time.monotonic() + 2000.0
+                monkeypatch.setattr("cvt_hpc.study.ranks.stopping.time.monotonic", lambda: late)
             return super().run_point(job, point, interrupt)
 
     report = sweep(Job(), tmp_path, simulator=Late(), time_limit=1000.0)

@@ -1,6 +1,7 @@
 """Traces: what is run, what is inferred, and that neither depends on the order, on ranks or on interruptions."""
 
 import csv
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -250,7 +251,8 @@ def test_an_interrupted_trace_goes_on_to_the_same_runs(tmp_path, monkeypatch, re
     class Late(Counting):
         def run_point(self, *arguments):
             if self.runs + 1 == until:
-                monkeypatch.setattr("cvt_hpc.study.ranks.stopping.time.monotonic", lambda: float("inf"))
+                late = time.monotonic() + 2000.0
+                monkeypatch.setattr("cvt_hpc.study.ranks.stopping.time.monotonic", lambda: late)
             return super().run_point(*arguments)
 
     report = run(JOB, tmp_path, simulator=Late(lanes=lanes), progress=False, time_limit=1000.0)

@@ -121,7 +121,7 @@ def test_costs_are_estimated_by_what_is_on_record(serial):
     estimate = {}
     for name in ("small", "other"):
         done = call("check", "small.toml", "--set", f"name={name}", cwd=serial.parents[1])
-        estimate[name] = done.stdout.splitlines()[-1]
+        (estimate[name],) = (line for line in done.stdout.splitlines() if line.startswith("estimated cost"))
     took = load_results(serial)["core_seconds"].values[:, :3].mean()
     assert estimate["small"].startswith(f"estimated cost: {took:.3g} core-seconds per run")
     assert estimate["small"].endswith("(by what 6 runs on record took)")
@@ -213,7 +213,7 @@ def test_runs_with_a_step_too_long_are_failed_on_the_map_not_quiet(folder):
     assert done.returncode == 1
     named = [line for line in done.stderr.splitlines() if "failed_numerics" in line]
     assert len(named) == 3
-    assert named[0].startswith("cvt-hpc: run 3 (step = 5e-05, load = 0): failed_numerics: at ")
+    assert named[0].startswith("cvt-hpc: run 3 (step = 50 us, load = 0 N m): failed_numerics: at ")
     dataset = load_results(folder / "steps")
     classes = occurrence_classes(dataset)
     assert (classes.sel(step=50e-6) == OccurrenceClass.FAILED).all()
