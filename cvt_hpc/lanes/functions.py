@@ -26,6 +26,13 @@ def _library(name: str):
     return build
 
 
+def _as(context, builder, value, kind, wanted):
+    """A value of one type in another, be that lanes or a plain number."""
+    if isinstance(wanted, Lanes):
+        return converted(context, builder, value, kind, wanted)
+    return context.cast(builder, value, kind, wanted)
+
+
 @intrinsic
 def sqrt(context, x):
     """Square root of each lane."""
@@ -72,14 +79,49 @@ def select(context, mask, yes, no):
     return kind(mask, yes, no), build
 
 
+def _chosen(a, b, comparison: str):
+    """The type of one of two numbers, and how to choose `a` where the comparison holds, else `b`."""
+    kind = next((t for t in (a, b) if isinstance(t, Lanes)), a)
+
+    def build(context, builder, sig, arguments):
+        one, other = (_as(context, builder, x, t, kind) for x, t in zip(arguments, sig.args, strict=True))
+        return builder.select(builder.fcmp_ordered(comparison, one, other), one, other)
+
+    return kind(a, b), build
+
+
+@intrinsic
+def minimum(context, a, b):
+    """The lesser, lane by lane; b where one is not a number."""
+    return _chosen(a, b, "<")
+
+
+@intrinsic
+def maximum(context, a, b):
+    """The greater, lane by lane; b where one is not a number."""
+    return _chosen(a, b, ">")
+
+
+@intrinsic
+def reciprocals(context, a, b):
+    """1 / a and 1 / b by one division, the dearest of operations; a b must be within the exponent's range."""
+
+    def build(context, builder, sig, arguments):
+        one, other = arguments
+        unit = _as(context, builder, ir.Constant(ir.DoubleType(), 1.0), types.float64, a)
+        per_both = builder.fdiv(unit, builder.fmul(one, other))
+        both = builder.fmul(other, per_both), builder.fmul(one, per_both)
+        return context.make_tuple(builder, sig.return_type, both)
+
+    return types.UniTuple(a, 2)(a, a), build
+
+
 @intrinsic
 def like(context, x, pattern):
     """A number, or lanes of another precision, in `pattern`'s type, which may be a plain number's."""
 
     def build(context, builder, sig, arguments):
-        if not isinstance(pattern, Lanes):
-            return context.cast(builder, arguments[0], sig.args[0], sig.return_type)
-        return converted(context, builder, arguments[0], sig.args[0], sig.return_type)
+        return _as(context, builder, arguments[0], sig.args[0], sig.return_type)
 
     return pattern(x, pattern), build
 
@@ -115,46 +157,12 @@ def _two_to(context, n):
     return n(n), build
 
 
-def minimum(a, b):
-    """The lesser, lane by lane; b where one is not a number."""
-    raise NotImplementedError("for kernels")
-
-
-def maximum(a, b):
-    """The greater, lane by lane; b where one is not a number."""
-    raise NotImplementedError("for kernels")
-
-
 def decay(x):
     """e^-x of each lane for x >= 0, to two units in the last place.
 
     x is held within the range of the exponent, at its upper end where it is not a number.
     """
     raise NotImplementedError("for kernels")
-
-
-def reciprocals(a, b):
-    """1 / a and 1 / b by one division, the dearest of operations; a b must be within the exponent's range."""
-    raise NotImplementedError("for kernels")
-
-
-@overload(minimum, inline="always")
-def _minimum(a, b):
-    return lambda a, b: select(a < b, a, b)
-
-
-@overload(maximum, inline="always")
-def _maximum(a, b):
-    return lambda a, b: select(a > b, a, b)
-
-
-@overload(reciprocals, inline="always")
-def _reciprocals(a, b):
-    def both(a, b):
-        per_both = 1.0 / (a * b)
-        return b * per_both, a * per_both
-
-    return both
 
 
 # ln 2 in two parts, the first with bits to spare, so that n times it is exact; largest argument

@@ -228,14 +228,14 @@ def _lane_unknown(kind, numbers, speed):
     return like(np.nan, speed)
 
 
-def _by_kind(formulas: list[tuple[Law, Any]], otherwise: Any, inline: str = "never") -> Any:
+def _by_kind(formulas: list[tuple[Law, Any]], otherwise: Any, merged: bool = False) -> Any:
     """What takes a kind and a formula's numbers: the formula of that kind, for others `otherwise`."""
     if not formulas:
-        return register_jitable(inline=inline)(otherwise)
-    own, formula = int(formulas[0][0]), register_jitable(inline=inline)(formulas[0][1])
-    others = _by_kind(formulas[1:], otherwise, inline)
+        return register_jitable(forceinline=merged)(otherwise)
+    own, formula = int(formulas[0][0]), register_jitable(forceinline=merged)(formulas[0][1])
+    others = _by_kind(formulas[1:], otherwise, merged)
 
-    @register_jitable(inline=inline)
+    @register_jitable(forceinline=merged)
     def find(kind, numbers, speed):
         if kind == own:
             found = formula(numbers, speed)
@@ -248,7 +248,7 @@ def _by_kind(formulas: list[tuple[Law, Any]], otherwise: Any, inline: str = "nev
 
 _plain = _by_kind([(law, formula.plain) for law, formula in FORMULAS.items()], _unknown)
 # a call from an inner loop costs more than the formula
-_lanes = _by_kind([(law, formula.lanes) for law, formula in FORMULAS.items()], _lane_unknown, inline="always")
+_lanes = _by_kind([(law, formula.lanes) for law, formula in FORMULAS.items()], _lane_unknown, merged=True)
 
 
 @kernel

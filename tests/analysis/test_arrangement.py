@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 import xarray as xr
-from studies import study
 
 from cvt_hpc.analysis.arrangement import arrange, ruler, value_text
 from cvt_hpc.analysis.classes import OccurrenceClass, occurrence_classes
 from cvt_hpc.analysis.maps import draw_map
 from cvt_hpc.errors import InputError
 from cvt_hpc.variables import Status
+from support.studies import study
 
 
 def test_load_runs_along_x_gradient_along_y_and_stiffness_over_panels():

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib import image
-from studies import STIFFNESSES, sampled, study, two_flags
 
 from cvt_hpc.analysis.comparison import compare, write_comparison
 from cvt_hpc.analysis.comparison_drawing import draw_comparison
@@ -17,6 +16,7 @@ from cvt_hpc.printing import comparison_lines
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.agreement import PairClass, classify_pairs
 from cvt_hpc.vibration.classes import OccurrenceClass
+from support.studies import STIFFNESSES, sampled, study, two_flags
 
 JOB = {
     "name": "x",

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from PIL import Image
-from studies import GRADIENTS, LOADS, fills_of, sampled, study, traced
 
 from cvt_hpc.analysis.cells import INFERRED_VIBRATION, LINES, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, map_classes, occurrence_classes
 from cvt_hpc.analysis.maps import draw_map, map_figure
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 from cvt_hpc.errors import InputError
+from support.studies import GRADIENTS, LOADS, fills_of, sampled, study, traced
 
 QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN, SLIPPING, IRREGULAR = OccurrenceClass
 SOFT = {"sheave_stiffness": 1.0}

@@ -3,12 +3,12 @@
 import matplotlib
 import numpy as np
 import pytest
-from rungs import rung_job
 
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.figures import STYLE, save_figure
 from cvt_hpc.analysis.maps import draw_map
 from cvt_hpc.study import open_results, run
+from support.rungs import rung_job
 
 LOADS = [200.0, 0.0, 100.0]
 SPEEDS = [300.0, 2000.0]

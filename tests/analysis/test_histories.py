@@ -8,7 +8,6 @@ from textwrap import wrap
 import numpy as np
 import pytest
 import xarray as xr
-from runs import PROBES, RATE, run
 
 from cvt_hpc.analysis.figures import balanced
 from cvt_hpc.analysis.histories import draw_history, history_figure
@@ -18,6 +17,7 @@ from cvt_hpc.job import load_job
 from cvt_hpc.netcdf import is_history, write_history
 from cvt_hpc.printing import point_lines
 from cvt_hpc.variables import Status
+from support.runs import PROBES, RATE, run
 
 BAND = (100.0, 1500.0)
 

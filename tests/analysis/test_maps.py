@@ -12,7 +12,6 @@ import pytest
 import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
-from studies import GRADIENTS, LOADS, STIFFNESSES, fills_of, flags, study, two_flags
 
 import cvt_hpc
 from cvt_hpc.analysis.cells import AMPLITUDE_COLOURS, FREQUENCY_COLOURS, STYLES
@@ -21,6 +20,7 @@ from cvt_hpc.analysis.figures import STYLE
 from cvt_hpc.analysis.maps import draw_map, map_figure
 from cvt_hpc.errors import InputError
 from cvt_hpc.variables import Status, Vibrates
+from support.studies import GRADIENTS, LOADS, STIFFNESSES, fills_of, flags, study, two_flags
 
 LIMIT = 300_000  # bytes that a picture may have
 FINE = {"gradients": np.linspace(-2.4, -0.4, 6), "loads": np.linspace(5, 200, 40)}

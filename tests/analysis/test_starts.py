@@ -5,7 +5,6 @@ from itertools import product
 import numpy as np
 import pytest
 import xarray as xr
-from studies import fills_of, study, traced
 
 from cvt_hpc.analysis.cells import OF_STARTS, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, map_classes, occurrence_classes
@@ -13,6 +12,7 @@ from cvt_hpc.analysis.maps import draw_map, map_figure
 from cvt_hpc.analysis.starts import has_starts, join_starts, start_line
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.hysteresis import StartClass, classify_starts
+from support.studies import fills_of, study, traced
 
 Q, V, U, F, N, S, IRR = OccurrenceClass
 ONLY = StartClass.LARGE_START_ONLY

@@ -5,7 +5,8 @@ import runpy
 from pathlib import Path
 
 import numpy as np
-from studies import study
+
+from support.studies import study
 
 ROWS = runpy.run_path(str(Path(__file__).parents[2] / "jobs" / "tabulate.py"))["rows"]
 

@@ -2,7 +2,7 @@
 
     python tests/benchmarks/faults.py TABLE.csv [--kills 200] [--seed 0] [--slurm 3] [--only KIND] [--model]
 
-About 3 s a kill on a crowded core. Kinds of faults and what is looked at: tests/study/fault_kinds.py. The table has
+About 3 s a kill on a crowded core. Kinds of faults and what is looked at: tests/support/fault_kinds.py. The table has
 a line for each kind: cases, faults that struck, starts, acknowledged records, those of them that were lost, datasets that
 differ from the undisturbed one, starts that hung, processes left behind, the longest start [s]. The last line is the
 sum. With --model, oscillators of the program's own are swept instead of a double without mechanics. With --slurm, nodes of a Slurm of its own are lost as well, slurmd first; there the records on disk when the node was
@@ -23,16 +23,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 TESTS = Path(__file__).parents[1]
-sys.path[:0] = [str(TESTS), str(TESTS / "study"), str(TESTS / "slurm")]
-
-from cluster import JOB, TWO_NODES, Cluster, missing, wait_until  # noqa: E402
-from fault_cases import Outcome, make_reference  # noqa: E402
-from fault_kinds import KINDS, NEED_MOUNT, NEED_MPI, can_mount, play  # noqa: E402
-from recorded import assert_same_numbers, records  # noqa: E402
+sys.path.insert(0, str(TESTS))
 
 from cvt_hpc import load_job, open_results, run  # noqa: E402
 from cvt_hpc.study.folder import StudyFolder  # noqa: E402
 from cvt_hpc.study.record.recovery import read_records  # noqa: E402
+from support.cluster import JOB, TWO_NODES, Cluster, missing, wait_until  # noqa: E402
+from support.fault_cases import Outcome, make_reference  # noqa: E402
+from support.fault_kinds import KINDS, NEED_MOUNT, NEED_MPI, can_mount, play  # noqa: E402
+from support.recorded import assert_same_numbers, records  # noqa: E402
 
 SLURMD = "kill -9 of slurmd and its node"
 COUNTS = ("faults", "starts", "acknowledged", "lost", "different", "hangs", "left")

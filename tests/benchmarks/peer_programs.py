@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from peer_tasks import NUMBERS, Tasks, simulate_one
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "study"))
-from study_double import Axis, Job, Simulator  # noqa: E402
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from support.study_double import Axis, Job, Simulator  # noqa: E402
 
 SAVED_EVERY = 10  # tasks, where libEnsemble is asked to save its history
 

@@ -27,8 +27,8 @@ import psutil
 from peer_tasks import read_witness
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE.parent / "study"))
-from study_processes import clean_environment, find_mpirun  # noqa: E402
+sys.path.insert(0, str(HERE.parent))
+from support.study_processes import clean_environment, find_mpirun  # noqa: E402
 
 PEERS = ("cvt_hpc", "mpi4py.futures", "libEnsemble", "dask.distributed")
 IN_BATCHES = ("cvt_hpc", "mpi4py.futures")  # those that take several tasks at a time if asked

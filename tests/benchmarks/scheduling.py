@@ -20,11 +20,8 @@ from typing import Any
 
 import numpy as np
 
-STUDY_TESTS = Path(__file__).parents[1] / "study"
-sys.path.insert(0, str(STUDY_TESTS))
-
-from study_double import Axis, Job, Simulator  # noqa: E402
-from study_processes import clean_environment, find_mpirun  # noqa: E402
+TESTS = Path(__file__).parents[1]
+sys.path.insert(0, str(TESTS))
 
 from cvt_hpc.study import process_rank, run  # noqa: E402
 from cvt_hpc.study.batches import share_out  # noqa: E402
@@ -39,6 +36,8 @@ from cvt_hpc.study.forecast.simulate import (  # noqa: E402
 from cvt_hpc.study.ranks.launch import assembled_team  # noqa: E402
 from cvt_hpc.study.ranks.schedule import open_counter  # noqa: E402
 from cvt_hpc.study.status import find_records  # noqa: E402
+from support.study_double import Axis, Job, Simulator  # noqa: E402
+from support.study_processes import clean_environment, find_mpirun  # noqa: E402
 
 SHARED_MEMORY = ClaimTimes(2e-6, 0.0, 0.0)
 RANKS = (2, 4)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import xarray as xr
-from cf import cf_findings
 
 from cvt_hpc.bifurcation.attractors import Start, attractors
 from cvt_hpc.bifurcation.dataset import Direction, Stability
@@ -12,6 +11,7 @@ from cvt_hpc.cli import main
 from cvt_hpc.job import build_job
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.vibration.classes import OccurrenceClass
+from support.cf import cf_findings
 
 JOB = """
 name = "x"

@@ -5,10 +5,10 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 
 import pytest
-from bells import CHANNELS, JOB, PARAMETERS, STEP, TOLERANCE, Clock, Transient, exact
 
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.marched import batches_of_one
+from support.bells import CHANNELS, JOB, PARAMETERS, STEP, TOLERANCE, Clock, Transient, exact
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from cf import cf_findings
 
 from cvt_hpc.cli import main
 from cvt_hpc.job import load_job
@@ -15,6 +14,7 @@ from cvt_hpc.ladder.costs import cost_left
 from cvt_hpc.ladder.rungs import ladder
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
 from cvt_hpc.study import run
+from support.cf import cf_findings
 
 JOB = """name = "small"
 model = "elastic_belt"

@@ -9,8 +9,6 @@ from importlib import metadata
 import numpy as np
 import pytest
 import xarray as xr
-from bells import Transient
-from cf import cf_findings
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from cvt_hpc.chart import load_chart, make_chart
@@ -19,6 +17,8 @@ from cvt_hpc.chart.table import table_lines
 from cvt_hpc.errors import InputError
 from cvt_hpc.output_folder import checksum
 from cvt_hpc.provenance import git_revision, machine
+from support.bells import Transient
+from support.cf import cf_findings
 
 DAMAGE = {
     "nothing left": lambda whole: b"",

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from bells import Transient
 
 from cvt_hpc.chart import load_chart
 from cvt_hpc.chart.checks import check_prospects
@@ -12,6 +11,7 @@ from cvt_hpc.chart.measuring import measure
 from cvt_hpc.chart.quantities import History, Quantity, observe
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.contract import Model
+from support.bells import Transient
 
 
 def measured(chart, name, repeats=2, time_limit=math.inf):

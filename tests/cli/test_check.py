@@ -3,10 +3,10 @@
 import sys
 
 import pytest
-from toy_jobs import GRID, TRACED
 
 from cvt_hpc.models import MODELS
 from cvt_hpc.variables import Status, Variable
+from support.toy_jobs import GRID, TRACED
 
 pytestmark = pytest.mark.usefixtures("mechanics")
 

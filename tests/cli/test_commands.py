@@ -4,12 +4,12 @@ import re
 
 import netCDF4
 import pytest
-from toy_jobs import GRID
 
 from cvt_hpc.cli.parts import INTERRUPTED
 from cvt_hpc.printing import report_lines
 from cvt_hpc.study import FailedRun, RunReport, StudyStatus
 from cvt_hpc.variables import Status
+from support.toy_jobs import GRID
 
 pytestmark = pytest.mark.usefixtures("mechanics")
 

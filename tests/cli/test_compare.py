@@ -4,9 +4,9 @@ import csv
 import sys
 
 import pytest
-from toy_jobs import GRID
 
 from cvt_hpc.variables import Vibrates
+from support.toy_jobs import GRID
 
 pytestmark = pytest.mark.usefixtures("mechanics")
 

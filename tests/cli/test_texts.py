@@ -5,12 +5,12 @@ import os
 from dataclasses import replace
 
 import pytest
-from toy_jobs import GRID
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError, one_line, show
 from cvt_hpc.job import load_job
 from cvt_hpc.study.folder import StudyFolder
+from support.toy_jobs import GRID
 
 NASTY = "a\x1b[2J\nb\r\u202e\x9b"
 ESCAPED = r"a\x1b[2J\nb\r\u202e\x9b"

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from fast_runs import march
-from settled import STEP, start
 
 from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, U
+from support.fast_runs import march
+from support.settled import STEP, start
 
 
 @pytest.mark.parametrize(

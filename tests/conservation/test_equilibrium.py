@@ -8,7 +8,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from settled import DEFAULTS, T1, T2, Settled
+
+from support.settled import DEFAULTS, T1, T2, Settled
 
 COULOMB = {"friction_law": "coulomb", "friction_gradient": 0.0, "kinetic_friction": 0.1}
 FRICTIONLESS = COULOMB | {"kinetic_friction": 1e-12, "ring_friction": 0.0, "disturbance": 0.0}

@@ -4,9 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fast_runs import FastRuns
-from growing import at_rest
-from settled import DEFAULTS
 
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.belt import (
@@ -27,6 +24,9 @@ from cvt_hpc.models.linear_stability.modes import modes
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.physics.flank import flank_forces
 from cvt_hpc.physics.friction import friction_coefficient
+from support.fast_runs import FastRuns
+from support.growing import at_rest
+from support.settled import DEFAULTS
 
 BELT = DEFAULTS | {"stations": 96}
 PHASES = 8  # of a period; sums over them are exact up to the third harmonic of a product

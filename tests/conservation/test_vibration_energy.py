@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from small_systems import FACTS, begin, scene
 
 from cvt_hpc.models.moving_string import motion
 from cvt_hpc.steppers import symplectic_euler
 from cvt_hpc.steppers.facts import COUNTERS
+from support.small_systems import FACTS, begin, scene
 
 CELLS = 16
 STRING = scene("moving_string", belt_speed=0.0, mode=2, cells=CELLS, strand_probes=3, solver_tolerance=1e-13)

@@ -6,12 +6,12 @@ nothing diverges at first: friction saturates, stations hum from step to step, a
 
 import numpy as np
 import pytest
-from belts import eigenvalues, general, longest_stable_step, settled
 
 from cvt_hpc.models.elastic_belt.one_system import unpack
 from cvt_hpc.models.elastic_belt.rhs import ring_drag
 from cvt_hpc.steppers.fastest_rate import STABLE, fastest_rate
 from cvt_hpc.variables import Status
+from support.belts import eigenvalues, general, longest_stable_step, settled
 
 SMOOTH = {"ring_friction": 0.0, "friction_speed": 0.5, "friction_gradient": -0.05}
 CASES = {

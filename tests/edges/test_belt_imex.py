@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from belts import point
 
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
 from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.variables import Status
+from support.belts import point
 
 CASES = {
     "bending": {"bending_stiffness": 200.0, "stations": 64},

@@ -1,9 +1,9 @@
 """Implicit steps on the belt: where their equations have no solution, because a force jumps."""
 
 import pytest
-from belts import general
 
 from cvt_hpc.variables import Status
+from support.belts import general
 
 # Pressed elements have a damper, which is there from the moment their gap closes: P jumps from 0 to the damping
 # times their speed of closing over a cell. A step that would end at the jump ends nowhere.

@@ -6,7 +6,8 @@ not make them part of a sound model: runs look orderly and depend on the mesh (j
 
 import numpy as np
 import pytest
-from belts import eigenvalues
+
+from support.belts import eigenvalues
 
 STEEP = {"friction_gradient": -1.2}
 

@@ -1,10 +1,10 @@
 """Single precision on the belt: the fast step's round-off shakes strands that nothing else moves, and how much."""
 
 import pytest
-from belts import point
 
 from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.vibration.signals import band_amplitude
+from support.belts import point
 
 THRESHOLD, NEGLIGIBLE = 5e-6, 1e-8  # [m]: defaults of what vibrates, and of what is at rest
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from belts import point
 
 from cvt_hpc.models.elastic_belt.belt import (
     FIELDS,
@@ -19,6 +18,7 @@ from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, system
 from cvt_hpc.models.elastic_belt.validity import slack_doubt
 from cvt_hpc.steppers.system import jacobian
 from cvt_hpc.variables import Status
+from support.belts import point
 
 RADIUS = 0.024
 CELLS = (12, 24, 48)  # in each half of the path of 0.30 m

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from small_systems import FACTS, begin, bisect, finished
-from sticking import LOAD, MASS, MU, RATE, STUCK, WIDTH
 
 from cvt_hpc.variables import Status
+from support.small_systems import FACTS, begin, bisect, finished
+from support.sticking import LOAD, MASS, MU, RATE, STUCK, WIDTH
 
 
 def sliding(stepper, **changes):

@@ -7,10 +7,10 @@ s / (s^2 + w^2). A vibration of 600 Hz that grows at 50 / s dies from 7 us on.
 
 import numpy as np
 import pytest
-from small_systems import begin, bisect, finished, scene
 
 from cvt_hpc.models.oscillator.exact import exact
 from cvt_hpc.variables import Status
+from support.small_systems import begin, bisect, finished, scene
 
 FREQUENCY, GROWTH = 2 * np.pi * 600.0, 50.0
 MASS, LOAD = 0.02, 500.0

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from small_systems import finished, order, scene
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.marching import Marching
 from cvt_hpc.steppers.system import SetValuedSystem, System
+from support.small_systems import finished, order, scene
 
 # A mass on a belt at rest, held by a spring so soft that its pull does not change: friction of 0.6 N holds it.
 PULL = 0.3

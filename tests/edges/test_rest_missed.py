@@ -7,13 +7,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from small_systems import FACTS, begin, bisect, finished, scene
-from sticking import LOAD, MASS, MU, RATE, STUCK, WIDTH
 
 from cvt_hpc.models.oscillator.constants import oscillator
 from cvt_hpc.models.oscillator.exact import exact
 from cvt_hpc.models.oscillator.rest import peak, wrongly_held
 from cvt_hpc.variables import Status
+from support.small_systems import FACTS, begin, bisect, finished, scene
+from support.sticking import LOAD, MASS, MU, RATE, STUCK, WIDTH
 
 BELT = 0.2  # [m/s]
 STICK_SLIP = scene(

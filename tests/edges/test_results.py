@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from scripted import ENDS, Script, system
-from small_systems import ADAPTIVE, FACTS, METHODS, scene
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.steppers.facts import MESSAGES, Result
 from cvt_hpc.steppers.marching import Marching
 from cvt_hpc.steppers.system import SetValuedSystem
+from support.scripted import ENDS, Script, system
+from support.small_systems import ADAPTIVE, FACTS, METHODS, scene
 
 
 @kernel

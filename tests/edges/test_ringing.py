@@ -8,11 +8,11 @@ where the force F - c v (z / 2 - 1) / (z / 2 + 1) would be below 0.
 
 import numpy as np
 import pytest
-from scripted import STOP, Script, system
-from small_systems import bisect
 
 from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.marching import Marching
+from support.scripted import STOP, Script, system
+from support.small_systems import bisect
 
 RATE, SLOW, PRESS, PUSH = 1e4, 1.0, 10.0, 2e-3  # c / m, k / c [1/s], F / m [m/s^2], v [m/s]
 

@@ -7,12 +7,12 @@ s a + w^2 a^2 > 0: with a soft spring up to step s = 1 / coefficient.
 
 import numpy as np
 import pytest
-from scripted import TWO_MASSES, Script, system
-from small_systems import IMPLICIT, begin, bisect, scene
 
 from cvt_hpc.steppers.facts import MESSAGES, Result
 from cvt_hpc.steppers.marching import Marching
 from cvt_hpc.variables import Status
+from support.scripted import TWO_MASSES, Script, system
+from support.small_systems import IMPLICIT, begin, bisect, scene
 
 FALL, FREQUENCY = 200.0, 5.0
 STEEP = scene(

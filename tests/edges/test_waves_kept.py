@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from small_systems import FACTS, begin, bisect, scene
 
 from cvt_hpc.models.moving_string.exact import frequency
 from cvt_hpc.variables import Status
+from support.small_systems import FACTS, begin, bisect, scene
 
 STRING = scene("moving_string", cells=32, duration=0.05)
 SWING = scene(

@@ -4,9 +4,10 @@ from itertools import product
 
 import numpy as np
 import pytest
-from complementarity import ComplementarityError, solve_lcp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from support.complementarity import ComplementarityError, solve_lcp
 
 
 def murty(n):

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from complementarity import solve_lcp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cvt_hpc.physics.compliance import ROUNDS_OF_BLOCK_FLIPS, contact_state, solve_contact
 from cvt_hpc.physics.sheaves import flexibility, sheaves
+from support.complementarity import solve_lcp
 
 # A wrap of the default belt: radius [m], element stiffness c_e [N/m^2], k [N/m^2], l [m], c_tilt [N m/rad]
 RADIUS, ELEMENTS, LOCAL, LENGTH, TILT = 0.075, 3e10, 4e9, 0.012, 4e5

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from rungs import rung_job, rung_record
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
@@ -10,6 +9,7 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.models.criterion.energy import energy_per_cycle, flank
 from cvt_hpc.models.criterion.record import RELATIVE_AMPLITUDES
 from cvt_hpc.variables import Status, Vibrates
+from support.rungs import rung_job, rung_record
 
 # A law that falls in a straight line around the sliding speed, regularised far below it, as sec. 4.3 has it
 PAPER = {

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from rungs import rung_job, rung_record
-from small_systems import VERASZTO_STEPAN
 
 from cvt_hpc.bifurcation.attractors import Attractor, Start, attractors, close_values
 from cvt_hpc.models.oscillator.constants import oscillator
 from cvt_hpc.models.oscillator.steady import steady_sliding
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Kind, criticality
+from support.rungs import rung_job, rung_record
+from support.small_systems import VERASZTO_STEPAN
 
 QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN, SLIPPING, IRREGULAR = OccurrenceClass
 BOTH_STARTS = (Start({"start": "sliding"}), Start({"start": "sticking"}))

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from complementarity import solve_lcp
-from wraps import STATIONS, courses, random_wrap
 
 from cvt_hpc.physics.compliance import contact_state, solve_contact
 from cvt_hpc.physics.lane_compliance import (
@@ -16,6 +14,8 @@ from cvt_hpc.physics.lane_compliance import (
     solve_lane_contact,
 )
 from cvt_hpc.physics.sheaves import flexibility
+from support.complementarity import solve_lcp
+from support.wraps import STATIONS, courses, random_wrap
 
 MOST_ROUNDS = 400
 WIDTHS = {np.float64: 8, np.float32: 16}

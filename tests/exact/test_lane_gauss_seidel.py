@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from wraps import STATIONS, courses, random_wrap
 
 from cvt_hpc.physics.compliance import contact_state, solve_contact
 from cvt_hpc.physics.lane_compliance import GAP, PUSH, SOLVES, lane_contact
 from cvt_hpc.physics.lane_gauss_seidel import sweep_lane_contact
 from cvt_hpc.physics.sheaves import flexibility
+from support.wraps import STATIONS, courses, random_wrap
 
 LANES = 8
 

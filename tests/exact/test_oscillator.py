@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from small_systems import finished, order, scene
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.oscillator.exact import exact, phases
 from cvt_hpc.models.oscillator.motion import largest_rate, oscillator, regularised_friction, system
+from support.small_systems import finished, order, scene
 
 STICK_SLIP = scene("oscillator")
 # a mass on slowly falling friction, which slides at 0.1 to 0.5 m/s all the while

@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-from rungs import rung_job, rung_record
 from scipy.integrate import solve_ivp
-from small_systems import VERASZTO_STEPAN, begin, scene
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.oscillator.constants import oscillator
@@ -13,6 +11,8 @@ from cvt_hpc.models.oscillator.record import Sticks, judge
 from cvt_hpc.models.oscillator.steady import steady_sliding
 from cvt_hpc.simulation import record_variables, simulate
 from cvt_hpc.variables import Status, Vibrates
+from support.rungs import rung_job, rung_record
+from support.small_systems import VERASZTO_STEPAN, begin, scene
 
 # 8 s periods, of unit mass and stiffness: the band of what vibrates lies around them
 STICK_SLIP = {"band_low": 0.05, "band_high": 2.0, "window_length": 40.0, "spectrum_step": 1.0}

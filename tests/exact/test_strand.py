@@ -6,10 +6,10 @@ The belt's own acceleration kernel is linearised by probing it with unit columns
 import numpy as np
 import pytest
 from scipy.linalg import eigh
-from straight import LENGTH, MASS, TENSION, WAVE, moving_straight, straight_belt
 
 from cvt_hpc.models.elastic_belt.belt import State, U, W
 from cvt_hpc.models.elastic_belt.rhs import accelerations, strains
+from support.straight import LENGTH, MASS, TENSION, WAVE, moving_straight, straight_belt
 
 
 def linearise(belt, **forces):

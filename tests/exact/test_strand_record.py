@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from rungs import rung_job, rung_record
 from scipy.integrate import quad, solve_ivp
 
 from cvt_hpc.errors import InputError
@@ -11,6 +10,7 @@ from cvt_hpc.models.strand.record import MODES
 from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies, ritz_matrices
 from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.variables import Status, Vibrates
+from support.rungs import rung_job, rung_record
 
 # A strand of unit length, mass and tension: shafts 1 m apart, radii of 1/4 m; wave speed 1 m/s
 UNIT = {

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from fast_runs import FastRuns
-from straight import LENGTH, WAVE, moving_straight, straight_belt
 
 from cvt_hpc.models.elastic_belt.belt import U, W
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP as STEP
+from support.fast_runs import FastRuns
+from support.straight import LENGTH, WAVE, moving_straight, straight_belt
 
 SIZE = 1e-8  # amplitude [m]
 

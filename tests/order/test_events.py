@@ -8,9 +8,9 @@ none.
 
 import numpy as np
 import pytest
-from small_systems import FACTS, FIXED, finished, order, scene
 
 from cvt_hpc.models.oscillator.exact import exact, phases
+from support.small_systems import FACTS, FIXED, finished, order, scene
 
 SLIDING_TO_REST = scene(
     "oscillator",

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
-from small_systems import ADAPTIVE, FACTS, FIXED, begin, finished, order, scene
 
 from cvt_hpc.models.moving_string import motion as string_motion
 from cvt_hpc.models.oscillator import motion as oscillator_motion
+from support.small_systems import ADAPTIVE, FACTS, FIXED, begin, finished, order, scene
 
 SCENES = {
     # sliding between 0.3 and 1.6 m/s: the law is a cubic there, the smoothing at rest not felt

@@ -9,8 +9,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fast_runs import FastRuns
-from fast_runs import march as march_steps
 
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_SPEED,
@@ -26,6 +24,8 @@ from cvt_hpc.models.elastic_belt.belt import (
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP as STEP
+from support.fast_runs import FastRuns
+from support.fast_runs import march as march_steps
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
 DEFAULTS |= {"duration": 0.1, "load": 100.0}

@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from rungs import rung_job
 
 from cvt_hpc.models.auto.rules import Rung, coarse, is_passive, is_settled
 from cvt_hpc.models.elastic_belt import transient
@@ -22,6 +21,7 @@ from cvt_hpc.simulation import (
 from cvt_hpc.simulation.batches import MOST_TURNS
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.assessment import Occurrence
+from support.rungs import rung_job
 
 # cells of the reference map by what is known of them: the middle of a window, outside of all, push changing strands
 VIBRATING = {"load": 120.0, "friction_gradient": -1.0}

@@ -4,8 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fast_runs import march, march_fast
-from marched import job
 
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
@@ -34,6 +32,8 @@ from cvt_hpc.models.elastic_belt.rhs import (
     strains,
 )
 from cvt_hpc.physics.compliance import contact_state
+from support.fast_runs import march, march_fast
+from support.marched import job
 
 BASE = {"stations": 96, "load": 100.0, "duration": 0.06, "rise_time": 0.01}
 TABLE = {

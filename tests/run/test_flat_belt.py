@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fast_runs import FastRuns, march
 
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
@@ -22,6 +21,7 @@ from cvt_hpc.models.elastic_belt.belt import (
 )
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates, system, unpack
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
+from support.fast_runs import FastRuns, march
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
 DEFAULTS |= {"duration": 0.1, "load": 100.0, "load_history": "ramp", "stations": 96}

@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from marched import CHEAP, job
 
 from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates, system
@@ -12,6 +11,7 @@ from cvt_hpc.models.elastic_belt.sparsity import SparseJacobian, groups, pattern
 from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.steppers.system import jacobian
 from cvt_hpc.variables import Status
+from support.marched import CHEAP, job
 
 SAMPLES = 30
 

@@ -4,9 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from cf import cf_findings
-from growing import at_rest, measured
-from rungs import rung_job, rung_record
 from scipy.sparse import csc_array
 
 from cvt_hpc.errors import InputError
@@ -19,6 +16,9 @@ from cvt_hpc.models.linear_stability.spectrum import eigenpairs
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Vibrates
+from support.cf import cf_findings
+from support.growing import at_rest, measured
+from support.rungs import rung_job, rung_record
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
 LOADS = (80.0, 105.0, 125.0, 140.0)

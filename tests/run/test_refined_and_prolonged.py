@@ -5,7 +5,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from marched import CHEAP, assert_same_bits, job, never
 
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.batch import Batch, LaneRun
@@ -15,6 +14,7 @@ from cvt_hpc.models.oscillator.transient import Transient as Oscillator
 from cvt_hpc.simulation import Interrupted, run_point, run_points, simulate
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration import assessment
+from support.marched import CHEAP, assert_same_bits, job, never
 
 T = CHEAP["duration"]
 ALL = {"most_refinements": 3, "longest_duration": 4 * T}

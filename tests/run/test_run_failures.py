@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from marched import CHEAP, job, record
 
 from cvt_hpc import simulation
 from cvt_hpc.job import build_job
@@ -19,6 +18,7 @@ from cvt_hpc.simulation.record import record_of
 from cvt_hpc.study.description import describe
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration import ramp
+from support.marched import CHEAP, job, record
 
 
 def assert_no_numbers(found):

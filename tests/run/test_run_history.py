@@ -4,7 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from marched import CHEAP, fresh_record, job
 
 from cvt_hpc import simulate
 from cvt_hpc.errors import InputError
@@ -13,6 +12,7 @@ from cvt_hpc.models.elastic_belt.belt import REGIONS, mesh
 from cvt_hpc.models.elastic_belt.sampling import probes
 from cvt_hpc.simulation import record_coordinates, record_variables
 from cvt_hpc.variables import Status, Vibrates
+from support.marched import CHEAP, fresh_record, job
 
 LOADED = CHEAP | {"load": 120.0}
 JUDGED = slice(400, None)  # of 800 samples

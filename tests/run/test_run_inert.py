@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from marched import fresh_record, job
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt import inert
 from cvt_hpc.simulation import record_variables
+from support.marched import fresh_record, job
 
 COARSE = {"stations": 32, "duration": 0.04, "rise_time": 0.01, "load": 60.0}
 TABLE = {

@@ -5,8 +5,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fast_runs import FastRuns
-from marched import CHEAP, assert_same_bits, job, never
 
 from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.models.elastic_belt.belt import DRIVEN_SPEED, N_RING, U, W, belt_constants, initial_state
@@ -17,6 +15,8 @@ from cvt_hpc.physics.lane_compliance import UNSOLVED
 from cvt_hpc.simulation import lane_groups, run_point, run_points
 from cvt_hpc.simulation.batches import MOST_TURNS
 from cvt_hpc.variables import Status, Vibrates
+from support.fast_runs import FastRuns
+from support.marched import CHEAP, assert_same_bits, job, never
 
 WIDTHS = {"double": 8, "single": 16}
 METHODS = {

@@ -6,8 +6,6 @@ stations, judged over 40 ms, these are 10 W: 0.03 % of the power of a loaded bel
 
 import numpy as np
 import pytest
-from fast_runs import FastRuns, march
-from marched import balance, finished, job, mean
 
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
@@ -27,6 +25,8 @@ from cvt_hpc.models.elastic_belt.record import LOSSES
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.validity import power_limit
+from support.fast_runs import FastRuns, march
+from support.marched import balance, finished, job, mean
 
 COARSE = {"stations": 64, "duration": 0.08}
 CONSTANT = {"friction_law": "coulomb", "friction_gradient": 0.0}

@@ -7,9 +7,9 @@ in the strand that is not loaded. All runs take 0.2 s, of which the last 0.1 s a
 
 import numpy as np
 import pytest
-from marched import job, record
 
 from cvt_hpc.variables import Status, Vibrates
+from support.marched import job, record
 
 T1, T2 = 0, 1
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from marched import job, record
 
 from cvt_hpc.analysis.histories import draw_history
 from cvt_hpc.simulation import simulate
 from cvt_hpc.variables import Status, Vibrates
+from support.marched import job, record
 
 BELT = {"stations": 96, "step": 7.6e-6, "friction_gradient": -1.0, "precision": "single"}
 RAMP = BELT | {"load_history": "ramp", "load_start": 20.0, "load": 200.0, "duration": 0.8}

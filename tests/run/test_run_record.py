@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from marched import CHEAP, finished, fresh_record, job, record
 
 from cvt_hpc import simulation
 from cvt_hpc.errors import InputError
@@ -11,6 +10,7 @@ from cvt_hpc.simulation import Interrupted, estimate_cost, record_coordinates, r
 from cvt_hpc.study.description import describe
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration import ramp
+from support.marched import CHEAP, finished, fresh_record, job, record
 
 LOADED = CHEAP | {"load": 120.0}
 ENDINGS = {

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, event, given
 from hypothesis import strategies as st
-from marched import job
 
 from cvt_hpc import recording
 from cvt_hpc.errors import InputError
@@ -13,6 +12,7 @@ from cvt_hpc.models.elastic_belt.record import coordinates
 from cvt_hpc.vibration import settings as vibration_settings
 from cvt_hpc.vibration.assessment import assess
 from cvt_hpc.vibration.signals import amplitude_spectrum
+from support.marched import job
 
 DEFAULTS = job().parameters
 

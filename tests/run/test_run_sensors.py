@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from marched import job
 
 from cvt_hpc.models.elastic_belt.belt import mesh
 from cvt_hpc.models.elastic_belt.record import MODES
 from cvt_hpc.models.elastic_belt.sampling import probes, sensors
+from support.marched import job
 
 STRANDS = (1, 3)  # regions of the path
 

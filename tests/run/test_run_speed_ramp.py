@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from marched import balance, finished, job, mean, record
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.variables import Status, Vibrates
+from support.marched import balance, finished, job, mean, record
 
 RPM = np.pi / 30.0
 NOMINAL = job().parameters["driving_speed"]

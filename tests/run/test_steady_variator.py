@@ -4,8 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fast_runs import FastRuns
-from rungs import rung_record
 
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_SPEED,
@@ -23,6 +21,8 @@ from cvt_hpc.models.steady_variator.newton import newton
 from cvt_hpc.models.steady_variator.record import judge
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 from cvt_hpc.variables import Status, Vibrates
+from support.fast_runs import FastRuns
+from support.rungs import rung_record
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
 DEFAULTS |= {"duration": 0.1, "stations": 96}

@@ -7,8 +7,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fast_runs import FastRuns
-from marched import fresh_record, job, record
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
@@ -21,6 +19,8 @@ from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP, SAFE_SHARE, 
 from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.models.elastic_belt.validity import LARGEST_STEP_RIPPLE, doubt, step_doubt
 from cvt_hpc.variables import Status, Vibrates
+from support.fast_runs import FastRuns
+from support.marched import fresh_record, job, record
 
 ONE_BELT = {"belt_length": 0.6612, "centre_distance": 0.155, "stations": 48}
 SHORT = {"duration": 0.08, "rise_time": 0.01, "load": 80.0, "friction_gradient": -0.4}

@@ -3,7 +3,8 @@
 import os
 
 import pytest
-from cluster import Cluster, missing
+
+from support.cluster import Cluster, missing
 
 
 @pytest.fixture(scope="session")

@@ -4,11 +4,11 @@ serial run and nothing is done twice."""
 import getpass
 
 import pytest
-from cluster import JOB, SPOILT, TWO_NODES, wait_until
-from recorded import assert_same_numbers, frames_written, recorded_runs, records
 
 from cvt_hpc import load_job, open_results, run
 from cvt_hpc.study.part import Part
+from support.cluster import JOB, SPOILT, TWO_NODES, wait_until
+from support.recorded import assert_same_numbers, frames_written, recorded_runs, records
 
 pytestmark = [pytest.mark.slow, pytest.mark.flaky(reruns=2, only_rerun=SPOILT)]
 RUNS = 12

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from study_processes import HERE, Sweep, clean_environment, fault_tolerance, find_mpirun
+
+from support.study_processes import HERE, Sweep, clean_environment, fault_tolerance, find_mpirun
 
 
 @pytest.fixture

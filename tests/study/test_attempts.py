@@ -7,8 +7,6 @@ import time
 
 import numpy as np
 import pytest
-from study_double import Axis, Job, Simulator
-from study_processes import wait_until
 
 from cvt_hpc.study import open_results, read_status, run
 from cvt_hpc.study.attempts import given_up, plan_runs, runs_to_repeat
@@ -18,6 +16,8 @@ from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.log import RecordLog
 from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.variables import Status
+from support.study_double import Axis, Job, Simulator
+from support.study_processes import wait_until
 
 RUNS = 12
 JOB = Job((Axis("load", tuple(range(RUNS))),))

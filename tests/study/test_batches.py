@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from recorded import assert_same_numbers
-from study_double import Axis, Job, Simulator
 
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.batches import batch_cost, share_out
@@ -16,6 +14,8 @@ from cvt_hpc.study.forecast.cost_model import CostModel
 from cvt_hpc.study.record.frames import RECORD
 from cvt_hpc.study.record.log import RecordLog
 from cvt_hpc.variables import Status
+from support.recorded import assert_same_numbers
+from support.study_double import Axis, Job, Simulator
 
 RUNS = 20
 

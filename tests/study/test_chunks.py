@@ -12,8 +12,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from study_double import Axis, Coordinate, Job, Simulator
-from study_processes import clean_environment, wait_until
 
 from cvt_hpc.files import StorageError
 from cvt_hpc.study import gather, open_results, run
@@ -24,6 +22,8 @@ from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.log import RecordLog
 from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.variables import Status
+from support.study_double import Axis, Coordinate, Job, Simulator
+from support.study_processes import clean_environment, wait_until
 
 SESSION = {
     "id": "a", "started": 1.0, "command": "run", "host": "here", "ranks": 1, "versions": {}, "git_revision": "",

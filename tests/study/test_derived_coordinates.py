@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
-from study_double import Axis, Job, Simulator
 
 from cvt_hpc.analysis.scatter import scatter_figure
 from cvt_hpc.cli import main
@@ -15,6 +14,7 @@ from cvt_hpc.job import load_job
 from cvt_hpc.job.definition import fingerprint_of
 from cvt_hpc.study import gather, open_results, run
 from cvt_hpc.study.folder import StudyFolder
+from support.study_double import Axis, Job, Simulator
 
 JOB = """
 name = "one_belt"

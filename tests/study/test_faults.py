@@ -1,9 +1,10 @@
 """A short fault campaign, one sweep for each kind of fault; `tests/benchmarks/faults.py` is the long one."""
 
 import pytest
-from fault_cases import make_reference
-from fault_kinds import NEED_MOUNT, NEED_MPI, can_mount, play
-from study_processes import find_mpirun
+
+from support.fault_cases import make_reference
+from support.fault_kinds import NEED_MOUNT, NEED_MPI, can_mount, play
+from support.study_processes import find_mpirun
 
 # With seeds for which one blow or two come in the middle of the sweep, however fast the machine is.
 CASES = {

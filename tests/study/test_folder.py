@@ -4,12 +4,12 @@ import json
 import os
 
 import pytest
-from study_double import Axis, Job, Simulator
-from study_processes import wait_until
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.locks import is_locked, locked
 from cvt_hpc.study import gather, open_results, read_status, run
+from support.study_double import Axis, Job, Simulator
+from support.study_processes import wait_until
 
 JOB = Job()
 OTHER = Job(parameters={"thrust": 2.0})

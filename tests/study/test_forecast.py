@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from study_double import Axis, Job, Simulator
 
 from cvt_hpc.printing import disk_line
 from cvt_hpc.study import run
@@ -27,6 +26,7 @@ from cvt_hpc.study.forecast.simulate import (
     simulate_schedule,
 )
 from cvt_hpc.study.record.frames import PREAMBLE
+from support.study_double import Axis, Job, Simulator
 
 AT_ONCE = ClaimTimes(0.0, 0.0, 0.0)
 MANY = 10**8

@@ -12,9 +12,6 @@ from types import SimpleNamespace
 
 import pytest
 import xarray as xr
-from recorded import assert_same_numbers
-from study_double import Job, Simulator
-from study_processes import wait_until
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
@@ -27,6 +24,9 @@ from cvt_hpc.study import gather, open_results, read_status, run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.frames import FORMAT_VERSION, PREAMBLE, RECORD, RecordFormat
 from cvt_hpc.study.repeats import Repeat
+from support.recorded import assert_same_numbers
+from support.study_double import Job, Simulator
+from support.study_processes import wait_until
 
 JOB = Job(histories=(3,))
 GATHERING = sys.modules["cvt_hpc.study.gather"]  # whose name is that of its function

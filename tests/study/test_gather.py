@@ -9,9 +9,6 @@ import sys
 import netCDF4
 import numpy as np
 import pytest
-from cf import cf_findings
-from study_double import Axis, Job, Simulator
-from study_processes import HERE, clean_environment
 
 import cvt_hpc
 from cvt_hpc.errors import InputError
@@ -19,6 +16,9 @@ from cvt_hpc.netcdf import variable_attributes
 from cvt_hpc.study import gather, open_results, run
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.variables import Status, Vibrates
+from support.cf import cf_findings
+from support.study_double import Axis, Job, Simulator
+from support.study_processes import HERE, clean_environment
 
 AXES = (
     Axis("friction_gradient", (-0.5, -0.25, 0.0), "s/m", "slope of the friction law"),

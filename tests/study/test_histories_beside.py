@@ -6,13 +6,13 @@ import signal
 import numpy as np
 import pytest
 import xarray as xr
-from study_double import Axis, Job, Simulator, logistic_numbers
-from study_processes import wait_until
 
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.frames import RECORD
 from cvt_hpc.variables import Status
+from support.study_double import Axis, Job, Simulator, logistic_numbers
+from support.study_processes import wait_until
 
 RUNS = 12
 AXES = (Axis("load", tuple(range(RUNS))),)

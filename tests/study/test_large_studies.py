@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from study_double import Axis, Job, Simulator
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
@@ -13,6 +12,7 @@ from cvt_hpc.study import check_start, description, open_results, run
 from cvt_hpc.study.forecast import needs as needs_module
 from cvt_hpc.study.forecast.needs import needs, refuse_too_large
 from cvt_hpc.study.ranks.time_limit import find_time_limit, planning_within
+from support.study_double import Axis, Job, Simulator
 
 MANY = (Axis("load", tuple(range(1000))), Axis("speed", tuple(range(1000))), Axis("x", tuple(range(1000))))
 

@@ -12,8 +12,6 @@ import time
 
 import numpy as np
 import pytest
-from study_double import Job, Simulator
-from study_processes import wait_until
 
 from cvt_hpc.locks import locked
 from cvt_hpc.provenance import new_session
@@ -24,6 +22,8 @@ from cvt_hpc.study.ranks.progress import Progress, Steps, show_duration
 from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.log import RecordLog
 from cvt_hpc.variables import Vibrates
+from support.study_double import Job, Simulator
+from support.study_processes import wait_until
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ import os
 
 import numpy as np
 import pytest
-from study_double import Axis, Job, Simulator
 
 from cvt_hpc.files import StorageError
 from cvt_hpc.study.description import describe
@@ -13,6 +12,7 @@ from cvt_hpc.study.record.frames import BEGUN, HEAD, PLACE, RECORD, RecordFormat
 from cvt_hpc.study.record.log import RecordLog
 from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.variables import Status
+from support.study_double import Axis, Job, Simulator
 
 SESSION = {
     "id": "a",

@@ -7,8 +7,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from recorded import assert_same_numbers, frames_written
-from study_double import Axis, Job, Simulator
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.study import open_results, run
@@ -19,6 +17,8 @@ from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.study.task import Task
 from cvt_hpc.study.time_steps import untried_factor
 from cvt_hpc.variables import Status
+from support.recorded import assert_same_numbers, frames_written
+from support.study_double import Axis, Job, Simulator
 
 RUNS = 12
 STEP = 1e-6

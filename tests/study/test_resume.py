@@ -7,14 +7,14 @@ import time
 
 import numpy as np
 import pytest
-from recorded import assert_same_numbers
-from study_double import Axis, Job, Simulator
-from study_processes import wait_until
 
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.frames import PLACE, RECORD
 from cvt_hpc.study.record.recovery import read_records
+from support.recorded import assert_same_numbers
+from support.study_double import Axis, Job, Simulator
+from support.study_processes import wait_until
 
 RUNS = 60
 

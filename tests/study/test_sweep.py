@@ -4,14 +4,14 @@ import json
 import time
 
 import pytest
-from recorded import assert_same_numbers
-from study_double import Axis, Coordinate, Job, Simulator
 
 from cvt_hpc.job import load_job
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.variables import Status
+from support.recorded import assert_same_numbers
+from support.study_double import Axis, Coordinate, Job, Simulator
 
 
 def sweep(job, out, **options):

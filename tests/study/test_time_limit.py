@@ -6,7 +6,6 @@ import time
 
 import numpy as np
 import pytest
-from study_double import Axis, Job, Simulator
 
 from cvt_hpc.study import run
 from cvt_hpc.study.folder import StudyFolder
@@ -18,6 +17,7 @@ from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.log import RecordLog
 from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.variables import Status
+from support.study_double import Axis, Job, Simulator
 
 JOB = Job((Axis("load", tuple(range(12))),))
 

@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recorded import assert_same_numbers
 from scipy import ndimage
-from study_double import Axis, Job, Simulator
-from study_processes import HERE
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.study import open_results, read_status, run
@@ -20,6 +17,9 @@ from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.tracing import inferred_classes, needed_runs
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.classes import OccurrenceClass
+from support.recorded import assert_same_numbers
+from support.study_double import Axis, Job, Simulator
+from support.study_processes import HERE
 
 QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN, SLIPPING, IRREGULAR = OccurrenceClass
 FLAGS = {

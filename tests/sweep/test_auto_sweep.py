@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from cf import cf_findings
-from sweeps import call
 
 from cvt_hpc.study import open_results
 from cvt_hpc.variables import Status
+from support.cf import cf_findings
+from support.sweeps import call
 
 JOB = """name = "a"
 model = "auto"

@@ -11,15 +11,15 @@ import time
 import numpy as np
 import pytest
 import xarray as xr
-from cf import cf_findings
 from PIL import Image
-from recorded import assert_same_numbers, frames_written, records
-from sweeps import call, environment, kill, start, wait_for_records
 
 from cvt_hpc import open_results
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, occurrence_classes
 from cvt_hpc.variables import Status, Vibrates
+from support.cf import cf_findings
+from support.recorded import assert_same_numbers, frames_written, records
+from support.sweeps import call, environment, kill, start, wait_for_records
 
 JOB = """
 name = "small"

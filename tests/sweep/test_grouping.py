@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from recorded import assert_same_numbers
 
 from cvt_hpc import simulation
 from cvt_hpc.job import build_job
@@ -14,6 +13,7 @@ from cvt_hpc.simulation import batches
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration import assessment
+from support.recorded import assert_same_numbers
 
 # The last load is more than friction carries: its runs end early, beside others that go on.
 GRID = {"sheave_stiffness": [1.0, np.inf], "load": [0.0, 120.0, 500.0]}

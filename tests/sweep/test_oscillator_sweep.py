@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cf import cf_findings
 
 from cvt_hpc.analysis.histories import draw_history
 from cvt_hpc.analysis.maps import draw_map
@@ -15,6 +14,7 @@ from cvt_hpc.job import build_job
 from cvt_hpc.simulation import simulate
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status, Vibrates
+from support.cf import cf_findings
 
 JOBS = Path(__file__).parents[2] / "jobs"
 SPEEDS = [0.15, 0.23, 0.28]

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from cf import cf_findings
-from rungs import rung_job
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
@@ -12,6 +10,8 @@ from cvt_hpc.job.summary import summarize
 from cvt_hpc.simulation import Interrupted, estimate_cost, record_variables, run_point, simulate
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status, Vibrates
+from support.cf import cf_findings
+from support.rungs import rung_job
 
 AXES = {"tangential_speed": [0.0, 0.05, 0.2], "friction_gradient": [-1.6, 0.0]}
 

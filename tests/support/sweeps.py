@@ -10,7 +10,8 @@ from pathlib import Path
 
 import psutil
 import pytest
-from recorded import records
+
+from support.recorded import records
 
 PATIENCE = 120.0  # [s] until a process that should end counts as hanging; kernels may have to be compiled
 _LAUNCHERS = ("SLURM_", "PMI", "OMPI_", "MPI_")

@@ -16,15 +16,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from fault_child import ACKNOWLEDGED
-from fault_starts import Forked, Hang, Launched
-from recorded import assert_same_numbers
-from study_double import Axis, Job, Simulator
 
 from cvt_hpc.job import load_job
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.recovery import read_records
+from support.fault_child import ACKNOWLEDGED
+from support.fault_starts import Forked, Hang, Launched
+from support.recorded import assert_same_numbers
+from support.study_double import Axis, Job, Simulator
 
 RUNS = 40
 HISTORIES = (5, 23)

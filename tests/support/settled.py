@@ -1,7 +1,6 @@
 """A belt run until it has settled, and what a free body cut through its strands needs to know."""
 
 import numpy as np
-from fast_runs import FastRuns
 
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
@@ -18,6 +17,7 @@ from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, strains
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.physics.compliance import contact_state
+from support.fast_runs import FastRuns
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
 DEFAULTS["duration"] = 0.1

@@ -8,8 +8,8 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from fault_cases import RUNS, Case, Outcome, Reference
-from fault_damage import DAMAGE
+from support.fault_cases import RUNS, Case, Outcome, Reference
+from support.fault_damage import DAMAGE
 
 _LOG = 20_000  # [bytes], about
 

@@ -12,13 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import psutil
-from fault_child import run_child
-from study_processes import HERE, Sweep, clean_environment, find_mpirun
+
+from support.fault_child import run_child
+from support.study_processes import HERE, Sweep, clean_environment, find_mpirun
 
 BOUND = 60.0  # [s] until a start counts as hanging; a sweep takes half a second and mpirun some more
 _GRACE = 15.0  # [s] until what outlives its launcher counts as left behind
 
-_MODULES = ["fault_child", "cvt_hpc.study.sweep", "cvt_hpc.netcdf", "netCDF4", "h5py", "dask.array"]
+_MODULES = ["support.fault_child", "cvt_hpc.study.sweep", "cvt_hpc.netcdf", "netCDF4", "h5py", "dask.array"]
 _MODULES += ["cvt_hpc.simulation", "cvt_hpc.models.oscillator.record", "cvt_hpc.models.oscillator.transient"]
 _context = multiprocessing.get_context("forkserver")
 
@@ -33,7 +34,7 @@ class Forked:
     def __init__(self, options: dict[str, Any], output: Path) -> None:
         _context.set_forkserver_preload(_MODULES)
         before = os.environ.get("PYTHONPATH", "")
-        os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE), str(HERE.parents[1]), before])
+        os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE.parent), str(HERE.parents[1]), before])
         self._process = _context.Process(target=run_child, args=(options, str(output)), daemon=True)
         self.began = time.monotonic()
         self._process.start()

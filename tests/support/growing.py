@@ -1,13 +1,13 @@
 """How fast the transient belt lets a small disturbance of its steady state grow, beside the eigenvalue."""
 
 import numpy as np
-from fast_runs import FastRuns
 
 from cvt_hpc.models.elastic_belt.one_system import FlatBelt, flat_belt, pack, rates, unpack
 from cvt_hpc.models.linear_stability.branch import Point
 from cvt_hpc.models.steady_variator.equations import LATE
 from cvt_hpc.models.steady_variator.linearised import Linearisation
 from cvt_hpc.models.steady_variator.walking import Steady
+from support.fast_runs import FastRuns
 
 
 def at_rest(steady: Steady) -> tuple[FlatBelt, np.ndarray, np.ndarray]:

@@ -1,6 +1,6 @@
 """A mass on a belt at rest, which should stick."""
 
-from small_systems import scene
+from support.small_systems import scene
 
 WIDTH, MU, LOAD, MASS = 1e-3, 0.6, 2.0, 0.5
 RATE = LOAD * MU / (MASS * WIDTH)  # of the decay of sliding at rest [1/s]

@@ -16,7 +16,6 @@ import time
 from typing import Any
 
 import numpy as np
-import study_double
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import load_job
@@ -24,6 +23,7 @@ from cvt_hpc.study import gather, run
 from cvt_hpc.study.ranks.launch import end_process
 from cvt_hpc.study.record import log
 from cvt_hpc.study.record.log import Record, RecordLog
+from support import study_double
 
 # A record whose write has returned: run, SHA-256 of its bytes, and the name and the end [byte] of its log.
 ACKNOWLEDGED = np.dtype([("run", "i8"), ("digest", "S64"), ("log", "S160"), ("end", "i8")])
