@@ -19,11 +19,12 @@ from cvt_hpc import lanes
 from cvt_hpc.job import build_job
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, fma, like, rings
-from cvt_hpc.models.elastic_belt import course, imex, imex_stations, imex_system, lane_forces
+from cvt_hpc.models.elastic_belt import imex, imex_stations, imex_system, lane_forces
 from cvt_hpc.models.elastic_belt.batch import PRECISIONS, Batch
 from cvt_hpc.models.elastic_belt.lane_belt import REPEATS
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP as STEP
 from cvt_hpc.physics import flank, friction, lane_compliance
+from cvt_hpc.variator import course
 
 CALLS = 15
 STATIONS = 160

@@ -35,7 +35,6 @@ from cvt_hpc.models.elastic_belt.belt import (
     U,
     W,
 )
-from cvt_hpc.models.elastic_belt.course import load_course, speed_course, start_damping
 from cvt_hpc.models.elastic_belt.lane_belt import (
     AXIAL_DAMPING,
     BELT_SPEED,
@@ -73,6 +72,7 @@ from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.lane_compliance import CLOSED, FORCED, GAP, solve_lane_contact
 from cvt_hpc.physics.lane_compliance import PUSH as PUSHED
 from cvt_hpc.physics.lane_gauss_seidel import sweep_lane_contact
+from cvt_hpc.variator.course import load_course, speed_course, start_damping
 
 MOST_CONTACT_ROUNDS = 200
 LEAST_SHARE_OF_WIDTH = 1e-3  # of friction_speed: below it friction is linear to 1e-6, and has no direction

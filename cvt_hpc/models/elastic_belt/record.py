@@ -12,9 +12,11 @@ from cvt_hpc.models.elastic_belt import fluctuation
 from cvt_hpc.models.elastic_belt.belt import MODES
 from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.models.elastic_belt.history import histories
-from cvt_hpc.models.elastic_belt.slip import PULLEYS, slid, slip_margin, with_slip
 from cvt_hpc.models.elastic_belt.slip import VARIABLE as SLIP_MARGIN
+from cvt_hpc.models.elastic_belt.slip import slid, slip_margin, with_slip
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+from cvt_hpc.variator import PULLEYS, STRANDS
+from cvt_hpc.variator.variables import COORDINATES, shared
 from cvt_hpc.vibration import assessment, ramp
 from cvt_hpc.vibration.ramped import ramped
 from cvt_hpc.vibration.signals import amplitude_spectrum, band_amplitude
@@ -34,7 +36,6 @@ __all__ = [
     "lanes",
 ]
 
-STRANDS = ("t1", "t2")
 RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by what a ramp changes
 
 LOSSES = (
@@ -69,37 +70,27 @@ VARIABLES = (
         "at the strongest probe",
         words="amplitude spectrum",
     ),
-    Variable("mean_ring_tension", ("strand",), "f8", "N", "mean ring tension in the middle of the strand"),
-    Variable("mean_push_force", ("strand",), "f8", "N", "mean push force in the middle of the strand"),
-    Variable("axial_force", ("pulley",), "f8", "N", "mean axial force of the belt on a sheave"),
-    Variable(
-        "slip", ("pulley",), "f8", "1", "mean tangential sliding over belt speed, weighted by contact force"
-    ),
+    *shared("mean_ring_tension", "mean_push_force", "axial_force", "slip"),
     SLIP_MARGIN,
     Variable("open_share", ("pulley",), "f8", "1", "mean, out of contact", words="open share of the wrap"),
-    Variable("flank_loss", ("pulley",), "f8", "W", "mean friction power of the flanks"),
-    Variable("thrust_ratio", (), "f8", "1", "mean axial force of the driving over that of the driven pulley"),
-    Variable("speed_loss", (), "f8", "1", "1 - ratio x driven speed / driving speed, mean"),
-    Variable("driven_speed_ripple", (), "f8", "rad s-1", "standard deviation of the driven pulley's speed"),
-    Variable("driving_power", (), "f8", "W", "mean power of the driving pulley"),
-    Variable("load_power", (), "f8", "W", "mean power of the load"),
-    Variable("thrust_power", (), "f8", "W", "mean power that the thrust takes up"),
-    Variable("storing_power", (), "f8", "W", "mean rate of the stored energy"),
-    Variable("ring_loss", (), "f8", "W", "mean friction power between rings and elements"),
+    *shared(
+        "flank_loss",
+        "thrust_ratio",
+        "speed_loss",
+        "driven_speed_ripple",
+        "driving_power",
+        "load_power",
+        "thrust_power",
+        "storing_power",
+        "ring_loss",
+    ),
     Variable("belt_loss", (), "f8", "W", "mean power of the belt's transverse damping"),
     Variable("layer_loss", (), "f8", "W", "mean power of the layers' longitudinal dampers"),
     Variable("lag_loss", (), "f8", "W", "mean power of the driven sheave's lag"),
     Variable(
         "seating_loss", (), "f8", "W", "mean elastic power carried out of the contact at the arcs' ends"
     ),
-    Variable("loss", (), "f8", "W", "mean of all losses", words="total loss"),
-    Variable(
-        "power_residual",
-        (),
-        "f8",
-        "1",
-        "what the power balance leaves open, over the larger of drive and losses",
-    ),
+    *shared("loss", "power_residual"),
     Variable(
         "step_ripple",
         (),
@@ -123,8 +114,7 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     step = parameters["spectrum_step"]
     bins = np.arange(0.0, parameters["band_high"] + step / 2, step)
     return {
-        "strand": Coordinate(np.array(STRANDS), "", "strand", "t1 leaves the driving pulley, t2 enters it"),
-        "pulley": Coordinate(np.array(PULLEYS), "", "pulley"),
+        **COORDINATES,
         "arc_part": Coordinate(
             np.arange(1, fluctuation.ARC_PARTS + 1), "1", "part of the wrap", "from its inlet to its outlet"
         ),

@@ -39,11 +39,11 @@ from cvt_hpc.models.elastic_belt.belt import (
     U,
     W,
 )
-from cvt_hpc.models.elastic_belt.course import load_course, speed_course, start_damping
 from cvt_hpc.physics.compliance import ContactState, solve_contact
 from cvt_hpc.physics.flank import flank_forces, sliding
 from cvt_hpc.physics.friction import friction_coefficient, saturation
 from cvt_hpc.physics.sheaves import Sheaves
+from cvt_hpc.variator.course import load_course, speed_course, start_damping
 
 
 @merged_kernel

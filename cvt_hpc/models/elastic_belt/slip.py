@@ -27,13 +27,13 @@ from cvt_hpc.physics.capacity import torque_limit
 from cvt_hpc.physics.friction import FrictionLaw, friction_coefficients, given_law
 from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.variables import Variable, Vibrates
+from cvt_hpc.variator import PULLEYS
 from cvt_hpc.vibration.assessment import Occurrence
 from cvt_hpc.vibration.occurrence import LONGEST_REASON
 
 if TYPE_CHECKING:
     from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
 
-PULLEYS = ("driving", "driven")
 GROSS_SLIP = 0.05  # of the belt's speed
 
 VARIABLE = Variable(

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.record import STRANDS
-from cvt_hpc.models.elastic_belt.slip import GROSS_SLIP, PULLEYS
+from cvt_hpc.models.elastic_belt.slip import GROSS_SLIP
 from cvt_hpc.models.elastic_belt.slip import VARIABLE as SLIP_MARGIN
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+from cvt_hpc.variator.variables import COORDINATES
 
 VARIABLES = (
     Variable("mean_ring_tension", ("strand",), "f8", "N", "ring tension in the middle of the strand"),
@@ -27,10 +27,7 @@ VARIABLES = (
 
 def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, whatever the parameters."""
-    return {
-        "strand": Coordinate(np.array(STRANDS), "", "strand", "t1 leaves the driving pulley, t2 enters it"),
-        "pulley": Coordinate(np.array(PULLEYS), "", "pulley"),
-    }
+    return dict(COORDINATES)
 
 
 def cost(parameters: Mapping[str, Any], stepper: None) -> Any:

@@ -11,8 +11,9 @@ from cvt_hpc.models.strand.forces import net_forces
 from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies, resting_frequencies
 from cvt_hpc.physics.geometry import variator
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+from cvt_hpc.variator import STRANDS
+from cvt_hpc.variator.variables import COORDINATES
 
-STRANDS = ("t1", "t2")
 MODES = 5  # that are recorded
 
 VARIABLES = (
@@ -43,7 +44,7 @@ class Solution(NamedTuple):
 def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, whatever the parameters."""
     return {
-        "strand": Coordinate(np.array(STRANDS), "", "strand", "t1 leaves the driving pulley, t2 enters it"),
+        "strand": COORDINATES["strand"],
         "half_waves": Coordinate(np.arange(1, MODES + 1), "1", "half waves", "along the strand"),
     }
 

@@ -1,0 +1,129 @@
+"""What a job may set of a variator, whichever model of it: the scene, and the friction of the flanks.
+
+Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht et al. 2004, sec. 3.1); sizes
+are those of a common passenger-car belt; every other default is an assumption, plausible and not measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
+from cvt_hpc.physics import capacity
+from cvt_hpc.physics.friction_laws import FRICTION_LAWS
+from cvt_hpc.physics.friction_table import friction_file
+from cvt_hpc.physics.geometry import driven_radius
+
+
+def _closing_radius(parameters: Mapping[str, Any]) -> float:
+    return driven_radius(*(parameters[key] for key in ("ratio", "belt_length", "centre_distance")))
+
+
+SCENE: dict[str, Parameter] = {
+    "ratio": positive(2.52, "", "speed ratio, driven radius / driving radius (Lebrecht 2004: LOW stop)"),
+    "driven_radius": positive(0.075, "m", "pitch radius on the driven pulley", sensible=(0.01, 0.5)),
+    "belt_length": Parameter(
+        None,
+        "m",
+        "length of the closed pitch line, in the place of driven_radius, which follows at each ratio",
+        minimum=0.0,
+        exclusive=True,
+        gives=Substitute("driven_radius", ("ratio", "centre_distance"), _closing_radius),
+        sensible=(0.1, 5.0),
+    ),
+    "centre_distance": positive(0.155, "m", "distance of the shafts", sensible=(0.03, 2.0)),
+    "driving_speed": positive(
+        3000.0 * np.pi / 30.0,
+        "rad/s",
+        "speed of the driving pulley, prescribed; at the end of a ramp",
+        sensible=(1.0, 800.0),
+    ),
+    "thrust": positive(50e3, "N", "axial force on the driven pulley", sensible=(500.0, 2000000.0)),
+    "load": Parameter(
+        0.0,
+        "N m",
+        "torque at the driving pulley; the driven one is loaded by ratio x load",
+        sensible=(0.5, 2000.0),
+    ),
+    "load_share": Parameter(
+        None,
+        "",
+        "torque ratio, load over the torque that friction carries, in the place of load, which follows",
+        gives=Substitute("load", capacity.NEEDS, capacity.shared_load),
+    ),
+    "load_history": Parameter(
+        "constant",
+        "",
+        "load is reached within rise_time and kept, or rises from load_start over the whole run",
+        choices=("constant", "ramp"),
+    ),
+    "load_start": Parameter(0.0, "N m", "load at the start of a ramp", sensible=(0.5, 2000.0)),
+    "speed_history": Parameter(
+        "constant",
+        "",
+        "driving_speed is kept, or the driving pulley goes to it from speed_start over the whole run",
+        choices=("constant", "ramp"),
+    ),
+    "speed_start": positive(
+        1000.0 * np.pi / 30.0,
+        "rad/s",
+        "speed of the driving pulley at the start of a ramp",
+        sensible=(1.0, 800.0),
+    ),
+    "rise_time": positive(
+        0.03,
+        "s",
+        "start-up: load rises smoothly, extra damping of the belt fades out",
+        sensible=(0.0001, 10.0),
+    ),
+    "disturbance": not_negative(
+        1e-6,
+        "m",
+        "largest random displacement of the strands, given to them at rise_time",
+        sensible=(1e-12, 0.01),
+    ),
+    "seed": Parameter(1, "", "seed of that disturbance", minimum=0),
+}
+
+FRICTION: dict[str, Parameter] = {
+    "friction_law": Parameter(
+        "stribeck",
+        "",
+        "friction of the flanks over sliding speed",
+        choices=FRICTION_LAWS,
+    ),
+    "friction_gradient": Parameter(
+        -0.8,
+        "s/m",
+        "slope dmu/dv of the friction law at v -> 0+, its steepest fall, without regularisation",
+        maximum=0.0,
+        sensible=(0.001, 100.0),
+    ),
+    "kinetic_friction": positive(0.1, "", "the level that does not change with the gradient"),
+    "stribeck_velocity": positive(0.05, "m/s", "speed scale of the fall", sensible=(0.0001, 10.0)),
+    "friction_speed": positive(
+        0.03, "m/s", "regularisation speed of the flanks' friction", sensible=(1e-06, 5.0)
+    ),
+    "friction_memory": not_negative(
+        0.3e-3, "s", "time constant of the filtered sliding speed; 0: no memory", sensible=(1e-07, 0.1)
+    ),
+    "table_file": friction_file("N/m"),
+    "table_force": Parameter(
+        (), "N/m", "normal line forces of a friction table, ascending", sensible=(1.0, 100000000.0)
+    ),
+    "table_speed": Parameter((), "m/s", "speeds of a friction table, ascending", sensible=(1e-07, 100.0)),
+    "table_mu": Parameter((), "", "friction table: a row of coefficients for each force"),
+}
+
+HALF_WEDGE_ANGLE = Parameter(
+    np.deg2rad(11.0),
+    "rad",
+    "half wedge angle of the groove",
+    minimum=0.0,
+    maximum=1.0,
+    exclusive=True,
+    sensible=(0.02, 0.8),
+)

@@ -1,0 +1,45 @@
+"""What records of a variator have in common, whichever model wrote them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cvt_hpc.variables import Coordinate, Variable
+from cvt_hpc.variator import PULLEYS, STRANDS
+
+COORDINATES = {
+    "strand": Coordinate(np.array(STRANDS), "", "strand", "t1 leaves the driving pulley, t2 enters it"),
+    "pulley": Coordinate(np.array(PULLEYS), "", "pulley"),
+}
+
+_SHARED = (
+    Variable("mean_ring_tension", ("strand",), "f8", "N", "mean ring tension in the middle of the strand"),
+    Variable("mean_push_force", ("strand",), "f8", "N", "mean push force in the middle of the strand"),
+    Variable("axial_force", ("pulley",), "f8", "N", "mean axial force of the belt on a sheave"),
+    Variable(
+        "slip", ("pulley",), "f8", "1", "mean tangential sliding over belt speed, weighted by contact force"
+    ),
+    Variable("flank_loss", ("pulley",), "f8", "W", "mean friction power of the flanks"),
+    Variable("thrust_ratio", (), "f8", "1", "mean axial force of the driving over that of the driven pulley"),
+    Variable("speed_loss", (), "f8", "1", "1 - ratio x driven speed / driving speed, mean"),
+    Variable("driven_speed_ripple", (), "f8", "rad s-1", "standard deviation of the driven pulley's speed"),
+    Variable("driving_power", (), "f8", "W", "mean power of the driving pulley"),
+    Variable("load_power", (), "f8", "W", "mean power of the load"),
+    Variable("thrust_power", (), "f8", "W", "mean power that the thrust takes up"),
+    Variable("storing_power", (), "f8", "W", "mean rate of the stored energy"),
+    Variable("ring_loss", (), "f8", "W", "mean friction power between rings and elements"),
+    Variable("loss", (), "f8", "W", "mean of all losses", words="total loss"),
+    Variable(
+        "power_residual",
+        (),
+        "f8",
+        "1",
+        "what the power balance leaves open, over the larger of drive and losses",
+    ),
+)
+
+
+def shared(*names: str) -> tuple[Variable, ...]:
+    """Variables of the records of all variators, by name."""
+    by_name = {variable.name: variable for variable in _SHARED}
+    return tuple(by_name[name] for name in names)
