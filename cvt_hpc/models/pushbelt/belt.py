@@ -1,0 +1,300 @@
+"""The constants, state and work space of a planar pushbelt, as its kernels take them.
+
+Arrays hold one row an element, in linked lanes (`cvt_hpc.lanes.rings`): the ring of elements is cut into
+equal parts, one for each lane of a register.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cvt_hpc.lanes import LaneArray
+
+# Fields of the state of an element. Speeds are those at the middle of the last step.
+(
+    Y,  # saddle point, which is the ring line and the assumed centre of gravity [m]
+    Z,
+    HEADING_Y,  # running direction of the element, a unit vector
+    HEADING_Z,
+    U_Y,  # velocity of the saddle point [m/s]
+    U_Z,
+    OMEGA,  # angular velocity [rad/s]
+    V,  # velocity of the ring's material along its line [m/s]
+    LENGTH,  # unstretched length of the ring up to the next element [m]
+    TENSION,  # of the ring up to the next element [N]
+    SADDLE,  # normal force of the ring on the element [N]
+    EDGE,  # contact forces to the next element, at rocking edge and head [N]
+    HEAD,
+    FLANK,  # normal force at each of the two flanks [N]
+    FLANK_SLIP_M,  # sliding speed along the meridian of the sheave, outwards [m/s]
+    FLANK_SLIP_T,  # sliding speed in the direction of rotation, element over sheave [m/s]
+    FLANK_FRICTION_M,  # friction force at each flank against these speeds [N]
+    FLANK_FRICTION_T,
+    RING_SLIP,  # of the ring over the saddle, forwards [m/s]
+    RING_FRICTION,  # friction force of the element against that [N]
+    RING_DUAL,  # directions of friction as the Newton iteration has them, at most 1 in size
+    FLANK_DUAL_M,
+    FLANK_DUAL_T,
+    DRIVEN,  # 1 where the nearer pulley is the driven one, else 0
+) = range(24)
+STATE_FIELDS = 24
+UNKNOWNS = 4  # U_Y, U_Z, OMEGA, V of each element
+
+# Entries of the state of the pulleys
+DRIVING_SPEED, DRIVEN_SPEED, DRIVING_RADIUS, DRIVEN_RADIUS = range(4)
+
+# Entries of the inputs, at the start and at the end of a call
+IN_SPEED, IN_DRIVING_THRUST, IN_DRIVEN_THRUST, IN_LOAD = range(4)
+
+# Entries of the totals: time, and what adds up over it
+(
+    TIME,  # [s]
+    WORK_IN,  # of the driving shaft [J]
+    WORK_OUT,  # against the load [J]
+    FLANK_LOSS,  # [J]
+    RING_LOSS,  # [J]
+    DRIVING_THRUST,  # axial force of the belt on a sheave, over time [N s]
+    DRIVEN_THRUST,
+    DRIVING_TORQUE,  # [N m s]
+    DRIVEN_TORQUE,
+    POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
+) = range(10)
+TOTALS = 10
+
+# Entries of the counters
+STEPS, ITERATIONS, FAILED_STEPS, STATUS, FAILED_ELEMENT, FAILED_UNKNOWN, FAILED_CONTACT = range(7)
+COUNTERS = 7
+# values of STATUS
+CONVERGED, NOT_CONVERGED, NOT_FINITE = range(3)
+# values of FAILED_CONTACT
+CONTACTS = ("edge", "head", "flank", "ring")
+
+
+class Belt(NamedTuple):
+    """Constants of a belt and its pulleys; of an element where not said otherwise.
+
+    Attributes
+    ----------
+    centre_distance : float
+        [m]
+    sine, cosine, tangent : float
+        Of the half wedge angle.
+    thickness : float
+        [m]
+    pitch_depth, head_height : float
+        Of the rocking edge and the flank's contact point below the saddle, and of the head's contact above
+        it [m].
+    mass, inertia, ring_mass : float
+        [kg], [kg m^2], and mass of the ring for each element [kg].
+    ring_stiffness : float
+        EA of both ring packages [N].
+    flank_stiffness : float
+        Normal force at each flank by its penetration [N/m].
+    contact_stiffness : float
+        Of each of the two contacts between elements [N/m].
+    angle_stiffness, angle_damping : float
+        Of an element's rotation against each segment of the ring, half at each end [N m/rad], [N m s/rad].
+    flank_law, flank_kinetic, flank_gradient, flank_speed : int, float, float, float
+        Friction law at the flanks (`physics.friction`).
+    ring_law, ring_kinetic, ring_gradient, ring_speed : int, float, float, float
+        Friction law of the ring on the saddles.
+    friction_speed : float
+        v_reg: friction is mu N v / sqrt(v^2 + v_reg^2) [m/s].
+    driven_inertia : float
+        [kg m^2]
+    driving_rate, driven_rate : float
+        Radial speed of the belt by the excess of a loose sheave's thrust over the belt's axial force
+        [m/(s N)]; 0: the sheave is fixed.
+    modal_stiffness : (modes,) array
+        S_k of the opening of a pulley's sheaves as sum a_k psi_k(phi), psi 1, cos, sin, cos 2, ... [N/m];
+        none: rigid sheaves.
+    """
+
+    centre_distance: float
+    sine: float
+    cosine: float
+    tangent: float
+    thickness: float
+    pitch_depth: float
+    head_height: float
+    mass: float
+    inertia: float
+    ring_mass: float
+    ring_stiffness: float
+    flank_stiffness: float
+    contact_stiffness: float
+    angle_stiffness: float
+    angle_damping: float
+    flank_law: int
+    flank_kinetic: float
+    flank_gradient: float
+    flank_speed: float
+    ring_law: int
+    ring_kinetic: float
+    ring_gradient: float
+    ring_speed: float
+    friction_speed: float
+    driven_inertia: float
+    driving_rate: float
+    driven_rate: float
+    modal_stiffness: np.ndarray
+
+
+class Newton(NamedTuple):
+    """How a step is solved.
+
+    Attributes
+    ----------
+    tolerance : float
+        Largest correction of a speed [m/s]; angular velocities count with `omega_length`.
+    power_tolerance : float
+        Largest power residual of the whole belt [W].
+    omega_length : float
+        [m]
+    most_iterations, first_half_step : int
+        Iterations a step, and the first one whose correction is halved.
+    most_failures : int
+        Failed steps in a row with which a run ends.
+    """
+
+    tolerance: float = 1e-3
+    power_tolerance: float = 1.0
+    omega_length: float = 2e-3
+    most_iterations: int = 20
+    first_half_step: int = 16
+    most_failures: int = 20
+
+
+class BeltState(NamedTuple):
+    """State of a run, which `step.advance` takes on.
+
+    Attributes
+    ----------
+    elements : (rows, STATE_FIELDS) LaneArray
+        Element p rows + j lies in row j, lane p.
+    pulleys : (4,) array
+        Speeds [rad/s], and radii on which the flanks' contact points run without penetration [m].
+    openings : (2, modes) array
+        a_k of each pulley's sheaves [m].
+    totals : (TOTALS,) array
+        What has added up since the start.
+    counters : (COUNTERS,) int array
+        Work done, and how the last call ended.
+    """
+
+    elements: LaneArray
+    pulleys: np.ndarray
+    openings: np.ndarray
+    totals: np.ndarray
+    counters: np.ndarray
+
+
+class Workspace(NamedTuple):
+    """What `step.advance` writes to and needs no longer afterwards.
+
+    Attributes
+    ----------
+    step : (rows, STEP_FIELDS) LaneArray
+        Geometry, directions and the linear laws of a step.
+    iterate : (rows, ITERATE_FIELDS) LaneArray
+        Forces, slopes and residuals of an iterate.
+    shapes : (rows, modes) LaneArray
+        psi_k at the elements.
+    blocks : (rows, 4 (12 + columns)) LaneArray
+        The system of an iteration (`cyclic`), with one column for the residual and one for each unknown of the
+        border.
+    scratch : (1, 48 + 4 columns) LaneArray
+        Blocks and sums.
+    reduced : (4 lanes, 4 lanes + columns) array
+        System of the parts' last elements.
+    border : (columns - 1, columns) array
+        System of the border, its right side last.
+    increments : (columns - 1,) array
+        Changes of the border's unknowns within the step.
+    inputs : (4,) array
+        Inputs of the step.
+    """
+
+    step: LaneArray
+    iterate: LaneArray
+    shapes: LaneArray
+    blocks: LaneArray
+    scratch: LaneArray
+    reduced: np.ndarray
+    border: np.ndarray
+    increments: np.ndarray
+    inputs: np.ndarray
+
+
+# Fields of Workspace.step
+(
+    PREDICTED_Y,  # saddle point and running direction at q*
+    PREDICTED_Z,
+    PREDICTED_HEADING_Y,
+    PREDICTED_HEADING_Z,
+    T_Y,  # direction of the ring at an element
+    T_Z,
+    START_SLIP,  # of the ring at the old speeds
+    TENSION_I_Y,  # direction of the tension at this element and at the next one
+    TENSION_I_Z,
+    TENSION_J_Y,
+    TENSION_J_Z,
+    PREDICTED_TENSION,
+    TENSION_SLOPE,
+    TURN_Y,  # rate of the angle of a segment by the speed difference of its ends
+    TURN_Z,
+    ANGLE_I,  # rate of the sine of the angle between element and segment by the difference of their rates
+    ANGLE_J,
+    PREDICTED_MOMENT_I,
+    PREDICTED_MOMENT_J,
+    EDGE_LEVER_I,
+    EDGE_LEVER_J,
+    EDGE_GAP,
+    HEAD_LEVER_I,
+    HEAD_LEVER_J,
+    HEAD_GAP,
+    R_Y,  # radial direction at the flank's contact point, at q_k
+    R_Z,
+    R_LEVER,
+    T_LEVER,
+    MID_R_Y,  # and at mid step
+    MID_R_Z,
+    MID_R_LEVER,
+    MID_T_LEVER,
+    MID_RADIUS,
+    PREDICTED_DEPTH,  # penetration of the flank without opening of the sheaves
+    DIAGONAL,  # 4 x 4 blocks of the linear laws, by columns: of an element, and of it with the next one
+) = range(36)
+LINK = DIAGONAL + 16
+STEP_FIELDS = LINK + 16
+
+# Fields of Workspace.iterate
+(
+    CHANGE,  # 4: of the speeds since the last step
+    RESIDUAL,  # 4
+    ITERATE_TENSION,
+    MOMENT_I,  # of the angle to the segment ahead, on this element and on the next one
+    MOMENT_J,
+    CONTACT,  # sums over both contacts: force, force times lever on this element and on the next one
+    CONTACT_I,
+    CONTACT_J,
+    STIFF,  # the same of slopes: 1, levers, and products of levers
+    STIFF_I,
+    STIFF_J,
+    STIFF_II,
+    STIFF_IJ,
+    STIFF_JJ,
+    FORCE_R,  # of both flanks, in radial and in circumferential direction
+    FORCE_T,
+    SLOPE_R,  # 3: decrease of FORCE_R by U_Y, U_Z, OMEGA
+    SLOPE_T,  # 3
+    DRIVEN_R,  # increase of both forces by the driven pulley's speed
+    DRIVEN_T,
+    OPENING_R,  # decrease of both forces by the opening of the sheaves
+    OPENING_T,
+    OPENING_N,  # decrease of the normal force by it
+    RING_SLOPE,  # decrease of the ring's friction by its slip
+) = (0, 4, *range(8, 22), 22, 25, *range(28, 34))
+ITERATE_FIELDS = 34

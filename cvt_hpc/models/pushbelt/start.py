@@ -1,0 +1,259 @@
+"""Start of a pushbelt from the geometry of its path: constants, state and work space from given values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.pushbelt.belt import (
+    COUNTERS,
+    DRIVEN,
+    HEADING_Y,
+    HEADING_Z,
+    ITERATE_FIELDS,
+    LENGTH,
+    OMEGA,
+    STATE_FIELDS,
+    STEP_FIELDS,
+    TENSION,
+    TOTALS,
+    U_Y,
+    U_Z,
+    Belt,
+    BeltState,
+    V,
+    Workspace,
+    Y,
+    Z,
+)
+from cvt_hpc.physics.friction_laws import Law
+from cvt_hpc.physics.geometry import Variator, driven_radius, variator
+
+# Assumptions, but for centre distance, belt length, elements and their mass, which are a public data set's.
+ASSUMED: dict[str, Any] = {
+    "ratio": 1.35,  # [1]
+    "centre_distance": 0.155,  # [m]
+    "belt_length": 0.6612,  # of the pitch line, on which the rocking edges lie [m]
+    "elements": 432,  # elements of the belt
+    "nodes": 432,  # super elements of the model
+    "element_mass": 1.858e-3,  # [kg]
+    "element_height": 13e-3,  # [m], of which and of the thickness the inertia is that of a plate
+    "pitch_depth": 1.5e-3,  # [m]
+    "head_height": 4e-3,  # [m]
+    "play": 0.3e-3,  # sum of the gaps between elements [m]
+    "ring_mass": 0.165,  # [kg]
+    "ring_stiffness": 6.0e6,  # EA [N]
+    "ring_strain": 1e-4,  # at the start
+    "half_wedge_angle": np.radians(11.0),  # [rad]
+    "flank_stiffness": 5e7,  # [N/m]
+    "contact_stiffness": 1e9,  # [N/m]
+    "angle_stiffness": 5.0,  # [N m/rad]
+    "angle_damping": 5e-5,  # [N m s]
+    "friction_law": "coulomb",
+    "kinetic_friction": 0.09,
+    "friction_gradient": 0.0,  # [s/m]
+    "stribeck_velocity": 0.1,  # [m/s]
+    "ring_friction_law": "coulomb",
+    "ring_friction": 0.06,
+    "ring_friction_gradient": 0.0,  # [s/m]
+    "ring_stribeck_velocity": 0.1,  # [m/s]
+    "friction_speed": 5e-4,  # [m/s]
+    "driven_inertia": 0.01,  # [kg m^2]
+    "driving_rate": 0.0,  # [m/(s N)]: position prescribed
+    "driven_rate": 5e-6,  # [m/(s N)]
+    "modal_stiffness": (),  # [N/m]
+    "driving_speed": 100.0 * np.pi,  # [rad/s]
+}
+
+
+def parts_of(nodes: int) -> int:
+    """How many lanes a ring of nodes is cut into: as many of 8, 4 or 2 as leave whole parts; else 1."""
+    return next(parts for parts in (8, 4, 2, 1) if nodes % parts == 0)
+
+
+def path_of(given: Mapping[str, Any]) -> Variator:
+    """The path of the pitch line at the start."""
+    radius = driven_radius(given["ratio"], given["belt_length"], given["centre_distance"])
+    return variator(given["ratio"], radius, given["centre_distance"])
+
+
+def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
+    """Constants from given values [SI] by the names of `ASSUMED`, and the distance of neighbours [m]."""
+    g = given
+    nodes, group = g["nodes"], g["elements"] / g["nodes"]
+    thickness = chord - g["play"] / nodes
+    mass = g["element_mass"] * group
+    angle = g["half_wedge_angle"]
+    return Belt(
+        centre_distance=float(g["centre_distance"]),
+        sine=float(np.sin(angle)),
+        cosine=float(np.cos(angle)),
+        tangent=float(np.tan(angle)),
+        thickness=float(thickness),
+        pitch_depth=float(g["pitch_depth"]),
+        head_height=float(g["head_height"]),
+        mass=float(mass),
+        inertia=float(mass * (g["element_height"] ** 2 + thickness**2) / 12.0),
+        ring_mass=float(g["ring_mass"] / nodes),
+        ring_stiffness=float(g["ring_stiffness"]),
+        flank_stiffness=float(g["flank_stiffness"] * group),
+        contact_stiffness=float(g["contact_stiffness"] / group),
+        angle_stiffness=float(g["angle_stiffness"]),
+        angle_damping=float(g["angle_damping"]),
+        flank_law=int(Law[g["friction_law"].upper()]),
+        flank_kinetic=float(g["kinetic_friction"]),
+        flank_gradient=float(g["friction_gradient"]),
+        flank_speed=float(g["stribeck_velocity"]),
+        ring_law=int(Law[g["ring_friction_law"].upper()]),
+        ring_kinetic=float(g["ring_friction"]),
+        ring_gradient=float(g["ring_friction_gradient"]),
+        ring_speed=float(g["ring_stribeck_velocity"]),
+        friction_speed=float(g["friction_speed"]),
+        driven_inertia=float(g["driven_inertia"]),
+        driving_rate=float(g["driving_rate"]),
+        driven_rate=float(g["driven_rate"]),
+        modal_stiffness=np.array(g["modal_stiffness"], dtype=np.float64),
+    )
+
+
+def on_path(
+    path: Variator, centre_distance: float, s: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points, angles of the running direction and curvatures of the path at arc lengths.
+
+    Parameters
+    ----------
+    path : Variator
+        Arcs and strands. The belt runs counter-clockwise around the driving pulley at (0, 0) and the driven
+        one at (centre_distance, 0); s = 0 is the end of the driving arc, at the lower strand.
+    centre_distance : float
+        [m]
+    s : (n,) array
+        [m]
+
+    Returns
+    -------
+    (n, 2), (n,), (n,) arrays
+        [m], [rad], [1/m]
+    """
+    s = np.mod(s, path.path_length)
+    tilt = 0.5 * (path.driven_wrap - np.pi)  # of the strands: the lower one runs downwards for it > 0
+    driving, strand, driven = path.driving_radius, path.strand_length, path.driven_radius
+    ends = np.cumsum([strand, driven * path.driven_wrap, strand, driving * path.driving_wrap])
+    region = np.searchsorted(ends, s, side="right").clip(0, 3)
+    local = s - np.concatenate([[0.0], ends[:3]])[region]
+    angle = np.choose(
+        region,
+        [
+            -tilt + 0.0 * local,
+            -tilt + local / driven,
+            np.pi + tilt + 0.0 * local,
+            np.pi + tilt + local / driving,
+        ],
+    )
+    centre = np.where((region == 1) | (region == 2), centre_distance, 0.0)
+    radius = np.choose(region, [driving, driven, driven, driving])
+    straight = np.where(region % 2 == 0, local, 0.0)
+    # radius times the outward normal (sin, -cos), from the arc's end on along the strand
+    y = centre + radius * np.sin(angle) + straight * np.cos(angle)
+    z = -radius * np.cos(angle) + straight * np.sin(angle)
+    return np.stack([y, z], 1), angle, np.where(region % 2 == 1, 1.0 / radius, 0.0)
+
+
+def equal_chords(path: Variator, centre_distance: float, nodes: int) -> tuple[np.ndarray, float]:
+    """Arc lengths (nodes,) [m] of points on a path with equal distances to their neighbours, and that [m]."""
+    s = np.arange(nodes) * path.path_length / nodes
+    for _ in range(50):
+        points, _, _ = on_path(path, centre_distance, s)
+        chords = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+        if np.ptp(chords) < 1e-13:
+            break
+        # arc lengths in proportion to what the chords leave; it contracts, as both differ by their curvature
+        gaps = np.diff(np.append(s, path.path_length)) * (chords.mean() / chords)
+        gaps *= path.path_length / gaps.sum()
+        s = np.concatenate([[0.0], np.cumsum(gaps[:-1])])
+    return s, float(chords.mean())
+
+
+def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
+    """Constants and a state from which a belt can run in: equal chords along the ideal path, at its speed.
+
+    Parameters
+    ----------
+    given : mapping
+        Values [SI] by the names of `ASSUMED`, all of them.
+
+    Returns
+    -------
+    Belt, BeltState
+        The flanks just touch; the ring has the strain `ring_strain`.
+    """
+    g = given
+    nodes, path = g["nodes"], path_of(g)
+    s, chord = equal_chords(path, g["centre_distance"], nodes)
+    belt = belt_of(g, chord)
+    pitch, _, curvature = on_path(path, belt.centre_distance, s)
+    along = np.roll(pitch, -1, axis=0) - np.roll(pitch, 1, axis=0)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    points = pitch + belt.pitch_depth * np.stack([along[:, 1], -along[:, 0]], 1)
+    distances = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+    speed = g["driving_speed"] * path.driving_radius
+    fields = np.zeros((nodes, STATE_FIELDS))
+    fields[:, [Y, Z]], fields[:, [HEADING_Y, HEADING_Z]] = points, along
+    fields[:, OMEGA] = speed * curvature
+    fields[:, [U_Y, U_Z]] = (speed + belt.pitch_depth * fields[:, OMEGA])[:, None] * along
+    fields[:, V] = speed * distances.sum() / (nodes * chord)
+    fields[:, LENGTH] = distances / (1.0 + g["ring_strain"])
+    fields[:, TENSION] = belt.ring_stiffness * g["ring_strain"]
+    fields[:, DRIVEN] = points[:, 0] > 0.5 * belt.centre_distance
+    pulleys = np.array(
+        [
+            g["driving_speed"],
+            speed / path.driven_radius,
+            path.driving_radius,
+            path.driven_radius,
+        ]
+    )
+    modes = belt.modal_stiffness.size
+    state = BeltState(
+        in_lanes(fields), pulleys, np.zeros((2, modes)), np.zeros(TOTALS), np.zeros(COUNTERS, np.int64)
+    )
+    return belt, state
+
+
+def in_lanes(fields: np.ndarray) -> LaneArray:
+    """Values (nodes, fields) as a LaneArray of linked parts."""
+    nodes, count = fields.shape
+    parts = parts_of(nodes)
+    array = LaneArray(nodes // parts, count, parts, linked=parts > 1)
+    array.data[:] = fields.reshape(parts, -1, count).transpose(1, 2, 0)
+    return array
+
+
+def of_lanes(array: LaneArray) -> np.ndarray:
+    """Values (nodes, fields) of a LaneArray of linked parts."""
+    return array.data.transpose(2, 0, 1).reshape(-1, array.data.shape[1])
+
+
+def workspace(belt: Belt, nodes: int) -> Workspace:
+    """Work space for a belt of so many nodes."""
+    parts, modes = parts_of(nodes), belt.modal_stiffness.size
+    rows, columns = nodes // parts, 2 + 2 * modes
+
+    def lanes(count: int, fields: int) -> LaneArray:
+        return LaneArray(count, fields, parts, linked=parts > 1)
+
+    return Workspace(
+        step=lanes(rows, STEP_FIELDS),
+        iterate=lanes(rows, ITERATE_FIELDS),
+        shapes=lanes(rows, max(modes, 1)),
+        blocks=lanes(rows, 48 + 4 * columns),
+        scratch=lanes(1, 48 + 4 * columns),
+        reduced=np.zeros((4 * parts, 4 * parts + columns)),
+        border=np.zeros((columns - 1, columns)),
+        increments=np.zeros(columns - 1),
+        inputs=np.zeros(4),
+    )

@@ -1,0 +1,350 @@
+"""Steps of the planar pushbelt in time.
+
+From q_k and X_{k-1/2}, X_{k+1/2} is found with all magnitudes of stiff laws at q_{k+1} = q_k + dt X_{k+1/2} and
+all directions at q_k: implicit Euler along the direction of each law, symplectic Euler for what is slow.
+"""
+
+from __future__ import annotations
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.lanes import absolute, ahead, around, behind, like, maximum
+from cvt_hpc.models.pushbelt.assembly import (
+    RIGHT,
+    assemble,
+    border_system,
+    element_forces,
+    pair_forces,
+    residuals,
+)
+from cvt_hpc.models.pushbelt.belt import (
+    CHANGE,
+    CONVERGED,
+    DRIVEN,
+    DRIVEN_RADIUS,
+    DRIVEN_SPEED,
+    DRIVEN_THRUST,
+    DRIVEN_TORQUE,
+    DRIVING_RADIUS,
+    DRIVING_SPEED,
+    DRIVING_THRUST,
+    DRIVING_TORQUE,
+    EDGE,
+    FAILED_CONTACT,
+    FAILED_ELEMENT,
+    FAILED_STEPS,
+    FAILED_UNKNOWN,
+    FLANK,
+    FLANK_FRICTION_M,
+    FLANK_FRICTION_T,
+    FLANK_LOSS,
+    FLANK_SLIP_M,
+    FLANK_SLIP_T,
+    FORCE_T,
+    HEAD,
+    HEADING_Y,
+    HEADING_Z,
+    IN_DRIVEN_THRUST,
+    IN_DRIVING_THRUST,
+    IN_LOAD,
+    IN_SPEED,
+    ITERATE_TENSION,
+    ITERATIONS,
+    LENGTH,
+    MID_RADIUS,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    OMEGA,
+    POWER_RESIDUAL,
+    R_Y,
+    R_Z,
+    RING_FRICTION,
+    RING_LOSS,
+    RING_SLIP,
+    SADDLE,
+    STATUS,
+    STEPS,
+    T_Y,
+    T_Z,
+    TENSION,
+    TENSION_I_Y,
+    TENSION_I_Z,
+    TENSION_J_Y,
+    TENSION_J_Z,
+    TIME,
+    U_Y,
+    U_Z,
+    WORK_IN,
+    WORK_OUT,
+    V,
+    Y,
+    Z,
+)
+from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
+from cvt_hpc.models.pushbelt.cyclic import solve
+
+LARGE = 1e100  # more than any speed or power that means something
+
+
+@kernel
+def _shapes(belt, step, shapes):
+    """psi_k at the elements: 1, cos, sin, cos 2, sin 2, ..."""
+    modes = shapes.data.shape[1] if belt.modal_stiffness.size > 0 else 0
+    for j in range(step.rows):
+        c, s = step[j, R_Y], step[j, R_Z]
+        cosine, sine = like(1.0, c), like(0.0, c)
+        for k in range(modes):
+            if k % 2 == 1:
+                cosine, sine = cosine * c - sine * s, sine * c + cosine * s
+                shapes[j, k] = cosine
+            elif k > 0:
+                shapes[j, k] = sine
+            else:
+                shapes[j, k] = 1.0
+
+
+@kernel
+def _solve_border(border):
+    """Solve the border's equations, by elimination without pivoting."""
+    size = border.shape[0]
+    for p in range(size):
+        per_pivot = 1.0 / border[p, p]
+        for c in range(p, size + 1):
+            border[p, c] *= per_pivot
+        for r in range(size):
+            if r != p:
+                factor = border[r, p]
+                for c in range(p, size + 1):
+                    border[r, c] -= factor * border[p, c]
+
+
+@kernel
+def _correct(iterate, blocks, border, increments, scratch, share, omega_length):
+    """Take the iterate to the solution, or a share of the way; return the largest correction [m/s]."""
+    size = border.shape[0]
+    largest = like(0.0, blocks[0, RIGHT])
+    for j in range(blocks.rows):
+        for r in range(4):
+            change = blocks[j, RIGHT + r]
+            for k in range(size):
+                change -= blocks[j, RIGHT + 4 * (1 + k) + r] * border[k, size]
+            blocks[j, RIGHT + r] = change
+            iterate[j, CHANGE + r] += share * change
+            largest = maximum(absolute(change * omega_length) if r == 2 else absolute(change), largest)
+    for k in range(size):
+        increments[k] += share * border[k, size]
+    scratch[0, 0] = largest
+    found = 0.0
+    for part in range(scratch.data.shape[2]):
+        value = scratch.data[0, 0, part]
+        # a comparison that also finds what is not a number
+        if not value <= found:
+            found = value
+    return found
+
+
+@kernel
+def _newton(belt, newton, state, work, load, dt):
+    """Find the speeds of a step; iterations, the last correction [m/s] and the power residual [W]."""
+    elements, step, iterate = state.elements, work.step, work.iterate
+    change, power = 0.0, 0.0
+    for iteration in range(newton.most_iterations + 1):
+        pair_forces(belt, elements, step, iterate, dt)
+        element_forces(
+            belt, elements, state.pulleys, work.increments, state.openings, work.shapes, step, iterate, dt
+        )
+        power = residuals(
+            belt,
+            elements,
+            state.pulleys,
+            work.increments,
+            state.openings,
+            work.shapes,
+            load,
+            step,
+            iterate,
+            work.scratch,
+            work.border,
+            dt,
+        )
+        enough = iteration > 0 and change < newton.tolerance and abs(power) < newton.power_tolerance
+        if enough or iteration == newton.most_iterations or not abs(power) < LARGE:
+            return iteration, change, power
+        assemble(belt, elements, work.shapes, step, iterate, work.blocks)
+        solve(work.blocks, work.scratch, work.reduced)
+        border_system(belt, elements, work.shapes, step, iterate, work.blocks, work.scratch, work.border, dt)
+        _solve_border(work.border)
+        share = 0.5 if iteration >= newton.first_half_step else 1.0
+        change = _correct(
+            iterate, work.blocks, work.border, work.increments, work.scratch, share, newton.omega_length
+        )
+    return newton.most_iterations, change, power
+
+
+@kernel
+def _accept(belt, state, work, inputs, dt):
+    """Take the state to the end of the step, and add up what it has done."""
+    elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
+    totals, pulleys = state.totals, state.pulleys
+    for k in range(6):
+        scratch[0, k] = 0.0
+    per_dt, square = 1.0 / dt, belt.cosine * belt.cosine
+    for j in range(step.rows):
+        t_y, t_z = step[j, T_Y], step[j, T_Z]
+        ahead_of_it, tension = iterate[j, ITERATE_TENSION], behind(iterate, j, ITERATE_TENSION)
+        pull = ahead_of_it * (t_z * step[j, TENSION_I_Y] - t_y * step[j, TENSION_I_Z])
+        pull -= tension * (t_z * behind(step, j, TENSION_J_Y) - t_y * behind(step, j, TENSION_J_Z))
+        across = per_dt * (t_z * iterate[j, CHANGE] - t_y * iterate[j, CHANGE + 1])
+        elements[j, SADDLE] = absolute(belt.ring_mass * across - pull)
+        elements[j, TENSION] = ahead_of_it
+        elements[j, LENGTH] += dt * (elements[j, RING_SLIP] - ahead(elements, j, RING_SLIP))
+
+        u_y, u_z = elements[j, U_Y] + iterate[j, CHANGE], elements[j, U_Z] + iterate[j, CHANGE + 1]
+        omega = elements[j, OMEGA] + iterate[j, CHANGE + 2]
+        elements[j, U_Y], elements[j, U_Z], elements[j, OMEGA] = u_y, u_z, omega
+        elements[j, V] += iterate[j, CHANGE + 3]
+        elements[j, Y] += dt * u_y
+        elements[j, Z] += dt * u_z
+        x_y, x_z = turned(elements[j, HEADING_Y], elements[j, HEADING_Z], dt * omega)
+        elements[j, HEADING_Y], elements[j, HEADING_Z] = x_y, x_z
+
+        grip_m, grip_t = elements[j, FLANK_FRICTION_M], elements[j, FLANK_FRICTION_T]
+        driven = elements[j, DRIVEN]
+        thrust = elements[j, FLANK] * belt.cosine + grip_m * belt.sine
+        scratch[0, 0] += (1.0 - driven) * thrust
+        scratch[0, 1] += driven * thrust
+        torque = step[j, MID_RADIUS] * iterate[j, FORCE_T]
+        scratch[0, 2] += (1.0 - driven) * torque
+        scratch[0, 3] -= driven * torque
+        scratch[0, 4] += 2.0 * (
+            square * grip_m * elements[j, FLANK_SLIP_M] + grip_t * elements[j, FLANK_SLIP_T]
+        )
+        scratch[0, 5] += elements[j, RING_FRICTION] * elements[j, RING_SLIP]
+    for k in range(6):
+        scratch[0, k] = around(scratch[0, k])
+    driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]
+    torque, driven_torque = scratch.data[0, 2, 0], scratch.data[0, 3, 0]
+    pulleys[DRIVEN_SPEED] += work.increments[0]
+    modes = belt.modal_stiffness.size
+    for k in range(2 * modes):
+        state.openings[k // modes, k % modes] += work.increments[1 + k]
+    pulleys[DRIVING_RADIUS] += dt * belt.driving_rate * (inputs[IN_DRIVING_THRUST] - driving_thrust)
+    pulleys[DRIVEN_RADIUS] += dt * belt.driven_rate * (inputs[IN_DRIVEN_THRUST] - driven_thrust)
+    totals[TIME] += dt
+    totals[WORK_IN] += dt * torque * pulleys[DRIVING_SPEED]
+    totals[WORK_OUT] += dt * inputs[IN_LOAD] * pulleys[DRIVEN_SPEED]
+    totals[FLANK_LOSS] += dt * scratch.data[0, 4, 0]
+    totals[RING_LOSS] += dt * scratch.data[0, 5, 0]
+    totals[DRIVING_THRUST] += dt * driving_thrust
+    totals[DRIVEN_THRUST] += dt * driven_thrust
+    totals[DRIVING_TORQUE] += dt * torque
+    totals[DRIVEN_TORQUE] += dt * driven_torque
+
+
+@kernel
+def _shift(work, share):
+    """Shift an iterate by a share of its last correction."""
+    for j in range(work.iterate.rows):
+        for r in range(4):
+            work.iterate[j, CHANGE + r] += share * work.blocks[j, RIGHT + r]
+
+
+@kernel
+def _contact_at_fault(belt, state, work, dt):
+    """Element and unknown with the largest last correction, and the contact whose force it changed most."""
+    solution = work.blocks.data
+    rows, parts = solution.shape[0], solution.shape[2]
+    worst, row, part, unknown = -1.0, 0, 0, 0
+    for j in range(rows):
+        for p in range(parts):
+            for r in range(4):
+                size = abs(solution[j, RIGHT + r, p])
+                if not size <= worst:
+                    worst, row, part, unknown = size, j, p, r
+    forces = state.elements.data
+    edge, head = forces[row, EDGE, part], forces[row, HEAD, part]
+    flank, ring = forces[row, FLANK_FRICTION_T, part], forces[row, RING_FRICTION, part]
+    _shift(work, -1.0)
+    pair_forces(belt, state.elements, work.step, work.iterate, dt)
+    element_forces(
+        belt,
+        state.elements,
+        state.pulleys,
+        work.increments,
+        state.openings,
+        work.shapes,
+        work.step,
+        work.iterate,
+        dt,
+    )
+    _shift(work, 1.0)
+    contact, most = 0, abs(forces[row, EDGE, part] - edge)
+    if abs(forces[row, HEAD, part] - head) > most:
+        contact, most = 1, abs(forces[row, HEAD, part] - head)
+    if abs(forces[row, FLANK_FRICTION_T, part] - flank) > most:
+        contact, most = 2, abs(forces[row, FLANK_FRICTION_T, part] - flank)
+    if abs(forces[row, RING_FRICTION, part] - ring) > most:
+        contact = 3
+    return part * rows + row, unknown, contact
+
+
+@kernel
+def advance(belt, newton, state, work, inputs, steps, dt):
+    """Advance a pushbelt by a number of steps, in place.
+
+    Parameters
+    ----------
+    belt : Belt
+        Constants.
+    newton : Newton
+        How steps are solved.
+    state : BeltState
+        The state at the start; at the end, of its last step.
+    work : Workspace
+        Work space.
+    inputs : (2, 4) array
+        Speed of the driving pulley [rad/s], thrust on a sheave of both pulleys [N], and torque of the load
+        [N m], at the start and at the end: between, they change linearly.
+    steps : int
+        Number of steps.
+    dt : float
+        Step [s].
+
+    Returns
+    -------
+    int
+        CONVERGED; NOT_CONVERGED where `most_failures` steps in a row had not converged; NOT_FINITE. The
+        counters then name the element, the unknown and the contact at fault.
+    """
+    counters = state.counters
+    failures = 0
+    for k in range(steps):
+        share = (k + 1.0) / steps
+        for entry in range(4):
+            work.inputs[entry] = inputs[0, entry] + share * (inputs[1, entry] - inputs[0, entry])
+        state.pulleys[DRIVING_SPEED] = work.inputs[IN_SPEED]
+        predict(belt, state.elements, state.pulleys, work.step, dt)
+        link(belt, state.elements, work.step, dt)
+        linear_blocks(belt, work.step, dt)
+        _shapes(belt, work.step, work.shapes)
+        for j in range(work.iterate.rows):
+            for r in range(4):
+                work.iterate[j, CHANGE + r] = 0.0
+        work.increments[:] = 0.0
+        iterations, change, power = _newton(belt, newton, state, work, work.inputs[IN_LOAD], dt)
+        counters[STEPS] += 1
+        counters[ITERATIONS] += iterations
+        finite = abs(power) < LARGE and change < LARGE
+        failed = not (finite and change < newton.tolerance and abs(power) < newton.power_tolerance)
+        failures = failures + 1 if failed else 0
+        if failed:
+            counters[FAILED_STEPS] += 1
+            element, unknown, contact = _contact_at_fault(belt, state, work, dt)
+            counters[FAILED_ELEMENT], counters[FAILED_UNKNOWN] = element, unknown
+            counters[FAILED_CONTACT] = contact
+        if not finite or failures == newton.most_failures:
+            counters[STATUS] = NOT_CONVERGED if finite else NOT_FINITE
+            return counters[STATUS]
+        state.totals[POWER_RESIDUAL] += dt * power
+        _accept(belt, state, work, work.inputs, dt)
+    counters[STATUS] = CONVERGED
+    return counters[STATUS]
