@@ -8,6 +8,7 @@ MODELS = {
     "oscillator": "cvt_hpc.models.oscillator",
     "moving_string": "cvt_hpc.models.moving_string",
     "strand": "cvt_hpc.models.strand",
+    "pushbelt": "cvt_hpc.models.pushbelt",
     "quasi_static_belt": "cvt_hpc.models.quasi_static_belt",
     "steady_variator": "cvt_hpc.models.steady_variator",
 }

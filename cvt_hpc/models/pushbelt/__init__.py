@@ -1,1 +1,16 @@
-"""The planar pushbelt of Geier and Schindler: elements, ring and sheaves with contacts that open and slide."""
+"""The planar pushbelt of rigid elements on flexible rings (Geier and Schindler 2007).
+
+Importing this package is cheap: kernels are compiled when `transient` is imported.
+"""
+
+from cvt_hpc.models.pushbelt.parameters import PARAMETERS, check, inert
+from cvt_hpc.steppers import STEPPERS as GENERAL
+
+DEFAULT_STEPPER = "newton"
+REFUSED = dict.fromkeys(
+    GENERAL,
+    "the pushbelt's contacts open, close and stick by the hundred: it is marched by its own step, newton",
+)
+STEPPERS = {"newton": "cvt_hpc.models.pushbelt.newton_settings"}
+
+__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]

@@ -1,0 +1,50 @@
+"""Semi-implicit: magnitudes of stiff forces at the end of a step, their directions at its start.
+
+Needs of a model: a step kernel with Newton's method and dual slopes of friction.
+
+Order 1. Contacts, tension and friction are implicit, so that they do not limit the step; the transverse motion
+of the strands is a leapfrog, without numerical damping, which does.
+"""
+
+from cvt_hpc.parameters import Parameter
+from cvt_hpc.steppers.facts import Facts
+
+FACTS = Facts(
+    order=1,
+    order_at_events=None,
+    adaptive=False,
+    needs=frozenset(),  # of a general system: it is a step of the pushbelt's own
+    implicit=True,
+    l_stable=False,
+    stability="transverse waves of the strands: step < pitch / sqrt(T / m)",
+    damping="none of the strands' transverse motion; contacts like a damper of stiffness x step",
+)
+PARAMETERS = {
+    "numerics": {
+        "step": Parameter(
+            1e-5,
+            "s",
+            "largest time step; a whole number of steps makes a sampling interval",
+            minimum=1e-8,
+            maximum=1e-3,
+            sensible=(1e-09, 0.001),
+        ),
+        "speed_tolerance": Parameter(
+            1e-3,
+            "m/s",
+            "largest correction of a speed with which the equations of a step count as solved",
+            minimum=1e-12,
+            maximum=1.0,
+            sensible=(1e-12, 0.1),
+        ),
+        "power_tolerance": Parameter(
+            1.0,
+            "W",
+            "largest power that these equations may leave open over the whole belt",
+            minimum=1e-9,
+            maximum=1e6,
+            sensible=(1e-9, 1e3),
+        ),
+        "most_iterations": Parameter(20, "", "iterations of a step", minimum=2, maximum=1000),
+    }
+}

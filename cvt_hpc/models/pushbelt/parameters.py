@@ -1,0 +1,222 @@
+"""What a job may set of the planar pushbelt, with units, bounds and defaults.
+
+Centre distance, belt length, number and mass of the elements are those of a common passenger-car belt; ratio
+and driving_speed are those of Geier and Schindler's measurements (2007, fig. 4). Every other default is an
+assumption, plausible and not measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
+from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
+from cvt_hpc.physics.geometry import variator, variator_problems
+from cvt_hpc.variator.scene import FRICTION, HALF_WEDGE_ANGLE, SCENE
+
+FEWEST_ELEMENTS = 100
+NOT_HERE = ("disturbance", "seed")
+NO_TABLE = ("friction_memory", "table_file", "table_force", "table_speed", "table_mu")
+
+
+def _play(parameters: Mapping[str, Any]) -> float:
+    play = path_length(parameters) - parameters["elements"] * parameters["thickness"]
+    if not 0.0 <= play <= parameters["thickness"]:
+        least, most = (
+            path_length(parameters) / (parameters["elements"] + more) for more in (1, 0)
+        )
+        raise ValueError(f"{least:.6g} to {most:.6g} m, so that the elements fit with less play than one of them")
+    return play
+
+
+def path_length(parameters: Mapping[str, Any]) -> float:
+    """Length of the closed pitch line [m]."""
+    p = parameters
+    return variator(p["ratio"], p["driven_radius"], p["centre_distance"]).path_length
+
+
+PARAMETERS: dict[str, dict[str, Parameter]] = {
+    "scene": {
+        **{key: entry for key, entry in SCENE.items() if key not in NOT_HERE},
+        "ratio": replace(SCENE["ratio"], default=1.35, description="speed ratio, driven radius / driving radius"),
+        "belt_length": replace(SCENE["belt_length"], default=0.6612),
+        "driving_speed": replace(SCENE["driving_speed"], default=100.0 * np.pi),
+        "thrust": replace(SCENE["thrust"], default=20e3),
+        "driving_thrust": not_negative(
+            0.0,
+            "N",
+            "axial force on the driving pulley; 0: its sheave stays where the ratio puts it",
+            sensible=(500.0, 2000000.0),
+        ),
+    },
+    "belt": {
+        "elements": Parameter(432, "", "elements of the belt", minimum=32, maximum=4096),
+        "coarse": Parameter(
+            False, "", f"fewer than {FEWEST_ELEMENTS} elements are meant: super elements, a polygon around the arcs"
+        ),
+        "element_mass": positive(1.214, "kg/m", "mass per length of the elements", sensible=(0.05, 20.0)),
+        "element_height": positive(
+            0.013, "m", "height of an element, of which its inertia is that of a plate", sensible=(1e-3, 0.1)
+        ),
+        "play": not_negative(
+            0.3e-3, "m", "sum of the gaps between elements on the path", sensible=(1e-07, 0.05)
+        ),
+        "thickness": Parameter(
+            None,
+            "m",
+            "thickness of an element, in the place of play, which follows",
+            minimum=0.0,
+            exclusive=True,
+            gives=Substitute("play", ("elements", "ratio", "driven_radius", "centre_distance"), _play),
+            sensible=(1e-4, 0.02),
+        ),
+        "edge_stiffness": positive(
+            1.53e6,
+            "N",
+            "force between neighbours at rocking edge or head by their approach over the pitch",
+            sensible=(1e4, 1e10),
+        ),
+        "ring_offset": positive(
+            1.5e-3, "m", "radial offset of the rings from the pitch line and the rocking edge", sensible=(1e-06, 0.05)
+        ),
+        "head_height": positive(
+            4e-3, "m", "height above the rings of the second contact between neighbours", sensible=(1e-05, 0.05)
+        ),
+        "ring_mass": positive(0.2495, "kg/m", "mass per length of the rings", sensible=(0.01, 10.0)),
+        "ring_stiffness": positive(
+            6e6, "N", "longitudinal stiffness EA of all rings", sensible=(10000.0, 10000000000.0)
+        ),
+        "ring_friction": not_negative(0.06, "", "friction coefficient between rings and elements"),
+        "tilt_spring": not_negative(
+            5.0, "N m/rad", "stiffness of an element's tilt against the rings", sensible=(1e-3, 1e6)
+        ),
+        "tilt_damper": not_negative(
+            5e-5, "N m s", "damping of an element's tilt against the rings", sensible=(1e-9, 1e3)
+        ),
+    },
+    "sheaves": {
+        "sheave_stiffness": replace(
+            positive(1.0, "", "stiffness of the sheaves, multiple of the reference; inf: rigid"), allow_infinite=True
+        ),
+        "modal_stiffness": Parameter(
+            (6e8, 3e8, 3e8, 9e8, 9e8),
+            "N/m",
+            "reference stiffness of a pulley's opening by 1, cos, sin, cos 2, sin 2 of the angle",
+            sensible=(1e5, 1e12),
+        ),
+        "flank_stiffness": positive(
+            3.27e10,
+            "N/m^2",
+            "axial stiffness of the elements, per length",
+            sensible=(1000000.0, 100000000000000.0),
+        ),
+        "half_wedge_angle": HALF_WEDGE_ANGLE,
+        "sheave_rate": positive(
+            5e-6,
+            "m/(N s)",
+            "radial speed of the belt by what the thrust exceeds the axial force of the belt",
+            sensible=(1e-12, 1.0),
+        ),
+        "driven_inertia": positive(
+            0.02, "kg m^2", "moment of inertia of the driven pulley", sensible=(1e-05, 100.0)
+        ),
+    },
+    "friction": {
+        **{key: entry for key, entry in FRICTION.items() if key not in NO_TABLE},
+        "friction_law": replace(
+            FRICTION["friction_law"], choices=tuple(law for law in FRICTION_LAWS if law != "table")
+        ),
+        "friction_gradient": replace(FRICTION["friction_gradient"], default=0.0),
+        "kinetic_friction": replace(FRICTION["kinetic_friction"], default=0.09),
+        "friction_speed": replace(
+            FRICTION["friction_speed"],
+            default=5e-4,
+            description="sliding speed below which friction at flanks and rings is smoothed",
+        ),
+    },
+}
+
+
+def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems that lie between parameters.
+
+    Parameters
+    ----------
+    parameters : dict
+        Values by name, in SI units.
+
+    Returns
+    -------
+    list of (key, expected, found)
+        Empty where all is well.
+    """
+    p = parameters
+    problems = variator_problems(p)
+    if not problems:
+        pitch = path_length(p) / p["elements"]
+        if p["play"] > pitch:
+            problems.append(("play", f"less than the pitch of the elements, {pitch:.4g} m", f"{p['play']:g} m"))
+        psi = np.arcsin((p["ratio"] - 1.0) * p["driven_radius"] / p["ratio"] / p["centre_distance"])
+        least = min(p["driven_radius"], p["driven_radius"] / p["ratio"])
+        arc = (np.pi - 2.0 * abs(psi)) * least
+        if arc < 8.0 * pitch:
+            expected = f"at least {int(np.ceil(8.0 * path_length(p) / arc))}, eight on the shorter arc"
+            problems.append(("elements", expected, f"{p['elements']}"))
+    if p["elements"] < FEWEST_ELEMENTS and not p["coarse"]:
+        expected = f"{FEWEST_ELEMENTS} or more, or coarse = true"
+        problems.append(("elements", expected, f"{p['elements']}"))
+    before = (1.0 - p["judged_fraction"]) * p["duration"]
+    if p["rise_time"] > before * (1.0 + 1e-9):
+        expected = f"a load that has risen before the run is judged, within {before:g} s"
+        problems.append(("rise_time", expected, f"{p['rise_time']:g} s"))
+    if p["load_history"] == p["speed_history"] == "ramp":
+        problems.append(("speed_history", 'constant under load_history = "ramp": one ramp a run', "ramp"))
+    limit = string_limit(p)
+    if not problems and "step" in p and p["step"] > limit:
+        expected = f"at most {limit:.3g} s, pitch over the speed of transverse waves under the thrust"
+        problems.append(("step", expected, f"{p['step']:g} s"))
+    return problems + friction_problems(p)
+
+
+def string_limit(parameters: Mapping[str, Any]) -> float:
+    """Longest step with which the strands' transverse motion, which is explicit, is stable [s].
+
+    It is pitch / sqrt(T / m) of a string in steps of symplectic Euler. The tension is that of the tighter
+    strand under thrust and load, estimated by the equilibrium of an arc and of a pulley, with half as much
+    again for what arcs add.
+    """
+    p = parameters
+    driving = p["driven_radius"] / p["ratio"]
+    wrap = np.pi + 2.0 * np.arcsin((p["driven_radius"] - driving) / p["centre_distance"])
+    mass = p["element_mass"] + p["ring_mass"]
+    centrifugal = mass * (p["driving_speed"] * driving) ** 2
+    held = 2.0 * p["thrust"] * np.tan(p["half_wedge_angle"]) / wrap + centrifugal
+    tension = 1.5 * (held + 0.5 * abs(p["load"]) / driving)
+    return float(path_length(p) / p["elements"] * np.sqrt(mass / tension))
+
+
+def inert(parameters: dict[str, Any]) -> dict[str, str]:
+    """Parameters without effect on a run, so that a study does not vary them for nothing.
+
+    Parameters
+    ----------
+    parameters : dict
+        Values by name, in SI units.
+
+    Returns
+    -------
+    dict
+        By the name of the parameter, the setting that makes it so, e.g. "sheave_stiffness inf".
+    """
+    p = parameters
+    cases = (
+        (p["load_history"] == "constant", "load_start", "load_history constant"),
+        (p["speed_history"] == "constant", "speed_start", "speed_history constant"),
+        (np.isinf(p["sheave_stiffness"]), "modal_stiffness", "sheave_stiffness inf"),
+        (p["elements"] >= FEWEST_ELEMENTS, "coarse", f"elements {FEWEST_ELEMENTS} or more"),
+    )
+    return friction_inert(p | dict.fromkeys(NO_TABLE, ())) | {key: setting for holds, key, setting in cases if holds}

@@ -1,0 +1,295 @@
+"""A transient run of the planar pushbelt: it starts from geometry, is clamped and loaded, and recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.models.marched import Probe, batches_of_one
+from cvt_hpc.models.pushbelt import belt as fields
+from cvt_hpc.models.pushbelt.belt import CONTACTS, NOT_CONVERGED, Newton
+from cvt_hpc.models.pushbelt.parameters import path_length
+from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Readings
+from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start, workspace
+from cvt_hpc.models.pushbelt.step import advance
+from cvt_hpc.recording import sample_count
+from cvt_hpc.variables import Status
+from cvt_hpc.vibration.ramped import ramped
+from cvt_hpc.variator import STRANDS
+from cvt_hpc.variator.course import load_course, speed_course
+
+CHANNELS = ("load", "driving_speed", *SCALARS)
+FIRST_THRUST = 500.0  # [N]: with which the run begins, so that the belt settles in the grooves
+LEAST_SPEED, MOST_SPEED = 0.5, 2.0  # of the driven pulley, of that without slip: beyond, the belt slips through
+
+
+class Transient:
+    """One run of the pushbelt, advanced sample by sample.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Resolved parameters of the run [SI], those of the stepper among them.
+    stepper : str
+        "newton".
+
+    Attributes
+    ----------
+    parameters
+        As given.
+    probes : tuple of Probe
+        On the strands, equally spaced between their ends.
+    interval : float
+        Sampling interval [s].
+    samples, done : int
+        Samples of the whole run, and those recorded so far.
+    failure : (Status, str) or None
+        Why the run does not go on: what has gone wrong, or that the belt slips through, with the status done.
+    """
+
+    def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
+        p = parameters
+        self.interval = 1.0 / p["sampling_rate"]
+        self._steps_per_sample = max(1, int(np.ceil(self.interval / p["step"] * (1.0 - 1e-9))))
+        self._belt, self._state = start(given(p))
+        self._work = workspace(self._belt, p["elements"])
+        self._newton = Newton(
+            tolerance=p["speed_tolerance"],
+            power_tolerance=p["power_tolerance"],
+            most_iterations=p["most_iterations"],
+        )
+        self._readings = Readings(p, self._belt)
+        self.probes = tuple(
+            Probe(f"{strand} {k + 1}", float(position))
+            for strand, positions in zip(STRANDS, self._readings.probes, strict=True)
+            for k, position in enumerate(positions)
+        )
+        self.done = 0
+        self.failure: tuple[Status, str] | None = None
+        self._rows = np.empty((0, len(self.probes) + len(CHANNELS)))
+        self._totals = np.empty((0, fields.TOTALS + 1))
+        self.prolong(p)
+
+    def prolong(self, parameters: Mapping[str, Any]) -> None:
+        """Make room for the samples of a longer duration.
+
+        Parameters
+        ----------
+        parameters : mapping
+            Those of the run but for `duration` and `judged_fraction`.
+        """
+        self.parameters = parameters
+        self.samples = sample_count(parameters)
+        self.first_judged = self.samples - round(parameters["judged_fraction"] * self.samples)
+        more = self.samples - len(self._rows)
+        self._rows = np.concatenate([self._rows, np.full((more, self._rows.shape[1]), np.nan)])
+        self._totals = np.concatenate([self._totals, np.full((more, self._totals.shape[1]), np.nan)])
+        self._sums = np.zeros((len(PROFILES) + 1, self._readings.places.size))
+
+    def advance(self, samples: int) -> tuple[Status, str] | None:
+        """March on.
+
+        Parameters
+        ----------
+        samples : int
+            How many samples at most; 0 compiles only.
+
+        Returns
+        -------
+        (Status, str) or None
+            Why the run ends here.
+        """
+        if samples == 0:
+            self._compile()
+        for _ in range(min(samples, self.samples - self.done)):
+            first, last = self._inputs(self.time), self._inputs(self.time + self.interval)
+            outcome = self._march(np.array([first, last]), self._steps_per_sample)
+            if outcome:
+                self.failure = Status.FAILED_NUMERICS, self._why(outcome)
+                break
+            self._take_sample(last)
+            if (slipped := self._slipped(last)) is not None:
+                self.failure = Status.DONE, slipped
+                break
+        return self.failure
+
+    def _march(self, inputs: np.ndarray, steps: int) -> int:
+        return advance(self._belt, self._newton, self._state, self._work, inputs, steps, self.step)
+
+    def _compile(self) -> None:
+        self._march(np.array([self._inputs(0.0)] * 2), 0)
+
+    def _inputs(self, time: float) -> tuple[float, float, float, float]:
+        """Speed [rad/s], thrusts on both pulleys [N] and torque on the driven one [N m] at a time."""
+        p = self.parameters
+        rise, end = p["rise_time"], p["duration"]
+        load = self.load(time)
+        share = 1.0
+        if ramped(p) == "speed":
+            share = speed_course.py_func(time, rise, end, p["speed_start"] / p["driving_speed"])
+        clamped = load_course.py_func(time, rise, rise, p["thrust"], p["thrust"]) / p["thrust"]
+        driving, driven = (
+            FIRST_THRUST + clamped * (thrust - FIRST_THRUST) for thrust in (p["driving_thrust"], p["thrust"])
+        )
+        return share * p["driving_speed"], driving, driven, p["ratio"] * load
+
+    def load(self, time: float) -> float:
+        """Torque at the driving pulley without losses [N m]."""
+        p = self.parameters
+        begun = p["load_start"] if ramped(p) == "load" else p["load"]
+        return load_course.py_func(time, p["rise_time"], p["duration"], begun, p["load"])
+
+    def _take_sample(self, inputs: tuple[float, float, float, float]) -> None:
+        elements = of_lanes(self._state.elements)
+        moved, scalars, profiles = self._readings.read(elements, self._state, self._belt)
+        speed, _, _, torque = inputs
+        self._rows[self.done] = [*moved, torque / self.parameters["ratio"], speed, *scalars]
+        stored = self._readings.stored_energy(elements, self._state, self._belt)
+        self._totals[self.done] = [*self._state.totals, stored]
+        if self.done >= self.first_judged:
+            self._sums += profiles
+        self.done += 1
+
+    def _why(self, outcome: int) -> str:
+        counters = self._state.counters
+        element, contact = counters[fields.FAILED_ELEMENT], CONTACTS[counters[fields.FAILED_CONTACT]]
+        what = "the equations of a step were not solved" if outcome == NOT_CONVERGED else "the state is not a number"
+        return f"at {self.time * 1e3:.4g} ms: {what}, at the {contact} contact of element {element}"
+
+    def _slipped(self, inputs: tuple[float, float, float, float]) -> str | None:
+        expected = inputs[0] / self.parameters["ratio"]
+        share = self._state.pulleys[fields.DRIVEN_SPEED] / expected
+        if LEAST_SPEED <= share <= MOST_SPEED:
+            return None
+        change = f"lost {1.0 - share:.0%}" if share < 1.0 else f"gained {share - 1.0:.0%}"
+        return f"the belt slips through: the driven pulley has {change} of its speed"
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self._state.totals[fields.TIME])
+
+    @property
+    def step(self) -> float:
+        """Time step [s]."""
+        return self.interval / self._steps_per_sample
+
+    @property
+    def steps(self) -> int:
+        """Steps taken so far."""
+        return int(self._state.counters[fields.STEPS])
+
+    @property
+    def contact_solves(self) -> int:
+        """Solves of the contact problem so far: iterations."""
+        return int(self._state.counters[fields.ITERATIONS])
+
+    def counters(self) -> dict[str, int]:
+        """Work done so far: steps, iterations, and steps that were not solved to the tolerance."""
+        names = ("steps", "iterations", "unsolved")
+        return dict(zip(names, self._state.counters[: len(names)].tolist(), strict=True))
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Displacement at the probes, outwards, (done, probe) [m]."""
+        return self._rows[: self.done, : len(self.probes)]
+
+    def channel(self, name: str) -> np.ndarray:
+        """History of one of CHANNELS, (done,)."""
+        return self._rows[: self.done, len(self.probes) + CHANNELS.index(name)]
+
+    @property
+    def judged(self) -> slice:
+        """Samples of the judged part."""
+        return slice(self.first_judged, self.samples)
+
+    def mean_rate(self, total: int) -> float:
+        """Mean rate of one of the totals over the judged part; their index, or TOTALS for the stored energy."""
+        part = self._totals[self.judged]
+        return float((part[-1, total] - part[0, total]) / (part[-1, fields.TIME] - part[0, fields.TIME]))
+
+    @property
+    def profiles(self) -> dict[str, np.ndarray]:
+        """PROFILES at places along the path, (place,): mean over the judged part; nan where no element was."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            means = self._sums[:-1] / self._sums[-1]
+        return dict(zip(PROFILES, means, strict=True))
+
+    @property
+    def path(self) -> Any:
+        """The reference path."""
+        return self._readings.path
+
+    @property
+    def places(self) -> np.ndarray:
+        """Path coordinates of the profiles, (place,) [m]."""
+        return self._readings.places
+
+    def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
+        """Why a run that reached its end is not to be trusted, by its values; None where it is.
+
+        Parameters
+        ----------
+        record : dict
+            With `power_residual` and `unsolved_share`.
+        """
+        for name, most, words in DOUBTS:
+            if not abs(record[name]) <= most:
+                return Status.FAILED_NUMERICS, f"{words}: {record[name]:.3g} instead of {most:g} at most"
+        return None
+
+    def paused(self) -> Transient:
+        """What a batch of the same point over a longer time goes on from: the run itself."""
+        return self
+
+
+DOUBTS = (
+    ("power_residual", 0.02, "the power balance does not close"),
+    ("unsolved_share", 0.02, "too many steps were not solved to the tolerance"),
+)
+
+
+def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """What `start` takes, from flat parameters of a run [SI]."""
+    p, length = parameters, path_length(parameters)
+    pitch = length / p["elements"]
+    rigid = np.isinf(p["sheave_stiffness"])
+    return {
+        "ratio": p["ratio"],
+        "centre_distance": p["centre_distance"],
+        "belt_length": length,
+        "elements": p["elements"],
+        "nodes": p["elements"],
+        "element_mass": p["element_mass"] * pitch,
+        "element_height": p["element_height"],
+        "pitch_depth": p["ring_offset"],
+        "head_height": p["head_height"],
+        "play": p["play"],
+        "ring_mass": p["ring_mass"] * length,
+        "ring_stiffness": p["ring_stiffness"],
+        "ring_strain": 1e-4,
+        "half_wedge_angle": p["half_wedge_angle"],
+        "flank_stiffness": p["flank_stiffness"] * pitch,
+        "contact_stiffness": p["edge_stiffness"] / pitch,
+        "angle_stiffness": p["tilt_spring"],
+        "angle_damping": p["tilt_damper"],
+        "friction_law": p["friction_law"],
+        "kinetic_friction": p["kinetic_friction"],
+        "friction_gradient": p["friction_gradient"],
+        "stribeck_velocity": p["stribeck_velocity"],
+        "ring_friction_law": "coulomb",
+        "ring_friction": p["ring_friction"],
+        "ring_friction_gradient": 0.0,
+        "ring_stribeck_velocity": p["stribeck_velocity"],
+        "friction_speed": p["friction_speed"],
+        "driven_inertia": p["driven_inertia"],
+        "driving_rate": p["sheave_rate"] if p["driving_thrust"] > 0.0 else 0.0,
+        "driven_rate": p["sheave_rate"],
+        "modal_stiffness": () if rigid else p["sheave_stiffness"] * np.array(p["modal_stiffness"]),
+        "driving_speed": p["speed_start"] if ramped(p) == "speed" else p["driving_speed"],
+    }
+
+
+batch = batches_of_one(Transient)
