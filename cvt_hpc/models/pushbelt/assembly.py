@@ -102,10 +102,10 @@ def pair_forces(belt, state, step, iterate, dt):
     steep = 0.5 * (dt * belt.angle_stiffness + belt.angle_damping)
     stiffness = belt.contact_stiffness
     for j in range(step.rows):
-        iy, iz = iterate[j, CHANGE], iterate[j, CHANGE + 1]
-        iw, iv = iterate[j, CHANGE + 2], iterate[j, CHANGE + 3]
-        jy, jz = ahead(iterate, j, CHANGE), ahead(iterate, j, CHANGE + 1)
-        jw, jv = ahead(iterate, j, CHANGE + 2), ahead(iterate, j, CHANGE + 3)
+        iy, iz = state[j, CHANGE], state[j, CHANGE + 1]
+        iw, iv = state[j, CHANGE + 2], state[j, CHANGE + 3]
+        jy, jz = ahead(state, j, CHANGE), ahead(state, j, CHANGE + 1)
+        jw, jv = ahead(state, j, CHANGE + 2), ahead(state, j, CHANGE + 3)
 
         stretch = step[j, TENSION_I_Y] * iy + step[j, TENSION_I_Z] * iz + iv
         stretch -= step[j, TENSION_J_Y] * jy + step[j, TENSION_J_Z] * jz + jv
@@ -142,8 +142,8 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
     wide = 1.0 / belt.cosine
     driving_speed, driven_speed = pulleys[DRIVING_SPEED], pulleys[DRIVEN_SPEED] + increments[0]
     for j in range(step.rows):
-        dy, dz = iterate[j, CHANGE], iterate[j, CHANGE + 1]
-        dw, dv = iterate[j, CHANGE + 2], iterate[j, CHANGE + 3]
+        dy, dz = state[j, CHANGE], state[j, CHANGE + 1]
+        dw, dv = state[j, CHANGE + 2], state[j, CHANGE + 3]
         u_y, u_z, omega = state[j, U_Y] + dy, state[j, U_Z] + dz, state[j, OMEGA] + dw
         driven = state[j, DRIVEN]
 
@@ -229,8 +229,8 @@ def residuals(belt, state, pulleys, increments, openings, shapes, load, step, it
         scratch[0, k] = 0.0
     for j in range(step.rows):
         t_y, t_z = step[j, T_Y], step[j, T_Z]
-        dy, dz = iterate[j, CHANGE], iterate[j, CHANGE + 1]
-        dw, dv = iterate[j, CHANGE + 2], iterate[j, CHANGE + 3]
+        dy, dz = state[j, CHANGE], state[j, CHANGE + 1]
+        dw, dv = state[j, CHANGE + 2], state[j, CHANGE + 3]
         across = belt.ring_mass * (t_z * dy - t_y * dz)
         f_y = -per_dt * (belt.mass * dy + across * t_z)
         f_z = -per_dt * (belt.mass * dz - across * t_y)

@@ -38,8 +38,9 @@ from cvt_hpc.lanes import LaneArray
     FLANK_DUAL_M,
     FLANK_DUAL_T,
     DRIVEN,  # 1 where the nearer pulley is the driven one, else 0
-) = range(24)
-STATE_FIELDS = 24
+    CHANGE,  # 4: of the speeds in the last step, from which the next one starts
+) = range(25)
+STATE_FIELDS = CHANGE + 4
 UNKNOWNS = 4  # U_Y, U_Z, OMEGA, V of each element
 
 # Entries of the state of the pulleys
@@ -178,6 +179,8 @@ class BeltState(NamedTuple):
         Speeds [rad/s], and radii on which the flanks' contact points run without penetration [m].
     openings : (2, modes) array
         a_k of each pulley's sheaves [m].
+    increments : (1 + 2 modes,) array
+        Changes in the last step of the border's unknowns: speed of the driven pulley, openings.
     totals : (TOTALS,) array
         What has added up since the start.
     counters : (COUNTERS,) int array
@@ -187,6 +190,7 @@ class BeltState(NamedTuple):
     elements: LaneArray
     pulleys: np.ndarray
     openings: np.ndarray
+    increments: np.ndarray
     totals: np.ndarray
     counters: np.ndarray
 
@@ -211,8 +215,6 @@ class Workspace(NamedTuple):
         System of the parts' last elements.
     border : (columns - 1, columns) array
         System of the border, its right side last.
-    increments : (columns - 1,) array
-        Changes of the border's unknowns within the step.
     inputs : (4,) array
         Inputs of the step.
     """
@@ -224,7 +226,6 @@ class Workspace(NamedTuple):
     scratch: LaneArray
     reduced: np.ndarray
     border: np.ndarray
-    increments: np.ndarray
     inputs: np.ndarray
 
 
@@ -272,7 +273,6 @@ STEP_FIELDS = LINK + 16
 
 # Fields of Workspace.iterate
 (
-    CHANGE,  # 4: of the speeds since the last step
     RESIDUAL,  # 4
     ITERATE_TENSION,
     MOMENT_I,  # of the angle to the segment ahead, on this element and on the next one
@@ -296,5 +296,5 @@ STEP_FIELDS = LINK + 16
     OPENING_T,
     OPENING_N,  # decrease of the normal force by it
     RING_SLOPE,  # decrease of the ring's friction by its slip
-) = (0, 4, *range(8, 22), 22, 25, *range(28, 34))
-ITERATE_FIELDS = 34
+) = (0, *range(4, 18), 18, 21, *range(24, 30))
+ITERATE_FIELDS = 30

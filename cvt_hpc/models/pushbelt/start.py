@@ -219,7 +219,12 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     )
     modes = belt.modal_stiffness.size
     state = BeltState(
-        in_lanes(fields), pulleys, np.zeros((2, modes)), np.zeros(TOTALS), np.zeros(COUNTERS, np.int64)
+        in_lanes(fields),
+        pulleys,
+        np.zeros((2, modes)),
+        np.zeros(1 + 2 * modes),
+        np.zeros(TOTALS),
+        np.zeros(COUNTERS, np.int64),
     )
     return belt, state
 
@@ -254,6 +259,5 @@ def workspace(belt: Belt, nodes: int) -> Workspace:
         scratch=lanes(1, 48 + 4 * columns),
         reduced=np.zeros((4 * parts, 4 * parts + columns)),
         border=np.zeros((columns - 1, columns)),
-        increments=np.zeros(columns - 1),
         inputs=np.zeros(4),
     )

@@ -118,7 +118,7 @@ def _solve_border(border):
 
 
 @kernel
-def _correct(iterate, blocks, border, increments, scratch, share, omega_length):
+def _correct(elements, blocks, border, increments, scratch, share, omega_length):
     """Take the iterate to the solution, or a share of the way; return the largest correction [m/s]."""
     size = border.shape[0]
     largest = like(0.0, blocks[0, RIGHT])
@@ -128,7 +128,7 @@ def _correct(iterate, blocks, border, increments, scratch, share, omega_length):
             for k in range(size):
                 change -= blocks[j, RIGHT + 4 * (1 + k) + r] * border[k, size]
             blocks[j, RIGHT + r] = change
-            iterate[j, CHANGE + r] += share * change
+            elements[j, CHANGE + r] += share * change
             largest = maximum(absolute(change * omega_length) if r == 2 else absolute(change), largest)
     for k in range(size):
         increments[k] += share * border[k, size]
@@ -150,13 +150,13 @@ def _newton(belt, newton, state, work, load, dt):
     for iteration in range(newton.most_iterations + 1):
         pair_forces(belt, elements, step, iterate, dt)
         element_forces(
-            belt, elements, state.pulleys, work.increments, state.openings, work.shapes, step, iterate, dt
+            belt, elements, state.pulleys, state.increments, state.openings, work.shapes, step, iterate, dt
         )
         power = residuals(
             belt,
             elements,
             state.pulleys,
-            work.increments,
+            state.increments,
             state.openings,
             work.shapes,
             load,
@@ -175,7 +175,7 @@ def _newton(belt, newton, state, work, load, dt):
         _solve_border(work.border)
         share = 0.5 if iteration >= newton.first_half_step else 1.0
         change = _correct(
-            iterate, work.blocks, work.border, work.increments, work.scratch, share, newton.omega_length
+            elements, work.blocks, work.border, state.increments, work.scratch, share, newton.omega_length
         )
     return newton.most_iterations, change, power
 
@@ -193,15 +193,15 @@ def _accept(belt, state, work, inputs, dt):
         ahead_of_it, tension = iterate[j, ITERATE_TENSION], behind(iterate, j, ITERATE_TENSION)
         pull = ahead_of_it * (t_z * step[j, TENSION_I_Y] - t_y * step[j, TENSION_I_Z])
         pull -= tension * (t_z * behind(step, j, TENSION_J_Y) - t_y * behind(step, j, TENSION_J_Z))
-        across = per_dt * (t_z * iterate[j, CHANGE] - t_y * iterate[j, CHANGE + 1])
+        across = per_dt * (t_z * elements[j, CHANGE] - t_y * elements[j, CHANGE + 1])
         elements[j, SADDLE] = absolute(belt.ring_mass * across - pull)
         elements[j, TENSION] = ahead_of_it
         elements[j, LENGTH] += dt * (elements[j, RING_SLIP] - ahead(elements, j, RING_SLIP))
 
-        u_y, u_z = elements[j, U_Y] + iterate[j, CHANGE], elements[j, U_Z] + iterate[j, CHANGE + 1]
-        omega = elements[j, OMEGA] + iterate[j, CHANGE + 2]
+        u_y, u_z = elements[j, U_Y] + elements[j, CHANGE], elements[j, U_Z] + elements[j, CHANGE + 1]
+        omega = elements[j, OMEGA] + elements[j, CHANGE + 2]
         elements[j, U_Y], elements[j, U_Z], elements[j, OMEGA] = u_y, u_z, omega
-        elements[j, V] += iterate[j, CHANGE + 3]
+        elements[j, V] += elements[j, CHANGE + 3]
         elements[j, Y] += dt * u_y
         elements[j, Z] += dt * u_z
         x_y, x_z = turned(elements[j, HEADING_Y], elements[j, HEADING_Z], dt * omega)
@@ -223,10 +223,10 @@ def _accept(belt, state, work, inputs, dt):
         scratch[0, k] = around(scratch[0, k])
     driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]
     torque, driven_torque = scratch.data[0, 2, 0], scratch.data[0, 3, 0]
-    pulleys[DRIVEN_SPEED] += work.increments[0]
+    pulleys[DRIVEN_SPEED] += state.increments[0]
     modes = belt.modal_stiffness.size
     for k in range(2 * modes):
-        state.openings[k // modes, k % modes] += work.increments[1 + k]
+        state.openings[k // modes, k % modes] += state.increments[1 + k]
     pulleys[DRIVING_RADIUS] += dt * belt.driving_rate * (inputs[IN_DRIVING_THRUST] - driving_thrust)
     pulleys[DRIVEN_RADIUS] += dt * belt.driven_rate * (inputs[IN_DRIVEN_THRUST] - driven_thrust)
     totals[TIME] += dt
@@ -241,11 +241,11 @@ def _accept(belt, state, work, inputs, dt):
 
 
 @kernel
-def _shift(work, share):
+def _shift(state, work, share):
     """Shift an iterate by a share of its last correction."""
     for j in range(work.iterate.rows):
         for r in range(4):
-            work.iterate[j, CHANGE + r] += share * work.blocks[j, RIGHT + r]
+            state.elements[j, CHANGE + r] += share * work.blocks[j, RIGHT + r]
 
 
 @kernel
@@ -263,20 +263,20 @@ def _contact_at_fault(belt, state, work, dt):
     forces = state.elements.data
     edge, head = forces[row, EDGE, part], forces[row, HEAD, part]
     flank, ring = forces[row, FLANK_FRICTION_T, part], forces[row, RING_FRICTION, part]
-    _shift(work, -1.0)
+    _shift(state, work, -1.0)
     pair_forces(belt, state.elements, work.step, work.iterate, dt)
     element_forces(
         belt,
         state.elements,
         state.pulleys,
-        work.increments,
+        state.increments,
         state.openings,
         work.shapes,
         work.step,
         work.iterate,
         dt,
     )
-    _shift(work, 1.0)
+    _shift(state, work, 1.0)
     contact, most = 0, abs(forces[row, EDGE, part] - edge)
     if abs(forces[row, HEAD, part] - head) > most:
         contact, most = 1, abs(forces[row, HEAD, part] - head)
@@ -326,10 +326,6 @@ def advance(belt, newton, state, work, inputs, steps, dt):
         link(belt, state.elements, work.step, dt)
         linear_blocks(belt, work.step, dt)
         _shapes(belt, work.step, work.shapes)
-        for j in range(work.iterate.rows):
-            for r in range(4):
-                work.iterate[j, CHANGE + r] = 0.0
-        work.increments[:] = 0.0
         iterations, change, power = _newton(belt, newton, state, work, work.inputs[IN_LOAD], dt)
         counters[STEPS] += 1
         counters[ITERATIONS] += iterations
