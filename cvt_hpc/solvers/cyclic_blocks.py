@@ -227,33 +227,28 @@ def _invert(blocks, i, scale, size):
 
     Only whole rows are written: a row read soon after one number of it was written would wait for memory.
     """
-    b, spare, a = len(size), blocks.rows - 1, blocks.data
-    regular, exchanged, order = True, False, 0
+    b, spare = len(size), blocks.rows - 1
+    regular = True
+    for r in range(b):
+        blocks[spare, b + r] = blocks[i, r]
+        blocks[i, r] = blocks[spare, r]
     for k in range(b):
         largest = k
         for r in range(k + 1, b):
-            if abs(a[i, r, k]) > abs(a[i, largest, k]):
+            if abs(blocks.data[spare, b + r, k]) > abs(blocks.data[spare, b + largest, k]):
                 largest = r
-        order = order * b + largest
+        row, inverse = blocks[spare, b + largest], blocks[i, largest]
+        regular = regular and anywhere(blocks[spare, k] * (absolute(row) - SMALLEST_PIVOT * scale) > 0.0)
+        factor = 1.0 / blocks.data[spare, b + largest, k]
         if largest != k:
-            exchanged = True
-            row = blocks[i, k]
-            blocks[i, k] = blocks[i, largest]
-            blocks[i, largest] = row
-        unit, row, pivot = blocks[spare, k], blocks[i, k], a[i, k, k]
-        regular = regular and anywhere(unit * (absolute(row) - SMALLEST_PIVOT * scale) > 0.0)
-        row = (1.0 / pivot) * (fma(-pivot, unit, row) + unit)
-        blocks[i, k] = row
+            blocks[spare, b + largest], blocks[i, largest] = blocks[spare, b + k], blocks[i, k]
+        row, inverse = factor * row, factor * inverse
+        blocks[spare, b + k], blocks[i, k] = row, inverse
         for r in range(b):
             if r != k:
-                factor = a[i, r, k]
-                blocks[i, r] = fma(-factor, row, fma(-factor, unit, blocks[i, r]))
-    if exchanged:
-        for k in range(b - 1, -1, -1):
-            largest = order % b
-            order //= b
-            for r in range(b):
-                a[i, r, k], a[i, r, largest] = a[i, r, largest], a[i, r, k]
+                factor = -blocks.data[spare, b + r, k]
+                blocks[spare, b + r] = fma(factor, row, blocks[spare, b + r])
+                blocks[i, r] = fma(factor, inverse, blocks[i, r])
     return regular
 
 
