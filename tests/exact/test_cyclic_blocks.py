@@ -24,6 +24,7 @@ def random_chain(n, b, dominance=4.0):
     chain = draw.normal(size=(n, 3, b, b))
     for i in range(n):  # the large entries lie anywhere but on the diagonal: rows must be exchanged
         chain[i, 0] += dominance * b * np.eye(b)[draw.permutation(b)]
+    chain[0, 0, 0] = 0.0, *[dominance * b] * (b - 1)  # without an exchange node 0 has no first pivot
     return chain, draw
 
 
