@@ -1,0 +1,193 @@
+"""Rings and open beams of planar RCM elements: equations of all elements, and steps in time.
+
+The coordinates lie one after the other, five for each element and three for the last node:
+x, y, phi, a1, a2, x, y, phi, ... An element takes eight of them from its node on, so that mass matrices join
+to blocks of 5 x 5. In a ring the last three are those of the first node, turned once around.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.lanes import LaneArray
+from cvt_hpc.multibody.rcm_beam import RcmBeam, equations_of_motion
+from cvt_hpc.solvers.cyclic_blocks import (
+    DIAGONAL,
+    LOWER,
+    UPPER,
+    block_size,
+    empty_blocks,
+    empty_columns,
+    factor,
+    solve,
+)
+
+PER_ELEMENT, PER_NODE = 5, 3
+SIZE = block_size(PER_ELEMENT)
+
+
+class Chain(NamedTuple):
+    """Elements that are joined, and their motion.
+
+    Attributes
+    ----------
+    beam : RcmBeam
+        Constants of each of the k elements.
+    turn : float
+        Angle by which the tangent turns along a ring [rad]; 0 for an open beam.
+    q, u : (5 k + 3,) arrays
+        Coordinates [m, rad] and their rates.
+    blocks, columns : (n + 1, 25) and (n + 1, 5) LaneArrays
+        Equations of n nodes, k of a ring, k + 1 of an open beam.
+    mass, force : (8, 8) and (8,) arrays
+        Those of an element.
+    """
+
+    beam: RcmBeam
+    turn: float
+    q: np.ndarray
+    u: np.ndarray
+    blocks: LaneArray
+    columns: LaneArray
+    mass: np.ndarray
+    force: np.ndarray
+
+
+def relaxed_ring(beam: RcmBeam, elements: int) -> Chain:
+    """A ring at rest around the origin, counter-clockwise: nodes and quarter points on a circle.
+
+    Parameters
+    ----------
+    beam : RcmBeam
+        Constants of an element. With its curvature that of the circle, hardly any energy is stored.
+    elements : int
+        At least 3.
+
+    Returns
+    -------
+    Chain
+        The ring.
+    """
+    step = 2.0 * math.pi / elements
+    radius = beam.length / step
+    nodes = np.zeros((elements + 1, PER_ELEMENT))
+    angle = step * np.arange(elements + 1)
+    nodes[:, 0], nodes[:, 1], nodes[:, 2] = (
+        radius * np.cos(angle),
+        radius * np.sin(angle),
+        angle + math.pi / 2,
+    )
+    nodes[:, 3:] = math.hypot(radius, 0.25 * beam.length) - radius
+    ring = _chain(beam, 2.0 * math.pi, nodes, elements)
+    close(ring)
+    return ring
+
+
+def straight_beam(beam: RcmBeam, elements: int) -> Chain:
+    """An open beam at rest, straight along x from the origin on."""
+    nodes = np.zeros((elements + 1, PER_ELEMENT))
+    nodes[:, 0] = beam.length * np.arange(elements + 1)
+    return _chain(beam, 0.0, nodes, elements + 1)
+
+
+def _chain(beam: RcmBeam, turn: float, nodes: np.ndarray, blocks: int) -> Chain:
+    q = nodes.ravel()[: nodes.size - (PER_ELEMENT - PER_NODE)].copy()
+    return Chain(
+        beam,
+        turn,
+        q,
+        np.zeros_like(q),
+        empty_blocks(blocks, PER_ELEMENT),
+        empty_columns(blocks, PER_ELEMENT, 1),
+        np.zeros((8, 8)),
+        np.zeros(8),
+    )
+
+
+@kernel
+def close(ring: Chain) -> None:
+    """Give the end of a ring the state of its first node, which has been changed."""
+    end = ring.q.size - PER_NODE
+    for k in range(PER_NODE):
+        ring.q[end + k], ring.u[end + k] = ring.q[k], ring.u[k]
+    ring.q[end + 2] += ring.turn
+
+
+@kernel
+def assemble(chain: Chain, ahead: float, stiff: float, damp: float) -> None:
+    """Set up M u' = h of all elements, in `blocks` and column 0 of `columns`.
+
+    Parameters
+    ----------
+    chain : Chain
+        At a state.
+    ahead, stiff, damp : float
+        As `equations_of_motion` takes them [s, s^2, s].
+    """
+    blocks, columns, mass, force = chain.blocks.data, chain.columns.data, chain.mass, chain.force
+    nodes = chain.blocks.rows - 1
+    blocks[:] = 0.0
+    columns[:] = 0.0
+    for i in range((chain.q.size - PER_NODE) // PER_ELEMENT):
+        first = i * PER_ELEMENT
+        q, u = chain.q[first : first + 8], chain.u[first : first + 8]
+        equations_of_motion(chain.beam, q, u, ahead, stiff, damp, mass, force)
+        j = (i + 1) % nodes
+        for r in range(PER_ELEMENT):
+            columns[i, r, 0] += force[r]
+            for c in range(PER_ELEMENT):
+                blocks[i, DIAGONAL * PER_ELEMENT + r, c] += mass[r, c]
+        for c in range(PER_NODE):
+            columns[j, c, 0] += force[PER_ELEMENT + c]
+            for r in range(PER_NODE):
+                blocks[j, DIAGONAL * PER_ELEMENT + r, c] += mass[PER_ELEMENT + r, PER_ELEMENT + c]
+            for r in range(PER_ELEMENT):
+                blocks[i, UPPER * PER_ELEMENT + r, c] = mass[r, PER_ELEMENT + c]
+                blocks[j, LOWER * PER_ELEMENT + c, r] = mass[PER_ELEMENT + c, r]
+    if chain.turn == 0.0:  # the last node of an open beam has no quarter points
+        for c in range(PER_NODE, PER_ELEMENT):
+            blocks[nodes - 1, DIAGONAL * PER_ELEMENT + c, c] = 1.0
+
+
+@kernel
+def advance(chain: Chain, dt: float, theta: float, steps: int) -> int:
+    """Advance by steps of first order: u+ = u + dt (M + theta dt D + theta^2 dt^2 K)^-1 h, q+ = q + dt u+.
+
+    With `theta` 0 this is the symplectic Euler method, half explicit: stable while dt < 2 / omega_max, where
+    the axial vibration of an element has omega_max = sqrt(12 EA / line_mass) / length, and its bending
+    379 sqrt(EI / line_mass) / length^2 (a free element; 306 in a chain). From 1/2 on neither sets a limit;
+    the change of directions under tension still does, at dt < 0.3 length / sqrt(tension / line_mass).
+    A vibration that dt does not resolve loses a factor (1 - theta) / theta in amplitude a step: with 1/2 it
+    lasts, with 1 it vanishes. One of angular frequency omega that dt does resolve is damped at a rate of
+    (theta - 1/2) omega^2 dt, since elastic forces are taken (2 theta - 1) dt ahead.
+
+    Parameters
+    ----------
+    chain : Chain
+        At a state; then at the last one.
+    dt : float
+        Step [s].
+    theta : float
+        0 or 1/2 to 1.
+    steps : int
+        How many.
+
+    Returns
+    -------
+    int
+        Steps done; fewer than `steps` where a matrix was singular or not finite.
+    """
+    q, u = chain.q, chain.u
+    for step in range(steps):
+        assemble(chain, max(2.0 * theta - 1.0, 0.0) * dt, (theta * dt) ** 2, theta * dt)
+        if not factor(chain.blocks, SIZE):
+            return step
+        solve(chain.blocks, chain.columns, SIZE)
+        for k in range(q.size):
+            u[k] += dt * chain.columns.data[k // PER_ELEMENT % (chain.blocks.rows - 1), k % PER_ELEMENT, 0]
+            q[k] += dt * u[k]
+    return steps

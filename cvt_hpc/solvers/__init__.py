@@ -1,0 +1,1 @@
+"""Algebra without physics: systems of equations with a structure that the models share."""
