@@ -2,7 +2,7 @@
 
 Needs of a model: a step kernel with Newton's method and dual slopes of friction.
 
-Order 1. Contacts, tension and friction are implicit, so that they do not limit the step; the transverse motion
+Order 1. Contacts, tension and friction are implicit, so that they do not limit the step; transverse motion
 of the strands is a leapfrog, without numerical damping, which does.
 """
 

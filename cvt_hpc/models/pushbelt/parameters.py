@@ -26,10 +26,10 @@ NO_TABLE = ("friction_memory", "table_file", "table_force", "table_speed", "tabl
 def _play(parameters: Mapping[str, Any]) -> float:
     play = path_length(parameters) - parameters["elements"] * parameters["thickness"]
     if not 0.0 <= play <= parameters["thickness"]:
-        least, most = (
-            path_length(parameters) / (parameters["elements"] + more) for more in (1, 0)
+        least, most = (path_length(parameters) / (parameters["elements"] + more) for more in (1, 0))
+        raise ValueError(
+            f"{least:.6g} to {most:.6g} m, so that the elements fit with less play than one of them"
         )
-        raise ValueError(f"{least:.6g} to {most:.6g} m, so that the elements fit with less play than one of them")
     return play
 
 
@@ -42,7 +42,9 @@ def path_length(parameters: Mapping[str, Any]) -> float:
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {
         **{key: entry for key, entry in SCENE.items() if key not in NOT_HERE},
-        "ratio": replace(SCENE["ratio"], default=1.35, description="speed ratio, driven radius / driving radius"),
+        "ratio": replace(
+            SCENE["ratio"], default=1.35, description="speed ratio, driven radius / driving radius"
+        ),
         "belt_length": replace(SCENE["belt_length"], default=0.6612),
         "driving_speed": replace(SCENE["driving_speed"], default=100.0 * np.pi),
         "thrust": replace(SCENE["thrust"], default=20e3),
@@ -56,7 +58,9 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     "belt": {
         "elements": Parameter(432, "", "elements of the belt", minimum=32, maximum=4096),
         "coarse": Parameter(
-            False, "", f"fewer than {FEWEST_ELEMENTS} elements are meant: super elements, a polygon around the arcs"
+            False,
+            "",
+            f"fewer than {FEWEST_ELEMENTS} elements are meant: super elements, a polygon around the arcs",
         ),
         "element_mass": positive(1.214, "kg/m", "mass per length of the elements", sensible=(0.05, 20.0)),
         "element_height": positive(
@@ -81,10 +85,16 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             sensible=(1e4, 1e10),
         ),
         "ring_offset": positive(
-            1.5e-3, "m", "radial offset of the rings from the pitch line and the rocking edge", sensible=(1e-06, 0.05)
+            1.5e-3,
+            "m",
+            "radial offset of the rings from the pitch line and the rocking edge",
+            sensible=(1e-06, 0.05),
         ),
         "head_height": positive(
-            4e-3, "m", "height above the rings of the second contact between neighbours", sensible=(1e-05, 0.05)
+            4e-3,
+            "m",
+            "height above the rings of the second contact between neighbours",
+            sensible=(1e-05, 0.05),
         ),
         "ring_mass": positive(0.2495, "kg/m", "mass per length of the rings", sensible=(0.01, 10.0)),
         "ring_stiffness": positive(
@@ -100,7 +110,8 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     },
     "sheaves": {
         "sheave_stiffness": replace(
-            positive(1.0, "", "stiffness of the sheaves, multiple of the reference; inf: rigid"), allow_infinite=True
+            positive(1.0, "", "stiffness of the sheaves, multiple of the reference; inf: rigid"),
+            allow_infinite=True,
         ),
         "modal_stiffness": Parameter(
             (6e8, 3e8, 3e8, 9e8, 9e8),
@@ -159,7 +170,9 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if not problems:
         pitch = path_length(p) / p["elements"]
         if p["play"] > pitch:
-            problems.append(("play", f"less than the pitch of the elements, {pitch:.4g} m", f"{p['play']:g} m"))
+            problems.append(
+                ("play", f"less than the pitch of the elements, {pitch:.4g} m", f"{p['play']:g} m")
+            )
         psi = np.arcsin((p["ratio"] - 1.0) * p["driven_radius"] / p["ratio"] / p["centre_distance"])
         least = min(p["driven_radius"], p["driven_radius"] / p["ratio"])
         arc = (np.pi - 2.0 * abs(psi)) * least
@@ -219,4 +232,6 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         (np.isinf(p["sheave_stiffness"]), "modal_stiffness", "sheave_stiffness inf"),
         (p["elements"] >= FEWEST_ELEMENTS, "coarse", f"elements {FEWEST_ELEMENTS} or more"),
     )
-    return friction_inert(p | dict.fromkeys(NO_TABLE, ())) | {key: setting for holds, key, setting in cases if holds}
+    return friction_inert(p | dict.fromkeys(NO_TABLE, ())) | {
+        key: setting for holds, key, setting in cases if holds
+    }

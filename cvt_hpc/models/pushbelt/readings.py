@@ -1,4 +1,4 @@
-"""What is read off the elements of a pushbelt at a sample: displacement, forces, losses, and where they are."""
+"""What is read off the elements of a pushbelt at a sample: displacement, forces, losses and their places."""
 
 from __future__ import annotations
 
@@ -31,7 +31,11 @@ PROFILES = {
     "push_force": ("push force", "N", "mean, between elements"),
     "ring_tension": ("ring tension", "N", "mean"),
     "contact_force": ("contact force", "N m-1", "mean normal line force of one flank"),
-    "radial_friction": ("friction along the meridian", "N m-1", "mean line force of one flank, against sliding outwards"),
+    "radial_friction": (
+        "friction along the meridian",
+        "N m-1",
+        "mean line force of one flank, against sliding outwards",
+    ),
     "tangential_friction": (
         "friction along the belt",
         "N m-1",
@@ -101,9 +105,7 @@ class Readings:
         e = elements
         position, offset = along(self.path, self._centre_distance, e[:, [f.Y, f.Z]])
         order = np.argsort(position)
-        moved = np.interp(
-            self.probes.ravel(), position[order], offset[order], period=self.path.path_length
-        )
+        moved = np.interp(self.probes.ravel(), position[order], offset[order], period=self.path.path_length)
         push = e[:, f.EDGE] + e[:, f.HEAD]
         on_driven = e[:, f.DRIVEN] > 0.5
         thrust = e[:, f.FLANK] * belt.cosine + e[:, f.FLANK_FRICTION_M] * belt.sine

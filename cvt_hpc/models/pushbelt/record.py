@@ -9,7 +9,7 @@ import numpy as np
 
 from cvt_hpc.models.pushbelt import belt as fields
 from cvt_hpc.netcdf import attributes
-from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+from cvt_hpc.variables import Coordinate, Variable, Vibrates
 from cvt_hpc.variator import PULLEYS, STRANDS
 from cvt_hpc.variator.path import REGIONS, regions
 from cvt_hpc.variator.variables import COORDINATES, shared
@@ -30,7 +30,12 @@ VARIABLES = (
     *assessment.VARIABLES,
     *ramp.VARIABLES,
     Variable(
-        "spectrum", ("strand", "frequency_bin"), "f8", "m", "at the strongest probe", words="amplitude spectrum"
+        "spectrum",
+        ("strand", "frequency_bin"),
+        "f8",
+        "m",
+        "at the strongest probe",
+        words="amplitude spectrum",
     ),
     *shared("mean_ring_tension", "mean_push_force", "axial_force", "slip", "flank_loss", "thrust_ratio"),
     *shared("speed_loss", "driven_speed_ripple", "driving_power", "load_power", "thrust_power"),
@@ -38,7 +43,9 @@ VARIABLES = (
     *shared("loss", "power_residual"),
     Variable("efficiency", (), "f8", "1", "mean power of the load over that of the driving pulley"),
     Variable("largest_push_force", (), "f8", "N", "largest along the path, of means over the judged part"),
-    Variable("driven_radius_found", (), "f8", "m", "mean radius at which the flanks touch the driven sheaves"),
+    Variable(
+        "driven_radius_found", (), "f8", "m", "mean radius at which the flanks touch the driven sheaves"
+    ),
     Variable("unsolved_share", (), "f8", "1", "share of steps that were not solved to the tolerance"),
     Variable("iterations", (), "f8", "1", "of Newton's method in a step, mean"),
 )
@@ -130,7 +137,9 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     work = run.counters()
     return {
         "spectrum": amplitude_spectrum(
-            run.displacement[judged][:, strongest_probe], p["sampling_rate"], coordinates(p)["frequency_bin"].values
+            run.displacement[judged][:, strongest_probe],
+            p["sampling_rate"],
+            coordinates(p)["frequency_bin"].values,
         ).T,
         "mean_ring_tension": pair("ring_tension", STRANDS),
         "mean_push_force": pair("push_force", STRANDS),
@@ -166,7 +175,7 @@ def histories(run: Transient) -> xr.Dataset:
     Returns
     -------
     Dataset
-        `displacement` (time, probe) [m], scalars over time, and the profiles of the judged part by `position`.
+        `displacement` (time, probe) [m], scalars over time, profiles of the judged part by `position`.
     """
     import xarray as xr
 
@@ -194,7 +203,9 @@ def histories(run: Transient) -> xr.Dataset:
             variables[f"{name}_{label}"] = (
                 "time",
                 run.channel(f"{name} {label}"),
-                attributes(words, "N", "mean over the middle half of the strand" if labels is STRANDS else ""),
+                attributes(
+                    words, "N", "mean over the middle half of the strand" if labels is STRANDS else ""
+                ),
             )
     for name, values in run.profiles.items():
         variables[name] = ("position", values, attributes(*PROFILES[name]))

@@ -12,17 +12,20 @@ from cvt_hpc.models.pushbelt import belt as fields
 from cvt_hpc.models.pushbelt.belt import CONTACTS, NOT_CONVERGED, Newton
 from cvt_hpc.models.pushbelt.parameters import path_length
 from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Readings
-from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start, workspace
+from cvt_hpc.models.pushbelt.start import of_lanes, start, workspace
 from cvt_hpc.models.pushbelt.step import advance
 from cvt_hpc.recording import sample_count
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.ramped import ramped
 from cvt_hpc.variator import STRANDS
 from cvt_hpc.variator.course import load_course, speed_course
+from cvt_hpc.vibration.ramped import ramped
 
 CHANNELS = ("load", "driving_speed", *SCALARS)
 FIRST_THRUST = 500.0  # [N]: with which the run begins, so that the belt settles in the grooves
-LEAST_SPEED, MOST_SPEED = 0.5, 2.0  # of the driven pulley, of that without slip: beyond, the belt slips through
+LEAST_SPEED, MOST_SPEED = (
+    0.5,
+    2.0,
+)  # of the driven pulley, of that without slip: beyond, the belt slips through
 
 
 class Transient:
@@ -155,7 +158,11 @@ class Transient:
     def _why(self, outcome: int) -> str:
         counters = self._state.counters
         element, contact = counters[fields.FAILED_ELEMENT], CONTACTS[counters[fields.FAILED_CONTACT]]
-        what = "the equations of a step were not solved" if outcome == NOT_CONVERGED else "the state is not a number"
+        what = (
+            "the equations of a step were not solved"
+            if outcome == NOT_CONVERGED
+            else "the state is not a number"
+        )
         return f"at {self.time * 1e3:.4g} ms: {what}, at the {contact} contact of element {element}"
 
     def _slipped(self, inputs: tuple[float, float, float, float]) -> str | None:
@@ -206,13 +213,13 @@ class Transient:
         return slice(self.first_judged, self.samples)
 
     def mean_rate(self, total: int) -> float:
-        """Mean rate of one of the totals over the judged part; their index, or TOTALS for the stored energy."""
+        """Mean rate over the judged part of one of the totals, by its index; TOTALS: of the stored energy."""
         part = self._totals[self.judged]
         return float((part[-1, total] - part[0, total]) / (part[-1, fields.TIME] - part[0, fields.TIME]))
 
     @property
     def profiles(self) -> dict[str, np.ndarray]:
-        """PROFILES at places along the path, (place,): mean over the judged part; nan where no element was."""
+        """PROFILES at places along the path, (place,), means over the judged part; nan where no element was."""
         with np.errstate(invalid="ignore", divide="ignore"):
             means = self._sums[:-1] / self._sums[-1]
         return dict(zip(PROFILES, means, strict=True))
