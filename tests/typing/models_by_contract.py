@@ -7,6 +7,7 @@ from cvt_hpc.models import (
     linear_stability,
     moving_string,
     oscillator,
+    pushbelt,
     quasi_static_belt,
     steady_variator,
     strand,
@@ -21,6 +22,8 @@ from cvt_hpc.models.linear_stability import record as linear_stability_record
 from cvt_hpc.models.moving_string import transient as moving_string_transient
 from cvt_hpc.models.oscillator import record as oscillator_record
 from cvt_hpc.models.oscillator import transient as oscillator_transient
+from cvt_hpc.models.pushbelt import record as pushbelt_record
+from cvt_hpc.models.pushbelt import transient as pushbelt_transient
 from cvt_hpc.models.quasi_static_belt import record as quasi_static_belt_record
 from cvt_hpc.models.quasi_static_belt import transient as quasi_static_belt_transient
 from cvt_hpc.models.steady_variator import record as steady_variator_record
@@ -33,6 +36,7 @@ declared = elastic_belt
 declared = linear_stability
 declared = moving_string
 declared = oscillator
+declared = pushbelt
 declared = quasi_static_belt
 declared = steady_variator
 declared = strand
@@ -43,6 +47,7 @@ recorded = criterion_record
 recorded = elastic_belt_record
 recorded = linear_stability_record
 recorded = oscillator_record
+recorded = pushbelt_record
 recorded = quasi_static_belt_record
 recorded = steady_variator_record
 recorded = strand_record
@@ -52,4 +57,5 @@ marched = auto_transient
 marched = elastic_belt_transient
 marched = moving_string_transient
 marched = oscillator_transient
+marched = pushbelt_transient
 marched = quasi_static_belt_transient
