@@ -1,1 +1,1 @@
-"""The planar pushbelt of Geier and Schindler: elements, ring and sheaves with contacts that open and slide."""
+"""Planar pushbelt with contacts that open and slide, after Geier and Schindler (README.md)."""
