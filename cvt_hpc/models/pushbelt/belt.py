@@ -56,13 +56,14 @@ IN_SPEED, IN_DRIVING_THRUST, IN_DRIVEN_THRUST, IN_LOAD = range(4)
     WORK_OUT,  # against the load [J]
     FLANK_LOSS,  # [J]
     RING_LOSS,  # [J]
+    DAMPING_LOSS,  # of the rotation of elements against the ring [J]
     DRIVING_THRUST,  # axial force of the belt on a sheave, over time [N s]
     DRIVEN_THRUST,
     DRIVING_TORQUE,  # [N m s]
     DRIVEN_TORQUE,
     POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
-) = range(10)
-TOTALS = 10
+) = range(11)
+TOTALS = 11
 
 # Entries of the counters
 STEPS, ITERATIONS, FAILED_STEPS, STATUS, FAILED_ELEMENT, FAILED_UNKNOWN, FAILED_CONTACT = range(7)
@@ -207,8 +208,8 @@ class Workspace(NamedTuple):
     shapes : (rows, modes) LaneArray
         psi_k at the elements.
     blocks : (rows, 4 (12 + columns)) LaneArray
-        The system of an iteration (`cyclic`), with one column for the residual and one for each unknown of the
-        border.
+        The system of an iteration (`cyclic`), with a column for the residual and one for each unknown of
+        the border.
     scratch : (1, 48 + 4 columns) LaneArray
         Blocks and sums.
     reduced : (4 lanes, 4 lanes + columns) array

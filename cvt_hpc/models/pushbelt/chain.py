@@ -1,12 +1,11 @@
 """Geometry of the chain of elements in lanes: predicted gaps and strains, and the directions of all forces.
 
-Index i is an element, j the next one; x the running direction of an element, o = (x_z, -x_y) outward; both turn
-as x' = -o, o' = x. Directions are those at q_k, magnitudes those at q* = q_k + dt X_k, both linear in the change
-of the speeds X from there on.
+Index i is an element and j the next one. x is the running direction of an element and o = (x_z, -x_y) its
+outward normal; both turn as x' = -o, o' = x. Directions are those at q_k. Magnitudes are those at
+q* = q_k + dt X_k, from where on they are linear in the change of the speeds X.
 
-A slip speed is that of the chord from q_k to q_{k+1}: radial directions at either end of a step would add
-v phi' dt / 2 of false radial sliding, and the lever of the contact point at either end d omega^2 dt / 2. Both
-are taken at mid step.
+Slip speeds at the flanks take the radial direction and the lever of the contact point at mid step. At either
+end of a step the direction would add v phi' dt / 2 of false radial sliding, and the lever d omega^2 dt / 2.
 """
 
 from __future__ import annotations
@@ -89,7 +88,7 @@ def contact_gap(ri, xi, rj, xj, thickness, height):
 
 @register_jitable
 def contact_levers(ri, xi, rj, xj, thickness, height):
-    """Rate of `contact_gap` by the angular velocities of both elements [m]; by the speeds it is -xj and xj."""
+    """Rate of `contact_gap` by the angular velocities of both elements [m]; by speeds it is -xj, xj."""
     along, across = xi[0] * xj[0] + xi[1] * xj[1], xi[1] * xj[0] - xi[0] * xj[1]
     lever_i = 0.5 * thickness * across - height * along
     # (Q - P) . o_j, of which the part of Q along x_j vanishes
@@ -100,7 +99,7 @@ def contact_levers(ri, xi, rj, xj, thickness, height):
 
 @register_jitable
 def radial(r, x, centre, pitch_depth):
-    """Direction and radius of a flank's contact point: e_r, rho, and the rates of both components by omega."""
+    """e_r and rho of a flank's contact point, and the rates of its two components of velocity by omega."""
     y = r[0] - pitch_depth * x[1] - centre
     z = r[1] + pitch_depth * x[0]
     radius = sqrt(y * y + z * z)

@@ -2,15 +2,15 @@
 
     L_i x_{i-1} + A_i x_i + U_i x_{i+1} = f_i,    L_i = U_{i-1}',
 
-around a ring of n elements, cut into W parts, one a lane, that are solved at the same time. The last element of
-a part is its separator. Elimination forward through a part keeps two more blocks: the coupling to the separator
-behind, and that of the separator behind to the element at hand. What is left is a small ring of the W separators,
-solved densely; from its solution each part is solved backward.
+around a ring of n elements, which is cut into W parts, one for each lane, that are solved at the same time.
+The last element of a part is its separator. Elimination runs forward through a part and keeps two more
+blocks: the coupling to the separator behind, and that of the separator behind to the element at hand. This
+leaves a small ring of W separators, which is solved densely. From its solution each part is solved backward.
 
 There is no pivoting: the blocks are mass over step plus parts that are nearly symmetric and positive.
 
-A row of blocks has A in its fields 0-15, U in 16-31, a place for the coupling behind in 32-47, all by columns, and
-right sides of four from 48 on.
+A row of blocks has A in its fields 0-15, U in 16-31, and a place for the coupling behind in 32-47, all by
+columns; right sides of four fields each follow from 48 on.
 """
 
 from __future__ import annotations
@@ -75,12 +75,12 @@ def _inverse(m):
     """Inverse of a block, both by columns, by its four parts of 2 x 2."""
     a, b, c, d = m[0], m[4], m[1], m[5]  # upper left
     per = 1.0 / (a * d - b * c)
-    i, k, l, n = d * per, -b * per, -c * per, a * per
+    i, k, o, n = d * per, -b * per, -c * per, a * per
     # lower left times that, and that times upper right
-    p, q = fma(m[2], i, m[6] * l), fma(m[2], k, m[6] * n)
-    r, s = fma(m[3], i, m[7] * l), fma(m[3], k, m[7] * n)
+    p, q = fma(m[2], i, m[6] * o), fma(m[2], k, m[6] * n)
+    r, s = fma(m[3], i, m[7] * o), fma(m[3], k, m[7] * n)
     t, u = fma(i, m[8], k * m[9]), fma(i, m[12], k * m[13])
-    v, w = fma(l, m[8], n * m[9]), fma(l, m[12], n * m[13])
+    v, w = fma(o, m[8], n * m[9]), fma(o, m[12], n * m[13])
     # what is left of the lower right, and its inverse
     a, b = m[10] - fma(p, m[8], q * m[9]), m[14] - fma(p, m[12], q * m[13])
     c, d = m[11] - fma(r, m[8], s * m[9]), m[15] - fma(r, m[12], s * m[13])
@@ -90,7 +90,7 @@ def _inverse(m):
     g, h = -fma(v, a, w * c), -fma(v, b, w * d)
     return (
         i - fma(e, p, f * r),
-        l - fma(g, p, h * r),
+        o - fma(g, p, h * r),
         -fma(a, p, b * r),
         -fma(c, p, d * r),
         k - fma(e, q, f * s),

@@ -1,9 +1,9 @@
-"""Laws of contacts in lanes: unilateral contact, and friction with the slopes by which Newton's method converges.
+"""Laws of contacts in lanes: unilateral contact, and friction with slopes by which Newton's method converges.
 
-A friction force mu N v / q, q = sqrt(v^2 + v_reg^2), has a slope that is nearly zero as soon as it slides and
-very steep where it sticks, so that Newton's method goes back and forth between both. The primal-dual method of
-Chan, Golub and Mulet (1999) keeps the direction h = v / q of each contact as an unknown of its own: its linear
-equation q h = v gives the slope mu N (1 - h v / q) / q, and the next h, cut off at size 1.
+A friction force mu N v / q, q = sqrt(v^2 + v_reg^2), has a slope that is nearly zero where it slides and very
+steep where it sticks. Newton's method with that slope goes back and forth between both. The primal-dual
+method of Chan, Golub and Mulet (1999) keeps the direction h = v / q of each contact as an unknown of its own:
+the linearised equation q h = v gives the slope mu N (1 - h v / q) / q, and the next h, cut off at size 1.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def friction(v, q, dual, mu, mu_slope):
 
 @register_jitable
 def friction_in_a_plane(v, w, q, dual_v, dual_w, mu, mu_slope):
-    """`friction` with two components: forces, and slopes of the first by v and w, of the second by v and w."""
+    """`friction` with two components: both forces, and the slopes of each by v and w."""
     per_q = 1.0 / q
     a, b = v * per_q, w * per_q
     steep = mu * per_q

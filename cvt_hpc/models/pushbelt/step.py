@@ -1,7 +1,8 @@
 """Steps of the planar pushbelt in time.
 
-From q_k and X_{k-1/2}, X_{k+1/2} is found with all magnitudes of stiff laws at q_{k+1} = q_k + dt X_{k+1/2} and
-all directions at q_k: implicit Euler along the direction of each law, symplectic Euler for what is slow.
+From q_k and X_{k-1/2} a step finds X_{k+1/2}. The magnitudes of stiff laws are those at q_{k+1} = q_k +
+dt X_{k+1/2} and all directions those at q_k: implicit Euler along the direction of each law, symplectic Euler
+for what is slow.
 """
 
 from __future__ import annotations
@@ -17,8 +18,11 @@ from cvt_hpc.models.pushbelt.assembly import (
     residuals,
 )
 from cvt_hpc.models.pushbelt.belt import (
+    ANGLE_I,
+    ANGLE_J,
     CHANGE,
     CONVERGED,
+    DAMPING_LOSS,
     DRIVEN,
     DRIVEN_RADIUS,
     DRIVEN_SPEED,
@@ -71,6 +75,8 @@ from cvt_hpc.models.pushbelt.belt import (
     TENSION_J_Y,
     TENSION_J_Z,
     TIME,
+    TURN_Y,
+    TURN_Z,
     U_Y,
     U_Z,
     WORK_IN,
@@ -82,7 +88,7 @@ from cvt_hpc.models.pushbelt.belt import (
 from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
 from cvt_hpc.models.pushbelt.cyclic import solve
 
-LARGE = 1e100  # more than any speed or power that means something
+_LARGE = 1e100  # more than any speed or power that means something
 
 
 @kernel
@@ -167,7 +173,7 @@ def _newton(belt, newton, state, work, load, dt):
             dt,
         )
         enough = iteration > 0 and change < newton.tolerance and abs(power) < newton.power_tolerance
-        if enough or iteration == newton.most_iterations or not abs(power) < LARGE:
+        if enough or iteration == newton.most_iterations or not abs(power) < _LARGE:
             return iteration, change, power
         assemble(belt, elements, work.shapes, step, iterate, work.blocks)
         solve(work.blocks, work.scratch, work.reduced)
@@ -185,8 +191,20 @@ def _accept(belt, state, work, inputs, dt):
     """Take the state to the end of the step, and add up what it has done."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     totals, pulleys = state.totals, state.pulleys
-    for k in range(6):
+    for k in range(7):
         scratch[0, k] = 0.0
+    for j in range(step.rows):
+        change_y, change_z = (
+            elements[j, U_Y] + elements[j, CHANGE],
+            elements[j, U_Z] + elements[j, CHANGE + 1],
+        )
+        change_y = ahead(elements, j, U_Y) + ahead(elements, j, CHANGE) - change_y
+        change_z = ahead(elements, j, U_Z) + ahead(elements, j, CHANGE + 1) - change_z
+        turn = step[j, TURN_Y] * change_y + step[j, TURN_Z] * change_z
+        omega, next_omega = elements[j, OMEGA], ahead(elements, j, OMEGA)
+        rate_i = step[j, ANGLE_I] * (omega + elements[j, CHANGE + 2] - turn)
+        rate_j = step[j, ANGLE_J] * (next_omega + ahead(elements, j, CHANGE + 2) - turn)
+        scratch[0, 6] += 0.5 * belt.angle_damping * (rate_i * rate_i + rate_j * rate_j)
     per_dt, square = 1.0 / dt, belt.cosine * belt.cosine
     for j in range(step.rows):
         t_y, t_z = step[j, T_Y], step[j, T_Z]
@@ -219,7 +237,7 @@ def _accept(belt, state, work, inputs, dt):
             square * grip_m * elements[j, FLANK_SLIP_M] + grip_t * elements[j, FLANK_SLIP_T]
         )
         scratch[0, 5] += elements[j, RING_FRICTION] * elements[j, RING_SLIP]
-    for k in range(6):
+    for k in range(7):
         scratch[0, k] = around(scratch[0, k])
     driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]
     torque, driven_torque = scratch.data[0, 2, 0], scratch.data[0, 3, 0]
@@ -234,6 +252,7 @@ def _accept(belt, state, work, inputs, dt):
     totals[WORK_OUT] += dt * inputs[IN_LOAD] * pulleys[DRIVEN_SPEED]
     totals[FLANK_LOSS] += dt * scratch.data[0, 4, 0]
     totals[RING_LOSS] += dt * scratch.data[0, 5, 0]
+    totals[DAMPING_LOSS] += dt * scratch.data[0, 6, 0]
     totals[DRIVING_THRUST] += dt * driving_thrust
     totals[DRIVEN_THRUST] += dt * driven_thrust
     totals[DRIVING_TORQUE] += dt * torque
@@ -329,7 +348,7 @@ def advance(belt, newton, state, work, inputs, steps, dt):
         iterations, change, power = _newton(belt, newton, state, work, work.inputs[IN_LOAD], dt)
         counters[STEPS] += 1
         counters[ITERATIONS] += iterations
-        finite = abs(power) < LARGE and change < LARGE
+        finite = abs(power) < _LARGE and change < _LARGE
         failed = not (finite and change < newton.tolerance and abs(power) < newton.power_tolerance)
         failures = failures + 1 if failed else 0
         if failed:

@@ -222,7 +222,7 @@ class Transient:
 
     @property
     def profiles(self) -> dict[str, np.ndarray]:
-        """PROFILES at places along the path, (place,), means over the judged part; nan where no element was."""
+        """PROFILES at places along the path, (place,), means of the judged part; nan without elements."""
         with np.errstate(invalid="ignore", divide="ignore"):
             means = self._sums[:-1] / self._sums[-1]
         return dict(zip(PROFILES, means, strict=True))
