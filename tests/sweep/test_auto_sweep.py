@@ -17,6 +17,8 @@ load = [60, 120]
 disturbance = ["1 um", "0.3 mm"]
 [scene]
 thrust = "50 kN"
+[mesh]
+stations = 96
 [run]
 duration = "0.3 s"
 """
