@@ -119,6 +119,8 @@ class Cluster:
         """Kill -9 the daemon of a node and all that runs there, as a power failure would."""
         self._kill(TEST_NODE=node)
         self._daemons[node].wait()
+        # What the controller finds out by itself, half a minute later.
+        self.ask("scontrol", "update", f"NodeName={node}", "State=DOWN", "Reason=lost")
 
     def stop(self) -> None:
         """End all daemons and all that they have started."""
