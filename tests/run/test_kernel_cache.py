@@ -272,11 +272,11 @@ def test_a_changed_kernel_that_was_handed_over_is_another(package, tmp_path):
         "print(euler(fall, 1.0, 1.0), sum(euler.stats.cache_hits.values()))"
     )
     found = []
-    for slope in ("1.0", "1.0", "0.5", "1.0"):
+    for slope in ("1.0", "0.5", "1.0"):
         text = f"from cvt_hpc.kernels import kernel\n@kernel\ndef slope(y):\n    return {slope} * y\n"
         (package / "physics" / "slope.py").write_text(text)
         found.append(output(program, tmp_path, package.parent))
-    assert found == [["0.5", "0"], ["0.5", "1"], ["0.75", "0"], ["0.5", "1"]]
+    assert found == [["0.5", "0"], ["0.75", "0"], ["0.5", "1"]]
 
 
 def test_a_changed_kernel_from_outside_the_package_is_another(tmp_path):
