@@ -258,7 +258,9 @@ def test_runs_left_open_share_the_lanes_of_the_next_rung(monkeypatch):
         return own(points, stepper, paused)
 
     monkeypatch.setattr(transient, "Batch", counted)
-    job = rung_job("auto", {"seed": list(range(1, 18))}, duration=0.2, longest_duration=0.2, stations=80, **JUDDER)
+    job = rung_job(
+        "auto", {"seed": list(range(1, 18))}, duration=0.2, longest_duration=0.2, stations=80, **JUDDER
+    )
     (batch,) = lane_groups(job, range(17))
     found = run_points(job, [job.point(index) for index in batch], lambda: None)
     open_runs = sum(record["rung"] == Rung.FULL for record in found)

@@ -20,7 +20,6 @@ from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration import ramp
 from support.marched import CHEAP, Together, job, record
 
-
 # mu_k x thrust, two flanks each, on the driven pulley's radius: 2 x 0.1 x 50 kN / cos 11 deg x 75 mm / 2.52
 CARRIED = 2 * 0.1 * 50e3 / np.cos(np.deg2rad(11)) * 0.075 / 2.52
 LONG_STEPS = [(0.0, 10e-6), (40.0, 10e-6), (120.0, 10e-6), (120.0, 12.5e-6)]
