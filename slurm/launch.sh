@@ -5,8 +5,8 @@
 #     CVT_HPC_LAUNCHER=srun|mpirun    what starts the ranks: Slurm itself, or the mpirun of the MPI library
 #     CVT_HPC_SRUN_MPI=pmi2|pmix|...  how srun connects them: pmi2 for MPICH and its kin, pmix for Open MPI; `srun
 #                                     --mpi=list` shows what there is. A wrong one is refused before anything is
-#                                     computed. Ranks that print "mpi/pmi2: request not begin with" and then nothing
-#                                     wait for ever: on a busy node Slurm has misread MPICH. Requeue, or take mpirun
+#                                     computed. Ranks that print "mpi/pmi2: request not begin with" have an MPICH that
+#                                     cannot go over libfabric, see short_addresses: take mpirun
 #
 # Exit statuses of `cvt-hpc run`, and what becomes of the job:
 #     0  all runs done             1  some runs failed, their reasons are in the output             2  bad input
@@ -34,12 +34,23 @@ if [ -z "${NUMBA_CACHE_DIR:-}" ]; then
     export NUMBA_CACHE_DIR=$own_cache
 fi
 
+# Slurm reads 1024 bytes of a request by PMI and takes the rest for another one; ranks then wait for each other for ever
+# or die. MPICH writes addresses for UCX in up to 1060 bytes, now and then, and those for libfabric (ofi) in a tenth.
+short_addresses() {
+    if [ -z "${MPIR_CVAR_CH4_NETMOD:-}" ] && mpichversion 2> /dev/null | grep -q '^MPICH Device:.*ch4.*\<ofi\>'; then
+        export MPIR_CVAR_CH4_NETMOD=ofi
+    fi
+}
+
 launch() {
     local launcher status
     case ${CVT_HPC_LAUNCHER:-srun} in
         # --wait: should a rank die without a word (out of memory), the others are ended a minute later, not left
         # waiting.
-        srun) srun --mpi="${CVT_HPC_SRUN_MPI:-pmi2}" --wait=60 "$@" & ;;
+        srun)
+            short_addresses
+            srun --mpi="${CVT_HPC_SRUN_MPI:-pmi2}" --wait=60 "$@" &
+            ;;
         mpirun) mpirun -n "$SLURM_NTASKS" "$@" & ;;
         *)
             echo "CVT_HPC_LAUNCHER: expected srun or mpirun, found $CVT_HPC_LAUNCHER" >&2

@@ -23,6 +23,7 @@ P = ParamSpec("P")
 
 WIDTH = 6.4  # [inch]: letters of 10 points stay readable across a page and on a telephone held sideways
 RESOLUTION = 170  # dots per inch
+SETTLED = 1000  # pixels: the palette is refined until no more than these, one in a thousand, change colour
 FORMATS = (".png", ".svg", ".pdf")
 LONGEST_NAME = 26  # letters of a name on an axis
 
@@ -145,7 +146,7 @@ def _write_png(figure: Figure, path: Path) -> None:
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-    reduced = picture.quantize(256, Image.Quantize.MEDIANCUT, kmeans=1, dither=Image.Dither.NONE)
+    reduced = picture.quantize(256, Image.Quantize.MEDIANCUT, kmeans=SETTLED, dither=Image.Dither.NONE)
     reduced.save(path, "png", optimize=True, dpi=(RESOLUTION, RESOLUTION))
 
 

@@ -12,11 +12,11 @@ import numpy as np
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import discard, kind_of, naming_refusals, written_aside
 from cvt_hpc.locks import locked
-from cvt_hpc.netcdf import global_attributes, variable_attributes, write_netcdf
+from cvt_hpc.netcdf import global_attributes, variable_attributes
 from cvt_hpc.provenance import history_line
 from cvt_hpc.study.chunks import chunk_shape, fill
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.dimensions import DerivedCoordinate, Dimension
+from cvt_hpc.study.dimensions import Dimension
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.record.log import KEPT
@@ -38,7 +38,6 @@ _INFERRED = Variable(
     OccurrenceClass,
 )
 PATIENCE = 600.0  # [s]; 10^6 runs are gathered within a minute
-_Coordinate = tuple[tuple[str, ...], np.ndarray, dict[str, str]]
 _logger = logging.getLogger(__name__)
 
 
@@ -144,30 +143,62 @@ def write_results(folder: StudyFolder, study: Study, records: Records) -> Path:
     StorageError
         If the system refuses; the dataset that was there is then untouched.
     """
-    import xarray as xr
-
-    coordinates = {
-        axis.name: _coordinate(axis, study.dims if study.is_sampled else (axis.name,)) for axis in study.axes
-    }
-    coordinates |= {d.name: _coordinate(d, (d.name,)) for d in study.coordinates}
-    coordinates |= {derived.name: _derived_coordinate(derived, study) for derived in study.derived}
-    frame = xr.Dataset(coords=coordinates, attrs=_global_attributes(study, records))
     with written_aside(folder.results, advice=KEPT) as aside:
-        write_netcdf(frame, aside)
         _declare(aside, study, records)
         fill(aside, study, records)
     return folder.results
 
 
 def _declare(path: Path, study: Study, records: Records) -> None:
-    """Add one variable per quantity over the runs, `status` first, to a file with the coordinates."""
+    """Write a file with the coordinates and one variable per quantity over the runs, `status` first.
+
+    Not through xarray: its first dataset loads dask, scipy and pint, a second at the end of each sweep.
+    """
     import netCDF4
 
-    with netCDF4.Dataset(path, "a") as file:
+    with netCDF4.Dataset(path, "w") as file:
+        file.setncatts(_global_attributes(study, records))
+        for name, length in zip(study.dims, study.shape, strict=True):
+            file.createDimension(name, length)
+        for axis in study.axes:
+            _write_coordinate(file, axis, study.dims if study.is_sampled else (axis.name,))
+        for extra in study.coordinates:
+            file.createDimension(extra.name, len(extra.values))
+            _write_coordinate(file, extra, (extra.name,))
+        for derived in study.derived:
+            _write_coordinate(file, derived, derived.dims)
         for variable in study.variables:
             _create(file, study, variable, chunk_shape(study, variable.name))
         if study.is_traced:
             _create(file, study, _INFERRED, study.shape)[:] = inferred_classes(study, records)
+
+
+def _write_coordinate(file: netCDF4.Dataset, dimension: Dimension, along: tuple[str, ...]) -> None:
+    """Add the values of a coordinate, given in C order, to a file with its dimensions."""
+    values = np.array(dimension.values)
+    named = dimension.attributes
+    if dimension.holds_texts:
+        values = np.char.encode(values, "utf-8")
+        named = {**named, "_Encoding": "utf-8"}  # the netCDF library's convention: readers return texts
+    elif values.dtype == bool:
+        values = values.astype(np.int8)
+        named = {**named, "dtype": "bool"}  # xarray's convention
+    values = values.reshape([len(file.dimensions[name]) for name in along])
+    if dimension.holds_texts:
+        along = (*along, _character_dimension(file, values.dtype.itemsize))
+        values = values[..., np.newaxis].view("S1")
+    stored = file.createVariable(dimension.name, values.dtype, along, compression="zlib" if along else None)
+    stored.set_auto_chartostring(False)
+    stored[...] = values
+    stored.setncatts(named)
+
+
+def _character_dimension(file: netCDF4.Dataset, length: int) -> str:
+    """Return the name of the dimension along the bytes of texts, made where there is none."""
+    name = f"string{length}"
+    if name not in file.dimensions:
+        file.createDimension(name, length)
+    return name
 
 
 def _create(file: netCDF4.Dataset, study: Study, variable: Variable, chunk: tuple[int, ...]) -> Any:
@@ -176,9 +207,7 @@ def _create(file: netCDF4.Dataset, study: Study, variable: Variable, chunk: tupl
     dims = study.dims + variable.dims
     is_text = dtype.kind == "S"  # stored as characters, which compress
     if is_text:
-        dims += (f"string{dtype.itemsize}",)
-        if dims[-1] not in file.dimensions:
-            file.createDimension(dims[-1], dtype.itemsize)
+        dims += (_character_dimension(file, dtype.itemsize),)
     stored = file.createVariable(
         variable.name,
         "S1" if is_text else dtype,
@@ -195,18 +224,6 @@ def _create(file: netCDF4.Dataset, study: Study, variable: Variable, chunk: tupl
     if auxiliary:
         stored.coordinates = " ".join(auxiliary)  # by CF: these have no dimension of their own
     return stored
-
-
-def _derived_coordinate(derived: DerivedCoordinate, study: Study) -> _Coordinate:
-    along, values, named = _coordinate(derived, derived.dims)
-    lengths = dict(zip(study.dims, study.shape, strict=True))
-    shape = tuple(lengths[name] for name in derived.dims)
-    return along, values.reshape(shape), named
-
-
-def _coordinate(dimension: Dimension, along: tuple[str, ...]) -> _Coordinate:
-    values = np.array(dimension.values, dtype=object if dimension.holds_texts else None)
-    return along, values, dimension.attributes
 
 
 def _global_attributes(study: Study, records: Records) -> dict[str, str]:

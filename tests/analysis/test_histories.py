@@ -22,9 +22,19 @@ from support.runs import PROBES, RATE, run
 BAND = (100.0, 1500.0)
 
 
+@pytest.fixture(scope="module")
+def whole():
+    """The picture of a run with everything that a history may hold, only looked at."""
+    return history_figure(run())
+
+
 def panel(figure, ylabel):
     (found,) = [axes for axes in figure.axes if axes.get_ylabel() == ylabel]
     return found
+
+
+def labels_of(figure):
+    return {axes.get_ylabel() for axes in figure.axes}
 
 
 # File
@@ -90,38 +100,36 @@ def test_a_system_that_refuses_leaves_the_old_one(tmp_path, monkeypatch):
 # Picture
 
 
-def test_everything_a_history_holds_is_drawn():
-    figure = history_figure(run())
-    whole, spectrum = panel(figure, "t1 [µm]"), panel(figure, "amplitude [µm]")
-    assert whole.get_title(loc="left") == "displacement at t1 1/4, judged part shaded"  # 1/2 is a node
-    values = whole.lines[0].get_ydata()
+def test_everything_a_history_holds_is_drawn(whole):
+    t1, spectrum = panel(whole, "t1 [µm]"), panel(whole, "amplitude [µm]")
+    assert t1.get_title(loc="left") == "displacement at t1 1/4, judged part shaded"  # 1/2 is a node
+    values = t1.lines[0].get_ydata()
     assert values.mean() == pytest.approx(0, abs=1e-9)
     assert np.ptp(values[-200:]) == pytest.approx(20, rel=0.01)
-    assert whole.lines[0].get_xdata()[-1] == pytest.approx(300, abs=0.1)
+    assert t1.lines[0].get_xdata()[-1] == pytest.approx(300, abs=0.1)
     marked = sorted(text.get_text() for text in spectrum.texts)
     assert marked == ["560 Hz", "560 Hz", "690 Hz"]
     heights = {
         line.get_label(): line.get_ydata().max() for line in spectrum.lines if line.get_label()[0] == "t"
     }
     assert heights == pytest.approx({"t1 1/4": 10.0, "t2 1/6": 6.0}, rel=0.01)
-    load = panel(figure, "load [N m]").lines[0]
+    load = panel(whole, "load [N m]").lines[0]
     assert load.get_ydata()[[0, -1]] == pytest.approx([20, 140], rel=1e-3)
 
 
-def test_forces_lie_over_shaded_arcs():
-    figure = history_figure(run())
-    forces = panel(figure, "force [kN]")
+def test_forces_lie_over_shaded_arcs(whole):
+    forces = panel(whole, "force [kN]")
     tension, push = (line.get_ydata().max() for line in forces.lines)
     assert (tension, push) == pytest.approx((9.1, 5.0), rel=1e-2)
-    assert panel(figure, "contact [kN/m]").lines[0].get_ydata().max() == pytest.approx(400, rel=1e-2)
+    assert panel(whole, "contact [kN/m]").lines[0].get_ydata().max() == pytest.approx(400, rel=1e-2)
     assert [text.get_text() for text in forces.texts] == ["driving arc", "t1", "driven arc", "t2"]
     spans = [(p.get_x(), p.get_x() + p.get_width()) for p in forces.patches]
     # borders between stations, which are 4.1 mm apart
     assert np.array(spans) == pytest.approx(np.array([[0, 100], [248, 504]]), abs=4.1)
 
 
-def test_what_feeds_lies_above_zero_and_what_takes_below():
-    fed = panel(history_figure(run()), "fed [W/m]")
+def test_what_feeds_lies_above_zero_and_what_takes_below(whole):
+    fed = panel(whole, "fed [W/m]")
     flanks, stresses, damping, zero = (np.asarray(line.get_ydata()) for line in fed.lines)
     assert (flanks.min(), flanks.max(), stresses.max()) == (-800.0, 100.0, 1500.0)
     assert np.all(damping == -1.0) and np.all(zero == 0.0)
@@ -132,9 +140,8 @@ def test_what_feeds_lies_above_zero_and_what_takes_below():
     assert height > fed.bbox.height / 6
 
 
-def test_the_end_shows_all_probes_of_a_strand():
-    figure = history_figure(run())
-    close = [axes for axes in figure.axes if axes.get_legend() and len(axes.lines) == 3]
+def test_the_end_shows_all_probes_of_a_strand(whole):
+    close = [axes for axes in whole.axes if axes.get_legend() and len(axes.lines) == 3]
     labels = [[text.get_text() for text in axes.get_legend().get_texts()] for axes in close]
     assert labels == [["1/4", "1/2", "3/4"], ["1/6", "1/2", "5/6"]]
     for axes in close:
@@ -155,23 +162,20 @@ def test_the_end_shows_all_probes_of_a_strand():
         (["status", "vibrates", "reason"], set()),
     ],
 )
-def test_what_is_absent_is_left_out(missing, gone):
-    everything, rest = (
-        {axes.get_ylabel() for axes in history_figure(dataset).axes}
-        for dataset in (run(), run().drop_vars(missing))
-    )
-    assert (everything - rest) - {""} == gone  # the close-ups have no label
+def test_what_is_absent_is_left_out(whole, missing, gone):
+    rest = labels_of(history_figure(run().drop_vars(missing)))
+    assert (labels_of(whole) - rest) - {""} == gone  # the close-ups have no label
 
 
 def test_a_constant_load_is_not_drawn():
-    labels = {axes.get_ylabel() for axes in history_figure(run(ramp=False)).axes}
+    labels = labels_of(history_figure(run(ramp=False)))
     assert "load [N m]" not in labels and "force [kN]" in labels
     ramp = run().assign(
         driving_speed=("time", np.linspace(100.0, 400.0, run().sizes["time"]), {"units": "rad s-1"})
     )
-    assert "driving speed\n[rpm]" in {axes.get_ylabel() for axes in history_figure(ramp).axes} - labels
+    assert "driving speed\n[rpm]" in labels_of(history_figure(ramp)) - labels
     scalar = run().drop_vars("load").assign(load=120.0)
-    assert "load [N m]" not in {axes.get_ylabel() for axes in history_figure(scalar).axes}
+    assert "load [N m]" not in labels_of(history_figure(scalar))
 
 
 def test_a_run_without_history_is_refused(tmp_path):
@@ -180,8 +184,8 @@ def test_a_run_without_history_is_refused(tmp_path):
     assert not any(tmp_path.iterdir())
 
 
-def test_the_title_says_what_became_of_the_run():
-    assert history_figure(run()).get_suptitle().startswith("One run: ramp\nvibrates: yes (t1 vibrates")
+def test_the_title_says_what_became_of_the_run(whole):
+    assert whole.get_suptitle().startswith("One run: ramp\nvibrates: yes (t1 vibrates")
     failed = run().assign(status=np.int8(Status.FAILED_NUMERICS), reason=b"not a number at 0.02 s")
     title = history_figure(failed).get_suptitle()
     assert title.endswith("failed numerics: not a number at 0.02\u00a0s")
@@ -236,8 +240,7 @@ def test_lines_of_a_title_are_of_like_length_and_keep_numbers_with_units(width):
     assert any("27.2\u00a0um" in part for part in lines)
 
 
-def boxes(figure, artists):
-    figure.draw_without_rendering()
+def boxes(artists):
     return [artist.get_window_extent() for artist in artists]
 
 
@@ -245,8 +248,9 @@ def test_labels_and_legends_cover_nothing():
     level = run()
     level["ring_tension"][:] = 9e3
     figure = history_figure(level)
+    figure.draw_without_rendering()
     spectrum, forces = panel(figure, "amplitude [µm]"), panel(figure, "force [kN]")
-    labels = boxes(figure, spectrum.texts)
+    labels = boxes(spectrum.texts)
     assert not any(a.overlaps(b) for a, b in combinations(labels, 2))
     first, second = (line for line in spectrum.lines if line.get_label()[0] == "t")
     for text, box in zip(spectrum.texts, labels, strict=True):
@@ -254,7 +258,7 @@ def test_labels_and_legends_cover_nothing():
         other = second if text.get_color() == first.get_color() else first
         assert not other.get_path().transformed(spectrum.transData).intersects_bbox(box, filled=False)
     for axes in (spectrum, forces):
-        (legend,) = boxes(figure, [axes.get_legend()])
+        (legend,) = boxes([axes.get_legend()])
         for line in axes.lines:
             assert not line.get_path().transformed(axes.transData).intersects_bbox(legend, filled=False)
 
@@ -266,9 +270,10 @@ def test_labels_stay_within_the_spectrum(frequency):
     at_the_edge["displacement"][:] = wave[:, np.newaxis]
     at_the_edge.attrs["job"] = json.dumps({"vibration": {"band_low": 100.0}})
     figure = history_figure(at_the_edge)
+    figure.draw_without_rendering()
     spectrum = panel(figure, "amplitude [µm]")
     assert len(spectrum.texts) == 2
-    for box in boxes(figure, spectrum.texts):
+    for box in boxes(spectrum.texts):
         assert box.x0 > spectrum.bbox.x0 and box.x1 < spectrum.bbox.x1
 
 
@@ -288,7 +293,7 @@ def test_nothing_of_a_failed_run_is_shown_as_judged():
     axes = panel(figure, "t1 [µm]")
     assert axes.get_title(loc="left") == "displacement at t1 1/4"
     assert len(axes.patches) == 0 and axes.lines
-    assert "amplitude [µm]" not in {axes.get_ylabel() for axes in figure.axes}  # the judged part's spectrum
+    assert "amplitude [µm]" not in labels_of(figure)  # the judged part's spectrum
 
 
 def test_the_judged_part_is_that_of_the_job():
@@ -300,7 +305,7 @@ def test_the_judged_part_is_that_of_the_job():
 
 def test_short_or_coarse_records_have_no_spectrum():
     for dataset in (run(0.002), run().isel(time=slice(None, None, 10))):
-        labels = {axes.get_ylabel() for axes in history_figure(dataset).axes}
+        labels = labels_of(history_figure(dataset))
         assert "amplitude [µm]" not in labels and "t1 [µm]" in labels
 
 

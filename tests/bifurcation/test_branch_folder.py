@@ -23,10 +23,13 @@ load = ["90 N m", "105 N m"]
 
 @pytest.fixture
 def branch(tmp_path, monkeypatch):
-    """The command, on branches without any steady state, whose runs end as `classes` says."""
+    """The command, on branches without any steady state, whose runs end as `classes` says.
+
+    Pictures take most of the time: they are files without content unless `drawn`.
+    """
     (tmp_path / "x.toml").write_text(JOB)
 
-    def command(*options, classes=(OccurrenceClass.QUIET,) * 2, interrupted=False):
+    def command(*options, classes=(OccurrenceClass.QUIET,) * 2, interrupted=False, drawn=False):
         left = iter(classes)
 
         def follow(diagram, asked):
@@ -36,8 +39,11 @@ def branch(tmp_path, monkeypatch):
                 raise KeyboardInterrupt
             return Followed(asked, None, Branch([], dict.fromkeys(diagram.loads, "none")), [], [], [run], [])
 
-        monkeypatch.setattr(diagram, "_follow", follow)
-        return main(["branch", str(tmp_path / "x.toml"), "--out", str(tmp_path / "out"), *options])
+        with monkeypatch.context() as patch:
+            patch.setattr(diagram, "_follow", follow)
+            if not drawn:
+                patch.setattr(diagram, "draw_branch", lambda diagram, followed, out: out.touch())
+            return main(["branch", str(tmp_path / "x.toml"), "--out", str(tmp_path / "out"), *options])
 
     return command
 
@@ -87,7 +93,7 @@ def test_an_interruption_keeps_the_branches_that_are_done(branch, tmp_path):
 
 
 def test_failed_runs_are_named_and_make_the_exit_status(branch, tmp_path, capsys):
-    assert branch(classes=(OccurrenceClass.QUIET, OccurrenceClass.FAILED)) == 1
+    assert branch(classes=(OccurrenceClass.QUIET, OccurrenceClass.FAILED), drawn=True) == 1
     told = capsys.readouterr()
     place = "friction gradient -0.8 s/m, sheave stiffness 1"
     assert f"{place}: the run from the large start at 90 N m failed: slips" in told.err

@@ -14,8 +14,6 @@ from cvt_hpc.chart.comparing import compare
 from cvt_hpc.chart.measuring import measure
 from cvt_hpc.chart.scene_drawing import GREY, scene_figure
 
-_DRAWN = []
-
 
 def comparison_of(job):
     chart = load_chart(job)
@@ -39,13 +37,27 @@ def marked(axes, what):
     return [(*line.get_xdata(), *line.get_ydata()) for line in axes.lines if line.get_gid() == what]
 
 
+@pytest.fixture(scope="module")
+def kept():
+    """What is measured and drawn once for all tests, and only looked at."""
+    return {}
+
+
 @pytest.fixture
-def figure(write_chart):
-    """Against the bell at 2 us, whose own error is 2e-4; drawn once, and only looked at."""
-    if not _DRAWN:
+def figure(write_chart, kept):
+    """Against the bell at 2 us, whose own error is 2e-4."""
+    if "figure" not in kept:
         job = write_chart(('reference = "exact"', 'reference = { stepper = "soft", step = "2 us" }'))
-        _DRAWN.append(drawn(scene_figure, comparison_of(job)))
-    return _DRAWN[0]
+        kept["figure"] = drawn(scene_figure, comparison_of(job))
+    return kept["figure"]
+
+
+@pytest.fixture
+def comparison(write_chart, kept):
+    """Against the exact solution."""
+    if "comparison" not in kept:
+        kept["comparison"] = comparison_of(write_chart())
+    return kept["comparison"]
 
 
 def test_each_quantity_has_a_panel_with_both_axes_logarithmic(figure):
@@ -122,13 +134,13 @@ def test_what_failed_is_listed_under_the_panels(figure):
     assert "cheapest within all tolerances: clever at 0.1, 0.00022 core-s/s" in texts(figure)
 
 
-def test_the_legend_explains_all_signs(figure, write_chart):
+def test_the_legend_explains_all_signs(figure, comparison):
     names = [text.get_text() for text in figure.legends[0].texts]
     assert names == [
         "soft hammer", "clever", "hard", "below the reference's error", "tolerance",
         "cheapest within all tolerances",
     ]  # fmt: skip
-    exact = drawn(scene_figure, comparison_of(write_chart()))
+    exact = drawn(scene_figure, comparison)
     assert "below the reference's error" not in [text.get_text() for text in exact.legends[0].texts]
     assert "reference: exact solution" in texts(exact)
 
@@ -157,8 +169,8 @@ def test_an_error_over_a_scale_says_so(write_chart):
     assert panel(drawn(scene_figure, comparison_of(job)), "amplitude").get_xlabel() == "error / 5 µm"
 
 
-def test_the_budget_shows_errors_of_the_default_first(write_chart):
-    figure = drawn(budget_figure, comparison_of(write_chart()))
+def test_the_budget_shows_errors_of_the_default_first(comparison):
+    figure = drawn(budget_figure, comparison)
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["amplitude", "frequency"]
     axes = figure.axes[0]
     assert axes.get_xscale() == "log" and axes.get_xlabel() == "relative error"

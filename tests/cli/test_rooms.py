@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -18,14 +19,16 @@ def room(path):
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
+@cache
 def imported(path):
     """Modules that a file names in its imports."""
+    names = set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            names.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            names.update([node.module, *(f"{node.module}.{alias.name}" for alias in node.names)])
+    return names
 
 
 def test_the_tree_names_all_that_is_there():
@@ -62,7 +65,7 @@ def test_imports_run_downwards():
     ],
 )
 def test_what_only_some_rooms_do(modules, rooms):
-    assert {room(path) for path in SOURCES if modules & set(imported(path))} == rooms
+    assert {room(path) for path in SOURCES if modules & imported(path)} == rooms
 
 
 def test_what_test_modules_share_lies_in_support():
@@ -76,7 +79,7 @@ def test_no_circle_of_imports():
     # those for a type checker included: a file that cannot be read without another one is no part of its own
     names = (".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts) for path in SOURCES)
     files = dict(zip((name.removesuffix(".__init__") for name in names), SOURCES, strict=True))
-    reached = {name: set(imported(path)) & set(files) - {name} for name, path in files.items()}
+    reached = {name: imported(path) & set(files) - {name} for name, path in files.items()}
     assert sum(map(len, reached.values())) > 500  # the files' imports are seen
     for between in files:
         for name in files:

@@ -67,6 +67,13 @@ def checked(mechanics, write_job, call, monkeypatch):
     return lambda fraction="1", *more: call("run", "x.toml", "--check-step", fraction, *more)
 
 
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Pictures take most of the time; those of a grid and of samples are drawn by tests without this."""
+    drawing = "cvt_hpc.analysis.comparison_drawing.draw_comparison"
+    monkeypatch.setattr(drawing, lambda found, path, sources: path)
+
+
 def loads(path):
     """Loads at which a study has runs, and their time steps."""
     with xr.open_dataset(path, decode_times=False) as dataset:
@@ -97,7 +104,7 @@ def test_contradictions_deviations_and_failures_are_reported(checked, tmp_path):
     assert [row["load"] for row in rows if row["class_b"] == "not run"] == ["8.0"]
 
 
-def test_each_run_is_done_at_half_of_the_step_that_it_took(checked, tmp_path):
+def test_each_run_is_done_at_half_of_the_step_that_it_took(checked, undrawn, tmp_path):
     checked()
     found, steps = loads(tmp_path / "out/x/check_step/results.nc")
     wanted = [
@@ -128,7 +135,7 @@ def test_a_check_by_the_explicit_step_is_priced_by_it(tmp_path):
     assert check.core_seconds() > 20.0 * estimate_cost(job)
 
 
-def test_a_study_that_is_right_has_no_contradiction(checked):
+def test_a_study_that_is_right_has_no_contradiction(checked, undrawn):
     status, out, _ = checked("1", "--set", "load=30")
     assert status == 0
     assert out[3].startswith(
@@ -136,7 +143,7 @@ def test_a_study_that_is_right_has_no_contradiction(checked):
     )
 
 
-def test_a_larger_share_goes_on_with_the_same_sample(checked, tmp_path):
+def test_a_larger_share_goes_on_with_the_same_sample(checked, undrawn, tmp_path):
     place = tmp_path / "out/x/check_step"
     _, first, _ = checked("0.2")
     few, _ = loads(place / "results.nc")
@@ -150,7 +157,7 @@ def test_a_larger_share_goes_on_with_the_same_sample(checked, tmp_path):
     assert checked("0.2")[1] == first
 
 
-def test_a_check_that_was_stopped_goes_on(checked, tmp_path, monkeypatch):
+def test_a_check_that_was_stopped_goes_on(checked, undrawn, tmp_path, monkeypatch):
     double = sys.modules["cvt_hpc.simulation"]  # the double of this room
 
     whole = checked("0.5")[1]
@@ -212,7 +219,7 @@ def test_a_study_over_steps_is_not_checked(checked, call, write_job):
     )
 
 
-def test_another_job_in_the_folder_of_the_check_is_refused(checked, call):
+def test_another_job_in_the_folder_of_the_check_is_refused(checked, undrawn, call):
     checked()
     call("run", "x.toml", "--set", "step=3e-6", "--fresh")
     status, out, err = checked("1", "--set", "step=3e-6")

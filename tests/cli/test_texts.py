@@ -31,7 +31,7 @@ def test_what_does_not_print_is_escaped_and_long_texts_are_cut():
     assert str(InputError(NASTY)) == ESCAPED
 
 
-@pytest.mark.parametrize("key", [NASTY, "k" * 10_000_000], ids=["escapes", "long"])
+@pytest.mark.parametrize("key", [NASTY, "k" * 1_000_000], ids=["escapes", "long"])
 @pytest.mark.parametrize(
     "table", ["scene.{}", "{}", "{}.x", "axes.{}", "scene.load.{}", "design.{}", "derived.{}"]
 )
@@ -56,7 +56,7 @@ def test_a_description_is_shown_line_by_line(write_job, mechanics, call):
     write_job(GRID, head='name = "x"\nmodel = "toy"\ndescription = "one\\n\\u001b[2Jtwo"\n')
     _, out, _ = call("check", "x.toml")
     assert out[1:3] == ["one", r"\x1b[2Jtwo"]
-    text = json.dumps("\n".join(["long"] * 1_000_000) + "y" * 1_000_000)
+    text = json.dumps("\n".join(["long"] * 100_000) + "y" * 100_000)
     write_job(GRID, head=f'name = "x"\nmodel = "toy"\ndescription = {text}\n')
     _, out, _ = call("check", "x.toml")
     assert_clean([line for line in out if line])

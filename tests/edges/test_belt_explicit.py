@@ -67,7 +67,7 @@ def test_the_limit_is_that_of_formula_and_eigenvalue(case):
     # Friction: the formula is that of the largest force on a station that sticks, some slide slowly. Else
     # layers and contact swing with their neighbours, tension and bending add to the contact's stiffness.
     assert (0.2 if "friction" in case else 0.9) < share < (1.0 if "friction" in case else 1.15)
-    # velocities first: a decay d and a frequency w are stable to 2 d dt + (w dt)^2 = 4; eight halvings find 1 %
+    # velocities first: a decay d and a frequency w are stable to 2 d dt + (w dt)^2 = 4
     swing = abs(fastest) ** 2 if abs(fastest.imag) > 0.0 else 0.0
     decay = -2.0 * fastest.real if swing else -fastest.real
     limit = 2.0 / decay if not swing else (np.sqrt(decay**2 + 4.0 * swing) - decay) / swing

@@ -40,9 +40,13 @@ def test_keys_are_unique_over_all_tables(model, stepper):
     assert set(keys) == set(load_schema(model, stepper, "x").parameters)
 
 
+@pytest.fixture(scope="module")
+def registry():
+    return pint.UnitRegistry()
+
+
 @both
-def test_units_are_si_and_what_a_job_file_may_write(model, stepper):
-    registry = pint.UnitRegistry()
+def test_units_are_si_and_what_a_job_file_may_write(registry, model, stepper):
     for unit in {parameter.unit for parameter in load_schema(model, stepper, "x").parameters.values()} - {""}:
         assert registry.Quantity(1.0, unit).to_base_units().magnitude == 1.0
         assert to_si(f"3 ({unit})", unit) == 3.0

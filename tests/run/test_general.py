@@ -26,7 +26,7 @@ def plain(step):
 
 
 def general(stepper, **values):
-    asked = job(stepper, **CHEAP, load=60.0, **values)
+    asked = job(stepper, **CHEAP | {"load": 60.0} | values)
     return GeneralTransient(asked.point(0), stepper)
 
 
@@ -72,8 +72,9 @@ def test_a_ramp_of_speed_is_that_of_the_explicit_step():
 
 
 def test_the_strands_are_disturbed_once_the_start_up_is_over():
-    run, same = (general("symplectic_euler", step=2e-7, disturbance=size) for size in (1e-6, 0.0))
-    kick = round(CHEAP["rise_time"] / run.interval)
+    short = {"rise_time": 1e-3, "step": 2e-7}
+    run, same = (general("symplectic_euler", **short, disturbance=size) for size in (1e-6, 0.0))
+    kick = round(short["rise_time"] / run.interval)
     assert run.advance(kick) is None and same.advance(kick) is None
     assert np.array_equal(run.displacement, same.displacement)
     assert run.advance(1) is None and same.advance(1) is None

@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from types import CodeType, ModuleType
 
@@ -227,21 +228,49 @@ def test_a_module_that_is_edited_and_imported_again_has_its_new_content(package)
 
 def output(program, tmp_path, path):
     """What a program prints, in a process of its own with a cache of its own, which finds modules in a folder."""
+    (found,) = outputs(program, tmp_path, path, [lambda: None])
+    return found
+
+
+# Each program a process of its own, begun where the compiler, which takes long to import, is all that is there.
+FORKING = """
+import os, sys
+import numba
+for line in sys.stdin:
+    if not (child := os.fork()):
+        exec(PROGRAM)
+        sys.stdout.flush()
+        os._exit(0)
+    assert os.waitpid(child, 0)[1] == 0
+    print("done", flush=True)
+"""
+
+
+def outputs(program, tmp_path, path, changes):
+    """What a program prints after each of some changes; else as `output`."""
     environment = {
         **os.environ,
         "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
         "PYTHONPATH": str(PACKAGE.parent),
     }
-    done = subprocess.run(
-        [sys.executable, "-c", program],
+    found = []
+    with subprocess.Popen(
+        [sys.executable, "-c", FORKING.replace("PROGRAM", repr(program))],
         cwd=path,
         env=environment,
+        stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
-        check=True,
-        timeout=60,
-    )
-    return done.stdout.split()
+    ) as process:
+        for change in changes:
+            change()
+            process.stdin.write("next\n")
+            process.stdin.flush()
+            found.append([])
+            while (line := process.stdout.readline()) != "done\n":
+                assert line, "the program has failed"
+                found[-1] += line.split()
+    return found
 
 
 EULER = (
@@ -271,29 +300,33 @@ def test_a_changed_kernel_that_was_handed_over_is_another(package, tmp_path):
         "from cvt_hpc.physics.falling import fall; from cvt_hpc.steppers.marching_on import euler; "
         "print(euler(fall, 1.0, 1.0), sum(euler.stats.cache_hits.values()))"
     )
-    found = []
-    for slope in ("1.0", "1.0", "0.5", "1.0"):
+
+    def written(slope):
         text = f"from cvt_hpc.kernels import kernel\n@kernel\ndef slope(y):\n    return {slope} * y\n"
         (package / "physics" / "slope.py").write_text(text)
-        found.append(output(program, tmp_path, package.parent))
-    assert found == [["0.5", "0"], ["0.5", "1"], ["0.75", "0"], ["0.5", "1"]]
+
+    changes = [partial(written, slope) for slope in ("1.0", "0.5", "1.0")]
+    found = outputs(program, tmp_path, package.parent, changes)
+    assert found == [["0.5", "0"], ["0.75", "0"], ["0.5", "1"]]
 
 
 def test_a_changed_kernel_from_outside_the_package_is_another(tmp_path):
     (tmp_path / "marching.py").write_text(EULER)
-    found = []
-    for slope in ("1.0", "0.5", "1.0"):
-        (tmp_path / "falling.py").write_text(FALL.replace("SLOPE", slope).replace("NAME", "Rate"))
-        found.append(output(RUN, tmp_path, tmp_path))
+    texts = [FALL.replace("SLOPE", slope).replace("NAME", "Rate") for slope in ("1.0", "0.5", "1.0")]
+    found = outputs(
+        RUN, tmp_path, tmp_path, [partial((tmp_path / "falling.py").write_text, text) for text in texts]
+    )
     assert found == [["0.5", "0"], ["0.75", "0"], ["0.5", "1"]]
 
 
 def test_an_entry_with_a_type_that_is_not_at_hand_is_skipped_and_kept(tmp_path):
     (tmp_path / "marching.py").write_text(EULER)
-    found = []
-    for name in ("Rate", "Speed", "Speed", "Rate"):
-        (tmp_path / "falling.py").write_text(FALL.replace("SLOPE", "1.0").replace("NAME", name))
-        found.append(output(RUN, tmp_path, tmp_path))
+    texts = [
+        FALL.replace("SLOPE", "1.0").replace("NAME", name) for name in ("Rate", "Speed", "Speed", "Rate")
+    ]
+    found = outputs(
+        RUN, tmp_path, tmp_path, [partial((tmp_path / "falling.py").write_text, text) for text in texts]
+    )
     assert found == [["0.5", "0"], ["0.5", "0"], ["0.5", "1"], ["0.5", "1"]]
 
 

@@ -18,7 +18,18 @@ from cvt_hpc.simulation.record import record_of
 from cvt_hpc.study.description import describe
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration import ramp
-from support.marched import CHEAP, job, record
+from support.marched import CHEAP, Together, job, record
+
+# mu_k x thrust, two flanks each, on the driven pulley's radius: 2 x 0.1 x 50 kN / cos 11 deg x 75 mm / 2.52
+CARRIED = 2 * 0.1 * 50e3 / np.cos(np.deg2rad(11)) * 0.075 / 2.52
+LONG_STEPS = [(0.0, 10e-6), (40.0, 10e-6), (120.0, 10e-6), (120.0, 12.5e-6)]
+NARROW = [{"load": load, "friction_speed": 3e-3} for load in (0.0, 40.0)]
+LOADS = (0.0, 40.0, 120.0, 400.0, -400.0, 0.6 * CARRIED, 1.2 * CARRIED)
+RUNS = Together(
+    *({"load": load, "duration": 0.1} for load in LOADS),
+    *({"load": load, "duration": 0.1, "step": step} for load, step in LONG_STEPS),
+    *(values | {"duration": 0.1} for values in NARROW),
+)
 
 
 def assert_no_numbers(found):
@@ -50,12 +61,9 @@ def test_a_step_far_too_long_diverges_and_says_when(stations):
     assert_no_numbers(found)
 
 
-LONG_STEPS = [(0.0, 10e-6), (40.0, 10e-6), (120.0, 10e-6), (120.0, 12.5e-6)]
-
-
 @pytest.mark.parametrize(("load", "step"), LONG_STEPS)
 def test_a_step_that_is_too_long_fails_or_does_no_harm(load, step):
-    found, trusted = record(load=load, step=step, duration=0.1), record(load=load, duration=0.1)
+    found, trusted = (RUNS.record(load=load, duration=0.1, **long) for long in ({"step": step}, {}))
     assert trusted["status"] == Status.DONE
     if found["status"] == Status.DONE:
         # of first order in the step: 0.3 % are seen
@@ -69,7 +77,7 @@ def test_a_step_that_is_too_long_fails_or_does_no_harm(load, step):
 def test_the_power_balance_catches_steps_that_do_not_diverge():
     # friction regularised over 3 mm/s: what the default step makes of it stays within bounds, and is no motion of
     # this belt
-    found = [record(load=load, friction_speed=3e-3, duration=0.1) for load in (0.0, 40.0)]
+    found = [RUNS.record(**values, duration=0.1) for values in NARROW]
     caught = [f for f in found if "the power balance is open by" in f["reason"]]
     assert caught
     for f in caught:
@@ -86,7 +94,7 @@ def test_a_sound_run_without_load_passes_the_power_balance():
 
 
 def test_more_torque_than_friction_carries_slips_through():
-    found = record(load=400.0, duration=0.1)
+    found = RUNS.record(load=400.0, duration=0.1)
     assert_slips(found)
     assert "the belt slips through: the driven pulley has lost 50% of its speed" in found["reason"]
     # physics, not numerics: half the step slips at the same time
@@ -96,19 +104,17 @@ def test_more_torque_than_friction_carries_slips_through():
 
 
 def test_torque_that_friction_just_carries_does_not():
-    # mu_k x thrust, two flanks each, on the driven pulley's radius: 2 x 0.1 x 50 kN / cos 11 deg x 75 mm / 2.52
-    carried = 2 * 0.1 * 50e3 / np.cos(np.deg2rad(11)) * 0.075 / 2.52
-    below = record(load=0.6 * carried, duration=0.1)
+    below = RUNS.record(load=0.6 * CARRIED, duration=0.1)
     assert below["status"] == Status.DONE and below["vibrates"] != Vibrates.SLIPS
     # the same with the smaller axial force in place of the thrust; at 0.47 m/s friction has fallen to mu_k
-    largest = carried * below["axial_force"].min() / 50e3
-    assert below["slip_margin"] == pytest.approx(0.6 * carried / largest - 1.0, abs=1e-4)
+    largest = CARRIED * below["axial_force"].min() / 50e3
+    assert below["slip_margin"] == pytest.approx(0.6 * CARRIED / largest - 1.0, abs=1e-4)
     assert np.abs(below["slip"]).max() < 0.03
-    assert_slips(record(load=1.2 * carried, duration=0.1))
+    assert_slips(RUNS.record(load=1.2 * CARRIED, duration=0.1))
 
 
 def test_a_load_that_drives_beyond_what_friction_carries_slips_through():
-    found = record(load=-400.0, duration=0.1)
+    found = RUNS.record(load=-400.0, duration=0.1)
     assert_slips(found)
     assert "the belt slips through: the driven pulley has gained 50% of its speed" in found["reason"]
     assert found["slip"][0] > GROSS_SLIP and found["speed_loss"] < -GROSS_SLIP

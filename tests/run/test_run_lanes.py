@@ -22,7 +22,7 @@ WIDTHS = {"double": 8, "single": 16}
 METHODS = {
     "double": {"stepper": "imex", "precision": "double"},
     "single": {"stepper": "imex", "precision": "single"},
-    "explicit": {"stepper": "explicit", "precision": "double", "step": 2e-7},
+    "explicit": {"stepper": "explicit", "precision": "double", "step": 2e-7, "stations": 24},
 }
 SHORT = CHEAP | {"stations": 40}
 # Of all that may differ between the lanes of a batch, and of all endings.

@@ -26,7 +26,7 @@ from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.validity import power_limit
 from support.fast_runs import FastRuns, march
-from support.marched import balance, finished, job, mean
+from support.marched import Together, balance, finished, job, mean
 
 COARSE = {"stations": 64, "duration": 0.08}
 CONSTANT = {"friction_law": "coulomb", "friction_gradient": 0.0}
@@ -54,11 +54,18 @@ DEFAULT_MESH = {
     # of a step that begins at every sample in the same phase: dampers that were sampled too were 80 W off here, 4 %
     "no load, in phase": (NO_LOAD | {"step": 2.5e-6}, 2e-3),
 }
+HALF_STEP = {"step": 0.5 * job().parameters["step"]}
+HALVED = ["vibrating", "quiet", "rigid", "no load"]
+RUNS = Together(
+    *(COARSE | values for values, _ in SCENES.values()),
+    *(COARSE | SCENES[name][0] | HALF_STEP for name in HALVED),
+    *({"duration": 0.1} | values for values, _ in DEFAULT_MESH.values()),
+)
 
 
 def settled(name):
     values, tolerance = SCENES[name]
-    return finished(**COARSE | values), tolerance
+    return RUNS.finished(**COARSE | values), tolerance
 
 
 def flow(found):
@@ -75,16 +82,16 @@ def test_the_balance_closes(name):
 @pytest.mark.parametrize("name", DEFAULT_MESH)
 def test_the_balance_closes_on_the_default_mesh(name):
     values, tolerance = DEFAULT_MESH[name]
-    assert abs(balance(finished(**{"duration": 0.1} | values))["power_residual"]) < tolerance
+    assert abs(balance(RUNS.finished(**{"duration": 0.1} | values))["power_residual"]) < tolerance
 
 
-@pytest.mark.parametrize("name", ["vibrating", "quiet", "rigid", "no load"])
+@pytest.mark.parametrize("name", HALVED)
 def test_half_the_step_does_not_open_it(name):
     # it is the mesh that leaves most of it open: one step or the other, the rest differs by 0.02 % of the power
     values, tolerance = SCENES[name]
-    half = balance(finished(**COARSE | values, step=0.5 * job().parameters["step"]))["power_residual"]
+    half = balance(RUNS.finished(**COARSE | values | HALF_STEP))["power_residual"]
     assert abs(half) < tolerance
-    assert abs(half) < abs(balance(finished(**COARSE | values))["power_residual"]) + 2e-4
+    assert abs(half) < abs(balance(RUNS.finished(**COARSE | values))["power_residual"]) + 2e-4
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -137,7 +144,7 @@ def test_powers_are_torque_times_speed(name):
 
 
 def test_a_front_into_which_gaps_run_leaves_the_same_open_at_any_step():
-    found = [balance(finished(**NO_LOAD, stations=80, step=step)) for step in (4.6e-6, 1.5e-6, 0.3e-6)]
+    found = [balance(finished(**NO_LOAD, stations=80, step=step)) for step in (4.6e-6, 1.5e-6, 0.6e-6)]
     # 0.06 %, as the explicit step has it, is the mesh's; a cell that rattles leaves -0.7 % at 3 us, and its damper takes
     # 19 W instead of 5.6 W
     assert np.ptp([f["power_residual"] for f in found]) < 3e-4

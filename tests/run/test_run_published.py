@@ -9,13 +9,24 @@ import numpy as np
 import pytest
 
 from cvt_hpc.variables import Status, Vibrates
-from support.marched import job, record
+from support.marched import Together, job
 
 T1, T2 = 0, 1
+QUIET = {
+    "level friction": {"friction_gradient": 0.0},
+    "constant friction": {"friction_law": "coulomb", "friction_gradient": 0.0},
+    "rigid sheaves": {"sheave_stiffness": np.inf},
+    "half the fall": {"friction_gradient": -0.4},
+}
+SCENES = [{}, {"seed": 2}, *QUIET.values()]
+RUNS = Together(
+    *({"load": load, "duration": 0.2} for load in (0.0, 60.0, 100.0, 160.0)),
+    *({"load": 120.0, "duration": 0.2} | scene for scene in SCENES),
+)
 
 
 def run(load, **values):
-    found = record(load=load, duration=0.2, **values)
+    found = RUNS.record(load=load, duration=0.2, **values)
     assert found["status"] == Status.DONE, found["reason"]
     return found
 
@@ -31,16 +42,7 @@ def test_falling_friction_lets_the_loaded_strand_vibrate():
     assert abs(found["growth_rate"][T1]) * 0.1 < 0.25
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"friction_gradient": 0.0},
-        {"friction_law": "coulomb", "friction_gradient": 0.0},
-        {"sheave_stiffness": np.inf},
-        {"friction_gradient": -0.4},
-    ],
-    ids=["level friction", "constant friction", "rigid sheaves", "half the fall"],
-)
+@pytest.mark.parametrize("values", QUIET.values(), ids=QUIET)
 def test_it_is_quiet_without_the_fall_of_friction_or_without_elastic_sheaves(values):
     found = run(120.0, **values)
     assert found["vibrates"] == Vibrates.NO

@@ -6,7 +6,7 @@ import pytest
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.variables import Status, Vibrates
-from support.marched import balance, finished, job, mean, record
+from support.marched import Together, balance, finished, job, mean, record
 
 RPM = np.pi / 30.0
 NOMINAL = job().parameters["driving_speed"]
@@ -17,6 +17,12 @@ VIBRATING = {"stations": 96, "step": 7.6e-6, "friction_gradient": -1.0, "load": 
 def ramp(start, end):
     """Parameters of a ramp between two speeds [rad/s]."""
     return {"speed_history": "ramp", "speed_start": start, "driving_speed": end}
+
+
+ENDS = [(1000 * RPM, 3000 * RPM), (5000 * RPM, 3000 * RPM)]
+PRECISIONS = ["double", "single"]
+SPEEDS = [1500 * RPM, 3000 * RPM, 4500 * RPM]
+CONSTANT = Together(*(COARSE | {"driving_speed": speed, "duration": 0.2} for speed in SPEEDS))
 
 
 def test_a_ramp_of_no_extent_is_the_constant_run_and_its_neighbours_change_no_bit():
@@ -34,8 +40,8 @@ def test_a_ramp_of_no_extent_is_the_constant_run_and_its_neighbours_change_no_bi
 
 # 698 rad/s^2. What is left open is that of constant speed, 2e-4: friction that followed the layers' speeds within a step,
 # but not the pulleys', would leave 0.7 %.
-@pytest.mark.parametrize("ends", [(1000 * RPM, 3000 * RPM), (5000 * RPM, 3000 * RPM)])
-@pytest.mark.parametrize("precision", ["double", "single"])
+@pytest.mark.parametrize("ends", ENDS)
+@pytest.mark.parametrize("precision", PRECISIONS)
 def test_the_power_balance_closes_while_the_speed_changes(ends, precision):
     run = finished(**COARSE, **ramp(*ends), precision=precision)
     found, p, judged = balance(run), run.parameters, run.judged
@@ -63,8 +69,8 @@ def test_forces_along_a_rising_ramp_are_those_of_constant_speeds():
     torque = rate * (p["driven_inertia"] / p["ratio"] ** 2 + mass * path.driving_radius**2)
     assert torque == pytest.approx(2.12, abs=0.01)
     more = torque / p["load"]
-    for speed in (1500 * RPM, 3000 * RPM, 4500 * RPM):
-        constant = finished(**COARSE, driving_speed=speed, duration=0.2)
+    for speed in SPEEDS:
+        constant = CONSTANT.finished(**COARSE, driving_speed=speed, duration=0.2)
         near = np.abs(speeds - speed) < 60 * RPM
         for name, tolerance in {
             "ring_tension t1": 0.5 * more,
@@ -81,9 +87,10 @@ def test_forces_along_a_rising_ramp_are_those_of_constant_speeds():
 @pytest.mark.slow
 def test_onset_and_end_are_where_constant_speeds_have_them():
     inside, outside = (2100.0, 3900.0), (1980.0, 4000.0)
+    runs = Together(*(VIBRATING | {"driving_speed": s * RPM, "duration": 0.3} for s in (*inside, *outside)))
     for speeds, expected in ((inside, Vibrates.YES), (outside, Vibrates.NO)):
         for speed in speeds:
-            constant = record(**VIBRATING, driving_speed=speed * RPM, duration=0.3)
+            constant = runs.record(**VIBRATING, driving_speed=speed * RPM, duration=0.3)
             assert constant["vibrates"] is expected, speed
     low, high = ((a * RPM, b * RPM) for a, b in zip(outside, inside, strict=True))
     up, down = (

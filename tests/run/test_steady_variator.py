@@ -135,8 +135,8 @@ def test_friction_carries_what_bullinger_says():
 
 def test_a_load_beyond_what_friction_carries():
     with pytest.raises(NoSteadyState, match="400 N m"):
-        SteadyBelt(DEFAULTS).at(400.0)
-    record = rung_record("steady_variator", load=400.0, stations=96)
+        SteadyBelt(DEFAULTS | {"stations": 48}).at(400.0)
+    record = rung_record("steady_variator", load=400.0, stations=48)
     assert record["status"] == Status.FAILED_NUMERICS and b"400 N m" in record["reason"].encode()
 
 

@@ -7,10 +7,10 @@ import pytest
 
 from cvt_hpc import load_job, open_results, run
 from cvt_hpc.study.part import Part
-from support.cluster import JOB, SPOILT, TWO_NODES, wait_until
+from support.cluster import JOB, TWO_NODES, wait_until
 from support.recorded import assert_same_numbers, frames_written, recorded_runs, records
 
-pytestmark = [pytest.mark.slow, pytest.mark.flaky(reruns=2, only_rerun=SPOILT)]
+pytestmark = pytest.mark.slow
 RUNS = 12
 
 

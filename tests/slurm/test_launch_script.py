@@ -12,7 +12,8 @@ ROOT = Path(__file__).parents[2]
 SRUN = """#!/bin/bash
 case "$*" in
     *"rm -rf"*) echo "$*" >> removed ;;
-    *) echo "$NUMBA_CACHE_DIR $(stat -c %a "$NUMBA_CACHE_DIR")" >> folders
+    *) echo "${MPIR_CVAR_CH4_NETMOD:-none}" >> netmods
+       echo "$NUMBA_CACHE_DIR $(stat -c %a "$NUMBA_CACHE_DIR")" >> folders
        touch "$NUMBA_CACHE_DIR/kernel"
        exit "${@: -1}" ;;
 esac
@@ -58,3 +59,15 @@ def test_a_folder_that_the_user_names_stays(launch, tmp_path):
     assert launch(0, NUMBA_CACHE_DIR=str(named), SLURM_NNODES="2") == 0
     assert [path.name for path in named.iterdir()] == ["kernel"]
     assert not (tmp_path / "removed").exists()
+
+
+@pytest.mark.parametrize(
+    ("device", "chosen", "netmod"),
+    [("ucx ofi", "", "ofi"), ("ofi", "", "ofi"), ("ucx", "", "none"), ("ucx ofi", "ucx", "ucx")],
+)
+def test_mpich_goes_over_libfabric_where_it_can(launch, tmp_path, device, chosen, netmod):
+    told = tmp_path / "bin" / "mpichversion"
+    told.write_text(f"#!/bin/sh\necho 'MPICH Version:      5.0.2'\necho 'MPICH Device:       ch4:{device}'\n")
+    told.chmod(0o755)
+    assert launch(0, MPIR_CVAR_CH4_NETMOD=chosen) == 0
+    assert (tmp_path / "netmods").read_text().split() == [netmod]

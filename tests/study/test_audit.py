@@ -20,6 +20,8 @@ friction_gradient = [-1.0, -0.9]
 load = [60, 120]
 [scene]
 thrust = "50 kN"
+[mesh]
+stations = 96
 [run]
 duration = "0.3 s"
 """

@@ -29,10 +29,10 @@ def test_launch_is_read_from_the_environment(environment, expected):
     assert detect_launch(environment) == expected
 
 
-def test_a_serial_run_never_imports_mpi(start, tmp_path):
+def test_a_serial_run_imports_neither_mpi_nor_xarray(start, tmp_path):
     finished = start({"out": tmp_path / "out"}).finish()
     assert finished.returncode == 0, finished.stderr
-    assert json.loads(finished.stdout)["mpi"] is False
+    assert json.loads(finished.stdout)["loaded"] == []
 
 
 @pytest.mark.parametrize("variable", ["SLURM_NTASKS", "PMI_SIZE", "OMPI_COMM_WORLD_SIZE"])

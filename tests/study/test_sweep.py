@@ -147,6 +147,7 @@ def test_a_real_job_fits(write_job, tmp_path):
             "refined": 2,
         }
         assert dataset["load"].attrs["units"] == "N m"
+        assert dataset["refined"].dtype == bool
         assert json.loads(dataset.attrs["job"]) == job.resolved()
         for index in range(job.size):
             point = job.point(index)

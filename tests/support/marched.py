@@ -1,13 +1,16 @@
 """Runs of the elastic belt for the tests of this folder: each is done once, however many tests look at it."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 
 from cvt_hpc.job import Job, build_job
+from cvt_hpc.models.elastic_belt.batch import LaneRun
 from cvt_hpc.models.elastic_belt.record import evaluate
 from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.simulation import record_variables, run_point
+from cvt_hpc.simulation.marching import march_runs
 
 # A coarse belt that is loaded within 10 ms, judged over the shortest part that is allowed: 0.1 s of computing.
 CHEAP = {"stations": 48, "duration": 0.04, "rise_time": 0.01}
@@ -41,6 +44,37 @@ def record(**values) -> dict:
     return fresh_record(**values)
 
 
+class Together:
+    """Runs that are done when the first one is asked for, in lanes: each is bit by bit what it is alone.
+
+    Parameters
+    ----------
+    *scenes : dict
+        Parameters of each run but for defaults [SI].
+    """
+
+    def __init__(self, *scenes: dict) -> None:
+        self._scenes = {frozenset(scene.items()): scene for scene in scenes}
+        self._done: dict[frozenset, tuple[Any, dict]] = {}
+
+    def _of(self, values: dict) -> tuple[Any, dict]:
+        if not self._done:
+            points = [job(**scene).point(0) for scene in self._scenes.values()]
+            found = march_runs(job(), points, never, range(len(points)))
+            self._done = dict(zip(self._scenes, found, strict=True))
+        return self._done[frozenset(values.items())]
+
+    def record(self, **values) -> dict:
+        """The record of one of them."""
+        return self._of(values)[1]
+
+    def finished(self, **values) -> LaneRun:
+        """One of them with all its samples."""
+        run, _ = self._of(values)
+        assert run.failure is None
+        return run
+
+
 @cache
 def finished(**values) -> Transient:
     """One run with all its samples."""
@@ -51,12 +85,12 @@ def finished(**values) -> Transient:
     return run
 
 
-def balance(run: Transient) -> dict:
+def balance(run: LaneRun) -> dict:
     """The model's part of the record of a finished run."""
     return evaluate(run, np.array([2, 7]))  # the probes in the middles of the strands
 
 
-def mean(run: Transient, name: str) -> float:
+def mean(run: LaneRun, name: str) -> float:
     """Mean of a channel over the judged part."""
     return float(run.channel(name)[run.judged].mean())
 

@@ -17,13 +17,15 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -139,6 +141,9 @@ class Simulator:
         interrupt: Callable[[], str | None],
         kept: Sequence[int],
     ) -> tuple[list[dict[str, Any]], dict[int, xr.Dataset]]:
+        # not above: it takes a third of a second of each process
+        import xarray as xr
+
         histories = {
             place: xr.Dataset({"x": ("time", logistic_numbers(points[place], job))}) for place in kept
         }
@@ -228,7 +233,15 @@ def main(options: dict[str, Any]) -> int:
         raise_defect()
     if process_rank() == 0:
         facts = {"done": report.done, "failed": len(report.failed), "remaining": report.remaining}
-        print(json.dumps({**facts, "stopped": report.stopped, "mpi": "mpi4py.MPI" in sys.modules}))
+        print(
+            json.dumps(
+                {
+                    **facts,
+                    "stopped": report.stopped,
+                    "loaded": sorted({"mpi4py.MPI", "xarray"} & sys.modules.keys()),
+                }
+            )
+        )
     return end_process(report.exit_status)
 
 

@@ -16,6 +16,7 @@ from PIL import Image
 from cvt_hpc import open_results
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, occurrence_classes
+from cvt_hpc.cli import main
 from cvt_hpc.variables import Status, Vibrates
 from support.cf import cf_findings
 from support.recorded import assert_same_numbers, frames_written, records
@@ -61,8 +62,9 @@ duration = "0.15 s"
 
 
 @pytest.fixture
-def folder(tmp_path):
-    """A folder with the job."""
+def folder(tmp_path, monkeypatch):
+    """A folder with the job, where commands find themselves."""
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "small.toml").write_text(JOB)
     return tmp_path
 
@@ -117,11 +119,13 @@ def test_the_cf_checker_finds_nothing_in_a_sweep(serial):
     assert cf_findings(serial / "results.nc") == []
 
 
-def test_costs_are_estimated_by_what_is_on_record(serial):
+def test_costs_are_estimated_by_what_is_on_record(serial, monkeypatch, capsys):
+    monkeypatch.chdir(serial.parents[1])
     estimate = {}
     for name in ("small", "other"):
-        done = call("check", "small.toml", "--set", f"name={name}", cwd=serial.parents[1])
-        (estimate[name],) = (line for line in done.stdout.splitlines() if line.startswith("estimated cost"))
+        assert main(["check", "small.toml", "--set", f"name={name}"]) == 0
+        printed = capsys.readouterr().out.splitlines()
+        (estimate[name],) = (line for line in printed if line.startswith("estimated cost"))
     took = load_results(serial)["core_seconds"].values[:, :3].mean()
     assert estimate["small"].startswith(f"estimated cost: {took:.3g} core-seconds per run")
     assert estimate["small"].endswith("(by what 6 runs on record took)")
@@ -159,12 +163,12 @@ def test_kill_9_at_any_moment_and_resume(meshes, tmp_path, ranks):
 
 
 @pytest.mark.slow
-def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):
+def test_simulate_gives_the_numbers_of_the_sweep(serial, folder, capsys):
     at = ("--at", "load=120 N m", "--at", "lanes=runs")
-    done = call("simulate", "small.toml", *at, "--out", "h.nc", "--plot", "h.png", cwd=folder)
-    assert done.returncode == 0
-    assert [line for line in done.stderr.splitlines() if "cvt-hpc: compil" not in line] == []
-    assert "vibrates" in done.stdout
+    assert main(["simulate", "small.toml", *at, "--out", "h.nc", "--plot", "h.png"]) == 0
+    printed = capsys.readouterr()
+    assert [line for line in printed.err.splitlines() if "cvt-hpc: compil" not in line] == []
+    assert "vibrates" in printed.out
     swept = load_results(serial).sel(sheave_stiffness=1.0, load=120.0)
     with xr.open_dataset(folder / "h.nc", decode_times=False) as history:
         for name in swept.data_vars:
@@ -187,11 +191,10 @@ def test_simulate_gives_the_numbers_of_the_sweep(serial, folder):
 
 
 @pytest.mark.slow
-def test_simulate_of_a_run_that_fails_ends_with_1_and_still_draws(folder):
+def test_simulate_of_a_run_that_fails_ends_with_1_and_still_draws(folder, capsys):
     bare = ["--set", "most_refinements=0"]  # else the run is done again at half the step, and well
-    done = call("simulate", "small.toml", "--at", "step=20 us", *bare, "--plot", "f.png", cwd=folder)
-    assert done.returncode == 1
-    assert "cvt-hpc: the run failed: failed_numerics: at " in done.stderr
+    assert main(["simulate", "small.toml", "--at", "step=20 us", *bare, "--plot", "f.png"]) == 1
+    assert "cvt-hpc: the run failed: failed_numerics: at " in capsys.readouterr().err
     assert (folder / "f.png").exists()
 
 
@@ -204,14 +207,13 @@ def ink(picture, colour, tolerance=12):
 
 
 @pytest.mark.slow
-def test_runs_with_a_step_too_long_are_failed_on_the_map_not_quiet(folder):
+def test_runs_with_a_step_too_long_are_failed_on_the_map_not_quiet(folder, capsys):
     job = JOB.replace("sheave_stiffness = [1.0, inf]", 'step = ["2.5 us", "50 us"]').replace(
         ', "500 N m"', ""
     )
     (folder / "steps.toml").write_text(job)
-    done = call("run", "steps.toml", "--set", "most_refinements=0", "--out", "steps", cwd=folder)
-    assert done.returncode == 1
-    named = [line for line in done.stderr.splitlines() if "failed_numerics" in line]
+    assert main(["run", "steps.toml", "--set", "most_refinements=0", "--out", "steps"]) == 1
+    named = [line for line in capsys.readouterr().err.splitlines() if "failed_numerics" in line]
     assert len(named) == 3
     assert named[0].startswith("cvt-hpc: run 3 (step = 50 us, load = 0 N m): failed_numerics: at ")
     dataset = load_results(folder / "steps")
@@ -220,10 +222,8 @@ def test_runs_with_a_step_too_long_are_failed_on_the_map_not_quiet(folder):
     assert (classes.sel(step=2.5e-6) != OccurrenceClass.FAILED).all()
     assert classes.sel(step=2.5e-6, load=0.0) == OccurrenceClass.QUIET
     assert classes.sel(step=2.5e-6, load=120.0) == OccurrenceClass.VIBRATING
-    done = call("map", "steps", cwd=folder)
-    assert (done.returncode, done.stdout) == (0, "map: steps/map.png\n")
-    done = call("map", "steps", "--at", "step=2.5 us", "--out", "good.png", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    assert (main(["map", "steps"]), capsys.readouterr().out) == (0, "map: steps/map.png\n")
+    assert main(["map", "steps", "--at", "step=2.5 us", "--out", "good.png"]) == 0
     # the red of failed runs covers their half of the map, hatching between white, and is nowhere else
     red = STYLES[OccurrenceClass.FAILED].ink
     assert ink(folder / "steps" / "map.png", red) > 10 * max(ink(folder / "good.png", red), 100)

@@ -1,5 +1,7 @@
 """What counts as irregular: amplitudes that come and go without a trend, and never growth nor decay."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.stats import linregress, t
@@ -17,18 +19,24 @@ NO, YES, UNDECIDED, IRREGULAR = Vibrates.NO, Vibrates.YES, Vibrates.UNDECIDED, V
 STRANDS = ("t1", "t2")
 
 
+@cache
+def noise(alike):
+    """Normal random numbers (2000, 200), of which neighbours in a row are alike by `alike`."""
+    found = np.array([np.random.default_rng(seed).normal(size=200) for seed in range(2000)])
+    for k in range(1, 200):
+        found[:, k] = alike * found[:, k - 1] + np.sqrt(1.0 - alike**2) * found[:, k]
+    return found
+
+
 def scattered(seed, count, scatter=0.5, gain=0.0, alike=0.0):
     """Amplitudes of median 1 whose logarithm scatters and rises by `gain`; neighbours are alike by `alike`."""
-    random = np.random.default_rng(seed)
-    noise = random.normal(size=count)
-    for k in range(1, count):
-        noise[k] = alike * noise[k - 1] + np.sqrt(1.0 - alike**2) * noise[k]
-    return np.exp(scatter * noise + gain * np.linspace(-0.5, 0.5, count))
+    return np.exp(scatter * noise(alike)[seed, :count] + gain * np.linspace(-0.5, 0.5, count))
 
 
 def share(count, trials=2000, **how):
     """Share of irregular records; a gain of 1 e-fold has to be ruled out."""
-    return np.mean([is_irregular(scattered(seed, count, **how), 1.0, 1.0) for seed in range(trials)])
+    records = scattered(slice(trials), count, **how)
+    return np.mean([is_irregular(record, 1.0, 1.0) for record in records])
 
 
 def test_what_scatters_about_the_threshold_is_irregular_once_there_are_windows_enough():
