@@ -22,6 +22,7 @@ from cvt_hpc.vibration.ramped import ramped
 
 CHANNELS = ("load", "driving_speed", *SCALARS)
 FIRST_THRUST = 500.0  # [N]: with which the run begins, so that the belt settles in the grooves
+CLAMPED = 0.5  # of the rise time: until then the thrust rises, from then on the load, so that nothing slips before
 LARGEST_POWER_RESIDUAL = 0.02  # of the driving power
 MOST_UNSOLVED = 0.02  # of the steps
 LEAST_SPEED, MOST_SPEED = (
@@ -134,7 +135,7 @@ class Transient:
         share = 1.0
         if ramped(p) == "speed":
             share = speed_course.py_func(time, rise, end, p["speed_start"] / p["driving_speed"])
-        clamped = load_course.py_func(time, rise, rise, p["thrust"], p["thrust"]) / p["thrust"]
+        clamped = load_course.py_func(time, CLAMPED * rise, rise, 1.0, 1.0)
         driving, driven = (
             FIRST_THRUST + clamped * (thrust - FIRST_THRUST) for thrust in (p["driving_thrust"], p["thrust"])
         )
@@ -144,7 +145,9 @@ class Transient:
         """Torque at the driving pulley without losses [N m]."""
         p = self.parameters
         begun = p["load_start"] if ramped(p) == "load" else p["load"]
-        return load_course.py_func(time, p["rise_time"], p["duration"], begun, p["load"])
+        clamped = CLAMPED * p["rise_time"]
+        rise, end = p["rise_time"] - clamped, p["duration"] - clamped
+        return load_course.py_func(max(time - clamped, 0.0), rise, end, begun, p["load"])
 
     def _take_sample(self, inputs: tuple[float, float, float, float]) -> None:
         elements = of_lanes(self._state.elements)
