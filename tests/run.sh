@@ -25,4 +25,6 @@ install_slurm() {
 
 prepare_environment mpich,test
 install_slurm
+# Where nothing may be written beside the sources, each process rewrites all assertions anew, for 8 s of a core.
+unset PYTHONDONTWRITEBYTECODE
 exec .venv/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder "$@"

@@ -4,21 +4,20 @@ from functools import cache
 
 import numpy as np
 
-from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, system
 from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.marching import Marching
 from cvt_hpc.steppers.system import RELATIVE_INCREMENT, System, jacobian
+from support.rungs import rung_job
 
 COARSE = {"stations": 48, "duration": 0.04, "rise_time": 0.01, "load": 60.0}
 
 
 def point(stepper: str, **values) -> dict:
     """Parameters of a run of a coarse belt with defaults but for `values` [SI]."""
-    document = {"name": "test", "model": "elastic_belt", "stepper": stepper}
-    return build_job(document, "test.toml", COARSE | values).point(0)
+    return rung_job("elastic_belt", stepper=stepper, **COARSE | values).point(0)
 
 
 def general(stepper: str, **values) -> GeneralTransient:

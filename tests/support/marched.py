@@ -5,12 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.job import Job, build_job
+from cvt_hpc.job import Job
 from cvt_hpc.models.elastic_belt.batch import LaneRun
 from cvt_hpc.models.elastic_belt.record import evaluate
 from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.simulation import record_variables, run_point
 from cvt_hpc.simulation.marching import march_runs
+from support.rungs import rung_job
 
 # A coarse belt that is loaded within 10 ms, judged over the shortest part that is allowed: 0.1 s of computing.
 CHEAP = {"stations": 48, "duration": 0.04, "rise_time": 0.01}
@@ -24,8 +25,7 @@ def job(stepper: str = "imex", axes: dict | None = None, **values) -> Job:
     values = {"most_refinements": 0, "longest_duration": values.get("duration", 0.3)} | values
     if stepper == "imex" and "precision" not in (axes or {}):
         values = {"precision": "double"} | values
-    document = {"name": "test", "model": "elastic_belt", "stepper": stepper, "axes": axes or {}}
-    return build_job(document, "test.toml", values)
+    return rung_job("elastic_belt", axes, stepper, **values)
 
 
 def never() -> None:
