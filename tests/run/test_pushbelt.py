@@ -47,7 +47,8 @@ def test_forces_of_both_strands_give_the_torque(records):
     found, radius = records[60.0], 0.06389598 / 1.35
     (t1, t2), (p1, p2) = found["mean_ring_tension"], found["mean_push_force"]
     torque = found["driving_power"] / (100.0 * np.pi)
-    least, most = ((t2 - t1) * radius + (p1 - p2) * (radius + height) for height in (-1.5e-3, 4e-3))
+    ring = radius + 1.5e-3
+    least, most = ((t2 - t1) * ring + (p1 - p2) * height for height in (radius, ring + 4e-3))
     assert least < torque < most
     assert torque == pytest.approx(60.0, rel=0.03)  # the driven pulley is still set right
 

@@ -104,6 +104,7 @@ class Readings:
         """
         e = elements
         position, offset = along(self.path, self._centre_distance, e[:, [f.Y, f.Z]])
+        offset -= belt.pitch_depth  # of the saddles, the path being that of the pitch line
         order = np.argsort(position)
         moved = np.interp(self.probes.ravel(), position[order], offset[order], period=self.path.path_length)
         push = e[:, f.EDGE] + e[:, f.HEAD]

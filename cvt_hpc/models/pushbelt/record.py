@@ -40,6 +40,7 @@ VARIABLES = (
     *shared("mean_ring_tension", "mean_push_force", "axial_force", "slip", "flank_loss", "thrust_ratio"),
     *shared("speed_loss", "driven_speed_ripple", "driving_power", "load_power", "thrust_power"),
     *shared("storing_power", "ring_loss"),
+    Variable("tilt_loss", (), "f8", "W", "mean power of the dampers of the elements' tilt"),
     *shared("loss", "power_residual"),
     Variable("efficiency", (), "f8", "1", "mean power of the load over that of the driving pulley"),
     Variable("largest_push_force", (), "f8", "N", "largest along the path, of means over the judged part"),
@@ -129,7 +130,8 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     radius = run.channel("driven_radius")[judged]
     driving, load = run.mean_rate(fields.WORK_IN), run.mean_rate(fields.WORK_OUT)
     ring = run.mean_rate(fields.RING_LOSS)
-    loss = run.mean_rate(fields.FLANK_LOSS) + ring
+    tilt = run.mean_rate(fields.DAMPING_LOSS)
+    loss = run.mean_rate(fields.FLANK_LOSS) + ring + tilt
     # both sheaves of a pulley give way by the tangent of the wedge angle
     widening = -2.0 * np.tan(p["half_wedge_angle"]) * (radius[-1] - radius[0])
     thrust = axial[1] * widening / ((radius.size - 1) * run.interval)
@@ -154,6 +156,7 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
         "thrust_power": thrust,
         "storing_power": storing,
         "ring_loss": ring,
+        "tilt_loss": tilt,
         "loss": loss,
         "power_residual": (driving - load - thrust - loss - storing) / max(abs(driving), loss),
         "efficiency": load / driving if driving > 0.0 else np.nan,
