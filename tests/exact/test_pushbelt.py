@@ -351,12 +351,36 @@ def test_contacts_hold_their_laws(run):
     for height, field in ((-belt.pitch_depth, b.EDGE), (belt.head_height, b.HEAD)):
         gap = ((rear - r - 0.5 * belt.thickness * x - height * o) * ahead).sum(1)
         assert np.maximum(-gap, 0.0) == pytest.approx(f[:, field] / belt.contact_stiffness, abs=1e-7)
+    length = np.linalg.norm(np.roll(r, -1, 0) - r, axis=1)
+    strain = length / f[:, b.LENGTH] - 1.0
+    # linear within a step, so off by some N where an element meets a pulley
+    off = np.abs(f[:, b.TENSION] - belt.ring_stiffness * strain)
+    assert np.median(off) < 1.0 and off.max() < 20.0
     pitch = r - belt.pitch_depth * o
     driven = f[:, b.DRIVEN] > 0.5
     pitch[driven, 0] -= belt.centre_distance
     groove = np.where(driven, state.pulleys[b.DRIVEN_RADIUS], state.pulleys[b.DRIVING_RADIUS])
     depth = (groove - np.linalg.norm(pitch, axis=1)) * belt.sine
     assert np.maximum(depth, 0.0) == pytest.approx(f[:, b.FLANK] / belt.flank_stiffness, abs=1e-7)
+
+
+def test_elements_that_turn_with_a_pulley_do_not_slide():
+    belt, state = start(given())
+    work, radius, omega = workspace(belt, NODES), 0.05, SPEED
+    angle = 2.0 * np.pi * np.arange(NODES) / NODES
+    f = fields(state.elements)
+    f[:, b.Y], f[:, b.Z] = radius * np.cos(angle), radius * np.sin(angle)
+    f[:, b.HEADING_Y], f[:, b.HEADING_Z] = -np.sin(angle), np.cos(angle)
+    f[:, b.OMEGA] = omega
+    f[:, b.U_Y] = radius * (np.cos(angle + omega * STEP) - np.cos(angle)) / STEP
+    f[:, b.U_Z] = radius * (np.sin(angle + omega * STEP) - np.sin(angle)) / STEP
+    write(state.elements, f)
+    prepared(belt, state, work, STEP)
+    evaluated(belt, state, work, STEP)
+    f = fields(state.elements)
+    # the lever at the end of the step would add d omega^2 dt / 2, 0.7 mm/s
+    assert np.abs(f[:, b.FLANK_SLIP_M]).max() < 1e-10
+    assert np.abs(f[:, b.FLANK_SLIP_T]).max() < radius * omega * (omega * STEP) ** 2 / 8.0
 
 
 def test_push_force_at_half_the_step(run):

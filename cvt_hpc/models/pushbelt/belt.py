@@ -81,7 +81,7 @@ class Belt(NamedTuple):
     ----------
     centre_distance : float
         [m]
-    sine, cosine, tangent : float
+    sine, cosine : float
         Of the half wedge angle.
     thickness : float
         [m]
@@ -117,7 +117,6 @@ class Belt(NamedTuple):
     centre_distance: float
     sine: float
     cosine: float
-    tangent: float
     thickness: float
     pitch_depth: float
     head_height: float

@@ -91,7 +91,6 @@ def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
         centre_distance=float(g["centre_distance"]),
         sine=float(np.sin(angle)),
         cosine=float(np.cos(angle)),
-        tangent=float(np.tan(angle)),
         thickness=float(thickness),
         pitch_depth=float(g["pitch_depth"]),
         head_height=float(g["head_height"]),
