@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+import xarray  # noqa: F401 - here, before a test takes away the rights to read it
 
 from support.study_processes import HERE, Sweep, clean_environment, fault_tolerance, find_mpirun
 

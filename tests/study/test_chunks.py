@@ -158,7 +158,9 @@ def test_memory_is_bounded_by_the_block_not_by_the_study(tmp_path, monkeypatch):
 
 
 def test_a_running_sweep_is_gathered_again_and_again(start, tmp_path):
-    out, runs = tmp_path / "out", 80
+    # loads xarray and what it needs, for which no sweep would wait
+    open_results(run(grid(1), tmp_path / "first", simulator=Simulator(), progress=False).out).close()
+    out, runs = tmp_path / "out", 160
     sweep = start({"out": out, "runs": runs, "parameters": {"pause": 0.02}}, ranks=2)
     wait_until(lambda: (out / "job.json").exists() and recorded(out).recorded.any(), "the first record")
     snapshots = []
