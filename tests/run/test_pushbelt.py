@@ -44,7 +44,7 @@ def test_push_changes_strands_with_the_torque(records):
 
 def test_forces_of_both_strands_give_the_torque(records):
     """Rings pull at the radius of their line; elements push somewhere between rocking edge and head."""
-    found, radius = records[60.0], 0.06389598 / 1.35
+    found, radius = records[60.0], 0.063896 / 1.35
     (t1, t2), (p1, p2) = found["mean_ring_tension"], found["mean_push_force"]
     torque = found["driving_power"] / (100.0 * np.pi)
     ring = radius + 1.5e-3

@@ -45,7 +45,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "ratio": replace(
             SCENE["ratio"], default=1.35, description="speed ratio, driven radius / driving radius"
         ),
-        "belt_length": replace(SCENE["belt_length"], default=0.6612),
+        "driven_radius": replace(SCENE["driven_radius"], default=0.063896),
         "driving_speed": replace(SCENE["driving_speed"], default=100.0 * np.pi),
         "thrust": replace(SCENE["thrust"], default=20e3),
         "driving_thrust": not_negative(

@@ -23,8 +23,8 @@ from cvt_hpc.vibration.ramped import ramped
 CHANNELS = ("load", "driving_speed", *SCALARS)
 FIRST_THRUST = 500.0  # [N]: with which the run begins, so that the belt settles in the grooves
 CLAMPED = 0.5  # of the rise time: until then the thrust rises, from then on the load, lest the belt slips
-# What the power balance may leave open: of the driving power, and of thrust times belt speed. Without load sound
-# runs leave 9 to 46 W of 298 kW (432 to 104 elements, steps of 2.5 to 10 us), in proportion to pitch and step.
+# What the power balance may leave open: of the driving power, and of thrust times belt speed. Without load
+# sound runs leave 9 to 46 W of 298 kW (432 to 104 elements, steps of 2.5 to 10 us), by pitch and step.
 LARGEST_POWER_RESIDUAL, OF_THRUST = 0.005, 2e-4
 MOST_UNSOLVED = 0.02  # of the steps
 LEAST_SPEED, MOST_SPEED = (
