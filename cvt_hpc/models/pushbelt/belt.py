@@ -296,5 +296,5 @@ STEP_FIELDS = LINK + 16
     OPENING_T,
     OPENING_N,  # decrease of the normal force by it
     RING_SLOPE,  # decrease of the ring's friction by its slip
-) = (0, *range(4, 18), 18, 21, *range(24, 30))
+) = [0, *range(4, 18), 18, 21, *range(24, 30)]
 ITERATE_FIELDS = 30
