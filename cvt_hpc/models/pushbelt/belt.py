@@ -273,7 +273,6 @@ STEP_FIELDS = LINK + 16
 
 # Fields of Workspace.iterate
 (
-    RESIDUAL,  # 4
     ITERATE_TENSION,
     MOMENT_I,  # of the angle to the segment ahead, on this element and on the next one
     MOMENT_J,
@@ -288,13 +287,14 @@ STEP_FIELDS = LINK + 16
     STIFF_JJ,
     FORCE_R,  # of both flanks, in radial and in circumferential direction
     FORCE_T,
-    SLOPE_R,  # 3: decrease of FORCE_R by U_Y, U_Z, OMEGA
-    SLOPE_T,  # 3
     DRIVEN_R,  # increase of both forces by the driven pulley's speed
     DRIVEN_T,
     OPENING_R,  # decrease of both forces by the opening of the sheaves
     OPENING_T,
     OPENING_N,  # decrease of the normal force by it
     RING_SLOPE,  # decrease of the ring's friction by its slip
-) = (0, *range(4, 18), 18, 21, *range(24, 30))
-ITERATE_FIELDS = 30
+) = range(20)
+RESIDUAL = 20  # 4 fields: of an element's equations
+SLOPE_R = RESIDUAL + 4  # 3 fields: decrease of FORCE_R by U_Y, U_Z, OMEGA
+SLOPE_T = SLOPE_R + 3  # 3 fields
+ITERATE_FIELDS = SLOPE_T + 3
