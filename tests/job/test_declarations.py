@@ -4,6 +4,7 @@ import re
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pint
 import pytest
 
@@ -67,7 +68,8 @@ def test_what_has_a_unit_has_a_sensible_range_around_its_default(model, stepper)
         if parameter.sensible is not None:
             low, high = parameter.sensible
             assert 0.0 < low < high, key
-            assert not parameter.default or low <= abs(parameter.default) <= high, key
+            sizes = np.abs(np.ravel(parameter.default or ()))
+            assert ((low <= sizes) & (sizes <= high) | (sizes == 0.0)).all(), key
 
 
 @pytest.mark.parametrize("model", sorted(set(MODELS) - {"moving_string"}))
@@ -119,7 +121,8 @@ def test_every_stepper_is_taken_or_refused_with_a_reason(model):
     assert not asked.refused.keys() & asked.steppers.keys()
     assert asked.default_stepper in asked.steppers
     for stepper in (STEPPERS | OWN).keys() - asked.steppers.keys():
-        reason = asked.refused.get(stepper, "it is elastic_belt's own step")
+        owner = "pushbelt" if stepper == "newton" else "elastic_belt"
+        reason = asked.refused.get(stepper, f"it is {owner}'s own step")
         assert len(reason.split()) > 3, stepper
         assert stepper in OWN or stepper in asked.refused
         with pytest.raises(InputError) as caught:

@@ -47,7 +47,8 @@ def test_one_belt_has_its_radii_at_each_ratio(model):
         path = variator(point["ratio"], point["driven_radius"], point["centre_distance"])
         assert path.path_length == pytest.approx(0.661195, rel=1e-14)
         # Bullinger et al. 2005, eq. 2
-        most = 2.0 * 0.1 / math.cos(math.radians(11.0)) * 50e3 * path.driving_radius
+        pressed = 2.0 * asked.parameters["kinetic_friction"] * asked.parameters["thrust"]
+        most = pressed / math.cos(math.radians(11.0)) * path.driving_radius
         assert point["load"] == pytest.approx(SHARES[index % 3] * most, rel=1e-14)
     # the fast step of the belt follows from the scene, too
     told = {one.name: (one.axes, one.words) for one in asked.derived if one.name != "step"}
