@@ -1,4 +1,8 @@
-"""Where points lie along the path of a belt, and how far off it."""
+"""The path of a belt in the plane: points along it, and where points lie along it and how far off.
+
+It is run through counter-clockwise around the driving pulley at (0, 0) and the driven one at (a, 0), so that t1
+is the lower strand. Path coordinates begin at the inlet of the driving arc.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +13,49 @@ from cvt_hpc.physics.geometry import Variator
 REGIONS = ("driving", "t1", "driven", "t2")
 
 
+def points_at(
+    path: Variator, centre_distance: float, position: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points of the path, angles of the running direction, and curvatures.
+
+    Parameters
+    ----------
+    path : Variator
+        Radii, wraps and strands.
+    centre_distance : float
+        a [m]
+    position : (n,) array
+        Path coordinates [m].
+
+    Returns
+    -------
+    (n, 2), (n,), (n,) arrays
+        [m], [rad], [1/m]
+    """
+    s = np.mod(position, path.path_length)
+    tilt = 0.5 * (path.driven_wrap - np.pi)  # of the strands: the lower one runs downwards for it > 0
+    driving, driven = path.driving_radius, path.driven_radius
+    region = regions(path, s)
+    local = s - np.concatenate([[0.0], np.cumsum(path.lengths)[:3]])[region]
+    turned = [np.pi + tilt + local / driving, -tilt, -tilt + local / driven, np.pi + tilt]
+    angle = np.choose(region, np.broadcast_arrays(*turned))
+    on_arc = region % 2 == 0
+    centre = np.where((region == 2) | (region == 3), centre_distance, 0.0)
+    radius = np.choose(region, [driving, driving, driven, driven])
+    straight = np.where(on_arc, 0.0, local)
+    # the radius along the outward normal (sin, -cos), from the end of an arc on along the strand
+    y = centre + radius * np.sin(angle) + straight * np.cos(angle)
+    z = -radius * np.cos(angle) + straight * np.sin(angle)
+    return np.stack([y, z], 1), angle, np.where(on_arc, 1.0 / radius, 0.0)
+
+
 def along(path: Variator, centre_distance: float, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Path coordinates of points, and their distances from the path.
 
     Parameters
     ----------
     path : Variator
-        The path, run through counter-clockwise around the driving pulley at (0, 0) and the driven one at
-        (centre_distance, 0), so that t1 is the lower strand.
+        Radii, wraps and strands.
     centre_distance : float
         [m]
     points : (n, 2) array
@@ -25,7 +64,7 @@ def along(path: Variator, centre_distance: float, points: np.ndarray) -> tuple[n
     Returns
     -------
     position : (n,) array
-        From the inlet of the driving arc on, less than the path's length [m].
+        Less than the path's length [m].
     offset : (n,) array
         Outwards [m].
     """

@@ -31,6 +31,7 @@ from cvt_hpc.models.pushbelt.belt import (
 )
 from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.geometry import Variator, driven_radius, variator
+from cvt_hpc.variator.path import points_at
 
 # Assumptions, but for centre distance, belt length, elements and their mass, which are a public data set's.
 ASSUMED: dict[str, Any] = {
@@ -118,55 +119,11 @@ def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
     )
 
 
-def on_path(
-    path: Variator, centre_distance: float, s: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points, angles of the running direction and curvatures of the path at arc lengths.
-
-    Parameters
-    ----------
-    path : Variator
-        Arcs and strands. The belt runs counter-clockwise around the driving pulley at (0, 0) and the driven
-        one at (centre_distance, 0); s = 0 is the end of the driving arc, at the lower strand.
-    centre_distance : float
-        [m]
-    s : (n,) array
-        [m]
-
-    Returns
-    -------
-    (n, 2), (n,), (n,) arrays
-        [m], [rad], [1/m]
-    """
-    s = np.mod(s, path.path_length)
-    tilt = 0.5 * (path.driven_wrap - np.pi)  # of the strands: the lower one runs downwards for it > 0
-    driving, strand, driven = path.driving_radius, path.strand_length, path.driven_radius
-    ends = np.cumsum([strand, driven * path.driven_wrap, strand, driving * path.driving_wrap])
-    region = np.searchsorted(ends, s, side="right").clip(0, 3)
-    local = s - np.concatenate([[0.0], ends[:3]])[region]
-    angle = np.choose(
-        region,
-        [
-            -tilt + 0.0 * local,
-            -tilt + local / driven,
-            np.pi + tilt + 0.0 * local,
-            np.pi + tilt + local / driving,
-        ],
-    )
-    centre = np.where((region == 1) | (region == 2), centre_distance, 0.0)
-    radius = np.choose(region, [driving, driven, driven, driving])
-    straight = np.where(region % 2 == 0, local, 0.0)
-    # radius times the outward normal (sin, -cos), from the arc's end on along the strand
-    y = centre + radius * np.sin(angle) + straight * np.cos(angle)
-    z = -radius * np.cos(angle) + straight * np.sin(angle)
-    return np.stack([y, z], 1), angle, np.where(region % 2 == 1, 1.0 / radius, 0.0)
-
-
 def equal_chords(path: Variator, centre_distance: float, nodes: int) -> tuple[np.ndarray, float]:
     """Arc lengths (nodes,) [m] of points on a path with equal distances to their neighbours, and that [m]."""
     s = np.arange(nodes) * path.path_length / nodes
     for _ in range(50):
-        points, _, _ = on_path(path, centre_distance, s)
+        points, _, _ = points_at(path, centre_distance, s)
         chords = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
         if np.ptp(chords) < 1e-13:
             break
@@ -194,7 +151,7 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     nodes, path = g["nodes"], path_of(g)
     s, chord = equal_chords(path, g["centre_distance"], nodes)
     belt = belt_of(g, chord)
-    pitch, _, curvature = on_path(path, belt.centre_distance, s)
+    pitch, _, curvature = points_at(path, belt.centre_distance, s)
     along = np.roll(pitch, -1, axis=0) - np.roll(pitch, 1, axis=0)
     along /= np.linalg.norm(along, axis=1)[:, None]
     points = pitch + belt.pitch_depth * np.stack([along[:, 1], -along[:, 0]], 1)
