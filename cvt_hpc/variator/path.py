@@ -1,7 +1,7 @@
 """The path of a belt in the plane: points along it, and where points lie along it and how far off.
 
-It is run through counter-clockwise around the driving pulley at (0, 0) and the driven one at (a, 0), so that t1
-is the lower strand. Path coordinates begin at the inlet of the driving arc.
+It is run through counter-clockwise around the driving pulley at (0, 0) and the driven one at (a, 0), so that
+t1 is the lower strand. Path coordinates begin at the inlet of the driving arc.
 """
 
 from __future__ import annotations

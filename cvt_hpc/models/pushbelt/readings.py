@@ -63,110 +63,111 @@ class Readings:
 
     Attributes
     ----------
+    belt
+        As given.
     path : Variator
         The reference path.
+    centre_distance, pitch, belt_speed : float
+        [m], [m], [m/s]
     probes : (2, p) array
         Path coordinates on both strands [m].
+    middles : (2,) array
+        Path coordinates of the middles of the strands [m].
     places : (PLACES,) array
         Path coordinates of profiles [m].
     """
 
     def __init__(self, parameters: Mapping[str, Any], belt: Belt) -> None:
         p = parameters
+        self.belt = belt
         self.path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
-        self._pitch = self.path.path_length / p["elements"]
-        self._centre_distance = p["centre_distance"]
+        self.centre_distance = p["centre_distance"]
+        self.pitch = self.path.path_length / p["elements"]
+        self.belt_speed = p["driving_speed"] * self.path.driving_radius
         driving, strand, driven, _ = self.path.lengths
+        starts = np.array([driving, driving + strand + driven])
         shares = np.arange(1, p["strand_probes"] + 1) / (p["strand_probes"] + 1.0)
-        self._starts = np.array([driving, driving + strand + driven])
-        self.probes = self._starts[:, None] + strand * shares
+        self.probes = starts[:, None] + strand * shares
+        self.middles = starts + 0.5 * strand
         self.places = (np.arange(PLACES) + 0.5) * (self.path.path_length / PLACES)
-        self._belt_speed = p["driving_speed"] * self.path.driving_radius
 
-    def read(
-        self, elements: np.ndarray, state: BeltState, belt: Belt
-    ) -> tuple[np.ndarray, list[float], np.ndarray]:
-        """Displacement at the probes (2 p,) [m], SCALARS, and sums over elements (profile + 1, place).
 
-        Parameters
-        ----------
-        elements : (n, fields) array
-            In the order of the belt.
-        state : BeltState
-            Of which the pulleys are read.
-        belt : Belt
-            Constants.
+class Reading:
+    """What is read at one sample.
 
-        Returns
-        -------
-        displacement, scalars, profiles
-            The last row of profiles counts elements.
-        """
-        e = elements
-        position, offset = along(self.path, self._centre_distance, e[:, [f.Y, f.Z]])
-        offset -= belt.pitch_depth  # of the saddles, the path being that of the pitch line
-        order = np.argsort(position)
-        moved = np.interp(self.probes.ravel(), position[order], offset[order], period=self.path.path_length)
-        push = e[:, f.EDGE] + e[:, f.HEAD]
-        on_driven = e[:, f.DRIVEN] > 0.5
+    Parameters
+    ----------
+    where : Readings
+        Where it is read.
+    elements : (n, fields) array
+        In the order of the belt.
+    state : BeltState
+        Of which pulleys and openings are read.
+    """
+
+    def __init__(self, where: Readings, elements: np.ndarray, state: BeltState) -> None:
+        self._where, self._elements, self._state = where, elements, state
+        saddles = elements[:, [f.Y, f.Z]]
+        self._position, offset = along(where.path, where.centre_distance, saddles)
+        self._offset = offset - where.belt.pitch_depth  # the path is that of the pitch line
+        self._push = elements[:, f.EDGE] + elements[:, f.HEAD]
+
+    def displacement(self) -> np.ndarray:
+        """Displacement at the probes, outwards, (2 p,) [m]."""
+        order, length = np.argsort(self._position), self._where.path.path_length
+        return np.interp(
+            self._where.probes.ravel(), self._position[order], self._offset[order], period=length
+        )
+
+    def scalars(self) -> list[float]:
+        """SCALARS."""
+        e, pulleys, belt = self._elements, self._state.pulleys, self._where.belt
+        driven = e[:, f.DRIVEN]
+        both = np.stack([1.0 - driven, driven])
         thrust = e[:, f.FLANK] * belt.cosine + e[:, f.FLANK_FRICTION_M] * belt.sine
         # the meridian's speed is the radial one over the cosine, its force in radial direction has the cosine
         loss = 2.0 * (
             belt.cosine**2 * e[:, f.FLANK_FRICTION_M] * e[:, f.FLANK_SLIP_M]
             + e[:, f.FLANK_FRICTION_T] * e[:, f.FLANK_SLIP_T]
         )
-        pulleys = (~on_driven, on_driven)
-        weight = [max(float(e[on, f.FLANK].sum()), 1e-9) for on in pulleys]
-        slip = [
-            float((e[on, f.FLANK] * e[on, f.FLANK_SLIP_T]).sum()) / w / self._belt_speed
-            for on, w in zip(pulleys, weight, strict=True)
-        ]
-        middles = [
-            np.abs(position - (start + 0.5 * self.path.strand_length)) < 0.25 * self.path.strand_length
-            for start in self._starts
-        ]
-        scalars = [
-            float(state.pulleys[f.DRIVEN_SPEED]),
-            float(state.pulleys[f.DRIVEN_RADIUS]),
-            *(float(push[middle].mean()) for middle in middles),
-            *(float(e[middle, f.TENSION].mean()) for middle in middles),
-            *(float(thrust[on].sum()) for on in pulleys),
-            *slip,
-            *(float(loss[on].sum()) for on in pulleys),
-            float((e[:, f.RING_FRICTION] * e[:, f.RING_SLIP]).sum()),
-        ]
-        return moved, scalars, self._by_place(e, position, offset, push, belt)
+        pressed = np.maximum(both @ e[:, f.FLANK], 1e-9)
+        slip = both @ (e[:, f.FLANK] * e[:, f.FLANK_SLIP_T]) / (pressed * self._where.belt_speed)
+        quarter = 0.25 * self._where.path.strand_length
+        inside = (np.abs(self._position - self._where.middles[:, None]) < quarter).astype(float)
+        inside /= inside.sum(axis=1, keepdims=True)
+        ring_loss = e[:, f.RING_FRICTION] @ e[:, f.RING_SLIP]
+        groups = (inside @ self._push, inside @ e[:, f.TENSION], both @ thrust, slip, both @ loss)
+        return [pulleys[f.DRIVEN_SPEED], pulleys[f.DRIVEN_RADIUS], *np.concatenate(groups), ring_loss]
 
-    def _by_place(
-        self, e: np.ndarray, position: np.ndarray, offset: np.ndarray, push: np.ndarray, belt: Belt
-    ) -> np.ndarray:
+    def profiles(self) -> np.ndarray:
+        """Sums over the elements at each place: PROFILES, and their number, (profile + 1, place)."""
+        e, where = self._elements, self._where
         ahead = np.roll(e, -1, axis=0)
         across = ahead[:, [f.Y, f.Z]] - e[:, [f.Y, f.Z]]
         length = np.hypot(*across.T)
         rising = (e[:, f.HEADING_Y] * across[:, 1] - e[:, f.HEADING_Z] * across[:, 0]) / length
-        gap = _edge_gap(e, ahead, belt)
         rows = [
-            push,
+            self._push,
             e[:, f.TENSION],
-            e[:, f.FLANK] / self._pitch,
-            e[:, f.FLANK_FRICTION_M] / self._pitch,
-            e[:, f.FLANK_FRICTION_T] / self._pitch,
-            e[:, f.SADDLE] / self._pitch,
+            e[:, f.FLANK] / where.pitch,
+            e[:, f.FLANK_FRICTION_M] / where.pitch,
+            e[:, f.FLANK_FRICTION_T] / where.pitch,
+            e[:, f.SADDLE] / where.pitch,
             e[:, f.RING_SLIP],
             e[:, f.FLANK_SLIP_T],
-            gap,
+            _edge_gap(e, ahead, where.belt),
             -rising,
-            offset,
-            np.ones_like(gap),
+            self._offset,
+            np.ones(len(e)),
         ]
-        place = np.minimum((position / self.path.path_length * PLACES).astype(int), PLACES - 1)
+        share = self._position / where.path.path_length
+        place = np.minimum((share * PLACES).astype(int), PLACES - 1)
         return np.array([np.bincount(place, row, PLACES) for row in rows])
 
-    def stored_energy(self, elements: np.ndarray, state: BeltState, belt: Belt) -> float:
+    def stored_energy(self) -> float:
         """Kinetic and elastic energy of belt and driven pulley [J]."""
-        e = elements
-        ahead, behind = np.roll(e, -1, axis=0), np.roll(e, 1, axis=0)
-        t = ahead[:, [f.Y, f.Z]] - behind[:, [f.Y, f.Z]]
+        e, state, belt = self._elements, self._state, self._where.belt
+        t = np.roll(e[:, [f.Y, f.Z]], -1, axis=0) - np.roll(e[:, [f.Y, f.Z]], 1, axis=0)
         t /= np.hypot(*t.T)[:, None]
         u = e[:, [f.U_Y, f.U_Z]]
         outward = u[:, 0] * t[:, 1] - u[:, 1] * t[:, 0]

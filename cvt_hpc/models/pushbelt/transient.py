@@ -11,7 +11,7 @@ from cvt_hpc.models.marched import Probe, batches_of_one
 from cvt_hpc.models.pushbelt import belt as fields
 from cvt_hpc.models.pushbelt.belt import CONTACTS, NOT_CONVERGED, Newton
 from cvt_hpc.models.pushbelt.parameters import path_length
-from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Readings
+from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Reading, Readings
 from cvt_hpc.models.pushbelt.start import of_lanes, start, workspace
 from cvt_hpc.models.pushbelt.step import advance
 from cvt_hpc.recording import sample_count
@@ -26,6 +26,7 @@ CLAMPED = 0.5  # of the rise time: until then the thrust rises, from then on the
 # What the power balance may leave open: of the driving power, and of thrust times belt speed. Without load
 # sound runs leave 9 to 46 W of 298 kW (432 to 104 elements, steps of 2.5 to 10 us), by pitch and step.
 LARGEST_POWER_RESIDUAL, OF_THRUST = 0.005, 2e-4
+EVERY = 4  # samples: what is averaged along the path is read that often
 MOST_UNSOLVED = 0.02  # of the steps
 LEAST_SPEED, MOST_SPEED = (
     0.5,
@@ -152,14 +153,16 @@ class Transient:
         return load_course.py_func(max(time - clamped, 0.0), rise, end, begun, p["load"])
 
     def _take_sample(self, inputs: tuple[float, float, float, float]) -> None:
-        elements = of_lanes(self._state.elements)
-        moved, scalars, profiles = self._readings.read(elements, self._state, self._belt)
+        found = Reading(self._readings, of_lanes(self._state.elements), self._state)
         speed, _, _, torque = inputs
-        self._rows[self.done] = [*moved, torque / self.parameters["ratio"], speed, *scalars]
-        stored = self._readings.stored_energy(elements, self._state, self._belt)
-        self._totals[self.done] = [*self._state.totals, stored]
+        load = torque / self.parameters["ratio"]
+        self._rows[self.done] = [*found.displacement(), load, speed, *found.scalars()]
+        stored = np.nan
         if self.done >= self.first_judged:
-            self._sums += profiles
+            stored = found.stored_energy()
+            if self.done % EVERY == 0:
+                self._sums += found.profiles()
+        self._totals[self.done] = [*self._state.totals, stored]
         self.done += 1
 
     def _why(self, outcome: int) -> str:
