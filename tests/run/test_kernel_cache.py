@@ -6,8 +6,8 @@ import importlib
 import importlib.util
 import logging
 import os
-import re
 import pkgutil
+import re
 import shutil
 import subprocess
 import sys
