@@ -33,42 +33,6 @@ from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.geometry import Variator, driven_radius, variator
 from cvt_hpc.variator.path import points_at
 
-# Assumptions, but for centre distance, belt length, elements and their mass, which are a public data set's.
-ASSUMED: dict[str, Any] = {
-    "ratio": 1.35,  # [1]
-    "centre_distance": 0.155,  # [m]
-    "belt_length": 0.6612,  # of the pitch line, on which the rocking edges lie [m]
-    "elements": 432,  # elements of the belt
-    "nodes": 432,  # super elements of the model
-    "element_mass": 1.858e-3,  # [kg]
-    "element_height": 13e-3,  # [m], of which and of the thickness the inertia is that of a plate
-    "pitch_depth": 1.5e-3,  # [m]
-    "head_height": 4e-3,  # [m]
-    "play": 0.3e-3,  # sum of the gaps between elements [m]
-    "ring_mass": 0.165,  # [kg]
-    "ring_stiffness": 6.0e6,  # EA [N]
-    "ring_strain": 1e-4,  # at the start
-    "half_wedge_angle": np.radians(11.0),  # [rad]
-    "flank_stiffness": 5e7,  # [N/m]
-    "contact_stiffness": 1e9,  # [N/m]
-    "angle_stiffness": 5.0,  # [N m/rad]
-    "angle_damping": 5e-5,  # [N m s]
-    "friction_law": "coulomb",
-    "kinetic_friction": 0.09,
-    "friction_gradient": 0.0,  # [s/m]
-    "stribeck_velocity": 0.1,  # [m/s]
-    "ring_friction_law": "coulomb",
-    "ring_friction": 0.06,
-    "ring_friction_gradient": 0.0,  # [s/m]
-    "ring_stribeck_velocity": 0.1,  # [m/s]
-    "friction_speed": 5e-4,  # [m/s]
-    "driven_inertia": 0.01,  # [kg m^2]
-    "driving_rate": 0.0,  # [m/(s N)]: position prescribed
-    "driven_rate": 5e-6,  # [m/(s N)]
-    "modal_stiffness": (),  # [N/m]
-    "driving_speed": 100.0 * np.pi,  # [rad/s]
-}
-
 
 def parts_of(nodes: int) -> int:
     """How many lanes a ring of nodes is cut into: as many of 8, 4 or 2 as leave whole parts; else 1."""
@@ -82,7 +46,7 @@ def path_of(given: Mapping[str, Any]) -> Variator:
 
 
 def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
-    """Constants from given values [SI] by the names of `ASSUMED`, and the distance of neighbours [m]."""
+    """Constants from values as `start` takes them, and the distance of neighbours [m]."""
     g = given
     nodes, group = g["nodes"], g["elements"] / g["nodes"]
     thickness = chord - g["play"] / nodes
@@ -140,7 +104,7 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     Parameters
     ----------
     given : mapping
-        Values [SI] by the names of `ASSUMED`, all of them.
+        Values [SI] as `transient.given` names them. `elements` of the belt are shared out among `nodes`.
 
     Returns
     -------
