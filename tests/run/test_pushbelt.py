@@ -6,6 +6,7 @@ import pytest
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.pushbelt.parameters import string_limit
+from cvt_hpc.models.pushbelt.record import of_passage
 from cvt_hpc.models.pushbelt.transient import Transient
 from cvt_hpc.simulation import run_point, simulate
 from cvt_hpc.variables import Status, Vibrates
@@ -113,3 +114,12 @@ def test_the_longest_step_is_that_of_the_strand():
     tension = record(load=60.0)["mean_ring_tension"].max()
     exact = 0.6612 / 104 * np.sqrt((1.214 + 0.2495) / tension)
     assert 0.6 * exact < string_limit(p) < exact
+
+
+def test_elements_pass_as_often_as_the_belt_goes_round(records):
+    """104 elements on the way around a path of 0.6612 m at the speed of the pitch line."""
+    path, radius = 0.6612, 0.063896 / 1.35
+    passing = records[60.0]["passing_frequency"]
+    assert passing == pytest.approx(104 * 100.0 * np.pi * radius / path, rel=0.01)
+    assert of_passage(0.5 * passing, passing) and of_passage(2.0 * passing, passing)
+    assert not any(of_passage(share * passing, passing) for share in (0.2, 0.49, 0.52, 0.7))

@@ -26,6 +26,7 @@ SCALARS = (
     "driving_flank_loss",
     "driven_flank_loss",
     "ring_loss",
+    "passing_frequency",
 )
 PROFILES = {
     "push_force": ("push force", "N", "mean, between elements"),
@@ -137,7 +138,11 @@ class Reading:
         inside /= inside.sum(axis=1, keepdims=True)
         ring_loss = e[:, f.RING_FRICTION] @ e[:, f.RING_SLIP]
         groups = (inside @ self._push, inside @ e[:, f.TENSION], both @ thrust, slip, both @ loss)
-        return [pulleys[f.DRIVEN_SPEED], pulleys[f.DRIVEN_RADIUS], *np.concatenate(groups), ring_loss]
+        # elements over the time of a revolution: their speeds over the length of their line
+        speeds = np.hypot(e[:, f.U_Y], e[:, f.U_Z]).sum()
+        line = np.hypot(*np.diff(e[:, [f.Y, f.Z]], axis=0, prepend=e[-1:, [f.Y, f.Z]]).T).sum()
+        found = [pulleys[f.DRIVEN_SPEED], pulleys[f.DRIVEN_RADIUS], *np.concatenate(groups)]
+        return [*found, ring_loss, speeds / line]
 
     def profiles(self) -> np.ndarray:
         """Sums over the elements at each place: PROFILES, and their number, (profile + 1, place)."""

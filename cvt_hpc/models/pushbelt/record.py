@@ -48,6 +48,7 @@ VARIABLES = (
     Variable(
         "driven_radius_found", (), "f8", "m", "mean radius at which the flanks touch the driven sheaves"
     ),
+    Variable("passing_frequency", (), "f8", "Hz", "mean, of elements that pass a point of the path"),
     Variable("unsolved_share", (), "f8", "1", "share of steps that were not solved to the tolerance"),
     Variable("iterations", (), "f8", "1", "of Newton's method in a step, mean"),
 )
@@ -98,11 +99,25 @@ def judge(run: Transient) -> dict[str, Any]:
     else:
         found = assessment.assess(run.displacement, p["sampling_rate"], labels, p)
     record = found.record() | evaluate(run, found.strongest_probe)
+    leading = record["frequency"][np.argmax(record["amplitude"])]
+    if record["vibrates"] == Vibrates.YES and of_passage(leading, record["passing_frequency"]):
+        record["vibrates"] = Vibrates.UNDECIDED
+        record["reason"] = f"{leading:.4g} Hz is of the passage of elements, which more elements shift"
     largest = np.abs(record["slip"]).max()
     if largest > GROSS_SLIP:
         record["vibrates"] = Vibrates.SLIPS
         record["reason"] = f"a pulley slips by {largest:.3g} of the belt's speed"
     return record
+
+
+def of_passage(frequency: float, passing: float) -> bool:
+    """Whether a frequency [Hz] is a multiple of half of that at which elements pass [Hz], within 1 %.
+
+    The polygon of the elements on the pulleys excites strands at that frequency, and by the change of their
+    stiffness at half of it.
+    """
+    order = round(2.0 * frequency / passing)
+    return order > 0 and abs(2.0 * frequency - order * passing) < 0.01 * order * passing
 
 
 def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
@@ -164,6 +179,7 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
         "efficiency": load / driving if driving > 0.0 else np.nan,
         "largest_push_force": np.nanmax(run.profiles["push_force"]),
         "driven_radius_found": radius.mean(),
+        "passing_frequency": mean("passing_frequency"),
         "unsolved_share": work["unsolved"] / max(work["steps"], 1),
         "iterations": work["iterations"] / max(work["steps"], 1),
     }
