@@ -60,7 +60,11 @@ def run_child(options: dict[str, Any], output: str) -> None:
     descriptor = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
     os.dup2(descriptor, 1)
     os.dup2(descriptor, 2)
-    sys.exit(main(options))
+    try:
+        sys.exit(main(options))
+    except KeyboardInterrupt:  # once the sweep has ended; end as Python itself would
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        os.kill(os.getpid(), signal.SIGINT)
 
 
 def acknowledge(path: str) -> None:
