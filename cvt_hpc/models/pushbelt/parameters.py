@@ -19,6 +19,7 @@ from cvt_hpc.physics.geometry import variator, variator_problems
 from cvt_hpc.variator.scene import FRICTION, HALF_WEDGE_ANGLE, SCENE
 
 FEWEST_ELEMENTS = 100
+BELOW_PASSAGE = 0.9  # of half that frequency: belts run up to 4 % slower than by the nominal radius
 NOT_HERE = ("disturbance", "seed")
 NO_TABLE = ("friction_memory", "table_file", "table_force", "table_speed", "table_mu")
 
@@ -48,6 +49,9 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "driven_radius": replace(SCENE["driven_radius"], default=0.063896),
         "driving_speed": replace(SCENE["driving_speed"], default=100.0 * np.pi),
         "thrust": replace(SCENE["thrust"], default=20e3),
+        "rise_time": replace(
+            SCENE["rise_time"], description="start-up: thrust rises in its first half, load in its second"
+        ),
         "driving_thrust": not_negative(
             0.0,
             "N",
@@ -167,18 +171,24 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     """
     p = parameters
     problems = variator_problems(p)
-    if not problems:
-        pitch = path_length(p) / p["elements"]
-        if p["play"] > pitch:
-            problems.append(
-                ("play", f"less than the pitch of the elements, {pitch:.4g} m", f"{p['play']:g} m")
-            )
-        psi = np.arcsin((p["ratio"] - 1.0) * p["driven_radius"] / p["ratio"] / p["centre_distance"])
-        least = min(p["driven_radius"], p["driven_radius"] / p["ratio"])
-        arc = (np.pi - 2.0 * abs(psi)) * least
-        if arc < 8.0 * pitch:
-            expected = f"at least {int(np.ceil(8.0 * path_length(p) / arc))}, eight on the shorter arc"
-            problems.append(("elements", expected, f"{p['elements']}"))
+    if problems:
+        return problems
+    pitch = path_length(p) / p["elements"]
+    if p["play"] > pitch:
+        problems.append(("play", f"less than the pitch of the elements, {pitch:.4g} m", f"{p['play']:g} m"))
+    psi = np.arcsin((p["ratio"] - 1.0) * p["driven_radius"] / p["ratio"] / p["centre_distance"])
+    least = min(p["driven_radius"], p["driven_radius"] / p["ratio"])
+    arc = (np.pi - 2.0 * abs(psi)) * least
+    if arc < 8.0 * pitch:
+        expected = f"at least {int(np.ceil(8.0 * path_length(p) / arc))}, eight on the shorter arc"
+        problems.append(("elements", expected, f"{p['elements']}"))
+    # the polygon of the elements shakes strands as they pass, and by the change of stiffness at half of that
+    half = 0.5 * p["driving_speed"] * p["driven_radius"] / p["ratio"] / pitch
+    if BELOW_PASSAGE * half < p["band_high"]:
+        most = f"{BELOW_PASSAGE * half:.4g} Hz, below half of the frequency at which elements pass"
+        problems.append(("band_high", f"at most {most}, or more elements", f"{p['band_high']:g} Hz"))
+    if not p["modal_stiffness"] or min(p["modal_stiffness"]) <= 0.0:
+        problems.append(("modal_stiffness", "values above 0", f"{list(p['modal_stiffness'])}"))
     if p["elements"] < FEWEST_ELEMENTS and not p["coarse"]:
         expected = f"{FEWEST_ELEMENTS} or more, or coarse = true"
         problems.append(("elements", expected, f"{p['elements']}"))
@@ -207,8 +217,8 @@ def string_limit(parameters: Mapping[str, Any]) -> float:
     wrap = np.pi + 2.0 * np.arcsin((p["driven_radius"] - driving) / p["centre_distance"])
     mass = p["element_mass"] + p["ring_mass"]
     centrifugal = mass * (p["driving_speed"] * driving) ** 2
-    held = 2.0 * p["thrust"] * np.tan(p["half_wedge_angle"]) / wrap + centrifugal
-    tension = 1.5 * (held + 0.5 * abs(p["load"]) / driving)
+    held = 2.0 * max(p["thrust"], p["driving_thrust"]) * np.tan(p["half_wedge_angle"]) / wrap + centrifugal
+    tension = 1.5 * (held + 0.5 * max(abs(p["load"]), abs(p["load_start"])) / driving)
     return float(path_length(p) / p["elements"] * np.sqrt(mass / tension))
 
 

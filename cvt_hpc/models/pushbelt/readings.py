@@ -14,6 +14,7 @@ from cvt_hpc.variator.path import along
 
 SCALARS = (
     "driven_speed",
+    "driving_radius",
     "driven_radius",
     "push_force t1",
     "push_force t2",
@@ -68,8 +69,8 @@ class Readings:
         As given.
     path : Variator
         The reference path.
-    centre_distance, pitch, belt_speed : float
-        [m], [m], [m/s]
+    centre_distance, pitch : float
+        [m]
     probes : (2, p) array
         Path coordinates on both strands [m].
     middles : (2,) array
@@ -84,7 +85,6 @@ class Readings:
         self.path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
         self.centre_distance = p["centre_distance"]
         self.pitch = self.path.path_length / p["elements"]
-        self.belt_speed = p["driving_speed"] * self.path.driving_radius
         driving, strand, driven, _ = self.path.lengths
         starts = np.array([driving, driving + strand + driven])
         shares = np.arange(1, p["strand_probes"] + 1) / (p["strand_probes"] + 1.0)
@@ -132,7 +132,11 @@ class Reading:
             + e[:, f.FLANK_FRICTION_T] * e[:, f.FLANK_SLIP_T]
         )
         pressed = np.maximum(both @ e[:, f.FLANK], 1e-9)
-        slip = both @ (e[:, f.FLANK] * e[:, f.FLANK_SLIP_T]) / (pressed * self._where.belt_speed)
+        slip = (
+            both
+            @ (e[:, f.FLANK] * e[:, f.FLANK_SLIP_T])
+            / (pressed * pulleys[f.DRIVING_SPEED] * self._where.path.driving_radius)
+        )
         quarter = 0.25 * self._where.path.strand_length
         inside = (np.abs(self._position - self._where.middles[:, None]) < quarter).astype(float)
         inside /= inside.sum(axis=1, keepdims=True)
@@ -141,14 +145,14 @@ class Reading:
         # elements over the time of a revolution: their speeds over the length of their line
         speeds = np.hypot(e[:, f.U_Y], e[:, f.U_Z]).sum()
         line = np.hypot(*np.diff(e[:, [f.Y, f.Z]], axis=0, prepend=e[-1:, [f.Y, f.Z]]).T).sum()
-        found = [pulleys[f.DRIVEN_SPEED], pulleys[f.DRIVEN_RADIUS], *np.concatenate(groups)]
+        found = [*pulleys[[f.DRIVEN_SPEED, f.DRIVING_RADIUS, f.DRIVEN_RADIUS]], *np.concatenate(groups)]
         return [*found, ring_loss, speeds / line]
 
     def profiles(self) -> np.ndarray:
         """Sums over the elements at each place: PROFILES, and their number, (profile + 1, place)."""
         e, where = self._elements, self._where
         ahead = np.roll(e, -1, axis=0)
-        across = ahead[:, [f.Y, f.Z]] - e[:, [f.Y, f.Z]]
+        across = ahead[:, [f.Y, f.Z]] - np.roll(e[:, [f.Y, f.Z]], 1, axis=0)
         length = np.hypot(*across.T)
         rising = (e[:, f.HEADING_Y] * across[:, 1] - e[:, f.HEADING_Z] * across[:, 0]) / length
         rows = [

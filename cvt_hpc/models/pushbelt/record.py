@@ -99,25 +99,11 @@ def judge(run: Transient) -> dict[str, Any]:
     else:
         found = assessment.assess(run.displacement, p["sampling_rate"], labels, p)
     record = found.record() | evaluate(run, found.strongest_probe)
-    leading = record["frequency"][np.argmax(record["amplitude"])]
-    if record["vibrates"] == Vibrates.YES and of_passage(leading, record["passing_frequency"]):
-        record["vibrates"] = Vibrates.UNDECIDED
-        record["reason"] = f"{leading:.4g} Hz is of the passage of elements, which more elements shift"
     largest = np.abs(record["slip"]).max()
     if largest > GROSS_SLIP:
         record["vibrates"] = Vibrates.SLIPS
         record["reason"] = f"a pulley slips by {largest:.3g} of the belt's speed"
     return record
-
-
-def of_passage(frequency: float, passing: float) -> bool:
-    """Whether a frequency [Hz] is a multiple of half of that at which elements pass [Hz], within 1 %.
-
-    The polygon of the elements on the pulleys excites strands at that frequency, and by the change of their
-    stiffness at half of it.
-    """
-    order = round(2.0 * frequency / passing)
-    return order > 0 and abs(2.0 * frequency - order * passing) < 0.01 * order * passing
 
 
 def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
@@ -144,14 +130,14 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
         return np.array([mean(f"{name} {label}") for label in labels])
 
     axial, driven_speed = pair("axial_force", PULLEYS), run.channel("driven_speed")[judged]
-    radius = run.channel("driven_radius")[judged]
+    radii = np.stack([run.channel(f"{pulley}_radius")[judged] for pulley in PULLEYS])
     driving, load = run.mean_rate(fields.WORK_IN), run.mean_rate(fields.WORK_OUT)
     ring = run.mean_rate(fields.RING_LOSS)
     tilt = run.mean_rate(fields.DAMPING_LOSS)
     loss = run.mean_rate(fields.FLANK_LOSS) + ring + tilt
     # both sheaves of a pulley give way by the tangent of the wedge angle
-    widening = -2.0 * np.tan(p["half_wedge_angle"]) * (radius[-1] - radius[0])
-    thrust = axial[1] * widening / ((radius.size - 1) * run.interval)
+    widening = -2.0 * np.tan(p["half_wedge_angle"]) * (radii[:, -1] - radii[:, 0])
+    thrust = float(axial @ widening) / ((radii.shape[1] - 1) * run.interval)
     storing = run.mean_rate(fields.TOTALS)
     work = run.counters()
     return {
@@ -178,7 +164,7 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
         "power_residual": (driving - load - thrust - loss - storing) / max(abs(driving), loss),
         "efficiency": load / driving if driving > 0.0 else np.nan,
         "largest_push_force": np.nanmax(run.profiles["push_force"]),
-        "driven_radius_found": radius.mean(),
+        "driven_radius_found": radii[1].mean(),
         "passing_frequency": mean("passing_frequency"),
         "unsolved_share": work["unsolved"] / max(work["steps"], 1),
         "iterations": work["iterations"] / max(work["steps"], 1),

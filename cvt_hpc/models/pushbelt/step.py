@@ -47,6 +47,7 @@ from cvt_hpc.models.pushbelt.belt import (
     HEAD,
     HEADING_Y,
     HEADING_Z,
+    IN_A_ROW,
     IN_DRIVEN_THRUST,
     IN_DRIVING_THRUST,
     IN_LOAD,
@@ -149,15 +150,29 @@ def _correct(elements, blocks, border, increments, scratch, share, omega_length)
 
 
 @kernel
+def _evaluate(belt, state, work, dt):
+    """Forces of the iterate."""
+    pair_forces(belt, state.elements, work.step, work.iterate, dt)
+    element_forces(
+        belt,
+        state.elements,
+        state.pulleys,
+        state.increments,
+        state.openings,
+        work.shapes,
+        work.step,
+        work.iterate,
+        dt,
+    )
+
+
+@kernel
 def _newton(belt, newton, state, work, load, dt):
     """Find the speeds of a step; iterations, the last correction [m/s] and the power residual [W]."""
     elements, step, iterate = state.elements, work.step, work.iterate
     change, power = 0.0, 0.0
     for iteration in range(newton.most_iterations + 1):
-        pair_forces(belt, elements, step, iterate, dt)
-        element_forces(
-            belt, elements, state.pulleys, state.increments, state.openings, work.shapes, step, iterate, dt
-        )
+        _evaluate(belt, state, work, dt)
         power = residuals(
             belt,
             elements,
@@ -283,18 +298,7 @@ def _contact_at_fault(belt, state, work, dt):
     edge, head = forces[row, EDGE, part], forces[row, HEAD, part]
     flank, ring = forces[row, FLANK_FRICTION_T, part], forces[row, RING_FRICTION, part]
     _shift(state, work, -1.0)
-    pair_forces(belt, state.elements, work.step, work.iterate, dt)
-    element_forces(
-        belt,
-        state.elements,
-        state.pulleys,
-        state.increments,
-        state.openings,
-        work.shapes,
-        work.step,
-        work.iterate,
-        dt,
-    )
+    _evaluate(belt, state, work, dt)
     _shift(state, work, 1.0)
     contact, most = 0, abs(forces[row, EDGE, part] - edge)
     if abs(forces[row, HEAD, part] - head) > most:
@@ -303,6 +307,7 @@ def _contact_at_fault(belt, state, work, dt):
         contact, most = 2, abs(forces[row, FLANK_FRICTION_T, part] - flank)
     if abs(forces[row, RING_FRICTION, part] - ring) > most:
         contact = 3
+    _evaluate(belt, state, work, dt)  # the state is to have the forces of the last iterate
     return part * rows + row, unknown, contact
 
 
@@ -335,7 +340,6 @@ def advance(belt, newton, state, work, inputs, steps, dt):
         counters then name the element, the unknown and the contact at fault.
     """
     counters = state.counters
-    failures = 0
     for k in range(steps):
         share = (k + 1.0) / steps
         for entry in range(4):
@@ -350,13 +354,13 @@ def advance(belt, newton, state, work, inputs, steps, dt):
         counters[ITERATIONS] += iterations
         finite = abs(power) < _LARGE and change < _LARGE
         failed = not (finite and change < newton.tolerance and abs(power) < newton.power_tolerance)
-        failures = failures + 1 if failed else 0
+        counters[IN_A_ROW] = counters[IN_A_ROW] + 1 if failed else 0
         if failed:
             counters[FAILED_STEPS] += 1
             element, unknown, contact = _contact_at_fault(belt, state, work, dt)
             counters[FAILED_ELEMENT], counters[FAILED_UNKNOWN] = element, unknown
             counters[FAILED_CONTACT] = contact
-        if not finite or failures == newton.most_failures:
+        if not finite or counters[IN_A_ROW] == newton.most_failures:
             counters[STATUS] = NOT_CONVERGED if finite else NOT_FINITE
             return counters[STATUS]
         state.totals[POWER_RESIDUAL] += dt * power

@@ -17,7 +17,7 @@ from cvt_hpc.models.pushbelt.step import advance
 from cvt_hpc.recording import sample_count
 from cvt_hpc.variables import Status
 from cvt_hpc.variator import STRANDS
-from cvt_hpc.variator.course import load_course, speed_course
+from cvt_hpc.variator.course import load_course
 from cvt_hpc.vibration.ramped import ramped
 
 CHANNELS = ("load", "driving_speed", *SCALARS)
@@ -137,7 +137,8 @@ class Transient:
         load = self.load(time)
         share = 1.0
         if ramped(p) == "speed":
-            share = speed_course.py_func(time, rise, end, p["speed_start"] / p["driving_speed"])
+            begun = p["speed_start"] / p["driving_speed"]
+            share = begun + (1.0 - begun) * min(max((time - rise) / (end - rise), 0.0), 1.0)
         clamped = load_course.py_func(time, CLAMPED * rise, rise, 1.0, 1.0)
         driving, driven = (
             FIRST_THRUST + clamped * (thrust - FIRST_THRUST) for thrust in (p["driving_thrust"], p["thrust"])
@@ -168,7 +169,7 @@ class Transient:
     def _why(self, outcome: int) -> str:
         unsolved = outcome == NOT_CONVERGED
         what = "the equations of a step were not solved" if unsolved else "the state is not a number"
-        return f"at {self.time * 1e3:.4g} ms: {what}, {self._fault()}"
+        return f"{what}, {self._fault()}"
 
     def _fault(self) -> str:
         """Where the last step that was not solved was not."""
@@ -255,7 +256,7 @@ class Transient:
         """
         unsolved, open_power = record["unsolved_share"], record["power_residual"]
         if not unsolved <= MOST_UNSOLVED:
-            why = f"{unsolved:.3g} of the steps were not solved, the last {self._fault()}"
+            why = f"{unsolved:.1%} of the steps were not solved, the last {self._fault()}"
         elif not abs(open_power) <= (most := self._most_open(record)):
             why = f"the power balance does not close: {open_power:.3g} instead of {most:.3g} at most"
         else:
