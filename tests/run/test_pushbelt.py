@@ -82,7 +82,9 @@ def test_a_step_that_is_not_solved_fails_with_time_element_and_contact():
 def test_load_and_speed_rise_along_a_ramp(ramp):
     run = Transient(job(load=40.0, duration=0.1, **ramp).point(0), "newton")
     assert run.advance(run.samples) is None
-    name, first, last = ("load", 0.0, 40.0) if "load_history" in ramp else ("driving_speed", 250.0, 100.0 * np.pi)
+    name, first, last = (
+        ("load", 0.0, 40.0) if "load_history" in ramp else ("driving_speed", 250.0, 100.0 * np.pi)
+    )
     values = run.channel(name)[199:]  # from rise_time on
     assert values[0] == pytest.approx(first, abs=1e-3) and values[-1] == pytest.approx(last, rel=1e-4)
     assert np.diff(values) == pytest.approx((last - first) / (values.size - 1), rel=1e-6)
@@ -113,7 +115,7 @@ def test_profiles_and_histories_agree_with_the_record(records):
         ({"band_high": 1500.0}, "band_high"),
         ({"modal_stiffness": (1e8, -1e8)}, "modal_stiffness"),
         ({"driven_radius": 0.1}, "driven_radius"),
-        ({"load_start": 4000.0, "load_history": "ramp", "step": 4.9e-5}, "step"),
+        ({"load_start": 1900.0, "load_history": "ramp", "step": 4.9e-5}, "step"),
         ({"step": 4.9e-5, "elements": 432}, "step"),
         ({"friction_law": "table"}, "friction_law"),
         ({"rise_time": 0.025}, "rise_time"),
