@@ -115,6 +115,7 @@ def test_profiles_and_histories_agree_with_the_record(records):
         ({"band_high": 1500.0}, "band_high"),
         ({"modal_stiffness": (1e8, -1e8)}, "modal_stiffness"),
         ({"driven_radius": 0.1}, "driven_radius"),
+        ({"sheave_rate": 1e-4}, "sheave_rate"),
         ({"load_start": 1900.0, "load_history": "ramp", "step": 4.9e-5}, "step"),
         ({"step": 4.9e-5, "elements": 432}, "step"),
         ({"friction_law": "table"}, "friction_law"),

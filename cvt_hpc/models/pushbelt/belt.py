@@ -41,7 +41,6 @@ from cvt_hpc.lanes import LaneArray
     CHANGE,  # 4: of the speeds in the last step, from which the next one starts
 ) = range(25)
 STATE_FIELDS = CHANGE + 4
-UNKNOWNS = 4  # U_Y, U_Z, OMEGA, V of each element
 
 # Entries of the state of the pulleys
 DRIVING_SPEED, DRIVEN_SPEED, DRIVING_RADIUS, DRIVEN_RADIUS = range(4)

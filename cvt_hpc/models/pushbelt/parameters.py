@@ -187,6 +187,15 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if BELOW_PASSAGE * half < p["band_high"]:
         most = f"{BELOW_PASSAGE * half:.4g} Hz, below half of the frequency at which elements pass"
         problems.append(("band_high", f"at most {most}, or more elements", f"{p['band_high']:g} Hz"))
+    # a sheave moves by an explicit step against the stiffness of the flanks on the longer arc
+    angle, arc = (
+        p["half_wedge_angle"],
+        (np.pi + 2.0 * abs(psi)) * max(p["driven_radius"] / p["ratio"], p["driven_radius"]),
+    )
+    fastest = 1.0 / (p.get("step", 0.0) * p["flank_stiffness"] * arc * np.sin(angle) * np.cos(angle) + 1e-300)
+    if p["sheave_rate"] > fastest:
+        expected = f"at most {fastest:.3g} m/(N s) at this step, beyond which the sheave does not settle"
+        problems.append(("sheave_rate", expected, f"{p['sheave_rate']:g} m/(N s)"))
     if not p["modal_stiffness"] or min(p["modal_stiffness"]) <= 0.0:
         problems.append(("modal_stiffness", "values above 0", f"{list(p['modal_stiffness'])}"))
     if p["elements"] < FEWEST_ELEMENTS and not p["coarse"]:

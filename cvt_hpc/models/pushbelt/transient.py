@@ -26,7 +26,6 @@ CLAMPED = 0.5  # of the rise time: until then the thrust rises, from then on the
 # What the power balance may leave open: of the driving power, and of thrust times belt speed. Without load
 # sound runs leave 9 to 46 W of 298 kW (432 to 104 elements, steps of 2.5 to 10 us), by pitch and step.
 LARGEST_POWER_RESIDUAL, OF_THRUST = 0.005, 2e-4
-EVERY = 4  # samples: what is averaged along the path is read that often
 MOST_UNSOLVED = 0.02  # of the steps
 LEAST_SPEED, MOST_SPEED = (
     0.5,
@@ -161,8 +160,7 @@ class Transient:
         stored = np.nan
         if self.done >= self.first_judged:
             stored = found.stored_energy()
-            if self.done % EVERY == 0:
-                self._sums += found.profiles()
+            self._sums += found.profiles()
         self._totals[self.done] = [*self._state.totals, stored]
         self.done += 1
 
