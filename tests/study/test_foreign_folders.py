@@ -217,7 +217,9 @@ class TestLinks:
     def test_crash_log(self, start, tmp_path, mine):
         (tmp_path / "out").mkdir()
         (tmp_path / "out" / "crash.log").symlink_to(mine / "precious")
-        finished = start({"out": tmp_path / "out", "break_rank": 1}, ranks=2).finish()
+        slow = {"pause": 0.05}  # so that one rank does not do all runs before the other has begun
+        options = {"out": tmp_path / "out", "break_rank": 1, "parameters": slow}
+        finished = start(options, ranks=2).finish()
         assert finished.returncode != 0 and "a defect outside of runs" in finished.stderr
 
     @pytest.mark.parametrize(
