@@ -158,9 +158,7 @@ KINDS: dict[str, Kind] = {
     "onset": Kind("N m", "onset load", _onset, takes_part=True),
     "push_force": _means("N", "push force", "push_force t1", "push_force t2"),
     "ring_tension": _means("N", "ring tension", "ring_tension t1", "ring_tension t2"),
-    "friction_loss": _means(
-        "W", "friction losses", "driving_flank_loss", "driven_flank_loss", "ring_loss"
-    ),
+    "friction_loss": _means("W", "friction losses", "driving_flank_loss", "driven_flank_loss", "ring_loss"),
 }
 
 
