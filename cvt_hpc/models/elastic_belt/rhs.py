@@ -40,7 +40,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     W,
 )
 from cvt_hpc.physics.compliance import ContactState, solve_contact
-from cvt_hpc.physics.flank import flank_forces, sliding
+from cvt_hpc.physics.flank import flank_forces, flank_sliding
 from cvt_hpc.physics.friction import friction_coefficient, saturation
 from cvt_hpc.physics.sheaves import Sheaves
 from cvt_hpc.variator.course import load_course, speed_course, start_damping
@@ -210,9 +210,10 @@ def accelerations(
             radius = (belt.driven_radius if driven else belt.driving_radius) + w[j]
             omega = state.scalars[DRIVEN_SPEED] if driven else driving_speed
             v_tangential = v0[j] - omega * radius
-            v_law = sliding(v_radial, v_tangential, cosine)[0] if belt.friction_memory == 0.0 else vf[j]
+            speed, _ = flank_sliding(v_radial, v_tangential, 1.0 / cosine)
+            v_law = speed if belt.friction_memory == 0.0 else vf[j]
             coefficient, _ = friction_coefficient(belt.law, v_law, force[j] / cosine)
-            radial, tangential, _, _ = flank_forces(
+            radial, tangential = flank_forces(
                 coefficient, belt.friction_speed, sine, cosine, force[j], v_radial, v_tangential
             )
             outward += share * radial
@@ -277,4 +278,5 @@ def sliding_speed(belt: Belt, state: State, j: int) -> float:
     else:
         driving_speed = speed_share_at(belt, state.scalars[TIME]) * belt.driving_speed
         v_tangential = v - driving_speed * (belt.driving_radius + w[j])
-    return sliding(v_radial, v_tangential, np.cos(belt.half_wedge_angle))[0]
+    speed, _ = flank_sliding(v_radial, v_tangential, 1.0 / np.cos(belt.half_wedge_angle))
+    return speed
