@@ -78,7 +78,7 @@ def flank_forces(
     """
     speed, meridian = flank_sliding(v_radial, v_tangential, 1.0 / cosine)
     speed = maximum(speed, LEAST_SPEED)
-    factor, _ = saturation(speed, width)
+    factor, _ = saturation(speed, 1.0 / width)
     mu = coefficient * factor
     axial_share, radial_share = flank_shares(mu, meridian / speed, sine, cosine)
     twice_normal = 2.0 * axial / axial_share

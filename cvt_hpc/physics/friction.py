@@ -298,23 +298,22 @@ def friction_coefficients(law: FrictionLaw, speeds: np.ndarray, forces: np.ndarr
 
 
 @merged_kernel
-def saturation(speed, width):
-    """Regularisation of Coulomb friction about zero speed: tanh(speed / width) and its slope.
+def saturation(speed, per_width):
+    """Regularisation of Coulomb friction about zero speed: tanh(speed / v_reg) and its slope.
 
     Parameters
     ----------
     speed
         Sliding speed, any sign [m/s]; lanes or a plain number.
-    width
-        Regularisation speed v_reg, > 0 [m/s].
+    per_width
+        1 / v_reg, > 0 [s/m].
 
     Returns
     -------
     factor, slope
-        tanh(speed / width) [1] and its derivative [s/m].
+        tanh(speed / v_reg) [1] and its derivative [s/m].
     """
     # tanh by one exponential: a third of the cost of the library's
-    per_width = 1.0 / width
     left = decay(absolute(speed) * (2.0 * per_width))
     factor = (1.0 - left) / (1.0 + left)
     return with_sign_of(factor, speed), (1.0 - factor * factor) * per_width

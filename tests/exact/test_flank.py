@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from cvt_hpc.models.elastic_belt.belt import DRIVEN_POSITION, SCALARS, State, W, belt_constants
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
-from cvt_hpc.models.elastic_belt.rhs import contact_forces
-from cvt_hpc.physics.compliance import contact_state
+from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
 from cvt_hpc.physics.flank import flank_forces, flank_sliding
 
 speeds = st.floats(-1.0, 1.0)
@@ -63,8 +62,7 @@ def test_overlap_in_rigid_grooves():
     fields, scalars, force = np.zeros((7, n)), np.zeros(len(SCALARS)), np.empty(n)
     fields[W] = 1e-4 * np.sin(np.arange(n))
     scalars[DRIVEN_POSITION] = -2e-5
-    contacts = contact_state(belt.driving.weight.size), contact_state(count)
-    assert contact_forces(belt, State(fields, scalars), contacts, force) > 0
+    assert contact_forces(belt, State(fields, scalars), fresh_contacts(belt), force) > 0
 
     opening = np.full(n, np.inf)
     opening[: belt.driving.weight.size] = 3e-5

@@ -145,11 +145,11 @@ def test_table_by_hand():
 def test_saturation(speed, width):
     tiny = 1e-30
     exact = np.tanh((speed + tiny * 1j) / width)
-    factor, slope = saturation(speed, width)
+    factor, slope = saturation(speed, 1.0 / width)
     assert factor == pytest.approx(exact.real, abs=ROUND_OFF)
     # 1 - tanh^2 is formed by a difference: absolute, not relative, in units of 1 / width
     assert slope == pytest.approx(exact.imag / tiny, abs=ROUND_OFF / width)
-    assert saturation(-speed, width) == pytest.approx((-factor, slope), abs=0.0)
+    assert saturation(-speed, 1.0 / width) == pytest.approx((-factor, slope), abs=0.0)
 
 
 WIDTHS = {np.float64: 8, np.float32: 16}
@@ -177,7 +177,7 @@ def coefficients(kind: int, table: tuple[np.ndarray, np.ndarray, np.ndarray], a:
 @kernel
 def saturations(a: LaneArray) -> None:
     for j in range(a.rows):
-        a[j, FOUND], a[j, SLOPE] = saturation(a[j, SPEED], a[j, SCALE])
+        a[j, FOUND], a[j, SLOPE] = saturation(a[j, SPEED], 1.0 / a[j, SCALE])
 
 
 def arguments(dtype, rows=500):
@@ -246,7 +246,7 @@ def test_saturation_in_lanes_is_the_plain_one(dtype):
     a.data[1, SPEED] = 1e6  # what is left there is held within the exponent's range
     saturations(a)
     for _, _, width, speed, _, factor, slope in each(a):
-        expected, expected_slope = saturation(speed, width)
+        expected, expected_slope = saturation(speed, 1.0 / width)
         assert factor == pytest.approx(expected, abs=LANE_ROUND_OFF[dtype])
         assert slope == pytest.approx(expected_slope, abs=LANE_ROUND_OFF[dtype] / width)
 

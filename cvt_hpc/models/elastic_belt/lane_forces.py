@@ -64,11 +64,10 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneBelt,
     LaneState,
 )
+from cvt_hpc.physics.compliance import FORCED, GAP, contact_force, solve_contact
 from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
 from cvt_hpc.physics.friction_laws import Law
-from cvt_hpc.physics.lane_compliance import CLOSED, FORCED, GAP, solve_lane_contact
-from cvt_hpc.physics.lane_compliance import PUSH as PUSHED
 from cvt_hpc.physics.lane_gauss_seidel import sweep_lane_contact
 from cvt_hpc.variator.course import load_course, speed_course, start_damping
 
@@ -299,10 +298,10 @@ def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -
         if contact.sweeps > 0:
             sweep_lane_contact(contact)
         else:
-            solve_lane_contact(contact, MOST_CONTACT_ROUNDS)
+            solve_contact(contact, MOST_CONTACT_ROUNDS)
         row, part = first % n, first // n
         for k in range(contact.weight.size):
-            force = select(pushed[k, CLOSED] > 0.5, maximum(pushed[k, PUSHED], 0.0), 0.0)
+            force = contact_force(pushed, k)
             pushed[k, FORCED] = force
             set_station(stations, row, part, FORCE, force)
             row, part = _next_station(n, row, part)
@@ -361,7 +360,7 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     share = lane_speed_share(belt, state.time[0], c[0, BELT_SPEED])
     per_cosine, belt_speed, offset = 1.0 / c[0, COSINE], share * c[0, BELT_SPEED], c[0, RING_OFFSET]
     least = LEAST_SHARE_OF_WIDTH * c[0, FRICTION_SPEED]
-    per_width, ring_width = 1.0 / c[0, FRICTION_SPEED], c[0, RING_FRICTION_SPEED]
+    per_width, per_ring_width = 1.0 / c[0, FRICTION_SPEED], 1.0 / c[0, RING_FRICTION_SPEED]
     pulleys = lane_pulleys(belt, share, state.scalars[0, SPEED])
     for j in range(n):
         if not anywhere(belt.arc_share[j] > 0.0):
@@ -381,7 +380,7 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
         speed = maximum(speed, least)
         saddle = fma(fma(offset, belt.arc_curvature[j], 1.0), full_speed, -(belt_speed + fields[j, V_RING]))
         rest = decay(speed * (2.0 * per_width))
-        ring_factor, _ = saturation(saddle, ring_width)
+        ring_factor, _ = saturation(saddle, per_ring_width)
         per_flank = 1.0 / (speed * (1.0 + rest))
         stations[j, SLIDING_R], stations[j, SLIDING_T] = v_radial, v_tangential
         stations[j, COEFFICIENT] = coefficient

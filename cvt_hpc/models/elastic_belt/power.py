@@ -140,7 +140,8 @@ def audit(
     zero = like(0.0, axial)
     speed_share = lane_speed_share(belt, state.time[0], zero)
     belt_speed, sine, cosine, wedge = speed_share * c[0, BELT_SPEED], c[0, SINE], c[0, COSINE], c[0, WEDGE]
-    per_cosine, width, ring_width = 1.0 / cosine, c[0, FRICTION_SPEED], c[0, RING_FRICTION_SPEED]
+    per_cosine, width = 1.0 / cosine, c[0, FRICTION_SPEED]
+    per_width, per_ring_width = 1.0 / width, 1.0 / c[0, RING_FRICTION_SPEED]
     kind = belt.law.kind
     table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
     numbers = law_numbers(c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED])
@@ -207,7 +208,7 @@ def audit(
             mu, _ = table_coefficient(table, v_law, force * per_cosine)
         else:
             mu, _ = formula_coefficient(kind, numbers, v_law)
-        factor, _ = saturation(sliding, width)
+        factor, _ = saturation(sliding, per_width)
         mu *= factor
         upward = mu * meridian / sliding
         twice_normal = 2.0 * force / fma(upward, sine, cosine)
@@ -228,7 +229,7 @@ def audit(
         ring_left = ring_stiffness * stations[a, EPS_1]
         pressure = saddle_pressure(belt, j, ring_left, tension, ring_relief * longer)
         grip = c[0, RING_FRICTION] * 0.5 * pressure
-        factor, _ = saturation(saddle, ring_width)
+        factor, _ = saturation(saddle, per_ring_width)
         drag = grip * factor
         ring_loss += drag * saddle
         if summed:
