@@ -163,7 +163,11 @@ def _counting_tuple(values, memory: str = "array"):
 
 
 def count(step: float, precision: str) -> collections.Counter:
-    """Operations and array places of one step without a second pass, for one lane, in a loaded belt."""
+    """Operations and array places of one step without a second pass, for one lane, in a loaded belt.
+
+    Slopes of friction count, five products and sums at each station of an arc, though machine code, which reads
+    friction alone, has none of them.
+    """
     batch = _batch(1, step, "double")
     batch.advance(700)
     functions = _counting_functions(7 if precision == "single" else 13)
