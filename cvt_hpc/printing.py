@@ -9,7 +9,6 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.job.summary import cost_in_words
-from cvt_hpc.job.values import in_words
 from cvt_hpc.tables import columns
 from cvt_hpc.variables import Status, flag_in_words
 from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS, PairClass
@@ -136,7 +135,6 @@ def _class_table(found: Comparison) -> Iterator[str]:
 
 
 def _cell_line(cell: Cell) -> str:
-    place = ", ".join(f"{name} = {in_words(value, '')}" for name, value in cell.at.items())
     words = (
         kind.label
         + ("" if math.isnan(size) else f" {size * 1e6:.3g} um")
@@ -144,7 +142,7 @@ def _cell_line(cell: Cell) -> str:
         for kind, size, frequency in zip(cell.classes, cell.amplitude, cell.frequency, strict=True)
     )
     near = ", near the threshold" if cell.pair in NEAR_CONTRADICTIONS else ""
-    return f"  {place}: {' | '.join(words)}{near}"
+    return f"  {cell.place}: {' | '.join(words)}{near}"
 
 
 def _deviation_lines(found: Comparison) -> Iterator[str]:

@@ -18,6 +18,7 @@ from PIL import Image
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import written_aside
+from cvt_hpc.job.shown import JOB_UNITS, shown_number, shown_unit
 
 P = ParamSpec("P")
 
@@ -56,6 +57,13 @@ def display_unit(unit: str) -> tuple[float, str]:
     """Factor and unit in which a quantity with this SI unit is shown: ("N") -> (1e-3, "kN")."""
     known = _DISPLAY_UNITS.get(unit.replace("rad/s", "rad s-1"))
     return known if known is not None else (1.0, unit.replace("s m-1", "s/m").replace("N m-1", "N/m"))
+
+
+def coordinate_unit(attributes: Mapping[str, Any]) -> tuple[float, str]:
+    """Factor and unit in which a coordinate is shown: those of the job where it names one."""
+    if JOB_UNITS not in attributes:
+        return display_unit(str(attributes.get("units", "")))
+    return shown_number(1.0, attributes), shown_unit(attributes)
 
 
 def in_words(array: xr.DataArray) -> str:

@@ -58,7 +58,9 @@ def check_stored(entry: Mapping[str, Any]) -> None:
 def _check_dimension(entry: Mapping[str, Any]) -> None:
     name, values = entry["name"], entry["values"]
     _need(all(isinstance(entry[key], str) for key in ("name", "units", "long_name")), str(name)[:40], "texts")
-    _need(all(isinstance(entry.get(key, ""), str) for key in ("spacing", "comment")), name, "texts")
+    _need(
+        all(isinstance(entry.get(key, ""), str) for key in ("spacing", "comment", "job_units")), name, "texts"
+    )
     _need(isinstance(values, list) and len(values) > 0, name, "values")
     if entry["texts"] is True:
         _need(all(isinstance(value, str) and "\0" not in value for value in values), name, "texts")
