@@ -40,7 +40,7 @@ def test_check_prints_every_parameter_with_its_origin_the_axes_and_the_cost(writ
         "",
         "runs: 10 = 5 x 2",
         "estimated cost: 30 core-seconds per run, 300 core-seconds in all",
-        "needed: 0.004 MB of memory, 0.00274 MB of disk for records",
+        "needed: 4 kB of memory for the plan; disk: 2.74 kB of records, at most 27.4 kB of results.nc",
     ]
     assert call("run", "x.toml", *overrides, "--dry-run") == (0, out, [])
     assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]
@@ -102,7 +102,7 @@ def test_check_forecasts_a_sweep_on_several_numbers_of_ranks(write_job, call, tm
     assert [row.split()[0] for row in rows] == ["1", "10"]
     assert rows[0].split()[5] == "100%"
     assert rows[0].endswith("  00:05:00")
-    assert disk == "disk: 0.00306 MB of records, at most 0.00242 MB of results.nc"
+    assert disk == "disk: 3.06 kB of records, at most 27.4 kB of results.nc"
     assert picture == "picture: x.png"
     assert (tmp_path / "x.png").read_bytes().startswith(b"\x89PNG")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["x.png", "x.toml"]
@@ -142,5 +142,5 @@ def test_check_shortens_long_axes_and_long_times(write_job, call):
         "",
         "runs: 241",
         "estimated cost: 30 core-seconds per run, 2.01 core-hours in all",
-        "needed: 0.0964 MB of memory, 0.066 MB of disk for records",
+        "needed: 96.4 kB of memory for the plan; disk: 66 kB of records, at most 78.3 kB of results.nc",
     ]

@@ -29,24 +29,29 @@ def test_more_runs_than_memory_are_refused_before_anything_is_made(tmp_path):
 
 
 def test_more_records_than_the_disk_holds_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(needs_module.shutil, "disk_usage", lambda path: SimpleNamespace(free=5000))
     job, simulator = Job(), Simulator()
+    disk = needs(job, simulator).disk
+    room = SimpleNamespace(free=disk.results + 100)
+    monkeypatch.setattr(needs_module.shutil, "disk_usage", lambda path: room)
     with pytest.raises(
-        InputError, match="12 runs: expected .* GB on the disk for their records, found 5e-06 GB at "
+        InputError,
+        match="12 runs: expected .* kB on the disk for their records and results.nc, found .* kB at ",
     ):
         refuse_too_large(job, simulator, tmp_path)
     refuse_too_large(Job(design={"first_spacing": {}}), simulator, tmp_path)  # runs part of them
     (tmp_path / "records").mkdir()
-    (tmp_path / "records" / "rank-0.log").write_bytes(bytes(needs(job, simulator).disk))
+    (tmp_path / "records" / "rank-0.log").write_bytes(bytes(disk.records))
     assert refuse_too_large(job, simulator, tmp_path) == needs(job, simulator)  # they are there
 
 
 def test_the_disk_that_is_told_is_that_of_the_records(tmp_path):
     run(Job(), tmp_path, simulator=Simulator(lanes=4), progress=False)
     (log,) = (tmp_path / "records").iterdir()
-    expected = needs(Job(), Simulator()).disk
+    told = needs(Job(), Simulator()).disk
     # beside the records a log has its header, some 2 kB, and a mark for each batch
-    assert expected < log.stat().st_size < expected + 3000
+    assert told.records < log.stat().st_size < told.records + 3000
+    # most of it is names and where chunks lie, of which 5 kB of each quantity are the most
+    assert 0.8 * told.results < (tmp_path / "results.nc").stat().st_size < told.results
 
 
 def test_a_plan_that_takes_longer_than_its_limit_is_given_up(tmp_path, monkeypatch):
@@ -188,5 +193,5 @@ def test_check_start_refuses_as_a_run(tmp_path):
             "element_mass": {"from": 1, "to": 2, "count": 100_000},
         },
     }
-    with pytest.raises(InputError, match="^x.toml: 10000000000 runs: expected 4e.03 GB of memory"):
+    with pytest.raises(InputError, match="^x.toml: 10000000000 runs: expected 4 TB of memory"):
         check_start(build_job(document, "x.toml"), tmp_path / "out")
