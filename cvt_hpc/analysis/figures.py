@@ -16,7 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from cvt_hpc.errors import mismatch
+from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.files import written_aside
 from cvt_hpc.job.shown import JOB_UNITS, shown_number, shown_unit
 
@@ -80,7 +80,7 @@ def axis_label(array: xr.DataArray, unit: str) -> str:
 
 def headline(attributes: Mapping[str, Any]) -> str:
     """First line above a map of a dataset with these attributes."""
-    job = attributes.get("job_name", "")
+    job = one_line(attributes.get("job_name", ""))
     return f"Vibration occurrence: {job}" if job else "Vibration occurrence"
 
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis import history_panels as panels
 from cvt_hpc.analysis.figures import WIDTH, balanced, draw, styled
-from cvt_hpc.errors import InputError
+from cvt_hpc.errors import InputError, one_line
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.shown import JOB_UNITS, POINT_UNITS, shown
 from cvt_hpc.variables import Status, Vibrates, flag_in_words
@@ -112,7 +112,8 @@ def _vibration_settings(dataset: xr.Dataset) -> dict[str, float]:
 
 def _title(dataset: xr.Dataset) -> str:
     """Which run, and what became of it."""
-    lines = ["One run: " + dataset.attrs["job_name"] if "job_name" in dataset.attrs else "One run"]
+    name = one_line(dataset.attrs.get("job_name", ""))
+    lines = [f"One run: {name}" if name else "One run"]
     if place := _place(dataset.attrs):
         lines.append(place)
     if "rung" in dataset:
