@@ -166,7 +166,8 @@ def _inert(schema: Schema, rules: Sequence[Rule], point: dict[str, Any]) -> dict
             inert[rule.needs[0]] = inert[rule.key]
     for rule in reversed(rules):
         if rule.key not in inert:
-            inert = {key: setting for key, setting in inert.items() if key not in rule.needs}
+            read = rule.read(point)
+            inert = {key: setting for key, setting in inert.items() if key not in read}
     return inert
 
 

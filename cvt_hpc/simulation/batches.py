@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from cvt_hpc.job.rules import places, varied_by
+from cvt_hpc.job.rules import Noted, places, varied_by
 from cvt_hpc.models.contract import Model, Parameters, load_model
 from cvt_hpc.recording import longest_duration
 from cvt_hpc.simulation.record import recorded_model
@@ -41,33 +41,13 @@ def run_costs(job: Job) -> np.ndarray:
     """
     values = [np.asarray(axis.values) for axis in job.axes]
     grids = values if job.is_sampled else np.meshgrid(*values, indexing="ij", sparse=True)
-    p = _Noted(
+    p = Noted(
         {**job.parameters, **dict(zip((axis.name for axis in job.axes), grids, strict=True))},
         {derived.name: partial(_over_the_grid, job, derived) for derived in job.derived},
     )
     model = recorded_model(job)
     cost = model.cost(p, job.stepper) / model.lanes(job.parameters, job.stepper)
     return np.broadcast_to(cost * _allowance(p), job.shape).ravel()
-
-
-class _Noted(Mapping[str, Any]):
-    """Flat parameters that note which of them were read, and evaluate those of `later` when these are."""
-
-    def __init__(self, known: Mapping[str, Any], later: Mapping[str, Callable[[], Any]]) -> None:
-        self._known, self._later = dict(known), later
-        self.read: set[str] = set()
-
-    def __getitem__(self, key: str) -> Any:
-        if key in self._later and key not in self.read:
-            self._known[key] = self._later[key]()
-        self.read.add(key)
-        return self._known[key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter({**self._known, **self._later})
-
-    def __len__(self) -> int:
-        return len({**self._known, **self._later})
 
 
 def _allowance(p: Mapping[str, Any]) -> Any:
@@ -144,7 +124,7 @@ def _lane_kinds(job: Job) -> np.ndarray:
         kinds: dict[tuple, int] = {}
         numbers, read = [], set()
         for place in places(job.axes, along, sampled=job.is_sampled and bool(along)):
-            point = _Noted(job.complete({**first, **place}), {})
+            point = Noted(job.complete({**first, **place}))
             numbers.append(kinds.setdefault(model.lane_key(point), len(kinds)))
             read |= point.read
         asked = {axis for key in read for axis in varied.get(key, (key,)) if axis in first}
