@@ -65,4 +65,5 @@ def plan_lines(diagram: Diagram) -> Iterator[str]:
     runs = sum(cost.runs for cost in costs)
     ends = f", if vibration begins and ends once along each branch: {core_time_in_words(transient)}"
     yield f"runs: {f'about {runs}{ends}' if runs else 'none'}"
-    yield f"estimated cost: {core_time_in_words(steady + transient)}, in one process"
+    total = core_time_in_words(steady + transient)
+    yield f"estimated cost: {total}, in one process, anew after an interruption"
