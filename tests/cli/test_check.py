@@ -24,10 +24,10 @@ def test_check_prints_every_parameter_with_its_origin_the_axes_and_the_cost(writ
         "steppers of toy: hop",
         "",
         "[scene]",
-        "  ratio          2.5         default  speed ratio",
-        "  driving_speed  300 rad/s   default  speed of the driving pulley",
-        "  thrust         20 kN       given    axial force on the driven pulley",
-        "  load           see [axes]  axis     torque at the driving pulley",
+        "  ratio          2.5                      default  speed ratio",
+        "  driving_speed  300 rad/s (2864.79 rpm)  default  speed of the driving pulley",
+        "  thrust         20 kN                    given    axial force on the driven pulley",
+        "  load           see [axes]               axis     torque at the driving pulley",
     ]
     assert "  element_mass       1500 g/m             given    mass per length" in out
     assert "  table              [[1, 2.5], [3]] N/m  given    rows of line forces" in out
