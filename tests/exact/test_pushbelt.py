@@ -251,18 +251,21 @@ def test_newton_correction_is_that_of_differences(law):
         assert found == pytest.approx(wanted, abs=1e-5 * np.abs(wanted).max())
 
 
-def test_cyclic_system_against_a_dense_one():
-    rows, lanes, columns = 5, 8, 8
+@pytest.mark.parametrize("lanes", [8, 2])
+def test_cyclic_system_against_a_dense_one(lanes, monkeypatch):
+    monkeypatch.setattr(starting, "parts_of", lambda nodes: lanes)
+    rows, columns = 5, 8
     n, rng = rows * lanes, np.random.default_rng(4)
     a, u = rng.normal(size=(n, 4, 4)) + 8.0 * np.eye(4), rng.normal(size=(n, 4, 4))
     right = rng.normal(size=(n, columns, 4))
-    blocks = LaneArray(rows, 48 + 4 * columns, lanes, linked=True)
+    blocks = LaneArray(rows, 48 + 4 * columns, lanes, linked=lanes > 1)
     values = np.zeros((n, 48 + 4 * columns))
     values[:, :16] = a.transpose(0, 2, 1).reshape(n, 16)
     values[:, 16:32] = u.transpose(0, 2, 1).reshape(n, 16)
     values[:, 48:] = right.reshape(n, -1)
     write(blocks, values)
-    solve(blocks, LaneArray(1, 48 + 4 * columns, lanes, linked=True), np.zeros((32, 32 + columns)))
+    scratch = LaneArray(1, 48 + 4 * columns, lanes, linked=lanes > 1)
+    solve(blocks, scratch, np.zeros((4 * lanes, 4 * lanes + columns)))
 
     dense = np.zeros((n, 4, n, 4))
     for i in range(n):
@@ -563,21 +566,18 @@ def test_a_run_goes_on_from_its_state_alone():
     assert (state.pulleys == other.pulleys).all() and (state.totals == other.totals).all()
 
 
-def test_a_march_is_the_same_in_any_number_of_lanes(monkeypatch):
-    inputs, found = constant(THRUST, 0.0), {}
-    for lanes in (8, 4, 2, 1):
+def test_a_march_is_the_same_in_lanes_and_without(monkeypatch):
+    inputs, found = constant(THRUST, 0.0), []
+    for lanes in (8, 1):
         monkeypatch.setattr(starting, "parts_of", lambda nodes, lanes=lanes: lanes)
         belt, state = start(given(modal_stiffness=(6e8, 3e8)))
         assert advance(belt, b.Newton(), state, workspace(belt, NODES), inputs, 200, STEP) == b.CONVERGED
         assert state.elements.data.shape[2] == lanes
-        found[lanes] = fields(state.elements)[:, : b.CHANGE], state.totals.copy()
-    for lanes in (4, 2, 1):
-        for k in (0, 1):
-            print(
-                lanes,
-                k,
-                (np.abs(found[lanes][k] - found[8][k]).max(0) / (1e-30 + np.abs(found[8][k]).max(0))),
-            )
+        found.append(fields(state.elements)[:, : b.CHANGE])
+    scale = np.abs(found[0]).max(axis=0)
+    off = np.abs(found[1] - found[0]).max(axis=0)
+    # round-off, which 200 steps with stiff contacts make 1e-12 of speeds and 1e-9 of directions of friction
+    assert (off <= 1e-7 * scale).all() and (off[U] <= 1e-10 * scale[U]).all()
 
 
 def test_steps_that_do_not_converge_are_named():

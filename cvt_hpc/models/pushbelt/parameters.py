@@ -205,11 +205,21 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if arc < 8.0 * pitch:
         expected = f"at least {int(np.ceil(8.0 * path_length(p) / arc))}, eight on the shorter arc"
         problems.append(("elements", expected, f"{p['elements']}"))
+    if p["elements"] < FEWEST_ELEMENTS and not p["coarse"]:
+        expected = f"{FEWEST_ELEMENTS} or more, or coarse = true"
+        problems.append(("elements", expected, f"{p['elements']}"))
     # the polygon of the elements shakes strands as they pass, and by the change of stiffness at half of that
     half = 0.5 * p["driving_speed"] * p["driven_radius"] / p["ratio"] / pitch
     if BELOW_PASSAGE * half < p["band_high"]:
         most = f"{BELOW_PASSAGE * half:.4g} Hz, below half of the frequency at which elements pass"
         problems.append(("band_high", f"at most {most}, or more elements", f"{p['band_high']:g} Hz"))
+    if not p["modal_stiffness"] or min(p["modal_stiffness"]) <= 0.0:
+        problems.append(("modal_stiffness", "values above 0", f"{list(p['modal_stiffness'])}"))
+    problems += course_problems(p)
+    limit = string_limit(p)
+    if not problems and "step" in p and p["step"] > limit:
+        expected = f"at most {limit:.3g} s, pitch over the speed of transverse waves under the thrust"
+        problems.append(("step", expected, f"{p['step']:g} s"))
     # a sheave moves by an explicit step against the stiffness of the flanks on the longer arc
     angle, arc = (
         p["half_wedge_angle"],
@@ -219,16 +229,6 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if p["sheave_rate"] > fastest:
         expected = f"at most {fastest:.3g} m/(N s) at this step, beyond which the sheave does not settle"
         problems.append(("sheave_rate", expected, f"{p['sheave_rate']:g} m/(N s)"))
-    if not p["modal_stiffness"] or min(p["modal_stiffness"]) <= 0.0:
-        problems.append(("modal_stiffness", "values above 0", f"{list(p['modal_stiffness'])}"))
-    if p["elements"] < FEWEST_ELEMENTS and not p["coarse"]:
-        expected = f"{FEWEST_ELEMENTS} or more, or coarse = true"
-        problems.append(("elements", expected, f"{p['elements']}"))
-    problems += course_problems(p)
-    limit = string_limit(p)
-    if not problems and "step" in p and p["step"] > limit:
-        expected = f"at most {limit:.3g} s, pitch over the speed of transverse waves under the thrust"
-        problems.append(("step", expected, f"{p['step']:g} s"))
     return problems + friction_problems(p)
 
 
