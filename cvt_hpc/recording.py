@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
-
-import numpy as np
 
 from cvt_hpc.parameters import Parameter, not_negative
 from cvt_hpc.vibration.ramped import ramped
@@ -107,7 +106,7 @@ def start_up_samples(parameters: Mapping[str, Any]) -> int:
     parameters : mapping
         Flat parameters of the run [SI], `rise_time` among them.
     """
-    risen = int(np.ceil(parameters["rise_time"] * parameters["sampling_rate"]))
+    risen = math.ceil(parameters["rise_time"] * parameters["sampling_rate"])
     return min(risen, sample_count(parameters))
 
 
