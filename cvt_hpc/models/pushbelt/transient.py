@@ -27,7 +27,7 @@ CLAMPED = 0.5  # of the rise time: until then the thrust rises, from then on the
 # What the power balance may leave open. Elements are set turning where they meet an arc, and stopped where
 # they leave it, by contacts that damp what is as fast: that takes a share of their energy of rotation. The
 # contacts' own damping takes a share of thrust times belt speed, by step. Sound runs (40 random scenes: 104
-# to 432 elements, steps of 2.5 to 20 us, 7 to 33 m/s, 5 to 45 kN, all loads) leave 2 to 92 % of the sum of
+# to 432 elements, steps of 2.5 to 20 us, 7 to 33 m/s, 5 to 45 kN, all loads) leave 7 to 85 % of the sum of
 # both, and none gains power. Falling friction in long steps leaves up to 2 % of the losses, of either sign.
 OF_ROTATION, OF_THRUST, OF_LOSS = 1.5, 10.0, 0.02  # [1], [1/s], [1]
 MOST_UNSOLVED = 0.02  # of the steps
