@@ -1,4 +1,4 @@
-"""What models of a whole variator share: a job's settings, courses of load and speed, variables."""
+"""What models of a whole variator share: settings, courses, gross slip, verdict, record, history of a run."""
 
 STRANDS = ("t1", "t2")  # t1 leaves the driving pulley
 PULLEYS = ("driving", "driven")
