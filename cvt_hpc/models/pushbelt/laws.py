@@ -11,10 +11,7 @@ from __future__ import annotations
 from numba.extending import register_jitable
 
 from cvt_hpc.lanes import like, maximum, minimum, select, sqrt
-from cvt_hpc.physics.friction import lane_coefficient, lane_law
-from cvt_hpc.physics.friction_laws import Law
-
-_DIFFERENCE = 1e-6  # of a law's speed scale: the step by which its slope is found
+from cvt_hpc.physics.friction import formula_coefficient, law_numbers
 
 
 @register_jitable
@@ -26,16 +23,8 @@ def pressed(gap, stiffness):
 @register_jitable
 def coefficient(kind, kinetic, gradient, scale, speed):
     """Coefficient of friction [1] at sliding speeds >= 0 [m/s], and its slope [s/m]."""
-    mu = slope = like(0.0, speed)
-    if kind == Law.COULOMB:
-        mu = like(kinetic, speed)
-    else:
-        a, b, c, d = lane_law(kinetic, gradient, scale)
-        numbers = like(a, speed), like(b, speed), like(c, speed), like(d, speed)
-        step = _DIFFERENCE * scale
-        mu = lane_coefficient(kind, numbers, speed)
-        slope = (lane_coefficient(kind, numbers, speed + step) - mu) * (1.0 / step)
-    return mu, slope
+    found = formula_coefficient(kind, law_numbers(kinetic, gradient, scale), speed)
+    return found
 
 
 @register_jitable
