@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import ahead, around, behind, like, select, sqrt
+from cvt_hpc.lanes import ahead, around, behind, like, sqrt
 from cvt_hpc.models.pushbelt.belt import (
     ANGLE_I,
     ANGLE_J,
@@ -149,9 +149,7 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
 
         slip = state[j, V] + dv - step[j, T_Y] * u_y - step[j, T_Z] * u_z
         q, dual = sliding(slip, state[j, RING_SLIP], state[j, RING_DUAL], belt.friction_speed)
-        size = select(slip < 0.0, -slip, slip)
-        mu, fall = coefficient(belt.ring_law, belt.ring_kinetic, belt.ring_gradient, belt.ring_speed, size)
-        grip, slope = friction(slip, q, dual, mu, fall)
+        grip, slope = friction(slip, q, dual, belt.ring_friction)
         normal = state[j, SADDLE]
         iterate[j, RING_SLOPE] = normal * slope
         state[j, RING_SLIP], state[j, RING_FRICTION], state[j, RING_DUAL] = slip, normal * grip, dual

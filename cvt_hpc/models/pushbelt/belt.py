@@ -53,20 +53,17 @@ IN_SPEED, IN_DRIVING_THRUST, IN_DRIVEN_THRUST, IN_LOAD = range(4)
     TIME,  # [s]
     WORK_IN,  # of the driving shaft [J]
     WORK_OUT,  # against the load [J]
+    THRUST_WORK,  # that the thrusts take up as the sheaves open [J]
     FLANK_LOSS,  # [J]
     RING_LOSS,  # [J]
     DAMPING_LOSS,  # of the rotation of elements against the ring [J]
-    DRIVING_THRUST,  # axial force of the belt on a sheave, over time [N s]
-    DRIVEN_THRUST,
-    DRIVING_TORQUE,  # [N m s]
-    DRIVEN_TORQUE,
     POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
-) = range(11)
-TOTALS = 11
+) = range(8)
+TOTALS = 8
 
 # Entries of the counters
-STEPS, ITERATIONS, FAILED_STEPS, STATUS, FAILED_ELEMENT, FAILED_UNKNOWN, FAILED_CONTACT, IN_A_ROW = range(8)
-COUNTERS = 8
+STEPS, ITERATIONS, FAILED_STEPS, STATUS, FAILED_ELEMENT, FAILED_CONTACT, IN_A_ROW = range(7)
+COUNTERS = 7
 # values of STATUS
 CONVERGED, NOT_CONVERGED, NOT_FINITE = range(3)
 # values of FAILED_CONTACT
@@ -99,8 +96,8 @@ class Belt(NamedTuple):
         Of an element's rotation against each segment of the ring, half at each end [N m/rad], [N m s/rad].
     flank_law, flank_kinetic, flank_gradient, flank_speed : int, float, float, float
         Friction law at the flanks (`physics.friction`).
-    ring_law, ring_kinetic, ring_gradient, ring_speed : int, float, float, float
-        Friction law of the ring on the saddles.
+    ring_friction : float
+        Friction coefficient of the ring on the saddles.
     friction_speed : float
         v_reg: friction is mu N v / sqrt(v^2 + v_reg^2) [m/s].
     driven_inertia : float
@@ -131,10 +128,7 @@ class Belt(NamedTuple):
     flank_kinetic: float
     flank_gradient: float
     flank_speed: float
-    ring_law: int
-    ring_kinetic: float
-    ring_gradient: float
-    ring_speed: float
+    ring_friction: float
     friction_speed: float
     driven_inertia: float
     driving_rate: float

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from numba.extending import register_jitable
 
-from cvt_hpc.lanes import absolute, like, maximum, minimum, select, sqrt
+from cvt_hpc.lanes import like, maximum, minimum, select, sqrt
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers
 
 
@@ -48,16 +48,16 @@ def sliding_in_a_plane(v, w, earlier_v, earlier_w, dual_v, dual_w, regularisatio
 
 
 @register_jitable
-def friction(v, q, dual, mu, mu_slope):
+def friction(v, q, dual, mu):
     """Friction force for each newton of normal force at a sliding speed v [m/s], and its slope [s/m]."""
     per_q = 1.0 / q
     direction = v * per_q
-    return mu * direction, mu * per_q * (1.0 - dual * direction) + mu_slope * absolute(direction)
+    return mu * direction, mu * per_q * (1.0 - dual * direction)
 
 
 @register_jitable
 def friction_in_a_plane(v, w, q, dual_v, dual_w, mu, mu_slope):
-    """`friction` with two components: both forces, and the slopes of each by v and w."""
+    """`friction` with two components and a slope of mu: both forces, and the slopes of each by v and w."""
     per_q = 1.0 / q
     a, b = v * per_q, w * per_q
     steep = mu * per_q
