@@ -37,9 +37,10 @@ from cvt_hpc.lanes import LaneArray
     RING_DUAL,  # directions of friction as the Newton iteration has them, at most 1 in size
     FLANK_DUAL_M,
     FLANK_DUAL_T,
+    V_FILTERED,  # sliding speed at which the friction law of the flanks is read [m/s]
     DRIVEN,  # 1 where the nearer pulley is the driven one, else 0
     CHANGE,  # 4: of the speeds in the last step, from which the next one starts
-) = range(25)
+) = range(26)
 STATE_FIELDS = CHANGE + 4
 
 # Entries of the state of the pulleys
@@ -55,14 +56,15 @@ IN_SPEED, IN_DRIVING_THRUST, IN_DRIVEN_THRUST, IN_LOAD = range(4)
     WORK_OUT,  # against the load [J]
     FLANK_LOSS,  # [J]
     RING_LOSS,  # [J]
-    DAMPING_LOSS,  # of the rotation of elements against the ring [J]
+    TILT_LOSS,  # of the dampers of the elements' rotation against the ring [J]
+    BELT_LOSS,  # of the transverse damping [J]
     DRIVING_THRUST,  # axial force of the belt on a sheave, over time [N s]
     DRIVEN_THRUST,
     DRIVING_TORQUE,  # [N m s]
     DRIVEN_TORQUE,
     POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
-) = range(11)
-TOTALS = 11
+) = range(12)
+TOTALS = 12
 
 # Entries of the counters
 STEPS, ITERATIONS, FAILED_STEPS, STATUS, FAILED_ELEMENT, FAILED_UNKNOWN, FAILED_CONTACT, IN_A_ROW = range(8)
@@ -97,12 +99,16 @@ class Belt(NamedTuple):
         Of each of the two contacts between elements [N/m].
     angle_stiffness, angle_damping : float
         Of an element's rotation against each segment of the ring, half at each end [N m/rad], [N m s/rad].
+    transverse_damping : float
+        Force against the speed across the path [N s/m].
     flank_law, flank_kinetic, flank_gradient, flank_speed : int, float, float, float
         Friction law at the flanks (`physics.friction`).
+    friction_memory : float
+        Time constant of the sliding speed at which that law is read [s].
     ring_law, ring_kinetic, ring_gradient, ring_speed : int, float, float, float
         Friction law of the ring on the saddles.
     friction_speed : float
-        v_reg: friction is mu N v / sqrt(v^2 + v_reg^2) [m/s].
+        v_reg: friction is mu N tanh(|v| / v_reg) [m/s].
     driven_inertia : float
         [kg m^2]
     driving_rate, driven_rate : float
@@ -127,10 +133,12 @@ class Belt(NamedTuple):
     contact_stiffness: float
     angle_stiffness: float
     angle_damping: float
+    transverse_damping: float
     flank_law: int
     flank_kinetic: float
     flank_gradient: float
     flank_speed: float
+    friction_memory: float
     ring_law: int
     ring_kinetic: float
     ring_gradient: float
@@ -255,6 +263,8 @@ class Workspace(NamedTuple):
     HEAD_LEVER_I,
     HEAD_LEVER_J,
     HEAD_GAP,
+    NORMAL_Y,  # across the path: of the strand, or radial
+    NORMAL_Z,
     R_Y,  # radial direction at the flank's contact point, at q_k
     R_Z,
     R_LEVER,
@@ -266,7 +276,7 @@ class Workspace(NamedTuple):
     MID_RADIUS,
     PREDICTED_DEPTH,  # penetration of the flank without opening of the sheaves
     DIAGONAL,  # 4 x 4 blocks of the linear laws, by columns: of an element, and of it with the next one
-) = range(36)
+) = range(38)
 LINK = DIAGONAL + 16
 STEP_FIELDS = LINK + 16
 

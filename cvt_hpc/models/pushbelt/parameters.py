@@ -16,12 +16,12 @@ import numpy as np
 from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
-from cvt_hpc.variator.scene import FRICTION, HALF_WEDGE_ANGLE, SCENE
+from cvt_hpc.variator.scene import FRICTION, HALF_WEDGE_ANGLE, SCENE, TRANSVERSE_DAMPING
 
 FEWEST_ELEMENTS = 100
 BELOW_PASSAGE = 0.9  # of half that frequency: belts run up to 4 % slower than by the nominal radius
 NOT_HERE = ("disturbance", "seed")
-NO_TABLE = ("friction_memory", "table_file", "table_force", "table_speed", "table_mu")
+NO_TABLE = ("table_file", "table_force", "table_speed", "table_mu")
 
 
 def _play(parameters: Mapping[str, Any]) -> float:
@@ -105,6 +105,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             6e6, "N", "longitudinal stiffness EA of all rings", sensible=(10000.0, 10000000000.0)
         ),
         "ring_friction": not_negative(0.06, "", "friction coefficient between rings and elements"),
+        "transverse_damping": TRANSVERSE_DAMPING,
         "tilt_spring": not_negative(
             5.0, "N m/rad", "stiffness of an element's tilt against the rings", sensible=(1e-3, 1e6)
         ),
@@ -211,7 +212,30 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if not problems and "step" in p and p["step"] > limit:
         expected = f"at most {limit:.3g} s, pitch over the speed of transverse waves under the thrust"
         problems.append(("step", expected, f"{p['step']:g} s"))
+    limit = falling_limit(p)
+    if not problems and "step" in p and p["step"] > limit:
+        expected = f"at most {limit:.3g} s, beyond which friction that falls so steeply has several solutions"
+        problems.append(("step", expected, f"{p['step']:g} s"))
     return problems + friction_problems(p)
+
+
+def falling_limit(parameters: Mapping[str, Any]) -> float:
+    """Longest step in which falling friction of the flanks has one solution [s], by the mean over an arc.
+
+    An element that slides has m' (v - v_0) / dt = f - 2 n mu(v_f) per length, n being the normal line force of
+    a flank. That has one solution while its slope by v, m' / dt + 2 n g dt / (dt + tau), is positive: with
+    memory tau friction follows a sudden change of speed only by dt / (dt + tau). The gradient g is the law's
+    steepest; n is the axial force over R wrap cos d0, on the shorter arc, where both pulleys have the thrust.
+    """
+    p = parameters
+    if p["friction_gradient"] == 0.0:
+        return np.inf
+    driving = p["driven_radius"] / p["ratio"]
+    wrap = np.pi + 2.0 * np.arcsin((driving - p["driven_radius"]) / p["centre_distance"])
+    arc = min(driving * wrap, p["driven_radius"] * (2.0 * np.pi - wrap))
+    pressed = max(p["thrust"], p["driving_thrust"]) / (arc * np.cos(p["half_wedge_angle"]))
+    without = p["element_mass"] / (2.0 * pressed * -p["friction_gradient"])
+    return float(0.5 * without + np.sqrt(0.25 * without**2 + without * p["friction_memory"]))
 
 
 def string_limit(parameters: Mapping[str, Any]) -> float:
@@ -248,6 +272,7 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
     cases = (
         (p["load_history"] == "constant", "load_start", "load_history constant"),
         (p["speed_history"] == "constant", "speed_start", "speed_history constant"),
+        (p["friction_gradient"] == 0.0, "friction_memory", "friction_gradient 0"),
         (np.isinf(p["sheave_stiffness"]), "modal_stiffness", "sheave_stiffness inf"),
         (p["elements"] >= FEWEST_ELEMENTS, "coarse", f"elements {FEWEST_ELEMENTS} or more"),
     )

@@ -40,7 +40,7 @@ VARIABLES = (
     ),
     *shared("mean_ring_tension", "mean_push_force", "axial_force", "slip", "flank_loss", "thrust_ratio"),
     *shared("speed_loss", "driven_speed_ripple", "driving_power", "load_power", "thrust_power"),
-    *shared("storing_power", "ring_loss"),
+    *shared("storing_power", "ring_loss", "belt_loss"),
     Variable("tilt_loss", (), "f8", "W", "mean power of the dampers of the elements' tilt"),
     *shared("loss", "power_residual"),
     Variable("efficiency", (), "f8", "1", "mean power of the load over that of the driving pulley"),
@@ -133,8 +133,8 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     radii = np.stack([run.channel(f"{pulley}_radius")[judged] for pulley in PULLEYS])
     driving, load = run.mean_rate(fields.WORK_IN), run.mean_rate(fields.WORK_OUT)
     ring = run.mean_rate(fields.RING_LOSS)
-    tilt = run.mean_rate(fields.DAMPING_LOSS)
-    loss = run.mean_rate(fields.FLANK_LOSS) + ring + tilt
+    belt, tilt = run.mean_rate(fields.BELT_LOSS), run.mean_rate(fields.TILT_LOSS)
+    loss = run.mean_rate(fields.FLANK_LOSS) + ring + belt + tilt
     # both sheaves of a pulley give way by the tangent of the wedge angle
     widening = -2.0 * np.tan(p["half_wedge_angle"]) * (radii[:, -1] - radii[:, 0])
     thrust = float(axial @ widening) / ((radii.shape[1] - 1) * run.interval)
@@ -159,6 +159,7 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
         "thrust_power": thrust,
         "storing_power": storing,
         "ring_loss": ring,
+        "belt_loss": belt,
         "tilt_loss": tilt,
         "loss": loss,
         "power_residual": (driving - load - thrust - loss - storing) / max(abs(driving), loss),

@@ -8,7 +8,7 @@ for what is slow.
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import absolute, ahead, around, behind, like, maximum
+from cvt_hpc.lanes import absolute, ahead, around, behind, like, maximum, select, sqrt
 from cvt_hpc.models.pushbelt.assembly import (
     RIGHT,
     assemble,
@@ -20,9 +20,9 @@ from cvt_hpc.models.pushbelt.assembly import (
 from cvt_hpc.models.pushbelt.belt import (
     ANGLE_I,
     ANGLE_J,
+    BELT_LOSS,
     CHANGE,
     CONVERGED,
-    DAMPING_LOSS,
     DRIVEN,
     DRIVEN_RADIUS,
     DRIVEN_SPEED,
@@ -56,6 +56,8 @@ from cvt_hpc.models.pushbelt.belt import (
     ITERATIONS,
     LENGTH,
     MID_RADIUS,
+    NORMAL_Y,
+    NORMAL_Z,
     NOT_CONVERGED,
     NOT_FINITE,
     OMEGA,
@@ -75,11 +77,13 @@ from cvt_hpc.models.pushbelt.belt import (
     TENSION_I_Z,
     TENSION_J_Y,
     TENSION_J_Z,
+    TILT_LOSS,
     TIME,
     TURN_Y,
     TURN_Z,
     U_Y,
     U_Z,
+    V_FILTERED,
     WORK_IN,
     WORK_OUT,
     V,
@@ -88,6 +92,7 @@ from cvt_hpc.models.pushbelt.belt import (
 )
 from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
 from cvt_hpc.models.pushbelt.cyclic import solve
+from cvt_hpc.models.pushbelt.laws import remembered
 
 _LARGE = 1e100  # more than any speed or power that means something
 
@@ -206,7 +211,7 @@ def _accept(belt, state, work, inputs, dt):
     """Take the state to the end of the step, and add up what it has done."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     totals, pulleys = state.totals, state.pulleys
-    for k in range(7):
+    for k in range(8):
         scratch[0, k] = 0.0
     for j in range(step.rows):
         change_y, change_z = (
@@ -235,6 +240,8 @@ def _accept(belt, state, work, inputs, dt):
         omega = elements[j, OMEGA] + elements[j, CHANGE + 2]
         elements[j, U_Y], elements[j, U_Z], elements[j, OMEGA] = u_y, u_z, omega
         elements[j, V] += elements[j, CHANGE + 3]
+        across = step[j, NORMAL_Y] * u_y + step[j, NORMAL_Z] * u_z
+        scratch[0, 7] += belt.transverse_damping * across * across
         elements[j, Y] += dt * u_y
         elements[j, Z] += dt * u_z
         x_y, x_z = turned(elements[j, HEADING_Y], elements[j, HEADING_Z], dt * omega)
@@ -248,11 +255,13 @@ def _accept(belt, state, work, inputs, dt):
         torque = step[j, MID_RADIUS] * iterate[j, FORCE_T]
         scratch[0, 2] += (1.0 - driven) * torque
         scratch[0, 3] -= driven * torque
-        scratch[0, 4] += 2.0 * (
-            square * grip_m * elements[j, FLANK_SLIP_M] + grip_t * elements[j, FLANK_SLIP_T]
-        )
+        slip_m, slip_t = elements[j, FLANK_SLIP_M], elements[j, FLANK_SLIP_T]
+        scratch[0, 4] += 2.0 * (square * grip_m * slip_m + grip_t * slip_t)
+        size = sqrt(slip_m * slip_m + slip_t * slip_t)
+        filtered, _ = remembered(elements[j, V_FILTERED], size, belt.friction_memory, dt)
+        elements[j, V_FILTERED] = select(elements[j, FLANK] > 0.0, filtered, size)
         scratch[0, 5] += elements[j, RING_FRICTION] * elements[j, RING_SLIP]
-    for k in range(7):
+    for k in range(8):
         scratch[0, k] = around(scratch[0, k])
     driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]
     torque, driven_torque = scratch.data[0, 2, 0], scratch.data[0, 3, 0]
@@ -267,7 +276,8 @@ def _accept(belt, state, work, inputs, dt):
     totals[WORK_OUT] += dt * inputs[IN_LOAD] * pulleys[DRIVEN_SPEED]
     totals[FLANK_LOSS] += dt * scratch.data[0, 4, 0]
     totals[RING_LOSS] += dt * scratch.data[0, 5, 0]
-    totals[DAMPING_LOSS] += dt * scratch.data[0, 6, 0]
+    totals[TILT_LOSS] += dt * scratch.data[0, 6, 0]
+    totals[BELT_LOSS] += dt * scratch.data[0, 7, 0]
     totals[DRIVING_THRUST] += dt * driving_thrust
     totals[DRIVEN_THRUST] += dt * driven_thrust
     totals[DRIVING_TORQUE] += dt * torque
