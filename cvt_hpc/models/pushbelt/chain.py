@@ -217,7 +217,8 @@ def linear_blocks(belt, step, dt):
         mass, ring = belt.mass / dt, belt.ring_mass / dt
         yy, yz, zz = mass + ring * o_y * o_y, ring * o_y * o_z, mass + ring * o_z * o_z
         n_y, n_z = step[j, NORMAL_Y], step[j, NORMAL_Z]
-        yy, yz, zz = yy + belt.transverse_damping * n_y * n_y, yz + belt.transverse_damping * n_y * n_z, zz + belt.transverse_damping * n_z * n_z
+        drag = belt.transverse_damping
+        yy, yz, zz = yy + drag * n_y * n_y, yz + drag * n_y * n_z, zz + drag * n_z * n_z
         ww, vv = like(belt.inertia / dt, o_y), like(ring, o_y)
 
         # the segment ahead, of which this element is i

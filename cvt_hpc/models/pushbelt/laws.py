@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from numba.extending import register_jitable
 
-from cvt_hpc.lanes import like, maximum, minimum, select, sqrt
+from cvt_hpc.lanes import like, maximum, select, sqrt
 from cvt_hpc.physics.friction import lane_coefficient, lane_law, lane_saturation
 from cvt_hpc.physics.friction_laws import Law
 

@@ -222,9 +222,9 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
 def falling_limit(parameters: Mapping[str, Any]) -> float:
     """Longest step in which falling friction of the flanks has one solution [s], by the mean over an arc.
 
-    An element that slides has m' (v - v_0) / dt = f - 2 n mu(v_f) per length, n being the normal line force of
-    a flank. That has one solution while its slope by v, m' / dt + 2 n g dt / (dt + tau), is positive: with
-    memory tau friction follows a sudden change of speed only by dt / (dt + tau). The gradient g is the law's
+    An element that slides has m' (v - v_0) / dt = f - 2 n mu(v_f) per length, n being the normal line force
+    of a flank. That has one solution while its slope by v, m' / dt + 2 n g dt / (dt + tau), is positive: with
+    memory tau, friction follows a sudden change of speed only by dt / (dt + tau). The gradient g is the law's
     steepest; n is the axial force over R wrap cos d0, on the shorter arc, where both pulleys have the thrust.
     """
     p = parameters
