@@ -134,7 +134,7 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
     `increments` are the changes of the border's unknowns since the last step: of the driven pulley's speed,
     and of the openings of the driving and the driven sheaves.
     """
-    modes = belt.modal_stiffness.size
+    modes = belt.modal_stiffness.shape[1]
     wide = 1.0 / belt.cosine
     driving_speed, driven_speed = pulleys[DRIVING_SPEED], pulleys[DRIVEN_SPEED] + increments[0]
     for j in range(step.rows):
@@ -144,7 +144,7 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
         driven = state[j, DRIVEN]
 
         slip = state[j, V] + dv - step[j, T_Y] * u_y - step[j, T_Z] * u_z
-        width, none = belt.friction_speed, like(0.0, slip)
+        width, none = belt.ring_friction_speed, like(0.0, slip)
         dual, _ = dual_of(slip, none, state[j, RING_SLIP], none, state[j, RING_DUAL], none, width)
         size = absolute(slip)
         mu, fall = coefficient(belt.ring_law, belt.ring_kinetic, belt.ring_gradient, belt.ring_speed, size)
@@ -170,6 +170,7 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
         along = (m_y * u_y + m_z * u_z + mr_lever * omega) * wide
         rotation = driving_speed + driven * (driven_speed - driving_speed)
         around_it = m_y * u_z - m_z * u_y + mt_lever * omega - radius * rotation
+        width = belt.friction_speed
         dual_m, dual_t = dual_of(
             along,
             around_it,
@@ -221,7 +222,7 @@ def residuals(belt, state, pulleys, increments, openings, shapes, load, step, it
     float
         Power residual of the belt [W].
     """
-    modes = belt.modal_stiffness.size
+    modes = belt.modal_stiffness.shape[1]
     last = border.shape[1] - 1
     per_dt = 1.0 / dt
     power = torque = like(0.0, state[0, FLANK])
@@ -284,7 +285,7 @@ def residuals(belt, state, pulleys, increments, openings, shapes, load, step, it
         scratch[0, k] = around(scratch[0, k])
         pulley, mode = k // modes, k % modes
         opening = openings[pulley, mode] + increments[1 + k]
-        border[1 + k, last] = scratch.data[0, k, 0] - belt.modal_stiffness[mode] * opening
+        border[1 + k, last] = scratch.data[0, k, 0] - belt.modal_stiffness[pulley, mode] * opening
     scratch[0, 0], scratch[0, 1] = around(torque), around(power)
     border[0, last] = scratch.data[0, 0, 0] - load - belt.driven_inertia * increments[0] / dt
     return scratch.data[0, 1, 0]
@@ -297,7 +298,7 @@ def assemble(belt, state, shapes, step, iterate, blocks):
     The right sides are the residuals, and the columns of the border's unknowns: the driven pulley's speed and
     the openings of the sheaves.
     """
-    modes = belt.modal_stiffness.size
+    modes = belt.modal_stiffness.shape[1]
     for j in range(step.rows):
         x_y, x_z = ahead(state, j, HEADING_Y), ahead(state, j, HEADING_Z)
         k, ki, kj = iterate[j, STIFF], iterate[j, STIFF_I], iterate[j, STIFF_J]
@@ -368,7 +369,7 @@ def border_system(belt, state, shapes, step, iterate, blocks, scratch, border, d
 
     The first column of `blocks` holds the solution without border, the others those for its columns.
     """
-    modes = belt.modal_stiffness.size
+    modes = belt.modal_stiffness.shape[1]
     unknowns = border.shape[0]
     pressing = dt * belt.sine
     for row in range(unknowns):
@@ -404,4 +405,4 @@ def border_system(belt, state, shapes, step, iterate, blocks, scratch, border, d
         border[row, unknowns] += scratch.data[0, 0, 0]
         for column in range(unknowns):
             border[row, column] = scratch.data[0, 1 + column, 0]
-        border[row, row] += belt.driven_inertia / dt if row == 0 else belt.modal_stiffness[mode]
+        border[row, row] += belt.driven_inertia / dt if row == 0 else belt.modal_stiffness[pulley, mode]

@@ -56,7 +56,7 @@ IN_SPEED, IN_DRIVING_THRUST, IN_DRIVEN_THRUST, IN_LOAD = range(4)
     WORK_OUT,  # against the load [J]
     FLANK_LOSS,  # [J]
     RING_LOSS,  # [J]
-    TILT_LOSS,  # of the dampers of the elements' rotation against the ring [J]
+    DAMPING_LOSS,  # of the rotation of elements against the ring [J]
     BELT_LOSS,  # of the transverse damping [J]
     DRIVING_THRUST,  # axial force of the belt on a sheave, over time [N s]
     DRIVEN_THRUST,
@@ -107,15 +107,15 @@ class Belt(NamedTuple):
         Time constant of the sliding speed at which that law is read [s].
     ring_law, ring_kinetic, ring_gradient, ring_speed : int, float, float, float
         Friction law of the ring on the saddles.
-    friction_speed : float
-        v_reg: friction is mu N tanh(|v| / v_reg) [m/s].
+    friction_speed, ring_friction_speed : float
+        v_reg of both: friction is mu N tanh(|v| / v_reg) [m/s].
     driven_inertia : float
         [kg m^2]
     driving_rate, driven_rate : float
         Radial speed of the belt by the excess of a loose sheave's thrust over the belt's axial force
         [m/(s N)]; 0: the sheave is fixed.
-    modal_stiffness : (modes,) array
-        S_k of the opening of a pulley's sheaves as sum a_k psi_k(phi), psi 1, cos, sin, cos 2, ... [N/m];
+    modal_stiffness : (2, modes) array
+        S_k of the opening of each pulley's sheaves as sum a_k psi_k(phi), psi 1, cos, sin, cos 2, ... [N/m];
         none: rigid sheaves.
     """
 
@@ -144,6 +144,7 @@ class Belt(NamedTuple):
     ring_gradient: float
     ring_speed: float
     friction_speed: float
+    ring_friction_speed: float
     driven_inertia: float
     driving_rate: float
     driven_rate: float

@@ -16,11 +16,13 @@ import numpy as np
 from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
+from cvt_hpc.variator import PULLEYS
 from cvt_hpc.variator.scene import FRICTION, HALF_WEDGE_ANGLE, SCENE, TRANSVERSE_DAMPING
 
 FEWEST_ELEMENTS = 100
 BELOW_PASSAGE = 0.9  # of half that frequency: belts run up to 4 % slower than by the nominal radius
 NOT_HERE = ("disturbance", "seed")
+MODES = ("driving_modal_stiffness", "driven_modal_stiffness")
 NO_TABLE = ("table_file", "table_force", "table_speed", "table_mu")
 
 
@@ -105,6 +107,9 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             6e6, "N", "longitudinal stiffness EA of all rings", sensible=(10000.0, 10000000000.0)
         ),
         "ring_friction": not_negative(0.06, "", "friction coefficient between rings and elements"),
+        "ring_friction_speed": positive(
+            5e-4, "m/s", "regularisation speed of that friction", sensible=(1e-06, 5.0)
+        ),
         "transverse_damping": TRANSVERSE_DAMPING,
         "tilt_spring": not_negative(
             5.0, "N m/rad", "stiffness of an element's tilt against the rings", sensible=(1e-3, 1e6)
@@ -118,12 +123,15 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             positive(1.0, "", "stiffness of the sheaves, multiple of the reference; inf: rigid"),
             allow_infinite=True,
         ),
-        "modal_stiffness": Parameter(
-            (6e8, 3e8, 3e8, 9e8, 9e8),
-            "N/m",
-            "reference stiffness of a pulley's opening by 1, cos, sin, cos 2, sin 2 of the angle",
-            sensible=(1e5, 1e12),
-        ),
+        **{
+            key: Parameter(
+                (6e8, 3e8, 3e8, 9e8, 9e8),
+                "N/m",
+                f"reference stiffness of the {pulley} pulley's opening by angle: 1, cos, sin, cos 2, sin 2",
+                sensible=(1e5, 1e12),
+            )
+            for key, pulley in zip(MODES, PULLEYS, strict=True)
+        },
         "flank_stiffness": positive(
             3.27e10,
             "N/m^2",
@@ -148,11 +156,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "friction_gradient": replace(FRICTION["friction_gradient"], default=0.0),
         "kinetic_friction": replace(FRICTION["kinetic_friction"], default=0.09),
-        "friction_speed": replace(
-            FRICTION["friction_speed"],
-            default=5e-4,
-            description="sliding speed below which friction at flanks and rings is smoothed",
-        ),
+        "friction_speed": replace(FRICTION["friction_speed"], default=5e-4),
     },
 }
 
@@ -197,8 +201,10 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if p["sheave_rate"] > fastest:
         expected = f"at most {fastest:.3g} m/(N s) at this step, beyond which the sheave does not settle"
         problems.append(("sheave_rate", expected, f"{p['sheave_rate']:g} m/(N s)"))
-    if not p["modal_stiffness"] or min(p["modal_stiffness"]) <= 0.0:
-        problems.append(("modal_stiffness", "values above 0", f"{list(p['modal_stiffness'])}"))
+    for key in MODES:
+        if not p[key] or len(p[key]) != len(p[MODES[0]]) or min(p[key]) <= 0.0:
+            expected = "values above 0, as many of both pulleys"
+            problems.append((key, expected, f"{list(p[key])}"))
     if p["elements"] < FEWEST_ELEMENTS and not p["coarse"]:
         expected = f"{FEWEST_ELEMENTS} or more, or coarse = true"
         problems.append(("elements", expected, f"{p['elements']}"))
@@ -272,8 +278,9 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
     cases = (
         (p["load_history"] == "constant", "load_start", "load_history constant"),
         (p["speed_history"] == "constant", "speed_start", "speed_history constant"),
+        (p["ring_friction"] == 0.0, "ring_friction_speed", "ring_friction 0"),
         (p["friction_gradient"] == 0.0, "friction_memory", "friction_gradient 0"),
-        (np.isinf(p["sheave_stiffness"]), "modal_stiffness", "sheave_stiffness inf"),
+        *((np.isinf(p["sheave_stiffness"]), key, "sheave_stiffness inf") for key in MODES),
         (p["elements"] >= FEWEST_ELEMENTS, "coarse", f"elements {FEWEST_ELEMENTS} or more"),
     )
     return friction_inert(p | dict.fromkeys(NO_TABLE, ())) | {

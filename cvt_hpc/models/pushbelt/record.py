@@ -133,7 +133,7 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     radii = np.stack([run.channel(f"{pulley}_radius")[judged] for pulley in PULLEYS])
     driving, load = run.mean_rate(fields.WORK_IN), run.mean_rate(fields.WORK_OUT)
     ring = run.mean_rate(fields.RING_LOSS)
-    belt, tilt = run.mean_rate(fields.BELT_LOSS), run.mean_rate(fields.TILT_LOSS)
+    belt, tilt = run.mean_rate(fields.BELT_LOSS), run.mean_rate(fields.DAMPING_LOSS)
     loss = run.mean_rate(fields.FLANK_LOSS) + ring + belt + tilt
     # both sheaves of a pulley give way by the tangent of the wedge angle
     widening = -2.0 * np.tan(p["half_wedge_angle"]) * (radii[:, -1] - radii[:, 0])

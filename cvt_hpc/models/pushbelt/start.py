@@ -78,10 +78,11 @@ def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
         ring_gradient=float(g["ring_friction_gradient"]),
         ring_speed=float(g["ring_stribeck_velocity"]),
         friction_speed=float(g["friction_speed"]),
+        ring_friction_speed=float(g["ring_friction_speed"]),
         driven_inertia=float(g["driven_inertia"]),
         driving_rate=float(g["driving_rate"]),
         driven_rate=float(g["driven_rate"]),
-        modal_stiffness=np.array(g["modal_stiffness"], dtype=np.float64),
+        modal_stiffness=np.array(g["modal_stiffness"], dtype=np.float64).reshape(2, -1),
     )
 
 
@@ -139,7 +140,7 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
             path.driven_radius,
         ]
     )
-    modes = belt.modal_stiffness.size
+    modes = belt.modal_stiffness.shape[1]
     state = BeltState(
         in_lanes(fields),
         pulleys,
@@ -167,7 +168,7 @@ def of_lanes(array: LaneArray) -> np.ndarray:
 
 def workspace(belt: Belt, nodes: int) -> Workspace:
     """Work space for a belt of so many nodes."""
-    parts, modes = parts_of(nodes), belt.modal_stiffness.size
+    parts, modes = parts_of(nodes), belt.modal_stiffness.shape[1]
     rows, columns = nodes // parts, 2 + 2 * modes
 
     def lanes(count: int, fields: int) -> LaneArray:

@@ -23,6 +23,7 @@ from cvt_hpc.models.pushbelt.belt import (
     BELT_LOSS,
     CHANGE,
     CONVERGED,
+    DAMPING_LOSS,
     DRIVEN,
     DRIVEN_RADIUS,
     DRIVEN_SPEED,
@@ -77,7 +78,6 @@ from cvt_hpc.models.pushbelt.belt import (
     TENSION_I_Z,
     TENSION_J_Y,
     TENSION_J_Z,
-    TILT_LOSS,
     TIME,
     TURN_Y,
     TURN_Z,
@@ -100,7 +100,7 @@ _LARGE = 1e100  # more than any speed or power that means something
 @kernel
 def _shapes(belt, step, shapes):
     """psi_k at the elements: 1, cos, sin, cos 2, sin 2, ..."""
-    modes = shapes.data.shape[1] if belt.modal_stiffness.size > 0 else 0
+    modes = shapes.data.shape[1] if belt.modal_stiffness.shape[1] > 0 else 0
     for j in range(step.rows):
         c, s = step[j, R_Y], step[j, R_Z]
         cosine, sine = like(1.0, c), like(0.0, c)
@@ -266,7 +266,7 @@ def _accept(belt, state, work, inputs, dt):
     driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]
     torque, driven_torque = scratch.data[0, 2, 0], scratch.data[0, 3, 0]
     pulleys[DRIVEN_SPEED] += state.increments[0]
-    modes = belt.modal_stiffness.size
+    modes = belt.modal_stiffness.shape[1]
     for k in range(2 * modes):
         state.openings[k // modes, k % modes] += state.increments[1 + k]
     pulleys[DRIVING_RADIUS] += dt * belt.driving_rate * (inputs[IN_DRIVING_THRUST] - driving_thrust)
@@ -276,7 +276,7 @@ def _accept(belt, state, work, inputs, dt):
     totals[WORK_OUT] += dt * inputs[IN_LOAD] * pulleys[DRIVEN_SPEED]
     totals[FLANK_LOSS] += dt * scratch.data[0, 4, 0]
     totals[RING_LOSS] += dt * scratch.data[0, 5, 0]
-    totals[TILT_LOSS] += dt * scratch.data[0, 6, 0]
+    totals[DAMPING_LOSS] += dt * scratch.data[0, 6, 0]
     totals[BELT_LOSS] += dt * scratch.data[0, 7, 0]
     totals[DRIVING_THRUST] += dt * driving_thrust
     totals[DRIVEN_THRUST] += dt * driven_thrust
