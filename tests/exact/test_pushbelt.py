@@ -316,37 +316,41 @@ def test_free_spinning_ring():
 
 def test_a_strand_decays_by_the_transverse_damping():
     # damping in proportion to mass: each mode decays by exp(-d_b t / (2 m')), its energy goes into BELT_LOSS
-    tension, speed, damping = 3000.0, 0.1, 500.0  # [N], [m/s], [N s/m^2]
-    belt, state = start(given(ratio=1.0, ring_strain=tension / 6e6, angle_damping=0.0, kinetic_friction=1e-9))
-    pitch = 0.6612 / NODES
-    belt = belt._replace(thickness=belt.thickness - 1e-3, ring_kinetic=0.0, driven_rate=0.0)
-    f = fields(state.elements)
-    f[:, U] = 0.0
-    write(state.elements, f)
+    speed, pitch = 0.1, 0.6612 / NODES  # [m/s], [m]
+    belt, state = start(given(ratio=1.0, ring_strain=5e-4))
+    belt = belt._replace(thickness=belt.thickness - 1e-3, driven_rate=0.0)  # elements apart
+    work, mass = workspace(belt, NODES), belt.mass + belt.ring_mass
     state.pulleys[:2] = 0.0
-    work = workspace(belt, NODES)
 
-    def march(damping, steps):
+    def march(f, damping, steps):
+        write(state.elements, f)
         damped = belt._replace(transverse_damping=damping * pitch)
         assert advance(damped, b.Newton(), state, work, np.zeros((2, 4)), steps, STEP) == b.CONVERGED
         return fields(state.elements)
 
-    f = march(2e4, 4000)  # to rest
+    f = fields(state.elements)
+    f[:, U] = 0.0
+    f = march(f, 2e4, 4000)
     t1 = (f[:, b.Z] < 0.0) & (np.abs(f[:, b.Y] - 0.0775) < 0.0775)
     shape = np.where(t1, np.sin(np.pi * f[:, b.Y] / 0.155), 0.0)
     f[:, b.U_Z] -= speed * shape
-    write(state.elements, f)
-    mass = belt.mass + belt.ring_mass
-    energy, before = 0.5 * mass * speed**2 * (shape**2).sum(), state.totals[b.BELT_LOSS]
-    w = np.array([march(damping, 10)[:, b.Z] @ shape for _ in range(300)])
-    lost = state.totals[b.BELT_LOSS] - before
-    rate = damping * pitch / (2.0 * mass)
-    # x(t + h) = 2 r cos(wh) x(t) - r^2 x(t - h), with r = exp(-rate h), whatever the frequency
-    w -= march(2e4, 4000)[:, b.Z] @ shape
-    (_, square), *_ = np.linalg.lstsq(np.stack([w[1:-1], -w[:-2]], 1), w[2:], rcond=None)
-    # 2 %: what is not the first mode; the step adds rate x step, 0.2 %
-    assert -np.log(square) / (20 * STEP) == pytest.approx(rate, rel=0.02)
-    assert lost == pytest.approx(energy * (1.0 - np.exp(-2.0 * rate * 3000 * STEP)), rel=0.02)
+    rates, lost = [], []
+    for damping in (0.0, 500.0):
+        g, w, before = f, [], state.totals[b.BELT_LOSS]
+        for _ in range(300):
+            g = march(g, damping, 10)
+            w.append((g[:, b.Z] - f[:, b.Z]) @ shape)
+        # x(t + h) = 2 r cos(w h) x(t) - r^2 x(t - h) + const, with r = exp(-rate h)
+        x = np.array(w)
+        known = np.stack([x[1:-1], -x[:-2], np.ones(298)], 1)
+        rates.append(-np.log(np.linalg.lstsq(known, x[2:], rcond=None)[0][1]) / (20 * STEP))
+        lost.append(state.totals[b.BELT_LOSS] - before)
+    expected = 500.0 * pitch / (2.0 * mass)
+    assert abs(rates[0]) < 0.02 * expected  # by friction of the elements at the arcs' ends
+    # 0.5 %: the step adds rate x step, 0.2 %
+    assert rates[1] - rates[0] == pytest.approx(expected, rel=5e-3)
+    # 3 %: that friction's share, and motion along the belt
+    assert lost == [0.0, pytest.approx(0.5 * mass * speed**2 * (shape**2).sum(), rel=0.03)]
 
 
 def on_a_pulley(values, speed, pressed):
@@ -371,7 +375,7 @@ def test_friction_is_read_at_a_speed_that_follows_with_memory():
     memory, sliding, force = 0.3e-3, 0.1, 100.0
     falling = {"friction_law": "stribeck", "friction_gradient": -0.4, "friction_memory": memory}
     belt, state, work = on_a_pulley(given(**falling), sliding, force)
-    belt = belt._replace(mass=1e6)
+    belt = belt._replace(mass=1e6, inertia=1e6)
     inputs = np.array([[state.pulleys[b.DRIVING_SPEED], 0.0, 0.0, 0.0]] * 2)
     for k in range(1, 11):
         assert advance(belt, b.Newton(), state, work, inputs, 10, STEP) == b.CONVERGED
@@ -407,11 +411,11 @@ def test_the_longest_step_of_falling_friction(memory):
     wrap = np.pi - 2.0 * np.arcsin((p["driven_radius"] - driving) / p["centre_distance"])
     pitch = path_length(p) / NODES
     force = p["thrust"] / (driving * wrap * np.cos(p["half_wedge_angle"])) * pitch
-    belt, state, work = on_a_pulley(values | {"nodes": NODES, "friction_speed": 1e-6}, 1e-3, force)
+    belt, state, work = on_a_pulley(values | {"nodes": NODES, "friction_speed": 1e-7}, 1e-4, force)
     belt = belt._replace(ring_mass=0.0, ring_kinetic=0.0)
     for share, falls in ((0.98, True), (1.02, False)):
         left = []
-        for change in (0.0, -1e-4):
+        for change in (0.0, -1e-5):
             f = fields(state.elements)
             f[:, b.CHANGE : b.CHANGE + 4] = 0.0
             f[:, [b.CHANGE, b.CHANGE + 1]] = change * f[:, [b.HEADING_Y, b.HEADING_Z]]

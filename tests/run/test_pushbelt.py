@@ -54,9 +54,9 @@ def test_forces_of_both_strands_give_the_torque(records):
 
 
 def test_power_balance_closes_with_falling_friction_and_damping():
-    found = record(load=60.0, friction_gradient=-0.4, transverse_damping=2e5)
+    found = record(load=60.0, friction_gradient=-0.4, transverse_damping=1e6)
     assert found["status"] == Status.DONE and found["unsolved_share"] == 0.0
-    assert found["belt_loss"] > 0.02 * found["driving_power"]
+    assert found["belt_loss"] > 0.004 * found["driving_power"]
     assert abs(found["power_residual"]) < 5e-3  # of so few elements, as without damping
 
 
