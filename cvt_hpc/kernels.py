@@ -12,8 +12,9 @@ never find such code again: here it is the name, and the content that names the 
 compiler cannot read an index that names a type of a script that is not at hand: here it skips that entry.
 
 A kernel that only other kernels call gets no entry from Python, which for tuples of arrays takes long to
-compile. One that is called with lanes does not count who uses an array: it makes none, and the arrays that it
-is given outlast it.
+compile, and no machine code: each caller takes in its LLVM code and optimises it with its own. That holds for
+all functions that kernels call, also those of numpy. A kernel that is called with lanes does not count who
+uses an array: it makes none, and the arrays that it is given outlast it.
 
 The folders lie below NUMBA_CACHE_DIR if that is set; else in the package where it is the user's own, else in
 the user's cache. Whoever can write to them can run any code as the user, so folders to which others can write
@@ -40,12 +41,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numba
 from numba import types
 from numba.core import compiler_lock
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.codegen import JITCodeLibrary
+from numba.core.environment import lookup_environment
 from numba.core.event import Event, Listener, register
 from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
@@ -82,6 +86,81 @@ def merged_kernel(function: Callable[..., Any]) -> Any:
     return _compiled(function, _OPTIONS | {"inline": "always"})
 
 
+class _Library(JITCodeLibrary):
+    """The LLVM code of a function; optimised and made machine code once an address in it is asked for."""
+
+    _is_native = False
+
+    def _optimize_final_module(self) -> None:
+        """Nothing yet: callers optimise what they take in."""
+
+    def _finalize_final_module(self) -> None:
+        if self._object_caching_enabled and self._compiled_object:  # found on the disk
+            self._make_native()
+        else:
+            self._finalize_dynamic_globals()
+            self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        self._ensure_finalized()
+        if not self._is_native and any(found.name == name for found in self.get_defined_functions()):
+            super()._optimize_final_module()
+            self._final_module.verify()
+            self._make_native()
+            self._shared_module = None  # callers take in what is optimised
+        return super().get_pointer_to_function(name)
+
+    def _make_native(self) -> None:
+        """Make machine code, and set the environments that it refers to."""
+        self._is_native = True
+        self._dynamic_globals.clear()  # of the code before it was optimised
+        super()._finalize_final_module()
+        # the compiler does so for the function itself, but not for those taken in, which had no address
+        for variable in self._final_module.global_variables:
+            if environment := lookup_environment(variable.name):
+                self._codegen.set_env(variable.name, environment)
+
+    @property
+    def codegen(self) -> Any:
+        """What the compiler has set the function's environment, at its address if it has one."""
+        return self._codegen if self._is_native else _WITHOUT_ADDRESS
+
+    def serialize_using_object_code(self) -> tuple:
+        return super().serialize_using_object_code() if self._is_native else self.serialize_using_bitcode()
+
+
+_WITHOUT_ADDRESS = SimpleNamespace(set_env=lambda name, environment: None)
+
+
+def _call_type(function: types.Function, typing: Any, arguments: Any, named: Any) -> Any:
+    """Type the call of an operator, or the like; only once, as to try its implementations takes 1 ms."""
+    key = function, tuple(arguments)
+    if not named and (found := _signatures.get(key)):
+        return found
+    found = types.BaseFunction.get_call_type(function, typing, arguments, named)
+    # one with a key of its own has code of its own, compiled anew for other options of the caller
+    if function._impl_keys[found.args] is function.typing_key and not named:
+        _signatures[key] = found
+    return found
+
+
+_signatures: dict[tuple, Any] = {}
+
+
+@contextmanager
+def _replaced(owner: Any, name: str, value: Any) -> Iterator[None]:
+    """Give an object or a class another attribute for a while."""
+    own = vars(owner).get(name)
+    setattr(owner, name, value)
+    try:
+        yield
+    finally:
+        if own is None:
+            delattr(owner, name)
+        else:
+            setattr(owner, name, own)
+
+
 class _Kernel(CPUDispatcher):
     """A function and its machine code, with an entry from Python where Python has called it."""
 
@@ -114,7 +193,11 @@ class _Kernel(CPUDispatcher):
                 self._without_entry.remove(kinds)
                 del self.overloads[kinds]
             self._takes_lanes = any(_holds(kind, LaneArrayKind) for kind in kinds)
-            return super().compile(sig)
+            with (
+                _replaced(self.targetctx.codegen(), "_library_class", _Library),
+                _replaced(types.Function, "get_call_type", _call_type),
+            ):
+                return super().compile(sig)
 
     def add_overload(self, cres: Any) -> None:
         """Take machine code."""

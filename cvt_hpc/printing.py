@@ -9,7 +9,6 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.job.summary import cost_in_words
-from cvt_hpc.job.values import in_words
 from cvt_hpc.tables import columns
 from cvt_hpc.variables import Status, flag_in_words
 from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS, PairClass
@@ -22,8 +21,7 @@ if TYPE_CHECKING:
     from cvt_hpc.job import Job
     from cvt_hpc.ladder.audit import AuditReport
     from cvt_hpc.study import RunReport, StudyStatus
-    from cvt_hpc.study.forecast.needs import Needs
-    from cvt_hpc.study.forecast.resources import Disk
+    from cvt_hpc.study.forecast.needs import Disk, Needs
     from cvt_hpc.study.forecast.simulate import Forecast
     from cvt_hpc.study.repeats import Repeat
 
@@ -136,7 +134,6 @@ def _class_table(found: Comparison) -> Iterator[str]:
 
 
 def _cell_line(cell: Cell) -> str:
-    place = ", ".join(f"{name} = {in_words(value, '')}" for name, value in cell.at.items())
     words = (
         kind.label
         + ("" if math.isnan(size) else f" {size * 1e6:.3g} um")
@@ -144,7 +141,7 @@ def _cell_line(cell: Cell) -> str:
         for kind, size, frequency in zip(cell.classes, cell.amplitude, cell.frequency, strict=True)
     )
     near = ", near the threshold" if cell.pair in NEAR_CONTRADICTIONS else ""
-    return f"  {place}: {' | '.join(words)}{near}"
+    return f"  {cell.place}: {' | '.join(words)}{near}"
 
 
 def _deviation_lines(found: Comparison) -> Iterator[str]:
@@ -212,26 +209,30 @@ def forecast_lines(forecasts: Sequence[Forecast], job: Job, basis: str) -> Itera
     yield from columns(rows)
 
 
-def needs_line(needed: Needs) -> str:
+def needs_line(needed: Needs, histories: int) -> str:
     """Return the line that says what memory and disk a sweep needs."""
+    from cvt_hpc.study.forecast.needs import size_in_words
+
     return (
-        f"needed: {_in_megabytes(needed.memory)} of memory, {_in_megabytes(needed.disk)} of disk for records"
+        f"needed: {size_in_words(needed.memory)} of memory for the plan; {disk_line(needed.disk, histories)}"
     )
 
 
 def disk_line(disk: Disk, histories: int) -> str:
     """Return the line that says what space a study takes on the disk."""
+    from cvt_hpc.study.forecast.needs import size_in_words
+
     line = (
-        f"disk: {_in_megabytes(disk.records)} of records, at most {_in_megabytes(disk.results)} of results.nc"
+        f"disk: {size_in_words(disk.records)} of records, at most {size_in_words(disk.results)} of results.nc"
     )
     if not histories:
         return line
-    size = "of unknown size (--pilots tells)" if math.isnan(disk.histories) else _in_megabytes(disk.histories)
+    size = (
+        "of unknown size (--ranks with --pilots tells)"
+        if math.isnan(disk.histories)
+        else size_in_words(disk.histories)
+    )
     return f"{line}, {histories} histor{'y' if histories == 1 else 'ies'} {size}"
-
-
-def _in_megabytes(size: float) -> str:
-    return f"{size / 1e6:.3g} MB"
 
 
 def point_lines(job: Job, at: Mapping[str, Any]) -> Iterator[str]:

@@ -12,7 +12,7 @@ from cvt_hpc.job import schema
 from cvt_hpc.models import MODELS
 from cvt_hpc.parameters import Parameter
 
-# A worker is a core: threads of the linear algebra on top, here or in what tests start, would wait for each other.
+# Workers take all cores: threads of the linear algebra on top, here or in what tests start, would wait for each other.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 threadpool_limits(1)
 
@@ -70,9 +70,12 @@ def check_run(parameters):
 
 
 def pytest_collection_modifyitems(items):
-    """Put files with slow tests first: begun last, one would keep one core waiting for another."""
+    """Put files with slow tests first: begun last, one would keep one core waiting for another.
+
+    Before them go those that wait for a Slurm most of the time, beside which others compute.
+    """
     slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: item.path not in slow)
+    items.sort(key=lambda item: (item.path.parent.name != "slurm", item.path not in slow))
 
 
 @pytest.fixture

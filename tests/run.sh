@@ -27,4 +27,5 @@ prepare_environment mpich,test
 install_slurm
 # Where nothing may be written beside the sources, each process rewrites all assertions anew, for 8 s of a core.
 unset PYTHONDONTWRITEBYTECODE
-exec .venv/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder "$@"
+# One worker more than cores: some tests wait, for Slurm or for ranks, while others compute.
+exec .venv/bin/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder "$@"

@@ -9,10 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from cvt_hpc.analysis.arrangement import known_values, value_text
+from cvt_hpc.analysis.arrangement import known_values
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import InputError, did_you_mean, mismatch
+from cvt_hpc.job.shown import shown
 from cvt_hpc.study.job_difference import flatten
 
 COMPARED = ("status", "vibrates", "amplitude", "frequency")
@@ -95,8 +96,9 @@ def _reduced(
             raise mismatch(where, f"an axis of {sources[1]}, since samples have no common values", "none")
         places = np.flatnonzero(_keys(one[name]) == _key(fixed[name])) if name in fixed else np.zeros(1, int)
         if not places.size:
-            raise mismatch(where, f"one of {known_values(one[name])}", f"{_key(fixed[name])} in {sources[1]}")
-        note = f"axis {name} of {labels[0]} alone: at {value_text(one[name], int(places[0]))}"
+            found = f"{_shown(one[name], fixed[name])} in {sources[1]}"
+            raise mismatch(where, f"one of {known_values(one[name])}", found)
+        note = f"axis {name} of {labels[0]} alone: at {_shown(one[name], one[name].values[places[0]].item())}"
         notes.append(note + (f", as in {labels[1]}" if name in fixed else f", unknown in {labels[1]}"))
         one = one.isel({name: int(places[0])}, drop=True)
     return one
@@ -137,6 +139,11 @@ def _common_places(a: Iterable[Hashable], b: Iterable[Hashable]) -> tuple[list[i
 
 def _keys(coordinate: xr.DataArray) -> np.ndarray:
     return np.array([_key(value) for value in coordinate.values.tolist()], dtype=object)
+
+
+def _shown(coordinate: xr.DataArray, value: Any) -> str:
+    """A value of an axis for people; of a resolved job infinity is a text."""
+    return shown(value if coordinate.dtype.kind in "OUS" else float(value), coordinate.attrs)
 
 
 def _key(value: Any) -> str:

@@ -10,8 +10,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.figures import axis_label, display_unit, in_words
-from cvt_hpc.errors import InputError, few_of, mismatch, unknown
+from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words
+from cvt_hpc.errors import InputError, few_of, mismatch, show, unknown
+from cvt_hpc.job.shown import shown_as_read, shown_number, shown_unit
 
 MOST_VALUES_NAMED = 12
 
@@ -102,26 +103,27 @@ def _take(names: list[str], preferred: str, avoid: str = "") -> str | None:
 
 def _index_of(coordinate: xr.DataArray, value: Any, where: str) -> int:
     """Index of a value on an axis."""
-    values = coordinate.values
+    values, wanted = coordinate.values, np.nan
     if values.dtype.kind in "iuf":
         try:
             wanted = float(value)
         except (TypeError, ValueError):
-            wanted = np.nan
+            pass
         hits = np.flatnonzero((values == wanted) | np.isclose(values, wanted, rtol=1e-9, atol=0))
     else:
         hits = np.flatnonzero(values.astype(str) == str(value))
     if hits.size == 0:
-        raise mismatch(where, f"a value of that axis: {known_values(coordinate)}", repr(value))
+        found = show(value) if np.isnan(wanted) else shown_as_read(wanted, coordinate.attrs)
+        raise mismatch(where, f"a value of that axis: {known_values(coordinate)}", found)
     return int(hits[0])
 
 
 def known_values(coordinate: xr.DataArray) -> str:
-    """The values of an axis [SI] in words, a few of them if there are many."""
-    is_numeric = coordinate.dtype.kind in "iuf"
-    texts = [f"{value:g}" if is_numeric else str(value) for value in coordinate.values.tolist()]
-    unit = coordinate.attrs.get("units", "1")
-    return few_of(texts, MOST_VALUES_NAMED) + ("" if unit in ("", "1") else f" [{unit}]")
+    """The values of an axis in words, a few of them if there are many."""
+    numbers = (shown_number(value, coordinate.attrs) for value in coordinate.values.tolist())
+    unit = shown_unit(coordinate.attrs)
+    texts = [f"{value:g}" if isinstance(value, float) else str(value) for value in numbers]
+    return few_of(texts, MOST_VALUES_NAMED) + (f" [{unit}]" if unit else "")
 
 
 def value_text(coordinate: xr.DataArray, index: int) -> str:
@@ -131,7 +133,7 @@ def value_text(coordinate: xr.DataArray, index: int) -> str:
         return str(value)
     if np.isinf(value):
         return _infinity(str(coordinate.name))
-    factor, unit = display_unit(coordinate.attrs.get("units", ""))
+    factor, unit = coordinate_unit(coordinate.attrs)
     return f"{_number(value * factor)} {unit}".strip()
 
 
@@ -177,7 +179,7 @@ def ruler(coordinate: xr.DataArray) -> Ruler:
         Sorted if numeric; `units` is its SI unit.
     """
     name = str(coordinate.name)
-    factor, unit = display_unit(coordinate.attrs.get("units", ""))
+    factor, unit = coordinate_unit(coordinate.attrs)
     values = coordinate.values
     if values.dtype.kind not in "iuf":
         centres = np.arange(float(values.size))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis.alignment import align, axes_of, job_of
 from cvt_hpc.analysis.classes import at_strongest_strand, occurrence_classes
 from cvt_hpc.files import written_aside
+from cvt_hpc.job.shown import heading, shown, shown_number
 from cvt_hpc.study.job_difference import differences, short
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.agreement import (
@@ -62,6 +63,8 @@ class Cell(NamedTuple):
     ----------
     at : dict
         Values of the axes by name [SI].
+    place : str
+        The same for people, in the units of the job.
     classes : (OccurrenceClass, OccurrenceClass)
         In A and in B.
     pair : int
@@ -71,6 +74,7 @@ class Cell(NamedTuple):
     """
 
     at: dict[str, Any]
+    place: str
     classes: tuple[OccurrenceClass, OccurrenceClass]
     pair: int
     amplitude: tuple[float, float]
@@ -150,11 +154,13 @@ class Comparison:
         dims = self.cells["status"].dims
         along = {name: self.cells[name] for name in axes_of(self.cells)}
         axes = {name: (values.values.tolist(), dims.index(values.dims[0])) for name, values in along.items()}
-        shown = {str(name): array.values for name, array in self.cells.data_vars.items()}
+        arrays = {str(name): array.values for name, array in self.cells.data_vars.items()}
         for place in map(tuple, np.argwhere(chosen)):
-            found = {name: values[place].item() for name, values in shown.items()}
+            found = {name: values[place].item() for name, values in arrays.items()}
+            at = {name: values[place[dim]] for name, (values, dim) in axes.items()}
             yield Cell(
-                {name: values[place[dim]] for name, (values, dim) in axes.items()},
+                at,
+                ", ".join(f"{name} = {shown(value, along[name].attrs)}" for name, value in at.items()),
                 (OccurrenceClass(found["class_a"]), OccurrenceClass(found["class_b"])),
                 found["occurrence_class"],
                 (found["amplitude_a"], found["amplitude_b"]),
@@ -204,12 +210,14 @@ def write_comparison(found: Comparison, table: Path) -> Path:
     """Write all cells of a comparison as a CSV table, a row each, and return its path."""
     with written_aside(table, parents=True) as path, path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*axes_of(found.cells), *_HEAD])
+        told = {name: found.cells[name].attrs for name in axes_of(found.cells)}
+        writer.writerow([*(heading(name, attributes) for name, attributes in told.items()), *_HEAD])
         for cell in found.rows(np.ones(found.pairs.shape, bool)):
             numbers = [_number(size * 1e6, ".4g") for size in cell.amplitude]
             numbers += [_number(frequency, ".5g") for frequency in cell.frequency]
             labels = [kind.label for kind in cell.classes]
-            writer.writerow([*cell.at.values(), *labels, cell.pair_label, *numbers])
+            place = [shown_number(value, told[name]) for name, value in cell.at.items()]
+            writer.writerow([*place, *labels, cell.pair_label, *numbers])
     return table
 
 

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.arrangement import Arrangement, arrange, ruler, value_text
 from cvt_hpc.analysis.figures import WIDTH, axis_label, in_words
+from cvt_hpc.errors import one_line
 
 COLOUR = "#1f4e8c"
 HEIGHT = 3.6  # [inch]
@@ -49,7 +50,7 @@ def eigenfrequency_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: st
             axes.set_xticks(along.ticks, along.tick_labels)
     panels[0].set_ylabel(axis_label(dataset["eigenfrequency"], "Hz"))
     panels[0].set_ylim(bottom=0.0)
-    headline = f"Eigenfrequencies: {dataset.attrs.get('job_name', '')}".rstrip(": ")
+    headline = f"Eigenfrequencies: {one_line(dataset.attrs.get('job_name', ''))}".rstrip(": ")
     lines = [headline, *notes, "beside the lines: half waves along the strand"]
     figure.suptitle("\n".join(fill(line, 72) for line in lines))
     return figure

@@ -16,8 +16,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from cvt_hpc.errors import mismatch
+from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.files import written_aside
+from cvt_hpc.job.shown import JOB_UNITS, shown_number, shown_unit
 
 P = ParamSpec("P")
 
@@ -58,6 +59,13 @@ def display_unit(unit: str) -> tuple[float, str]:
     return known if known is not None else (1.0, unit.replace("s m-1", "s/m").replace("N m-1", "N/m"))
 
 
+def coordinate_unit(attributes: Mapping[str, Any]) -> tuple[float, str]:
+    """Factor and unit in which a coordinate is shown: those of the job where it names one."""
+    if JOB_UNITS not in attributes:
+        return display_unit(str(attributes.get("units", "")))
+    return shown_number(1.0, attributes), shown_unit(attributes)
+
+
 def in_words(array: xr.DataArray) -> str:
     """Name of a variable for people: its `long_name` if that is short, else `name` without underscores."""
     words = str(array.attrs.get("long_name", ""))
@@ -72,7 +80,7 @@ def axis_label(array: xr.DataArray, unit: str) -> str:
 
 def headline(attributes: Mapping[str, Any]) -> str:
     """First line above a map of a dataset with these attributes."""
-    job = attributes.get("job_name", "")
+    job = one_line(attributes.get("job_name", ""))
     return f"Vibration occurrence: {job}" if job else "Vibration occurrence"
 
 

@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis import history_panels as panels
 from cvt_hpc.analysis.figures import WIDTH, balanced, draw, styled
-from cvt_hpc.errors import InputError
+from cvt_hpc.errors import InputError, one_line
 from cvt_hpc.job.schema import load_schema
-from cvt_hpc.job.values import in_words
+from cvt_hpc.job.shown import JOB_UNITS, POINT_UNITS, shown
 from cvt_hpc.variables import Status, Vibrates, flag_in_words
 from cvt_hpc.vibration.settings import PARAMETERS
 
@@ -60,7 +60,11 @@ def history_figure(dataset: xr.Dataset) -> Figure:
     courses = [name for name in panels.COURSES if _changes(dataset, name)]
     if courses:
         places = zip((LEFT, RIGHT), courses, strict=False)
-        rows.append((1.2, [(place, panels.draw_course, dataset[name]) for place, name in places]))
+        units = {name: {JOB_UNITS: unit} for name, unit in _job_units(dataset.attrs).items()}
+        rows.append(
+            (1.2, [(place, panels.draw_course, dataset[name].assign_attrs(units.get(name, {})))
+                   for place, name in places])
+        )  # fmt: skip
     if with_spectrum:
         rows.append((2.1, [(WHOLE, panels.draw_spectra, with_spectrum)]))
     if _is_known(dataset, "ring_tension") or _is_known(dataset, "push_force"):
@@ -108,7 +112,8 @@ def _vibration_settings(dataset: xr.Dataset) -> dict[str, float]:
 
 def _title(dataset: xr.Dataset) -> str:
     """Which run, and what became of it."""
-    lines = ["One run: " + dataset.attrs["job_name"] if "job_name" in dataset.attrs else "One run"]
+    name = one_line(dataset.attrs.get("job_name", ""))
+    lines = [f"One run: {name}" if name else "One run"]
     if place := _place(dataset.attrs):
         lines.append(place)
     if "rung" in dataset:
@@ -135,4 +140,11 @@ def _place(attributes: Mapping[str, Any]) -> str:
     others = [key for key in point if key not in job["axes"] and point[key] != tables.get(key)]
     # a parameter that follows from others stands in no table; where a load was given there is no `load_share`
     keys = [key for key in (*job["axes"], *others) if key in point]
-    return ", ".join(f"{key} {in_words(point[key], schema.parameters[key].unit)}" for key in keys)
+    units = _job_units(attributes)
+    told = {key: {"units": schema.parameters[key].unit, JOB_UNITS: units.get(key, "")} for key in keys}
+    return ", ".join(f"{key} {shown(point[key], told[key])}" for key in keys)
+
+
+def _job_units(attributes: Mapping[str, Any]) -> dict[str, str]:
+    """By key the unit in which the job of a history gives a parameter, where it names one."""
+    return json.loads(attributes.get(POINT_UNITS, "{}"))

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
-from cvt_hpc.analysis.figures import axis_label, display_unit, in_words
+from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words
 from cvt_hpc.vibration.settings import SHORTEST_SEGMENT
 from cvt_hpc.vibration.signals import amplitude_spectrum, band_amplitude, dominant_frequency
 
@@ -215,7 +215,7 @@ def _peaks(signal: Array, strand: Strand, bins: Array, spectrum: Array) -> list[
 def draw_course(axes: Axes, course: xr.DataArray) -> None:
     """One of COURSES over time."""
     time = 1e3 * course["time"].values
-    factor, unit = display_unit(course.attrs.get("units", ""))
+    factor, unit = coordinate_unit(course.attrs)
     axes.plot(time, factor * course.values, color=_OTHER_COLOUR, linewidth=1.2)
     label = fill(axis_label(course, unit), 14)  # what the height of the panel holds
     axes.set(xlabel="time [ms]", ylabel=label, xlim=time[[0, -1]])

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, count_classes, occurrence_classes
-from cvt_hpc.analysis.figures import WIDTH, axis_label, display_unit, headline
+from cvt_hpc.analysis.figures import WIDTH, axis_label, coordinate_unit, headline
 from cvt_hpc.errors import mismatch
 
 MOST_AXES = 4  # six pairs; the first axes of the job
@@ -173,5 +173,5 @@ def _tick_logarithmic(axis: XAxis | YAxis) -> None:
 
 def _along(coordinate: xr.DataArray) -> tuple[NDArray[np.float64], str]:
     """Values of an axis in display units, and its label."""
-    factor, unit = display_unit(coordinate.attrs.get("units", ""))
+    factor, unit = coordinate_unit(coordinate.attrs)
     return coordinate.values * factor, axis_label(coordinate, unit)

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.bifurcation.job import Asked, Diagram
-from cvt_hpc.job.summary import core_time_in_words
+from cvt_hpc.job.summary import core_time_in_words, values_in_words
 from cvt_hpc.models.contract import load_model
+from cvt_hpc.tables import columns
 
 # of a first state: a further one beside a known state with its modes, 40 ms and 100 ms where that takes 1 s
 FURTHER = 0.14
@@ -57,12 +58,12 @@ def plan_lines(diagram: Diagram) -> Iterator[str]:
     yield f"diagram {job.name} ({job.source}): {len(costs)} branches of {len(loads)} loads"
     if job.description:
         yield job.description
-    for axis in diagram.axes:
-        yield f"  {axis.name}: {len(axis.values)} values"
-    yield f"  load: {loads[0]:g} to {loads[-1]:g} N m, {len(loads)} values"
+    axes = [(axis.name, values_in_words(axis, job.schema), f"{len(axis.values)} values") for axis in job.axes]
+    yield from columns(axes)
     steady, transient = (sum(getattr(cost, name) for cost in costs) for name in ("steady", "transient"))
     yield f"steady states: {len(costs) * len(loads)}, {core_time_in_words(steady)}"
     runs = sum(cost.runs for cost in costs)
     ends = f", if vibration begins and ends once along each branch: {core_time_in_words(transient)}"
     yield f"runs: {f'about {runs}{ends}' if runs else 'none'}"
-    yield f"estimated cost: {core_time_in_words(steady + transient)}, in one process"
+    total = core_time_in_words(steady + transient)
+    yield f"estimated cost: {total}, in one process, anew after an interruption"

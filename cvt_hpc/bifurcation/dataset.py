@@ -70,12 +70,13 @@ def diagram_dataset(diagram: Diagram, followed: Sequence[Followed]) -> xr.Datase
         the grid of the axes, counted in C order.
     """
     axes: dict[str, Any] = {
-        axis.name: (axis.name, list(axis.values), axis_dimension(axis).attributes) for axis in diagram.axes
+        axis.name: (axis.name, list(axis.values), axis_dimension(axis, diagram.job).attributes)
+        for axis in diagram.axes
     }
     lengths = {axis.name: len(axis.values) for axis in diagram.axes}
     for derived in diagram.job.derived:  # none of them along the load
         values = np.array(derived.values).reshape([lengths[name] for name in derived.axes])
-        axes[derived.name] = derived.axes, values, derived_coordinate(derived, sampled=False).attributes
+        axes[derived.name] = derived.axes, values, derived_coordinate(derived, diagram.job).attributes
     axes["load"] = ("load", list(diagram.loads), attributes("load", "N m", LOAD))
     labels = {
         name: (name, c.values.astype(object), attributes(c.long_name, c.units, c.comment))

@@ -84,7 +84,10 @@ def make_diagram(
     followed: list[Followed] = []
     costs = [predicted_cost(diagram, asked).total for asked in diagram.branches]
     with folder.claimed(diagram, fresh=fresh), closing(Steps(costs, 0, "branch", tell)) as steps:
-        held = folder.branches()
+        held, total = folder.branches(), len(diagram.branches)
+        if held:
+            words = "all are followed anew, and it is replaced once as many are done"
+            tell(f"{folder.dataset} holds {held} of {total} branches of an earlier start; {words}")
         for number, asked in enumerate(diagram.branches, 1):
             # matrices are small: threads of the linear algebra would wait for each other in loops
             with threadpool_limits(1):

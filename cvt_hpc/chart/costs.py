@@ -63,7 +63,7 @@ def plan_lines(chart: Chart) -> Iterator[str]:
         total += sum(known)
         methods = ", ".join(dict.fromkeys(point.series for point in points if point.timed))
         cells = str(len(points)), str(sum(point.starts for point in points))
-        rows.append([scene.name, *cells, short(sum(known)) if known else "", methods])
+        rows.append([scene.name, *cells, short(sum(known)) if any(known) else "not known", methods])
     yield from columns([["scene", "points", "runs", "core-s", "methods"], *rows])
     beside = f"; not known of {unknown} points" if unknown else ""
     yield f"estimated cost: {core_time_in_words(total)}, by methods that choose their step roughly{beside}"

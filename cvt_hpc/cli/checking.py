@@ -123,7 +123,7 @@ def show_job(job: Job, out: Path | None) -> None:
         from cvt_hpc.study.status import expected_cost
 
         say(*summarize(job, *expected_cost(job, output_folder(out, job))).split("\n"))
-        say(needs_line(needed))
+        say(needs_line(needed, len(job.histories)))
 
 
 def _check_ranks(ranks: list[int]) -> None:

@@ -34,7 +34,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
     from cvt_hpc.job import load_job
     from cvt_hpc.job.assignments import read_assignments
 
-    job = load_job(arguments.path, arguments.set)
+    job = load_job(arguments.path, arguments.set).with_units_of(arguments.at, "--at")
     at = read_assignments(arguments.at, job.schema, job.source, "--at")
     job.point_at(at, "--at")
     check_output(arguments.out, (".nc",))

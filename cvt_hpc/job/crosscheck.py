@@ -85,7 +85,8 @@ def check_point(
         With the first problem found.
     """
     for key, expected, found in schema.problems(parameters):
-        if key in schema.units and found == f"{parameters[key]:g} {schema.parameters[key].unit}".rstrip():
+        unit = schema.parameters[key].unit
+        if schema.unit_in_words(key) != unit and found == f"{parameters[key]:g} {unit}".rstrip():
             found = f"{found} ({schema.in_words(key, parameters[key])})"  # models tell SI values
         where = f"{source}: [{schema.section_of[key]}] {key}"
         raise mismatch(where, expected, found + _place(schema, varied or {}))
@@ -165,7 +166,8 @@ def _inert(schema: Schema, rules: Sequence[Rule], point: dict[str, Any]) -> dict
             inert[rule.needs[0]] = inert[rule.key]
     for rule in reversed(rules):
         if rule.key not in inert:
-            inert = {key: setting for key, setting in inert.items() if key not in rule.needs}
+            read = rule.read(point)
+            inert = {key: setting for key, setting in inert.items() if key not in read}
     return inert
 
 

@@ -11,7 +11,7 @@ from functools import cached_property, partial
 from typing import Any
 
 from cvt_hpc.errors import mismatch
-from cvt_hpc.job.assignments import Assignments, read_assignments
+from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignments
 from cvt_hpc.job.axes import Axis, thinned
 from cvt_hpc.job.crosscheck import check_point, complete_point
 from cvt_hpc.job.derivation import ordered_rules, overridden
@@ -19,6 +19,7 @@ from cvt_hpc.job.design import Design
 from cvt_hpc.job.formula import Formula
 from cvt_hpc.job.rules import Link, Rule, follow, needed_rules, places, varied_by
 from cvt_hpc.job.schema import Schema, load_schema
+from cvt_hpc.job.units import unit_in
 
 HEADER = ("name", "model", "stepper", "description")
 
@@ -84,7 +85,7 @@ class Job:
     rules : tuple of Rule
         How parameters follow from others, in an order in which each finds what it needs.
     units : dict
-        By key the unit in which people read a parameter, where the job has it in another than the SI unit.
+        By key the unit in which the job gives a parameter, where it names one.
     """
 
     name: str
@@ -170,6 +171,13 @@ class Job:
             index, place = divmod(index, len(axis.values))
             values[axis.name] = axis.values[place]
         return self.complete(values)
+
+    def with_units_of(self, at: Assignments, label: str = "at") -> Job:
+        """Return this job with the units of `at`, as of `point_at`, for what it gives without a unit."""
+        written = split_assignments(at, self.source, label)
+        found = {self.schema.find(name, f"{self.source}: {label} {name}"): unit_in(raw)
+                 for name, raw in written.items()}  # fmt: skip
+        return replace(self, units={key: unit for key, unit in found.items() if unit} | {**self.units})
 
     def point_at(self, at: Assignments, label: str = "at") -> dict[str, Any]:
         """Return the parameters of a run at chosen values, whether they lie on the axes or not.

@@ -137,7 +137,7 @@ def _build(
     written = _written(document, pairs, schema, source, label) if units is None else {}
     found = {key: unit_in(raw) for key, (raw, _) in written.items()}
     if units is None:
-        units = {key: unit for key, unit in found.items() if unit not in ("", schema.parameters[key].unit)}
+        units = {key: unit for key, unit in found.items() if unit}
     schema = replace(schema, units=units)
     tables = _read_tables(document, schema, source)
     of_design = {key: structured(value) for key, value in pairs.items() if key.startswith(_OF_DESIGN)}

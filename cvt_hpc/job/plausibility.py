@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.errors import UnitWarning
-from cvt_hpc.job.units import UnitError, to_si, unit_in
+from cvt_hpc.job.units import UnitError, from_si, to_si, unit_in
 from cvt_hpc.parameters import Parameter
 
 # Units in which people give a quantity, by the SI unit in which a bare number is read
@@ -31,6 +31,12 @@ _CUSTOMARY = {
     "rad/s": ("rpm",),
     "s": ("ms", "us"),
 }
+
+
+def angle_in_words(value: Any, unit: str) -> str:
+    """Return an angle or a speed of rotation [SI] as people give it, such as "11 deg"; "" of all else."""
+    wanted = {"rad": "deg", "rad/s": "rpm"}.get(unit, "")
+    return f"{from_si(value, unit, wanted):.6g} {wanted}" if wanted and value else ""
 
 
 def meant(raw: Any, parameter: Parameter) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
@@ -51,6 +51,12 @@ class Rule:
     def is_substituted(self) -> bool:
         """Whether it is the model's, and stands in no table of the job."""
         return isinstance(self.source, Substituted)
+
+    def read(self, parameters: Mapping[str, Any]) -> set[str]:
+        """Return the parameters that its value follows from at flat parameters [SI], where it has one."""
+        noted = Noted(parameters)
+        self.source.value(noted)
+        return noted.read
 
     def value(self, parameters: Mapping[str, Any]) -> Any:
         """Return the value [SI] at flat parameters [SI].
@@ -119,6 +125,28 @@ class Substituted:
     def value(self, parameters: Mapping[str, Any]) -> float:
         """Return the value [SI]."""
         return self.substitute.value(parameters)
+
+
+class Noted(Mapping[str, Any]):
+    """Flat parameters that note which of them were read, and evaluate those of `later` when these are."""
+
+    def __init__(
+        self, known: Mapping[str, Any], later: Mapping[str, Callable[[], Any]] | None = None
+    ) -> None:
+        self._known, self._later = dict(known), later or {}
+        self.read: set[str] = set()
+
+    def __getitem__(self, key: str) -> Any:
+        if key in self._later and key not in self.read:
+            self._known[key] = self._later[key]()
+        self.read.add(key)
+        return self._known[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter({**self._known, **self._later})
+
+    def __len__(self) -> int:
+        return len({**self._known, **self._later})
 
 
 def follow(rules: Iterable[Rule], parameters: Mapping[str, Any]) -> dict[str, Any]:

@@ -44,7 +44,7 @@ class Schema:
     inert : callable
         Flat values -> the keys without effect on such a run, each with the setting that makes it so.
     units : dict
-        By key the unit in which people read a parameter, where the job has it in another than the SI unit.
+        By key the unit in which the job gives a parameter, where it names one; people read it in that.
     """
 
     model: str

@@ -9,6 +9,7 @@ from cvt_hpc.errors import one_line
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.crosscheck import without_effect
 from cvt_hpc.job.definition import Derived, Job
+from cvt_hpc.job.plausibility import angle_in_words
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.values import in_words
 from cvt_hpc.models import MODELS
@@ -47,7 +48,7 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
         lines += ["", f"[{section}]", *columns(rows)]
     if job.axes:
         noun = "samples" if job.is_sampled else "values"
-        in_short = _range_in_words if job.is_sampled else _values_in_words
+        in_short = _range_in_words if job.is_sampled else values_in_words
         axes = [(axis.name, in_short(axis, schema), f"{len(axis.values)} {noun}") for axis in job.axes]
         lines += ["", "[axes]", *columns(axes)]
     if job.rules:
@@ -97,7 +98,10 @@ def _tables(job: Job, schema: Schema) -> dict[str, list[tuple[str, ...]]]:
 
 def _value_in_words(schema: Schema, key: str, value: Any) -> str:
     """Return a value for people; a long list as its length and its ends."""
-    if not isinstance(value, tuple) or len(value) <= _FEW:
+    if not isinstance(value, tuple):
+        in_customary = "" if key in schema.units else angle_in_words(value, schema.parameters[key].unit)
+        return schema.in_words(key, value) + (f" ({in_customary})" if in_customary else "")
+    if len(value) <= _FEW:
         return schema.in_words(key, value)
     if isinstance(value[0], tuple):
         return f"{len(value)} rows of {len(value[0])}"
@@ -121,7 +125,8 @@ def _rules(job: Job, schema: Schema) -> list[tuple[str, ...]]:
     return rows
 
 
-def _values_in_words(axis: Axis, schema: Schema) -> str:
+def values_in_words(axis: Axis, schema: Schema) -> str:
+    """Return the values of an axis for people, few of them if there are many."""
     values = axis.values if len(axis.values) <= _FEW else (*axis.values[:3], axis.values[-1])
     words = [schema.in_words(axis.name, value) for value in values]
     unit = schema.unit_in_words(axis.name)

@@ -13,6 +13,7 @@ import numpy as np
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import written_aside
 from cvt_hpc.job.for_model import handed_to
+from cvt_hpc.job.shown import heading, shown_number
 from cvt_hpc.models.auto.rules import Rung
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
@@ -166,16 +167,17 @@ def _write(
     table: Path, study: Study, runs: np.ndarray, both: Sequence[Records], classes: Sequence[np.ndarray]
 ) -> None:
     """Write what either rung says of some runs."""
-    names = [axis.name for axis in study.axes]
+    axes = {axis.name: axis.attributes for axis in study.axes}
+    heads = [heading(name, attributes) for name, attributes in axes.items()]
     low, full = (records.read(runs) for records in both)
     with written_aside(table) as path, path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(
-            ["run", *names, "rung", "class", "class in full", "margin", "reason", "reason in full"]
+            ["run", *heads, "rung", "class", "class in full", "margin", "reason", "reason in full"]
         )
         for k, index in enumerate(runs):
-            place = study.place(int(index))
+            place = [shown_number(value, axes[name]) for name, value in study.place(int(index)).items()]
             words = [OccurrenceClass(int(found[k])).label for found in classes]
             reasons = [rows[k]["reason"].decode(errors="replace") for rows in (low, full)]
             rung, margin = Rung(int(low[k]["rung"])).name.lower(), f"{low[k]['margin']:.3g}"
-            writer.writerow([index, *(place[name] for name in names), rung, *words, margin, *reasons])
+            writer.writerow([index, *place, rung, *words, margin, *reasons])

@@ -7,6 +7,8 @@ processor; a plain number beside it counts for all lanes. So a run's results do 
 Nor do they depend on W: every operation is rounded once, as IEEE 754 has it, and products are fused with sums
 only where `fma` says so.
 
+The functions take plain numbers too, so that a formula of both stands once.
+
 A loop over lanes in plain arrays would be left to the compiler's vectoriser, which gives up where it cannot
 rule out that two of many arrays overlap.
 """

@@ -1,4 +1,4 @@
-"""Functions of lanes: those that the processor has, and those that are made of them."""
+"""Functions of lanes and of plain numbers: those that the processor has, and those that are made of them."""
 
 from __future__ import annotations
 
@@ -11,21 +11,6 @@ from numba.extending import intrinsic, overload
 from cvt_hpc.lanes.kinds import Lanes, converted, vector_type
 
 
-def _library(name: str):
-    """A function of lanes that the processor has: `llvm.<name>`."""
-
-    def build(context, builder, sig, arguments):
-        kind = sig.return_type
-        values = [converted(context, builder, x, t, kind) for x, t in zip(arguments, sig.args, strict=True)]
-        vector = vector_type(kind)
-        suffix = f"v{kind.count}f{kind.dtype.bitwidth}"
-        function_type = ir.FunctionType(vector, [vector] * len(values))
-        function = cgutils.get_or_insert_function(builder.module, function_type, f"llvm.{name}.{suffix}")
-        return builder.call(function, values)
-
-    return build
-
-
 def _as(context, builder, value, kind, wanted):
     """A value of one type in another, be that lanes or a plain number."""
     if isinstance(wanted, Lanes):
@@ -33,47 +18,66 @@ def _as(context, builder, value, kind, wanted):
     return context.cast(builder, value, kind, wanted)
 
 
+def _common(*kinds):
+    """The type of what is made of numbers: lanes where any is, else a plain number."""
+    return next((kind for kind in kinds if isinstance(kind, Lanes)), types.float64)
+
+
+def _library(name: str, *kinds):
+    """A function that the processor has, `llvm.<name>`, of numbers of these types."""
+    kind = _common(*kinds)
+
+    def build(context, builder, sig, arguments):
+        values = [_as(context, builder, x, t, kind) for x, t in zip(arguments, sig.args, strict=True)]
+        own, suffix = (
+            (vector_type(kind), f"v{kind.count}f{kind.dtype.bitwidth}")
+            if isinstance(kind, Lanes)
+            else (ir.DoubleType(), "f64")
+        )
+        function_type = ir.FunctionType(own, [own] * len(values))
+        function = cgutils.get_or_insert_function(builder.module, function_type, f"llvm.{name}.{suffix}")
+        return builder.call(function, values)
+
+    return kind(*kinds), build
+
+
 @intrinsic
 def sqrt(context, x):
     """Square root of each lane."""
-    return x(x), _library("sqrt")
+    return _library("sqrt", x)
 
 
 @intrinsic
 def absolute(context, x):
     """Absolute value of each lane."""
-    return x(x), _library("fabs")
+    return _library("fabs", x)
 
 
 @intrinsic
 def nearest_integer(context, x):
     """Nearest whole number of each lane."""
-    return x(x), _library("rint")
+    return _library("rint", x)
 
 
 @intrinsic
 def with_sign_of(context, size, sign):
     """`size` with the sign of `sign`, lane by lane."""
-    return size(size, sign), _library("copysign")
+    return _library("copysign", size, sign)
 
 
 @intrinsic
 def fma(context, a, b, c):
     """A b + c in each lane, rounded once."""
-    kind = next(t for t in (a, b, c) if isinstance(t, Lanes))
-    return kind(a, b, c), _library("fma")
+    return _library("fma", a, b, c)
 
 
 @intrinsic
 def select(context, mask, yes, no):
     """`yes` in lanes where `mask` holds, `no` in the others."""
-    kind = yes if isinstance(yes, Lanes) else no
+    kind = _common(yes, no)
 
     def build(context, builder, sig, arguments):
-        a, b = (
-            converted(context, builder, x, t, sig.return_type)
-            for x, t in zip(arguments[1:], sig.args[1:], strict=True)
-        )
+        a, b = (_as(context, builder, x, t, kind) for x, t in zip(arguments[1:], sig.args[1:], strict=True))
         return builder.select(arguments[0], a, b)
 
     return kind(mask, yes, no), build
@@ -81,7 +85,7 @@ def select(context, mask, yes, no):
 
 def _chosen(a, b, comparison: str):
     """The type of one of two numbers, and how to choose `a` where the comparison holds, else `b`."""
-    kind = next((t for t in (a, b) if isinstance(t, Lanes)), a)
+    kind = _common(a, b)
 
     def build(context, builder, sig, arguments):
         one, other = (_as(context, builder, x, t, kind) for x, t in zip(arguments, sig.args, strict=True))
@@ -160,7 +164,8 @@ def _two_to(context, n):
 def decay(x):
     """e^-x of each lane for x >= 0, to two units in the last place.
 
-    x is held within the range of the exponent, at its upper end where it is not a number.
+    x is held within the range of the exponent, at its upper end where it is not a number. Of a plain number
+    it is the library's exponential.
     """
     raise NotImplementedError("for kernels")
 
@@ -174,7 +179,7 @@ _PER_LN_2 = 1.4426950408889634
 @overload(decay)
 def _decay(x):
     if not isinstance(x, Lanes):
-        return None
+        return lambda x: np.exp(-x)
     high, low, largest = _SINGLE if x.dtype == types.float32 else _DOUBLE
     # Taylor's terms are as good as any on |r| < ln 2 / 2: the first one left out is below the round-off
     terms = 7 if x.dtype == types.float32 else 13

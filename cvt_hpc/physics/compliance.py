@@ -16,150 +16,227 @@ two; so for a given set of closed stations the solution takes one tridiagonal so
 is found by flipping every station that violates its sign, warm from the last set, and, should that not
 settle, by flipping the first violator only, which ends for every P-matrix (Murty 1974); this matrix is
 symmetric positive definite.
+
+Of a single run by plain numbers, or of several at once, each lane with stiffnesses and gaps of its own: lanes
+that have found their set repeat their last solve, with the same numbers, until the slowest has found its own.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from cvt_hpc.kernels import kernel, merged_kernel
+from cvt_hpc.lanes import LaneArray, anywhere, fma, like, maximum, select
 from cvt_hpc.physics.sheaves import Sheaves
 
 ROUNDS_OF_BLOCK_FLIPS = 10
-FORCE_ROUND_OFF = 1e-6  # [N/m]: forces are 1e5, double precision leaves 1e-10
+
+# fields of Contact.stations
+GAP, PUSH, DIAGONAL, PIVOT, MULTIPLIER, RESPONSE_1, RESPONSE_2, Y, CLOSED, FORCED = range(10)
+# fields of Contact.scalars
+ELEMENT_STIFFNESS, COMPLIANCE, OFF_DIAGONAL, TILT_COMPLIANCE, INVERSE_11, INVERSE_12, INVERSE_22 = range(7)
+ROUND_OFF, SOLVES, UNSOLVED = range(7, 10)
+
+# Forces are 1e5 N/m and come from openings that are 1 % of their parts: what each precision leaves of them.
+_ROUND_OFF = {np.dtype(np.float64): 1e-6, np.dtype(np.float32): 2.0}
 
 
-class ContactState(NamedTuple):
-    """What the solver keeps between calls: the closed set and what only depends on it.
+class Contact(NamedTuple):
+    """The contact of one wrap of m stations, and what its solver keeps between calls.
 
     Attributes
     ----------
-    closed : (m,) bool array
-        Stations in contact.
-    pivot, multiplier : (m,) arrays
-        Factors of the tridiagonal matrix for that set.
-    response : (2, m) array
-        U - a A^-1 [h c_e a closed U]: what a unit tilt opens at each station, local bending included.
-    inverse : (2, 2) array
-        Inverse of the tilt's 2x2 system.
-    y : (m,) array
-        Work space; the local bending of the last solution.
-    push : (m,) array
-        -c_e times the opening without f / c_e: the force where closed, positive where an open station
-        overlaps [N/m].
+    weight, cosine, sine : (m,) arrays
+        Length that a station stands for [m]; directions of the tilt.
+    stations : (m, 10) LaneArray or array
+        Gap of the rigid bodies [m] (set by the caller), -c_e times the opening without f / c_e [N/m]; the
+        local kernel's diagonal, factors, the tilt's response, work space, closed set (1 or 0), and the force
+        that the caller takes from it [N/m].
+    scalars : (1, 10) LaneArray or array
+        Constants of the wrap, the inverse of the tilt's 2x2 system, the round-off of forces [N/m]; linear
+        solves so far, and whether (1) a search for the closed set did not end.
     fresh : (1,) bool array
-        False until the factors belong to `closed`.
+        False until the factors belong to the closed set.
+    sweeps : int
+        Sweeps of projected Gauss-Seidel instead (`lane_gauss_seidel`); 0: none, the exact solution.
     """
 
-    closed: np.ndarray
-    pivot: np.ndarray
-    multiplier: np.ndarray
-    response: np.ndarray
-    inverse: np.ndarray
-    y: np.ndarray
-    push: np.ndarray
+    weight: np.ndarray
+    cosine: np.ndarray
+    sine: np.ndarray
+    stations: Any
+    scalars: Any
     fresh: np.ndarray
+    sweeps: int
 
 
-def contact_state(stations: int) -> ContactState:
-    """Fresh state for a wrap of `stations` stations, all closed."""
-    return ContactState(
-        np.ones(stations, dtype=np.bool_),
-        np.zeros(stations),
-        np.zeros(stations),
-        np.zeros((2, stations)),
-        np.zeros((2, 2)),
-        np.zeros(stations),
-        np.zeros(stations),
-        np.zeros(1, dtype=np.bool_),
-    )
-
-
-@merged_kernel
-def _bend(sheave: Sheaves, state: ContactState) -> None:
-    """Solve the tridiagonal system in place of `state.y`."""
-    y, m = state.y, state.y.size
-    for j in range(1, m):
-        y[j] -= state.multiplier[j] * y[j - 1]
-    y[m - 1] *= state.pivot[m - 1]
-    for j in range(m - 2, -1, -1):
-        y[j] = y[j] * state.pivot[j] - state.multiplier[j + 1] * y[j + 1]
-
-
-@kernel
-def _factorise(sheave: Sheaves, state: ContactState) -> None:
-    """Factors and tilt responses for the present closed set."""
-    m = sheave.weight.size
-    a, ce, off = sheave.compliance, sheave.element_stiffness, sheave.off_diagonal
-    for j in range(m):
-        d = sheave.diagonal[j] + (sheave.weight[j] * ce * a if state.closed[j] else 0.0)
-        if j > 0:
-            state.multiplier[j] = off * state.pivot[j - 1]
-            d -= off * state.multiplier[j]
-        state.pivot[j] = 1.0 / d
-    for b in range(2):
-        for j in range(m):
-            state.y[j] = sheave.weight[j] * ce * a * sheave.tilt[b, j] if state.closed[j] else 0.0
-        _bend(sheave, state)
-        for j in range(m):
-            state.response[b, j] = sheave.tilt[b, j] - state.y[j]
-    gain = sheave.tilt_compliance * ce
-    s00, s01, s11 = 1.0, 0.0, 1.0
-    for j in range(m):
-        if state.closed[j]:
-            h = a * gain * sheave.weight[j]
-            s00 += h * sheave.tilt[0, j] * state.response[0, j]
-            s01 += h * sheave.tilt[0, j] * state.response[1, j]
-            s11 += h * sheave.tilt[1, j] * state.response[1, j]
-    determinant = s00 * s11 - s01 * s01
-    state.inverse[0, 0], state.inverse[1, 1] = s11 / determinant, s00 / determinant
-    state.inverse[0, 1] = state.inverse[1, 0] = -s01 / determinant
-    state.fresh[0] = True
-
-
-@merged_kernel
-def _forces(sheave: Sheaves, state: ContactState, gap: np.ndarray) -> int:
-    """`push` for the present closed set; returns the number of stations on the wrong side."""
-    m = gap.size
-    a, ce = sheave.compliance, sheave.element_stiffness
-    for j in range(m):
-        state.y[j] = -sheave.weight[j] * ce * gap[j] if state.closed[j] else 0.0
-    _bend(sheave, state)
-    p0 = p1 = 0.0
-    for j in range(m):
-        if state.closed[j]:
-            overlap = sheave.weight[j] * (gap[j] + a * state.y[j])
-            p0 -= sheave.tilt[0, j] * overlap
-            p1 -= sheave.tilt[1, j] * overlap
-    gain = sheave.tilt_compliance * ce
-    t0 = gain * (state.inverse[0, 0] * p0 + state.inverse[0, 1] * p1)
-    t1 = gain * (state.inverse[1, 0] * p0 + state.inverse[1, 1] * p1)
-    wrong = 0
-    for j in range(m):
-        opening = gap[j] + a * (state.y[j] + t0 * state.response[0, j] + t1 * state.response[1, j])
-        state.push[j] = -ce * opening
-        wrong += _wrong_side(state, j)
-    return wrong
-
-
-@merged_kernel
-def _wrong_side(state: ContactState, j: int) -> bool:
-    """A closed station that pulls or an open one that overlaps, beyond round-off."""
-    return state.push[j] < -FORCE_ROUND_OFF if state.closed[j] else state.push[j] > FORCE_ROUND_OFF
-
-
-@merged_kernel
-def solve_contact(sheave: Sheaves, state: ContactState, gap: np.ndarray, force: np.ndarray) -> int:
-    """Axial line forces of one wrap from the gaps of the rigid bodies.
+def lane_contact(wraps: list[Sheaves], dtype: DTypeLike, sweeps: int = 0) -> Contact:
+    """All stations closed, for wraps of the same stations, one for each lane.
 
     Parameters
     ----------
-    sheave : Sheaves
-        Constants of the wrap, m stations.
-    state : ContactState
-        Last closed set (where the search starts) and its factors; updated.
+    wraps : list of Sheaves
+        One for each lane.
+    dtype : type
+        np.float64 or np.float32.
+    sweeps : int
+        As in `Contact`.
+    """
+    weight = wraps[0].weight
+    stations = LaneArray(weight.size, 10, len(wraps), dtype)
+    scalars = LaneArray(1, 10, len(wraps), dtype)
+    stations.data[:, CLOSED] = 1.0
+    scalars.data[:, ROUND_OFF] = _ROUND_OFF[np.dtype(dtype)]
+    for lane, wrap in enumerate(wraps):
+        stations.data[:, DIAGONAL, lane] = wrap.diagonal
+        scalars.data[0, :INVERSE_11, lane] = (
+            wrap.element_stiffness,
+            wrap.compliance,
+            wrap.off_diagonal,
+            wrap.tilt_compliance,
+        )
+    shared = (weight.astype(dtype), wraps[0].tilt[0].astype(dtype), wraps[0].tilt[1].astype(dtype))
+    return Contact(*shared, stations, scalars, np.zeros(1, dtype=np.bool_), sweeps)
+
+
+def plain_contact(wrap: Sheaves) -> Contact:
+    """All stations closed, for a single wrap in plain numbers."""
+    contact = lane_contact([wrap], np.float64)
+    stations, scalars = contact.stations.data[:, :, 0], contact.scalars.data[:, :, 0]
+    return contact._replace(stations=stations, scalars=scalars)
+
+
+@kernel
+def _bend(m: int, stations) -> None:
+    """Solve the tridiagonal system in place of Y."""
+    y = stations[0, Y]
+    for j in range(1, m):
+        y = fma(-stations[j, MULTIPLIER], y, stations[j, Y])
+        stations[j, Y] = y
+    y = y * stations[m - 1, PIVOT]
+    stations[m - 1, Y] = y
+    for j in range(m - 2, -1, -1):
+        y = fma(-stations[j + 1, MULTIPLIER], y, stations[j, Y] * stations[j, PIVOT])
+        stations[j, Y] = y
+
+
+@kernel
+def _factorise(contact: Contact) -> None:
+    """Factors and tilt responses for the present closed set."""
+    stations, scalars, weight = contact.stations, contact.scalars, contact.weight
+    m = weight.size
+    ce, a, off = scalars[0, ELEMENT_STIFFNESS], scalars[0, COMPLIANCE], scalars[0, OFF_DIAGONAL]
+    grip = ce * a
+    pivot = like(0.0, ce)
+    for j in range(m):
+        multiplier = off * pivot
+        d = stations[j, DIAGONAL] + weight[j] * grip * stations[j, CLOSED] - off * multiplier
+        pivot = 1.0 / d
+        stations[j, MULTIPLIER], stations[j, PIVOT] = multiplier, pivot
+    for b in range(2):
+        tilt = contact.sine if b else contact.cosine
+        for j in range(m):
+            stations[j, Y] = weight[j] * tilt[j] * grip * stations[j, CLOSED]
+        _bend(m, stations)
+        for j in range(m):
+            stations[j, RESPONSE_1 + b] = tilt[j] - stations[j, Y]
+    gain = scalars[0, TILT_COMPLIANCE] * grip
+    s11, s12, s22 = like(1.0, ce), like(0.0, ce), like(1.0, ce)
+    for j in range(m):
+        h = gain * stations[j, CLOSED] * weight[j]
+        s11 += h * contact.cosine[j] * stations[j, RESPONSE_1]
+        s12 += h * contact.cosine[j] * stations[j, RESPONSE_2]
+        s22 += h * contact.sine[j] * stations[j, RESPONSE_2]
+    per_determinant = 1.0 / (s11 * s22 - s12 * s12)
+    scalars[0, INVERSE_11], scalars[0, INVERSE_22] = s22 * per_determinant, s11 * per_determinant
+    scalars[0, INVERSE_12] = -s12 * per_determinant
+    contact.fresh[0] = True
+
+
+@kernel
+def _pushes(contact: Contact) -> bool:
+    """PUSH for the present closed set; whether a station of any lane is on the wrong side."""
+    stations, scalars, weight = contact.stations, contact.scalars, contact.weight
+    m = weight.size
+    ce, a, round_off = scalars[0, ELEMENT_STIFFNESS], scalars[0, COMPLIANCE], scalars[0, ROUND_OFF]
+    y = like(0.0, ce)
+    for j in range(m):
+        y = fma(-stations[j, MULTIPLIER], y, -weight[j] * stations[j, CLOSED] * ce * stations[j, GAP])
+        stations[j, Y] = y
+    y = p1 = p2 = multiplier = like(0.0, ce)
+    for j in range(m - 1, -1, -1):
+        y = fma(-multiplier, y, stations[j, Y] * stations[j, PIVOT])
+        multiplier = stations[j, MULTIPLIER]
+        stations[j, Y] = y
+        overlap = weight[j] * stations[j, CLOSED] * fma(a, y, stations[j, GAP])
+        p1 = fma(-contact.cosine[j], overlap, p1)
+        p2 = fma(-contact.sine[j], overlap, p2)
+    gain = scalars[0, TILT_COMPLIANCE] * ce
+    t1 = gain * (scalars[0, INVERSE_11] * p1 + scalars[0, INVERSE_12] * p2)
+    t2 = gain * (scalars[0, INVERSE_12] * p1 + scalars[0, INVERSE_22] * p2)
+    wrong = ce < 0.0
+    for j in range(m):
+        elastic = fma(t2, stations[j, RESPONSE_2], fma(t1, stations[j, RESPONSE_1], stations[j, Y]))
+        push = -ce * fma(a, elastic, stations[j, GAP])
+        stations[j, PUSH] = push
+        # closed stations that pull, open ones that overlap
+        outward = select(stations[j, CLOSED] > 0.5, -push, push)
+        wrong |= outward > round_off
+    return anywhere(wrong)
+
+
+@kernel
+def solve_contact(contact: Contact, most_rounds: int) -> None:
+    """Closed sets and pushes from the gaps; forces are the pushes of closed stations, where positive.
+
+    Parameters
+    ----------
+    contact : Contact
+        With GAP set; the last closed set is where the search starts.
+    most_rounds : int
+        After that many the lanes whose search has not ended are marked UNSOLVED.
+    """
+    stations, scalars = contact.stations, contact.scalars
+    m = contact.weight.size
+    round_off = scalars[0, ROUND_OFF]
+    scalars[0, SOLVES] = scalars[0, SOLVES] + 1.0
+    busy = round_off < 0.0
+    for round_ in range(most_rounds):
+        if not contact.fresh[0]:
+            _factorise(contact)
+        if not _pushes(contact):
+            return
+        busy = round_off < 0.0
+        for j in range(m):
+            push, closed = stations[j, PUSH], stations[j, CLOSED]
+            wrong = select(closed > 0.5, -push, push) > round_off
+            if round_ >= ROUNDS_OF_BLOCK_FLIPS:
+                # one at a time: ends for every P-matrix
+                wrong &= ~busy
+            busy |= wrong
+            stations[j, CLOSED] = select(wrong, 1.0 - closed, closed)
+        scalars[0, SOLVES] = scalars[0, SOLVES] + select(busy, like(1.0, round_off), 0.0)
+        contact.fresh[0] = False
+    scalars[0, UNSOLVED] = select(busy, like(1.0, round_off), scalars[0, UNSOLVED])
+
+
+@merged_kernel
+def contact_force(stations, j: int):
+    """Axial line force of station j >= 0 [N/m], of the last solution."""
+    return select(stations[j, CLOSED] > 0.5, maximum(stations[j, PUSH], 0.0), 0.0)
+
+
+@kernel
+def solve_wrap(contact: Contact, gap: np.ndarray, force: np.ndarray) -> int:
+    """Axial line forces of one wrap from the gaps of the rigid bodies, in plain numbers.
+
+    Parameters
+    ----------
+    contact : Contact
+        Of plain arrays; the last closed set is where the search starts.
     gap : (m,) array
         G, negative where rigid bodies would overlap [m].
     force : (m,) array
@@ -171,20 +248,13 @@ def solve_contact(sheave: Sheaves, state: ContactState, gap: np.ndarray, force: 
         Number of linear solves taken (1 where the set has not changed); 0 if the search did not end, which
         happens for gaps that are not numbers only.
     """
-    m = gap.size
-    for round_ in range(ROUNDS_OF_BLOCK_FLIPS + 10 * m):
-        if not state.fresh[0]:
-            _factorise(sheave, state)
-        if _forces(sheave, state, gap) == 0:
-            finite = True
-            for j in range(m):
-                finite &= np.isfinite(state.push[j])
-                force[j] = max(state.push[j], 0.0) if state.closed[j] else 0.0
-            return round_ + 1 if finite else 0
-        for j in range(m):
-            if _wrong_side(state, j):
-                state.closed[j] = not state.closed[j]
-                if round_ >= ROUNDS_OF_BLOCK_FLIPS:
-                    break
-        state.fresh[0] = False
-    return 0
+    stations, scalars, m = contact.stations, contact.scalars, gap.size
+    for j in range(m):
+        stations[j, GAP] = gap[j]
+    scalars[0, SOLVES] = scalars[0, UNSOLVED] = 0.0
+    solve_contact(contact, ROUNDS_OF_BLOCK_FLIPS + 10 * m)
+    solved = scalars[0, UNSOLVED] == 0.0
+    for j in range(m):
+        solved &= np.isfinite(stations[j, PUSH])
+        force[j] = contact_force(stations, j)
+    return int(scalars[0, SOLVES]) if solved else 0

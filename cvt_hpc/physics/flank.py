@@ -1,34 +1,49 @@
-"""Forces between an element's flanks and the sheaves at one station."""
+"""Forces between an element's flanks and the sheaves at one station, of plain numbers and of lanes."""
 
 from __future__ import annotations
 
-import numpy as np
-
 from cvt_hpc.kernels import merged_kernel
-from cvt_hpc.lanes import fma, sqrt
+from cvt_hpc.lanes import fma, maximum, sqrt
 from cvt_hpc.physics.friction import saturation
 
 LEAST_SPEED = 1e-9  # [m/s]: below it the direction of sliding is of no effect, friction is linear there
 
 
 @merged_kernel
-def sliding(v_radial: float, v_tangential: float, cosine: float) -> tuple[float, float]:
+def flank_sliding(v_radial, v_tangential, per_cosine):
     """Sliding speed in the plane of the flank and the part of it along the meridian.
 
     Parameters
     ----------
-    v_radial, v_tangential : float
+    v_radial, v_tangential
         Speed of the element against the sheave, radial and along the belt [m/s].
-    cosine : float
-        Cosine of the half wedge angle: the flank is inclined, so the meridian speed is v_radial / cosine.
+    per_cosine
+        1 / cosine of the half wedge angle: the flank is inclined, its meridian speed is v_radial times that.
 
     Returns
     -------
-    speed, meridian : float
+    speed, meridian
         |v| and v_meridian [m/s].
     """
-    meridian = v_radial / cosine
-    return max(np.sqrt(meridian * meridian + v_tangential * v_tangential), LEAST_SPEED), meridian
+    meridian = v_radial * per_cosine
+    return sqrt(fma(meridian, meridian, v_tangential * v_tangential)), meridian
+
+
+@merged_kernel
+def flank_shares(mu, climb, sine, cosine):
+    """Axial and radial force of a flank over its normal force (Bullinger et al. 2005, eqs 37-38).
+
+    Parameters
+    ----------
+    mu
+        Coefficient of friction, with its regularisation [1].
+    climb
+        Share of the meridian in the sliding speed [1].
+    sine, cosine
+        Of the half wedge angle.
+    """
+    upward = mu * climb
+    return fma(upward, sine, cosine), fma(-upward, cosine, sine)
 
 
 @merged_kernel
@@ -40,7 +55,7 @@ def flank_forces(
     axial: float,
     v_radial: float,
     v_tangential: float,
-) -> tuple[float, float, float, float]:
+) -> tuple[float, float]:
     """Line forces of both flanks on the belt (Bullinger et al. 2005, eqs 37-39).
 
     Parameters
@@ -60,23 +75,19 @@ def flank_forces(
     -------
     radial, tangential : float
         Forces of both flanks, outward and along the belt [N/m].
-    along, across : float
-        Minus the slope of the friction force with speed, in the direction of sliding (law's value kept) and
-        across it [N s/m^2]; both >= 0.
     """
-    speed, meridian = sliding(v_radial, v_tangential, cosine)
-    factor, slope = saturation(speed, width)
+    speed, meridian = flank_sliding(v_radial, v_tangential, 1.0 / cosine)
+    speed = maximum(speed, LEAST_SPEED)
+    factor, _ = saturation(speed, 1.0 / width)
     mu = coefficient * factor
-    share = mu * meridian / speed
-    twice_normal = 2.0 * axial / (cosine + share * sine)
-    radial = twice_normal * (sine - share * cosine)
-    tangential = -twice_normal * mu * v_tangential / speed
-    return radial, tangential, twice_normal * coefficient * slope, twice_normal * mu / speed
+    axial_share, radial_share = flank_shares(mu, meridian / speed, sine, cosine)
+    twice_normal = 2.0 * axial / axial_share
+    return twice_normal * radial_share, -twice_normal * mu * v_tangential / speed
 
 
 @merged_kernel
 def tangential_sliding(v_element, w, turning, surface):
-    """Speed of an element against the sheave along the belt [m/s], in lanes.
+    """Speed of an element against the sheave along the belt [m/s].
 
     Parameters
     ----------
@@ -88,27 +99,3 @@ def tangential_sliding(v_element, w, turning, surface):
         Pulley's speed [rad/s] and that of its surface at the pitch radius, less the belt speed [m/s].
     """
     return v_element - fma(turning, w, surface)
-
-
-@merged_kernel
-def flank_sliding(v_radial, v_tangential, per_cosine):
-    """`sliding` in lanes, from the reciprocal of the cosine; the speed has no least value here."""
-    meridian = v_radial * per_cosine
-    return sqrt(fma(meridian, meridian, v_tangential * v_tangential)), meridian
-
-
-@merged_kernel
-def flank_shares(mu, climb, sine, cosine):
-    """Axial and radial force of a flank over its normal force (Bullinger et al. 2005, eqs 37-38), in lanes.
-
-    Parameters
-    ----------
-    mu
-        Coefficient of friction, with its regularisation [1].
-    climb
-        Share of the meridian in the sliding speed [1].
-    sine, cosine
-        Of the half wedge angle.
-    """
-    upward = mu * climb
-    return fma(upward, sine, cosine), fma(-upward, cosine, sine)

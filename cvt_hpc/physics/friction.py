@@ -24,8 +24,8 @@ The cubic law (Thomsen and Fidlin 2003) has mu_s = mu_k - 2/3 g v_s; beyond x = 
 back at mu_s, it is held there. For a table the gradient is the slope of its first interval at the lowest
 force.
 
-Kernels of lanes take mu alone, from coefficients prepared once (`lane_law`), so that a formula has no
-division; plain ones take its slope too. The two differ by round-off.
+A formula stands once, for lanes and for plain numbers. It takes coefficients that are prepared beforehand
+(`law_numbers`), which spares divisions. The two differ by the round-off of the exponential alone.
 """
 
 from __future__ import annotations
@@ -37,8 +37,10 @@ import numpy as np
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel, merged_kernel
-from cvt_hpc.lanes import decay, fma, like, maximum, minimum
+from cvt_hpc.lanes import absolute, decay, fma, like, maximum, minimum, select, with_sign_of
 from cvt_hpc.physics.friction_laws import FORMULA_PARAMETERS, FRICTION_LAWS, TABLE_PARAMETERS, Law
+
+_ROOT_3 = 1.7320508075688772
 
 
 class FrictionLaw(NamedTuple):
@@ -114,104 +116,58 @@ def given_law(parameters: Mapping[str, Any]) -> FrictionLaw:
     return friction_law(parameters["friction_law"], *(parameters[key] for key in keys))
 
 
-@kernel
-def _bracket(grid: np.ndarray, value: float) -> tuple[int, float]:
-    """Interval of an ascending grid and the position in it, 0..1; held at both ends."""
-    last = grid.size - 2
-    i = min(max(np.searchsorted(grid, value) - 1, 0), last)
-    return i, min(max((value - grid[i]) / (grid[i + 1] - grid[i]), 0.0), 1.0)  # type: ignore[return-value, index, operator]  # i is an int to the compiler
+FORMULAS: dict[Law, Callable[..., Any]] = {}  # asked for in this order
 
 
-@kernel
-def _table_lookup(law: FrictionLaw, speed: float, force: float) -> tuple[float, float]:
-    i, a = _bracket(law.table_force, force)
-    j, b = _bracket(law.table_speed, speed)
-    low = (1.0 - a) * law.table_mu[i, j] + a * law.table_mu[i + 1, j]
-    high = (1.0 - a) * law.table_mu[i, j + 1] + a * law.table_mu[i + 1, j + 1]
-    inside = law.table_speed[0] <= speed < law.table_speed[-1]
-    slope = (high - low) / (law.table_speed[j + 1] - law.table_speed[j]) if inside else 0.0
-    return (1.0 - b) * low + b * high, slope
+def _formula_of(law: Law) -> Callable[..., Any]:
+    """Note a function as the formula of a law: mu and its slope, from what `law_numbers` prepares and v.
+
+    Kernels that take mu alone do not compute the slope: the compiler drops what nobody reads.
+    """
+
+    def note(formula: Callable[..., Any]) -> Callable[..., Any]:
+        FORMULAS[law] = formula
+        return formula
+
+    return note
 
 
-# Each formula twice. In plain numbers: mu and its slope from mu_k, g, v_s and v. In lanes: mu from what
-# `lane_law` prepares, mu_k, g v_s, 1 / v_s and -g / mu_k, and v.
-
-
-def _coulomb(numbers, speed):
-    kinetic, gradient, scale = numbers
-    return kinetic, 0.0
-
-
-def _lane_coulomb(numbers, speed):
-    kinetic, fall, per_scale, decline = numbers
-    return kinetic
-
-
-def _linear(numbers, speed):
-    kinetic, gradient, scale = numbers
-    mu, slope = kinetic, 0.0
-    if speed < scale:
-        mu, slope = kinetic + gradient * (speed - scale), gradient
-    return mu, slope
-
-
-def _lane_linear(numbers, speed):
-    kinetic, fall, per_scale, decline = numbers
-    return fma(fall, minimum(speed * per_scale - 1.0, 0.0), kinetic)
-
-
+@_formula_of(Law.STRIBECK)
 def _stribeck(numbers, speed):
-    kinetic, gradient, scale = numbers
-    fall = gradient * np.exp(-speed / scale)
-    return kinetic - scale * fall, fall
-
-
-def _lane_stribeck(numbers, speed):
     kinetic, fall, per_scale, decline = numbers
-    return fma(-fall, decay(speed * per_scale), kinetic)
+    left = decay(speed * per_scale)
+    return fma(-fall, left, kinetic), fall * per_scale * left
 
 
+@_formula_of(Law.COULOMB)
+def _coulomb(numbers, speed):
+    kinetic, fall, per_scale, decline = numbers
+    return like(kinetic, speed), like(0.0, speed)
+
+
+@_formula_of(Law.LINEAR)
+def _linear(numbers, speed):
+    kinetic, fall, per_scale, decline = numbers
+    below = minimum(speed * per_scale - 1.0, 0.0)
+    return fma(fall, below, kinetic), select(below < 0.0, like(fall * per_scale, speed), 0.0)
+
+
+@_formula_of(Law.HYPERBOLIC)
 def _hyperbolic(numbers, speed):
-    kinetic, gradient, scale = numbers
-    denominator = 1.0 - gradient / kinetic * speed
-    return kinetic / denominator, gradient / (denominator * denominator)
-
-
-def _lane_hyperbolic(numbers, speed):
     kinetic, fall, per_scale, decline = numbers
-    return kinetic / fma(decline, speed, 1.0)
+    denominator = fma(decline, speed, 1.0)
+    mu = kinetic / denominator
+    return mu, -decline * mu / denominator
 
 
+@_formula_of(Law.CUBIC)
 def _cubic(numbers, speed):
-    kinetic, gradient, scale = numbers
-    x = speed / scale
-    span = -2.0 / 3.0 * gradient * scale
-    mu, slope = kinetic + span, 0.0
-    if x * x < 3.0:
-        mu, slope = kinetic + span * (1.0 - 1.5 * (x - x * x * x / 3.0)), gradient * (1.0 - x * x)
-    return mu, slope
-
-
-def _lane_cubic(numbers, speed):
     kinetic, fall, per_scale, decline = numbers
-    x = minimum(speed * per_scale, 1.7320508075688772)
-    return kinetic - fall * (2.0 / 3.0) * (1.0 - 1.5 * (x - x * x * x * (1.0 / 3.0)))
+    x = minimum(speed * per_scale, _ROOT_3)
+    mu = kinetic - fall * (2.0 / 3.0) * (1.0 - 1.5 * (x - x * x * x * (1.0 / 3.0)))
+    return mu, select(x < _ROOT_3, fall * per_scale * (1.0 - x * x), 0.0)
 
 
-class Formula(NamedTuple):
-    """A law's formula in plain numbers and in lanes."""
-
-    plain: Callable[..., Any]
-    lanes: Callable[..., Any]
-
-
-FORMULAS = {
-    Law.STRIBECK: Formula(_stribeck, _lane_stribeck),
-    Law.COULOMB: Formula(_coulomb, _lane_coulomb),
-    Law.LINEAR: Formula(_linear, _lane_linear),
-    Law.HYPERBOLIC: Formula(_hyperbolic, _lane_hyperbolic),
-    Law.CUBIC: Formula(_cubic, _lane_cubic),
-}
 if missing := set(Law) - {Law.TABLE} - set(FORMULAS):
     raise NotImplementedError(f"friction laws without a formula: {missing}")
 
@@ -221,21 +177,18 @@ if missing := set(Law) - {Law.TABLE} - set(FORMULAS):
 
 
 def _unknown(kind, numbers, speed):
-    return np.nan, np.nan
+    return like(np.nan, speed), like(np.nan, speed)
 
 
-def _lane_unknown(kind, numbers, speed):
-    return like(np.nan, speed)
-
-
-def _by_kind(formulas: list[tuple[Law, Any]], otherwise: Any, merged: bool = False) -> Any:
-    """What takes a kind and a formula's numbers: the formula of that kind, for others `otherwise`."""
+def _by_kind(formulas: list[tuple[Law, Any]]) -> Any:
+    """What takes a kind and a formula's numbers: the formula of that kind, for others `_unknown`."""
+    # merged, as a call from an inner loop costs more than the formula
     if not formulas:
-        return register_jitable(forceinline=merged)(otherwise)
-    own, formula = int(formulas[0][0]), register_jitable(forceinline=merged)(formulas[0][1])
-    others = _by_kind(formulas[1:], otherwise, merged)
+        return register_jitable(forceinline=True)(_unknown)
+    own, formula = int(formulas[0][0]), register_jitable(forceinline=True)(formulas[0][1])
+    others = _by_kind(formulas[1:])
 
-    @register_jitable(forceinline=merged)
+    @register_jitable(forceinline=True)
     def find(kind, numbers, speed):
         if kind == own:
             found = formula(numbers, speed)
@@ -246,21 +199,65 @@ def _by_kind(formulas: list[tuple[Law, Any]], otherwise: Any, merged: bool = Fal
     return find
 
 
-_plain = _by_kind([(law, formula.plain) for law, formula in FORMULAS.items()], _unknown)
-# a call from an inner loop costs more than the formula
-_lanes = _by_kind([(law, formula.lanes) for law, formula in FORMULAS.items()], _lane_unknown, merged=True)
+_formula = _by_kind(list(FORMULAS.items()))
+
+
+@merged_kernel
+def law_numbers(kinetic, gradient, scale):
+    """Coefficients of a law as `formula_coefficient` takes them, from mu_k [1], g [s/m] and v_s [m/s]."""
+    return kinetic, gradient * scale, 1.0 / scale, -gradient / kinetic
+
+
+@merged_kernel
+def formula_coefficient(kind: int, numbers, speed):
+    """Coefficient of friction in steady sliding by a law that is a formula, and its slope.
+
+    Parameters
+    ----------
+    kind : int
+        One of `Law`, the same in all lanes; not a number comes of any other.
+    numbers
+        What `law_numbers` made of the law's.
+    speed
+        Sliding speed, >= 0 [m/s]; lanes or a plain number.
+
+    Returns
+    -------
+    mu, slope
+        Coefficient [1] and dmu/dspeed [s/m].
+    """
+    found = _formula(kind, numbers, speed)
+    return found
 
 
 @kernel
-def formula_coefficient(
-    kind: int, kinetic: float, gradient: float, scale: float, speed: float
-) -> tuple[float, float]:
-    """`friction_coefficient` of the laws that are formulas, from plain numbers.
+def table_coefficient(table: tuple[np.ndarray, np.ndarray, np.ndarray], speed, force):
+    """`formula_coefficient` by a table that all lanes share: bilinear, held constant outside.
 
-    Kernels call this one in their inner loops: handing over a `FrictionLaw` costs more than the law itself.
-    Not a number comes of a kind that is no such law.
+    `table` holds forces (nf,) [N/m], speeds (nv,) [m/s] and coefficients (nf, nv). Kernels of lanes choose
+    between it and `formula_coefficient` themselves: handing over the table in an inner loop counts references
+    to its arrays, which costs a fifth of all that is done of sliding. Written as a sum over its intervals, of
+    which each lane fills those below its place. At a knot the slope is that of the interval above.
     """
-    return _plain(kind, (kinetic, gradient, scale), speed)
+    table_force, table_speed, table_mu = table
+    mu = slope = mu_below = slope_below = like(0.0, speed)
+    for i in range(table_force.size):
+        row, rise = like(table_mu[i, 0], speed), like(0.0, speed)
+        for j in range(table_speed.size - 1):
+            width = table_speed[j + 1] - table_speed[j]
+            steepness = (table_mu[i, j + 1] - table_mu[i, j]) / width
+            row += minimum(maximum(speed - table_speed[j], 0.0), width) * steepness
+            rise = select(speed >= table_speed[j], like(steepness, speed), rise)
+        rise = select(speed < table_speed[-1], rise, 0.0)
+        if i == 0:
+            mu, slope = row, rise
+        else:
+            span = table_force[i] - table_force[i - 1]
+            share = minimum(maximum((force - table_force[i - 1]) / span, 0.0), 1.0)
+            mu += (row - mu_below) * share
+            slope += (rise - slope_below) * share
+        mu_below, slope_below = row, rise
+    return mu, slope
 
 
 @merged_kernel
@@ -284,8 +281,11 @@ def friction_coefficient(law: FrictionLaw, speed: float, force: float) -> tuple[
         dmu/dspeed [s/m].
     """
     if law.kind == Law.TABLE:
-        return _table_lookup(law, speed, force)
-    return formula_coefficient(law.kind, law.kinetic, law.gradient, law.speed, speed)
+        found = table_coefficient((law.table_force, law.table_speed, law.table_mu), speed, force)
+    else:
+        numbers = law_numbers(law.kinetic, law.gradient, law.speed)
+        found = formula_coefficient(law.kind, numbers, speed)
+    return found
 
 
 @kernel
@@ -297,79 +297,23 @@ def friction_coefficients(law: FrictionLaw, speeds: np.ndarray, forces: np.ndarr
     return found
 
 
-@kernel
-def saturation(speed: float, width: float) -> tuple[float, float]:
-    """Regularisation of Coulomb friction about zero speed: tanh(speed / width) and its slope.
+@merged_kernel
+def saturation(speed, per_width):
+    """Regularisation of Coulomb friction about zero speed: tanh(speed / v_reg) and its slope.
 
     Parameters
     ----------
-    speed : float
-        Sliding speed, any sign [m/s].
-    width : float
-        Regularisation speed v_reg, > 0 [m/s].
+    speed
+        Sliding speed, any sign [m/s]; lanes or a plain number.
+    per_width
+        1 / v_reg, > 0 [s/m].
 
     Returns
     -------
-    factor, slope : float
-        tanh(speed / width) [1] and its derivative [s/m].
+    factor, slope
+        tanh(speed / v_reg) [1] and its derivative [s/m].
     """
     # tanh by one exponential: a third of the cost of the library's
-    decay = np.exp(-2.0 * abs(speed) / width)
-    factor = (1.0 - decay) / (1.0 + decay)
-    return np.copysign(factor, speed), (1.0 - factor * factor) / width
-
-
-@merged_kernel
-def lane_saturation(speed, per_width):
-    """tanh(speed / width) of speeds >= 0 [m/s], from 1 / width [s/m], in lanes."""
-    left = decay(speed * (2.0 * per_width))
-    return (1.0 - left) / (1.0 + left)
-
-
-@merged_kernel
-def lane_law(kinetic, gradient, scale):
-    """Coefficients of a law as `lane_coefficient` takes them, from mu_k [1], g [s/m] and v_s [m/s]."""
-    return kinetic, gradient * scale, 1.0 / scale, -gradient / kinetic
-
-
-@merged_kernel
-def lane_coefficient(kind: int, coefficients, speed):
-    """Coefficient of friction in steady sliding by a law that is a formula, in lanes.
-
-    Parameters
-    ----------
-    kind : int
-        One of `Law`, the same in all lanes; not a number comes of any other.
-    coefficients
-        What `lane_law` made of the law's numbers.
-    speed
-        Sliding speed, >= 0 [m/s].
-    """
-    mu = _lanes(kind, coefficients, speed)
-    return mu
-
-
-@kernel
-def lane_table(table: tuple[np.ndarray, np.ndarray, np.ndarray], speed, force):
-    """Coefficient by a table that all lanes share: bilinear, held constant outside.
-
-    `table` holds forces (nf,) [N/m], speeds (nv,) [m/s] and coefficients (nf, nv). Kernels choose between it
-    and `lane_coefficient` themselves: handing over the table in an inner loop counts references to its
-    arrays, which costs a fifth of all that is done of sliding. Written as a sum over its intervals, of which
-    each lane fills those below its place.
-    """
-    table_force, table_speed, table_mu = table
-    mu = mu_below = like(0.0, speed)
-    for i in range(table_force.size):
-        row = like(table_mu[i, 0], speed)
-        for j in range(table_speed.size - 1):
-            width = table_speed[j + 1] - table_speed[j]
-            filled = minimum(maximum(speed - table_speed[j], 0.0), width)
-            row += filled * ((table_mu[i, j + 1] - table_mu[i, j]) / width)
-        if i == 0:
-            mu = row
-        else:
-            span = table_force[i] - table_force[i - 1]
-            mu += (row - mu_below) * minimum(maximum((force - table_force[i - 1]) / span, 0.0), 1.0)
-        mu_below = row
-    return mu
+    left = decay(absolute(speed) * (2.0 * per_width))
+    factor = (1.0 - left) / (1.0 + left)
+    return with_sign_of(factor, speed), (1.0 - factor * factor) * per_width

@@ -1,35 +1,83 @@
 """The friction laws: which there are, the parameters that each reads, and what may be wrong with these.
 
-A law is declared by an entry in `Law` and in `_DECLARATIONS`; its formula, by which this file cannot be read
-without a compiler, goes into `friction.FORMULAS`, whose import fails where one is missing.
+A law is declared by an entry in `Law`; its formula, by which this file cannot be read without a compiler,
+goes into `friction`, whose import fails where one is missing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 Problems = list[tuple[str, str, str]]  # of (key, expected, found)
 
-
-class Law(IntEnum):
-    """The laws, as kernels know them."""
-
-    COULOMB = 0
-    LINEAR = 1
-    STRIBECK = 2
-    HYPERBOLIC = 3
-    CUBIC = 4
-    TABLE = 5
-
-
-FRICTION_LAWS = tuple(law.name.lower() for law in Law)  # as a job names them
 FORMULA_PARAMETERS = ("kinetic_friction", "friction_gradient", "stribeck_velocity")
 TABLE_PARAMETERS = ("table_force", "table_speed", "table_mu")
 _ALL_PARAMETERS = (*FORMULA_PARAMETERS, "table_file", *TABLE_PARAMETERS)
+
+
+def _no_problems(p: Mapping[str, Any]) -> Problems:
+    return []
+
+
+def _coulomb_problems(p: Mapping[str, Any]) -> Problems:
+    if p["friction_gradient"] == 0.0:
+        return []
+    return [("friction_gradient", "0 with friction_law coulomb", f"{p['friction_gradient']:g} s/m")]
+
+
+def _table_problems(p: Mapping[str, Any]) -> Problems:
+    """Problems of a friction table; the first one only."""
+    force, speed, mu = (p[key] for key in TABLE_PARAMETERS)
+    for key, grid in (("table_force", force), ("table_speed", speed)):
+        if len(grid) < 2 or np.any(np.diff(grid) <= 0.0):
+            return [(key, "at least two ascending values", f"{list(grid)}")]
+    shape = (len(force), len(speed))
+    if len(mu) != shape[0] or any(not isinstance(row, tuple) or len(row) != shape[1] for row in mu):
+        lengths = ", ".join(str(len(row)) if isinstance(row, tuple) else "no row" for row in mu)
+        return [("table_mu", f"{shape[0]} rows of {shape[1]} coefficients", f"rows of {lengths or 'none'}")]
+    if np.min(mu) <= 0.0:
+        return [("table_mu", "coefficients > 0", f"{np.min(mu):g}")]
+    return []
+
+
+class Law(IntEnum):
+    """The laws, as kernels know them, each with its declaration.
+
+    Attributes
+    ----------
+    reads : tuple of str
+        The parameters that the law reads.
+    problems : callable
+        What finds its problems in parameters by name.
+    """
+
+    reads: tuple[str, ...]
+    problems: Callable[[Mapping[str, Any]], Problems]
+
+    def __new__(
+        cls,
+        number: int,
+        reads: tuple[str, ...],
+        problems: Callable[[Mapping[str, Any]], Problems] = _no_problems,
+    ) -> Law:
+        """Make the member of a number."""
+        law = int.__new__(cls, number)
+        law._value_, law.reads, law.problems = number, reads, problems
+        return law
+
+    COULOMB = 0, ("kinetic_friction", "friction_gradient"), _coulomb_problems
+    LINEAR = 1, FORMULA_PARAMETERS
+    STRIBECK = 2, FORMULA_PARAMETERS
+    HYPERBOLIC = 3, ("kinetic_friction", "friction_gradient")
+    CUBIC = 4, FORMULA_PARAMETERS
+    TABLE = 5, ("table_file", *TABLE_PARAMETERS), _table_problems
+
+
+FRICTION_LAWS = tuple(law.name.lower() for law in Law)  # as a job names them
 
 
 def friction_problems(parameters: Mapping[str, Any]) -> Problems:
@@ -58,47 +106,5 @@ def friction_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
     return inert
 
 
-class _Declaration(NamedTuple):
-    """The parameters that a law reads, and what finds its problems in parameters by name."""
-
-    reads: tuple[str, ...]
-    problems: Callable[[Mapping[str, Any]], Problems]
-
-
-def _declared(parameters: Mapping[str, Any]) -> _Declaration:
-    return _DECLARATIONS[Law[parameters["friction_law"].upper()]]
-
-
-def _no_problems(p: Mapping[str, Any]) -> Problems:
-    return []
-
-
-def _coulomb_problems(p: Mapping[str, Any]) -> Problems:
-    if p["friction_gradient"] == 0.0:
-        return []
-    return [("friction_gradient", "0 with friction_law coulomb", f"{p['friction_gradient']:g} s/m")]
-
-
-def _table_problems(p: Mapping[str, Any]) -> Problems:
-    """Problems of a friction table; the first one only."""
-    force, speed, mu = (p[key] for key in TABLE_PARAMETERS)
-    for key, grid in (("table_force", force), ("table_speed", speed)):
-        if len(grid) < 2 or np.any(np.diff(grid) <= 0.0):
-            return [(key, "at least two ascending values", f"{list(grid)}")]
-    shape = (len(force), len(speed))
-    if len(mu) != shape[0] or any(not isinstance(row, tuple) or len(row) != shape[1] for row in mu):
-        lengths = ", ".join(str(len(row)) if isinstance(row, tuple) else "no row" for row in mu)
-        return [("table_mu", f"{shape[0]} rows of {shape[1]} coefficients", f"rows of {lengths or 'none'}")]
-    if np.min(mu) <= 0.0:
-        return [("table_mu", "coefficients > 0", f"{np.min(mu):g}")]
-    return []
-
-
-_DECLARATIONS = {
-    Law.COULOMB: _Declaration(("kinetic_friction", "friction_gradient"), _coulomb_problems),
-    Law.LINEAR: _Declaration(FORMULA_PARAMETERS, _no_problems),
-    Law.STRIBECK: _Declaration(FORMULA_PARAMETERS, _no_problems),
-    Law.HYPERBOLIC: _Declaration(("kinetic_friction", "friction_gradient"), _no_problems),
-    Law.CUBIC: _Declaration(FORMULA_PARAMETERS, _no_problems),
-    Law.TABLE: _Declaration(("table_file", *TABLE_PARAMETERS), _table_problems),
-}
+def _declared(parameters: Mapping[str, Any]) -> Law:
+    return Law[parameters["friction_law"].upper()]

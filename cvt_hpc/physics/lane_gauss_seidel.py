@@ -1,4 +1,4 @@
-"""The contact of `lane_compliance` by a few sweeps of projected Gauss-Seidel: how inexact may contact be?
+"""The contact of `compliance` by a few sweeps of projected Gauss-Seidel: how inexact may contact be?
 
 Each station in turn takes the force that closes its gap while all others keep theirs, or none if it would
 have to pull. The kernel of local bending is Markov, so what a station feels of those behind it goes along
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import fma, like, maximum
-from cvt_hpc.physics.lane_compliance import (
+from cvt_hpc.physics.compliance import (
     COMPLIANCE,
     DIAGONAL,
     ELEMENT_STIFFNESS,
@@ -20,18 +20,18 @@ from cvt_hpc.physics.lane_compliance import (
     PUSH,
     SOLVES,
     TILT_COMPLIANCE,
-    LaneContact,
+    Contact,
     Y,
 )
 
 
 @kernel
-def sweep_lane_contact(contact: LaneContact) -> None:
+def sweep_lane_contact(contact: Contact) -> None:
     """Approximate PUSH from the gaps, by `contact.sweeps` sweeps; it is never negative, and no set is kept.
 
     Parameters
     ----------
-    contact : LaneContact
+    contact : Contact
         With GAP set; PUSH of the last call is where the sweeps start.
     """
     scalars = contact.scalars
@@ -41,7 +41,7 @@ def sweep_lane_contact(contact: LaneContact) -> None:
 
 
 @kernel
-def _sweep(contact: LaneContact) -> None:
+def _sweep(contact: Contact) -> None:
     stations, scalars, weight = contact.stations, contact.scalars, contact.weight
     m = weight.size
     a, tilt = scalars[0, COMPLIANCE], scalars[0, TILT_COMPLIANCE]

@@ -69,7 +69,7 @@ def sheaves(
     Returns
     -------
     Sheaves
-        For `solve_contact`.
+        For `plain_contact` and `lane_contact`.
     """
     decay = np.exp(-spacing / local_length)
     scale = 2.0 * local_length * local_stiffness / (1.0 - decay * decay)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from cvt_hpc.job.rules import Noted, places, varied_by
 from cvt_hpc.models.contract import Model, Parameters, load_model
 from cvt_hpc.recording import longest_duration
 from cvt_hpc.simulation.record import recorded_model
@@ -39,14 +41,16 @@ def run_costs(job: Job) -> np.ndarray:
     """
     values = [np.asarray(axis.values) for axis in job.axes]
     grids = values if job.is_sampled else np.meshgrid(*values, indexing="ij", sparse=True)
-    p = {**job.parameters, **dict(zip((axis.name for axis in job.axes), grids, strict=True))}
-    p |= {derived.name: _over_the_grid(job, derived) for derived in job.derived}
+    p = Noted(
+        {**job.parameters, **dict(zip((axis.name for axis in job.axes), grids, strict=True))},
+        {derived.name: partial(_over_the_grid, job, derived) for derived in job.derived},
+    )
     model = recorded_model(job)
     cost = model.cost(p, job.stepper) / model.lanes(job.parameters, job.stepper)
     return np.broadcast_to(cost * _allowance(p), job.shape).ravel()
 
 
-def _allowance(p: dict[str, Any]) -> Any:
+def _allowance(p: Mapping[str, Any]) -> Any:
     """Cost of a run over that of its first transient, mean of a map: a number or an array of them."""
     if "longest_duration" not in p:
         return 1.0
@@ -93,12 +97,44 @@ def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
     list of tuple of int
         Each index once, in as few batches as can be, of nearly equal size.
     """
+    runs = np.asarray(indices, np.int64)
+    kinds = _lane_kinds(job)[runs]
+    order = np.argsort(kinds, kind="stable")
+    ends = np.flatnonzero(np.diff(kinds[order])) + 1
     batches = []
-    for group in _grouped(load_model(job.model), indices, job.point):
-        parts = -(-len(group) // _batch_size(job, job.point(group[0])))
-        bounds = [len(group) * part // parts for part in range(parts + 1)]
-        batches += [tuple(group[first:last]) for first, last in pairwise(bounds)]
+    for group in sorted(np.split(runs[order], ends), key=lambda group: group[:1].tolist()):
+        if group.size:
+            parts = -(-group.size // _batch_size(job, job.point(int(group[0]))))
+            bounds = [group.size * part // parts for part in range(parts + 1)]
+            batches += [tuple(group[first:last].tolist()) for first, last in pairwise(bounds)]
     return batches
+
+
+def _lane_kinds(job: Job) -> np.ndarray:
+    """Number of the lane key of each run, shape (runs,).
+
+    A key follows from the parameters that are read for it. So it is asked for at all places along the axes
+    with which these vary, and along no other axis.
+    """
+    names, model = [axis.name for axis in job.axes], load_model(job.model)
+    varied = varied_by(job.rules, names)
+    first = {axis.name: axis.values[0] for axis in job.axes}
+    along: set[str] = set()
+    while True:
+        kinds: dict[tuple, int] = {}
+        numbers, read = [], set()
+        for place in places(job.axes, along, sampled=job.is_sampled and bool(along)):
+            point = Noted(job.complete({**first, **place}))
+            numbers.append(kinds.setdefault(model.lane_key(point), len(kinds)))
+            read |= point.read
+        asked = {axis for key in read for axis in varied.get(key, (key,)) if axis in first}
+        if asked <= along:
+            break
+        along |= asked
+    if job.is_sampled:
+        return np.broadcast_to(np.array(numbers, np.int32), job.shape)
+    lengths = [len(axis.values) if axis.name in along else 1 for axis in job.axes]
+    return np.broadcast_to(np.array(numbers, np.int32).reshape(lengths), job.shape).ravel()
 
 
 def in_lanes(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.job.assignments import Assignments, read_assignments, warn_of_bare_assignments
+from cvt_hpc.job.shown import POINT_UNITS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.netcdf import attributes, global_attributes, variable_attributes
 from cvt_hpc.simulation.record import record_coordinates, record_variables
@@ -45,6 +46,7 @@ def simulate(job: Job, at: Assignments | None = None) -> xr.Dataset:
         If a value is not fit for its key.
     """
     given, schema = at or {}, job.schema
+    job = job.with_units_of(given, "at")
     at = read_assignments(given, schema, job.source, "at")
     warn_of_bare_assignments(given, schema, job.source, "at")
     point = job.point_at(at)
@@ -94,6 +96,7 @@ def _history(job: Job, point: dict[str, Any], run: Any, record: dict[str, Any]) 
     told: dict[str, Any] = {
         **global_attributes(job, job.resolved(), f"model {job.model}"),
         "point": json.dumps({key: repr(value) if value == np.inf else value for key, value in point.items()}),
+        POINT_UNITS: json.dumps(dict(job.units)),
     }
     if job.stepper is not None and run is not None:
         told["judged_fraction"] = run.parameters["judged_fraction"]  # less than asked if prolonged

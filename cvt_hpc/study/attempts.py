@@ -97,6 +97,8 @@ def predicted_costs(job: Job, simulator: Simulator, steps: Mapping[int, float]) 
 
 
 def _by_step(runs: list[int], steps: Mapping[int, float]) -> Iterable[list[int]]:
+    if not steps:
+        return [runs]
     groups: dict[float | None, list[int]] = {}
     for index in runs:
         groups.setdefault(steps.get(index), []).append(index)

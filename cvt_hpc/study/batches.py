@@ -57,7 +57,7 @@ def batch_cost(batch: Batch, costs: np.ndarray, turns: Turns = one_turn) -> floa
     turns : callable
         How many times so many runs fill the lanes.
     """
-    return turns(len(batch)) * float(max(costs[index] for index in batch))
+    return turns(len(batch)) * float(costs[list(batch)].max())
 
 
 def share_out(groups: Sequence[Batch], costs: np.ndarray, ranks: int, turns: Turns = one_turn) -> list[Batch]:
@@ -92,9 +92,10 @@ def share_out(groups: Sequence[Batch], costs: np.ndarray, ranks: int, turns: Tur
 def _largest_batch(groups: Sequence[Batch], ranks: int) -> int:
     """Return the least number of runs in a batch that makes no more batches than can be done at once."""
     largest = max(map(len, groups), default=1)
-    at_once = max(ranks, len(groups))
+    if ranks <= len(groups):
+        return largest
     return next(
-        most for most in range(1, largest + 1) if sum(-(-len(group) // most) for group in groups) <= at_once
+        most for most in range(1, largest + 1) if sum(-(-len(group) // most) for group in groups) <= ranks
     )
 
 

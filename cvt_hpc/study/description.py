@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from enum import IntEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.job.values import in_words
+from cvt_hpc.job.shown import shown
 from cvt_hpc.study.dimensions import DerivedCoordinate, Dimension, axis_dimension, derived_coordinate
 from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.variables import Status, Variable
@@ -43,8 +43,6 @@ class Study:
         Dimensions of the variables beside the grid.
     derived : tuple of DerivedCoordinate
         Parameters that follow from the axes, but for those of more than `MOST_DERIVED` values.
-    units : dict
-        By axis the unit in which the job at work gives it, where it is not the SI unit; not kept in a folder.
     """
 
     name: str
@@ -55,7 +53,6 @@ class Study:
     variables: tuple[Variable, ...]
     coordinates: tuple[Dimension, ...]
     derived: tuple[DerivedCoordinate, ...] = ()
-    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def design(self) -> dict[str, Any]:
@@ -105,10 +102,9 @@ class Study:
 
     def place_in_words(self, index: int) -> str:
         """Return the axes' values of run `index` for people; "" without axes."""
-        units = {axis.name: "" if axis.units == "1" else axis.units for axis in self.axes}
+        attributes = {axis.name: axis.attributes for axis in self.axes}
         return ", ".join(
-            f"{name} = {in_words(value, units[name], self.units.get(name, ''))}"
-            for name, value in self.place(index).items()
+            f"{name} = {shown(value, attributes[name])}" for name, value in self.place(index).items()
         )
 
     def blank_rows(self, shape: int | tuple[int, ...] = ()) -> np.ndarray:
@@ -178,12 +174,11 @@ def describe(job: Job, simulator: Simulator) -> Study:
     """Return the study of a job; errors as of `check_names`."""
     check_names(job, simulator)
     variables, coordinates = record_layout(job, simulator)
-    axes = tuple(axis_dimension(axis) for axis in job.axes)
+    axes = tuple(axis_dimension(axis, job) for axis in job.axes)
     few = (one for one in job.derived if runs_along(job, one.axes) <= MOST_DERIVED)
-    derived = tuple(derived_coordinate(one, sampled="runs" in job.design) for one in few)
+    derived = tuple(derived_coordinate(one, job) for one in few)
     head = job.name, job.description, job.fingerprint(), job.resolved()
-    units = {axis.name: job.units[axis.name] for axis in job.axes if axis.name in job.units}
-    return Study(*head, axes, variables, coordinates, derived, units)
+    return Study(*head, axes, variables, coordinates, derived)
 
 
 def runs_along(job: Job, names: Collection[str]) -> int:

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from cvt_hpc.job.shown import JOB_UNITS
 from cvt_hpc.netcdf import attributes
 
 if TYPE_CHECKING:
-    from cvt_hpc.job import Axis
+    from cvt_hpc.job import Axis, Job
     from cvt_hpc.job.definition import Derived
 
 
@@ -34,6 +35,8 @@ class Dimension:
         "log" for samples that are spread evenly by their logarithm.
     comment : str
         CF comment.
+    job_units : str
+        Unit in which the job gives the values; "" where it has none.
     """
 
     name: str
@@ -42,12 +45,14 @@ class Dimension:
     long_name: str
     spacing: str = "linear"
     comment: str = ""
+    job_units: str = ""
 
     @property
     def attributes(self) -> dict[str, Any]:
         """Those of its coordinate in a dataset."""
         spacing = {"spacing": self.spacing} if self.spacing == "log" else {}
-        return attributes(self.long_name, self.units, self.comment) | spacing
+        job_units = {JOB_UNITS: self.job_units} if self.job_units else {}
+        return attributes(self.long_name, self.units, self.comment) | spacing | job_units
 
     @property
     def holds_texts(self) -> bool:
@@ -97,19 +102,24 @@ class DerivedCoordinate(Dimension):
         return super().attributes | {"derived": self.follows}
 
 
-def axis_dimension(axis: Axis) -> Dimension:
+def axis_dimension(axis: Axis, job: Job) -> Dimension:
     """Return the dimension of an axis of a job."""
-    return Dimension(
-        axis.name, *_values_and_units(axis), _in_words(axis.name), axis.spacing, axis.description
-    )
+    values, units = _values_and_units(axis)
+    return Dimension(axis.name, values, units, spacing=axis.spacing, **_named(axis, job))
 
 
-def derived_coordinate(derived: Derived, *, sampled: bool) -> DerivedCoordinate:
+def derived_coordinate(derived: Derived, job: Job) -> DerivedCoordinate:
     """Return the coordinate of a parameter that follows from axes; of samples it lies along `run`."""
-    dims = ("run",) if sampled else derived.axes
+    dims = ("run",) if "runs" in job.design else derived.axes
     values, units = _values_and_units(derived)
-    named = {"long_name": _in_words(derived.name), "comment": derived.description}
+    named = _named(derived, job)
     return DerivedCoordinate(derived.name, values, units, **named, dims=dims, follows=derived.words)
+
+
+def _named(varied: Axis | Derived, job: Job) -> dict[str, str]:
+    """Return what a coordinate tells people."""
+    named = {"long_name": _in_words(varied.name), "comment": varied.description}
+    return named | {"job_units": job.units.get(varied.name, "")}
 
 
 def _in_words(name: str) -> str:

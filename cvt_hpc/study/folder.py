@@ -160,7 +160,9 @@ def _is_log(path: Path) -> bool:
 
 
 def _numbers(study: Study) -> str:
-    """Return all of a study that has to do with numbers: names and descriptions may change."""
+    """Return all of a study that has to do with numbers: names, descriptions, units for people may change."""
     entry = study.to_json()
+    for table in (*entry["axes"], *entry["derived"]):
+        del table["job_units"]
     job = {key: value for key, value in entry["job"].items() if key not in ("name", "description")}
     return json.dumps({**entry, "job": job, "name": "", "description": ""})

@@ -29,8 +29,8 @@ def check_stored(entry: Mapping[str, Any]) -> None:
     ValueError
         If it is not; the text says what was found.
     """
-    _need(isinstance(entry["name"], str) and entry["name"].isprintable(), "name", "a name")
-    _need(isinstance(entry["description"], str), "description", "a text")
+    for key in ("name", "description"):
+        _need(_is_text(entry[key]), key, "a text")
     _need(_matches(_FINGERPRINT, entry["fingerprint"]), "fingerprint", "64 digits")
     for key in ("axes", "variables", "coordinates", "derived"):
         found = entry.get(key, []) if key == "derived" else entry[key]
@@ -58,7 +58,9 @@ def check_stored(entry: Mapping[str, Any]) -> None:
 def _check_dimension(entry: Mapping[str, Any]) -> None:
     name, values = entry["name"], entry["values"]
     _need(all(isinstance(entry[key], str) for key in ("name", "units", "long_name")), str(name)[:40], "texts")
-    _need(all(isinstance(entry.get(key, ""), str) for key in ("spacing", "comment")), name, "texts")
+    _need(
+        all(isinstance(entry.get(key, ""), str) for key in ("spacing", "comment", "job_units")), name, "texts"
+    )
     _need(isinstance(values, list) and len(values) > 0, name, "values")
     if entry["texts"] is True:
         _need(all(isinstance(value, str) and "\0" not in value for value in values), name, "texts")
@@ -127,6 +129,11 @@ def _is_number(value: Any) -> bool:
 def _plain(values: list[Any]) -> list[Any]:
     """Return values so that equal ones are equal, whether as 1 or 1.0."""
     return [value if isinstance(value, str) else float(value) for value in values]
+
+
+def _is_text(value: Any) -> bool:
+    """Return whether a value is a text that a dataset can hold; who shows it escapes what does not print."""
+    return isinstance(value, str) and "\0" not in value and not any("\ud800" <= c <= "\udfff" for c in value)
 
 
 def _matches(pattern: re.Pattern[str], text: Any) -> bool:

@@ -143,7 +143,7 @@ def assess_ramp(
     levels = np.stack([windows[:, columns].max(axis=1) for columns in members], axis=1)
     at = np.interp(centres, np.arange(len(w)) / rate, values)
     bins = np.minimum((centres * rate / samples * BINS).astype(int), BINS - 1)
-    verdict = Passages(levels, at, QUANTITIES[quantity].units, parameters)
+    verdict = Passages(levels, at, QUANTITIES[quantity], parameters)
     vibrates, reason = verdict.classify(names)
     unknown = np.full(len(names), np.nan)
     return RampOccurrence(
@@ -173,14 +173,16 @@ class Passages:
         Amplitudes in successive windows [m].
     values : array, shape (window,)
         What is ramped, in their middles.
-    units : str
-        Of the values.
+    quantity : Quantity
+        What the values are of.
     parameters : mapping
         As `assess_ramp` takes them.
     """
 
-    def __init__(self, levels: Array, values: Array, units: str, parameters: Mapping[str, Any]) -> None:
-        self.levels, self.at, self.units = levels, values, units
+    def __init__(
+        self, levels: Array, values: Array, quantity: Quantity, parameters: Mapping[str, Any]
+    ) -> None:
+        self.levels, self.at, self.quantity = levels, values, quantity
         self.threshold, self.negligible = (
             parameters[key] for key in ("amplitude_threshold", "negligible_amplitude")
         )
@@ -195,10 +197,10 @@ class Passages:
             which = [name for name, kept in zip(names, self.kept.T, strict=True) if kept.any()]
             who = " and ".join(which) + (" vibrates" if len(which) == 1 else " vibrate")
             onset, end = self.ends()
-            since = "the ramp's start" if np.isnan(onset) else f"{onset:.4g} {self.units}"
-            until = "its end" if np.isnan(end) else f"{end:.4g} {self.units}"
+            since = "the ramp's start" if np.isnan(onset) else self._in_words(onset)
+            until = "its end" if np.isnan(end) else self._in_words(end)
             return Vibrates.YES, f"{who} from {since} to {until}, {top}"[:LONGEST_REASON]
-        place = f"between {self.at[0]:.4g} and {self.at[-1]:.4g} {self.units}"
+        place = f"between {self.quantity.factor * self.at[0]:.4g} and {self._in_words(self.at[-1])}"
         above = int((self.levels >= self.threshold).any(axis=1).sum())
         if above:
             return Vibrates.UNDECIDED, f"above the threshold in {above} windows only {place}, {top}"
@@ -207,6 +209,9 @@ class Passages:
         if np.any(rising & (last[-1] - last[0] >= self.tolerance)):
             return Vibrates.UNDECIDED, f"below the threshold {place}, {top}, but growing at the end"
         return Vibrates.NO, f"quiet {place}, {top}"
+
+    def _in_words(self, value: float) -> str:
+        return f"{self.quantity.factor * value:.4g} {self.quantity.units}"
 
     def ends(self) -> tuple[float, float]:
         """Values at the onset and at the end."""

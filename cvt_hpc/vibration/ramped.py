@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 
 class Quantity(NamedTuple):
-    """What a ramp changes: the parameter that says so, units in sentences and in attributes, and its name."""
+    """What a ramp changes: the parameter that says so, its name, and its units.
+
+    Those in sentences are as people give it, of `factor` times a value [cf_units].
+    """
 
     history: str
+    factor: float
     units: str
     cf_units: str
     long_name: str
 
 
 QUANTITIES = {
-    "load": Quantity("load_history", "N m", "N m", "load"),
-    "speed": Quantity("speed_history", "rad/s", "rad s-1", "speed of the driving pulley"),
+    "load": Quantity("load_history", 1.0, "N m", "N m", "load"),
+    "speed": Quantity("speed_history", 30.0 / math.pi, "rpm", "rad s-1", "speed of the driving pulley"),
 }
 
 

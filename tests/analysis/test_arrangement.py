@@ -94,8 +94,8 @@ def test_panels_and_rows_are_sorted_with_their_values():
     ("at", "message"),
     [
         ({"lod": 20.0}, "at lod: unknown axis of the results; did you mean load?"),
-        ({"load": 21.0}, "at load: expected a value of that axis: 20, 40, .* \\[N m\\], found 21.0"),
-        ({"load": "much"}, "found 'much'"),
+        ({"load": 21.0}, "at load: expected a value of that axis: 20, 40, .* \\[N m\\], found 21 N m"),
+        ({"load": "much"}, 'found "much"'),
         (
             {"load": 20, "friction_gradient": -2.4, "sheave_stiffness": 1},
             "expected results over one axis or more to be drawn, found a single run",
@@ -113,7 +113,7 @@ def test_of_many_values_the_error_names_a_few():
     dataset = with_axes(load=np.arange(1.0, 101.0), refined=[False, True])
     with pytest.raises(InputError, match=r"axis: 1, 2, .* 11, [.]{3}, 100, found 0.5"):
         arrange(dataset, {"load": 0.5}, "out/x")
-    with pytest.raises(InputError, match="axis: False, True, found 'maybe'"):
+    with pytest.raises(InputError, match='axis: False, True, found "maybe"'):
         arrange(dataset, {"refined": "maybe"}, "out/x")
 
 
@@ -136,6 +136,32 @@ def test_values_are_shown_in_units_for_people(unit, value, shown):
     assert value_text(coordinate("x", [value], unit), 0) == shown
 
 
+@pytest.mark.parametrize(
+    ("unit", "in_job", "value", "shown"),
+    [
+        ("N", "N", 5e4, "50000 N"),
+        ("m/s", "mm/s", 0.015, "15 mm/s"),
+        ("N m", "kN m", 120.0, "0.12 kN m"),
+        ("N", "rpm", 5e4, "50000 N"),  # of a file that somebody has made up
+        ("1", "%", 0.25, "25 %"),
+    ],
+)
+def test_what_the_job_gives_in_a_unit_is_shown_in_it(unit, in_job, value, shown):
+    assert value_text(coordinate("x", [value], unit, in_job), 0) == shown
+    number, _, shown_in = shown.partition(" ")
+    drawn = ruler(coordinate("x", [value], unit, in_job))
+    assert (drawn.centres.tolist(), drawn.label) == ([pytest.approx(float(number))], f"x [{shown_in}]")
+
+
+def test_an_axis_is_fixed_and_refused_in_the_unit_of_the_job():
+    dataset = with_axes(driving_speed=[100 * np.pi, 200 * np.pi], load=[20.0, 40.0])
+    dataset["driving_speed"].attrs = {"units": "rad/s", "job_units": "rpm"}
+    assert arrange(dataset, {"driving_speed": 100 * np.pi}, "x").notes == ("driving speed = 3000 rpm",)
+    message = r"of that axis: 3000, 6000 \[rpm\], found 28647\.88976 rpm \(3000 rad/s\)$"
+    with pytest.raises(InputError, match=message):
+        arrange(dataset, {"driving_speed": 3000.0}, "x")
+
+
 def test_a_value_is_found_by_number_or_text():
     third = 0.1 + 0.2  # not 0.3, as results of arithmetic are
     dataset = with_axes(load=[1.0, 2.0], ratio=[0.1, third], sheave_stiffness=[1.0, np.inf])
@@ -146,8 +172,9 @@ def test_a_value_is_found_by_number_or_text():
         assert "sheave stiffness = rigid" in chosen.notes
 
 
-def coordinate(name, values, units="1"):
-    return xr.DataArray(np.array(values), dims=name, name=name, attrs={"units": units})
+def coordinate(name, values, units="1", in_job=None):
+    told = {"units": units} | ({"job_units": in_job} if in_job else {})
+    return xr.DataArray(np.array(values), dims=name, name=name, attrs=told)
 
 
 def test_cells_reach_halfway_to_their_neighbours():

@@ -197,16 +197,21 @@ def test_the_title_says_which_run_it_is(write_job):
         write_job("""[scene]
 thrust = "20 kN"
 [axes]
-load = [0, 50, 120]
+load = [0, "0.05 kN m", 120]
 sheave_stiffness = [1, inf]
 """)
     )
-    point = job.point_at({"load": 50.0, "sheave_stiffness": np.inf, "ratio": 2.0})
+    at = {"load": 50.0, "sheave_stiffness": np.inf, "driving_speed": "2000 rpm"}
+    job = job.with_units_of(at)
+    point = job.point_at(at)
     told = {key: repr(value) if value == np.inf else value for key, value in point.items()}
     attributes = {"job": json.dumps(job.resolved()), "point": json.dumps(told)}
-    lines = history_figure(run().assign_attrs(attributes)).get_suptitle().splitlines()
-    assert lines[1].replace("\u00a0", " ") == "load 50 N m, sheave_stiffness inf, ratio 2"
-    (printed,) = point_lines(job, {"load": 50.0, "sheave_stiffness": np.inf, "ratio": 2.0})
+    attributes["point_units"] = json.dumps(dict(job.units))
+    figure = history_figure(run().assign_attrs(attributes))
+    lines = figure.get_suptitle().splitlines()
+    assert lines[1].replace("\u00a0", " ") == "load 0.05 kN m, sheave_stiffness inf, driving_speed 2000 rpm"
+    assert panel(figure, "load [kN m]").lines[0].get_ydata()[[0, -1]] == pytest.approx([0.02, 0.14], rel=1e-3)
+    (printed,) = point_lines(job, {**at, "driving_speed": point["driving_speed"]})
     assert printed.endswith(lines[1].replace("\u00a0", " "))
 
 

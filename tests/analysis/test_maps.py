@@ -62,15 +62,19 @@ def lightness(rgb):
     return np.asarray(rgb) @ (0.299, 0.587, 0.114)
 
 
+def small_study():
+    """Of two panels."""
+    return study(stiffnesses=(1.0, np.inf))
+
+
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
-    """The picture of the whole study, as a file."""
-    return draw_map(study(), tmp_path_factory.mktemp("plain") / "map.png")
+    """The picture of the small study, as a file."""
+    return draw_map(small_study(), tmp_path_factory.mktemp("plain") / "map.png")
 
 
 def test_cells_show_their_class_at_their_place():
-    dataset = study(stiffnesses=(1.0, np.inf))
-    figure = figure_of(dataset)
+    figure = figure_of(small_study())
     soft, rigid = panels_of(figure)
     assert soft.get_title(loc="left") == "sheave stiffness: 1"
     assert rigid.get_title(loc="left") == "sheave stiffness: rigid"
@@ -216,7 +220,7 @@ def test_pictures_are_small_in_every_format(suffix, tmp_path):
 
 
 def test_the_file_is_as_wide_as_a_telephone_and_the_same_every_time(plain, tmp_path):
-    assert draw_map(study(), tmp_path / "again.png").read_bytes() == plain.read_bytes()
+    assert draw_map(small_study(), tmp_path / "again.png").read_bytes() == plain.read_bytes()
     with Image.open(plain) as picture:
         assert 1000 <= picture.width <= 1300
         assert 150 <= picture.info["dpi"][0] <= 200
@@ -251,7 +255,7 @@ def test_the_plotting_library_keeps_its_state(tmp_path):
 
 
 def test_results_read_back_from_a_file_give_the_same_map(plain, tmp_path):
-    study().to_netcdf(tmp_path / "results.nc", engine="netcdf4")
+    small_study().to_netcdf(tmp_path / "results.nc", engine="netcdf4")
     with xr.open_dataset(tmp_path / "results.nc", engine="netcdf4") as stored:
         drawn = draw_map(stored, tmp_path / "a.png").read_bytes()
     assert drawn == plain.read_bytes()
@@ -274,7 +278,7 @@ sys.exit("matplotlib.pyplot" in sys.modules)
 
 
 def test_a_matplotlibrc_that_cannot_be_read_changes_nothing_and_pyplot_is_left_alone(plain, tmp_path):
-    study().to_netcdf(tmp_path / "results.nc")
+    small_study().to_netcdf(tmp_path / "results.nc")
     (tmp_path / "matplotlibrc").write_bytes(b"font.size: 30\nfont.family: \xff\xfe\n")
     environment = {
         **os.environ,

@@ -23,7 +23,7 @@ from cvt_hpc.models.elastic_belt import imex, imex_stations, imex_system, lane_f
 from cvt_hpc.models.elastic_belt.batch import PRECISIONS, Batch
 from cvt_hpc.models.elastic_belt.lane_belt import REPEATS
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP as STEP
-from cvt_hpc.physics import flank, friction, lane_compliance
+from cvt_hpc.physics import compliance, flank, friction
 from cvt_hpc.variator import course
 
 CALLS = 15
@@ -163,13 +163,17 @@ def _counting_tuple(values, memory: str = "array"):
 
 
 def count(step: float, precision: str) -> collections.Counter:
-    """Operations and array places of one step without a second pass, for one lane, in a loaded belt."""
+    """Operations and array places of one step without a second pass, for one lane, in a loaded belt.
+
+    Slopes of friction count, five products and sums at each station of an arc, though machine code, which reads
+    friction alone, has none of them.
+    """
     batch = _batch(1, step, "double")
     batch.advance(700)
     functions = _counting_functions(7 if precision == "single" else 13)
     kept = []
     of_belt = imex, imex_stations, imex_system, lane_forces, course
-    for module in (*of_belt, lane_compliance, flank, friction, rings):
+    for module in (*of_belt, compliance, flank, friction, rings):
         for name, thing in list(vars(module).items()):
             plain = functions.get(name) or getattr(thing, "py_func", None)
             if plain is not None:

@@ -137,6 +137,7 @@ def test_check_tells_branches_runs_and_cost(tmp_path, capsys):
     assert main(["check", str(tmp_path / "x.toml"), "--set", "sheave_stiffness=1.5"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == f"diagram x ({tmp_path / 'x.toml'}): 1 branches of 3 loads"
+    assert any(line.startswith("  load") and line.endswith(" N m  3 values") for line in lines)
     assert lines[-3].startswith("steady states: 3, ")
     # two starts at three loads, and two between each pair of the two in which vibration begins or ends
     assert lines[-2].startswith("runs: about 14, ")

@@ -80,11 +80,16 @@ def test_another_job_is_refused_and_fresh_leaves_none_of_its_pictures(branch, tm
     assert branch("--set", "friction_gradient=-0.6") == 0  # the name is without effect on any number
 
 
-def test_an_interruption_keeps_the_branches_that_are_done(branch, tmp_path):
+def test_an_interruption_keeps_the_branches_that_are_done(branch, tmp_path, capsys):
     not_found, not_computed = [Stability.NOT_FOUND] * 2, [Stability.NOT_COMPUTED] * 2
     assert branch(interrupted=True) == 130
     assert stability(tmp_path / "out") == [not_found, not_computed]
+    assert "branches of an earlier start" not in capsys.readouterr().err
     assert branch() == 0
+    assert (
+        "branch.nc holds 1 of 2 branches of an earlier start; all are followed anew"
+        in capsys.readouterr().err
+    )
     assert stability(tmp_path / "out") == [not_found, not_found]
     assert branch(interrupted=True) == 130
     assert stability(tmp_path / "out") == [not_found, not_found]

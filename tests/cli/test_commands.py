@@ -197,7 +197,7 @@ def test_simulate_prints_the_outcome_and_keeps_the_history(write_job, call, mech
     status, out, err = call("simulate", "x.toml", *arguments)
     assert (status, err) == (0, [])
     assert out == [
-        "at      load 50 N m, sheave_stiffness 1",
+        "at      load 0.05 kN m, sheave_stiffness 1",
         "status     done",
         "vibrates   yes",
         "load       50 N m",
@@ -248,7 +248,7 @@ def test_simulate_of_a_run_that_fails_ends_with_1(write_job, call):
         ),
         (
             ["simulate", "x.toml", "--at", "load=1 kN m"],
-            "x.toml: [scene] load: expected at most 200 N m at this thrust, found 1000 N m (at load = 1000 N m)",
+            "x.toml: [scene] load: expected at most 200 N m at this thrust, found 1000 N m (1 kN m) (at load = 1 kN m)",
         ),
         (["simulate", "x.toml", "--out", "h.txt"], "h.txt: expected a file name in .nc, found .txt"),
         (
@@ -325,7 +325,7 @@ def test_map_says_what_it_cannot_fix(write_job, call):
     assert call("map", "out/x", "--at", "load=0.025 kN m")[0] == 0
     assert call("map", "out/x", "--at", "load=26 N m")[::2] == (
         2,
-        ["cvt-hpc: out/x: at load: expected a value of that axis: 0, 25, 50, 75, 100 [N m], found 26.0"],
+        ["cvt-hpc: out/x: at load: expected a value of that axis: 0, 25, 50, 75, 100 [N m], found 26 N m"],
     )
 
 

@@ -45,9 +45,9 @@ def test_studies_that_agree_and_studies_that_do_not(write_job, call, tmp_path, m
     call("run", "x.toml", "--set", "step=3e-6", "--out", "out/wrong")
     status, out, err = call("compare", "out/x/results.nc", "out/wrong/results.nc", "--out", "found")
     assert (status, err) == (1, [])
-    assert "  load = 75, sheave_stiffness = 1: vibrating | quiet" in out
+    assert "  load = 75 N m, sheave_stiffness = 1: vibrating | quiet" in out
     rows = list(csv.DictReader((tmp_path / "found/compare.csv").open()))
-    assert [row["load"] for row in rows if row["pair"] == "vibrates in A only"] == ["75.0"] * 2
+    assert [row["load [N m]"] for row in rows if row["pair"] == "vibrates in A only"] == ["75.0"] * 2
 
 
 def test_studies_of_other_grids(write_job, call):
@@ -60,6 +60,27 @@ def test_studies_of_other_grids(write_job, call):
     status, out, err = call("compare", "out/x", "out/other")
     assert (status, out) == (2, [])
     assert err == ["cvt-hpc: out/x: axis sheave_stiffness: expected one of 1, 3, found 2 in out/other"]
+
+
+def test_cells_are_named_in_the_units_of_the_job(write_job, call, tmp_path, monkeypatch):
+    write_job('[scene]\nthrust = "20 kN"\n[axes]\nload = ["0.025 kN m", "0.075 kN m"]\n')
+    call("run", "x.toml")
+    call("run", "x.toml", "--set", "load=50", "--out", "out/one")
+    assert call("compare", "out/x", "out/one")[2] == [
+        "cvt-hpc: out/x: axis load: expected one of 0.025, 0.075 [kN m], found 0.05 kN m in out/one"
+    ]
+    contrary_at(75, monkeypatch)
+    call("run", "x.toml", "--out", "out/wrong")
+    assert "  load = 0.075 kN m: vibrating | quiet" in call("compare", "out/x", "out/wrong")[1]
+    rows = list(csv.DictReader((tmp_path / "out/wrong/compare.csv").open()))
+    assert [row["load [kN m]"] for row in rows] == ["0.025", "0.075"]
+    # the units are no part of what determines the numbers
+    status, out, err = call("run", "x.toml", "--set", "load=[25, 75]")
+    assert (status, out[0], err[1:]) == (0, "2 runs: 2 done, 0 failed, 0 left", [])
+    assert call("map", "out/x", "--at", "load=75 N m")[2] == [
+        "cvt-hpc: out/x: expected results over one axis or more to be drawn, found a single run; "
+        "`cvt-hpc simulate` draws one"
+    ]
 
 
 def test_bad_input_is_one_line(write_job, call):

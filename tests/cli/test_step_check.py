@@ -92,16 +92,16 @@ def test_contradictions_deviations_and_failures_are_reported(checked, tmp_path):
         "step check: 39 of 39 runs that took steps done again at half the step",
         "  2 of 38 contradict (quiet against vibrating; 5.26%, 95 % interval 0.64% to 17.75%), 2 of them beyond "
         "the threshold; 0 more of another class; 1 more failed at half the step",
-        "  load = 5: vibrating 11 um 505 Hz | quiet 1 um 502.5 Hz",
-        "  load = 6: vibrating 11 um 505 Hz | quiet 1 um 502.5 Hz",
+        "  load = 5 N m: vibrating 11 um 505 Hz | quiet 1 um 502.5 Hz",
+        "  load = 6 N m: vibrating 11 um 505 Hz | quiet 1 um 502.5 Hz",
         "  amplitude where both vibrate (20 cells): B deviates by 4.55% (median), 4.55% (95 %), 4.55% (largest)",
         "  frequency where both vibrate (20 cells): B deviates by 0.50% (median), 0.50% (95 %), 0.50% (largest)",
         "picture: out/x/check_step/compare.png",
         "table: out/x/check_step/compare.csv",
     ]
     rows = list(csv.DictReader((tmp_path / "out/x/check_step/compare.csv").open()))
-    assert [row["load"] for row in rows if row["pair"] == "vibrates in A only"] == ["5.0", "6.0"]
-    assert [row["load"] for row in rows if row["class_b"] == "not run"] == ["8.0"]
+    assert [row["load [N m]"] for row in rows if row["pair"] == "vibrates in A only"] == ["5.0", "6.0"]
+    assert [row["load [N m]"] for row in rows if row["class_b"] == "not run"] == ["8.0"]
 
 
 def test_each_run_is_done_at_half_of_the_step_that_it_took(checked, undrawn, tmp_path):
@@ -120,7 +120,7 @@ def test_a_dry_run_tells_what_the_check_will_cost(checked, tmp_path):
         0,
         [
             "estimated cost: 30 core-seconds per run, 1.2e+03 core-seconds in all",
-            "needed: 0.016 MB of memory, 0.0126 MB of disk for records",
+            "needed: 16 kB of memory for the plan; disk: 12.6 kB of records, at most 51.3 kB of results.nc",
             "step check: about 4 runs again at half the step, estimated cost: 60 core-seconds per run, 240 core-seconds in all",
         ],
     )

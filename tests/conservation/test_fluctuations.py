@@ -177,7 +177,7 @@ def plain_feed(belt, forces, states):
             v_tangential = v[j] - omega * ((belt.driven_radius if driven else belt.driving_radius) + w[j])
             force = forces[j]
             mu, _ = friction_coefficient(belt.law, np.hypot(v_radial / cosine, v_tangential), force / cosine)
-            radial, tangential, *_ = flank_forces(
+            radial, tangential = flank_forces(
                 mu, belt.friction_speed, sine, cosine, force, v_radial, v_tangential
             )
             history[:, k, j] = radial - wedge * force, v_radial, tangential, v_tangential

@@ -100,4 +100,4 @@ def test_a_step_beyond_is_named_though_nothing_diverges(stepper):
 
 def test_a_step_within_is_not():
     run = general("symplectic_euler", step=1e-7)
-    assert run.advance(40) is None
+    assert run.advance(10) is None

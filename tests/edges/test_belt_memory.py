@@ -10,6 +10,7 @@ import pytest
 from support.belts import eigenvalues
 
 STEEP = {"friction_gradient": -1.2}
+STRANDS = 1000.0  # [Hz]: above every frequency that the strands have here
 
 
 def growing(memory, stations):
@@ -24,10 +25,11 @@ def test_without_memory_what_grows_is_the_mesh_s():
     highest = []
     for stations in (48, 96):
         rates, frequencies = growing(0.0, stations)
-        # doubled within a period of any strand's vibration, above every frequency that the strands have here
-        assert rates.max() > 5000.0 and frequencies[rates.argmax()] > 3000.0
+        # Doubled within a third of the period of any strand's vibration. A station whose friction falls steeply
+        # runs away without swinging, so that of frequencies only the highest that grows says something.
+        assert rates.max() > 3.0 * np.log(2.0) * STRANDS and frequencies.max() > 3.0 * STRANDS
         highest.append(frequencies.max())
-    # and faster on a finer mesh: there is nothing to converge to
+    # and the higher the finer the mesh: there is nothing to converge to
     assert highest[1] > 1.5 * highest[0]
 
 
@@ -35,4 +37,4 @@ def test_without_memory_what_grows_is_the_mesh_s():
 def test_with_memory_what_grows_is_a_vibration_of_strands_or_nothing():
     for stations in (48, 96):
         rates, frequencies = growing(0.3e-3, stations)
-        assert np.all(frequencies < 1000.0) and np.all(rates < 1000.0)
+        assert np.all(frequencies < STRANDS) and np.all(rates < 1000.0)

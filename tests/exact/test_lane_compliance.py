@@ -3,15 +3,16 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.physics.compliance import contact_state, solve_contact
-from cvt_hpc.physics.lane_compliance import (
+from cvt_hpc.physics.compliance import (
     CLOSED,
     GAP,
     PUSH,
     SOLVES,
     UNSOLVED,
     lane_contact,
-    solve_lane_contact,
+    plain_contact,
+    solve_contact,
+    solve_wrap,
 )
 from cvt_hpc.physics.sheaves import flexibility
 from support.complementarity import solve_lcp
@@ -24,7 +25,7 @@ WIDTHS = {np.float64: 8, np.float32: 16}
 def solve(contact, gaps, most_rounds=MOST_ROUNDS):
     """Forces (stations, lanes) [N/m]."""
     contact.stations.data[:, GAP] = gaps
-    solve_lane_contact(contact, most_rounds)
+    solve_contact(contact, most_rounds)
     closed = contact.stations.data[:, CLOSED] > 0.5
     return np.where(closed, np.maximum(contact.stations.data[:, PUSH], 0.0), 0.0)
 
@@ -39,17 +40,17 @@ def batch(seed, dtype=np.float64, **values):
 @pytest.mark.parametrize("seed", range(10))
 def test_each_lane_is_the_plain_solver(seed):
     wraps, contact, course = batch(seed)
-    plain = [contact_state(STATIONS) for _ in wraps]
+    plain = [plain_contact(wrap) for wrap in wraps]
     sets, counts = set(), np.zeros(len(wraps))
     for gaps in course:
         found = solve(contact, gaps)
-        for lane, (wrap, state) in enumerate(zip(wraps, plain, strict=True)):
+        for lane, state in enumerate(plain):
             force = np.empty(STATIONS)
-            counts[lane] += solve_contact(wrap, state, np.ascontiguousarray(gaps[:, lane]), force)
-            # the same operations but for contraction: round-off of forces of up to 1e7 N/m times a condition of 1e2
-            assert found[:, lane] == pytest.approx(force, abs=1e-5)
-            assert np.array_equal(contact.stations.data[:, CLOSED, lane] > 0.5, state.closed)
-            sets.add(tuple(state.closed))
+            counts[lane] += solve_wrap(state, np.ascontiguousarray(gaps[:, lane]), force)
+            assert np.array_equal(found[:, lane], force)
+            closed = state.stations[:, CLOSED]
+            assert np.array_equal(contact.stations.data[:, CLOSED, lane], closed)
+            sets.add(tuple(closed))
         assert np.array_equal(contact.scalars.data[0, SOLVES], counts)
         assert not contact.scalars.data[0, UNSOLVED].any()
     assert len(sets) > len(wraps)
@@ -83,7 +84,7 @@ def test_single_precision_knows_forces_to_its_round_off():
         for lane, wrap in enumerate(wraps):
             force = np.empty(STATIONS)
             given = gaps[:, lane].astype(np.float32).astype(float)
-            assert solve_contact(wrap, contact_state(STATIONS), given, force) > 0
+            assert solve_wrap(plain_contact(wrap), given, force) > 0
             # stations may be on the wrong side by 2 N/m; eps = 6e-8 times a condition of 1e2 of forces of 1e6 N/m
             assert found[:, lane] == pytest.approx(force, abs=2.0 + 3e-5 * force.max())
         assert not contact.scalars.data[0, UNSOLVED].any()

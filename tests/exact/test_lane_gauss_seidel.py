@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.physics.compliance import contact_state, solve_contact
-from cvt_hpc.physics.lane_compliance import GAP, PUSH, SOLVES, lane_contact
+from cvt_hpc.physics.compliance import GAP, PUSH, SOLVES, lane_contact, plain_contact, solve_wrap
 from cvt_hpc.physics.lane_gauss_seidel import sweep_lane_contact
 from cvt_hpc.physics.sheaves import flexibility
 from support.wraps import STATIONS, courses, random_wrap
@@ -51,9 +50,7 @@ def test_many_sweeps_lead_to_the_exact_contact():
     found = swept(contact, course[0])
     for lane, wrap in enumerate(wraps):
         force = np.empty(STATIONS)
-        assert (
-            solve_contact(wrap, contact_state(STATIONS), np.ascontiguousarray(course[0][:, lane]), force) > 0
-        )
+        assert solve_wrap(plain_contact(wrap), np.ascontiguousarray(course[0][:, lane]), force) > 0
         closed = force > 0.0
         matrix = flexibility(wrap)[np.ix_(closed, closed)]
         lower = np.tril(matrix)

@@ -6,8 +6,10 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job, known_keys, load_job
+from cvt_hpc.job.crosscheck import without_effect
 from cvt_hpc.job.for_model import handed_to
 from cvt_hpc.job.schema import load_schema
+from cvt_hpc.job.summary import summarize
 from cvt_hpc.models import MODELS
 from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.physics.geometry import variator
@@ -167,3 +169,16 @@ def test_a_value_for_comparisons_alone_is_refused_from_a_formula(tmp_path):
         path.write_text(f'{head}contact_sweeps = "{formula}"\n')
         with pytest.raises(InputError, match="contact_sweeps: expected 0 in a job of runs; .* found 8"):
             load_job(path)
+
+
+def test_what_gives_no_share_of_a_load_is_without_effect():
+    found = job()
+    inert = without_effect(found.schema, found.parameters, found.axes, found.rules)
+    assert inert["table_mu"] == inert["table_force"] == "friction_law stribeck"
+    assert "kinetic_friction" not in inert
+
+
+def test_angles_that_the_job_leaves_out_are_told_in_degrees_and_rpm():
+    told = [" ".join(line.split()) for line in summarize(job(), 1.0).splitlines()]
+    assert "half_wedge_angle 0.1919862177 rad (11 deg) default half wedge angle of the groove" in told
+    assert any(line.startswith("driving_speed 314.1592654 rad/s (3000 rpm) default") for line in told)

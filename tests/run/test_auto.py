@@ -41,7 +41,7 @@ TABLE = {
 @cache
 def records(model, **values):
     """Of all CELLS, together."""
-    job = rung_job(model, duration=0.4, stations=120, step=6.1e-6, **values)
+    job = rung_job(model, duration=0.3, stations=96, step=7.6e-6, **values)
     points = [job.point(0) | cell for cell in CELLS]
     return run_points(job, points, lambda: None)
 
@@ -153,8 +153,8 @@ def test_what_climbs_is_bit_by_bit_the_full_run(question, climbed):
     for k, (record, other) in enumerate(zip(found, full, strict=True)):
         assert (record["rung"] == Rung.FULL) is (k in climbed)
         assert same(record, other, names) is (k in climbed)
-        if k in climbed:  # the coarse run counts as well: 120 ms by 10 us
-            assert record["steps"] == other["steps"] + 12_000
+        if k in climbed:  # the coarse run counts as well: 90 ms by 12.5 us
+            assert record["steps"] == other["steps"] + 7_200
             assert record["contact_solves"] > other["contact_solves"]
 
 
@@ -175,7 +175,7 @@ def test_a_margin_beyond_reach_leaves_all_to_the_full_run():
 
 
 def test_runs_in_company_are_what_they_are_alone():
-    job = rung_job("auto", duration=0.4, stations=120, step=6.1e-6)
+    job = rung_job("auto", duration=0.3, stations=96, step=7.6e-6)
     (alone,) = run_points(job, [job.point(0) | QUIET], lambda: None)
     names = [variable.name for variable in record_variables(job) if not variable.volatile]
     assert same(records("auto")[1], alone, names)

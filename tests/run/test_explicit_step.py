@@ -27,11 +27,11 @@ from cvt_hpc.models.elastic_belt.rhs import (
     accelerations,
     contact_forces,
     content_rates,
+    fresh_contacts,
     load_at,
     memory_rates,
     strains,
 )
-from cvt_hpc.physics.compliance import contact_state
 from support.fast_runs import march, march_fast
 from support.marched import job
 
@@ -76,8 +76,7 @@ def rough_belt(case):
 def forces(belt, state):
     """Axial line forces (N,), strains (2, N)."""
     force, eps = np.zeros(belt.cell.size), np.zeros((2, belt.cell.size))
-    contacts = contact_state(belt.driving.weight.size), contact_state(belt.driven.weight.size)
-    assert contact_forces(belt, state, contacts, force) > 0
+    assert contact_forces(belt, state, fresh_contacts(belt), force) > 0
     strains(belt, state.fields, eps)
     return force, eps
 

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 from functools import partial
+from operator import add, mul
 from pathlib import Path
 from types import CodeType, ModuleType
 
@@ -20,7 +21,9 @@ import numba
 import numpy as np
 import pytest
 from numba.core import event
+from numba.core.codegen import JITCodeLibrary
 from numba.core.dispatcher import Dispatcher
+from numba.extending import register_jitable
 
 import cvt_hpc
 from cvt_hpc import kernels
@@ -349,15 +352,77 @@ def twice(inner):
     return lambda x: 2.0 * inner(x)
 
 
+def has_machine_code(function):
+    (code,) = function.overloads.values()
+    return code.library._is_native
+
+
 def test_a_kernel_that_kernels_have_called_can_be_called_from_python(package, chosen):
     for loaded in (False, True):
         module = load(package)
         inner = module.kernel(plus_one)
         caller = module.kernel(twice(inner))
-        assert [caller(1.0), inner(1.0), caller(2.0), inner(2.0)] == [4.0, 2.0, 6.0, 3.0]
+        assert caller(1.0) == 4.0
+        assert not has_machine_code(inner)
+        assert has_machine_code(caller)
+        assert [inner(1.0), caller(2.0), inner(2.0)] == [2.0, 6.0, 3.0]
+        assert has_machine_code(inner)
         assert sum(inner.stats.cache_hits.values()) == 2 * loaded
     inner_alone = load(package).kernel(plus_one)
     assert [inner_alone(1.0), sum(inner_alone.stats.cache_hits.values())] == [2.0, 1]
+
+
+CALLED = (
+    "from cvt_hpc.kernels import kernel\n"
+    "@kernel\ndef checked(x):\n    if x > 1.0:\n        raise ValueError('above', x)\n    return x\n"
+)
+CALLER = "from called import checked\n@kernel\ndef caller(x):\n    return FACTOR * checked(x)\n"
+CALL = """
+from calling import caller
+from called import checked
+try:
+    caller(1.5)
+except ValueError as error:
+    print(*error.args, caller(0.5), sum(checked.stats.cache_hits.values()))
+"""
+
+
+def test_other_processes_take_in_a_kernel_that_they_find(tmp_path):
+    # an error with a value needs the environment of the function that raises it, wherever its code is
+    (tmp_path / "called.py").write_text(CALLED)
+    texts = [CALLED.split("@")[0] + CALLER.replace("FACTOR", factor) for factor in ("2.0", "3.0", "3.0")]
+    found = outputs(
+        CALL, tmp_path, tmp_path, [partial((tmp_path / "calling.py").write_text, text) for text in texts]
+    )
+    assert found == [["above", "1.5", "1.0", "0"], ["above", "1.5", "1.5", "1"], ["above", "1.5", "1.5", "0"]]
+
+
+@register_jitable
+def shared(x):
+    return x - 1.0
+
+
+def test_functions_of_other_people_are_compiled_as_always(package, chosen):
+    ours, theirs = load(package).kernel(lambda x: shared(x)), numba.njit(lambda x: shared(x))
+    assert [ours(1.5), theirs(1.5)] == [0.5, 0.5]
+    (code,) = theirs.overloads.values()
+    assert type(code.library) is JITCodeLibrary
+
+
+def test_an_operator_is_typed_once_for_each_kind_of_operands(package, chosen, monkeypatch):
+    typed = []
+
+    ask = numba.types.BaseFunction.get_call_type
+
+    def get_call_type(function, context, arguments, named):
+        typed.append((function.typing_key, *arguments))
+        return ask(function, context, arguments, named)
+
+    monkeypatch.setattr(numba.types.BaseFunction, "get_call_type", get_call_type)
+    assert load(package).kernel(lambda x, n: x * x * x + n * n * x)(2.0, 3) == 26.0
+    real, whole = numba.types.float64, numba.types.int64
+    kinds = [(mul, real, real), (mul, whole, whole), (mul, whole, real), (add, real, real)]
+    assert sorted(map(str, typed)) == sorted(map(str, kinds))
 
 
 @kernels.kernel

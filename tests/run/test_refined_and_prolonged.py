@@ -18,12 +18,12 @@ from support.marched import CHEAP, assert_same_bits, job, never
 
 T = CHEAP["duration"]
 ALL = {"most_refinements": 3, "longest_duration": 4 * T}
-STEPS = 17  # in a sampling interval, by 3 us
+STEP, STEPS = 12.5e-6, 4  # the longest that stands, and how many are in a sampling interval
 
 
 def asked(**values):
     """A job whose runs are refined and prolonged as they are by default."""
-    return job(**CHEAP | ALL | {"step": 3e-6, "load": 60.0} | values)
+    return job(**CHEAP | ALL | {"step": STEP, "load": 60.0} | values)
 
 
 def point(**values):
@@ -53,12 +53,12 @@ def script(monkeypatch):
     return until, fails
 
 
-@pytest.mark.parametrize(("step", "refinements"), [(50e-6, 2), (25e-6, 1), (12.5e-6, 0)])
+@pytest.mark.parametrize(("step", "refinements"), [(4 * STEP, 2), (2 * STEP, 1), (STEP, 0)])
 def test_a_step_that_is_too_long_is_halved_until_the_run_stands(step, refinements):
     found = run_point(asked(), point(step=step, longest_duration=T), never)
     assert (found["status"], found["refinements"]) == (Status.DONE, refinements)
-    fine = run_point(asked(), point(step=12.5e-6, longest_duration=T), never)
-    assert found["time_step"] == fine["time_step"] == pytest.approx(12.5e-6)
+    fine = run_point(asked(), point(longest_duration=T), never)
+    assert found["time_step"] == fine["time_step"] == pytest.approx(STEP)
     assert found["core_seconds"] > 0.0
     for name in ("steps", "contact_solves"):
         assert (found[name] > fine[name]) is bool(refinements)  # those of the tries that failed count
@@ -210,7 +210,7 @@ def marched(run, samples):
 
 
 def general(duration):
-    values = {"stations": 24, "duration": duration, "rise_time": 2e-3, "load": 60.0, "step": 4e-7}
+    values = {"stations": 24, "duration": duration, "rise_time": 1e-3, "load": 60.0, "step": 4e-7}
     document = {"name": "test", "model": "elastic_belt", "stepper": "symplectic_euler"}
     checked = build_job(document, "test.toml", values | {"duration": 0.04}).point(0)
     return checked | {"duration": duration}
@@ -229,13 +229,13 @@ def oscillator(duration):
     ],
 )
 def test_runs_without_lanes_go_on_as_well(transient, parameters):
-    whole = marched(transient(parameters(0.01)), 200)
-    run = marched(transient(parameters(0.005)), 100).paused()
-    run.prolong(parameters(0.01))
-    marched(run, 200)
+    whole = marched(transient(parameters(0.005)), 100)
+    run = marched(transient(parameters(0.0025)), 50).paused()
+    run.prolong(parameters(0.005))
+    marched(run, 100)
     # general steppers know no step_ripple
     assert np.array_equal(run.rows, whole.rows, equal_nan=True) and run.steps == whole.steps
-    assert run.samples == 200 and np.array_equal(run.displacement, whole.displacement)
+    assert run.samples == 100 and np.array_equal(run.displacement, whole.displacement)
     if hasattr(run, "means"):
         for name, values in whole.means.items():
             assert np.array_equal(run.means[name], values) and np.isfinite(values).all(), name
@@ -243,8 +243,8 @@ def test_runs_without_lanes_go_on_as_well(transient, parameters):
 
 def test_a_run_that_goes_on_and_one_that_begins_anew_share_no_lanes(script):
     # in the second turn both have the same duration and step
-    script[0][1], script[1][2] = 2 * T, 10
-    values = [{"seed": 1, "step": 2.5e-6}, {"seed": 2, "step": 5e-6, "duration": 2 * T}]
+    script[0][1], script[1][2] = 2 * T, STEPS
+    values = [{"seed": 1, "step": STEP / 2}, {"seed": 2, "duration": 2 * T}]
     points = [point(**asked_for) for asked_for in values]
     together = run_points(asked(), points, never)
     assert [record["simulated_seconds"] for record in together] == pytest.approx([2 * T, 2 * T])

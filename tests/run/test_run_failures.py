@@ -12,7 +12,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import POSITION, SPEED
 from cvt_hpc.models.elastic_belt.sampling import LEAST_SPEED, MOST_SPEED, Outcome
 from cvt_hpc.models.elastic_belt.slip import GROSS_SLIP
 from cvt_hpc.models.elastic_belt.validity import FAILURES, LARGEST_POWER_RESIDUAL
-from cvt_hpc.physics.lane_compliance import ROUND_OFF
+from cvt_hpc.physics.compliance import ROUND_OFF
 from cvt_hpc.simulation import record_variables, run_point
 from cvt_hpc.simulation.record import record_of
 from cvt_hpc.study.description import describe

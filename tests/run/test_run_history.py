@@ -134,6 +134,7 @@ def test_the_file_alone_is_enough_to_repeat_the_run():
     dataset = simulate(asked, {"sheave_stiffness": np.inf, "load": "0.1 kN m", "seed": 7})
     again = build_job(json.loads(dataset.attrs["job"]), "again")
     assert (again.fingerprint(), again.axes) == (asked.fingerprint(), asked.axes)
+    assert json.loads(dataset.attrs["point_units"])["load"] == "kN m"
     point = json.loads(dataset.attrs["point"])
     assert (point["sheave_stiffness"], point["load"], point["seed"]) == ("inf", 100.0, 7)
     chosen = {"sheave_stiffness": np.inf, "load": 100.0, "seed": 7, "lanes": "stations"}

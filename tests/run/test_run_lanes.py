@@ -11,7 +11,7 @@ from cvt_hpc.models.elastic_belt.belt import DRIVEN_SPEED, N_RING, U, W, belt_co
 from cvt_hpc.models.elastic_belt.grouping import ALONE_SHARE, cost, lane_key
 from cvt_hpc.models.elastic_belt.lane_belt import REPEATS, parts_of
 from cvt_hpc.models.elastic_belt.sampling import Outcome
-from cvt_hpc.physics.lane_compliance import UNSOLVED
+from cvt_hpc.physics.compliance import UNSOLVED
 from cvt_hpc.simulation import lane_groups, run_point, run_points
 from cvt_hpc.simulation.batches import MOST_TURNS
 from cvt_hpc.variables import Status, Vibrates

@@ -103,7 +103,10 @@ def test_onset_and_end_are_where_constant_speeds_have_them():
         assert (found["status"], found["vibrates"]) == (Status.DONE, Vibrates.YES)
         assert -late < sign * (found["onset_speed"] - np.mean(first)) < late
         assert abs(found["end_speed"] - np.mean(last)) < late
-        assert f"from {found['onset_speed']:.4g} rad/s to {found['end_speed']:.4g} rad/s" in found["reason"]
+        assert (
+            f"from {found['onset_speed'] / RPM:.4g} rpm to {found['end_speed'] / RPM:.4g} rpm"
+            in found["reason"]
+        )
         assert np.all(sign * np.diff(found["ramp_speed"]) > 0.0)
         assert np.isnan(found["onset_load"]) and np.all(np.isnan(found["ramp_load"]))
         vibrating = found["ramp_amplitude"].max(axis=0) > 5e-6

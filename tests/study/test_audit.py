@@ -63,7 +63,7 @@ def test_a_rung_that_errs_is_found_out(job, capsys, monkeypatch):
     assert "passive: 2 of 2 runs of another class (100.00%, 95 % interval 15.81% to 100.00%)" in printed
     assert "2 of them quiet against vibrating\n" in printed  # no forces are compared where a rung knows none
     rows = list(csv.DictReader((out / "audit" / "audit.csv").open()))
-    assert [(row["load"], row["rung"], row["class"], row["class in full"]) for row in rows] == [
+    assert [(row["load [N m]"], row["rung"], row["class"], row["class in full"]) for row in rows] == [
         ("120.0", "passive", "quiet", "vibrating")
     ] * 2
 

@@ -319,6 +319,15 @@ def test_a_job_file_of_odd_types_with_a_checksum_is_one_line(out, capsys, caplog
     assert refused > 60  # texts may be others
 
 
+def test_a_name_that_does_not_print_is_escaped(out, capsys):
+    entry = json.loads((out / "job.json").read_text())
+    del entry["checksum"]
+    entry["name"] = "gr\u00fcn\x1b[31m\n"
+    (out / "job.json").write_text(json.dumps({**entry, "checksum": checksum(entry)}))
+    assert [main([command, str(out)]) for command in ("status", "gather", "map")] == [0, 0, 0]
+    assert capsys.readouterr().out.startswith("job     gr\u00fcn\\x1b[31m\\n (")
+
+
 @pytest.mark.parametrize(
     "text",
     [b"[" * 10**5, b'{"format": ' + b"[" * 10**5, b"9" * 5000, b'{"format": "cvt_hpc study 1", "axes": NaN}'],

@@ -14,9 +14,8 @@ from cvt_hpc.models.elastic_belt.belt import (
     mesh,
 )
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
-from cvt_hpc.models.elastic_belt.rhs import contact_forces, strains
+from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
 from cvt_hpc.models.elastic_belt.sampling import Outcome
-from cvt_hpc.physics.compliance import contact_state
 from support.fast_runs import FastRuns
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
@@ -24,11 +23,6 @@ DEFAULTS["duration"] = 0.1
 T1, T2 = 1, 3  # regions of the path
 # shorter than the default: flanks without friction leave the belt hardly damped, and 5 us is too long for it
 STEP = 3e-6
-
-
-def fresh_contacts(belt: Belt):
-    """Contact memory of both wraps."""
-    return contact_state(belt.driving.weight.size), contact_state(belt.driven.weight.size)
 
 
 def start(**parameters) -> tuple[Belt, State]:

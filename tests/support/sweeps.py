@@ -84,4 +84,4 @@ def wait_for_records(out: Path, count: int, process: subprocess.Popen) -> None:
             pytest.fail(f"ended with {process.returncode}: {process.communicate()[1]}")
         if time.monotonic() > deadline:
             pytest.fail(f"waited in vain for {count} records")
-        time.sleep(0.005)
+        time.sleep(0.02)

@@ -7,13 +7,15 @@ import random
 import subprocess
 import sys
 import time
+from contextlib import chdir, redirect_stdout
+from io import StringIO
 
 import numpy as np
 import pytest
 import xarray as xr
 from PIL import Image
 
-from cvt_hpc import open_results
+from cvt_hpc import load_job, open_results, run
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, occurrence_classes
 from cvt_hpc.cli import main
@@ -56,8 +58,11 @@ model = "elastic_belt"
 stations = { from = 48, to = 68, step = 4 }
 load = ["0 N m", "60 N m"]
 
+[scene]
+rise_time = "10 ms"
+
 [run]
-duration = "0.15 s"
+duration = "0.1 s"
 """
 
 
@@ -74,9 +79,9 @@ def serial(tmp_path_factory):
     """The folder of an undisturbed serial run."""
     folder = tmp_path_factory.mktemp("serial")
     (folder / "small.toml").write_text(JOB + HISTORY)
-    done = call("run", "small.toml", cwd=folder)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines() == [
+    with chdir(folder), redirect_stdout(StringIO()) as printed:
+        assert main(["run", "small.toml"]) == 0
+    assert printed.getvalue().splitlines() == [
         "8 runs: 8 done, 0 failed, 0 left",
         "of those done 2 slip",  # at 500 N m, on both sheaves
         "results: out/small/results.nc",
@@ -89,9 +94,9 @@ def meshes(tmp_path_factory):
     """The dataset of an undisturbed serial run over several meshes."""
     folder = tmp_path_factory.mktemp("meshes")
     (folder / "meshes.toml").write_text(MESHES)
-    done = call("run", "meshes.toml", cwd=folder)
-    assert done.returncode == 0, done.stderr
-    return load_results(folder / "out" / "meshes")
+    report = run(load_job(folder / "meshes.toml"), folder / "out", progress=False)
+    assert report.exit_status == 0
+    return load_results(report.out)
 
 
 def load_results(out):

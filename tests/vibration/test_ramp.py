@@ -5,6 +5,7 @@ import pytest
 
 from cvt_hpc.variables import Vibrates
 from cvt_hpc.vibration.ramp import BINS, SUSTAINED, VARIABLES, Passages, assess_ramp
+from cvt_hpc.vibration.ramped import QUANTITIES
 from cvt_hpc.vibration.settings import PARAMETERS
 
 RATE = 20_000.0
@@ -93,7 +94,9 @@ def test_vibration_counts_from_a_number_of_windows_in_a_row():
 
 def passages(*levels):
     """Verdict and margin of one strand by its amplitudes in windows, over the threshold."""
-    found = Passages(5e-6 * np.array(levels)[:, np.newaxis], 10.0 * np.arange(len(levels)), "N m", DEFAULTS)
+    found = Passages(
+        5e-6 * np.array(levels)[:, np.newaxis], 10.0 * np.arange(len(levels)), QUANTITIES["load"], DEFAULTS
+    )
     vibrates, _ = found.classify(["t1"])
     return vibrates, found.margin(vibrates)
 
@@ -153,7 +156,7 @@ def test_a_ramp_of_speed_is_told_in_its_units():
     found, quiet = (ramp(window(low, 150.0), quantity="speed") for low in (100.0, 1000.0))
     record = found.record()
     assert (record["onset_speed"], record["end_speed"]) == (found.onset, found.end)
-    assert f"from {found.onset:.4g} rad/s to {found.end:.4g} rad/s" in found.reason
-    assert quiet.reason.startswith("quiet between") and "rad/s" in quiet.reason
+    assert f"from {found.onset * 30 / np.pi:.4g} rpm to {found.end * 30 / np.pi:.4g} rpm" in found.reason
+    assert quiet.reason.startswith("quiet between") and "rpm" in quiet.reason
     units = {variable.name: variable.units for variable in VARIABLES}
     assert {units[name] for name in ("onset_speed", "end_speed", "ramp_speed")} == {"rad s-1"}

@@ -48,12 +48,12 @@ REFINED = 0.2  # of the runs are done in full, more of them in a trace
 def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
     """Core-seconds of runs that fill the lanes once."""
     coarse = COARSENESS**2 * SHARE
-    return (coarse + REFINED) * grouping.cost(dict(parameters), stepper)
+    return (coarse + REFINED) * grouping.cost(parameters, stepper)
 
 
 def lanes(parameters: Mapping[str, Any], stepper: str) -> int:
     """Most runs that can advance together."""
-    return grouping.lanes(dict(parameters), stepper)
+    return grouping.lanes(parameters, stepper)
 
 
 def known(parameters: Mapping[str, Any]) -> dict[str, Any] | None:

@@ -75,7 +75,7 @@ def flank(parameters: Mapping[str, Any]) -> Flank:
     speed = float(np.hypot(p["radial_speed"], p["tangential_speed"]))
     share = p["radial_speed"] / speed
     value, fall = friction_coefficient(law, speed, normal_force)
-    factor, rise = saturation(speed, p["friction_speed"])
+    factor, rise = saturation(speed, 1.0 / p["friction_speed"])
     mu = value * factor
     mass = p["element_mass"] + p["ring_mass"]
     stiffness = p["belt_stiffness"] + 2.0 * p["contact_stiffness"] * tangent * (tangent + mu * share)

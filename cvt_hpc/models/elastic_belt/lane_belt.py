@@ -27,8 +27,8 @@ from cvt_hpc.models.elastic_belt.belt import (
     bending_bands,
 )
 from cvt_hpc.models.elastic_belt.rhs import speed_share_at
+from cvt_hpc.physics.compliance import Contact, lane_contact
 from cvt_hpc.physics.friction import FrictionLaw
-from cvt_hpc.physics.lane_compliance import LaneContact, lane_contact
 
 # Constants of each lane, in SI units; what is not named in `Belt` is explained where it is computed below.
 CONSTANTS = (
@@ -180,14 +180,14 @@ class LaneState(NamedTuple):
         LANE_SCALARS.
     time : (1,) array
         [s]
-    contacts : pair of LaneContact
+    contacts : pair of Contact
         Driving and driven wrap.
     """
 
     fields: LaneArray
     scalars: LaneArray
     time: np.ndarray
-    contacts: tuple[LaneContact, LaneContact]
+    contacts: tuple[Contact, Contact]
 
 
 def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import (
     LaneArray,
-    absolute,
     ahead,
     anywhere,
     at_station,
@@ -24,7 +23,6 @@ from cvt_hpc.lanes import (
     select,
     set_station,
     sqrt,
-    with_sign_of,
 )
 from cvt_hpc.models.elastic_belt.belt import (
     N_ELEMENT,
@@ -66,11 +64,10 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneBelt,
     LaneState,
 )
+from cvt_hpc.physics.compliance import FORCED, GAP, contact_force, solve_contact
 from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
-from cvt_hpc.physics.friction import lane_coefficient, lane_law, lane_table
+from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
 from cvt_hpc.physics.friction_laws import Law
-from cvt_hpc.physics.lane_compliance import CLOSED, FORCED, GAP, solve_lane_contact
-from cvt_hpc.physics.lane_compliance import PUSH as PUSHED
 from cvt_hpc.physics.lane_gauss_seidel import sweep_lane_contact
 from cvt_hpc.variator.course import load_course, speed_course, start_damping
 
@@ -301,10 +298,10 @@ def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -
         if contact.sweeps > 0:
             sweep_lane_contact(contact)
         else:
-            solve_lane_contact(contact, MOST_CONTACT_ROUNDS)
+            solve_contact(contact, MOST_CONTACT_ROUNDS)
         row, part = first % n, first // n
         for k in range(contact.weight.size):
-            force = select(pushed[k, CLOSED] > 0.5, maximum(pushed[k, PUSHED], 0.0), 0.0)
+            force = contact_force(pushed, k)
             pushed[k, FORCED] = force
             set_station(stations, row, part, FORCE, force)
             row, part = _next_station(n, row, part)
@@ -359,7 +356,7 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     n, fields, c = state.fields.rows, state.fields, belt.constants
     kind, memory = belt.law.kind, belt.memory
     table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
-    law = lane_law(c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED])
+    numbers = law_numbers(c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED])
     share = lane_speed_share(belt, state.time[0], c[0, BELT_SPEED])
     per_cosine, belt_speed, offset = 1.0 / c[0, COSINE], share * c[0, BELT_SPEED], c[0, RING_OFFSET]
     least = LEAST_SHARE_OF_WIDTH * c[0, FRICTION_SPEED]
@@ -376,13 +373,14 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
         )
         v_law = fields[j, V_FILTERED] if memory else speed
         if kind == Law.TABLE:
-            coefficient = lane_table(table, v_law, stations[j, FORCE] * per_cosine)
+            coefficient, _ = table_coefficient(table, v_law, stations[j, FORCE] * per_cosine)
         else:
-            coefficient = lane_coefficient(kind, law, v_law)
-        # tanh(x) = (1 - e^-2x) / (1 + e^-2x) for flanks and rings
+            coefficient, _ = formula_coefficient(kind, numbers, v_law)
+        # of the flanks tanh(x) = (1 - e^-2x) / (1 + e^-2x) and 1 / speed by one division
         speed = maximum(speed, least)
         saddle = fma(fma(offset, belt.arc_curvature[j], 1.0), full_speed, -(belt_speed + fields[j, V_RING]))
-        rest, ring_rest = decay(speed * (2.0 * per_width)), decay(absolute(saddle) * (2.0 * per_ring_width))
+        rest = decay(speed * (2.0 * per_width))
+        ring_factor, _ = saturation(saddle, per_ring_width)
         per_flank = 1.0 / (speed * (1.0 + rest))
         stations[j, SLIDING_R], stations[j, SLIDING_T] = v_radial, v_tangential
         stations[j, COEFFICIENT] = coefficient
@@ -390,5 +388,4 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
             (1.0 - rest) * (speed * per_flank),
             (1.0 + rest) * per_flank,
         )
-        stations[j, RING_FACTOR] = with_sign_of((1.0 - ring_rest) / (1.0 + ring_rest), saddle)
-        stations[j, SADDLE] = saddle
+        stations[j, RING_FACTOR], stations[j, SADDLE] = ring_factor, saddle

@@ -35,12 +35,13 @@ from cvt_hpc.models.elastic_belt.rhs import (
     accelerations,
     contact_forces,
     content_rates,
+    fresh_contacts,
     load_at,
     memory_rates,
     sliding_speed,
     strains,
 )
-from cvt_hpc.physics.compliance import ContactState, contact_state
+from cvt_hpc.physics.compliance import Contact
 from cvt_hpc.steppers.system import System
 
 ROWS = (W, U, V_ELEMENT, V_RING, N_ELEMENT, N_RING)  # of the state, as they follow in y
@@ -60,7 +61,7 @@ class FlatBelt(NamedTuple):
         Constants.
     state : State
         Work space: y as fields and scalars, of the last call.
-    contacts : tuple of two ContactState
+    contacts : tuple of two Contact
         Closed sets of the last call, where the next search starts. They change results by round-off alone.
     remembering : (M,) int array
         Stations whose filtered speed is an unknown.
@@ -76,7 +77,7 @@ class FlatBelt(NamedTuple):
 
     belt: Belt
     state: State
-    contacts: tuple[ContactState, ContactState]
+    contacts: tuple[Contact, Contact]
     remembering: np.ndarray
     origin: np.ndarray
     start: float
@@ -101,13 +102,12 @@ def flat_belt(belt: Belt, start: float = 0.0) -> FlatBelt:
     arc = belt.arc_share > 0.0
     arc[[0, belt.driven_start]] = False
     remembering = np.flatnonzero(arc & (belt.friction_memory > 0.0))
-    contacts = contact_state(belt.driving.weight.size), contact_state(belt.driven.weight.size)
     origins = {V_ELEMENT: belt.belt_speed, V_RING: belt.belt_speed, N_ELEMENT: 1.0, N_RING: 1.0}
     rows = np.repeat([origins.get(row, 0.0) for row in ROWS], n)
     origin = np.concatenate([rows, np.zeros(remembering.size), [belt.driving_speed / belt.ratio, 0.0]])
     state = State(np.zeros((len(FIELDS), n)), np.zeros(len(SCALARS)))
     work = np.zeros(n), np.zeros((2, n)), np.zeros((len(FIELDS), n)), np.zeros(n)
-    return FlatBelt(belt, state, contacts, remembering, origin, start, 0.0, *work)
+    return FlatBelt(belt, state, fresh_contacts(belt), remembering, origin, start, 0.0, *work)
 
 
 def pack(flat: FlatBelt, state: State) -> np.ndarray:

@@ -21,7 +21,7 @@ distance of two stations alone.
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, with_sign_of
+from cvt_hpc.lanes import LaneArray, fma, like, maximum, minimum
 from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_FILTERED, V_RING, U, W
 from cvt_hpc.models.elastic_belt.lane_belt import (
     AXIAL_DAMPING,
@@ -75,7 +75,7 @@ from cvt_hpc.models.elastic_belt.moments import (
     add_stresses,
 )
 from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
-from cvt_hpc.physics.friction import lane_coefficient, lane_law, lane_saturation, lane_table
+from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
 from cvt_hpc.physics.friction_laws import Law
 
 POWERS = (
@@ -144,7 +144,7 @@ def audit(
     per_width, per_ring_width = 1.0 / width, 1.0 / c[0, RING_FRICTION_SPEED]
     kind = belt.law.kind
     table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
-    law = lane_law(c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED])
+    numbers = law_numbers(c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED])
     least = LEAST_SHARE_OF_WIDTH * width
     damping = lane_damping(belt, state.time[0])
     element_mass, ring_mass, mass, offset = c[0, ELEMENT_MASS], c[0, RING_MASS], c[0, MASS], c[0, RING_OFFSET]
@@ -205,10 +205,11 @@ def audit(
         sliding = maximum(sliding, least)
         v_law = fields[j, V_FILTERED] if belt.memory else sliding
         if kind == Law.TABLE:
-            mu = lane_table(table, v_law, force * per_cosine)
+            mu, _ = table_coefficient(table, v_law, force * per_cosine)
         else:
-            mu = lane_coefficient(kind, law, v_law)
-        mu *= lane_saturation(sliding, per_width)
+            mu, _ = formula_coefficient(kind, numbers, v_law)
+        factor, _ = saturation(sliding, per_width)
+        mu *= factor
         upward = mu * meridian / sliding
         twice_normal = 2.0 * force / fma(upward, sine, cosine)
         elastic_radial = share * wedge * force
@@ -228,7 +229,8 @@ def audit(
         ring_left = ring_stiffness * stations[a, EPS_1]
         pressure = saddle_pressure(belt, j, ring_left, tension, ring_relief * longer)
         grip = c[0, RING_FRICTION] * 0.5 * pressure
-        drag = with_sign_of(grip * lane_saturation(absolute(saddle), per_ring_width), saddle)
+        factor, _ = saturation(saddle, per_ring_width)
+        drag = grip * factor
         ring_loss += drag * saddle
         if summed:
             add_saddles(profiles, j, drag, saddle)

@@ -39,10 +39,9 @@ from cvt_hpc.models.elastic_belt.belt import (
     U,
     W,
 )
-from cvt_hpc.physics.compliance import ContactState, solve_contact
-from cvt_hpc.physics.flank import flank_forces, sliding
+from cvt_hpc.physics.compliance import Contact, plain_contact, solve_wrap
+from cvt_hpc.physics.flank import flank_forces, flank_sliding
 from cvt_hpc.physics.friction import friction_coefficient, saturation
-from cvt_hpc.physics.sheaves import Sheaves
 from cvt_hpc.variator.course import load_course, speed_course, start_damping
 
 
@@ -87,28 +86,28 @@ def strains(belt: Belt, fields: np.ndarray, eps: np.ndarray) -> None:
         eps[1, c] = (1.0 + kappa * (w + belt.ring_offset)) / fields[N_RING, c] - 1.0
 
 
+def fresh_contacts(belt: Belt) -> tuple[Contact, Contact]:
+    """Contact of the driving and of the driven wrap, as `contact_forces` takes them, all stations closed."""
+    return plain_contact(belt.driving), plain_contact(belt.driven)
+
+
 @merged_kernel
-def wrap_contact(
-    belt: Belt, sheave: Sheaves, contact: ContactState, w: np.ndarray, opening: float, force: np.ndarray
-) -> int:
+def wrap_contact(belt: Belt, contact: Contact, w: np.ndarray, opening: float, force: np.ndarray) -> int:
     """Axial line forces of one wrap from its displacements; returns the solver's count, 0 where it failed."""
     gap = opening + 2.0 * np.tan(belt.half_wedge_angle) * w
-    return solve_contact(sheave, contact, gap, force)
+    solves = solve_wrap(contact, gap, force)
+    return solves
 
 
 @merged_kernel
-def contact_forces(
-    belt: Belt, state: State, contacts: tuple[ContactState, ContactState], force: np.ndarray
-) -> int:
+def contact_forces(belt: Belt, state: State, contacts: tuple[Contact, Contact], force: np.ndarray) -> int:
     """Axial line forces of both wraps into `force` (N,) [N/m], 0 on the strands; 0 solves: failure."""
     force[:] = 0.0
     w = state.fields[W]
     last = belt.driving.weight.size
-    solves = wrap_contact(belt, belt.driving, contacts[0], w[:last], belt.driving_position, force[:last])
+    solves = wrap_contact(belt, contacts[0], w[:last], belt.driving_position, force[:last])
     first, last = belt.driven_start, belt.driven_start + belt.driven.weight.size
-    more = wrap_contact(
-        belt, belt.driven, contacts[1], w[first:last], state.scalars[DRIVEN_POSITION], force[first:last]
-    )
+    more = wrap_contact(belt, contacts[1], w[first:last], state.scalars[DRIVEN_POSITION], force[first:last])
     return solves + more if solves > 0 and more > 0 else 0
 
 
@@ -127,7 +126,7 @@ def ring_drag(
         Line force on the rings [N/m] and the speed of the saddles against them [m/s].
     """
     sliding_speed = (1.0 + belt.ring_offset * belt.arc_curvature[j]) * v_element - v_ring
-    factor, _ = saturation(sliding_speed, belt.ring_friction_speed)
+    factor, _ = saturation(sliding_speed, 1.0 / belt.ring_friction_speed)
     relief = belt.ring_relief[j] * share * share
     pressure = max(belt.ring_stiffness * eps[1, j] - relief, 0.0) * belt.cell[j] * belt.curvature[j]
     pressure += max(belt.ring_stiffness * eps[1, a] - relief, 0.0) * belt.cell[a] * belt.curvature[a]
@@ -210,9 +209,10 @@ def accelerations(
             radius = (belt.driven_radius if driven else belt.driving_radius) + w[j]
             omega = state.scalars[DRIVEN_SPEED] if driven else driving_speed
             v_tangential = v0[j] - omega * radius
-            v_law = sliding(v_radial, v_tangential, cosine)[0] if belt.friction_memory == 0.0 else vf[j]
+            speed, _ = flank_sliding(v_radial, v_tangential, 1.0 / cosine)
+            v_law = speed if belt.friction_memory == 0.0 else vf[j]
             coefficient, _ = friction_coefficient(belt.law, v_law, force[j] / cosine)
-            radial, tangential, _, _ = flank_forces(
+            radial, tangential = flank_forces(
                 coefficient, belt.friction_speed, sine, cosine, force[j], v_radial, v_tangential
             )
             outward += share * radial
@@ -277,4 +277,5 @@ def sliding_speed(belt: Belt, state: State, j: int) -> float:
     else:
         driving_speed = speed_share_at(belt, state.scalars[TIME]) * belt.driving_speed
         v_tangential = v - driving_speed * (belt.driving_radius + w[j])
-    return sliding(v_radial, v_tangential, np.cos(belt.half_wedge_angle))[0]
+    speed, _ = flank_sliding(v_radial, v_tangential, 1.0 / np.cos(belt.half_wedge_angle))
+    return speed

@@ -35,8 +35,8 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
 )
 from cvt_hpc.models.elastic_belt.moments import MOMENTS, add
 from cvt_hpc.models.elastic_belt.power import POWERS, audit
+from cvt_hpc.physics.compliance import SOLVES, UNSOLVED
 from cvt_hpc.physics.flank import tangential_sliding
-from cvt_hpc.physics.lane_compliance import SOLVES, UNSOLVED
 
 SCALARS = (
     "load",

@@ -28,7 +28,7 @@ def regularised_friction(o: Oscillator, sliding: float, load: float) -> float:
     mu = friction_coefficient(o.law, abs(sliding), load)[0]
     hump = sliding / (HUMP * o.width)
     at_rest = o.excess * hump * np.exp(0.5 * (1.0 - hump * hump))
-    return load * (mu * saturation(sliding, o.width)[0] + at_rest)
+    return load * (mu * saturation(sliding, 1.0 / o.width)[0] + at_rest)
 
 
 @kernel

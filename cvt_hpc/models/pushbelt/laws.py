@@ -12,11 +12,9 @@ from __future__ import annotations
 from numba.extending import register_jitable
 
 from cvt_hpc.lanes import like, maximum, select, sqrt
-from cvt_hpc.physics.friction import lane_coefficient, lane_law, lane_saturation
-from cvt_hpc.physics.friction_laws import Law
+from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation
 
 LEAST_SHARE_OF_WIDTH = 1e-3  # of v_reg: below it friction is linear to 3e-7
-_DIFFERENCE = 1e-6  # of a law's speed scale: the step by which its slope is found
 
 
 @register_jitable
@@ -28,16 +26,8 @@ def pressed(gap, stiffness):
 @register_jitable
 def coefficient(kind, kinetic, gradient, scale, speed):
     """Coefficient of friction [1] at sliding speeds >= 0 [m/s], and its slope [s/m]."""
-    mu = slope = like(0.0, speed)
-    if kind == Law.COULOMB:
-        mu = like(kinetic, speed)
-    else:
-        a, b, c, d = lane_law(kinetic, gradient, scale)
-        numbers = like(a, speed), like(b, speed), like(c, speed), like(d, speed)
-        step = _DIFFERENCE * scale
-        mu = lane_coefficient(kind, numbers, speed)
-        slope = (lane_coefficient(kind, numbers, speed + step) - mu) * (1.0 / step)
-    return mu, slope
+    found = formula_coefficient(kind, law_numbers(kinetic, gradient, scale), speed)
+    return found
 
 
 @register_jitable
@@ -53,11 +43,9 @@ def remembered(filtered, size, memory, dt):
 @register_jitable
 def smoothed(size, regularisation):
     """1 / q [s/m] of a sliding speed's size [m/s], and q' over that size [s/m]."""
-    per_width = 1.0 / regularisation
     size = maximum(size, LEAST_SHARE_OF_WIDTH * regularisation)
-    factor = lane_saturation(size, like(per_width, size))
+    factor, slope = saturation(size, 1.0 / regularisation)
     per_size = 1.0 / size
-    slope = (1.0 - factor * factor) * per_width
     return factor * per_size, (factor * per_size - slope) / (factor * factor)
 
 

@@ -7,10 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import DRIVEN_POSITION, DRIVEN_SPEED, V_ELEMENT, V_RING, Mesh, W
-from cvt_hpc.models.elastic_belt.rhs import contact_forces, strains
+from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
 from cvt_hpc.models.elastic_belt.slip import largest_torque
 from cvt_hpc.models.steady_variator.walking import Steady
-from cvt_hpc.physics.compliance import contact_state
 
 
 class Distributions(NamedTuple):
@@ -44,8 +43,7 @@ def distributions(steady: Steady) -> Distributions:
     belt, fields = steady.belt, steady.state.fields
     n = belt.cell.size
     force, eps = np.empty(n), np.empty((2, n))
-    contacts = contact_state(belt.driving.weight.size), contact_state(belt.driven.weight.size)
-    contact_forces(belt, steady.state, contacts, force)
+    contact_forces(belt, steady.state, fresh_contacts(belt), force)
     strains(belt, fields, eps)
     driven = np.arange(n) >= belt.driven_start
     radius = np.where(driven, belt.driven_radius, belt.driving_radius) + fields[W]

@@ -21,6 +21,7 @@ from cvt_hpc.models.elastic_belt.one_system import (
     rates_under_forces,
     set_inlets,
 )
+from cvt_hpc.physics.compliance import CLOSED
 from cvt_hpc.physics.sheaves import flexibility
 
 REACH = 2  # stations to either side that a rate knows of
@@ -148,7 +149,7 @@ class Linearisation:
         entries, first = [], 0
         wedge = 2.0 * np.tan(flat.belt.half_wedge_angle)
         for arc, matrix, contact in zip(self._arcs, self._flexibility, flat.contacts, strict=True):
-            closed = np.flatnonzero(contact.closed)
+            closed = np.flatnonzero(contact.stations[:, CLOSED])
             stiffness = np.linalg.inv(matrix[np.ix_(closed, closed)])
             rows, columns = np.meshgrid(first + closed, arc[closed], indexing="ij")
             entries.append((-wedge * stiffness.ravel(), rows.ravel(), columns.ravel()))

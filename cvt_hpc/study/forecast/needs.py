@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 from pathlib import Path
@@ -18,20 +19,39 @@ if TYPE_CHECKING:
 # [byte] of rank 0 for each run, for the plan and the index of the records: 207 were measured with 10^6 runs
 # on one rank, and about as much again is assumed for sending the plan.
 MEMORY_PER_RUN = 400
+# [byte] of results.nc for each quantity and coordinate, beside its values: 4700 at most were measured
+NAMES_AND_CHUNKS = 5000
+_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"))
+
+
+class Disk(NamedTuple):
+    """Space on the disk [byte], of `results` at most; `histories` NaN where it is not known."""
+
+    records: float
+    results: float
+    histories: float
 
 
 class Needs(NamedTuple):
-    """What a sweep needs: memory of rank 0 [byte], and disk for the records of all runs [byte]."""
+    """What a sweep needs: memory of rank 0 [byte], and space on the disk."""
 
     memory: int
-    disk: int
+    disk: Disk
 
 
 def needs(job: Job, simulator: Simulator) -> Needs:
-    """Return what a sweep of all runs of a job needs, without marks, dataset and histories."""
-    record = HEAD.size + PLACE.size + record_type(*record_layout(job, simulator)).itemsize
+    """Return what a sweep of all runs of a job needs, without the marks of its batches."""
+    variables, coordinates = record_layout(job, simulator)
+    record = record_type(variables, coordinates).itemsize
     size = runs_along(job, [axis.name for axis in job.axes])
-    return Needs(MEMORY_PER_RUN * size, record * size)
+    named = len(variables) + len(coordinates) + len(job.axes) + len(job.rules)
+    disk = Disk((HEAD.size + PLACE.size + record) * size, most_of_results(size * record, named), math.nan)
+    return Needs(MEMORY_PER_RUN * size, disk if job.histories else disk._replace(histories=0.0))
+
+
+def most_of_results(values: int, named: int) -> int:
+    """Return the most that results.nc takes [byte], by its values [byte] and number of quantities."""
+    return values + NAMES_AND_CHUNKS * named
 
 
 def refuse_too_large(job: Job, simulator: Simulator, out: Path) -> Needs:
@@ -56,19 +76,20 @@ def refuse_too_large(job: Job, simulator: Simulator, out: Path) -> Needs:
     where = f"{job.source}: {size} runs"
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if needed.memory > memory:
-        found = f"{in_gigabytes(memory)} in this machine"
-        raise mismatch(where, f"{in_gigabytes(needed.memory)} of memory for their plan", found)
+        found = f"{size_in_words(memory)} in this machine"
+        raise mismatch(where, f"{size_in_words(needed.memory)} of memory for their plan", found)
     if "first_spacing" not in job.design:
         free = _free(out) + _held(out)
-        if needed.disk > free:
-            expected = f"{in_gigabytes(needed.disk)} on the disk for their records"
-            raise mismatch(where, expected, f"{in_gigabytes(free)} at {out}")
+        if (disk := needed.disk.records + needed.disk.results) > free:
+            expected = f"{size_in_words(disk)} on the disk for their records and results.nc"
+            raise mismatch(where, expected, f"{size_in_words(free)} at {out}")
     return needed
 
 
-def in_gigabytes(size: float) -> str:
-    """Return a size [byte] in words."""
-    return f"{size / 1e9:.3g} GB"
+def size_in_words(size: float) -> str:
+    """Return a size [byte] in words, to three digits."""
+    factor, prefix = next((pair for pair in _PREFIXES if size >= 0.9995 * pair[0]), _PREFIXES[-1])
+    return f"{size / factor:.3g} {prefix}B"
 
 
 def _free(out: Path) -> int:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from cvt_hpc.study.description import Study, describe
+from cvt_hpc.study.forecast.needs import Disk, most_of_results
 from cvt_hpc.study.forecast.pilots import find_out
 from cvt_hpc.study.forecast.simulate import Forecast, forecast
 from cvt_hpc.study.ranks.time_limit import gathering_margin
@@ -20,14 +21,6 @@ if TYPE_CHECKING:
 
 _START_UP = 60.0  # [s] for MPI, Python and kernels; assumed, with room for slow file systems
 _STEP = 300.0  # [s] to which a time limit is rounded up
-
-
-class Disk(NamedTuple):
-    """Space on the disk [byte], at most; `histories` NaN where it is not known."""
-
-    records: float
-    results: float
-    histories: float
 
 
 class Expectation(NamedTuple):
@@ -94,8 +87,11 @@ def disk_space(study: Study, batches: int, histories: int, history_bytes: float)
     layout = RecordFormat(study.fingerprint, study.record_dtype)
     marks = batches * HEAD.size + study.size * PLACE.size
     values = study.size * study.record_dtype.itemsize
+    named = len((*study.variables, *study.coordinates, *study.axes, *study.derived))
     return Disk(
-        study.size * layout.record_size + marks, values, histories * history_bytes if histories else 0.0
+        study.size * layout.record_size + marks,
+        most_of_results(values, named),
+        histories * history_bytes if histories else 0.0,
     )
 
 

@@ -1,0 +1,56 @@
+"""Values of axes for people: in the unit in which the job gives them, by the attributes of a coordinate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+from cvt_hpc.job.units import UnitError, from_si
+from cvt_hpc.job.values import in_words
+
+JOB_UNITS = "job_units"  # attribute of a coordinate, beside `units`
+POINT_UNITS = "point_units"  # attribute of a history: by key, beside the values `point`
+
+
+def si_unit(attributes: Mapping[str, Any]) -> str:
+    """Return the SI unit of a coordinate with these attributes; "" for texts and plain numbers."""
+    unit = str(attributes.get("units", ""))
+    return "" if unit == "1" else unit
+
+
+def shown_unit(attributes: Mapping[str, Any]) -> str:
+    """Return the unit in which people read a coordinate: that of the job, else the SI unit."""
+    unit, wanted = si_unit(attributes), str(attributes.get(JOB_UNITS, ""))
+    return wanted if wanted and _is_of(unit, wanted) else unit
+
+
+def shown_number(value: Any, attributes: Mapping[str, Any]) -> Any:
+    """Return a value [SI] of a coordinate in its `shown_unit`; a text as it is."""
+    return from_si(value, si_unit(attributes), shown_unit(attributes)) if isinstance(value, float) else value
+
+
+def shown(value: Any, attributes: Mapping[str, Any]) -> str:
+    """Return a value [SI] of a coordinate with its `shown_unit`, such as "3000 rpm"."""
+    return in_words(value, si_unit(attributes), shown_unit(attributes))
+
+
+def shown_as_read(value: float, attributes: Mapping[str, Any]) -> str:
+    """Return the same for an error, with the value [SI], which may have been meant in another unit."""
+    in_si = in_words(value, si_unit(attributes))
+    return in_si if (text := shown(value, attributes)) == in_si else f"{text} ({in_si})"
+
+
+def heading(name: str, attributes: Mapping[str, Any]) -> str:
+    """Return the head of a table's column of `shown_number`, such as "driving_speed [rpm]"."""
+    unit = shown_unit(attributes)
+    return f"{name} [{unit}]" if unit else name
+
+
+@lru_cache
+def _is_of(unit: str, wanted: str) -> bool:
+    """Whether a unit, of a dataset that anybody may have written, is one of the same dimension."""
+    try:
+        return from_si(1.0, unit, wanted) > 0.0
+    except UnitError:
+        return False
