@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from itertools import product
+
 from cvt_hpc.chart.measuring import exact_displacement
 from cvt_hpc.chart.plan import Chart, Point, Role, Scene
 from cvt_hpc.chart.quantities import channels_needed
@@ -23,7 +26,8 @@ def check_prospects(chart: Chart) -> None:
         (point,) = chart.points_of(scene.name, Role.REFERENCE)
         if scene.exact:
             _check_exact(point, where)
-        _check_channels(point, scene, where)
+        models = dict.fromkeys(p.job.model for p in chart.points if p.scene == scene.name)
+        _check_channels(models, scene, where)
         if scene.lead is not None:
             _check_lead(point, where)
     for point in chart.points:
@@ -48,11 +52,10 @@ def _check_lead(point: Point, where: str) -> None:
         raise mismatch(f"{where} lead", "a model whose runs can take over from others", point.job.model)
 
 
-def _check_channels(point: Point, scene: Scene, where: str) -> None:
+def _check_channels(models: Iterable[str], scene: Scene, where: str) -> None:
     needed = channels_needed(scene.quantities)
     if scene.exact and needed:
         raise mismatch(f"{where} quantities", "those that an exact solution has", f"channel {needed[0]}")
-    for channel in needed:
-        if channel not in load_model(point.job.model).channels:
-            expected = f"a model that records {channel}"
-            raise mismatch(f"{where} quantities", expected, point.job.model)
+    for channel, model in product(needed, models):
+        if channel not in load_model(model).channels:
+            raise mismatch(f"{where} quantities", f"a model that records {channel}", model)

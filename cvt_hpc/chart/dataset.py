@@ -80,7 +80,10 @@ def _descriptions(rows: Sequence[Result]) -> dict[str, Any]:
 def _costs(rows: Sequence[Result]) -> dict[str, Any]:
     variables = {
         "core_seconds_per_simulated_second": _along(
-            [row.measurement.cost for row in rows], "1", "cost of a run", f"least of all repeats; {VOLATILE}"
+            [row.measurement.cost for row in rows],
+            "1",
+            "cost of a run",
+            f"of methods the least of all repeats; {VOLATILE}",
         ),
         "core_seconds": _along(
             [row.measurement.core_seconds for row in rows],

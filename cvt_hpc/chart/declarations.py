@@ -44,6 +44,7 @@ SCENE = {
 METHOD = {
     "label": Parameter("", "", "name in tables and pictures"),
     "stepper": Parameter(None, "", "stepper"),
+    "model": Parameter("", "", "model, where it is not the scene's; it is told all that the scene sets"),
     "lanes": Parameter(1, "", "runs that advance together; costs are those of one", minimum=1, maximum=64),
 }
 BUDGET = {

@@ -30,7 +30,7 @@ class Measurement:
         By quantity an array with the starts along the first axis; empty where it failed.
     cost : float
         Core-seconds for each simulated second of a run, the shortest of all repeats; of a run that failed or
-        was given up until then; nan where it is of no interest.
+        was given up until then. Of a point that is not timed by one pass, in as many lanes as it has starts.
     core_seconds : float
         Processor time that the first pass took [s].
     simulated : float
@@ -75,7 +75,7 @@ def measure(point: Point, scene: Scene, repeats: int, time_limit: float) -> Meas
             return Measurement(f"{_explained(run, run.failure)}, before the method takes over")
     marched = march(model, stepper, points, lanes, point.until, time_limit, led)
     reason, values = _outcome(point, scene, marched)
-    cost = marched.cost if point.timed else math.nan
+    cost = marched.cost
     if point.timed and not reason:
         again = repeats if marched.core_seconds < LONG * runs / lanes else 0
         costs = [march(model, stepper, points, lanes, point.until, led=led).cost for _ in range(again)]

@@ -89,9 +89,11 @@ def method_points(name: str, raw: Any, stages: list[Stage], where: str) -> Itera
     for stage in _chosen_stages(raw.get("scenes"), stages, where):
         for i, value in enumerate(raw[key], 1):
             setting: dict[str, Any] = {
-                key: stage.setting(own["stepper"], key, value, where, f"{where} {key}, value {i}")
+                key: stage.setting(
+                    own["stepper"], key, value, where, f"{where} {key}, value {i}", own["model"]
+                )
             }
-            job = stage.job(where, stepper=own["stepper"], **read_set(raw, where), **setting)
+            job = stage.job(where, own["model"], stepper=own["stepper"], **read_set(raw, where), **setting)
             yield Point(
                 f"{stage.scene.name}-{name}-{i}",
                 stage.scene.name,

@@ -26,8 +26,6 @@ from cvt_hpc.vibration.settings import fitting_window
 
 Array = NDArray[np.float64]
 
-PUSH_FORCE_CHANNELS = ("push_force t1", "push_force t2")
-
 
 @dataclass(frozen=True)
 class History:
@@ -88,6 +86,8 @@ class Kind:
         Whether it must.
     values : callable
         (History, Quantity) -> the run's values, shape (n,) or, for a trajectory, (time, probe).
+    channels : tuple of str
+        Recorded channels that it is made of.
     """
 
     unit: str
@@ -95,6 +95,7 @@ class Kind:
     values: Callable[[History, Quantity], Array]
     takes_part: bool = False
     needs_part: bool = False
+    channels: tuple[str, ...] = ()
 
 
 def _trajectory(history: History, quantity: Quantity) -> Array:
@@ -138,8 +139,13 @@ def _onset(history: History, quantity: Quantity) -> Array:
     return np.array([np.interp(crossing + 1 / history.rate, sampled, history.channel(quantity.channel))])
 
 
-def _push_force(history: History, quantity: Quantity) -> Array:
-    return np.array([history.channel(name)[history.judged].mean() for name in PUSH_FORCE_CHANNELS])
+def _means(unit: str, title: str, *channels: str) -> Kind:
+    """Means of channels over the judged part."""
+
+    def values(history: History, quantity: Quantity) -> Array:
+        return np.array([history.channel(name)[history.judged].mean() for name in channels])
+
+    return Kind(unit, title, values, channels=channels)
 
 
 _TIMES = (1e-6, 1e3)  # [s]
@@ -150,7 +156,9 @@ KINDS: dict[str, Kind] = {
     "growth_rate": Kind("s-1", "growth rate", _growth_rate, takes_part=True),
     "occurrence": Kind("1", "occurrence", _occurrence),
     "onset": Kind("N m", "onset load", _onset, takes_part=True),
-    "push_force": Kind("N", "push force", _push_force),
+    "push_force": _means("N", "push force", "push_force t1", "push_force t2"),
+    "ring_tension": _means("N", "ring tension", "ring_tension t1", "ring_tension t2"),
+    "friction_loss": _means("W", "friction losses", "driving_flank_loss", "driven_flank_loss", "ring_loss"),
 }
 
 
@@ -203,8 +211,8 @@ def read_quantity(name: str, raw: Any, where: str) -> Quantity:
 
 def channels_needed(quantities: Sequence[Quantity]) -> tuple[str, ...]:
     """Return the recorded channels that quantities are made of."""
-    pushing = PUSH_FORCE_CHANNELS if any(q.name == "push_force" for q in quantities) else ()
-    return (*pushing, *(q.channel for q in quantities if q.channel))
+    meant = (channel for q in quantities for channel in KINDS[q.name].channels)
+    return (*meant, *(q.channel for q in quantities if q.channel))
 
 
 def strand_of(label: str) -> str | None:

@@ -65,9 +65,9 @@ class Stage:
             raise mismatch(f"{where}: model", "one with a transient", job.model)
         return job
 
-    def setting(self, stepper: str, key: str, raw: Any, where: str, place: str) -> float:
+    def setting(self, stepper: str, key: str, raw: Any, where: str, place: str, model: str = "") -> float:
         """Return a step or a tolerance [SI] of a stepper; where is its table, and place the value's in it."""
-        schema = load_schema(self.document.get("model"), stepper, where)
+        schema = load_schema(model or self.document.get("model"), stepper, where)
         if key not in schema.parameters:
             known = [name for name in SETTINGS if name in schema.parameters]
             raise unknown(f"{where} {key}", f"key of stepper {stepper}", key, known)

@@ -56,12 +56,13 @@ def table_lines(comparison: Comparison) -> Iterator[str]:
     yield f"  chosen: {comparison.verdict}"
     if comparison.choices:
         shown = comparison.shown
-        rows = [
-            [f"error budget, against {comparison.base}", *(f"{name.replace('_', ' ')}" for name in shown), ""]
+        words = [name.replace("_", " ") for name in shown]
+        rows = [[f"error budget, against {comparison.base}", "core-s/s", *words, ""]]
+        rows += [
+            [r.point.label, short(r.measurement.cost), *_errors(r, shown), _note(r)]
+            for r in comparison.choices
         ]
-        yield from columns(
-            [*rows, *([r.point.label, *_errors(r, shown), _note(r)] for r in comparison.choices)]
-        )
+        yield from columns(rows)
 
 
 def _results(comparison: Comparison) -> tuple[Result, ...]:

@@ -15,7 +15,12 @@ CHARTS = [path for path in sorted(FOLDER.glob("*.toml")) if "chart" in tomllib.l
 
 
 def test_there_are_charts():
-    assert [path.stem for path in CHARTS] == ["chart_belt", "chart_oscillator", "chart_ratios"]
+    assert [path.stem for path in CHARTS] == [
+        "chart_belt",
+        "chart_oscillator",
+        "chart_pushbelt",
+        "chart_ratios",
+    ]
 
 
 @pytest.mark.parametrize("path", CHARTS, ids=lambda path: path.stem)
@@ -27,9 +32,10 @@ def test_a_chart_is_fit_to_be_made(path):
         assert any(quantity.tolerance < 1.0 for quantity in scene.quantities)
         # a method that is also the reference would be judged by itself
         reference = chart.points_of(scene.name, Role.REFERENCE)[0]
-        finest = [p.setting for p in chart.points_of(scene.name, Role.METHOD)
-                  if not scene.exact and p.job.stepper == reference.job.stepper]  # fmt: skip
-        assert all(setting > reference.setting for setting in finest)
+        alike = [p for p in chart.points_of(scene.name, Role.METHOD)
+                 if not scene.exact and p.job.stepper == reference.job.stepper]  # fmt: skip
+        assert all(p.setting >= reference.setting for p in alike)
+        assert all(p.job.parameters != reference.job.parameters for p in alike)
 
 
 @pytest.mark.parametrize("command", ["run", "simulate"])

@@ -130,11 +130,14 @@ def test_a_scene_needs_a_transient(write_chart):
         load_chart(write_chart(("[chart.methods.soft]", f"{scene}\n[chart.methods.soft]")))
 
 
-def test_a_choice_may_be_of_another_model_and_of_fewer_starts(write_chart, monkeypatch):
+def test_methods_and_choices_may_be_of_another_model_and_choices_of_fewer_starts(write_chart, monkeypatch):
     monkeypatch.setitem(sys.modules, "gong", sys.modules["bell"])
     monkeypatch.setitem(MODELS, "gong", "gong")
     chart = load_chart(write_chart(('title = "Ringing"', "starts = 3"),
+                                   ('stepper = "hard"\n', 'stepper = "hard"\nmodel = "gong"\n'),
                                    ('set = { loudness = "22 um" }', 'model = "gong"\nstepper = "hard"\nstarts = 2')))  # fmt: skip
+    models = {point.name: point.job.model for point in chart.points_of("ringing", Role.METHOD)}
+    assert models["ringing-hard-1"] == "gong" and models["ringing-soft-1"] == "bell"
     choice = next(point for point in chart.points if point.name == "ringing-choice-louder")
     assert (choice.job.model, choice.job.stepper, choice.starts) == ("gong", "hard", 2)
     assert choice.job.parameters["loudness"] == 20e-6  # of the scene
@@ -229,7 +232,7 @@ WHERE = "c.toml: [chart.scenes.ringing"
         ('stepper = "clever"', 'stepper = "clever"\nscenes = ["rining"]',
          'c.toml: [chart.methods.clever] scenes: unknown scene "rining"; did you mean ringing?'),
         ('stepper = "hard"', 'stepper = "hard"\nuntil = "20 ms"',
-         "c.toml: [chart.methods.hard] until: unknown key; known: label, stepper, lanes, set, scenes, step, tolerance"),
+         "c.toml: [chart.methods.hard] until: unknown key; known: label, stepper, model, lanes, set, scenes, step, tolerance"),
         ('stepper = "hard"', 'stepper = "clever"',
          "c.toml: [chart.methods.hard] step: unknown key of stepper clever; known: tolerance"),
         ('stepper = "soft"', 'stepper = "explicit"', None),

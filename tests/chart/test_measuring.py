@@ -10,8 +10,9 @@ from cvt_hpc.chart.checks import check_prospects
 from cvt_hpc.chart.measuring import measure
 from cvt_hpc.chart.quantities import History, Quantity, observe
 from cvt_hpc.errors import InputError
+from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import Model
-from support.bells import Transient
+from support.bells import CHANNELS, Transient
 
 
 def measured(chart, name, repeats=2, time_limit=math.inf):
@@ -65,8 +66,8 @@ def test_long_runs_are_timed_once(write_chart):
     measured(chart, "ringing-soft-2", repeats=5)  # 2.2 s
     assert Transient.made == 2
     Transient.made = 0
-    measured(chart, "ringing-base", repeats=5)  # not timed at all
-    assert Transient.made == 2
+    base = measured(chart, "ringing-base", repeats=5)  # not repeated, since only its result counts
+    assert Transient.made == 2 and base.cost == pytest.approx(cost(1e-5), rel=1e-9)
 
 
 def test_costs_are_those_of_one_run_whatever_the_number_of_starts(write_chart):
@@ -196,7 +197,7 @@ def test_models_are_asked_before_anything_is_computed(write_chart, old, new, mes
     assert str(caught.value).startswith(message)
 
 
-def test_a_channel_that_is_not_recorded_is_refused(write_chart):
+def test_a_channel_that_is_not_recorded_is_refused(write_chart, monkeypatch):
     job = write_chart(('reference = "exact"', 'reference = { stepper = "hard", step = "2 us" }'),
                       ("occurrence = {}", "push_force = {}"))  # fmt: skip
     with pytest.raises(
@@ -206,6 +207,14 @@ def test_a_channel_that_is_not_recorded_is_refused(write_chart):
     check_prospects(load_chart(write_chart(
         ('reference = "exact"', 'reference = { stepper = "hard", step = "2 us" }'),
         ("occurrence = {}", "onset = {}"))))  # fmt: skip
+    # a method may be of another model
+    monkeypatch.setattr(Model, "channels", property(lambda model: CHANNELS if model.name == "bell" else ()))
+    monkeypatch.setitem(MODELS, "gong", "bell")
+    job = write_chart(('reference = "exact"', 'reference = { stepper = "hard", step = "2 us" }'),
+                      ("occurrence = {}", "onset = {}"),
+                      ("[chart.methods.hard]", '[chart.methods.hard]\nmodel = "gong"'))  # fmt: skip
+    with pytest.raises(InputError, match="quantities: expected a model that records load, found gong"):
+        check_prospects(load_chart(job))
 
 
 PARAMETERS = {
@@ -244,3 +253,15 @@ def test_growth_is_that_of_the_part_asked_for():
     found = observe(growing(-35.0, start=1e-3), [quantity], True)
     assert found["growth_rate"] == pytest.approx([-35.0, -35.0], rel=1e-3)
     assert found["amplitude"].shape == (2,)  # tells which strand counts
+
+
+def test_forces_and_losses_are_means_of_the_judged_part():
+    levels = {"ring_tension t1": 2.0, "ring_tension t2": 3.0, "ring_loss": 5.0}
+    levels |= {"driving_flank_loss": 7.0, "driven_flank_loss": 11.0}
+    # before the judged half a channel is far away, and rises over it from 0 to twice its level
+    shape = np.concatenate([np.full(2000, 100.0), np.linspace(0.0, 2.0, 2000)])
+    still = History(np.zeros((4000, 2)), ("t1", "t2"), lambda name: levels[name] * shape, PARAMETERS)
+    asked = [Quantity(name, math.inf, 0.0) for name in ("ring_tension", "friction_loss")]
+    found = observe(still, asked, True)
+    assert found["ring_tension"] == pytest.approx([2.0, 3.0])
+    assert found["friction_loss"] == pytest.approx([7.0, 11.0, 5.0])
