@@ -1,4 +1,4 @@
-"""What a job may set of a variator, whichever model of it: the scene, and the friction of the flanks.
+"""What a job may set of a variator, whichever model of it: the scene, the friction of the flanks, damping.
 
 Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht et al. 2004, sec. 3.1); sizes
 are those of a common passenger-car belt; every other default is an assumption, plausible and not measured.
@@ -146,6 +146,10 @@ FRICTION: dict[str, Parameter] = {
     "table_speed": Parameter((), "m/s", "speeds of a friction table, ascending", sensible=(1e-07, 100.0)),
     "table_mu": Parameter((), "", "friction table: a row of coefficients for each force"),
 }
+
+TRANSVERSE_DAMPING = not_negative(
+    500.0, "N s/m^2", "viscous damping of the transverse motion", sensible=(0.1, 1000000.0)
+)
 
 HALF_WEDGE_ANGLE = Parameter(
     np.deg2rad(11.0),

@@ -28,6 +28,7 @@ _SHARED = (
     Variable("thrust_power", (), "f8", "W", "mean power that the thrust takes up"),
     Variable("storing_power", (), "f8", "W", "mean rate of the stored energy"),
     Variable("ring_loss", (), "f8", "W", "mean friction power between rings and elements"),
+    Variable("belt_loss", (), "f8", "W", "mean power of the belt's transverse damping"),
     Variable("loss", (), "f8", "W", "mean of all losses", words="total loss"),
     Variable(
         "power_residual",

@@ -57,6 +57,13 @@ def test_forces_of_both_strands_give_the_torque(records):
     assert torque == pytest.approx(60.0, rel=0.03)  # the driven pulley is still set right
 
 
+def test_power_balance_closes_with_falling_friction_and_damping():
+    found = record(load=60.0, friction_gradient=-0.4, transverse_damping=1e6)
+    assert found["status"] == Status.DONE and found["unsolved_share"] == 0.0
+    assert found["belt_loss"] > 0.004 * found["driving_power"]
+    assert abs(found["power_residual"]) < 5e-3  # of so few elements, as without damping
+
+
 def test_more_torque_than_friction_carries_slips_through(records):
     found = records[200.0]
     assert (found["status"], found["vibrates"]) == (Status.DONE, Vibrates.SLIPS)
@@ -192,11 +199,13 @@ def test_profiles_and_histories_agree_with_the_record(records):
         ({"elements": 32, "coarse": True, "ratio": 2.5}, "elements"),
         ({"thickness": 0.02}, "thickness"),
         ({"band_high": 1500.0}, "band_high"),
-        ({"modal_stiffness": (1e8, -1e8)}, "modal_stiffness"),
+        ({"driving_modal_stiffness": (1e8, -1e8)}, "driving_modal_stiffness"),
+        ({"driven_modal_stiffness": (1e8,)}, "driven_modal_stiffness"),
         ({"driven_radius": 0.1}, "driven_radius"),
         ({"sheave_rate": 1e-4}, "sheave_rate"),
         ({"load_start": 1900.0, "load_history": "ramp", "step": 4.9e-5}, "step"),
         ({"friction_law": "table"}, "friction_law"),
+        ({"friction_gradient": -0.8, "friction_memory": 0.0}, "step"),
         ({"rise_time": 0.025}, "rise_time"),
     ],
 )

@@ -14,7 +14,14 @@ import numpy as np
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
-from cvt_hpc.variator.scene import FRICTION, HALF_WEDGE_ANGLE, SCENE, course_inert, course_problems
+from cvt_hpc.variator.scene import (
+    FRICTION,
+    HALF_WEDGE_ANGLE,
+    SCENE,
+    TRANSVERSE_DAMPING,
+    course_inert,
+    course_problems,
+)
 
 
 def _stiffness(
@@ -50,9 +57,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "ring_friction_speed": positive(
             0.01, "m/s", "regularisation speed of that friction", sensible=(1e-05, 5.0)
         ),
-        "transverse_damping": not_negative(
-            500.0, "N s/m^2", "viscous damping of the transverse motion", sensible=(0.1, 1000000.0)
-        ),
+        "transverse_damping": TRANSVERSE_DAMPING,
         "element_damping": not_negative(
             20.0, "N s", "longitudinal damping of the pressed elements", sensible=(0.001, 100000.0)
         ),

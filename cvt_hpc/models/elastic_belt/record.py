@@ -80,8 +80,8 @@ VARIABLES = (
         "thrust_power",
         "storing_power",
         "ring_loss",
+        "belt_loss",
     ),
-    Variable("belt_loss", (), "f8", "W", "mean power of the belt's transverse damping"),
     Variable("layer_loss", (), "f8", "W", "mean power of the layers' longitudinal dampers"),
     Variable("lag_loss", (), "f8", "W", "mean power of the driven sheave's lag"),
     Variable(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import ahead, around, behind, like, sqrt
+from cvt_hpc.lanes import absolute, ahead, around, behind, like, sqrt
 from cvt_hpc.models.pushbelt.belt import (
     ANGLE_I,
     ANGLE_J,
@@ -45,6 +45,8 @@ from cvt_hpc.models.pushbelt.belt import (
     MID_T_LEVER,
     MOMENT_I,
     MOMENT_J,
+    NORMAL_Y,
+    NORMAL_Z,
     OMEGA,
     OPENING_N,
     OPENING_R,
@@ -82,16 +84,10 @@ from cvt_hpc.models.pushbelt.belt import (
     TURN_Z,
     U_Y,
     U_Z,
+    V_FILTERED,
     V,
 )
-from cvt_hpc.models.pushbelt.laws import (
-    coefficient,
-    friction,
-    friction_in_a_plane,
-    pressed,
-    sliding,
-    sliding_in_a_plane,
-)
+from cvt_hpc.models.pushbelt.laws import coefficient, dual_of, friction, pressed, remembered
 
 RIGHT = 48  # field of a row of blocks at which its right sides begin (`cyclic`)
 
@@ -138,7 +134,7 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
     `increments` are the changes of the border's unknowns since the last step: of the driven pulley's speed,
     and of the openings of the driving and the driven sheaves.
     """
-    modes = belt.modal_stiffness.size
+    modes = belt.modal_stiffness.shape[1]
     wide = 1.0 / belt.cosine
     driving_speed, driven_speed = pulleys[DRIVING_SPEED], pulleys[DRIVEN_SPEED] + increments[0]
     for j in range(step.rows):
@@ -148,8 +144,10 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
         driven = state[j, DRIVEN]
 
         slip = state[j, V] + dv - step[j, T_Y] * u_y - step[j, T_Z] * u_z
-        q, dual = sliding(slip, state[j, RING_SLIP], state[j, RING_DUAL], belt.friction_speed)
-        grip, slope = friction(slip, q, dual, belt.ring_friction)
+        width, none = belt.ring_friction_speed, like(0.0, slip)
+        dual, _ = dual_of(slip, none, state[j, RING_SLIP], none, state[j, RING_DUAL], none, width)
+        mu = like(belt.ring_friction, slip)
+        grip, _, slope, _, _, _ = friction(slip, none, absolute(slip), dual, none, mu, none, width)
         normal = state[j, SADDLE]
         iterate[j, RING_SLOPE] = normal * slope
         state[j, RING_SLIP], state[j, RING_FRICTION], state[j, RING_DUAL] = slip, normal * grip, dual
@@ -171,22 +169,26 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
         along = (m_y * u_y + m_z * u_z + mr_lever * omega) * wide
         rotation = driving_speed + driven * (driven_speed - driving_speed)
         around_it = m_y * u_z - m_z * u_y + mt_lever * omega - radius * rotation
-        q, dual_m, dual_t = sliding_in_a_plane(
+        width = belt.friction_speed
+        dual_m, dual_t = dual_of(
             along,
             around_it,
             state[j, FLANK_SLIP_M],
             state[j, FLANK_SLIP_T],
             state[j, FLANK_DUAL_M],
             state[j, FLANK_DUAL_T],
-            belt.friction_speed,
+            width,
         )
         state[j, FLANK_DUAL_M], state[j, FLANK_DUAL_T] = dual_m, dual_t
         state[j, FLANK_SLIP_M], state[j, FLANK_SLIP_T] = along, around_it
         size = sqrt(along * along + around_it * around_it)
+        filtered, share = remembered(state[j, V_FILTERED], size, belt.friction_memory, dt)
         mu, fall = coefficient(
-            belt.flank_law, belt.flank_kinetic, belt.flank_gradient, belt.flank_speed, size
+            belt.flank_law, belt.flank_kinetic, belt.flank_gradient, belt.flank_speed, filtered
         )
-        grip_m, grip_t, mm, mt, tm, tt = friction_in_a_plane(along, around_it, q, dual_m, dual_t, mu, fall)
+        grip_m, grip_t, mm, mt, tm, tt = friction(
+            along, around_it, size, dual_m, dual_t, mu, share * fall, width
+        )
         state[j, FLANK] = normal
         state[j, FLANK_FRICTION_M], state[j, FLANK_FRICTION_T] = normal * grip_m, normal * grip_t
         # both flanks together; the meridian leans by the half wedge angle against the radius
@@ -219,7 +221,7 @@ def residuals(belt, state, pulleys, increments, openings, shapes, load, step, it
     float
         Power residual of the belt [W].
     """
-    modes = belt.modal_stiffness.size
+    modes = belt.modal_stiffness.shape[1]
     last = border.shape[1] - 1
     per_dt = 1.0 / dt
     power = torque = like(0.0, state[0, FLANK])
@@ -230,8 +232,10 @@ def residuals(belt, state, pulleys, increments, openings, shapes, load, step, it
         dy, dz = state[j, CHANGE], state[j, CHANGE + 1]
         dw, dv = state[j, CHANGE + 2], state[j, CHANGE + 3]
         across = belt.ring_mass * (t_z * dy - t_y * dz)
-        f_y = -per_dt * (belt.mass * dy + across * t_z)
-        f_z = -per_dt * (belt.mass * dz - across * t_y)
+        n_y, n_z = step[j, NORMAL_Y], step[j, NORMAL_Z]
+        drag = belt.transverse_damping * (n_y * (state[j, U_Y] + dy) + n_z * (state[j, U_Z] + dz))
+        f_y = -per_dt * (belt.mass * dy + across * t_z) - drag * n_y
+        f_z = -per_dt * (belt.mass * dz - across * t_y) - drag * n_z
         f_w, f_v = -per_dt * belt.inertia * dw, -per_dt * belt.ring_mass * dv
 
         tension = iterate[j, ITERATE_TENSION]
@@ -280,7 +284,7 @@ def residuals(belt, state, pulleys, increments, openings, shapes, load, step, it
         scratch[0, k] = around(scratch[0, k])
         pulley, mode = k // modes, k % modes
         opening = openings[pulley, mode] + increments[1 + k]
-        border[1 + k, last] = scratch.data[0, k, 0] - belt.modal_stiffness[mode] * opening
+        border[1 + k, last] = scratch.data[0, k, 0] - belt.modal_stiffness[pulley, mode] * opening
     scratch[0, 0], scratch[0, 1] = around(torque), around(power)
     border[0, last] = scratch.data[0, 0, 0] - load - belt.driven_inertia * increments[0] / dt
     return scratch.data[0, 1, 0]
@@ -293,7 +297,7 @@ def assemble(belt, state, shapes, step, iterate, blocks):
     The right sides are the residuals, and the columns of the border's unknowns: the driven pulley's speed and
     the openings of the sheaves.
     """
-    modes = belt.modal_stiffness.size
+    modes = belt.modal_stiffness.shape[1]
     for j in range(step.rows):
         x_y, x_z = ahead(state, j, HEADING_Y), ahead(state, j, HEADING_Z)
         k, ki, kj = iterate[j, STIFF], iterate[j, STIFF_I], iterate[j, STIFF_J]
@@ -364,7 +368,7 @@ def border_system(belt, state, shapes, step, iterate, blocks, scratch, border, d
 
     The first column of `blocks` holds the solution without border, the others those for its columns.
     """
-    modes = belt.modal_stiffness.size
+    modes = belt.modal_stiffness.shape[1]
     unknowns = border.shape[0]
     pressing = dt * belt.sine
     for row in range(unknowns):
@@ -400,4 +404,4 @@ def border_system(belt, state, shapes, step, iterate, blocks, scratch, border, d
         border[row, unknowns] += scratch.data[0, 0, 0]
         for column in range(unknowns):
             border[row, column] = scratch.data[0, 1 + column, 0]
-        border[row, row] += belt.driven_inertia / dt if row == 0 else belt.modal_stiffness[mode]
+        border[row, row] += belt.driven_inertia / dt if row == 0 else belt.modal_stiffness[pulley, mode]

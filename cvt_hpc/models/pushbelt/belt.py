@@ -37,9 +37,10 @@ from cvt_hpc.lanes import LaneArray
     RING_DUAL,  # directions of friction as the Newton iteration has them, at most 1 in size
     FLANK_DUAL_M,
     FLANK_DUAL_T,
+    V_FILTERED,  # sliding speed at which the friction law of the flanks is read [m/s]
     DRIVEN,  # 1 where the nearer pulley is the driven one, else 0
     CHANGE,  # 4: of the speeds in the last step, from which the next one starts
-) = range(25)
+) = range(26)
 STATE_FIELDS = CHANGE + 4
 
 # Entries of the state of the pulleys
@@ -57,9 +58,10 @@ IN_SPEED, IN_DRIVING_THRUST, IN_DRIVEN_THRUST, IN_LOAD = range(4)
     FLANK_LOSS,  # [J]
     RING_LOSS,  # [J]
     DAMPING_LOSS,  # of the rotation of elements against the ring [J]
+    BELT_LOSS,  # of the transverse damping [J]
     POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
-) = range(8)
-TOTALS = 8
+) = range(9)
+TOTALS = 9
 
 # Entries of the counters
 STEPS, ITERATIONS, FAILED_STEPS, STATUS, FAILED_ELEMENT, FAILED_CONTACT, IN_A_ROW = range(7)
@@ -94,19 +96,23 @@ class Belt(NamedTuple):
         Of each of the two contacts between elements [N/m].
     angle_stiffness, angle_damping : float
         Of an element's rotation against each segment of the ring, half at each end [N m/rad], [N m s/rad].
+    transverse_damping : float
+        Force against the speed across the path [N s/m].
     flank_law, flank_kinetic, flank_gradient, flank_speed : int, float, float, float
         Friction law at the flanks (`physics.friction`).
+    friction_memory : float
+        Time constant of the sliding speed at which that law is read [s].
     ring_friction : float
         Friction coefficient of the ring on the saddles.
-    friction_speed : float
-        v_reg: friction is mu N v / sqrt(v^2 + v_reg^2) [m/s].
+    friction_speed, ring_friction_speed : float
+        v_reg of both: friction is mu N tanh(|v| / v_reg) [m/s].
     driven_inertia : float
         [kg m^2]
     driving_rate, driven_rate : float
         Radial speed of the belt by the excess of a loose sheave's thrust over the belt's axial force
         [m/(s N)]; 0: the sheave is fixed.
-    modal_stiffness : (modes,) array
-        S_k of the opening of a pulley's sheaves as sum a_k psi_k(phi), psi 1, cos, sin, cos 2, ... [N/m];
+    modal_stiffness : (2, modes) array
+        S_k of the opening of each pulley's sheaves as sum a_k psi_k(phi), psi 1, cos, sin, cos 2, ... [N/m];
         none: rigid sheaves.
     """
 
@@ -124,12 +130,15 @@ class Belt(NamedTuple):
     contact_stiffness: float
     angle_stiffness: float
     angle_damping: float
+    transverse_damping: float
     flank_law: int
     flank_kinetic: float
     flank_gradient: float
     flank_speed: float
+    friction_memory: float
     ring_friction: float
     friction_speed: float
+    ring_friction_speed: float
     driven_inertia: float
     driving_rate: float
     driven_rate: float
@@ -249,6 +258,8 @@ class Workspace(NamedTuple):
     HEAD_LEVER_I,
     HEAD_LEVER_J,
     HEAD_GAP,
+    NORMAL_Y,  # across the path: of the strand, or radial
+    NORMAL_Z,
     R_Y,  # radial direction at the flank's contact point, at q_k
     R_Z,
     R_LEVER,
@@ -260,7 +271,7 @@ class Workspace(NamedTuple):
     MID_RADIUS,
     PREDICTED_DEPTH,  # penetration of the flank without opening of the sheaves
     DIAGONAL,  # 4 x 4 blocks of the linear laws, by columns: of an element, and of it with the next one
-) = range(36)
+) = range(38)
 LINK = DIAGONAL + 16
 STEP_FIELDS = LINK + 16
 

@@ -10,6 +10,7 @@ end of a step the direction would add v phi' dt / 2 of false radial sliding, and
 
 from __future__ import annotations
 
+import numpy as np
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
@@ -36,6 +37,8 @@ from cvt_hpc.models.pushbelt.belt import (
     MID_R_Z,
     MID_RADIUS,
     MID_T_LEVER,
+    NORMAL_Y,
+    NORMAL_Z,
     OMEGA,
     PREDICTED_DEPTH,
     PREDICTED_HEADING_Y,
@@ -112,7 +115,10 @@ def radial(r, x, centre, pitch_depth):
 
 @kernel
 def predict(belt, state, pulleys, step, dt):
-    """Everything of a step that belongs to a single element: q*, the ring's direction, the flanks."""
+    """Everything of a step that belongs to a single element: q*, the ring's direction, normal, the flanks."""
+    # of the strands, the common tangents of both pulleys
+    sine = (pulleys[DRIVEN_RADIUS] - pulleys[DRIVING_RADIUS]) / belt.centre_distance
+    cosine = np.sqrt(1.0 - sine * sine)
     for j in range(state.rows):
         y, z = state[j, Y], state[j, Z]
         x = (state[j, HEADING_Y], state[j, HEADING_Z])
@@ -135,6 +141,11 @@ def predict(belt, state, pulleys, step, dt):
         _, _, radius, _, _ = radial(predicted, (turned_y, turned_z), centre, belt.pitch_depth)
         groove = select(driven, like(pulleys[DRIVEN_RADIUS], y), pulleys[DRIVING_RADIUS])
         step[j, PREDICTED_DEPTH] = (groove - radius) * belt.sine
+        side = select(z < 0.0, like(-1.0, y), 1.0)
+        reach = cosine * y + side * sine * z
+        strand = (reach > 0.0) & (reach < cosine * belt.centre_distance)
+        step[j, NORMAL_Y] = select(strand, like(-sine, y), r_y)
+        step[j, NORMAL_Z] = select(strand, side * cosine, r_z)
         middle = (y + 0.5 * dt * u_y, z + 0.5 * dt * u_z)
         r_y, r_z, radius, r_lever, t_lever = radial(
             middle, turned(x[0], x[1], 0.5 * dt * omega), centre, belt.pitch_depth
@@ -196,7 +207,7 @@ def link(belt, state, step, dt):
 
 @kernel
 def linear_blocks(belt, step, dt):
-    """Blocks of inertia, tension and angles: DIAGONAL and LINK of each element."""
+    """Blocks of inertia, transverse damping, tension and angles: DIAGONAL and LINK of each element."""
     steep = 0.5 * (dt * belt.angle_stiffness + belt.angle_damping)
     for j in range(step.rows):
         for field in range(32):
@@ -205,6 +216,9 @@ def linear_blocks(belt, step, dt):
         o_y, o_z = step[j, T_Z], -step[j, T_Y]
         mass, ring = belt.mass / dt, belt.ring_mass / dt
         yy, yz, zz = mass + ring * o_y * o_y, ring * o_y * o_z, mass + ring * o_z * o_z
+        n_y, n_z = step[j, NORMAL_Y], step[j, NORMAL_Z]
+        drag = belt.transverse_damping
+        yy, yz, zz = yy + drag * n_y * n_y, yz + drag * n_y * n_z, zz + drag * n_z * n_z
         ww, vv = like(belt.inertia / dt, o_y), like(ring, o_y)
 
         # the segment ahead, of which this element is i

@@ -1,17 +1,20 @@
 """Laws of contacts in lanes: unilateral contact, and friction with slopes by which Newton's method converges.
 
-A friction force mu N v / q, q = sqrt(v^2 + v_reg^2), has a slope that is nearly zero where it slides and very
-steep where it sticks. Newton's method with that slope goes back and forth between both. The primal-dual
-method of Chan, Golub and Mulet (1999) keeps the direction h = v / q of each contact as an unknown of its own:
-the linearised equation q h = v gives the slope mu N (1 - h v / q) / q, and the next h, cut off at size 1.
+A friction force mu N tanh(|v| / v_reg) v / |v| has a slope that is nearly zero where it slides and very steep
+where it sticks. Newton's method with that slope goes back and forth between both. The primal-dual method of
+Chan, Golub and Mulet (1999) keeps the direction h = v / q, q = |v| / tanh(|v| / v_reg), of each contact as an
+unknown of its own: the linearised equation q h = v gives the slope mu N (1 - h q' v / |v|) / q, with
+q' = dq / d|v|, and the next h, cut off at size 1.
 """
 
 from __future__ import annotations
 
 from numba.extending import register_jitable
 
-from cvt_hpc.lanes import like, maximum, minimum, select, sqrt
-from cvt_hpc.physics.friction import formula_coefficient, law_numbers
+from cvt_hpc.lanes import like, maximum, select, sqrt
+from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation
+
+LEAST_SHARE_OF_WIDTH = 1e-3  # of v_reg: below it friction is linear to 3e-7
 
 
 @register_jitable
@@ -28,46 +31,51 @@ def coefficient(kind, kinetic, gradient, scale, speed):
 
 
 @register_jitable
-def sliding(v, earlier, dual, regularisation):
-    """Size q of a sliding speed v [m/s] and its dual, from those of the iterate before."""
-    square = regularisation * regularisation
-    per_q = 1.0 / sqrt(earlier * earlier + square)
-    dual = (v - dual * (earlier * (v - earlier)) * per_q) * per_q
-    return sqrt(v * v + square), minimum(maximum(dual, -1.0), 1.0)
+def remembered(filtered, size, memory, dt):
+    """Filtered sliding speed at the end of a step [m/s], and its slope by the present one.
+
+    Implicit Euler of memory v_f' = |v| - v_f [s], from v_f at the start and |v| [m/s] at the end.
+    """
+    share = dt / (dt + memory)
+    return memory / (dt + memory) * filtered + share * size, share
 
 
 @register_jitable
-def sliding_in_a_plane(v, w, earlier_v, earlier_w, dual_v, dual_w, regularisation):
-    """`sliding` with two components of the speed."""
-    square = regularisation * regularisation
-    per_q = 1.0 / sqrt(earlier_v * earlier_v + earlier_w * earlier_w + square)
-    along = (earlier_v * (v - earlier_v) + earlier_w * (w - earlier_w)) * per_q
+def smoothed(size, regularisation):
+    """1 / q [s/m] of a sliding speed's size [m/s], and q' over that size [s/m]."""
+    size = maximum(size, LEAST_SHARE_OF_WIDTH * regularisation)
+    factor, slope = saturation(size, 1.0 / regularisation)
+    per_size = 1.0 / size
+    return factor * per_size, (factor * per_size - slope) / (factor * factor)
+
+
+@register_jitable
+def dual_of(v, w, earlier_v, earlier_w, dual_v, dual_w, regularisation):
+    """Dual of a sliding velocity [m/s] of two components, from velocity and dual of the iterate before."""
+    per_q, bend = smoothed(sqrt(earlier_v * earlier_v + earlier_w * earlier_w), regularisation)
+    along = (earlier_v * (v - earlier_v) + earlier_w * (w - earlier_w)) * bend
     dual_v, dual_w = (v - dual_v * along) * per_q, (w - dual_w * along) * per_q
     size = 1.0 / sqrt(maximum(dual_v * dual_v + dual_w * dual_w, 1.0))
-    return sqrt(v * v + w * w + square), dual_v * size, dual_w * size
+    return dual_v * size, dual_w * size
 
 
 @register_jitable
-def friction(v, q, dual, mu):
-    """Friction force for each newton of normal force at a sliding speed v [m/s], and its slope [s/m]."""
-    per_q = 1.0 / q
-    direction = v * per_q
-    return mu * direction, mu * per_q * (1.0 - dual * direction)
+def friction(v, w, size, dual_v, dual_w, mu, mu_slope, regularisation):
+    """Friction forces for each newton of normal force, and the slopes of each by both components [s/m].
 
-
-@register_jitable
-def friction_in_a_plane(v, w, q, dual_v, dual_w, mu, mu_slope):
-    """`friction` with two components and a slope of mu: both forces, and the slopes of each by v and w."""
-    per_q = 1.0 / q
+    The sliding velocity has the components v, w [m/s] and the size `size`; `mu_slope` is by that size [s/m].
+    """
+    per_q, bend = smoothed(size, regularisation)
     a, b = v * per_q, w * per_q
     steep = mu * per_q
-    size = sqrt(v * v + w * w)
-    fall = mu_slope * q / maximum(size, 1e-12)
+    along_v, along_w = bend * v, bend * w
+    per_size = 1.0 / maximum(size, 1e-12)
+    fall_v, fall_w = mu_slope * v * per_size, mu_slope * w * per_size
     return (
         mu * a,
         mu * b,
-        steep * (1.0 - dual_v * a) + fall * a * a,
-        fall * a * b - steep * dual_v * b,
-        fall * a * b - steep * dual_w * a,
-        steep * (1.0 - dual_w * b) + fall * b * b,
+        steep * (1.0 - dual_v * along_v) + fall_v * a,
+        fall_w * a - steep * dual_v * along_w,
+        fall_v * b - steep * dual_w * along_v,
+        steep * (1.0 - dual_w * along_w) + fall_w * b,
     )

@@ -16,12 +16,21 @@ import numpy as np
 from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
-from cvt_hpc.variator.scene import FRICTION, HALF_WEDGE_ANGLE, SCENE, course_inert, course_problems
+from cvt_hpc.variator import PULLEYS
+from cvt_hpc.variator.scene import (
+    FRICTION,
+    HALF_WEDGE_ANGLE,
+    SCENE,
+    TRANSVERSE_DAMPING,
+    course_inert,
+    course_problems,
+)
 
 FEWEST_ELEMENTS = 100
 BELOW_PASSAGE = 0.9  # of half that frequency: belts run up to 4 % slower than by the nominal radius
 NOT_HERE = ("disturbance", "seed")
-NO_TABLE = ("friction_memory", "table_file", "table_force", "table_speed", "table_mu")
+MODES = ("driving_modal_stiffness", "driven_modal_stiffness")
+NO_TABLE = ("table_file", "table_force", "table_speed", "table_mu")
 
 
 def _play(parameters: Mapping[str, Any]) -> float:
@@ -105,6 +114,10 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             6e6, "N", "longitudinal stiffness EA of all rings", sensible=(10000.0, 10000000000.0)
         ),
         "ring_friction": not_negative(0.06, "", "friction coefficient between rings and elements"),
+        "ring_friction_speed": positive(
+            5e-4, "m/s", "regularisation speed of that friction", sensible=(1e-06, 5.0)
+        ),
+        "transverse_damping": TRANSVERSE_DAMPING,
         "tilt_spring": not_negative(
             3267.0,
             "N",
@@ -123,12 +136,15 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             positive(1.0, "", "stiffness of the sheaves, multiple of the reference; inf: rigid"),
             allow_infinite=True,
         ),
-        "modal_stiffness": Parameter(
-            (6e8, 3e8, 3e8, 9e8, 9e8),
-            "N/m",
-            "reference stiffness of a pulley's opening by 1, cos, sin, cos 2, sin 2 of the angle",
-            sensible=(1e5, 1e12),
-        ),
+        **{
+            key: Parameter(
+                (6e8, 3e8, 3e8, 9e8, 9e8),
+                "N/m",
+                f"reference stiffness of the {pulley} pulley's opening by angle: 1, cos, sin, cos 2, sin 2",
+                sensible=(1e5, 1e12),
+            )
+            for key, pulley in zip(MODES, PULLEYS, strict=True)
+        },
         "flank_stiffness": positive(
             3.27e10,
             "N/m^2",
@@ -165,11 +181,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "friction_gradient": replace(FRICTION["friction_gradient"], default=0.0),
         "kinetic_friction": replace(FRICTION["kinetic_friction"], default=0.09),
-        "friction_speed": replace(
-            FRICTION["friction_speed"],
-            default=5e-4,
-            description="sliding speed below which friction at flanks and rings is smoothed",
-        ),
+        "friction_speed": replace(FRICTION["friction_speed"], default=5e-4),
     },
 }
 
@@ -213,12 +225,18 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if BELOW_PASSAGE * half < p["band_high"]:
         most = f"{BELOW_PASSAGE * half:.4g} Hz, below half of the frequency at which elements pass"
         problems.append(("band_high", f"at most {most}, or more elements", f"{p['band_high']:g} Hz"))
-    if not p["modal_stiffness"] or min(p["modal_stiffness"]) <= 0.0:
-        problems.append(("modal_stiffness", "values above 0", f"{list(p['modal_stiffness'])}"))
+    for key in MODES:
+        if not p[key] or len(p[key]) != len(p[MODES[0]]) or min(p[key]) <= 0.0:
+            expected = "values above 0, as many of both pulleys"
+            problems.append((key, expected, f"{list(p[key])}"))
     problems += course_problems(p)
     limit = string_limit(p)
     if not problems and "step" in p and p["step"] > limit:
         expected = f"at most {limit:.3g} s, pitch over the speed of transverse waves under the thrust"
+        problems.append(("step", expected, f"{p['step']:g} s"))
+    limit = falling_limit(p)
+    if not problems and "step" in p and p["step"] > limit:
+        expected = f"at most {limit:.3g} s, beyond which friction that falls so steeply has several solutions"
         problems.append(("step", expected, f"{p['step']:g} s"))
     # a sheave moves by an explicit step against the stiffness of the flanks on the longer arc
     angle, arc = (
@@ -230,6 +248,25 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         expected = f"at most {fastest:.3g} m/(N s) at this step, beyond which the sheave does not settle"
         problems.append(("sheave_rate", expected, f"{p['sheave_rate']:g} m/(N s)"))
     return problems + friction_problems(p)
+
+
+def falling_limit(parameters: Mapping[str, Any]) -> float:
+    """Longest step in which falling friction of the flanks has one solution [s], by the mean over an arc.
+
+    An element that slides has m' (v - v_0) / dt = f - 2 n mu(v_f) per length, n being the normal line force
+    of a flank. That has one solution while its slope by v, m' / dt + 2 n g dt / (dt + tau), is positive: with
+    memory tau, friction follows a sudden change of speed only by dt / (dt + tau). The gradient g is the law's
+    steepest; n is the axial force over R wrap cos d0, on the shorter arc, where both pulleys have the thrust.
+    """
+    p = parameters
+    if p["friction_gradient"] >= 0.0:
+        return np.inf
+    driving = p["driven_radius"] / p["ratio"]
+    wrap = np.pi + 2.0 * np.arcsin((driving - p["driven_radius"]) / p["centre_distance"])
+    arc = min(driving * wrap, p["driven_radius"] * (2.0 * np.pi - wrap))
+    pressed = max(p["thrust"], p["driving_thrust"]) / (arc * np.cos(p["half_wedge_angle"]))
+    without = p["element_mass"] / (2.0 * pressed * -p["friction_gradient"])
+    return float(0.5 * without + np.sqrt(0.25 * without**2 + without * p["friction_memory"]))
 
 
 def string_limit(parameters: Mapping[str, Any]) -> float:
@@ -264,7 +301,9 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
     """
     p = parameters
     cases = (
-        (np.isinf(p["sheave_stiffness"]), "modal_stiffness", "sheave_stiffness inf"),
+        (p["ring_friction"] == 0.0, "ring_friction_speed", "ring_friction 0"),
+        (p["friction_gradient"] == 0.0, "friction_memory", "friction_gradient 0"),
+        *((np.isinf(p["sheave_stiffness"]), key, "sheave_stiffness inf") for key in MODES),
         (p["elements"] >= FEWEST_ELEMENTS, "coarse", f"elements {FEWEST_ELEMENTS} or more"),
         (True, "arc_probes", "model pushbelt, which is probed on its strands"),
     )

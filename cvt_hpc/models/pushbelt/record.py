@@ -56,7 +56,7 @@ VARIABLES = (
         "mean radius of the flanks' contact points, weighted by contact force",
     ),
     *shared("driven_speed_ripple", "driving_power", "load_power", "thrust_power"),
-    *shared("storing_power", "ring_loss"),
+    *shared("storing_power", "ring_loss", "belt_loss"),
     Variable("tilt_loss", (), "f8", "W", "mean power of the dampers of the elements' tilt"),
     *shared("loss", "power_residual"),
     Variable("efficiency", (), "f8", "1", "what is left of driving_power for load, thrust and storing"),
@@ -122,8 +122,9 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     """
     p, judged = run.parameters, run.judged
     driving, load = run.mean_rate(fields.WORK_IN), run.mean_rate(fields.WORK_OUT)
-    ring, tilt = run.mean_rate(fields.RING_LOSS), run.mean_rate(fields.DAMPING_LOSS)
-    loss = run.mean_rate(fields.FLANK_LOSS) + ring + tilt
+    ring = run.mean_rate(fields.RING_LOSS)
+    belt, tilt = run.mean_rate(fields.BELT_LOSS), run.mean_rate(fields.DAMPING_LOSS)
+    loss = run.mean_rate(fields.FLANK_LOSS) + ring + belt + tilt
     thrust, storing = run.mean_rate(fields.THRUST_WORK), run.mean_rate(fields.TOTALS)
     work = run.counters()
     return {
@@ -132,6 +133,7 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
         **_speeds(run, judged),
         **power_balance(driving, load, thrust, loss, storing),
         "ring_loss": ring,
+        "belt_loss": belt,
         "tilt_loss": tilt,
         "efficiency": (load + thrust + storing) / driving if driving > 0.0 else np.nan,
         "largest_push_force": np.nanmax(run.profiles["push_force"]),

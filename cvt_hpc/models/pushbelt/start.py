@@ -65,16 +65,19 @@ def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
         contact_stiffness=float(g["contact_stiffness"]),
         angle_stiffness=float(g["angle_stiffness"]),
         angle_damping=float(g["angle_damping"]),
+        transverse_damping=float(g["transverse_damping"] * chord),
         flank_law=int(Law[g["friction_law"].upper()]),
         flank_kinetic=float(g["kinetic_friction"]),
         flank_gradient=float(g["friction_gradient"]),
         flank_speed=float(g["stribeck_velocity"]),
+        friction_memory=float(g["friction_memory"]),
         ring_friction=float(g["ring_friction"]),
         friction_speed=float(g["friction_speed"]),
+        ring_friction_speed=float(g["ring_friction_speed"]),
         driven_inertia=float(g["driven_inertia"]),
         driving_rate=float(g["driving_rate"]),
         driven_rate=float(g["driven_rate"]),
-        modal_stiffness=np.array(g["modal_stiffness"], dtype=np.float64),
+        modal_stiffness=np.array(g["modal_stiffness"], dtype=np.float64).reshape(2, -1),
     )
 
 
@@ -132,7 +135,7 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
             path.driven_radius,
         ]
     )
-    modes = belt.modal_stiffness.size
+    modes = belt.modal_stiffness.shape[1]
     state = BeltState(
         in_lanes(fields),
         pulleys,
@@ -160,7 +163,7 @@ def of_lanes(array: LaneArray) -> np.ndarray:
 
 def workspace(belt: Belt, nodes: int) -> Workspace:
     """Work space for a belt of so many nodes."""
-    parts, modes = parts_of(nodes), belt.modal_stiffness.size
+    parts, modes = parts_of(nodes), belt.modal_stiffness.shape[1]
     rows, columns = nodes // parts, 2 + 2 * modes
 
     def lanes(count: int, fields: int) -> LaneArray:

@@ -8,7 +8,7 @@ for what is slow.
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import absolute, ahead, around, behind, like, maximum
+from cvt_hpc.lanes import absolute, ahead, around, behind, like, maximum, select, sqrt
 from cvt_hpc.models.pushbelt.assembly import (
     RIGHT,
     assemble,
@@ -20,6 +20,7 @@ from cvt_hpc.models.pushbelt.assembly import (
 from cvt_hpc.models.pushbelt.belt import (
     ANGLE_I,
     ANGLE_J,
+    BELT_LOSS,
     CHANGE,
     CONVERGED,
     DAMPING_LOSS,
@@ -51,6 +52,8 @@ from cvt_hpc.models.pushbelt.belt import (
     ITERATIONS,
     LENGTH,
     MID_RADIUS,
+    NORMAL_Y,
+    NORMAL_Z,
     NOT_CONVERGED,
     NOT_FINITE,
     OMEGA,
@@ -76,6 +79,7 @@ from cvt_hpc.models.pushbelt.belt import (
     TURN_Z,
     U_Y,
     U_Z,
+    V_FILTERED,
     WORK_IN,
     WORK_OUT,
     V,
@@ -84,6 +88,7 @@ from cvt_hpc.models.pushbelt.belt import (
 )
 from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
 from cvt_hpc.models.pushbelt.cyclic import solve
+from cvt_hpc.models.pushbelt.laws import remembered
 
 _LARGE = 1e100  # more than any speed or power that means something
 
@@ -91,7 +96,7 @@ _LARGE = 1e100  # more than any speed or power that means something
 @kernel
 def _shapes(belt, step, shapes):
     """psi_k at the elements: 1, cos, sin, cos 2, sin 2, ..."""
-    modes = shapes.data.shape[1] if belt.modal_stiffness.size > 0 else 0
+    modes = shapes.data.shape[1] if belt.modal_stiffness.shape[1] > 0 else 0
     for j in range(step.rows):
         c, s = step[j, R_Y], step[j, R_Z]
         cosine, sine = like(1.0, c), like(0.0, c)
@@ -202,7 +207,7 @@ def _accept(belt, state, work, inputs, dt):
     """Take the state to the end of the step, and add up what it has done."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     totals, pulleys = state.totals, state.pulleys
-    for k in range(6):
+    for k in range(7):
         scratch[0, k] = 0.0
     for j in range(step.rows):
         change_y, change_z = (
@@ -231,6 +236,8 @@ def _accept(belt, state, work, inputs, dt):
         omega = elements[j, OMEGA] + elements[j, CHANGE + 2]
         elements[j, U_Y], elements[j, U_Z], elements[j, OMEGA] = u_y, u_z, omega
         elements[j, V] += elements[j, CHANGE + 3]
+        across = step[j, NORMAL_Y] * u_y + step[j, NORMAL_Z] * u_z
+        scratch[0, 6] += belt.transverse_damping * across * across
         elements[j, Y] += dt * u_y
         elements[j, Z] += dt * u_z
         x_y, x_z = turned(elements[j, HEADING_Y], elements[j, HEADING_Z], dt * omega)
@@ -242,15 +249,17 @@ def _accept(belt, state, work, inputs, dt):
         scratch[0, 0] += (1.0 - driven) * thrust
         scratch[0, 1] += driven * thrust
         scratch[0, 2] += (1.0 - driven) * step[j, MID_RADIUS] * iterate[j, FORCE_T]
-        scratch[0, 3] += 2.0 * (
-            square * grip_m * elements[j, FLANK_SLIP_M] + grip_t * elements[j, FLANK_SLIP_T]
-        )
+        slip_m, slip_t = elements[j, FLANK_SLIP_M], elements[j, FLANK_SLIP_T]
+        scratch[0, 3] += 2.0 * (square * grip_m * slip_m + grip_t * slip_t)
+        size = sqrt(slip_m * slip_m + slip_t * slip_t)
+        filtered, _ = remembered(elements[j, V_FILTERED], size, belt.friction_memory, dt)
+        elements[j, V_FILTERED] = select(elements[j, FLANK] > 0.0, filtered, size)
         scratch[0, 4] += elements[j, RING_FRICTION] * elements[j, RING_SLIP]
-    for k in range(6):
+    for k in range(7):
         scratch[0, k] = around(scratch[0, k])
     driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]
     pulleys[DRIVEN_SPEED] += state.increments[0]
-    modes = belt.modal_stiffness.size
+    modes = belt.modal_stiffness.shape[1]
     for k in range(2 * modes):
         state.openings[k // modes, k % modes] += state.increments[1 + k]
     driving = dt * belt.driving_rate * (inputs[IN_DRIVING_THRUST] - driving_thrust)
@@ -266,6 +275,7 @@ def _accept(belt, state, work, inputs, dt):
     totals[FLANK_LOSS] += dt * scratch.data[0, 3, 0]
     totals[RING_LOSS] += dt * scratch.data[0, 4, 0]
     totals[DAMPING_LOSS] += dt * scratch.data[0, 5, 0]
+    totals[BELT_LOSS] += dt * scratch.data[0, 6, 0]
 
 
 @kernel

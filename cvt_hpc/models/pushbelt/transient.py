@@ -10,7 +10,7 @@ import numpy as np
 from cvt_hpc.models.marched import Probe, batches_of_one
 from cvt_hpc.models.pushbelt import belt as fields
 from cvt_hpc.models.pushbelt.belt import CONTACTS, NOT_CONVERGED, Newton
-from cvt_hpc.models.pushbelt.parameters import path_length
+from cvt_hpc.models.pushbelt.parameters import MODES, path_length
 from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Reading, Readings
 from cvt_hpc.models.pushbelt.start import of_lanes, start, workspace
 from cvt_hpc.models.pushbelt.step import advance
@@ -305,16 +305,19 @@ def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
         "contact_stiffness": p["edge_stiffness"] / pitch,
         "angle_stiffness": p["tilt_spring"] * pitch,
         "angle_damping": p["tilt_damper"] * pitch,
+        "transverse_damping": p["transverse_damping"],
         "friction_law": p["friction_law"],
         "kinetic_friction": p["kinetic_friction"],
         "friction_gradient": p["friction_gradient"],
         "stribeck_velocity": p["stribeck_velocity"],
+        "friction_memory": p["friction_memory"],
         "ring_friction": p["ring_friction"],
         "friction_speed": p["friction_speed"],
+        "ring_friction_speed": p["ring_friction_speed"],
         "driven_inertia": p["driven_inertia"],
         "driving_rate": p["sheave_rate"] if p["driving_thrust"] > 0.0 else 0.0,
         "driven_rate": p["sheave_rate"],
-        "modal_stiffness": () if rigid else p["sheave_stiffness"] * np.array(p["modal_stiffness"]),
+        "modal_stiffness": () if rigid else p["sheave_stiffness"] * np.array([p[key] for key in MODES]),
         "driving_speed": p["speed_start"] if ramped(p) == "speed" else p["driving_speed"],
     }
 
