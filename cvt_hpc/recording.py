@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -95,6 +96,18 @@ def sample_count(parameters: Mapping[str, Any]) -> int:
         Flat parameters of the run [SI].
     """
     return max(int(round(parameters["duration"] * parameters["sampling_rate"])), 1)
+
+
+def start_up_samples(parameters: Mapping[str, Any]) -> int:
+    """Samples of a run before its load has risen.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat parameters of the run [SI], `rise_time` among them.
+    """
+    risen = math.ceil(parameters["rise_time"] * parameters["sampling_rate"])
+    return min(risen, sample_count(parameters))
 
 
 def longest_duration(parameters: Mapping[str, Any]) -> Any:

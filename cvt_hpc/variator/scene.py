@@ -88,6 +88,35 @@ SCENE: dict[str, Parameter] = {
     "seed": Parameter(1, "", "seed of that disturbance", minimum=0),
 }
 
+
+def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems of a run's courses of load and speed, in the form of a model's check: (key, expected, found).
+
+    Parameters
+    ----------
+    parameters : mapping
+        Values by name [SI], of which those of SCENE, `duration` and `judged_fraction` count.
+    """
+    p, problems = parameters, []
+    before = (1.0 - p["judged_fraction"]) * p["duration"]
+    if p["rise_time"] > before * (1.0 + 1e-9):
+        expected = f"a load that has risen before the run is judged, within {before:g} s"
+        problems.append(("rise_time", expected, f"{p['rise_time']:g} s"))
+    if p["load_history"] == p["speed_history"] == "ramp":
+        problems.append(("speed_history", 'constant under load_history = "ramp": one ramp a run', "ramp"))
+    return problems
+
+
+def course_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+    """Parameters of courses that are constant, each with the setting that makes it without effect."""
+    p = parameters
+    return {
+        f"{name}_start": f"{name}_history constant"
+        for name in ("load", "speed")
+        if p[f"{name}_history"] == "constant"
+    }
+
+
 FRICTION: dict[str, Parameter] = {
     "friction_law": Parameter(
         "stribeck",

@@ -6,6 +6,7 @@ import pytest
 from cvt_hpc.job import build_job
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.pushbelt import belt as b
+from cvt_hpc.models.pushbelt import start as starting
 from cvt_hpc.models.pushbelt import transient
 from cvt_hpc.models.pushbelt.assembly import (
     RIGHT,
@@ -26,8 +27,7 @@ ASSUMED = {
     "ratio": 1.35,  # [1]
     "centre_distance": 0.155,  # [m]
     "belt_length": 0.6612,  # of the pitch line, on which the rocking edges lie [m]
-    "elements": 432,  # elements of the belt
-    "nodes": 432,  # super elements of the model
+    "elements": 432,  # each of the values below; `given` makes super elements of them
     "element_mass": 1.858e-3,  # [kg]
     "element_height": 13e-3,  # [m], of which and of the thickness the inertia is that of a plate
     "pitch_depth": 1.5e-3,  # [m]
@@ -47,10 +47,7 @@ ASSUMED = {
     "friction_gradient": 0.0,  # [s/m]
     "stribeck_velocity": 0.1,  # [m/s]
     "friction_memory": 0.0,  # [s]
-    "ring_friction_law": "coulomb",
     "ring_friction": 0.06,
-    "ring_friction_gradient": 0.0,  # [s/m]
-    "ring_stribeck_velocity": 0.1,  # [m/s]
     "friction_speed": 5e-4,  # [m/s]
     "ring_friction_speed": 5e-4,  # [m/s]
     "driven_inertia": 0.01,  # [kg m^2]
@@ -65,8 +62,13 @@ SPEED, THRUST, LOAD = ASSUMED["driving_speed"], 20e3, 81.0
 U = slice(b.U_Y, b.V + 1)
 
 
-def given(**changes):
-    return ASSUMED | {"nodes": NODES} | changes
+def given(nodes=NODES, **changes):
+    """Values for `start`, of so many super elements."""
+    group = ASSUMED["elements"] / nodes
+    beside = ("element_mass", "flank_stiffness", "angle_stiffness", "angle_damping")
+    values = {key: ASSUMED[key] * group for key in beside}
+    values["contact_stiffness"] = ASSUMED["contact_stiffness"] / group
+    return ASSUMED | values | {"elements": nodes} | changes
 
 
 def fields(array):
@@ -194,7 +196,7 @@ def test_rates_of_gaps_strains_angles_and_depths():
 
 def test_forces_between_elements_carry_no_force_and_no_moment():
     belt, state, work, _ = shaken(2)
-    belt = belt._replace(flank_stiffness=0.0, ring_kinetic=0.0, transverse_damping=0.0)
+    belt = belt._replace(flank_stiffness=0.0, ring_friction=0.0, transverse_damping=0.0)
     prepared(belt, state, work, STEP)
     evaluated(belt, state, work, STEP)
     f, t = fields(state.elements), fields(work.step)[:, [b.T_Y, b.T_Z]]
@@ -260,18 +262,21 @@ def test_newton_correction_is_that_of_differences(law):
         assert found == pytest.approx(wanted, abs=1e-5 * np.abs(wanted).max())
 
 
-def test_cyclic_system_against_a_dense_one():
-    rows, lanes, columns = 5, 8, 8
+@pytest.mark.parametrize("lanes", [8, 2])
+def test_cyclic_system_against_a_dense_one(lanes, monkeypatch):
+    monkeypatch.setattr(starting, "parts_of", lambda nodes: lanes)
+    rows, columns = 5, 8
     n, rng = rows * lanes, np.random.default_rng(4)
     a, u = rng.normal(size=(n, 4, 4)) + 8.0 * np.eye(4), rng.normal(size=(n, 4, 4))
     right = rng.normal(size=(n, columns, 4))
-    blocks = LaneArray(rows, 48 + 4 * columns, lanes, linked=True)
+    blocks = LaneArray(rows, 48 + 4 * columns, lanes, linked=lanes > 1)
     values = np.zeros((n, 48 + 4 * columns))
     values[:, :16] = a.transpose(0, 2, 1).reshape(n, 16)
     values[:, 16:32] = u.transpose(0, 2, 1).reshape(n, 16)
     values[:, 48:] = right.reshape(n, -1)
     write(blocks, values)
-    solve(blocks, LaneArray(1, 48 + 4 * columns, lanes, linked=True), np.zeros((32, 32 + columns)))
+    scratch = LaneArray(1, 48 + 4 * columns, lanes, linked=lanes > 1)
+    solve(blocks, scratch, np.zeros((4 * lanes, 4 * lanes + columns)))
 
     dense = np.zeros((n, 4, n, 4))
     for i in range(n):
@@ -412,7 +417,7 @@ def test_the_longest_step_of_falling_friction(memory):
     pitch = path_length(p) / NODES
     force = p["thrust"] / (driving * wrap * np.cos(p["half_wedge_angle"])) * pitch
     belt, state, work = on_a_pulley(values | {"nodes": NODES, "friction_speed": 1e-7}, 1e-4, force)
-    belt = belt._replace(ring_mass=0.0, ring_kinetic=0.0)
+    belt = belt._replace(ring_mass=0.0, ring_friction=0.0)
     for share, falls in ((0.98, True), (1.02, False)):
         left = []
         for change in (0.0, -1e-5):
@@ -441,11 +446,12 @@ def driven_in(dt, **changes):
 
 def observed(belt, state, work, dt, duration=0.0448):
     """Rates of totals, means of samples over a revolution, and the samples."""
-    before, samples = state.totals.copy(), []
+    before, samples, sheaves = state.totals.copy(), [], []
     for _ in range(64):
         steps = round(duration / 64 / dt)
         assert advance(belt, b.Newton(), state, work, constant(THRUST, LOAD), steps, dt) == b.CONVERGED
         samples.append(fields(state.elements))
+        sheaves.append((state.pulleys.copy(), state.openings.copy()))
     total = state.totals - before
     samples = np.array(samples)
     middle = (samples[:, :, b.Y] > 0.04) & (samples[:, :, b.Y] < 0.11)
@@ -455,17 +461,17 @@ def observed(belt, state, work, dt, duration=0.0448):
         "push": (push[lower].mean(), push[upper].mean()),
         "tension": (samples[..., b.TENSION][lower].mean(), samples[..., b.TENSION][upper].mean()),
     }
-    return total / total[b.TIME], strands, samples
+    return total / total[b.TIME], strands, samples, sheaves
 
 
-@pytest.fixture(scope="module")
-def run():
-    belt, state, work = driven_in(STEP)
-    return belt, state, *observed(belt, state, work, STEP)
+@pytest.fixture(scope="module", params=[(), ((6e8, 3e8, 3e8, 9e8, 9e8),) * 2], ids=["rigid", "elastic"])
+def run(request):
+    belt, state, work = driven_in(STEP, modal_stiffness=request.param)
+    return belt, state, work, *observed(belt, state, work, STEP)
 
 
 def test_power_balance_over_a_revolution(run):
-    _, _, rates, _, _ = run
+    rates = run[3]
     losses = rates[b.FLANK_LOSS] + rates[b.RING_LOSS] + rates[b.DAMPING_LOSS] + rates[b.BELT_LOSS]
     # the polygon of so few elements, and the damping of implicit contacts: 0.5 %, 0.15 % with 432 elements
     assert rates[b.WORK_IN] == pytest.approx(rates[b.WORK_OUT] + losses, rel=7e-3)
@@ -474,53 +480,159 @@ def test_power_balance_over_a_revolution(run):
 
 
 def test_torque_is_carried_by_push_and_tension(run):
-    belt, state, rates, strands, _ = run
+    belt, state, _, rates, strands, *_ = run
     radius = state.pulleys[b.DRIVING_RADIUS]
     push, tension = np.diff(strands["push"])[0], np.diff(strands["tension"])[0]
     moment = -push * radius + tension * (radius + belt.pitch_depth)
     # 1 %: strands vibrate, and flanks give way
-    assert rates[b.DRIVING_TORQUE] == pytest.approx(moment, rel=0.01)
+    assert rates[b.WORK_IN] / SPEED == pytest.approx(moment, rel=0.01)
     assert strands["push"][0] > 600.0 and strands["push"][1] < 10.0
 
 
 def test_ring_friction_is_eytelwein(run):
-    belt, _, _, strands, _ = run
+    belt, _, _, _, strands, *_ = run
     centrifugal = belt.ring_mass * NODES / 0.67 * (SPEED * 0.0488) ** 2
     low, high = np.sort(strands["tension"]) - centrifugal
     # the wrap of the driving pulley, on which the ring slides all over but for elements at both ends
     wrap = 2.927 - 2.0 * np.pi / NODES / 0.0473 * 0.107
-    assert np.log(high / low) == pytest.approx(belt.ring_kinetic * wrap, rel=0.1)
+    assert np.log(high / low) == pytest.approx(belt.ring_friction * wrap, rel=0.1)
+
+
+def frame(f):
+    """Saddle points, running directions and outward normals."""
+    x = f[:, [b.HEADING_Y, b.HEADING_Z]]
+    return f[:, [b.Y, b.Z]], x, np.stack([x[:, 1], -x[:, 0]], 1)
+
+
+def pitch_points(belt, f, driven):
+    """The flanks' contact points, from the shaft of their pulley."""
+    r, _, o = frame(f)
+    return r - belt.pitch_depth * o - np.outer(driven, [belt.centre_distance, 0.0])
+
+
+def shapes(belt, points):
+    """psi_k at contact points: 1, cos, sin, cos 2, sin 2."""
+    angle = np.arctan2(points[:, 1], points[:, 0])
+    waves = [np.cos(angle), np.sin(angle), np.cos(2.0 * angle), np.sin(2.0 * angle)]
+    return np.stack([np.ones(len(points)), *waves], 1)[:, : belt.modal_stiffness.shape[1]]
+
+
+def near(forces):
+    return pytest.approx(forces, abs=0.01 * forces.max())
 
 
 def test_contacts_hold_their_laws(run):
-    belt, state, _, _, samples = run
-    f = samples[-1]
+    belt, *_, samples, sheaves = run
     mu = belt.flank_kinetic
-    sliding = np.hypot(f[:, b.FLANK_SLIP_M], f[:, b.FLANK_SLIP_T])
-    grip = np.hypot(f[:, b.FLANK_FRICTION_M], f[:, b.FLANK_FRICTION_T])
-    assert (f[:, [b.EDGE, b.HEAD, b.FLANK, b.SADDLE]] >= 0.0).all()
-    # 1e-6: within 1e-3 of the regularisation speed friction is linear
-    assert grip == pytest.approx(mu * f[:, b.FLANK] * np.tanh(sliding / belt.friction_speed), rel=1e-6)
-    along = f[:, b.FLANK_FRICTION_M] * f[:, b.FLANK_SLIP_M] + f[:, b.FLANK_FRICTION_T] * f[:, b.FLANK_SLIP_T]
-    assert along == pytest.approx(grip * sliding, abs=1e-9)
-    # gaps and depths of the positions reached: what is linear within a step is off by 0.1 um there
-    r, x = f[:, [b.Y, b.Z]], f[:, [b.HEADING_Y, b.HEADING_Z]]
-    o = np.stack([x[:, 1], -x[:, 0]], 1)
-    rear, ahead = np.roll(r - 0.5 * belt.thickness * x, -1, 0), np.roll(x, -1, 0)
-    for height, field in ((-belt.pitch_depth, b.EDGE), (belt.head_height, b.HEAD)):
-        gap = ((rear - r - 0.5 * belt.thickness * x - height * o) * ahead).sum(1)
-        assert np.maximum(-gap, 0.0) == pytest.approx(f[:, field] / belt.contact_stiffness, abs=1e-7)
-    length = np.linalg.norm(np.roll(r, -1, 0) - r, axis=1)
-    strain = length / f[:, b.LENGTH] - 1.0
-    # linear within a step, so off by some N where an element meets a pulley
-    off = np.abs(f[:, b.TENSION] - belt.ring_stiffness * strain)
-    assert np.median(off) < 1.0 and off.max() < 20.0
-    pitch = r - belt.pitch_depth * o
-    driven = f[:, b.DRIVEN] > 0.5
-    pitch[driven, 0] -= belt.centre_distance
-    groove = np.where(driven, state.pulleys[b.DRIVEN_RADIUS], state.pulleys[b.DRIVING_RADIUS])
-    depth = (groove - np.linalg.norm(pitch, axis=1)) * belt.sine
-    assert np.maximum(depth, 0.0) == pytest.approx(f[:, b.FLANK] / belt.flank_stiffness, abs=1e-7)
+    for f, (pulleys, openings) in zip(samples, sheaves, strict=True):
+        sliding = np.hypot(f[:, b.FLANK_SLIP_M], f[:, b.FLANK_SLIP_T])
+        grip = np.hypot(f[:, b.FLANK_FRICTION_M], f[:, b.FLANK_FRICTION_T])
+        assert (f[:, [b.EDGE, b.HEAD, b.FLANK, b.SADDLE]] >= 0.0).all()
+        # 1e-6: within 1e-3 of the regularisation speed friction is linear
+        assert grip == pytest.approx(mu * f[:, b.FLANK] * np.tanh(sliding / belt.friction_speed), rel=1e-6)
+        along = (f[:, [b.FLANK_FRICTION_M, b.FLANK_FRICTION_T]] * f[:, [b.FLANK_SLIP_M, b.FLANK_SLIP_T]]).sum(
+            1
+        )
+        assert along == pytest.approx(grip * sliding, abs=1e-9)
+        # of the ring the normal force is that of the step before
+        assert (f[:, b.RING_FRICTION] * f[:, b.RING_SLIP] >= 0.0).all()
+
+        # Gaps, depths and strains of the positions reached give the forces, which are linear within a step: to
+        # 1 % of the largest elastic deformation of each kind (0.3 % found)
+        r, x, o = frame(f)
+        rear, ahead = np.roll(r - 0.5 * belt.thickness * x, -1, 0), np.roll(x, -1, 0)
+        for height, field in ((-belt.pitch_depth, b.EDGE), (belt.head_height, b.HEAD)):
+            gap = ((rear - r - 0.5 * belt.thickness * x - height * o) * ahead).sum(1)
+            assert belt.contact_stiffness * np.maximum(-gap, 0.0) == near(f[:, field])
+        length = np.linalg.norm(np.roll(r, -1, 0) - r, axis=1)
+        assert belt.ring_stiffness * (length / f[:, b.LENGTH] - 1.0) == near(f[:, b.TENSION])
+        driven = f[:, b.DRIVEN].astype(int)
+        points = pitch_points(belt, f, driven)
+        groove = pulleys[[b.DRIVING_RADIUS, b.DRIVEN_RADIUS]][driven]
+        back = f.copy()  # the opening counts where the elements were at the start of the step
+        back[:, [b.Y, b.Z]] -= STEP * f[:, [b.U_Y, b.U_Z]]
+        opening = (shapes(belt, pitch_points(belt, back, driven)) * openings[driven]).sum(1)
+        depth = (groove - np.linalg.norm(points, axis=1)) * belt.sine - opening * belt.cosine
+        assert belt.flank_stiffness * np.maximum(depth, 0.0) == near(f[:, b.FLANK])
+
+
+def test_a_step_loses_what_its_contacts_take(run):
+    """Losses, and the force on the sheaves' modes, by the positions before and after a step."""
+    belt, state, work, *_ = run
+    start_, totals = fields(state.elements), state.totals.copy()
+    assert advance(belt, b.Newton(), state, work, constant(THRUST, LOAD), 1, STEP) == b.CONVERGED
+    end, found = fields(state.elements), (state.totals - totals) / STEP
+    driven = start_[:, b.DRIVEN].astype(int)
+
+    before, after = (pitch_points(belt, f, driven) for f in (start_, end))
+    radius = np.linalg.norm(0.5 * (before + after), axis=1)
+    turned = np.diff([np.arctan2(*p.T[::-1]) for p in (before, after)], axis=0)[0] / STEP
+    radial = (np.linalg.norm(after, axis=1) - np.linalg.norm(before, axis=1)) / STEP
+    tangential = radius * (turned - state.pulleys[[b.DRIVING_SPEED, b.DRIVEN_SPEED]][driven])
+    size = np.hypot(radial / belt.cosine, tangential)
+    normal = end[:, b.FLANK]
+    grip = belt.flank_kinetic * normal * np.tanh(size / belt.friction_speed) / size
+    flank = 2.0 * (grip * (radial**2 + tangential**2)).sum()
+
+    r, x, _ = frame(start_)
+    t = np.roll(r, -1, 0) - np.roll(r, 1, 0)
+    t /= np.linalg.norm(t, axis=1)[:, None]
+    slip = end[:, b.V] - (t * (end[:, [b.Y, b.Z]] - r)).sum(1) / STEP
+    grip = belt.ring_friction * start_[:, b.SADDLE] * np.tanh(slip / belt.ring_friction_speed)
+    ring = (grip * slip).sum()
+    flow = (end[:, b.LENGTH] - start_[:, b.LENGTH]) / STEP
+    assert flow == pytest.approx(slip - np.roll(slip, -1), abs=1e-9)
+
+    def angles(f):
+        r, x, _ = frame(f)
+        e = np.roll(r, -1, 0) - r
+        heading = np.arctan2(x[:, 1], x[:, 0])
+        along = np.arctan2(e[:, 1], e[:, 0])
+        return np.stack([heading - along, np.roll(heading, -1) - along])
+
+    rates = np.mod(angles(end) - angles(start_) + np.pi, 2.0 * np.pi) - np.pi
+    tilt = 0.5 * belt.angle_damping * ((rates / STEP) ** 2).sum()
+    # positions are of second order in the step, angles of first order: 1e-4 and 1e-3 found
+    wanted = np.array([flank, ring, tilt])
+    assert found[[b.FLANK_LOSS, b.RING_LOSS, b.DAMPING_LOSS]] == pytest.approx(wanted, rel=3e-3)
+    assert (wanted > 10.0).all()
+
+    psi = shapes(belt, before)
+    for pulley, openings in enumerate(state.openings):
+        force = belt.cosine * (normal * (driven == pulley)) @ psi
+        assert belt.modal_stiffness[pulley] * openings == pytest.approx(force, abs=1e-9 * THRUST)
+
+
+def test_heads_touch_in_a_belt_bent_inside_out():
+    """A spinning ring with its heads inside: they carry what the ring's tension exceeds m' v^2 by."""
+    radius, omega, push = 0.1082, 250.0, 500.0
+    belt, state = start(given())
+    belt = belt._replace(centre_distance=10.0)
+    state.pulleys[[b.DRIVING_RADIUS, b.DRIVEN_RADIUS]] = 0.01
+    angle = -2.0 * np.pi * np.arange(NODES) / NODES
+    o, x = np.stack([np.cos(angle), np.sin(angle)], 1), np.stack([np.sin(angle), -np.cos(angle)], 1)
+    half = np.sin(np.pi / NODES)
+    centrifugal = (belt.mass + belt.ring_mass) * radius * omega**2 / (2.0 * half)
+    tension = push + centrifugal
+    f = np.zeros((NODES, b.STATE_FIELDS))
+    f[:, [b.Y, b.Z]] = radius * o + [2.0, 0.0]
+    f[:, [b.HEADING_Y, b.HEADING_Z]] = x
+    f[:, [b.U_Y, b.U_Z]], f[:, b.OMEGA], f[:, b.V] = radius * omega * x, -omega, radius * omega
+    f[:, b.LENGTH] = 2.0 * radius * half / (1.0 + tension / belt.ring_stiffness)
+    # gap of rigid elements at their heads, and what the push force takes from it
+    r, x, outward = frame(f)
+    lines = (np.roll(r, -1, 0) - r - belt.head_height * outward) * np.roll(x, -1, 0)
+    turned = np.cos(2.0 * np.pi / NODES)
+    thickness = (lines.sum(1)[0] + push / belt.contact_stiffness) / (0.5 * (1.0 + turned))
+    belt = belt._replace(thickness=thickness)
+    write(state.elements, f)
+    work = workspace(belt, NODES)
+    assert advance(belt, b.Newton(), state, work, np.zeros((2, 4)), 1000, STEP) == b.CONVERGED
+    f = fields(state.elements)
+    # 1e-4 as of the ring without push; the push itself sets with the elements' tilt
+    assert f[:, b.TENSION] - f[:, b.HEAD] == pytest.approx(centrifugal, rel=1e-4)
+    assert (f[:, b.HEAD] > 0.5 * push).all()
+    assert (f[:, b.EDGE] == 0.0).all()
 
 
 def test_elements_that_turn_with_a_pulley_do_not_slide():
@@ -543,27 +655,28 @@ def test_elements_that_turn_with_a_pulley_do_not_slide():
 
 
 def test_push_force_at_half_the_step(run):
-    belt, state, work = driven_in(0.5 * STEP)
-    _, strands, _ = observed(belt, state, work, 0.5 * STEP)
+    belt, state, work = driven_in(0.5 * STEP, modal_stiffness=run[0].modal_stiffness)
+    _, strands, *_ = observed(belt, state, work, 0.5 * STEP)
     # first order in the step: 2 % is far below what the lever at the end of a step would change (5 %)
-    assert strands["push"][0] == pytest.approx(run[3]["push"][0], rel=0.02)
-    assert strands["tension"] == pytest.approx(run[3]["tension"], rel=0.01)
+    assert strands["push"][0] == pytest.approx(run[4]["push"][0], rel=0.02)
+    assert strands["tension"] == pytest.approx(run[4]["tension"], rel=0.01)
 
 
 def test_slip_limit():
     belt, state, work = driven_in(STEP, driven_inertia=0.2)
     overload = constant(14e3, 300.0)
-    advance(belt, b.Newton(), state, work, overload, 4000, STEP)
+    advance(belt, b.Newton(), state, work, overload, 4500, STEP)
     before = state.totals.copy()
-    assert advance(belt, b.Newton(), state, work, overload, 500, STEP) == b.CONVERGED
-    total = state.totals - before
+    assert advance(belt, b.Newton(), state, work, overload, 1, STEP) == b.CONVERGED
+    torque = (state.totals - before)[b.WORK_IN] / (STEP * SPEED)
     f = fields(state.elements)
     driving = (f[:, b.DRIVEN] < 0.5) & (f[:, b.FLANK] > 10.0)
     assert (f[driving, b.FLANK_SLIP_T] < -1.0).all()
     o = np.stack([f[:, b.HEADING_Z], -f[:, b.HEADING_Y]], 1)
     radius = np.linalg.norm((f[:, [b.Y, b.Z]] - belt.pitch_depth * o)[driving], axis=1).mean()
     limit = 2.0 * belt.flank_kinetic * radius / belt.cosine
-    assert total[b.DRIVING_TORQUE] / total[b.DRIVING_THRUST] == pytest.approx(limit, rel=1e-3)
+    thrust = (belt.cosine * f[:, b.FLANK] + belt.sine * f[:, b.FLANK_FRICTION_M])[driving].sum()
+    assert torque / thrust == pytest.approx(limit, rel=1e-3)
 
 
 def test_a_run_goes_on_from_its_state_alone():
@@ -577,6 +690,20 @@ def test_a_run_goes_on_from_its_state_alone():
         advance(belt, b.Newton(), other, workspace(belt, NODES), inputs, 30, STEP)
     assert (fields(state.elements) == fields(other.elements)).all()
     assert (state.pulleys == other.pulleys).all() and (state.totals == other.totals).all()
+
+
+def test_a_march_is_the_same_in_lanes_and_without(monkeypatch):
+    inputs, found = constant(THRUST, 0.0), []
+    for lanes in (8, 1):
+        monkeypatch.setattr(starting, "parts_of", lambda nodes, lanes=lanes: lanes)
+        belt, state = start(given(modal_stiffness=((6e8, 3e8),) * 2))
+        assert advance(belt, b.Newton(), state, workspace(belt, NODES), inputs, 200, STEP) == b.CONVERGED
+        assert state.elements.data.shape[2] == lanes
+        found.append(fields(state.elements)[:, : b.CHANGE])
+    scale = np.abs(found[0]).max(axis=0)
+    off = np.abs(found[1] - found[0]).max(axis=0)
+    # round-off, which 200 steps with stiff contacts make 1e-12 of speeds and 1e-9 of directions of friction
+    assert (off <= 1e-7 * scale).all() and (off[U] <= 1e-10 * scale[U]).all()
 
 
 def test_steps_that_do_not_converge_are_named():

@@ -9,14 +9,14 @@ from cvt_hpc import simulation
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.models.elastic_belt.lane_belt import POSITION, SPEED
-from cvt_hpc.models.elastic_belt.sampling import LEAST_SPEED, MOST_SPEED, Outcome
-from cvt_hpc.models.elastic_belt.slip import GROSS_SLIP
+from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.validity import FAILURES, LARGEST_POWER_RESIDUAL
 from cvt_hpc.physics.compliance import ROUND_OFF
 from cvt_hpc.simulation import record_variables, run_point
 from cvt_hpc.simulation.record import record_of
 from cvt_hpc.study.description import describe
 from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.variator import GROSS_SLIP, LEAST_SPEED, MOST_SPEED
 from cvt_hpc.vibration import ramp
 from support.marched import CHEAP, Together, job, record
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.fluctuation import at_stations
-from cvt_hpc.netcdf import attributes
+from cvt_hpc.variator.history import dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,42 +31,8 @@ def histories(run: RecordedRun) -> xr.Dataset:
         `displacement` (time, probe) [m], scalars over time, and the profiles of the judged part by
         `position`.
     """
-    import xarray as xr
-
-    time = (1 + np.arange(run.done)) * run.interval
-    over_time = {
-        "load": ("load", "N m", "torque at the driving pulley"),
-        "driving_speed": ("driving speed", "rad s-1", "of the driving pulley"),
-        "driven_speed": ("driven speed", "rad s-1", "of the driven pulley"),
-        "driven_position": ("driven position", "m", "axial opening of the driven pulley"),
-    }
-    variables: dict[str, Any] = {
-        "displacement": (
-            ("time", "probe"),
-            run.displacement,
-            attributes("displacement", "m", "transverse, outward"),
-        )
-    }
-    for name, named in over_time.items():
-        variables[name] = ("time", run.channel(name), attributes(*named))
-    for name, (values, *words) in _profiles(run).items():
-        variables[name] = ("position", values, attributes(*words))
-    coordinates = {
-        "time": ("time", time, attributes("time", "s")),
-        "probe": ("probe", np.array([probe.label for probe in run.probes], object), attributes("probe")),
-        "probe_position": (
-            "probe",
-            np.array([probe.position for probe in run.probes]),
-            attributes("position of the probe", "m", "path coordinate"),
-        ),
-        "position": (
-            "position",
-            run.mesh.position,
-            attributes("position", "m", "path coordinate, from the inlet of the driving arc"),
-        ),
-        "region": ("position", np.array(run.regions, object), attributes("region", comment="of the path")),
-    }
-    return xr.Dataset(variables, coordinates)
+    over_time = {"driven_position": ("driven position", "m", "axial opening of the driven pulley")}
+    return dataset(run, over_time, _profiles(run), run.mesh.position, run.regions)
 
 
 def _profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str]]:

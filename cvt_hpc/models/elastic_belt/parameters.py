@@ -14,7 +14,14 @@ import numpy as np
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
-from cvt_hpc.variator.scene import FRICTION, HALF_WEDGE_ANGLE, SCENE, TRANSVERSE_DAMPING
+from cvt_hpc.variator.scene import (
+    FRICTION,
+    HALF_WEDGE_ANGLE,
+    SCENE,
+    TRANSVERSE_DAMPING,
+    course_inert,
+    course_problems,
+)
 
 
 def _stiffness(
@@ -119,14 +126,7 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         Empty where all is well.
     """
     p = parameters
-    before = (1.0 - p["judged_fraction"]) * p["duration"]
-    problems = shape_problems(p)
-    if p["rise_time"] > before * (1.0 + 1e-9):
-        expected = f"a load that has risen before the run is judged, within {before:g} s"
-        problems.append(("rise_time", expected, f"{p['rise_time']:g} s"))
-    if p["load_history"] == p["speed_history"] == "ramp":
-        problems.append(("speed_history", 'constant under load_history = "ramp": one ramp a run', "ramp"))
-    return problems + friction_problems(p)
+    return shape_problems(p) + course_problems(p) + friction_problems(p)
 
 
 def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
@@ -156,10 +156,9 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
     p = parameters
     of_elastic_sheaves = ("tilt_stiffness", "local_stiffness", "local_length")
     cases = (
-        (p["load_history"] == "constant", ("load_start",), "load_history constant"),
-        (p["speed_history"] == "constant", ("speed_start",), "speed_history constant"),
         (p["disturbance"] == 0.0, ("seed",), "disturbance 0"),
         (p["ring_friction"] == 0.0, ("ring_friction_speed",), "ring_friction 0"),
         (np.isinf(p["sheave_stiffness"]), of_elastic_sheaves, "sheave_stiffness inf"),
     )
-    return friction_inert(p) | {key: setting for holds, keys, setting in cases if holds for key in keys}
+    found = {key: setting for holds, keys, setting in cases if holds for key in keys}
+    return friction_inert(p) | course_inert(p) | found

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,14 +11,14 @@ from cvt_hpc.models.elastic_belt import fluctuation
 from cvt_hpc.models.elastic_belt.belt import MODES
 from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.models.elastic_belt.history import histories
-from cvt_hpc.models.elastic_belt.slip import VARIABLE as SLIP_MARGIN
-from cvt_hpc.models.elastic_belt.slip import slid, slip_margin, with_slip
-from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
-from cvt_hpc.variator import PULLEYS, STRANDS
+from cvt_hpc.variables import Coordinate, Variable
+from cvt_hpc.variator import PULLEYS, judging
+from cvt_hpc.variator.judging import assess, mean, pair, power_balance
+from cvt_hpc.variator.slip import VARIABLE as SLIP_MARGIN
+from cvt_hpc.variator.slip import slide, slip_margin
 from cvt_hpc.variator.variables import COORDINATES, shared
 from cvt_hpc.vibration import assessment, ramp
-from cvt_hpc.vibration.ramped import ramped
-from cvt_hpc.vibration.signals import amplitude_spectrum, band_amplitude
+from cvt_hpc.vibration.signals import band_amplitude
 
 if TYPE_CHECKING:
     from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
@@ -35,8 +34,6 @@ __all__ = [
     "lane_key",
     "lanes",
 ]
-
-RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by what a ramp changes
 
 LOSSES = (
     "driving_flank_loss",
@@ -133,45 +130,11 @@ def judge(run: RecordedRun) -> dict[str, Any]:
         With all samples recorded, or those until it slipped through.
     """
     if run.failure is not None:
-        return _slipped(run, *run.failure)
+        samples = slide(run)
+        shares = [run.channel(f"open_share {pulley}")[samples].mean() for pulley in PULLEYS]
+        return judging.slipped(run) | {"open_share": np.array(shares)}
     found = assess(run)
     return found.record() | evaluate(run, found.strongest_probe)
-
-
-def assess(run: RecordedRun) -> assessment.Occurrence:
-    """Whether and how a run vibrates that has reached its end; its probes are columns of the displacement."""
-    p = run.parameters
-    if ramped(p):
-        return with_slip(run, _assess_ramp(run))  # type: ignore[arg-type]  # None is of a run before its end
-    columns, strands = _on_strands(run)
-    found = assessment.assess(run.displacement[:, columns], p["sampling_rate"], strands, p)
-    return with_slip(run, replace(found, strongest_probe=columns[found.strongest_probe]))
-
-
-def _assess_ramp(run: RecordedRun) -> ramp.RampOccurrence | None:
-    """Whether and how a run vibrates along a ramp; None if it ended too soon to tell."""
-    p, first, quantity = run.parameters, run.kick, ramped(run.parameters)
-    columns, strands = _on_strands(run)
-    rate, moved = p["sampling_rate"], run.displacement[first:, columns]
-    values = run.channel(RAMPED_CHANNELS[quantity])[first:]
-    found = ramp.assess_ramp(moved, rate, strands, quantity, values, run.samples - first, p)
-    return found and replace(found, strongest_probe=columns[found.strongest_probe])
-
-
-def _on_strands(run: RecordedRun) -> tuple[np.ndarray, list[str]]:
-    """Columns of the displacement whose probes lie on strands, and on which."""
-    regions = [probe.label.split()[0] for probe in run.probes]
-    columns = [k for k, region in enumerate(regions) if region in STRANDS]
-    return np.array(columns), [regions[k] for k in columns]
-
-
-def _slipped(run: RecordedRun, status: Status, why: str) -> dict[str, Any]:
-    """The record of a run that has slipped through before its end: what is known until then."""
-    found = {"status": status, "vibrates": Vibrates.SLIPS, "reason": f"at {run.time * 1e3:.4g} ms: {why}"}
-    before = _assess_ramp(run) if ramped(run.parameters) else None
-    if before is not None:
-        found = before.record() | found | {"reason": f"{found['reason']}; before: {before.reason}"[:240]}
-    return found | slid(run)
 
 
 def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
@@ -190,43 +153,19 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
         Value by name.
     """
     p, judged = run.parameters, run.judged
-    rate, band = p["sampling_rate"], (p["band_low"], p["band_high"])
-
-    def mean(name: str) -> float:
-        return float(run.channel(name)[judged].mean())
-
-    def pair(name: str, labels: tuple[str, str]) -> np.ndarray:
-        return np.array([mean(f"{name} {label}") for label in labels])
-
-    modal = band_amplitude(run.modes[judged], rate, band)
-    bins = coordinates(p)["frequency_bin"].values
-    axial = pair("axial_force", PULLEYS)
-    driven_speed = run.channel("driven_speed")[judged]
-    loss = sum(mean(name) for name in LOSSES)
+    modal = band_amplitude(run.modes[judged], p["sampling_rate"], (p["band_low"], p["band_high"]))
+    losses = {name: mean(run, name) for name in LOSSES}
     stored = run.channel("stored_energy")[judged]
     storing = (stored[-1] - stored[0]) / ((stored.size - 1) * run.interval)
-    open_power = mean("driving_power") - mean("load_power") - mean("thrust_power") - loss - storing
+    driving, load, thrust = (mean(run, f"{name}_power") for name in ("driving", "load", "thrust"))
     return {
         "mode": np.where(modal.max(axis=1) > 0.0, 1 + modal.argmax(axis=1), 0),
         "modal_amplitude": modal,
-        "spectrum": amplitude_spectrum(run.displacement[judged][:, strongest_probe], rate, bins).T,
-        "mean_ring_tension": pair("ring_tension", STRANDS),
-        "mean_push_force": pair("push_force", STRANDS),
-        "axial_force": axial,
-        "slip": pair("slip", PULLEYS),
+        **judging.evaluate(run, strongest_probe, coordinates(p)["frequency_bin"].values),
         SLIP_MARGIN.name: slip_margin(run, judged),
-        "open_share": pair("open_share", PULLEYS),
-        "flank_loss": np.array([mean(f"{pulley}_flank_loss") for pulley in PULLEYS]),
-        "thrust_ratio": axial[0] / axial[1],
-        "speed_loss": 1.0 - p["ratio"] * driven_speed.mean() / run.mean_driving_speed(judged),
-        "driven_speed_ripple": driven_speed.std(),
-        "driving_power": mean("driving_power"),
-        "load_power": mean("load_power"),
-        "thrust_power": mean("thrust_power"),
-        "storing_power": storing,
-        **{name: mean(name) for name in LOSSES if "flank" not in name},
-        "loss": loss,
-        "power_residual": open_power / max(abs(mean("driving_power")), loss),
+        "open_share": pair(run, "open_share"),
+        **power_balance(driving, load, thrust, sum(losses.values()), storing),
+        **{name: loss for name, loss in losses.items() if "flank" not in name},
         "step_ripple": np.sqrt(np.mean(run.channel("step_ripple")[judged] ** 2)),
         **fluctuation_record(run),
         "least_strand_force": run.channel("least_strand_force")[judged].min(),

@@ -11,7 +11,8 @@ from cvt_hpc.models.elastic_belt.belt import REGIONS, Mesh, mesh
 from cvt_hpc.models.elastic_belt.fluctuation import Fluctuation, fluctuation
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, PROFILES, Probe, Sensors, probes, sensors
 from cvt_hpc.models.elastic_belt.validity import doubt
-from cvt_hpc.recording import sample_count
+from cvt_hpc.physics.geometry import Variator
+from cvt_hpc.recording import sample_count, start_up_samples
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.ramped import ramped
 
@@ -67,7 +68,7 @@ def recording(parameters: Mapping[str, Any], dtype: type) -> Recording:
         sensors(grid, places, interval, dtype),
         interval,
         samples,
-        min(int(np.ceil(p["rise_time"] * p["sampling_rate"])), samples),
+        start_up_samples(p),
         samples - round(p["judged_fraction"] * samples),
     )
 
@@ -144,6 +145,11 @@ class RecordedRun:
         if ramped(self.parameters) != "speed":
             return self.parameters["driving_speed"]
         return float(self.channel("driving_speed")[samples].mean())
+
+    @property
+    def path(self) -> Variator:
+        """The reference path."""
+        return self.mesh.path
 
     @property
     def judged(self) -> slice:

@@ -37,6 +37,7 @@ from cvt_hpc.models.elastic_belt.moments import MOMENTS, add
 from cvt_hpc.models.elastic_belt.power import POWERS, audit
 from cvt_hpc.physics.compliance import SOLVES, UNSOLVED
 from cvt_hpc.physics.flank import tangential_sliding
+from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED
 
 SCALARS = (
     "load",
@@ -71,8 +72,6 @@ CONTACT_FORCE, MEAN_DISPLACEMENT = range(len(MOMENTS), len(PROFILES))
 LARGEST_DISPLACEMENT = 10e-3  # [m]: the belt has left its grooves
 LARGEST_STRAIN = 0.05  # of the rings, which break at 1 %
 LARGEST_ELEMENT_STRAIN = 0.2  # gaps of a fifth: all the play in a few cells
-LEAST_SPEED = 0.5  # of the driven pulley's speed without slip: beyond the torque that friction carries
-MOST_SPEED = 1.5  # likewise, under a load that drives
 
 
 class Outcome(IntEnum):

@@ -146,9 +146,8 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
         slip = state[j, V] + dv - step[j, T_Y] * u_y - step[j, T_Z] * u_z
         width, none = belt.ring_friction_speed, like(0.0, slip)
         dual, _ = dual_of(slip, none, state[j, RING_SLIP], none, state[j, RING_DUAL], none, width)
-        size = absolute(slip)
-        mu, fall = coefficient(belt.ring_law, belt.ring_kinetic, belt.ring_gradient, belt.ring_speed, size)
-        grip, _, slope, _, _, _ = friction(slip, none, size, dual, none, mu, fall, width)
+        mu = like(belt.ring_friction, slip)
+        grip, _, slope, _, _, _ = friction(slip, none, absolute(slip), dual, none, mu, none, width)
         normal = state[j, SADDLE]
         iterate[j, RING_SLOPE] = normal * slope
         state[j, RING_SLIP], state[j, RING_FRICTION], state[j, RING_DUAL] = slip, normal * grip, dual

@@ -54,21 +54,18 @@ IN_SPEED, IN_DRIVING_THRUST, IN_DRIVEN_THRUST, IN_LOAD = range(4)
     TIME,  # [s]
     WORK_IN,  # of the driving shaft [J]
     WORK_OUT,  # against the load [J]
+    THRUST_WORK,  # that the thrusts take up as the sheaves open [J]
     FLANK_LOSS,  # [J]
     RING_LOSS,  # [J]
     DAMPING_LOSS,  # of the rotation of elements against the ring [J]
     BELT_LOSS,  # of the transverse damping [J]
-    DRIVING_THRUST,  # axial force of the belt on a sheave, over time [N s]
-    DRIVEN_THRUST,
-    DRIVING_TORQUE,  # [N m s]
-    DRIVEN_TORQUE,
     POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
-) = range(12)
-TOTALS = 12
+) = range(9)
+TOTALS = 9
 
 # Entries of the counters
-STEPS, ITERATIONS, FAILED_STEPS, STATUS, FAILED_ELEMENT, FAILED_UNKNOWN, FAILED_CONTACT, IN_A_ROW = range(8)
-COUNTERS = 8
+STEPS, ITERATIONS, FAILED_STEPS, STATUS, FAILED_ELEMENT, FAILED_CONTACT, IN_A_ROW = range(7)
+COUNTERS = 7
 # values of STATUS
 CONVERGED, NOT_CONVERGED, NOT_FINITE = range(3)
 # values of FAILED_CONTACT
@@ -105,8 +102,8 @@ class Belt(NamedTuple):
         Friction law at the flanks (`physics.friction`).
     friction_memory : float
         Time constant of the sliding speed at which that law is read [s].
-    ring_law, ring_kinetic, ring_gradient, ring_speed : int, float, float, float
-        Friction law of the ring on the saddles.
+    ring_friction : float
+        Friction coefficient of the ring on the saddles.
     friction_speed, ring_friction_speed : float
         v_reg of both: friction is mu N tanh(|v| / v_reg) [m/s].
     driven_inertia : float
@@ -139,10 +136,7 @@ class Belt(NamedTuple):
     flank_gradient: float
     flank_speed: float
     friction_memory: float
-    ring_law: int
-    ring_kinetic: float
-    ring_gradient: float
-    ring_speed: float
+    ring_friction: float
     friction_speed: float
     ring_friction_speed: float
     driven_inertia: float

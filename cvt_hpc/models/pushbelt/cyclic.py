@@ -9,6 +9,12 @@ leaves a small ring of W separators, which is solved densely. From its solution 
 
 There is no pivoting: the blocks are mass over step plus parts that are nearly symmetric and positive.
 
+`solvers.cyclic_blocks` solves such systems, too, of blocks of any size with any L, and exchanges rows within
+a block. It has the numbers of one block side by side in a register, and goes around the ring one node after
+the other. Here a register holds the same number of nodes far apart, which is as the pushbelt's kernels
+compute them: nothing is rearranged, and a product of blocks is written out for their one size, so that its 16
+numbers stay in registers. Larger blocks would not, and need loops over memory as there.
+
 A row of blocks has A in its fields 0-15, U in 16-31, and a place for the coupling behind in 32-47, all by
 columns; right sides of four fields each follow from 48 on.
 """

@@ -27,7 +27,7 @@ PARAMETERS = {
             "largest time step; a whole number of steps makes a sampling interval",
             minimum=1e-8,
             maximum=1e-3,
-            sensible=(1e-09, 0.001),
+            sensible=(1e-08, 0.001),
         ),
         "speed_tolerance": Parameter(
             1e-3,

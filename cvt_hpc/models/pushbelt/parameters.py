@@ -17,7 +17,14 @@ from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
 from cvt_hpc.variator import PULLEYS
-from cvt_hpc.variator.scene import FRICTION, HALF_WEDGE_ANGLE, SCENE, TRANSVERSE_DAMPING
+from cvt_hpc.variator.scene import (
+    FRICTION,
+    HALF_WEDGE_ANGLE,
+    SCENE,
+    TRANSVERSE_DAMPING,
+    course_inert,
+    course_problems,
+)
 
 FEWEST_ELEMENTS = 100
 BELOW_PASSAGE = 0.9  # of half that frequency: belts run up to 4 % slower than by the nominal radius
@@ -112,10 +119,16 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "transverse_damping": TRANSVERSE_DAMPING,
         "tilt_spring": not_negative(
-            5.0, "N m/rad", "stiffness of an element's tilt against the rings", sensible=(1e-3, 1e6)
+            3267.0,
+            "N",
+            "stiffness of the elements' tilt against the rings, moment by angle and length",
+            sensible=(1.0, 1e9),
         ),
         "tilt_damper": not_negative(
-            5e-5, "N m s", "damping of an element's tilt against the rings", sensible=(1e-9, 1e3)
+            0.03267,
+            "N s",
+            "damping of the elements' tilt against the rings, moment by angular velocity and length",
+            sensible=(1e-6, 1e6),
         ),
     },
     "sheaves": {
@@ -139,6 +152,18 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             sensible=(1000000.0, 100000000000000.0),
         ),
         "half_wedge_angle": HALF_WEDGE_ANGLE,
+        "inner_radius": not_negative(
+            0.0, "m", "pitch radius at the inner end of the sheaves of both pulleys", sensible=(1e-3, 0.5)
+        ),
+        "outer_radius": replace(
+            positive(
+                np.inf,
+                "m",
+                "pitch radius at the outer end of the sheaves of both pulleys",
+                sensible=(1e-3, np.inf),
+            ),
+            allow_infinite=True,
+        ),
         "sheave_rate": positive(
             5e-6,
             "m/(N s)",
@@ -178,6 +203,11 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     problems = variator_problems(p)
     if problems:
         return problems
+    radii = sorted((p["driven_radius"] / p["ratio"], p["driven_radius"]))
+    if not p["inner_radius"] <= radii[0] <= radii[1] <= p["outer_radius"]:
+        expected = f"radii within the sheaves, {p['inner_radius']:g} to {p['outer_radius']:g} m"
+        found = f"{p['ratio']:g}, and with it radii of {radii[0]:.5g} and {radii[1]:.5g} m"
+        problems.append(("ratio", expected, found))
     pitch = path_length(p) / p["elements"]
     if p["play"] > pitch:
         problems.append(("play", f"less than the pitch of the elements, {pitch:.4g} m", f"{p['play']:g} m"))
@@ -187,11 +217,27 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if arc < 8.0 * pitch:
         expected = f"at least {int(np.ceil(8.0 * path_length(p) / arc))}, eight on the shorter arc"
         problems.append(("elements", expected, f"{p['elements']}"))
+    if p["elements"] < FEWEST_ELEMENTS and not p["coarse"]:
+        expected = f"{FEWEST_ELEMENTS} or more, or coarse = true"
+        problems.append(("elements", expected, f"{p['elements']}"))
     # the polygon of the elements shakes strands as they pass, and by the change of stiffness at half of that
     half = 0.5 * p["driving_speed"] * p["driven_radius"] / p["ratio"] / pitch
     if BELOW_PASSAGE * half < p["band_high"]:
         most = f"{BELOW_PASSAGE * half:.4g} Hz, below half of the frequency at which elements pass"
         problems.append(("band_high", f"at most {most}, or more elements", f"{p['band_high']:g} Hz"))
+    for key in MODES:
+        if not p[key] or len(p[key]) != len(p[MODES[0]]) or min(p[key]) <= 0.0:
+            expected = "values above 0, as many of both pulleys"
+            problems.append((key, expected, f"{list(p[key])}"))
+    problems += course_problems(p)
+    limit = string_limit(p)
+    if not problems and "step" in p and p["step"] > limit:
+        expected = f"at most {limit:.3g} s, pitch over the speed of transverse waves under the thrust"
+        problems.append(("step", expected, f"{p['step']:g} s"))
+    limit = falling_limit(p)
+    if not problems and "step" in p and p["step"] > limit:
+        expected = f"at most {limit:.3g} s, beyond which friction that falls so steeply has several solutions"
+        problems.append(("step", expected, f"{p['step']:g} s"))
     # a sheave moves by an explicit step against the stiffness of the flanks on the longer arc
     angle, arc = (
         p["half_wedge_angle"],
@@ -201,27 +247,6 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if p["sheave_rate"] > fastest:
         expected = f"at most {fastest:.3g} m/(N s) at this step, beyond which the sheave does not settle"
         problems.append(("sheave_rate", expected, f"{p['sheave_rate']:g} m/(N s)"))
-    for key in MODES:
-        if not p[key] or len(p[key]) != len(p[MODES[0]]) or min(p[key]) <= 0.0:
-            expected = "values above 0, as many of both pulleys"
-            problems.append((key, expected, f"{list(p[key])}"))
-    if p["elements"] < FEWEST_ELEMENTS and not p["coarse"]:
-        expected = f"{FEWEST_ELEMENTS} or more, or coarse = true"
-        problems.append(("elements", expected, f"{p['elements']}"))
-    before = (1.0 - p["judged_fraction"]) * p["duration"]
-    if p["rise_time"] > before * (1.0 + 1e-9):
-        expected = f"a load that has risen before the run is judged, within {before:g} s"
-        problems.append(("rise_time", expected, f"{p['rise_time']:g} s"))
-    if p["load_history"] == p["speed_history"] == "ramp":
-        problems.append(("speed_history", 'constant under load_history = "ramp": one ramp a run', "ramp"))
-    limit = string_limit(p)
-    if not problems and "step" in p and p["step"] > limit:
-        expected = f"at most {limit:.3g} s, pitch over the speed of transverse waves under the thrust"
-        problems.append(("step", expected, f"{p['step']:g} s"))
-    limit = falling_limit(p)
-    if not problems and "step" in p and p["step"] > limit:
-        expected = f"at most {limit:.3g} s, beyond which friction that falls so steeply has several solutions"
-        problems.append(("step", expected, f"{p['step']:g} s"))
     return problems + friction_problems(p)
 
 
@@ -234,7 +259,7 @@ def falling_limit(parameters: Mapping[str, Any]) -> float:
     steepest; n is the axial force over R wrap cos d0, on the shorter arc, where both pulleys have the thrust.
     """
     p = parameters
-    if p["friction_gradient"] == 0.0:
+    if p["friction_gradient"] >= 0.0:
         return np.inf
     driving = p["driven_radius"] / p["ratio"]
     wrap = np.pi + 2.0 * np.arcsin((driving - p["driven_radius"]) / p["centre_distance"])
@@ -276,13 +301,11 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
     """
     p = parameters
     cases = (
-        (p["load_history"] == "constant", "load_start", "load_history constant"),
-        (p["speed_history"] == "constant", "speed_start", "speed_history constant"),
         (p["ring_friction"] == 0.0, "ring_friction_speed", "ring_friction 0"),
         (p["friction_gradient"] == 0.0, "friction_memory", "friction_gradient 0"),
         *((np.isinf(p["sheave_stiffness"]), key, "sheave_stiffness inf") for key in MODES),
         (p["elements"] >= FEWEST_ELEMENTS, "coarse", f"elements {FEWEST_ELEMENTS} or more"),
+        (True, "arc_probes", "model pushbelt, which is probed on its strands"),
     )
-    return friction_inert(p | dict.fromkeys(NO_TABLE, ())) | {
-        key: setting for holds, key, setting in cases if holds
-    }
+    found = {key: setting for holds, key, setting in cases if holds}
+    return friction_inert(p | dict.fromkeys(NO_TABLE, ())) | course_inert(p) | found

@@ -22,6 +22,8 @@ SCALARS = (
     "ring_tension t2",
     "axial_force driving",
     "axial_force driven",
+    "running_radius driving",
+    "running_radius driven",
     "slip driving",
     "slip driven",
     "driving_flank_loss",
@@ -131,22 +133,27 @@ class Reading:
             belt.cosine**2 * e[:, f.FLANK_FRICTION_M] * e[:, f.FLANK_SLIP_M]
             + e[:, f.FLANK_FRICTION_T] * e[:, f.FLANK_SLIP_T]
         )
-        pressed = np.maximum(both @ e[:, f.FLANK], 1e-9)
-        slip = (
-            both
-            @ (e[:, f.FLANK] * e[:, f.FLANK_SLIP_T])
-            / (pressed * pulleys[f.DRIVING_SPEED] * self._where.path.driving_radius)
-        )
+        weights = both * e[:, f.FLANK]
+        pressed = weights.sum(axis=1)
+        weights /= np.maximum(pressed, 1e-9)[:, None]
+        running = np.where(pressed > 0.0, weights @ self._contact_radii(), np.nan)
+        slip = weights @ e[:, f.FLANK_SLIP_T] / (pulleys[f.DRIVING_SPEED] * self._where.path.driving_radius)
         quarter = 0.25 * self._where.path.strand_length
         inside = (np.abs(self._position - self._where.middles[:, None]) < quarter).astype(float)
         inside /= inside.sum(axis=1, keepdims=True)
         ring_loss = e[:, f.RING_FRICTION] @ e[:, f.RING_SLIP]
-        groups = (inside @ self._push, inside @ e[:, f.TENSION], both @ thrust, slip, both @ loss)
+        groups = (inside @ self._push, inside @ e[:, f.TENSION], both @ thrust, running, slip, both @ loss)
         # elements over the time of a revolution: their speeds over the length of their line
         speeds = np.hypot(e[:, f.U_Y], e[:, f.U_Z]).sum()
         line = np.hypot(*np.diff(e[:, [f.Y, f.Z]], axis=0, prepend=e[-1:, [f.Y, f.Z]]).T).sum()
         found = [*pulleys[[f.DRIVEN_SPEED, f.DRIVING_RADIUS, f.DRIVEN_RADIUS]], *np.concatenate(groups)]
         return [*found, ring_loss, speeds / line]
+
+    def _contact_radii(self) -> np.ndarray:
+        """Distances of the flanks' contact points from the shaft of the nearer pulley, (n,) [m]."""
+        e, depth = self._elements, self._where.belt.pitch_depth
+        y = e[:, f.Y] - depth * e[:, f.HEADING_Z] - e[:, f.DRIVEN] * self._where.centre_distance
+        return np.hypot(y, e[:, f.Z] + depth * e[:, f.HEADING_Y])
 
     def profiles(self) -> np.ndarray:
         """Sums over the elements at each place: PROFILES, and their number, (profile + 1, place)."""
@@ -176,8 +183,11 @@ class Reading:
     def stored_energy(self) -> float:
         """Kinetic and elastic energy of belt and driven pulley [J]."""
         e, state, belt = self._elements, self._state, self._where.belt
-        t = np.roll(e[:, [f.Y, f.Z]], -1, axis=0) - np.roll(e[:, [f.Y, f.Z]], 1, axis=0)
+        ahead = np.roll(e, -1, axis=0)
+        segment = ahead[:, [f.Y, f.Z]] - e[:, [f.Y, f.Z]]
+        t = segment + np.roll(segment, 1, axis=0)
         t /= np.hypot(*t.T)[:, None]
+        segment /= np.hypot(*segment.T)[:, None]
         u = e[:, [f.U_Y, f.U_Z]]
         outward = u[:, 0] * t[:, 1] - u[:, 1] * t[:, 0]
         kinetic = belt.mass * (u**2).sum() + belt.inertia * (e[:, f.OMEGA] ** 2).sum()
@@ -187,6 +197,9 @@ class Reading:
         elastic += (e[:, f.EDGE] ** 2 + e[:, f.HEAD] ** 2).sum() / belt.contact_stiffness
         elastic += 2.0 * (e[:, f.FLANK] ** 2).sum() / belt.flank_stiffness
         elastic += 2.0 * (belt.modal_stiffness * state.openings**2).sum()
+        for end in (e, ahead):  # half of the angle's stiffness at each end of a segment
+            cosine = (segment * end[:, [f.HEADING_Y, f.HEADING_Z]]).sum(axis=1)
+            elastic += belt.angle_stiffness * (1.0 - cosine).sum()
         return 0.5 * float(kinetic + elastic)
 
 

@@ -48,10 +48,8 @@ def path_of(given: Mapping[str, Any]) -> Variator:
 def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
     """Constants from values as `start` takes them, and the distance of neighbours [m]."""
     g = given
-    nodes, group = g["nodes"], g["elements"] / g["nodes"]
-    thickness = chord - g["play"] / nodes
-    mass = g["element_mass"] * group
-    angle = g["half_wedge_angle"]
+    mass, angle = g["element_mass"], g["half_wedge_angle"]
+    thickness = chord - g["play"] / g["elements"]
     return Belt(
         centre_distance=float(g["centre_distance"]),
         sine=float(np.sin(angle)),
@@ -61,10 +59,10 @@ def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
         head_height=float(g["head_height"]),
         mass=float(mass),
         inertia=float(mass * (g["element_height"] ** 2 + thickness**2) / 12.0),
-        ring_mass=float(g["ring_mass"] / nodes),
+        ring_mass=float(g["ring_mass"] / g["elements"]),
         ring_stiffness=float(g["ring_stiffness"]),
-        flank_stiffness=float(g["flank_stiffness"] * group),
-        contact_stiffness=float(g["contact_stiffness"] / group),
+        flank_stiffness=float(g["flank_stiffness"]),
+        contact_stiffness=float(g["contact_stiffness"]),
         angle_stiffness=float(g["angle_stiffness"]),
         angle_damping=float(g["angle_damping"]),
         transverse_damping=float(g["transverse_damping"] * chord),
@@ -73,10 +71,7 @@ def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
         flank_gradient=float(g["friction_gradient"]),
         flank_speed=float(g["stribeck_velocity"]),
         friction_memory=float(g["friction_memory"]),
-        ring_law=int(Law[g["ring_friction_law"].upper()]),
-        ring_kinetic=float(g["ring_friction"]),
-        ring_gradient=float(g["ring_friction_gradient"]),
-        ring_speed=float(g["ring_stribeck_velocity"]),
+        ring_friction=float(g["ring_friction"]),
         friction_speed=float(g["friction_speed"]),
         ring_friction_speed=float(g["ring_friction_speed"]),
         driven_inertia=float(g["driven_inertia"]),
@@ -107,7 +102,7 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     Parameters
     ----------
     given : mapping
-        Values [SI] as `transient.given` names them. `elements` of the belt are shared out among `nodes`.
+        Values [SI] as `transient.given` names them, those of an element for each of `elements`.
 
     Returns
     -------
@@ -115,7 +110,7 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
         The flanks just touch; the ring has the strain `ring_strain`.
     """
     g = given
-    nodes, path = g["nodes"], path_of(g)
+    nodes, path = g["elements"], path_of(g)
     s, chord = equal_chords(path, g["centre_distance"], nodes)
     belt = belt_of(g, chord)
     pitch, _, curvature = points_at(path, belt.centre_distance, s)

@@ -27,17 +27,12 @@ from cvt_hpc.models.pushbelt.belt import (
     DRIVEN,
     DRIVEN_RADIUS,
     DRIVEN_SPEED,
-    DRIVEN_THRUST,
-    DRIVEN_TORQUE,
     DRIVING_RADIUS,
     DRIVING_SPEED,
-    DRIVING_THRUST,
-    DRIVING_TORQUE,
     EDGE,
     FAILED_CONTACT,
     FAILED_ELEMENT,
     FAILED_STEPS,
-    FAILED_UNKNOWN,
     FLANK,
     FLANK_FRICTION_M,
     FLANK_FRICTION_T,
@@ -78,6 +73,7 @@ from cvt_hpc.models.pushbelt.belt import (
     TENSION_I_Z,
     TENSION_J_Y,
     TENSION_J_Z,
+    THRUST_WORK,
     TIME,
     TURN_Y,
     TURN_Z,
@@ -211,7 +207,7 @@ def _accept(belt, state, work, inputs, dt):
     """Take the state to the end of the step, and add up what it has done."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     totals, pulleys = state.totals, state.pulleys
-    for k in range(8):
+    for k in range(7):
         scratch[0, k] = 0.0
     for j in range(step.rows):
         change_y, change_z = (
@@ -224,7 +220,7 @@ def _accept(belt, state, work, inputs, dt):
         omega, next_omega = elements[j, OMEGA], ahead(elements, j, OMEGA)
         rate_i = step[j, ANGLE_I] * (omega + elements[j, CHANGE + 2] - turn)
         rate_j = step[j, ANGLE_J] * (next_omega + ahead(elements, j, CHANGE + 2) - turn)
-        scratch[0, 6] += 0.5 * belt.angle_damping * (rate_i * rate_i + rate_j * rate_j)
+        scratch[0, 5] += 0.5 * belt.angle_damping * (rate_i * rate_i + rate_j * rate_j)
     per_dt, square = 1.0 / dt, belt.cosine * belt.cosine
     for j in range(step.rows):
         t_y, t_z = step[j, T_Y], step[j, T_Z]
@@ -241,7 +237,7 @@ def _accept(belt, state, work, inputs, dt):
         elements[j, U_Y], elements[j, U_Z], elements[j, OMEGA] = u_y, u_z, omega
         elements[j, V] += elements[j, CHANGE + 3]
         across = step[j, NORMAL_Y] * u_y + step[j, NORMAL_Z] * u_z
-        scratch[0, 7] += belt.transverse_damping * across * across
+        scratch[0, 6] += belt.transverse_damping * across * across
         elements[j, Y] += dt * u_y
         elements[j, Z] += dt * u_z
         x_y, x_z = turned(elements[j, HEADING_Y], elements[j, HEADING_Z], dt * omega)
@@ -252,36 +248,34 @@ def _accept(belt, state, work, inputs, dt):
         thrust = elements[j, FLANK] * belt.cosine + grip_m * belt.sine
         scratch[0, 0] += (1.0 - driven) * thrust
         scratch[0, 1] += driven * thrust
-        torque = step[j, MID_RADIUS] * iterate[j, FORCE_T]
-        scratch[0, 2] += (1.0 - driven) * torque
-        scratch[0, 3] -= driven * torque
+        scratch[0, 2] += (1.0 - driven) * step[j, MID_RADIUS] * iterate[j, FORCE_T]
         slip_m, slip_t = elements[j, FLANK_SLIP_M], elements[j, FLANK_SLIP_T]
-        scratch[0, 4] += 2.0 * (square * grip_m * slip_m + grip_t * slip_t)
+        scratch[0, 3] += 2.0 * (square * grip_m * slip_m + grip_t * slip_t)
         size = sqrt(slip_m * slip_m + slip_t * slip_t)
         filtered, _ = remembered(elements[j, V_FILTERED], size, belt.friction_memory, dt)
         elements[j, V_FILTERED] = select(elements[j, FLANK] > 0.0, filtered, size)
-        scratch[0, 5] += elements[j, RING_FRICTION] * elements[j, RING_SLIP]
-    for k in range(8):
+        scratch[0, 4] += elements[j, RING_FRICTION] * elements[j, RING_SLIP]
+    for k in range(7):
         scratch[0, k] = around(scratch[0, k])
     driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]
-    torque, driven_torque = scratch.data[0, 2, 0], scratch.data[0, 3, 0]
     pulleys[DRIVEN_SPEED] += state.increments[0]
     modes = belt.modal_stiffness.shape[1]
     for k in range(2 * modes):
         state.openings[k // modes, k % modes] += state.increments[1 + k]
-    pulleys[DRIVING_RADIUS] += dt * belt.driving_rate * (inputs[IN_DRIVING_THRUST] - driving_thrust)
-    pulleys[DRIVEN_RADIUS] += dt * belt.driven_rate * (inputs[IN_DRIVEN_THRUST] - driven_thrust)
+    driving = dt * belt.driving_rate * (inputs[IN_DRIVING_THRUST] - driving_thrust)
+    driven = dt * belt.driven_rate * (inputs[IN_DRIVEN_THRUST] - driven_thrust)
+    pulleys[DRIVING_RADIUS] += driving
+    pulleys[DRIVEN_RADIUS] += driven
     totals[TIME] += dt
-    totals[WORK_IN] += dt * torque * pulleys[DRIVING_SPEED]
+    totals[WORK_IN] += dt * scratch.data[0, 2, 0] * pulleys[DRIVING_SPEED]
     totals[WORK_OUT] += dt * inputs[IN_LOAD] * pulleys[DRIVEN_SPEED]
-    totals[FLANK_LOSS] += dt * scratch.data[0, 4, 0]
-    totals[RING_LOSS] += dt * scratch.data[0, 5, 0]
-    totals[DAMPING_LOSS] += dt * scratch.data[0, 6, 0]
-    totals[BELT_LOSS] += dt * scratch.data[0, 7, 0]
-    totals[DRIVING_THRUST] += dt * driving_thrust
-    totals[DRIVEN_THRUST] += dt * driven_thrust
-    totals[DRIVING_TORQUE] += dt * torque
-    totals[DRIVEN_TORQUE] += dt * driven_torque
+    # both sheaves of a pulley close by the tangent of the wedge angle
+    closing = 2.0 * belt.sine / belt.cosine
+    totals[THRUST_WORK] -= closing * (driving_thrust * driving + driven_thrust * driven)
+    totals[FLANK_LOSS] += dt * scratch.data[0, 3, 0]
+    totals[RING_LOSS] += dt * scratch.data[0, 4, 0]
+    totals[DAMPING_LOSS] += dt * scratch.data[0, 5, 0]
+    totals[BELT_LOSS] += dt * scratch.data[0, 6, 0]
 
 
 @kernel
@@ -294,16 +288,16 @@ def _shift(state, work, share):
 
 @kernel
 def _contact_at_fault(belt, state, work, dt):
-    """Element and unknown with the largest last correction, and the contact whose force it changed most."""
+    """Element with the largest last correction, and the contact whose force it changed most."""
     solution = work.blocks.data
     rows, parts = solution.shape[0], solution.shape[2]
-    worst, row, part, unknown = -1.0, 0, 0, 0
+    worst, row, part = -1.0, 0, 0
     for j in range(rows):
         for p in range(parts):
             for r in range(4):
                 size = abs(solution[j, RIGHT + r, p])
                 if not size <= worst:
-                    worst, row, part, unknown = size, j, p, r
+                    worst, row, part = size, j, p
     forces = state.elements.data
     edge, head = forces[row, EDGE, part], forces[row, HEAD, part]
     flank, ring = forces[row, FLANK_FRICTION_T, part], forces[row, RING_FRICTION, part]
@@ -318,7 +312,7 @@ def _contact_at_fault(belt, state, work, dt):
     if abs(forces[row, RING_FRICTION, part] - ring) > most:
         contact = 3
     _evaluate(belt, state, work, dt)  # the state is to have the forces of the last iterate
-    return part * rows + row, unknown, contact
+    return part * rows + row, contact
 
 
 @kernel
@@ -347,7 +341,7 @@ def advance(belt, newton, state, work, inputs, steps, dt):
     -------
     int
         CONVERGED; NOT_CONVERGED where `most_failures` steps in a row had not converged; NOT_FINITE. The
-        counters then name the element, the unknown and the contact at fault.
+        counters then name the element and the contact at fault.
     """
     counters = state.counters
     for k in range(steps):
@@ -367,9 +361,8 @@ def advance(belt, newton, state, work, inputs, steps, dt):
         counters[IN_A_ROW] = counters[IN_A_ROW] + 1 if failed else 0
         if failed:
             counters[FAILED_STEPS] += 1
-            element, unknown, contact = _contact_at_fault(belt, state, work, dt)
-            counters[FAILED_ELEMENT], counters[FAILED_UNKNOWN] = element, unknown
-            counters[FAILED_CONTACT] = contact
+            element, contact = _contact_at_fault(belt, state, work, dt)
+            counters[FAILED_ELEMENT], counters[FAILED_CONTACT] = element, contact
         if not finite or counters[IN_A_ROW] == newton.most_failures:
             counters[STATUS] = NOT_CONVERGED if finite else NOT_FINITE
             return counters[STATUS]

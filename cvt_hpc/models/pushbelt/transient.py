@@ -14,23 +14,23 @@ from cvt_hpc.models.pushbelt.parameters import MODES, path_length
 from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Reading, Readings
 from cvt_hpc.models.pushbelt.start import of_lanes, start, workspace
 from cvt_hpc.models.pushbelt.step import advance
-from cvt_hpc.recording import sample_count
+from cvt_hpc.recording import sample_count, start_up_samples
 from cvt_hpc.variables import Status
-from cvt_hpc.variator import STRANDS
+from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, STRANDS
 from cvt_hpc.variator.course import load_course
+from cvt_hpc.variator.slip import GAINED, LOST
 from cvt_hpc.vibration.ramped import ramped
 
 CHANNELS = ("load", "driving_speed", *SCALARS)
 FIRST_THRUST = 500.0  # [N]: with which the run begins, so that the belt settles in the grooves
 CLAMPED = 0.5  # of the rise time: until then the thrust rises, from then on the load, lest the belt slips
-# What the power balance may leave open: of the driving power, and of thrust times belt speed. Without load
-# sound runs leave 9 to 46 W of 298 kW (432 to 104 elements, steps of 2.5 to 10 us), by pitch and step.
-LARGEST_POWER_RESIDUAL, OF_THRUST = 0.005, 2e-4
+# What the power balance may leave open. Elements are set turning where they meet an arc, and stopped where
+# they leave it, by contacts that damp what is as fast: that takes a share of their energy of rotation. The
+# contacts' own damping takes a share of thrust times belt speed, by step. Sound runs (40 random scenes: 104
+# to 432 elements, steps of 2.5 to 20 us, 7 to 33 m/s, 5 to 45 kN, all loads) leave 7 to 85 % of the sum of
+# both, and none gains power. Falling friction in long steps leaves up to 2 % of the losses, of either sign.
+OF_ROTATION, OF_THRUST, OF_LOSS = 1.5, 10.0, 0.02  # [1], [1/s], [1]
 MOST_UNSOLVED = 0.02  # of the steps
-LEAST_SPEED, MOST_SPEED = (
-    0.5,
-    2.0,
-)  # of the driven pulley, of that without slip: beyond, the belt slips through
 
 
 class Transient:
@@ -51,8 +51,8 @@ class Transient:
         On the strands, equally spaced between their ends.
     interval : float
         Sampling interval [s].
-    samples, done : int
-        Samples of the whole run, and those recorded so far.
+    samples, done, kick : int
+        Samples of the whole run, those recorded so far, and those before the load has risen.
     failure : (Status, str) or None
         Why the run does not go on: what has gone wrong, or that the belt slips through, with the status done.
     """
@@ -89,7 +89,7 @@ class Transient:
             Those of the run but for `duration` and `judged_fraction`.
         """
         self.parameters = parameters
-        self.samples = sample_count(parameters)
+        self.samples, self.kick = sample_count(parameters), start_up_samples(parameters)
         self.first_judged = self.samples - round(parameters["judged_fraction"] * self.samples)
         more = self.samples - len(self._rows)
         self._rows = np.concatenate([self._rows, np.full((more, self._rows.shape[1]), np.nan)])
@@ -118,7 +118,7 @@ class Transient:
                 self.failure = Status.FAILED_NUMERICS, self._why(outcome)
                 break
             self._take_sample(last)
-            if (slipped := self._slipped(last)) is not None:
+            if (slipped := self._slipped()) is not None:
                 self.failure = Status.DONE, slipped
                 break
         return self.failure
@@ -175,13 +175,13 @@ class Transient:
         contact = CONTACTS[counters[fields.FAILED_CONTACT]]
         return f"at the {contact} contact of element {counters[fields.FAILED_ELEMENT]}"
 
-    def _slipped(self, inputs: tuple[float, float, float, float]) -> str | None:
-        expected = inputs[0] / self.parameters["ratio"]
-        share = self._state.pulleys[fields.DRIVEN_SPEED] / expected
-        if LEAST_SPEED <= share <= MOST_SPEED:
-            return None
-        change = f"lost {1.0 - share:.0%}" if share < 1.0 else f"gained {share - 1.0:.0%}"
-        return f"the belt slips through: the driven pulley has {change} of its speed"
+    def _slipped(self) -> str | None:
+        """Whether the driven pulley runs far from the speed that the present radii give without slip."""
+        driving_speed, driven_speed, driving_radius, driven_radius = self._state.pulleys
+        driving, driven = driving_speed * driving_radius, driven_speed * driven_radius
+        if driven < LEAST_SPEED * driving:
+            return LOST
+        return GAINED if driven > MOST_SPEED * driving else None
 
     @property
     def time(self) -> float:
@@ -216,6 +216,10 @@ class Transient:
     def channel(self, name: str) -> np.ndarray:
         """History of one of CHANNELS, (done,)."""
         return self._rows[: self.done, len(self.probes) + CHANNELS.index(name)]
+
+    def mean_driving_speed(self, samples: slice) -> float:
+        """Mean speed of the driving pulley in some samples [rad/s]."""
+        return float(self.channel("driving_speed")[samples].mean())
 
     @property
     def judged(self) -> slice:
@@ -253,19 +257,25 @@ class Transient:
             With `power_residual`, `driving_power`, `loss` and `unsolved_share`.
         """
         unsolved, open_power = record["unsolved_share"], record["power_residual"]
+        least, most = self._sound(record)
         if not unsolved <= MOST_UNSOLVED:
             why = f"{unsolved:.1%} of the steps were not solved, the last {self._fault()}"
-        elif not abs(open_power) <= (most := self._most_open(record)):
-            why = f"the power balance does not close: {open_power:.3g} instead of {most:.3g} at most"
+        elif not least <= open_power <= most:
+            why = f"the power balance is open by {open_power:.3g}, not by {least:.3g} to {most:.3g}"
         else:
             return None
         return Status.FAILED_NUMERICS, why
 
-    def _most_open(self, record: dict[str, Any]) -> float:
-        """Largest `power_residual` of a sound run [1]."""
-        p, driving = self.parameters, abs(record["driving_power"])
-        flow = p["thrust"] * p["driving_speed"] * self.path.driving_radius
-        return (LARGEST_POWER_RESIDUAL * driving + OF_THRUST * flow) / max(driving, record["loss"])
+    def _sound(self, record: dict[str, Any]) -> tuple[float, float]:
+        """Smallest and largest `power_residual` of a sound run [1]."""
+        p, belt, path = self.parameters, self._belt, self.path
+        speed = self.mean_driving_speed(self.judged) * path.driving_radius
+        passing = speed / self._readings.pitch
+        turning = path.driving_radius**-2 + path.driven_radius**-2
+        rotation = 0.5 * belt.inertia * passing * speed**2 * turning
+        either = OF_THRUST * self.step * p["thrust"] * speed + OF_LOSS * record["loss"]
+        flow = max(abs(record["driving_power"]), record["loss"])
+        return -either / flow, (OF_ROTATION * rotation + either) / flow
 
     def paused(self) -> Transient:
         """What a batch of the same point over a longer time goes on from: the run itself."""
@@ -282,7 +292,6 @@ def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
         "centre_distance": p["centre_distance"],
         "belt_length": length,
         "elements": p["elements"],
-        "nodes": p["elements"],
         "element_mass": p["element_mass"] * pitch,
         "element_height": p["element_height"],
         "pitch_depth": p["ring_offset"],
@@ -294,18 +303,15 @@ def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
         "half_wedge_angle": p["half_wedge_angle"],
         "flank_stiffness": p["flank_stiffness"] * pitch,
         "contact_stiffness": p["edge_stiffness"] / pitch,
-        "angle_stiffness": p["tilt_spring"],
-        "angle_damping": p["tilt_damper"],
+        "angle_stiffness": p["tilt_spring"] * pitch,
+        "angle_damping": p["tilt_damper"] * pitch,
         "transverse_damping": p["transverse_damping"],
         "friction_law": p["friction_law"],
         "kinetic_friction": p["kinetic_friction"],
         "friction_gradient": p["friction_gradient"],
         "stribeck_velocity": p["stribeck_velocity"],
         "friction_memory": p["friction_memory"],
-        "ring_friction_law": "coulomb",
         "ring_friction": p["ring_friction"],
-        "ring_friction_gradient": 0.0,
-        "ring_stribeck_velocity": p["stribeck_velocity"],
         "friction_speed": p["friction_speed"],
         "ring_friction_speed": p["ring_friction_speed"],
         "driven_inertia": p["driven_inertia"],

@@ -8,8 +8,8 @@ import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import DRIVEN_POSITION, DRIVEN_SPEED, V_ELEMENT, V_RING, Mesh, W
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
-from cvt_hpc.models.elastic_belt.slip import largest_torque
 from cvt_hpc.models.steady_variator.walking import Steady
+from cvt_hpc.variator.slip import largest_torque
 
 
 class Distributions(NamedTuple):

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.slip import GROSS_SLIP
-from cvt_hpc.models.elastic_belt.slip import VARIABLE as SLIP_MARGIN
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+from cvt_hpc.variator import GROSS_SLIP
+from cvt_hpc.variator.slip import VARIABLE as SLIP_MARGIN
 from cvt_hpc.variator.variables import COORDINATES
 
 VARIABLES = (

@@ -14,27 +14,30 @@ torque that slip rises from 4 to 8 % within 1 % of the load; beyond, there are s
 by 8 to 40 % all the time, and then none. So a run slips grossly if a pulley's mean slip over the last half of
 the judged part is beyond GROSS_SLIP, or if the driven pulley loses or gains half of its speed before the
 run's end.
+
+A run is whatever has `parameters`, `channel(name)`, `samples`, `done`, `judged`, `path` and
+`mean_driving_speed(samples)`, with the channels load, driven_speed, and those of slip and axial_force of both
+pulleys.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cvt_hpc.physics.capacity import torque_limit
 from cvt_hpc.physics.friction import FrictionLaw, friction_coefficients, given_law
+from cvt_hpc.physics.friction_laws import TABLE_PARAMETERS
 from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.variables import Variable, Vibrates
-from cvt_hpc.variator import PULLEYS
+from cvt_hpc.variator import GROSS_SLIP, LEAST_SPEED, MOST_SPEED, PULLEYS
 from cvt_hpc.vibration.assessment import Occurrence
 from cvt_hpc.vibration.occurrence import LONGEST_REASON
 
-if TYPE_CHECKING:
-    from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
-
-GROSS_SLIP = 0.05  # of the belt's speed
+LOST = f"the belt slips through: the driven pulley has lost {1 - LEAST_SPEED:.0%} of its speed"
+GAINED = f"the belt slips through: the driven pulley has gained {MOST_SPEED - 1:.0%} of its speed"
 
 VARIABLE = Variable(
     "slip_margin",
@@ -69,14 +72,14 @@ def largest_torque(
     return float(torque_limit(mu, axial_force, path.driving_radius, half_wedge_angle).min())
 
 
-def slip_margin(run: RecordedRun, samples: slice) -> float:
+def slip_margin(run: Any, samples: slice) -> float:
     """Load over the largest torque that friction carries, less 1, by the means of some samples."""
-    p, path = run.parameters, run.mesh.path
+    p, path = run.parameters, run.path
     axial = np.array([run.channel(f"axial_force {pulley}")[samples].mean() for pulley in PULLEYS])
     # a run may slip through before a constant load has risen to its value
     load = p["load"] if p["load_history"] == "constant" else run.channel("load")[samples].mean()
     carried = largest_torque(
-        given_law(p),
+        given_law(dict.fromkeys(TABLE_PARAMETERS, ()) | p),  # not every model has tables
         p["half_wedge_angle"],
         path,
         run.mean_driving_speed(samples) * path.driving_radius,
@@ -85,7 +88,7 @@ def slip_margin(run: RecordedRun, samples: slice) -> float:
     return float(abs(load) / carried - 1.0)
 
 
-def with_slip(run: RecordedRun, found: Occurrence) -> Occurrence:
+def with_slip(run: Any, found: Occurrence) -> Occurrence:
     """What was found of the vibration of a run that reached its end, with gross slip where there is some.
 
     The margin is that to gross slip, where this is nearer than the one of the amplitude.
@@ -101,7 +104,7 @@ def with_slip(run: RecordedRun, found: Occurrence) -> Occurrence:
     return replace(found, vibrates=Vibrates.SLIPS, reason=reason[:LONGEST_REASON], margin=beyond)
 
 
-def slide(run: RecordedRun) -> slice:
+def slide(run: Any) -> slice:
     """Samples of a run that has slipped through from where a pulley began to slip grossly for good."""
     slips = np.abs([run.channel(f"slip {pulley}") for pulley in PULLEYS]).max(axis=0)
     gripping = np.flatnonzero(slips <= GROSS_SLIP)
@@ -109,7 +112,7 @@ def slide(run: RecordedRun) -> slice:
     return slice(min(int(first), max(run.done - 1, 0)), run.done)
 
 
-def slid(run: RecordedRun) -> dict[str, Any]:
+def slid(run: Any) -> dict[str, Any]:
     """What is known of a run that has slipped through before its end: means over its slide."""
     samples = slide(run)
 
@@ -120,7 +123,6 @@ def slid(run: RecordedRun) -> dict[str, Any]:
     return {
         "slip": pair("slip"),
         "axial_force": axial,
-        "open_share": pair("open_share"),
         "thrust_ratio": axial[0] / axial[1],
         "speed_loss": 1.0 - run.parameters["ratio"] * driven_speed / run.mean_driving_speed(samples),
         VARIABLE.name: slip_margin(run, samples),

@@ -1,0 +1,112 @@
+"""Verdict and record of a run of a variator, as far as they are the same whichever model marched it.
+
+A run is as `slip` takes it, and has `displacement`, `probes` with labels, `failure` and `time` as well, and
+`kick`, the samples before its load has risen. Of its channels, those of both strands count here, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.variables import Vibrates
+from cvt_hpc.variator import PULLEYS, STRANDS
+from cvt_hpc.variator.slip import slid, with_slip
+from cvt_hpc.vibration import assessment, ramp
+from cvt_hpc.vibration.occurrence import LONGEST_REASON
+from cvt_hpc.vibration.ramped import ramped
+from cvt_hpc.vibration.signals import amplitude_spectrum
+
+RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by what a ramp changes
+
+
+def assess(run: Any) -> assessment.Occurrence:
+    """Whether and how a run vibrates that has reached its end; its probes are columns of the displacement."""
+    p = run.parameters
+    if ramped(p):
+        return with_slip(run, _assess_ramp(run))  # type: ignore[arg-type]  # None is of a run before its end
+    columns, strands = _on_strands(run)
+    found = assessment.assess(run.displacement[:, columns], p["sampling_rate"], strands, p)
+    return with_slip(run, replace(found, strongest_probe=columns[found.strongest_probe]))
+
+
+def _assess_ramp(run: Any) -> ramp.RampOccurrence | None:
+    """Whether and how a run vibrates along a ramp; None if it ended too soon to tell."""
+    p, first, quantity = run.parameters, run.kick, ramped(run.parameters)
+    columns, strands = _on_strands(run)
+    rate, moved = p["sampling_rate"], run.displacement[first:, columns]
+    values = run.channel(RAMPED_CHANNELS[quantity])[first:]
+    found = ramp.assess_ramp(moved, rate, strands, quantity, values, run.samples - first, p)
+    return found and replace(found, strongest_probe=columns[found.strongest_probe])
+
+
+def _on_strands(run: Any) -> tuple[np.ndarray, list[str]]:
+    """Columns of the displacement whose probes lie on strands, and on which."""
+    regions = [probe.label.split()[0] for probe in run.probes]
+    columns = [k for k, region in enumerate(regions) if region in STRANDS]
+    return np.array(columns), [regions[k] for k in columns]
+
+
+def slipped(run: Any) -> dict[str, Any]:
+    """The record of a run that has slipped through before its end: what is known until then."""
+    status, why = run.failure
+    found = {"status": status, "vibrates": Vibrates.SLIPS, "reason": f"at {run.time * 1e3:.4g} ms: {why}"}
+    before = _assess_ramp(run) if ramped(run.parameters) else None
+    if before is not None:
+        reason = f"{found['reason']}; before: {before.reason}"[:LONGEST_REASON]
+        found = before.record() | found | {"reason": reason}
+    return found | slid(run)
+
+
+def mean(run: Any, name: str) -> float:
+    """Mean of a channel over the judged part."""
+    return float(run.channel(name)[run.judged].mean())
+
+
+def pair(run: Any, name: str, labels: tuple[str, str] = PULLEYS) -> np.ndarray:
+    """Means of a channel of both pulleys, or strands."""
+    return np.array([mean(run, f"{name} {label}") for label in labels])
+
+
+def evaluate(run: Any, strongest_probe: np.ndarray, bins: np.ndarray) -> dict[str, Any]:
+    """Values of a finished run that all models of a variator have.
+
+    Parameters
+    ----------
+    run : object
+        With all samples recorded.
+    strongest_probe : (2,) int array
+        Column of the displacement that vibrates most, for each strand.
+    bins : array
+        Frequencies of the spectrum [Hz].
+    """
+    p, judged = run.parameters, run.judged
+    axial, driven_speed = pair(run, "axial_force"), run.channel("driven_speed")[judged]
+    moved = run.displacement[judged][:, strongest_probe]
+    return {
+        "spectrum": amplitude_spectrum(moved, p["sampling_rate"], bins).T,
+        "mean_ring_tension": pair(run, "ring_tension", STRANDS),
+        "mean_push_force": pair(run, "push_force", STRANDS),
+        "axial_force": axial,
+        "slip": pair(run, "slip"),
+        "flank_loss": np.array([mean(run, f"{pulley}_flank_loss") for pulley in PULLEYS]),
+        "thrust_ratio": axial[0] / axial[1],
+        "speed_loss": 1.0 - p["ratio"] * driven_speed.mean() / run.mean_driving_speed(judged),
+        "driven_speed_ripple": driven_speed.std(),
+    }
+
+
+def power_balance(
+    driving: float, load: float, thrust: float, loss: float, storing: float
+) -> dict[str, float]:
+    """Powers of a run as its record names them [W], and what their balance leaves open."""
+    return {
+        "driving_power": driving,
+        "load_power": load,
+        "thrust_power": thrust,
+        "storing_power": storing,
+        "loss": loss,
+        "power_residual": (driving - load - thrust - loss - storing) / max(abs(driving), loss),
+    }
