@@ -18,6 +18,7 @@ from cvt_hpc.models.pushbelt.assembly import (
 )
 from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict
 from cvt_hpc.models.pushbelt.cyclic import solve
+from cvt_hpc.models.pushbelt.nose import add_nose_blocks, nose_forces, predict_noses
 from cvt_hpc.models.pushbelt.parameters import falling_limit, path_length
 from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start, workspace
 from cvt_hpc.models.pushbelt.step import _correct, _shapes, _solve_border, advance
@@ -39,6 +40,9 @@ ASSUMED = {
     "half_wedge_angle": np.radians(11.0),  # [rad]
     "flank_stiffness": 5e7,  # [N/m]
     "contact_stiffness": 1e9,  # [N/m]
+    "nose_height": 6e-3,  # [m]
+    "nose_clearance": np.inf,  # [m]
+    "nose_stiffness": 1e8,  # [N/m]
     "angle_stiffness": 5.0,  # [N m/rad]
     "angle_damping": 5e-5,  # [N m s]
     "transverse_damping": 500.0,  # [N s/m^2]
@@ -89,7 +93,8 @@ def shaken(seed, **changes):
         ((6e8, 3e8, 3e8), (9e8, 2e8, 1e8)),
         {"friction_speed": 0.05, "ring_friction_speed": 0.02},
     )
-    belt, state = start(given(nodes=64, modal_stiffness=stiffness, **smooth, **changes))
+    noses = {"nose_clearance": 2e-5}
+    belt, state = start(given(nodes=64, modal_stiffness=stiffness, **smooth, **noses, **changes))
     rng = np.random.default_rng(seed)
     f = fields(state.elements)
     f[:, [b.Y, b.Z]] += rng.normal(0.0, 2e-5, (64, 2))
@@ -111,6 +116,7 @@ def shaken(seed, **changes):
 def prepared(belt, state, work, dt):
     predict(belt, state.elements, state.pulleys, work.step, dt)
     link(belt, state.elements, work.step, dt)
+    predict_noses(belt, state.elements, work.step)
     linear_blocks(belt, work.step, dt)
     _shapes(belt, work.step, work.shapes)
 
@@ -119,6 +125,7 @@ def evaluated(belt, state, work, dt):
     """Residuals of elements and border, of an iterate evaluated twice, so that duals are those of its slips."""
     for _ in range(2):
         pair_forces(belt, state.elements, work.step, work.iterate, dt)
+        nose_forces(belt, state.elements, work.step, work.iterate, dt)
         element_forces(
             belt,
             state.elements,
@@ -182,14 +189,15 @@ def test_rates_of_gaps_strains_angles_and_depths():
         b.PREDICTED_TENSION: iterate[:, b.ITERATE_TENSION],
         b.EDGE_GAP: -elements[:, b.EDGE] / belt.contact_stiffness,
         b.HEAD_GAP: -elements[:, b.HEAD] / belt.contact_stiffness,
+        b.NOSE_OFFSET: elements[:, b.NOSE] / belt.nose_stiffness,
         b.PREDICTED_MOMENT_I: iterate[:, b.MOMENT_I],
         b.PREDICTED_MOMENT_J: iterate[:, b.MOMENT_J],
         b.PREDICTED_DEPTH: elements[:, b.FLANK] / belt.flank_stiffness,
     }
-    one_sided = {b.EDGE_GAP: b.EDGE, b.HEAD_GAP: b.HEAD, b.PREDICTED_DEPTH: b.FLANK}
+    one_sided = {b.EDGE_GAP: b.EDGE, b.HEAD_GAP: b.HEAD, b.NOSE_OFFSET: b.NOSE, b.PREDICTED_DEPTH: b.FLANK}
     for field, rate in pairs.items():
         # 1e-7: central differences of steps of 0.1 um; angles enter by their sine, whose slope at q_k is taken
-        pressed = forces[0.0][1][:, one_sided[field]] > 0.0 if field in one_sided else np.full(64, True)
+        pressed = forces[0.0][1][:, one_sided[field]] != 0.0 if field in one_sided else np.full(64, True)
         assert pressed.sum() > 30
         assert rate[pressed] == pytest.approx(difference[pressed, field], abs=1e-7 * np.abs(rate).max())
 
@@ -218,7 +226,7 @@ def test_newton_correction_is_that_of_differences(law):
     evaluated(belt, state, work, STEP)
     f, border = fields(state.elements), state.increments.size
     base = evaluated(belt, state, work, STEP)
-    assert (f[:, [b.EDGE, b.HEAD, b.FLANK]] > 0.0).any(0).all()
+    assert (f[:, [b.EDGE, b.HEAD, b.FLANK, b.NOSE]] > 0.0).any(0).all() and (f[:, b.NOSE] < 0.0).any()
 
     small = 1e-7  # [m/s]; of openings and angular velocities in their own units
     slopes = np.zeros((base.size, base.size))
@@ -241,6 +249,7 @@ def test_newton_correction_is_that_of_differences(law):
     state.increments[:] = 0.0
     evaluated(belt, state, work, STEP)
     assemble(belt, state.elements, work.shapes, work.step, work.iterate, work.blocks)
+    add_nose_blocks(state.elements, work.step, work.iterate, work.blocks)
     solve(work.blocks, work.scratch, work.reduced)
     border_system(
         belt,

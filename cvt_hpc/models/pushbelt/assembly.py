@@ -47,6 +47,9 @@ from cvt_hpc.models.pushbelt.belt import (
     MOMENT_J,
     NORMAL_Y,
     NORMAL_Z,
+    NOSE,
+    NOSE_LEVER_I,
+    NOSE_LEVER_J,
     OMEGA,
     OPENING_N,
     OPENING_R,
@@ -250,6 +253,9 @@ def residuals(belt, state, pulleys, increments, openings, shapes, load, step, it
         contact = iterate[j, CONTACT]
         f_y, f_z = f_y - contact * ahead(state, j, HEADING_Y), f_z - contact * ahead(state, j, HEADING_Z)
         f_w += iterate[j, CONTACT_I]
+        nose = state[j, NOSE]
+        f_y, f_z = f_y - nose * ahead(state, j, HEADING_Z), f_z + nose * ahead(state, j, HEADING_Y)
+        f_w -= nose * step[j, NOSE_LEVER_I]
 
         tension = behind(iterate, j, ITERATE_TENSION)
         f_y -= tension * behind(step, j, TENSION_J_Y)
@@ -262,6 +268,9 @@ def residuals(belt, state, pulleys, increments, openings, shapes, load, step, it
         contact = behind(iterate, j, CONTACT)
         f_y, f_z = f_y + contact * state[j, HEADING_Y], f_z + contact * state[j, HEADING_Z]
         f_w += behind(iterate, j, CONTACT_J)
+        nose = behind(state, j, NOSE)
+        f_y, f_z = f_y + nose * state[j, HEADING_Z], f_z - nose * state[j, HEADING_Y]
+        f_w -= nose * behind(step, j, NOSE_LEVER_J)
 
         radial, tangential = iterate[j, FORCE_R], iterate[j, FORCE_T]
         r_y, r_z = step[j, R_Y], step[j, R_Z]

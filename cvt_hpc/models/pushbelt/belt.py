@@ -27,6 +27,7 @@ from cvt_hpc.lanes import LaneArray
     SADDLE,  # normal force of the ring on the element [N]
     EDGE,  # contact forces to the next element, at rocking edge and head [N]
     HEAD,
+    NOSE,  # force of the next element's hole on the nose, inwards [N]
     FLANK,  # normal force at each of the two flanks [N]
     FLANK_SLIP_M,  # sliding speed along the meridian of the sheave, outwards [m/s]
     FLANK_SLIP_T,  # sliding speed in the direction of rotation, element over sheave [m/s]
@@ -40,7 +41,7 @@ from cvt_hpc.lanes import LaneArray
     V_FILTERED,  # sliding speed at which the friction law of the flanks is read [m/s]
     DRIVEN,  # 1 where the nearer pulley is the driven one, else 0
     CHANGE,  # 4: of the speeds in the last step, from which the next one starts
-) = range(26)
+) = range(27)
 STATE_FIELDS = CHANGE + 4
 
 # Entries of the state of the pulleys
@@ -69,7 +70,7 @@ COUNTERS = 7
 # values of STATUS
 CONVERGED, NOT_CONVERGED, NOT_FINITE = range(3)
 # values of FAILED_CONTACT
-CONTACTS = ("edge", "head", "flank", "ring")
+CONTACTS = ("edge", "head", "flank", "ring", "nose")
 
 
 class Belt(NamedTuple):
@@ -94,6 +95,8 @@ class Belt(NamedTuple):
         Normal force at each flank by its penetration [N/m].
     contact_stiffness : float
         Of each of the two contacts between elements [N/m].
+    nose_height, nose_clearance, nose_stiffness : float
+        Of nose and hole above the saddle [m], play to either side [m], infinite without noses, and [N/m].
     angle_stiffness, angle_damping : float
         Of an element's rotation against each segment of the ring, half at each end [N m/rad], [N m s/rad].
     transverse_damping : float
@@ -128,6 +131,9 @@ class Belt(NamedTuple):
     ring_stiffness: float
     flank_stiffness: float
     contact_stiffness: float
+    nose_height: float
+    nose_clearance: float
+    nose_stiffness: float
     angle_stiffness: float
     angle_damping: float
     transverse_damping: float
@@ -270,8 +276,11 @@ class Workspace(NamedTuple):
     MID_T_LEVER,
     MID_RADIUS,
     PREDICTED_DEPTH,  # penetration of the flank without opening of the sheaves
+    NOSE_OFFSET,
+    NOSE_LEVER_I,
+    NOSE_LEVER_J,
     DIAGONAL,  # 4 x 4 blocks of the linear laws, by columns: of an element, and of it with the next one
-) = range(38)
+) = range(41)
 LINK = DIAGONAL + 16
 STEP_FIELDS = LINK + 16
 
@@ -297,8 +306,9 @@ STEP_FIELDS = LINK + 16
     OPENING_T,
     OPENING_N,  # decrease of the normal force by it
     RING_SLOPE,  # decrease of the ring's friction by its slip
-) = range(20)
-RESIDUAL = 20  # 4 fields: of an element's equations
+    NOSE_SLOPE,
+) = range(21)
+RESIDUAL = 21  # 4 fields: of an element's equations
 SLOPE_R = RESIDUAL + 4  # 3 fields: decrease of FORCE_R by U_Y, U_Z, OMEGA
 SLOPE_T = SLOPE_R + 3  # 3 fields
 ITERATE_FIELDS = SLOPE_T + 3

@@ -109,6 +109,21 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "height above the rings of the second contact between neighbours",
             sensible=(1e-05, 0.05),
         ),
+        "nose_clearance": replace(
+            not_negative(
+                np.inf,
+                "m",
+                "play of an element's nose in the next one's hole, up and down; inf: no noses",
+                sensible=(1e-6, np.inf),
+            ),
+            allow_infinite=True,
+        ),
+        "nose_height": Parameter(
+            6e-3, "m", "height of nose and hole above the rings", minimum=-0.05, sensible=(-0.05, 0.05)
+        ),
+        "nose_stiffness": positive(
+            1e8, "N/m", "force of a nose by what the offset exceeds its play", sensible=(1e4, 1e11)
+        ),
         "ring_mass": positive(0.2495, "kg/m", "mass per length of the rings", sensible=(0.01, 10.0)),
         "ring_stiffness": positive(
             6e6, "N", "longitudinal stiffness EA of all rings", sensible=(10000.0, 10000000000.0)
@@ -304,6 +319,10 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         (p["ring_friction"] == 0.0, "ring_friction_speed", "ring_friction 0"),
         (p["friction_gradient"] == 0.0, "friction_memory", "friction_gradient 0"),
         *((np.isinf(p["sheave_stiffness"]), key, "sheave_stiffness inf") for key in MODES),
+        *(
+            (np.isinf(p["nose_clearance"]), f"nose_{key}", "nose_clearance inf")
+            for key in ("height", "stiffness")
+        ),
         (p["elements"] >= FEWEST_ELEMENTS, "coarse", f"elements {FEWEST_ELEMENTS} or more"),
         (True, "arc_probes", "model pushbelt, which is probed on its strands"),
     )

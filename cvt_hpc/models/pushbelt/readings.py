@@ -48,6 +48,7 @@ PROFILES = {
     "saddle_force": ("force of the rings on the saddles", "N m-1", "mean line force"),
     "ring_slip": ("sliding of the rings", "m s-1", "mean, forwards over the elements"),
     "flank_slip": ("sliding of the flanks", "m s-1", "mean, forwards over the sheave"),
+    "nose_force": ("force of noses", "N", "mean size, of the next element's hole on a nose"),
     "gap": ("gap", "m", "mean, between neighbours at the rocking edge"),
     "tilt": ("tilt of elements", "rad", "mean, against the rings"),
     "mean_displacement": ("mean displacement", "m", "off the reference path, outward"),
@@ -171,6 +172,7 @@ class Reading:
             e[:, f.SADDLE] / where.pitch,
             e[:, f.RING_SLIP],
             e[:, f.FLANK_SLIP_T],
+            np.abs(e[:, f.NOSE]),
             _edge_gap(e, ahead, where.belt),
             -rising,
             self._offset,
@@ -195,6 +197,7 @@ class Reading:
         kinetic += belt.driven_inertia * state.pulleys[f.DRIVEN_SPEED] ** 2
         elastic = (e[:, f.TENSION] ** 2 * e[:, f.LENGTH]).sum() / belt.ring_stiffness
         elastic += (e[:, f.EDGE] ** 2 + e[:, f.HEAD] ** 2).sum() / belt.contact_stiffness
+        elastic += (e[:, f.NOSE] ** 2).sum() / belt.nose_stiffness
         elastic += 2.0 * (e[:, f.FLANK] ** 2).sum() / belt.flank_stiffness
         elastic += 2.0 * (belt.modal_stiffness * state.openings**2).sum()
         for end in (e, ahead):  # half of the angle's stiffness at each end of a segment

@@ -7,6 +7,8 @@ for what is slow.
 
 from __future__ import annotations
 
+import numpy as np
+
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import absolute, ahead, around, behind, like, maximum, select, sqrt
 from cvt_hpc.models.pushbelt.assembly import (
@@ -54,6 +56,7 @@ from cvt_hpc.models.pushbelt.belt import (
     MID_RADIUS,
     NORMAL_Y,
     NORMAL_Z,
+    NOSE,
     NOT_CONVERGED,
     NOT_FINITE,
     OMEGA,
@@ -89,6 +92,7 @@ from cvt_hpc.models.pushbelt.belt import (
 from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
 from cvt_hpc.models.pushbelt.cyclic import solve
 from cvt_hpc.models.pushbelt.laws import remembered
+from cvt_hpc.models.pushbelt.nose import add_nose_blocks, nose_forces, predict_noses
 
 _LARGE = 1e100  # more than any speed or power that means something
 
@@ -154,6 +158,8 @@ def _correct(elements, blocks, border, increments, scratch, share, omega_length)
 def _evaluate(belt, state, work, dt):
     """Forces of the iterate."""
     pair_forces(belt, state.elements, work.step, work.iterate, dt)
+    if belt.nose_clearance < np.inf:
+        nose_forces(belt, state.elements, work.step, work.iterate, dt)
     element_forces(
         belt,
         state.elements,
@@ -192,6 +198,8 @@ def _newton(belt, newton, state, work, load, dt):
         if enough or iteration == newton.most_iterations or not abs(power) < _LARGE:
             return iteration, change, power
         assemble(belt, elements, work.shapes, step, iterate, work.blocks)
+        if belt.nose_clearance < np.inf:
+            add_nose_blocks(elements, step, iterate, work.blocks)
         solve(work.blocks, work.scratch, work.reduced)
         border_system(belt, elements, work.shapes, step, iterate, work.blocks, work.scratch, work.border, dt)
         _solve_border(work.border)
@@ -299,7 +307,7 @@ def _contact_at_fault(belt, state, work, dt):
                 if not size <= worst:
                     worst, row, part = size, j, p
     forces = state.elements.data
-    edge, head = forces[row, EDGE, part], forces[row, HEAD, part]
+    edge, head, nose = forces[row, EDGE, part], forces[row, HEAD, part], forces[row, NOSE, part]
     flank, ring = forces[row, FLANK_FRICTION_T, part], forces[row, RING_FRICTION, part]
     _shift(state, work, -1.0)
     _evaluate(belt, state, work, dt)
@@ -310,7 +318,9 @@ def _contact_at_fault(belt, state, work, dt):
     if abs(forces[row, FLANK_FRICTION_T, part] - flank) > most:
         contact, most = 2, abs(forces[row, FLANK_FRICTION_T, part] - flank)
     if abs(forces[row, RING_FRICTION, part] - ring) > most:
-        contact = 3
+        contact, most = 3, abs(forces[row, RING_FRICTION, part] - ring)
+    if abs(forces[row, NOSE, part] - nose) > most:
+        contact = 4
     _evaluate(belt, state, work, dt)  # the state is to have the forces of the last iterate
     return part * rows + row, contact
 
@@ -351,6 +361,8 @@ def advance(belt, newton, state, work, inputs, steps, dt):
         state.pulleys[DRIVING_SPEED] = work.inputs[IN_SPEED]
         predict(belt, state.elements, state.pulleys, work.step, dt)
         link(belt, state.elements, work.step, dt)
+        if belt.nose_clearance < np.inf:
+            predict_noses(belt, state.elements, work.step)
         linear_blocks(belt, work.step, dt)
         _shapes(belt, work.step, work.shapes)
         iterations, change, power = _newton(belt, newton, state, work, work.inputs[IN_LOAD], dt)

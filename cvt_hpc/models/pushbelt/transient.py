@@ -303,6 +303,7 @@ def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
         "half_wedge_angle": p["half_wedge_angle"],
         "flank_stiffness": p["flank_stiffness"] * pitch,
         "contact_stiffness": p["edge_stiffness"] / pitch,
+        **{key: p[key] for key in ("nose_height", "nose_clearance", "nose_stiffness")},
         "angle_stiffness": p["tilt_spring"] * pitch,
         "angle_damping": p["tilt_damper"] * pitch,
         "transverse_damping": p["transverse_damping"],
