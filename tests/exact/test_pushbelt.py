@@ -351,7 +351,7 @@ def test_a_strand_decays_by_the_transverse_damping():
         rates.append(-np.log(np.linalg.lstsq(known, x[2:], rcond=None)[0][1]) / (20 * STEP))
         lost.append(state.totals[b.BELT_LOSS] - before)
     expected = 500.0 * pitch / (2.0 * mass)
-    assert abs(rates[0]) < 0.02 * expected  # by friction of the elements at the arcs' ends
+    assert abs(rates[0]) < 0.04 * expected  # by friction and tilt
     # 0.5 %: the step adds rate x step, 0.2 %
     assert rates[1] - rates[0] == pytest.approx(expected, rel=5e-3)
     # 3 %: that friction's share, and motion along the belt
@@ -361,7 +361,7 @@ def test_a_strand_decays_by_the_transverse_damping():
 def on_a_pulley(values, speed, pressed):
     """Elements at rest around the driving pulley, which turns under them; with masses for which they stay."""
     belt, state = start(values)
-    nodes = values["nodes"]
+    nodes = values["elements"]
     belt = belt._replace(centre_distance=10.0, thickness=1e-3, ring_stiffness=1e-9, transverse_damping=0.0)
     radius, angle = 0.1, 2.0 * np.pi * np.arange(nodes) / nodes
     f = np.zeros((nodes, b.STATE_FIELDS))
@@ -416,7 +416,7 @@ def test_the_longest_step_of_falling_friction(memory):
     wrap = np.pi - 2.0 * np.arcsin((p["driven_radius"] - driving) / p["centre_distance"])
     pitch = path_length(p) / NODES
     force = p["thrust"] / (driving * wrap * np.cos(p["half_wedge_angle"])) * pitch
-    belt, state, work = on_a_pulley(values | {"nodes": NODES, "friction_speed": 1e-7}, 1e-4, force)
+    belt, state, work = on_a_pulley(values | {"friction_speed": 1e-7}, 1e-4, force)
     belt = belt._replace(ring_mass=0.0, ring_friction=0.0)
     for share, falls in ((0.98, True), (1.02, False)):
         left = []
@@ -607,7 +607,7 @@ def test_heads_touch_in_a_belt_bent_inside_out():
     """A spinning ring with its heads inside: they carry what the ring's tension exceeds m' v^2 by."""
     radius, omega, push = 0.1082, 250.0, 500.0
     belt, state = start(given())
-    belt = belt._replace(centre_distance=10.0)
+    belt = belt._replace(centre_distance=10.0, transverse_damping=0.0)
     state.pulleys[[b.DRIVING_RADIUS, b.DRIVEN_RADIUS]] = 0.01
     angle = -2.0 * np.pi * np.arange(NODES) / NODES
     o, x = np.stack([np.cos(angle), np.sin(angle)], 1), np.stack([np.sin(angle), -np.cos(angle)], 1)

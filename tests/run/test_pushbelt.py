@@ -16,6 +16,7 @@ from cvt_hpc.variables import Status, Vibrates
 
 # A belt of few elements between rigid sheaves, clamped and loaded within a quarter of a revolution
 BELT = {"elements": 104, "band_high": 1000.0, "sheave_stiffness": np.inf, "rise_time": 0.01, "duration": 0.04}
+BELT["transverse_damping"] = 0.0  # with which the driven pulley takes longer to settle
 TORQUES = (0.0, 60.0, 200.0)
 
 
@@ -58,10 +59,11 @@ def test_forces_of_both_strands_give_the_torque(records):
 
 
 def test_power_balance_closes_with_falling_friction_and_damping():
-    found = record(load=60.0, friction_gradient=-0.4, transverse_damping=1e6)
+    found = record(load=60.0, friction_gradient=-0.4, transverse_damping=2e5)
     assert found["status"] == Status.DONE and found["unsolved_share"] == 0.0
-    assert found["belt_loss"] > 0.004 * found["driving_power"]
-    assert abs(found["power_residual"]) < 5e-3  # of so few elements, as without damping
+    # twice the loss, by which a wrong sign would show, is three times what so few elements may leave open
+    assert found["belt_loss"] > 1.5e-3 * found["driving_power"]
+    assert abs(found["power_residual"]) < 1e-3
 
 
 def test_more_torque_than_friction_carries_slips_through(records):
