@@ -322,7 +322,7 @@ def test_free_spinning_ring():
 def test_a_strand_decays_by_the_transverse_damping():
     # damping in proportion to mass: each mode decays by exp(-d_b t / (2 m')), its energy goes into BELT_LOSS
     speed, pitch = 0.1, 0.6612 / NODES  # [m/s], [m]
-    belt, state = start(given(ratio=1.0, ring_strain=5e-4))
+    belt, state = start(given(ratio=1.0, ring_strain=5e-4, angle_stiffness=5.0, angle_damping=5e-5))
     belt = belt._replace(thickness=belt.thickness - 1e-3, driven_rate=0.0)  # elements apart
     work, mass = workspace(belt, NODES), belt.mass + belt.ring_mass
     state.pulleys[:2] = 0.0
@@ -351,7 +351,7 @@ def test_a_strand_decays_by_the_transverse_damping():
         rates.append(-np.log(np.linalg.lstsq(known, x[2:], rcond=None)[0][1]) / (20 * STEP))
         lost.append(state.totals[b.BELT_LOSS] - before)
     expected = 500.0 * pitch / (2.0 * mass)
-    assert abs(rates[0]) < 0.04 * expected  # by friction and tilt
+    assert abs(rates[0]) < 0.02 * expected  # by friction of the elements at the arcs' ends
     # 0.5 %: the step adds rate x step, 0.2 %
     assert rates[1] - rates[0] == pytest.approx(expected, rel=5e-3)
     # 3 %: that friction's share, and motion along the belt
@@ -416,7 +416,7 @@ def test_the_longest_step_of_falling_friction(memory):
     wrap = np.pi - 2.0 * np.arcsin((p["driven_radius"] - driving) / p["centre_distance"])
     pitch = path_length(p) / NODES
     force = p["thrust"] / (driving * wrap * np.cos(p["half_wedge_angle"])) * pitch
-    belt, state, work = on_a_pulley(values | {"friction_speed": 1e-7}, 1e-4, force)
+    belt, state, work = on_a_pulley(values | {"nodes": NODES, "friction_speed": 1e-7}, 1e-4, force)
     belt = belt._replace(ring_mass=0.0, ring_friction=0.0)
     for share, falls in ((0.98, True), (1.02, False)):
         left = []

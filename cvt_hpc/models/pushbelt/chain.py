@@ -4,8 +4,9 @@ Index i is an element and j the next one. x is the running direction of an eleme
 outward normal; both turn as x' = -o, o' = x. Directions are those at q_k. Magnitudes are those at
 q* = q_k + dt X_k, from where on they are linear in the change of the speeds X.
 
-Slip speeds at the flanks take the radial direction and the lever of the contact point at mid step. At either
-end of a step the direction would add v phi' dt / 2 of false radial sliding, and the lever d omega^2 dt / 2.
+Slip speeds at the flanks take the radial direction and the lever of the contact point at mid step, and speeds
+across the path that direction. At either end of a step the direction would add v phi' dt / 2 of false radial
+motion, and the lever d omega^2 dt / 2.
 """
 
 from __future__ import annotations
@@ -144,14 +145,14 @@ def predict(belt, state, pulleys, step, dt):
         side = select(z < 0.0, like(-1.0, y), 1.0)
         reach = cosine * y + side * sine * z
         strand = (reach > 0.0) & (reach < cosine * belt.centre_distance)
-        step[j, NORMAL_Y] = select(strand, like(-sine, y), r_y)
-        step[j, NORMAL_Z] = select(strand, side * cosine, r_z)
         middle = (y + 0.5 * dt * u_y, z + 0.5 * dt * u_z)
         r_y, r_z, radius, r_lever, t_lever = radial(
             middle, turned(x[0], x[1], 0.5 * dt * omega), centre, belt.pitch_depth
         )
         step[j, MID_R_Y], step[j, MID_R_Z], step[j, MID_RADIUS] = r_y, r_z, radius
         step[j, MID_R_LEVER], step[j, MID_T_LEVER] = r_lever, t_lever
+        step[j, NORMAL_Y] = select(strand, like(-sine, y), r_y)
+        step[j, NORMAL_Z] = select(strand, side * cosine, r_z)
 
 
 @kernel
