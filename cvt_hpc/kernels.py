@@ -144,7 +144,14 @@ def _call_type(function: types.Function, typing: Any, arguments: Any, named: Any
     return found
 
 
-_signatures: dict[tuple, Any] = {}
+class _Memo(dict):
+    """What a process remembers; a pickle of the code around it, which may name any type, leaves it out."""
+
+    def __reduce__(self) -> tuple:
+        return _Memo, ()
+
+
+_signatures: dict[tuple, Any] = _Memo()
 
 
 @contextmanager
