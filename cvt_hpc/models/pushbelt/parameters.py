@@ -118,9 +118,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             ),
             allow_infinite=True,
         ),
-        "nose_height": Parameter(
-            6e-3, "m", "height of nose and hole above the rings", minimum=-0.05, sensible=(-0.05, 0.05)
-        ),
+        "nose_height": positive(6e-3, "m", "height of nose and hole above the rings", sensible=(1e-5, 0.05)),
         "nose_stiffness": positive(
             1e8, "N/m", "force of a nose by what the offset exceeds its play", sensible=(1e4, 1e11)
         ),
