@@ -189,6 +189,11 @@ def test_profiles_and_histories_agree_with_the_record(records):
     push, region = dataset["push_force"].values, dataset["region"].values
     for strand, mean in zip(("t1", "t2"), records[60.0]["mean_push_force"], strict=True):
         assert np.nanmean(push[region == strand]) == pytest.approx(mean, abs=30.0)
+    for pulley, idle in zip(("driving", "driven"), records[60.0]["idle_arc"], strict=True):
+        assert np.mean(push[region == pulley] < 0.02 * push.max()) == pytest.approx(idle, abs=1e-12)
+    assert (
+        0.9 > records[60.0]["idle_arc"][0] > records[60.0]["idle_arc"][1]
+    )  # it presses all along the driven one
     gap, force = dataset["gap"].values, dataset["push_force"].values
     assert (gap[force > 700.0] < 1e-6).all() and np.nanmax(gap) > 1e-6
     assert np.nanmin(dataset["contact_force"].values) >= 0.0

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from cvt_hpc.models.pushbelt.transient import Transient
 
+IDLE = 0.02  # of the largest push force: what is below does not press
 # Measured on one core of an EPYC (Zen 5): core-seconds per element and step, and per sample
 RIGID_COST, ELASTIC_COST, SAMPLE_COST = 5.2e-7, 9.3e-7, 2e-4
 
@@ -61,6 +62,14 @@ VARIABLES = (
     *shared("loss", "power_residual"),
     Variable("efficiency", (), "f8", "1", "what is left of driving_power for load, thrust and storing"),
     Variable("largest_push_force", (), "f8", "N", "largest along the path, of means over the judged part"),
+    Variable(
+        "idle_arc",
+        ("pulley",),
+        "f8",
+        "1",
+        "where mean push force is below 2 % of the largest along the path",
+        words="share of the arc without push force",
+    ),
     Variable("passing_frequency", (), "f8", "Hz", "mean, of elements that pass a point of the path"),
     Variable("unsolved_share", (), "f8", "1", "share of steps that were not solved to the tolerance"),
     Variable("iterations", (), "f8", "1", "of Newton's method in a step, mean"),
@@ -126,6 +135,9 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     belt, tilt = run.mean_rate(fields.BELT_LOSS), run.mean_rate(fields.DAMPING_LOSS)
     loss = run.mean_rate(fields.FLANK_LOSS) + ring + belt + tilt
     thrust, storing = run.mean_rate(fields.THRUST_WORK), run.mean_rate(fields.TOTALS)
+    push, where = run.profiles["push_force"], regions(run.path, run.places)
+    largest = np.nanmax(push)
+    idle = ~(push >= IDLE * largest)  # as well where no element has been
     work = run.counters()
     return {
         **judging.evaluate(run, strongest_probe, coordinates(p)["frequency_bin"].values),
@@ -136,7 +148,8 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
         "belt_loss": belt,
         "tilt_loss": tilt,
         "efficiency": (load + thrust + storing) / driving if driving > 0.0 else np.nan,
-        "largest_push_force": np.nanmax(run.profiles["push_force"]),
+        "largest_push_force": largest,
+        "idle_arc": np.array([idle[where == REGIONS.index(pulley)].mean() for pulley in PULLEYS]),
         "passing_frequency": mean(run, "passing_frequency"),
         "unsolved_share": work["unsolved"] / max(work["steps"], 1),
         "iterations": work["iterations"] / max(work["steps"], 1),
