@@ -44,7 +44,7 @@ VARIABLE = Variable(
     (),
     "f8",
     "1",
-    "load over the largest torque that friction carries under these axial forces, less 1; slips from about 0",
+    "load over what friction carries at nominal radii under these axial forces, less 1; slips from about 0",
 )
 
 

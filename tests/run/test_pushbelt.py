@@ -131,7 +131,9 @@ def test_a_step_that_is_not_solved_fails_with_time_element_and_contact():
 
 
 @pytest.mark.parametrize(
-    "ramp", [{"load_history": "ramp"}, {"speed_history": "ramp", "speed_start": 250.0}], ids=str
+    "ramp",
+    [{"load_history": "ramp"}, {"speed_history": "ramp", "speed_start": 250.0, "band_high": 800.0}],
+    ids=str,
 )
 def test_load_and_speed_rise_along_a_ramp(ramp):
     run = Transient(job(load=40.0, duration=0.1, **ramp).point(0), "newton")
@@ -202,6 +204,7 @@ def test_profiles_and_histories_agree_with_the_record(records):
 @pytest.mark.parametrize(
     ("values", "key"),
     [
+        ({"speed_history": "ramp", "speed_start": 250.0}, "band_high"),
         ({"elements": 32, "coarse": True, "ratio": 2.5}, "elements"),
         ({"thickness": 0.02}, "thickness"),
         ({"band_high": 1500.0}, "band_high"),

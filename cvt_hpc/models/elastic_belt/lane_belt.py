@@ -280,7 +280,7 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type, sweeps: int 
     dtype : type
         np.float64 or np.float32.
     sweeps : int
-        Of the contact, as `LaneContact` has them.
+        Of the contact, as `Contact` has them.
     """
     n, lanes = belts[0].cell.size, len(belts)
     fields = LaneArray(n, states[0].fields.shape[0], lanes, dtype)

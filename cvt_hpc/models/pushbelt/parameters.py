@@ -25,6 +25,7 @@ from cvt_hpc.variator.scene import (
     course_inert,
     course_problems,
 )
+from cvt_hpc.vibration.ramped import ramped
 
 FEWEST_ELEMENTS = 100
 BELOW_PASSAGE = 0.9  # of half that frequency: belts run up to 4 % slower than by the nominal radius
@@ -234,7 +235,7 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         expected = f"{FEWEST_ELEMENTS} or more, or coarse = true"
         problems.append(("elements", expected, f"{p['elements']}"))
     # the polygon of the elements shakes strands as they pass, and by the change of stiffness at half of that
-    half = 0.5 * p["driving_speed"] * p["driven_radius"] / p["ratio"] / pitch
+    half = 0.5 * _driving_speeds(p)[0] * p["driven_radius"] / p["ratio"] / pitch
     if BELOW_PASSAGE * half < p["band_high"]:
         most = f"{BELOW_PASSAGE * half:.4g} Hz, below half of the frequency at which elements pass"
         problems.append(("band_high", f"at most {most}, or more elements", f"{p['band_high']:g} Hz"))
@@ -261,6 +262,12 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         expected = f"at most {fastest:.3g} m/(N s) at this step, beyond which the sheave does not settle"
         problems.append(("sheave_rate", expected, f"{p['sheave_rate']:g} m/(N s)"))
     return problems + friction_problems(p)
+
+
+def _driving_speeds(p: Mapping[str, Any]) -> tuple[float, float]:
+    """Lowest and highest speed of the driving pulley once it is loaded [rad/s]."""
+    speeds = (p["driving_speed"], p["speed_start"] if ramped(p) == "speed" else p["driving_speed"])
+    return min(speeds), max(speeds)
 
 
 def falling_limit(parameters: Mapping[str, Any]) -> float:
@@ -293,7 +300,7 @@ def string_limit(parameters: Mapping[str, Any]) -> float:
     driving = p["driven_radius"] / p["ratio"]
     wrap = np.pi + 2.0 * np.arcsin((p["driven_radius"] - driving) / p["centre_distance"])
     mass = p["element_mass"] + p["ring_mass"]
-    centrifugal = mass * (p["driving_speed"] * driving) ** 2
+    centrifugal = mass * (_driving_speeds(p)[1] * driving) ** 2
     held = 2.0 * max(p["thrust"], p["driving_thrust"]) * np.tan(p["half_wedge_angle"]) / wrap + centrifugal
     tension = 1.5 * (held + 0.5 * max(abs(p["load"]), abs(p["load_start"])) / driving)
     return float(path_length(p) / p["elements"] * np.sqrt(mass / tension))

@@ -137,7 +137,7 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     thrust, storing = run.mean_rate(fields.THRUST_WORK), run.mean_rate(fields.TOTALS)
     push, where = run.profiles["push_force"], regions(run.path, run.places)
     largest = np.nanmax(push)
-    idle = ~(push >= IDLE * largest)  # as well where no element has been
+    idle = ~(push > IDLE * largest)  # as well where no element has been
     work = run.counters()
     return {
         **judging.evaluate(run, strongest_probe, coordinates(p)["frequency_bin"].values),

@@ -295,7 +295,7 @@ def _shift(state, work, share):
 
 
 @kernel
-def _contact_at_fault(belt, state, work, dt):
+def _contact_at_fault(belt, newton, state, work, dt):
     """Element with the largest last correction, and the contact whose force it changed most."""
     solution = work.blocks.data
     rows, parts = solution.shape[0], solution.shape[2]
@@ -303,7 +303,7 @@ def _contact_at_fault(belt, state, work, dt):
     for j in range(rows):
         for p in range(parts):
             for r in range(4):
-                size = abs(solution[j, RIGHT + r, p])
+                size = abs(solution[j, RIGHT + r, p]) * (newton.omega_length if r == 2 else 1.0)
                 if not size <= worst:
                     worst, row, part = size, j, p
     forces = state.elements.data
@@ -373,7 +373,7 @@ def advance(belt, newton, state, work, inputs, steps, dt):
         counters[IN_A_ROW] = counters[IN_A_ROW] + 1 if failed else 0
         if failed:
             counters[FAILED_STEPS] += 1
-            element, contact = _contact_at_fault(belt, state, work, dt)
+            element, contact = _contact_at_fault(belt, newton, state, work, dt)
             counters[FAILED_ELEMENT], counters[FAILED_CONTACT] = element, contact
         if not finite or counters[IN_A_ROW] == newton.most_failures:
             counters[STATUS] = NOT_CONVERGED if finite else NOT_FINITE
