@@ -161,6 +161,111 @@ def material_point(l0: float, q: np.ndarray, s: float) -> tuple[float, float, fl
     return q[node] + along * c - w * sn, q[node + 1] + along * sn + w * c, q[node + 2] + side * slope / l0
 
 
+class LinePoint(NamedTuple):
+    """A material point of the line, and the line's direction there.
+
+    Attributes
+    ----------
+    x, y : float
+        Position [m].
+    cos, sin : float
+        Of the line's angle.
+    stretch : float
+        Length of the line by length without load, |dr/ds|.
+    bend : float
+        Change of the angle by length without load [1/m].
+    """
+
+    x: float
+    y: float
+    cos: float
+    sin: float
+    stretch: float
+    bend: float
+
+
+@kernel
+def line_point(
+    l0: float, q: np.ndarray, s: float, along: np.ndarray, across: np.ndarray, turn: np.ndarray
+) -> LinePoint:
+    """A material point, and what the rates of the coordinates make of its motion.
+
+    The angle here is that of the line, to which the tangent t and the normal n to its left belong; that of
+    the section (`material_point`) differs from it where the slope against the nodes' tangents is not small.
+
+    Parameters
+    ----------
+    l0 : float
+        Length of the element [m].
+    q : (8,) array
+        Coordinates [m, rad].
+    s : float
+        Where the point lies without load, -l0/2 to l0/2 from the centre [m].
+    along, across, turn : (8,) arrays
+        Places for the rows t.J and n.J, J the derivative of the position by the coordinates, and for the
+        derivative of the angle.
+    """
+    shape = kinematics(l0, q)
+    first = s < 0.0
+    side = 1.0 if first else -1.0
+    node = 0 if first else 5
+    x = 0.5 - abs(s) / l0
+    v = (q[3], q[4], shape.psi, shape.delta) if first else (q[4], q[3], shape.psi, -shape.delta)
+    w = slope = curve = 0.0
+    for j in range(4):
+        k0, k1, k2 = SHAPE[j]
+        w += v[j] * x * x * (k0 + x * (k1 + x * k2))
+        slope += v[j] * x * (2.0 * k0 + x * (3.0 * k1 + x * 4.0 * k2))
+        curve += v[j] * (2.0 * k0 + x * (6.0 * k1 + x * 12.0 * k2))
+    slope, curve = side * slope / l0, curve / (l0 * l0)
+    c, sn = math.cos(q[node + 2]), math.sin(q[node + 2])
+    ahead, e1 = side * l0 * x, shape.stretch
+    size = math.sqrt(e1 * e1 + slope * slope)
+    # in the frame of the node: t = (p, r), n = (-r, p)
+    p, r = e1 / size, slope / size
+
+    stretch, delta = _gradients(l0, shape)
+    for k in range(8):
+        by_w = by_slope = 0.0
+        for j in range(4):
+            k0, k1, k2 = SHAPE[j]
+            rate = 0.0
+            if j == 3:
+                rate = side * delta[k]
+            elif j == 2:
+                rate = l0 if k == 7 else (-l0 if k == 2 else 0.0)
+            elif k == (3 + j if first else 4 - j):
+                rate = 1.0
+            by_w += rate * x * x * (k0 + x * (k1 + x * k2))
+            by_slope += rate * x * (2.0 * k0 + x * (3.0 * k1 + x * 4.0 * k2))
+        on_t, on_n = ahead * stretch[k], by_w
+        angle = (p * side * by_slope / l0 - r * stretch[k]) / size
+        if k == node:
+            on_t, on_n = on_t + c, on_n - sn
+        elif k == node + 1:
+            on_t, on_n = on_t + sn, on_n + c
+        elif k == node + 2:
+            on_t, on_n, angle = on_t - w, on_n + ahead * e1, angle + 1.0
+        along[k], across[k], turn[k] = p * on_t + r * on_n, p * on_n - r * on_t, angle
+    forth = ahead * e1
+    return LinePoint(
+        q[node] + forth * c - w * sn,
+        q[node + 1] + forth * sn + w * c,
+        p * c - r * sn,
+        p * sn + r * c,
+        size,
+        e1 * curve / (size * size),
+    )
+
+
+@kernel
+def mean_strain(l0: float, q: np.ndarray) -> float:
+    """Mean axial strain e of an element of length `l0` [m] at coordinates `q`, an (8,) array [m, rad]."""
+    shape = kinematics(l0, q)
+    v = _first_half(q, shape.psi, shape.delta)
+    return shape.stretch - 1.0 + shape.stretch * _dot(v, _slopes(v)) / (2.0 * l0 * l0)
+
+
 @kernel
 def energies(beam: RcmBeam, q: np.ndarray, u: np.ndarray) -> tuple[float, float, float]:
     """Kinetic energy, elastic energy and potential of gravity of an element [J].
@@ -194,7 +299,7 @@ def energies(beam: RcmBeam, q: np.ndarray, u: np.ndarray) -> tuple[float, float,
         y = 0.5 * q[node + 1] + ahead * s + beside * c
         potential -= l0 * (beam.gravity[0] * x + beam.gravity[1] * y)
     v = _second_half(v)
-    strain = shape.stretch - 1.0 + shape.stretch * _dot(v, _slopes(v)) / (2.0 * l0 * l0)
+    strain = mean_strain(l0, q)
     bent = _dot(v, _curvatures(v)) / l0**3 - 2.0 * beam.curvature * shape.psi / l0 + l0 * beam.curvature**2
     elastic = 0.5 * (beam.axial_stiffness * l0 * strain**2 + beam.bending_stiffness * bent)
     return beam.line_mass * kinetic, elastic, beam.line_mass * potential

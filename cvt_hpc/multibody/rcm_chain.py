@@ -154,6 +154,46 @@ def assemble(chain: Chain, ahead: float, stiff: float, damp: float) -> None:
 
 
 @kernel
+def add_product(chain: Chain, element: int, factor: float, left: np.ndarray, right: np.ndarray) -> None:
+    """Add factor left right^T of an element's coordinates, rows (8,), to the matrix in `blocks`."""
+    blocks = chain.blocks.data
+    i, j = element, (element + 1) % (chain.blocks.rows - 1)
+    for r in range(8):
+        value = factor * left[r]
+        for c in range(8):
+            if r < PER_ELEMENT and c < PER_ELEMENT:
+                blocks[i, DIAGONAL * PER_ELEMENT + r, c] += value * right[c]
+            elif r < PER_ELEMENT:
+                blocks[i, UPPER * PER_ELEMENT + r, c - PER_ELEMENT] += value * right[c]
+            elif c < PER_ELEMENT:
+                blocks[j, LOWER * PER_ELEMENT + r - PER_ELEMENT, c] += value * right[c]
+            else:
+                blocks[j, DIAGONAL * PER_ELEMENT + r - PER_ELEMENT, c - PER_ELEMENT] += value * right[c]
+
+
+@kernel
+def add_to_column(columns: LaneArray, column: int, element: int, factor: float, row: np.ndarray) -> None:
+    """Add factor times a row (8,) of an element's coordinates to a right-hand side of `columns`."""
+    i, j = element, (element + 1) % (columns.rows - 1)
+    for r in range(PER_ELEMENT):
+        columns.data[i, r, column] += factor * row[r]
+    for r in range(PER_NODE):
+        columns.data[j, r, column] += factor * row[PER_ELEMENT + r]
+
+
+@kernel
+def along_row(columns: LaneArray, column: int, element: int, row: np.ndarray) -> float:
+    """Product of a row (8,) of an element's coordinates with a solution in `columns`."""
+    i, j = element, (element + 1) % (columns.rows - 1)
+    total = 0.0
+    for r in range(PER_ELEMENT):
+        total += columns.data[i, r, column] * row[r]
+    for r in range(PER_NODE):
+        total += columns.data[j, r, column] * row[PER_ELEMENT + r]
+    return total
+
+
+@kernel
 def advance(chain: Chain, dt: float, theta: float, steps: int) -> int:
     """Advance by steps of first order: u+ = u + dt (M + theta dt D + theta^2 dt^2 K)^-1 h, q+ = q + dt u+.
 

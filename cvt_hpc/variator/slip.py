@@ -73,7 +73,10 @@ def largest_torque(
 
 
 def slip_margin(run: Any, samples: slice) -> float:
-    """Load over the largest torque that friction carries, less 1, by the means of some samples."""
+    """Load over the largest torque that friction carries, less 1, by the means of some samples.
+
+    Without any friction it is infinite, or without load either not a number.
+    """
     p, path = run.parameters, run.path
     axial = np.array([run.channel(f"axial_force {pulley}")[samples].mean() for pulley in PULLEYS])
     # a run may slip through before a constant load has risen to its value
@@ -85,7 +88,8 @@ def slip_margin(run: Any, samples: slice) -> float:
         run.mean_driving_speed(samples) * path.driving_radius,
         axial,
     )
-    return float(abs(load) / carried - 1.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.divide(abs(load), carried) - 1.0)
 
 
 def with_slip(run: Any, found: Occurrence) -> Occurrence:

@@ -9,7 +9,9 @@ from cvt_hpc.multibody.rcm_beam import (
     energies,
     equations_of_motion,
     internal_coordinates,
+    line_point,
     material_point,
+    mean_strain,
 )
 from cvt_hpc.multibody.rcm_chain import close, relaxed_ring, straight_beam
 from support.rcm import conserved, equations, tangent_stiffness
@@ -170,6 +172,35 @@ def test_mass_forces_and_energies_are_those_of_the_definition(q, u):
         np.testing.assert_allclose(found, position(l0, q, s, s < 0), rtol=0, atol=1e-14)
         of_end = q[2] if s < 0 else q[7]
         assert angle == pytest.approx(of_end + quartic(l0, q, s < 0).deriv()(s), abs=1e-12)
+
+
+def test_line_and_its_rates():
+    # against differences of the position along the line and by the coordinates: rounding over their steps
+    l0, h = BEAM.length, 1e-5
+
+    def tangent(q, s):
+        sides = [np.array(material_point(l0, q, s + k * h)[:2]) for k in (-2, -1, 1, 2)]
+        return np.dot([1 / 12, -2 / 3, 2 / 3, -1 / 12], sides) / h
+
+    def angle(q, s):
+        return np.arctan2(*tangent(q, s)[::-1])
+
+    for s in (-0.31, -0.2, -0.03, 0.04, 0.1, 0.33):
+        rows = np.empty((3, 8))
+        point = line_point(l0, Q, s, *rows)
+        t = np.array([point.cos, point.sin])
+        np.testing.assert_allclose([point.x, point.y], material_point(l0, Q, s)[:2], rtol=0, atol=1e-15)
+        np.testing.assert_allclose(point.stretch * t, tangent(Q, s), rtol=0, atol=1e-10)
+        assert point.bend == pytest.approx((angle(Q, s + h) - angle(Q, s - h)) / (2 * h), abs=1e-5)
+        for k, unit in enumerate(np.eye(8)):
+            sides = [np.array(material_point(l0, Q + sign * h * unit, s)[:2]) for sign in (1, -1)]
+            rate = (sides[0] - sides[1]) / (2 * h)
+            turn = (angle(Q + h * unit, s) - angle(Q - h * unit, s)) / (2 * h)
+            expected = [t @ rate, t[0] * rate[1] - t[1] * rate[0], turn]
+            np.testing.assert_allclose(rows[:, k], expected, rtol=0, atol=1e-5)
+    stretched = Q.copy()
+    stretched[5:7] += 0.01 * l0 * np.array([np.cos(0.41), np.sin(0.41)])  # nearly along the element
+    assert mean_strain(l0, stretched) - mean_strain(l0, Q) == pytest.approx(0.01, rel=0.02)
 
 
 def test_a_matrix_for_implicit_steps_and_forces_ahead():

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.models.pushbelt import belt as f
-from cvt_hpc.models.pushbelt.belt import Belt, BeltState
+from cvt_hpc.models.pushbelt.belt import Belt
 from cvt_hpc.physics.geometry import variator
 from cvt_hpc.variator.path import along
 
@@ -105,12 +105,12 @@ class Reading:
         Where it is read.
     elements : (n, fields) array
         In the order of the belt.
-    state : BeltState
-        Of which pulleys and openings are read.
+    pulleys : (4,) array
+        State of the pulleys.
     """
 
-    def __init__(self, where: Readings, elements: np.ndarray, state: BeltState) -> None:
-        self._where, self._elements, self._state = where, elements, state
+    def __init__(self, where: Readings, elements: np.ndarray, pulleys: np.ndarray) -> None:
+        self._where, self._elements, self._pulleys = where, elements, pulleys
         saddles = elements[:, [f.Y, f.Z]]
         self._position, offset = along(where.path, where.centre_distance, saddles)
         self._offset = offset - where.belt.pitch_depth  # the path is that of the pitch line
@@ -125,7 +125,7 @@ class Reading:
 
     def scalars(self) -> list[float]:
         """SCALARS."""
-        e, pulleys, belt = self._elements, self._state.pulleys, self._where.belt
+        e, pulleys, belt = self._elements, self._pulleys, self._where.belt
         driven = e[:, f.DRIVEN]
         both = np.stack([1.0 - driven, driven])
         thrust = e[:, f.FLANK] * belt.cosine + e[:, f.FLANK_FRICTION_M] * belt.sine
@@ -182,9 +182,9 @@ class Reading:
         place = np.minimum((share * PLACES).astype(int), PLACES - 1)
         return np.array([np.bincount(place, row, PLACES) for row in rows])
 
-    def stored_energy(self) -> float:
-        """Kinetic and elastic energy of belt and driven pulley [J]."""
-        e, state, belt = self._elements, self._state, self._where.belt
+    def stored_energy(self, openings: np.ndarray) -> float:
+        """Kinetic and elastic energy of belt, driven pulley and sheaves with `openings` (2, modes) [J]."""
+        e, belt = self._elements, self._where.belt
         ahead = np.roll(e, -1, axis=0)
         segment = ahead[:, [f.Y, f.Z]] - e[:, [f.Y, f.Z]]
         t = segment + np.roll(segment, 1, axis=0)
@@ -194,12 +194,12 @@ class Reading:
         outward = u[:, 0] * t[:, 1] - u[:, 1] * t[:, 0]
         kinetic = belt.mass * (u**2).sum() + belt.inertia * (e[:, f.OMEGA] ** 2).sum()
         kinetic += belt.ring_mass * (e[:, f.V] ** 2 + outward**2).sum()
-        kinetic += belt.driven_inertia * state.pulleys[f.DRIVEN_SPEED] ** 2
+        kinetic += belt.driven_inertia * self._pulleys[f.DRIVEN_SPEED] ** 2
         elastic = (e[:, f.TENSION] ** 2 * e[:, f.LENGTH]).sum() / belt.ring_stiffness
         elastic += (e[:, f.EDGE] ** 2 + e[:, f.HEAD] ** 2).sum() / belt.contact_stiffness
         elastic += (e[:, f.NOSE] ** 2).sum() / belt.nose_stiffness
         elastic += 2.0 * (e[:, f.FLANK] ** 2).sum() / belt.flank_stiffness
-        elastic += 2.0 * (belt.modal_stiffness * state.openings**2).sum()
+        elastic += 2.0 * (belt.modal_stiffness * openings**2).sum()
         for end in (e, ahead):  # half of the angle's stiffness at each end of a segment
             cosine = (segment * end[:, [f.HEADING_Y, f.HEADING_Z]]).sum(axis=1)
             elastic += belt.angle_stiffness * (1.0 - cosine).sum()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -84,17 +84,22 @@ def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
     )
 
 
-def equal_chords(path: Variator, centre_distance: float, nodes: int) -> tuple[np.ndarray, float]:
-    """Arc lengths (nodes,) [m] of points on a path with equal distances to their neighbours, and that [m]."""
-    s = np.arange(nodes) * path.path_length / nodes
+def equal_chords(
+    points: Callable[[np.ndarray], np.ndarray], length: float, nodes: int
+) -> tuple[np.ndarray, float]:
+    """Places (nodes,) [m] along a closed line with equal distances of neighbours, and that distance [m].
+
+    `points` gives the points (nodes, 2) [m] of a line of that length, of which the first place is 0.
+    """
+    s = np.arange(nodes) * length / nodes
     for _ in range(50):
-        points, _, _ = points_at(path, centre_distance, s)
-        chords = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+        found = points(s)
+        chords = np.linalg.norm(np.roll(found, -1, axis=0) - found, axis=1)
         if np.ptp(chords) < 1e-13:
             break
         # arc lengths in proportion to what the chords leave; it contracts, as both differ by their curvature
-        gaps = np.diff(np.append(s, path.path_length)) * (chords.mean() / chords)
-        gaps *= path.path_length / gaps.sum()
+        gaps = np.diff(np.append(s, length)) * (chords.mean() / chords)
+        gaps *= length / gaps.sum()
         s = np.concatenate([[0.0], np.cumsum(gaps[:-1])])
     return s, float(chords.mean())
 
@@ -114,7 +119,7 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     """
     g = given
     nodes, path = g["elements"], path_of(g)
-    s, chord = equal_chords(path, g["centre_distance"], nodes)
+    s, chord = equal_chords(lambda s: points_at(path, g["centre_distance"], s)[0], path.path_length, nodes)
     belt = belt_of(g, chord)
     pitch, _, curvature = points_at(path, belt.centre_distance, s)
     along = np.roll(pitch, -1, axis=0) - np.roll(pitch, 1, axis=0)

@@ -61,13 +61,7 @@ class Transient:
         p = parameters
         self.interval = 1.0 / p["sampling_rate"]
         self._steps_per_sample = max(1, int(np.ceil(self.interval / p["step"] * (1.0 - 1e-9))))
-        self._belt, self._state = start(given(p))
-        self._work = workspace(self._belt, p["elements"])
-        self._newton = Newton(
-            tolerance=p["speed_tolerance"],
-            power_tolerance=p["power_tolerance"],
-            most_iterations=p["most_iterations"],
-        )
+        self._begin(p)
         self._readings = Readings(p, self._belt)
         self.probes = tuple(
             Probe(f"{strand} {k + 1}", float(position))
@@ -79,6 +73,15 @@ class Transient:
         self._rows = np.empty((0, len(self.probes) + len(CHANNELS)))
         self._totals = np.empty((0, fields.TOTALS + 1))
         self.prolong(p)
+
+    def _begin(self, p: Mapping[str, Any]) -> None:
+        self._belt, self._state = start(given(p))
+        self._work = workspace(self._belt, p["elements"])
+        self._newton = Newton(
+            tolerance=p["speed_tolerance"],
+            power_tolerance=p["power_tolerance"],
+            most_iterations=p["most_iterations"],
+        )
 
     def prolong(self, parameters: Mapping[str, Any]) -> None:
         """Make room for the samples of a longer duration.
@@ -153,16 +156,24 @@ class Transient:
         return load_course.py_func(max(time - clamped, 0.0), rise, end, begun, p["load"])
 
     def _take_sample(self, inputs: tuple[float, float, float, float]) -> None:
-        found = Reading(self._readings, of_lanes(self._state.elements), self._state)
+        found = Reading(self._readings, self._elements(), self._state.pulleys)
         speed, _, _, torque = inputs
         load = torque / self.parameters["ratio"]
         self._rows[self.done] = [*found.displacement(), load, speed, *found.scalars()]
         stored = np.nan
         if self.done >= self.first_judged:
-            stored = found.stored_energy()
+            stored = self._stored_energy(found)
             self._sums += found.profiles()
         self._totals[self.done] = [*self._state.totals, stored]
         self.done += 1
+
+    def _elements(self) -> np.ndarray:
+        """Fields of the elements in the order of the belt, (n, fields)."""
+        return of_lanes(self._state.elements)
+
+    def _stored_energy(self, found: Reading) -> float:
+        """Kinetic and elastic energy of belt and pulleys [J]."""
+        return found.stored_energy(self._state.openings)
 
     def _why(self, outcome: int) -> str:
         unsolved = outcome == NOT_CONVERGED

@@ -1,0 +1,102 @@
+"""What a job may set of the pushbelt on a ring of beams: of the names of `pushbelt`, and of the ring."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.models.pushbelt import parameters as pushbelt
+from cvt_hpc.parameters import Parameter, not_negative
+
+# what the model of rigid sheaves, bare strands and set-valued friction does without, and what that is there
+_WITHOUT = {
+    "coarse": True,
+    "nose_clearance": np.inf,
+    "transverse_damping": 0.0,
+    "sheave_stiffness": np.inf,
+    **{
+        key: table[key].default
+        for table in pushbelt.PARAMETERS.values()
+        for key in (
+            "nose_height",
+            "nose_stiffness",
+            "ring_friction_speed",
+            "friction_speed",
+            *pushbelt.MODES,
+        )
+        if key in table
+    },
+}
+_CHANGED: dict[str, Parameter] = {
+    "elements": Parameter(104, "", "elements of the belt", minimum=32, maximum=512),
+    "kinetic_friction": not_negative(0.09, "", "the level that does not change with the gradient"),
+}
+PARAMETERS: dict[str, dict[str, Parameter]] = {
+    name: {key: _CHANGED.get(key, entry) for key, entry in table.items() if key not in _WITHOUT}
+    for name, table in pushbelt.PARAMETERS.items()
+}
+PARAMETERS["belt"] |= {
+    "ring_beams": Parameter(26, "", "beams of the ring", minimum=4, maximum=512),
+    # a dozen steel bands of 0.18 mm, 18 mm wide in sum: 12 E b h^3 / 12
+    "ring_bending_stiffness": not_negative(
+        0.02, "N m^2", "EI of all rings, which are circles without load", sensible=(1e-4, 10.0)
+    ),
+}
+
+
+def as_pushbelt(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters with those that `pushbelt` has beside them."""
+    return {**_WITHOUT, **parameters}
+
+
+def step_limit(parameters: Mapping[str, Any]) -> float:
+    """Longest explicit step of elements that all press on each other at edge and head [s].
+
+    The contacts' forces f obey f'' = -c G f with G = W^T M^-1 W. A contact at height h shares its two
+    elements with those at both heights h' there and on both sides, each by 1 / m + h h' / J; so the sum of a
+    row bounds the square of the highest frequency.
+    """
+    p = parameters
+    pitch = pushbelt.path_length(p) / p["elements"]
+    mass = p["element_mass"] * pitch
+    inertia = mass * (p["element_height"] ** 2 + pitch**2) / 12.0
+    heights = np.array([-p["ring_offset"], p["head_height"]])
+    rows = 4.0 * np.abs(1.0 / mass + np.outer(heights, heights) / inertia).sum(axis=1)
+    return float(2.0 / np.sqrt(p["edge_stiffness"] / pitch * rows.max()))
+
+
+def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems that lie between parameters, in the form of `pushbelt.check`.
+
+    Parameters
+    ----------
+    parameters : dict
+        Values by name, in SI units.
+    """
+    p = parameters
+    problems = pushbelt.check(as_pushbelt(p))
+    if problems:
+        return problems
+    if "theta" in p and 0.0 < p["theta"] < 0.5:
+        problems.append(("theta", "0, or 0.5 to 1", f"{p['theta']:g}"))
+    limit, why = step_limit(p), "of elements that press on each other"
+    if "step" in p and p["theta"] == 0.0:
+        length = (pushbelt.path_length(p) + 2.0 * np.pi * p["ring_offset"]) / p["ring_beams"]
+        axial = np.sqrt(12.0 * p["ring_stiffness"] / p["ring_mass"]) / length
+        bending = 379.0 * np.sqrt(p["ring_bending_stiffness"] / p["ring_mass"]) / length**2
+        if 2.0 / max(axial, bending) < limit:
+            limit, why = 2.0 / max(axial, bending), "of the ring's beams with theta 0"
+    if "step" in p and p["step"] > limit:
+        problems.append(("step", f"at most {limit:.3g} s, the limit {why}", f"{p['step']:g} s"))
+    return problems
+
+
+def inert(parameters: dict[str, Any]) -> dict[str, str]:
+    """Parameters without effect on a run, by name the setting that makes them so."""
+    found = pushbelt.inert(as_pushbelt(parameters))
+    found["arc_probes"] = "model beam_pushbelt, which is probed on its strands"
+    if parameters["kinetic_friction"] == 0.0 == parameters["ring_friction"]:
+        found |= dict.fromkeys(("law_tolerance", "most_sweeps"), "kinetic_friction and ring_friction 0")
+    return {key: why for key, why in found.items() if key in parameters}

@@ -1,0 +1,34 @@
+"""What the record of a run holds: that of a run of `pushbelt`, by the same judge."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.models.pushbelt import record as pushbelt
+from cvt_hpc.models.pushbelt.record import coordinates, histories, judge
+
+# Measured on one core of an EPYC (Zen 5): core-seconds per beam, element and pair of elements that rub, and
+# step, and per sample
+BEAM_COST, ELEMENT_COST, RUB_COST, SAMPLE_COST = 3e-6, 6e-7, 2e-7, 3e-4
+
+VARIABLES = tuple(
+    replace(variable, comment="sweeps over all contacts in a step, mean")
+    if variable.name == "iterations"
+    else variable
+    for variable in pushbelt.VARIABLES
+)
+
+
+def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
+    """Core-seconds of a run; of parameters that are arrays, an array."""
+    p, n = parameters, parameters["elements"]
+    rubs = (np.asarray(p["kinetic_friction"]) > 0.0) | (np.asarray(p["ring_friction"]) > 0.0)
+    each = BEAM_COST * p["ring_beams"] + ELEMENT_COST * n + np.where(rubs, RUB_COST * n**2, 0.0)[()]
+    return p["duration"] * (each / p["step"] + SAMPLE_COST * p["sampling_rate"])
+
+
+__all__ = ["VARIABLES", "coordinates", "cost", "histories", "judge"]

@@ -1,0 +1,55 @@
+"""A transient run of the pushbelt on a ring of beams, recorded as one of `pushbelt`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.models.beam_pushbelt.belt import CORRECTIONS, Proximal
+from cvt_hpc.models.beam_pushbelt.parameters import as_pushbelt
+from cvt_hpc.models.beam_pushbelt.start import start, workspace
+from cvt_hpc.models.beam_pushbelt.step import advance
+from cvt_hpc.models.marched import batches_of_one
+from cvt_hpc.models.pushbelt import belt as fields
+from cvt_hpc.models.pushbelt import transient as pushbelt
+from cvt_hpc.models.pushbelt.readings import Reading
+from cvt_hpc.multibody.rcm_beam import energies
+
+CHANNELS = pushbelt.CHANNELS
+
+
+class Transient(pushbelt.Transient):
+    """One run, as `pushbelt.transient.Transient` has it."""
+
+    def _begin(self, p: Mapping[str, Any]) -> None:
+        given = pushbelt.given(as_pushbelt(p))
+        given |= {"ring_beams": p["ring_beams"], "bending_stiffness": p["ring_bending_stiffness"]}
+        self._belt, self._state = start(given)
+        self._work = workspace(self._state.ring, p["elements"])
+        self._proximal = Proximal(p["theta"], p["law_tolerance"], p["most_sweeps"])
+
+    def _march(self, inputs: np.ndarray, steps: int) -> int:
+        return advance(self._belt, self._proximal, self._state, self._work, inputs, steps, self.step)
+
+    def _elements(self) -> np.ndarray:
+        return self._state.elements
+
+    def _stored_energy(self, found: Reading) -> float:
+        e, belt, ring = self._state.elements, self._belt, self._state.ring
+        kinetic = belt.mass * (e[:, [fields.U_Y, fields.U_Z]] ** 2).sum()
+        kinetic += belt.inertia * (e[:, fields.OMEGA] ** 2).sum()
+        kinetic += belt.driven_inertia * self._state.pulleys[fields.DRIVEN_SPEED] ** 2
+        pressed = (e[:, [fields.EDGE, fields.HEAD]] ** 2).sum() / belt.contact_stiffness
+        pressed += 2.0 * (e[:, fields.FLANK] ** 2).sum() / belt.flank_stiffness
+        parts = range(0, ring.q.size - 3, 5)
+        of_ring = sum(sum(energies(ring.beam, ring.q[i : i + 8], ring.u[i : i + 8])) for i in parts)
+        return of_ring + 0.5 * float(kinetic + pressed)
+
+    def counters(self) -> dict[str, int]:
+        """Work done so far: steps, sweeps as iterations, unsolved steps, corrections of impulses."""
+        return super().counters() | {"corrections": int(self._state.counters[CORRECTIONS])}
+
+
+batch = batches_of_one(Transient)

@@ -1,0 +1,89 @@
+"""Runs of the pushbelt on a ring of beams, against the laws of its contacts and against the pushbelt's."""
+
+import numpy as np
+
+from cvt_hpc.job import build_job
+from cvt_hpc.models.beam_pushbelt.transient import Transient
+from cvt_hpc.models.pushbelt import belt as b
+from cvt_hpc.simulation import run_point
+from cvt_hpc.variables import Status
+
+# As few elements as fit on the arcs, clamped and loaded within a third of a revolution
+BELT = {
+    "elements": 56,
+    "band_low": 400.0,
+    "band_high": 560.0,
+    "rise_time": 0.01,
+    "duration": 0.025,
+    "sampling_rate": 10000.0,
+    "friction_law": "coulomb",
+    "load": 60.0,
+    "step": 5e-6,
+    "most_refinements": 0,
+    "longest_duration": 0.025,
+}
+BEAMS = {"ring_beams": 14}
+RIGID = {"sheave_stiffness": np.inf, "coarse": True, "transverse_damping": 0.0}
+
+
+def job(model, **values):
+    return build_job({"name": "x", "model": model}, "x", {**BELT} | values)
+
+
+def test_forces_are_those_of_the_pushbelt():
+    # other equations of the same belt, which coasts without friction
+    forces = {}
+    for model, values in (
+        ("beam_pushbelt", {**BEAMS, "kinetic_friction": 0.0}),
+        ("pushbelt", {**RIGID, "kinetic_friction": 1e-9}),
+    ):
+        asked = job(
+            model,
+            **values,
+            ring_friction=0.0,
+            tilt_damper=0.12,
+            load=0.0,
+            duration=0.04,
+            longest_duration=0.04,
+        )
+        record = run_point(asked, asked.point(0), lambda: None)
+        assert record["status"] == Status.DONE
+        net = record["mean_ring_tension"] - record["mean_push_force"]
+        forces[model] = np.append(net, record["axial_force"])
+        print(
+            model,
+            forces[model],
+            record["mean_ring_tension"],
+            record["core_seconds"],
+            record["power_residual"],
+        )
+    # the strands' sum of pull and push is given by the thrust; beams of 27 degrees and a polygon of 56 sides
+    np.testing.assert_allclose(forces["beam_pushbelt"], forces["pushbelt"], rtol=0.01)
+
+
+def test_laws_of_friction():
+    # at once sliding and sticking, while the belt is clamped and loaded
+    run = Transient(job("beam_pushbelt", **BEAMS).point(0), "proximal")
+    held = slid = 0
+    for _ in range(30):
+        run.advance(1)
+        e = run._elements()
+        for size, bound, slip in (
+            (abs(e[:, b.RING_FRICTION]), 0.06 * e[:, b.SADDLE], abs(e[:, b.RING_SLIP])),
+            (
+                np.hypot(e[:, b.FLANK_FRICTION_M], e[:, b.FLANK_FRICTION_T]),
+                0.09 * e[:, b.FLANK],
+                np.hypot(e[:, b.FLANK_SLIP_M], e[:, b.FLANK_SLIP_T]),
+            ),
+        ):
+            # impulses are found up to the speed of 1e-5 m/s that they change, of 14 g in 5 us
+            assert (size <= bound + 0.05).all()
+            slides = slip > 2e-5
+            assert abs(size - bound)[slides].max() < 0.05
+            held, slid = held + np.sum(~slides & (bound > 1.0)), slid + np.sum(slides & (bound > 1.0))
+        # friction acts against sliding
+        flank = e[:, [b.FLANK_FRICTION_M, b.FLANK_FRICTION_T]] * e[:, [b.FLANK_SLIP_M, b.FLANK_SLIP_T]]
+        assert flank.sum(axis=1)[slides & (bound > 0.0)].min() > 0.0
+    print(held, slid)
+    assert held > 300 and slid > 300
+    assert run.counters()["unsolved"] == 0
