@@ -185,9 +185,7 @@ class LinePoint(NamedTuple):
 
 
 @kernel
-def line_point(
-    l0: float, q: np.ndarray, s: float, along: np.ndarray, across: np.ndarray, turn: np.ndarray
-) -> LinePoint:
+def line_point(l0: float, q: np.ndarray, s: float, along: np.ndarray, across: np.ndarray) -> LinePoint:
     """A material point, and what the rates of the coordinates make of its motion.
 
     The angle here is that of the line, to which the tangent t and the normal n to its left belong; that of
@@ -201,9 +199,8 @@ def line_point(
         Coordinates [m, rad].
     s : float
         Where the point lies without load, -l0/2 to l0/2 from the centre [m].
-    along, across, turn : (8,) arrays
-        Places for the rows t.J and n.J, J the derivative of the position by the coordinates, and for the
-        derivative of the angle.
+    along, across : (8,) arrays
+        Places for the rows t.J and n.J, J the derivative of the position by the coordinates.
     """
     shape = kinematics(l0, q)
     first = s < 0.0
@@ -226,7 +223,7 @@ def line_point(
 
     stretch, delta = _gradients(l0, shape)
     for k in range(8):
-        by_w = by_slope = 0.0
+        by_w = 0.0
         for j in range(4):
             k0, k1, k2 = SHAPE[j]
             rate = 0.0
@@ -237,16 +234,14 @@ def line_point(
             elif k == (3 + j if first else 4 - j):
                 rate = 1.0
             by_w += rate * x * x * (k0 + x * (k1 + x * k2))
-            by_slope += rate * x * (2.0 * k0 + x * (3.0 * k1 + x * 4.0 * k2))
         on_t, on_n = ahead * stretch[k], by_w
-        angle = (p * side * by_slope / l0 - r * stretch[k]) / size
         if k == node:
             on_t, on_n = on_t + c, on_n - sn
         elif k == node + 1:
             on_t, on_n = on_t + sn, on_n + c
         elif k == node + 2:
-            on_t, on_n, angle = on_t - w, on_n + ahead * e1, angle + 1.0
-        along[k], across[k], turn[k] = p * on_t + r * on_n, p * on_n - r * on_t, angle
+            on_t, on_n = on_t - w, on_n + ahead * e1
+        along[k], across[k] = p * on_t + r * on_n, p * on_n - r * on_t
     forth = ahead * e1
     return LinePoint(
         q[node] + forth * c - w * sn,

@@ -28,8 +28,8 @@ def belt_with(**values):
 
 
 def under(chain, place):
-    """The line at a place of a chain, its rows of coordinates (3, 8), and the first of these coordinates."""
-    rows, length = np.empty((3, 8)), chain.beam.length
+    """The line at a place of a chain, its rows of coordinates (2, 8), and the first of these coordinates."""
+    rows, length = np.empty((2, 8)), chain.beam.length
     i = min(int(place / length), chain.q.size // 5 - 1)
     point = line_point(length, chain.q[5 * i : 5 * i + 8], place - (i + 0.5) * length, *rows)
     return point, rows, 5 * i
@@ -40,7 +40,7 @@ def state_of(chain, places, sliding, spin=0.0):
     e = np.zeros((len(places), r.FIELDS))
     for row, place, slip in zip(e, places, np.broadcast_to(sliding, len(places)), strict=True):
         point, rows, k = under(chain, place)
-        along, across, _ = rows @ chain.u[k : k + 8]
+        along, across = rows @ chain.u[k : k + 8]
         t = np.array([point.cos, point.sin])
         row[r.PLACE], row[r.PLACE_RATE], row[b.OMEGA] = place, slip / point.stretch, spin
         row[[b.U_Y, b.U_Z]] = (along + slip) * t + across * np.array([-t[1], t[0]])

@@ -113,18 +113,16 @@ class Workspace(NamedTuple):
 
 
 # Rows of Workspace.rows (`rcm_beam.line_point`), at the start of a step and at its middle
-ALONG, ACROSS, TURN, MID_ALONG, MID_ACROSS, MID_TURN = range(6)
-ROWS = 6
+ALONG, ACROSS, MID_ALONG, MID_ACROSS = range(4)
+ROWS = 4
 
 # Fields of Workspace.step
 (
     T_Y,  # tangent of the ring at the start of a step; its normal is (-T_Z, T_Y)
     T_Z,
-    STRETCH,  # |dr/ds| there
-    BEND,  # change of the tangent's angle by s [1/m]
     MID_T_Y,  # and at its middle
     MID_T_Z,
-    MID_STRETCH,
+    MID_STRETCH,  # |dr/ds| there
     COSINE,  # of the angle between both tangents
     TANGENT,
     FREE_T,  # velocity before the step in the directions of its start [m/s]
@@ -146,5 +144,5 @@ ROWS = 6
     FLANK_BOUND,  # largest impulse of friction at a flank [N s]
     RING_STEP,  # of the proximal points [kg]
     FLANK_STEP,
-) = range(28)
-STEP_FIELDS = 28
+) = range(26)
+STEP_FIELDS = 26

@@ -13,7 +13,6 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.models.beam_pushbelt.belt import (
     ACROSS,
     ALONG,
-    BEND,
     COSINE,
     FLANK_BOUND,
     FLANK_IMPULSE_M,
@@ -32,7 +31,6 @@ from cvt_hpc.models.beam_pushbelt.belt import (
     MID_T_LEVER,
     MID_T_Y,
     MID_T_Z,
-    MID_TURN,
     PLACE,
     PLACE_RATE,
     R_LEVER,
@@ -40,12 +38,10 @@ from cvt_hpc.models.beam_pushbelt.belt import (
     R_Z,
     RING_IMPULSE,
     SPIN,
-    STRETCH,
     T_LEVER,
     T_Y,
     T_Z,
     TANGENT,
-    TURN,
 )
 from cvt_hpc.models.pushbelt.belt import (
     DAMPING_LOSS,
@@ -93,12 +89,12 @@ def locate(belt, state, work, dt):
         work.beams[j] = beam
         s = e[j, PLACE] - (beam + 0.5) * length
         q = ring.q[first : first + 8]
-        at = line_point(length, q, s, rows[j, ALONG], rows[j, ACROSS], rows[j, TURN])
+        at = line_point(length, q, s, rows[j, ALONG], rows[j, ACROSS])
         q = work.middle[first : first + 8]
         s += 0.5 * dt * e[j, PLACE_RATE]
-        mid = line_point(length, q, s, rows[j, MID_ALONG], rows[j, MID_ACROSS], rows[j, MID_TURN])
+        mid = line_point(length, q, s, rows[j, MID_ALONG], rows[j, MID_ACROSS])
         e[j, Y], e[j, Z] = at.x, at.y
-        step[j, T_Y], step[j, T_Z], step[j, STRETCH], step[j, BEND] = at.cos, at.sin, at.stretch, at.bend
+        step[j, T_Y], step[j, T_Z] = at.cos, at.sin
         step[j, MID_T_Y], step[j, MID_T_Z], step[j, MID_STRETCH] = mid.cos, mid.sin, mid.stretch
         cosine = at.cos * mid.cos + at.sin * mid.sin
         step[j, COSINE] = cosine
@@ -142,8 +138,29 @@ def rub_flanks(belt, state, step, j, along_meridian, around):
 
 
 @kernel
+def tilt(belt, state, step, i, j, dt):
+    """Impulses by the angles of two neighbours to the segment between their saddles; law of `pushbelt`."""
+    e = state.elements
+    e_y, e_z = e[j, Y] - e[i, Y], e[j, Z] - e[i, Z]
+    per_length = 1.0 / np.sqrt(e_y * e_y + e_z * e_z)
+    e_y, e_z = e_y * per_length, e_z * per_length
+    turn = (e_y * (e[j, U_Z] - e[i, U_Z]) - e_z * (e[j, U_Y] - e[i, U_Y])) * per_length
+    both = 0.0
+    for k in (i, j):
+        cosine = e_y * e[k, HEADING_Y] + e_z * e[k, HEADING_Z]
+        rate = cosine * (e[k, OMEGA] - turn)
+        state.totals[DAMPING_LOSS] += 0.5 * dt * belt.angle_damping * rate * rate
+        sine = e_y * e[k, HEADING_Z] - e_z * e[k, HEADING_Y]
+        moment = 0.5 * dt * cosine * (belt.angle_stiffness * sine + belt.angle_damping * rate)
+        push(belt, step, k, 0.0, 0.0, -moment)
+        both += moment * per_length
+    push(belt, step, i, both * e_z, -both * e_y, 0.0)
+    push(belt, step, j, -both * e_z, both * e_y, 0.0)
+
+
+@kernel
 def apply_forces(belt, state, work, dt):
-    """Impulses of contact between elements, of flanks, of tilt, and of friction as in the last step.
+    """Impulses of contact between elements, of tilt, of flanks, and of friction as in the last step.
 
     Those on the ring go into its right-hand side.
     """
@@ -162,21 +179,10 @@ def apply_forces(belt, state, work, dt):
                 given = dt * force
                 push(belt, step, i, -given * xj[0], -given * xj[1], given * lever_i)
                 push(belt, step, j, given * xj[0], given * xj[1], given * lever_j)
+        tilt(belt, state, step, i, j, dt)
     for j in range(e.shape[0]):
         pressed = 2.0 * dt * e[j, FLANK] * belt.sine
         push(belt, step, j, pressed * step[j, R_Y], pressed * step[j, R_Z], pressed * step[j, R_LEVER])
-
-        first = work.beams[j] * PER_ELEMENT
-        t_y, t_z = step[j, T_Y], step[j, T_Z]
-        sine = t_y * e[j, HEADING_Z] - t_z * e[j, HEADING_Y]
-        turning = dot(work.rows[j, TURN], ring.u, first) + step[j, BEND] * e[j, PLACE_RATE]
-        rate = e[j, OMEGA] - turning
-        state.totals[DAMPING_LOSS] += dt * belt.angle_damping * rate * rate
-        moment = -dt * (belt.angle_stiffness * sine + belt.angle_damping * rate)
-        by_place = moment * step[j, BEND] / step[j, STRETCH]
-        push(belt, step, j, -by_place * t_y, -by_place * t_z, moment)
-        add_to_column(ring.columns, 0, work.beams[j], -moment, work.rows[j, TURN])
-        add_to_column(ring.columns, 0, work.beams[j], by_place, work.rows[j, ALONG])
 
         mu, _ = coefficient(
             belt.flank_law, belt.flank_kinetic, belt.flank_gradient, belt.flank_speed, e[j, V_FILTERED]

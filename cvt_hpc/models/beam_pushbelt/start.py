@@ -152,7 +152,7 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
 def _elements(belt: Belt, ring: Chain, n: int, speed: float) -> np.ndarray:
     """Fields (n, FIELDS) of elements with equal chords on a ring, at a speed of the pitch line [m/s]."""
     around = ring.beam.length * (ring.q.size // PER_ELEMENT)
-    rows = np.zeros((3, 8))
+    rows = np.zeros((2, 8))
 
     def on_ring(place: float) -> tuple[Any, np.ndarray]:
         beam = min(int(place / ring.beam.length), ring.q.size // PER_ELEMENT - 1)

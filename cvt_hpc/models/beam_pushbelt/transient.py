@@ -47,6 +47,11 @@ class Transient(pushbelt.Transient):
         of_ring = sum(sum(energies(ring.beam, ring.q[i : i + 8], ring.u[i : i + 8])) for i in parts)
         return of_ring + 0.5 * float(kinetic + pressed)
 
+    def _sound(self, record: dict[str, Any]) -> tuple[float, float]:
+        """As of `pushbelt`, but that theta above 1/2 may damp the ring's vibrations by any power."""
+        least, most = super()._sound(record)
+        return least, most if self._proximal.theta <= 0.5 else np.inf
+
     def counters(self) -> dict[str, int]:
         """Work done so far: steps, sweeps as iterations, unsolved steps, corrections of impulses."""
         return super().counters() | {"corrections": int(self._state.counters[CORRECTIONS])}
