@@ -30,7 +30,7 @@ _WITHOUT = {
     },
 }
 _CHANGED: dict[str, Parameter] = {
-    "elements": Parameter(104, "", "elements of the belt", minimum=32, maximum=512),
+    "elements": Parameter(160, "", "elements of the belt", minimum=32, maximum=512),
     "kinetic_friction": not_negative(0.09, "", "the level that does not change with the gradient"),
 }
 PARAMETERS: dict[str, dict[str, Parameter]] = {
@@ -38,7 +38,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     for name, table in pushbelt.PARAMETERS.items()
 }
 PARAMETERS["belt"] |= {
-    "ring_beams": Parameter(26, "", "beams of the ring", minimum=4, maximum=512),
+    "ring_beams": Parameter(40, "", "beams of the ring", minimum=4, maximum=512),
     # a dozen steel bands of 0.18 mm, 18 mm wide in sum: 12 E b h^3 / 12
     "ring_bending_stiffness": not_negative(
         0.02, "N m^2", "EI of all rings, which are circles without load", sensible=(1e-4, 10.0)
