@@ -16,6 +16,7 @@ CHARTS = [path for path in sorted(FOLDER.glob("*.toml")) if "chart" in tomllib.l
 
 def test_there_are_charts():
     assert [path.stem for path in CHARTS] == [
+        "chart_beam_pushbelt",
         "chart_belt",
         "chart_oscillator",
         "chart_pushbelt",

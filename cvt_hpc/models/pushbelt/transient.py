@@ -9,7 +9,7 @@ import numpy as np
 
 from cvt_hpc.models.marched import Probe, batches_of_one
 from cvt_hpc.models.pushbelt import belt as fields
-from cvt_hpc.models.pushbelt.belt import CONTACTS, NOT_CONVERGED, Newton
+from cvt_hpc.models.pushbelt.belt import CONTACTS, NOT_CONVERGED, Belt, Newton
 from cvt_hpc.models.pushbelt.parameters import MODES, path_length
 from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Reading, Readings
 from cvt_hpc.models.pushbelt.start import of_lanes, start, workspace
@@ -56,6 +56,10 @@ class Transient:
     failure : (Status, str) or None
         Why the run does not go on: what has gone wrong, or that the belt slips through, with the status done.
     """
+
+    _belt: Belt
+    _state: Any  # and work space, as `_march` takes them
+    _work: Any
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
         p = parameters
