@@ -262,12 +262,12 @@ def test_points_by_other_versions_or_machines_are_named(
 ):
     job = write_chart()
     with monkeypatch.context() as earlier:
-        earlier.setattr(f"cvt_hpc.chart.store.{name}", lambda: value)
+        earlier.setattr(f"cvt_hpc.study.archives.{name}", lambda: value)
         made(job)
     assert not caplog.records
     (tmp_path / "out/bells/points/ringing-soft-3.npz").unlink()
     report = made(job)
-    assert caplog.text.count("earlier points were measured with other versions or on another machine") == 1
+    assert caplog.text.count("earlier points were made with other versions or on another machine") == 1
     with xr.open_dataset(report.dataset) as dataset:
         found = dataset.attrs[attribute]
     old, new = {
