@@ -42,7 +42,7 @@ NUMBERS = {
 
 
 def in_job_unit(job: Job, findings: Sequence[Finding]) -> tuple[list[Finding], str]:
-    """Return the findings with errors of onsets in the unit in which the job gives the load; and it."""
+    """Return findings with errors of onsets in the unit in which the job gives the load, and that unit."""
     scale, unit = coordinate_unit({"units": UNITS["onset"], JOB_UNITS: job.units.get("load", "")})
     shown = []
     for finding in findings:

@@ -340,4 +340,4 @@ def test_a_point_that_unpacks_to_more_than_a_point_is_measured_again(report, tmp
     point = tmp_path / "out/bells/points/ringing-soft-3.npz"
     np.savez_compressed(point, head=np.zeros(1 << 25))  # 256 MiB in 300 kB
     assert made("c.toml").table.read_bytes() == before
-    assert "ringing-soft-3.npz: damaged (it holds more than a point)" in caplog.text
+    assert "ringing-soft-3.npz: damaged (it unpacks to more than it may)" in caplog.text
