@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from cvt_hpc.archives import Archives
 from cvt_hpc.bifurcation.dataset import Stability
 from cvt_hpc.bifurcation.followed import Followed
 from cvt_hpc.bifurcation.job import Diagram
@@ -21,7 +22,6 @@ from cvt_hpc.bifurcation.kept import packed, unpacked
 from cvt_hpc.files import kind_of
 from cvt_hpc.netcdf import DIAGRAM, holds
 from cvt_hpc.output_folder import Kind, OutputFolder
-from cvt_hpc.study.archives import Archives
 from cvt_hpc.study.job_difference import another_job
 
 DATASET = "branch.nc"

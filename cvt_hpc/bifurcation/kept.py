@@ -9,6 +9,7 @@ from typing import Any, TypeVar, get_type_hints
 
 import numpy as np
 
+from cvt_hpc.archives import Arrays
 from cvt_hpc.bifurcation.attractors import Attractor
 from cvt_hpc.bifurcation.followed import Followed
 from cvt_hpc.bifurcation.job import Asked
@@ -16,7 +17,6 @@ from cvt_hpc.models.elastic_belt.belt import mesh
 from cvt_hpc.models.linear_stability.branch import Branch, Onset, Point
 from cvt_hpc.models.linear_stability.modes import Mode
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
-from cvt_hpc.study.archives import Arrays
 from cvt_hpc.vibration.criticality import Criticality
 
 Row = TypeVar("Row")  # a named tuple

@@ -8,11 +8,11 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from cvt_hpc.archives import Archives, Arrays
 from cvt_hpc.chart.measuring import Measurement
 from cvt_hpc.chart.plan import Chart, fingerprint_of
 from cvt_hpc.files import kind_of
 from cvt_hpc.output_folder import CHART_FILE, Kind, OutputFolder
-from cvt_hpc.study.archives import Archives, Arrays
 from cvt_hpc.study.job_difference import another_job
 
 _LIMIT = 1 << 26  # [bytes] of a point

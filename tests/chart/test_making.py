@@ -262,7 +262,7 @@ def test_points_by_other_versions_or_machines_are_named(
 ):
     job = write_chart()
     with monkeypatch.context() as earlier:
-        earlier.setattr(f"cvt_hpc.study.archives.{name}", lambda: value)
+        earlier.setattr(f"cvt_hpc.archives.{name}", lambda: value)
         made(job)
     assert not caplog.records
     (tmp_path / "out/bells/points/ringing-soft-3.npz").unlink()
