@@ -130,6 +130,12 @@ def test_a_step_that_is_not_solved_fails_with_time_element_and_contact():
     assert "not solved, at the " in found["reason"] and " contact of element " in found["reason"]
 
 
+def test_a_state_that_is_not_a_number_names_no_contact():
+    run = Transient(job(load=60.0).point(0), "newton")
+    run._state.pulleys[b.DRIVEN_SPEED] = np.nan
+    assert run.advance(1) == (Status.FAILED_NUMERICS, "the state is not a number")
+
+
 @pytest.mark.parametrize(
     "ramp",
     [{"load_history": "ramp"}, {"speed_history": "ramp", "speed_start": 250.0, "band_high": 800.0}],
