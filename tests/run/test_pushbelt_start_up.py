@@ -9,11 +9,14 @@ from cvt_hpc import simulation
 from cvt_hpc.chart.timed_runs import march
 from cvt_hpc.job import build_job
 from cvt_hpc.models.contract import load_model
+from cvt_hpc.models.pushbelt import belt as b
+from cvt_hpc.models.pushbelt.start import of_lanes
 from cvt_hpc.models.pushbelt.start_up import StartUps, fingerprint
 from cvt_hpc.models.pushbelt.transient import Transient
 from cvt_hpc.simulation import run_point, run_points
 from cvt_hpc.study.forecast.pilots import run_pilots
 from cvt_hpc.variables import Status
+from cvt_hpc.variator import PULLEYS
 
 # A belt of few elements in long steps, clamped within 2 ms, of which the second half of 16 ms is judged
 BELT = {"elements": 104, "step": 2e-5, "rise_time": 4e-3, "duration": 16e-3, "longest_duration": 16e-3}
@@ -113,6 +116,31 @@ def test_a_start_up_follows_from_what_its_key_holds():
     entering = {"thrust", "step", "ring_mass", "kinetic_friction", "driving_speed", "strand_probes"}
     entering |= {"nose_clearance", "most_iterations", "speed_tolerance", "power_tolerance", "speed_history"}
     assert not shared & entering
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        {"ratio": 0.45, "thrust": 50e3, "driving_speed": 100.0, "sheave_stiffness": math.inf},
+        {"ratio": 1.0, "thrust": 20e3, "driving_speed": 500.0},
+        {"ratio": 2.6, "thrust": 5e3, "driving_speed": 300.0},
+    ],
+    ids=str,
+)
+def test_the_belt_is_clamped_at_the_ends_of_what_a_variator_does(scene):
+    """All steps are solved, the rings are taut, the strands calm, and nothing slides."""
+    band = {"band_low": 300.0, "band_high": 400.0}
+    times = {"rise_time": 0.03, "duration": 0.12, "longest_duration": 0.12}
+    run = started(job(belt_length=0.6612, **band, **times, **scene).point(0))
+    assert run.advance(run._start_up) is None
+    assert run.counters()["unsolved"] == 0
+    assert of_lanes(run._state.elements)[:, b.TENSION].min() > 0.0
+    assert np.ptp(run.displacement[-13:], axis=0).max() < 0.2e-3  # in the last ms; 0.12 mm found
+    # a sheave that closes at a finite rate is behind its thrust; nowhere as long as half of it is missing
+    axial = run.channel("axial_force driven")[-1]
+    assert 0.5 * scene["thrust"] < axial < scene["thrust"]
+    rims = [run.channel(f"{k}_speed")[-1] * run.channel(f"running_radius {k}")[-1] for k in PULLEYS]
+    assert rims[1] == pytest.approx(rims[0], rel=0.01)
 
 
 def test_a_start_up_that_fails_is_not_kept():
