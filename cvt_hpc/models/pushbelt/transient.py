@@ -40,6 +40,8 @@ forget = _start_ups.forget
 class Transient:
     """One run of the pushbelt, advanced sample by sample.
 
+    It begins at the end of its start-up where another run of this process has marched the same one.
+
     Parameters
     ----------
     parameters : mapping
