@@ -54,7 +54,8 @@ def test_forces_are_those_of_the_pushbelt():
 
 def test_laws_of_friction():
     # at once sliding and sticking, while the belt is clamped and loaded
-    run = Transient(job("beam_pushbelt", **BEAMS).point(0), "proximal")
+    point = job("beam_pushbelt", **BEAMS, rise_time=4e-3).point(0)
+    run = Transient(point, "proximal")
     held = slid = 0
     for _ in range(30):
         run.advance(1)
@@ -77,3 +78,8 @@ def test_laws_of_friction():
         assert flank.sum(axis=1)[slides & (bound > 0.0)].min() > 0.0
     assert held > 300 and slid > 300
     assert run.counters()["unsolved"] == 0
+    # another run goes on from the end of the clamping, bit by bit
+    again = Transient(point, "proximal")
+    assert again.done == 20
+    again.advance(10)
+    np.testing.assert_array_equal(again._elements(), run._elements())

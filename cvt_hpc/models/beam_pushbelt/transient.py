@@ -28,10 +28,15 @@ class Transient(pushbelt.Transient):
         given |= {"ring_beams": p["ring_beams"], "bending_stiffness": p["ring_bending_stiffness"]}
         self._belt, self._state = start(given)
         self._work = workspace(self._state.ring, p["elements"])
-        self._proximal = Proximal(p["theta"], p["law_tolerance"], p["most_sweeps"])
+        self._method = Proximal(p["theta"], p["law_tolerance"], p["most_sweeps"])
 
     def _march(self, inputs: np.ndarray, steps: int) -> int:
-        return advance(self._belt, self._proximal, self._state, self._work, inputs, steps, self.step)
+        return advance(self._belt, self._method, self._state, self._work, inputs, steps, self.step)
+
+    def _reached(self) -> tuple[np.ndarray, ...]:
+        elements, ring = self._state.elements, self._state.ring
+        recorded = self._rows[: self.done], self._totals[: self.done]
+        return elements, ring.q, ring.u, *self._state[2:], *recorded
 
     def _elements(self) -> np.ndarray:
         return self._state.elements
@@ -50,7 +55,7 @@ class Transient(pushbelt.Transient):
     def _sound(self, record: dict[str, Any]) -> tuple[float, float]:
         """As of `pushbelt`, but that theta above 1/2 may damp the ring's vibrations by any power."""
         least, most = super()._sound(record)
-        return least, most if self._proximal.theta <= 0.5 else np.inf
+        return least, most if self._method.theta <= 0.5 else np.inf
 
     def counters(self) -> dict[str, int]:
         """Work done so far: steps, sweeps as iterations, unsolved steps, corrections of impulses."""
@@ -58,3 +63,4 @@ class Transient(pushbelt.Transient):
 
 
 batch = batches_of_one(Transient)
+forget = pushbelt.forget
