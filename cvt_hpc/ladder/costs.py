@@ -55,7 +55,7 @@ def plan_lines(asked: Ladder, out: Path) -> Iterator[str]:
     total = sum(core_seconds for _, core_seconds in left.values())
     yield f"estimated cost of what is left: {core_time_in_words(total)}, shared by all ranks"
     if rungs[-1].job.model != PUSHBELT:
-        yield f'with --set ladder.reference={PUSHBELT}: {_pushbelt_cost(job)}'
+        yield f"with --set ladder.reference={PUSHBELT}: {_pushbelt_cost(job)}"
 
 
 def _pushbelt_cost(job: Job) -> str:

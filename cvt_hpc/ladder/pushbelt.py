@@ -63,10 +63,10 @@ def _document(job: Job) -> dict[str, Any]:
     axes = {axis.name: axis for axis in job.axes}
     varied = varied_by(job.rules, axes)
     along = {key: varied.get(key, (key,) if key in axes else ()) for key in job.parameters}
-    for key, value in ONLY.items():
-        if along[key] or job.parameters[key] != value:
-            found = "several values" if along[key] else f"{job.parameters[key]:g}"
-            raise mismatch(f"{where}: {key}", f"{value:g}, since the pushbelt knows no other", found)
+    for key, only in ONLY.items():
+        if along[key] or job.parameters[key] != only:
+            told = "several values" if along[key] else f"{job.parameters[key]:g}"
+            raise mismatch(f"{where}: {key}", f"{only:g}, since the pushbelt knows no other", told)
     whole = replace(job, given=frozenset(job.parameters))  # defaults are another belt's there
     document = handed_to(whole, PUSHBELT, "the reference of its ladder")
     document.get("numerics", {}).pop("step", None)
@@ -81,10 +81,10 @@ def _document(job: Job) -> dict[str, Any]:
             expected = f"one value, since {key} of the pushbelt follows and has one"
             raise mismatch(f"{job.source}: [axes] {followed[-1]}", expected, "several")
         table = document.setdefault(section_of[key], {})
-        table[key] = found
-        if followed:
-            del table[key]
-            name = followed[0]
-            values = [value(job.complete({name: place})) for place in axes[name].values]
-            linked.setdefault(name, {})[key] = values
+        table.pop(key, None)  # what the continuous belt has under this name is something else
+        if not followed:
+            table[key] = found
+            continue
+        values = [value(job.complete({followed[0]: place})) for place in axes[followed[0]].values]
+        linked.setdefault(followed[0], {})[key] = values
     return document

@@ -51,9 +51,7 @@ _LOWER: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
 }
 
 
-def ladder(
-    job: Job, pushbelt: Mapping[str, Any] | None = None
-) -> tuple[tuple[Rung, ...], dict[str, str]]:
+def ladder(job: Job, pushbelt: Mapping[str, Any] | None = None) -> tuple[tuple[Rung, ...], dict[str, str]]:
     """Return the rungs of a job, and why others refuse it.
 
     Parameters

@@ -9,6 +9,7 @@ import pytest
 from cvt_hpc.chart import load_chart
 from cvt_hpc.job import known_keys, load_job
 from cvt_hpc.models.elastic_belt import PARAMETERS
+from cvt_hpc.models.pushbelt import inert
 from cvt_hpc.models.pushbelt.continuous import ABSENT, FOLLOWS, ONLY
 from cvt_hpc.physics.sheaves import flexibility, sheaves
 
@@ -76,10 +77,11 @@ def assert_the_same_belt(pushbelt, continuous, but=()):
     assert "element_mass" in pushbelt and pushbelt.keys() >= FOLLOWS.keys()
     of_belt = {key for name in ("scene", "belt", "sheaves", "friction") for key in PARAMETERS[name]}
     expected = {key: continuous[key] for key in of_belt & pushbelt.keys() & continuous.keys()}
+    but = {*but, *inert(pushbelt)}
     for key, value in (expected | followed(continuous)).items():
         if key not in but:
             # three digits in a job file
-            wanted = value if isinstance(value, str) else pytest.approx(value, rel=2e-3)
+            wanted = value if isinstance(value, str) else pytest.approx(value, rel=5e-3)
             assert pushbelt[key] == wanted, key
 
 
@@ -95,9 +97,8 @@ def test_the_chart_has_the_same_belt_between_rigid_sheaves():
     """On elastic ones it goes the other way: the continuum's sheaves are fitted to the modes of the pushbelt."""
     chart = load_chart(JOBS / "chart_pushbelt.toml")
     points = {point.series: point.job.parameters for point in chart.points if point.scene == "rigid"}
-    modes = ("driving_modal_stiffness", "driven_modal_stiffness")
     # the chart's pushbelt has no transverse damping, and its own rate of the sheave
-    but = (*modes, "transverse_damping", "sheave_rate")
+    but = ("transverse_damping", "sheave_rate")
     assert_the_same_belt(points["elements_216"], points["continuous"], but)
     rings = points["continuous"]["reference_tension"] / points["continuous"]["ring_stiffness"]
     assert rings == pytest.approx(1e-4)
@@ -107,7 +108,9 @@ def test_the_chart_has_sheaves_that_open_nearly_alike():
     """Between places on half a circle: 10 % of the opening, as the job says."""
     table = tomllib.loads((JOBS / "chart_pushbelt.toml").read_text())
     scene = table["chart"]["methods"]["continuous"]["set"]
-    tilt, local, length = (float(scene[k].split()[0]) for k in ("tilt_stiffness", "local_stiffness", "local_length"))
+    tilt, local, length = (
+        float(scene[k].split()[0]) for k in ("tilt_stiffness", "local_stiffness", "local_length")
+    )
     radius, length = 0.0556, 1e-3 * length
     phi = np.linspace(0.0, np.pi, 91)
     apart = np.abs(phi[:, None] - phi)
