@@ -84,6 +84,15 @@ def test_a_rung_that_refuses_the_job_is_named(job):
     assert list(refusals) == ["linear_stability"] and "friction_memory" in refusals["linear_stability"]
 
 
+def test_a_rung_has_the_keys_of_the_job_in_tables_of_its_own(job):
+    rungs, refusals = ladder(load_job(job, ["vibration.band_high=1200"]))
+    jobs = {rung.name: rung.job for rung in rungs}
+    assert refusals == {} and jobs["linear_stability"].schema.section_of["band_high"] == "judgement"
+    assert (
+        jobs["linear_stability"].parameters["band_high"] == jobs["coarse"].parameters["band_high"] == 1200.0
+    )
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
