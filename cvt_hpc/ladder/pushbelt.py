@@ -8,6 +8,7 @@ from typing import Any
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job import Job, rebuild_job
+from cvt_hpc.job.assignments import warn_of_bare_assignments
 from cvt_hpc.job.for_model import handed_to
 from cvt_hpc.job.rules import varied_by
 from cvt_hpc.job.schema import known_keys, load_schema
@@ -39,6 +40,7 @@ def pushbelt_jobs(job: Job, settings: Mapping[str, Any]) -> tuple[Job, Job]:
     _check_settings(job, settings, f"{where} {label}")
     document = _document(job)
     coarser = rebuild_job(document, where, job.units, {**COARSER, **settings}, label)
+    warn_of_bare_assignments(settings, coarser.schema, where, label)
     if [axis.name for axis in coarser.axes] != [axis.name for axis in job.axes]:
         raise mismatch(f"{where} {label}", "one value for each key", "an axis")
     refined = coarser.resolved()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cvt_hpc.cli import main
-from cvt_hpc.errors import InputError
+from cvt_hpc.errors import InputError, UnitWarning
 from cvt_hpc.job import build_job
 from cvt_hpc.ladder.loading import load_ladder
 from cvt_hpc.ladder.rungs import QUESTIONS, ladder
@@ -74,6 +74,11 @@ def test_what_has_no_counterpart_is_refused_in_a_line(changes, settings, message
     with pytest.raises(InputError, match=message) as error:
         ladder(build_job(DOCUMENT | changes, "x.toml"), settings)
     assert str(error.value).startswith("x.toml: ")
+
+
+def test_a_setting_without_a_unit_that_is_far_from_usual_draws_a_warning():
+    with pytest.warns(UnitWarning, match="head_height"):
+        ladder(build_job(DOCUMENT, "x.toml"), {"head_height": 4})
 
 
 @pytest.fixture
