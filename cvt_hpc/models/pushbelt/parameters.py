@@ -59,8 +59,11 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "driven_radius": replace(SCENE["driven_radius"], default=0.063896),
         "driving_speed": replace(SCENE["driving_speed"], default=100.0 * np.pi),
         "thrust": replace(SCENE["thrust"], default=20e3),
+        # elements stick radially until they have come round: with less, a load near the limit slips through
         "rise_time": replace(
-            SCENE["rise_time"], description="start-up: thrust rises in its first half, load in its second"
+            SCENE["rise_time"],
+            default=0.12,
+            description="start-up: thrust rises in its first half, load in its second",
         ),
         "driving_thrust": not_negative(
             0.0,
