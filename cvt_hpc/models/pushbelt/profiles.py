@@ -23,7 +23,9 @@ _WHAT = {
 }
 
 PARAMETERS: dict[str, Parameter] = {
-    "profile_time": Parameter((), "s", "times of the profiles, ascending from rise_time on"),
+    "profile_time": Parameter(
+        (), "s", "times of the profiles, ascending from rise_time on", sensible=(1e-4, 200.0)
+    ),
     **{
         f"{name}_profile": Parameter((), "", f"multiples at these times of {what}")
         for name, what in _WHAT.items()
