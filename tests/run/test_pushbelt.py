@@ -156,7 +156,7 @@ def test_load_and_speed_rise_along_a_ramp(ramp):
 
 
 def test_what_the_power_balance_may_leave_open():
-    """1 % of the losses beside the 1 W of the equations; and the step may damp rotation, and thrust times belt speed by its length."""
+    """2 % of the losses beside the 1 W of the equations; and the step may damp rotation, and thrust times belt speed by its length."""
     run = Transient(job(load=60.0).point(0), "newton")
     run.done = run.samples
     run._rows[:] = 100.0 * np.pi  # the driving speed
@@ -165,10 +165,10 @@ def test_what_the_power_balance_may_leave_open():
     rotation = 0.5 * inertia * speed**3 * (radii[0] ** -2 + radii[1] ** -2)
     most = 1.5 * rotation + 1e-4 * 20e3 * speed
     for open_power, damped, complaint in (
-        (0.99 * 3.0, 0.99 * most, None),
-        (-0.99 * 3.0, 0.0, None),
-        (1.01 * 3.0, 0.0, "the power balance is open by"),
-        (-1.01 * 3.0, 0.0, "the power balance is open by"),
+        (0.99 * 5.0, 0.99 * most, None),
+        (-0.99 * 5.0, 0.0, None),
+        (1.01 * 5.0, 0.0, "the power balance is open by"),
+        (-1.01 * 5.0, 0.0, "the power balance is open by"),
         (0.0, 1.01 * most, "the time step itself damps"),
     ):
         found = {"unsolved_share": 0.0, "driving_power": 19e3, "loss": 200.0}

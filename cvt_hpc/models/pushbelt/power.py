@@ -1,8 +1,8 @@
 """What the laws of a step take from the motion, in lanes: losses, and what the step damps by itself.
 
 M (X - X_old) / dt = f times the mean speed (X + X_old) / 2, which belongs to q_k as the directions of all
-forces do, is the change of kinetic energy without remainder. So a force takes its magnitude times the mean rate
-along its direction: that is the loss of friction and dampers.
+forces do, is the change of kinetic energy without remainder. So a force takes its magnitude times the mean
+rate along its direction: that is the loss of friction and dampers.
 
 An elastic law has its magnitude -V'(g) from the end of the step. It takes -V'(g) r for the change r within a
 step at the mean rate, and stores (V(g) - V(g - 2 r)) / 2: potentials half a step later and earlier, which add
