@@ -16,6 +16,8 @@ compile, and no machine code: each caller takes in its LLVM code and optimises i
 all functions that kernels call, also those of numpy. A kernel that is called with lanes does not count who
 uses an array: it makes none, and the arrays that it is given outlast it.
 
+Of processes that need the same code at a time one compiles it, and the others wait for it.
+
 The folders lie below NUMBA_CACHE_DIR if that is set; else in the package where it is the user's own, else in
 the user's cache. Whoever can write to them can run any code as the user, so folders to which others can write
 are not used: without any, code is compiled in each process anew.
@@ -26,6 +28,8 @@ What takes long is told to the logger of this module: compiling as INFO, and tha
 from __future__ import annotations
 
 import ast
+import errno
+import fcntl
 import gc
 import hashlib
 import logging
@@ -38,7 +42,7 @@ import sys
 import time
 import weakref
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -63,6 +67,7 @@ _CODE_OF_ALL = (__file__, f"{_PREFIX}lanes{os.sep}__init__.py")
 _FOLDER = "cvt_hpc-kernels"
 _MONTH = 30 * 86400.0  # [s]: longer than any job lasts, so that none loses the folder it works in
 _LONG = 3.0  # [s]: what compiles faster is not worth a line
+_PATIENCE = 600.0  # [s] with a process that compiles the same; any kernel takes less, on a busy machine too
 
 # Division by zero gives inf as in numpy, without a test for it. Every operation is rounded once, as written:
 # were products contracted with sums, the bits would depend on which kernels the compiler merges, and so on
@@ -176,6 +181,7 @@ class _Kernel(CPUDispatcher):
         # of what is being compiled: whether another kernel calls it, whether with lanes
         self._for_kernel = self._takes_lanes = False
         self._without_entry: set[tuple] = set()  # types of arguments
+        self._claims = ExitStack()
         self._compiler._customize_flags = self._customized
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
@@ -203,6 +209,8 @@ class _Kernel(CPUDispatcher):
             with (
                 _replaced(self.targetctx.codegen(), "_library_class", _Library),
                 _replaced(types.Function, "get_call_type", _call_type),
+                ExitStack() as claims,  # kept until the code is saved, or failed to compile
+                _replaced(self, "_claims", claims),
             ):
                 return super().compile(sig)
 
@@ -427,6 +435,9 @@ def _make(folder: Path) -> None:
                 shutil.rmtree(other, ignore_errors=True)
 
 
+_ADDRESS = re.compile(r"0x[0-9a-f]+")
+
+
 class _Cache(FunctionCache):
     """The machine code of a kernel on the disk; without what the disk refuses."""
 
@@ -439,6 +450,17 @@ class _Cache(FunctionCache):
         self._cache_path = str(folder)
         self._cache_file = _ForgivingIndex(self._cache_path, self._impl.filename_base, source_stamp="")
         self.enable()
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Find machine code; where there is none, claim to compile it, once nobody else does so."""
+        found = super().load_overload(sig, target_context)
+        kernel = self._kernel()
+        if found is None and kernel:
+            types_called = _ADDRESS.sub("", str(sig))  # a kernel that is an argument shows its address
+            what = f"{self._cache_path} {self._impl.filename_base} {types_called} {kernel._for_kernel}"
+            kernel._claims.enter_context(_claimed(what, kernel.__name__))
+            found = super().load_overload(sig, target_context)
+        return found
 
     def _index_key(self, sig: Any, codegen: Any) -> tuple:
         return (*super()._index_key(sig, codegen), self._kernel()._for_kernel)  # type: ignore[union-attr]  # it lives as long as its cache
@@ -481,6 +503,11 @@ class _ForgivingIndex(IndexDataCacheFile):
     def _load_index(self) -> dict:
         return {_entry(packed): name for packed, name in super()._load_index().items()}
 
+    def save(self, key: Any, data: Any) -> None:
+        """Add an entry; another process that adds one meanwhile could take its file for its own."""
+        with _claimed(self._index_path):
+            super().save(key, data)
+
     def _save_index(self, overloads: dict) -> None:
         packed = {key if isinstance(key, bytes) else self._dump(key): name for key, name in overloads.items()}
         super()._save_index(packed)
@@ -491,6 +518,55 @@ def _entry(packed: bytes) -> Any:
         return pickle.loads(packed)
     except (AttributeError, ImportError):
         return packed
+
+
+@cache
+def _claims_file() -> int:
+    """Descriptor of the file whose bytes stand for what processes claim; open as long as the process lives.
+
+    Raises
+    ------
+    OSError
+        If there is none to be had.
+    """
+    place = _place()
+    if place is None:
+        raise FileNotFoundError("no folder for machine code")
+    return os.open(place / "claims", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+
+
+@contextmanager
+def _claimed(what: str, name: str = "") -> Iterator[None]:
+    """Wait until no other process claims the same, and claim it; a claim dies with its process.
+
+    After `_PATIENCE`, or where files cannot be locked, it goes on without: all that is lost then is time.
+    """
+    place = int.from_bytes(hashlib.sha256(what.encode()).digest()[:7], "big")  # a byte; the file stays empty
+    began, told = time.monotonic(), not name
+    with suppress(OSError):
+        while not _locks(_claims_file(), place):
+            if time.monotonic() - began > _PATIENCE:
+                break
+            if not told and time.monotonic() - began > _LONG:
+                told = True
+                _logger.info("waiting for another process that compiles %s ...", name)
+            time.sleep(0.05)
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            fcntl.lockf(_claims_file(), fcntl.LOCK_UN, 1, place)
+
+
+def _locks(descriptor: int, place: int) -> bool:
+    """Lock a byte of a file, unless another process has done so."""
+    try:
+        fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, place)
+    except OSError as error:
+        if error.errno in (errno.EACCES, errno.EAGAIN):
+            return False
+        raise
+    return True
 
 
 # What is told

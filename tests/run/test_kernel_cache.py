@@ -398,6 +398,52 @@ def test_other_processes_take_in_a_kernel_that_they_find(tmp_path):
     assert found == [["above", "1.5", "1.0", "0"], ["above", "1.5", "1.5", "1"], ["above", "1.5", "1.5", "0"]]
 
 
+SLOW = """
+import logging, sys
+from numba.extending import overload
+from cvt_hpc import kernels
+logging.basicConfig(level=logging.INFO, stream=sys.stdout, format="%(message)s")
+kernels._LONG = 0.0
+def plus(x): pass
+@overload(plus)
+def typed(x):
+    print("typing", flush=True)
+    sys.stdin.readline()
+    return lambda x: x + 1.0
+@kernels.kernel
+def slow(x): return plus(x)
+"""
+
+
+@pytest.mark.parametrize(("killed", "result"), [(False, "2.0 1\n"), (True, "2.0 0\n")])
+def test_who_needs_the_same_code_waits_for_the_process_that_compiles_it(tmp_path, killed, result):
+    (tmp_path / "slowly.py").write_text(SLOW)
+    program = "from slowly import slow; print(slow(1.0), sum(slow.stats.cache_hits.values()))"
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(PACKAGE.parent)}
+
+    def begun():
+        return subprocess.Popen(
+            [sys.executable, "-c", program],
+            cwd=tmp_path,
+            env=os.environ | cache,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    with begun() as first:
+        assert "typing\n" in iter(first.stdout.readline, "")
+        with begun() as second:
+            assert second.stdout.readline().startswith("waiting for another process that compiles slow")
+            if killed:
+                first.kill()
+            else:
+                first.communicate("\n")
+            said, _ = second.communicate("\n")
+    assert said.endswith(result)
+    assert ("typing" in said) == killed
+
+
 @register_jitable
 def shared(x):
     return x - 1.0
@@ -510,8 +556,9 @@ def test_nobody_else_can_write_to_the_folders(package, chosen):
         assert module.kernel(plus_one)(1.0) == 2.0
     finally:
         os.umask(before)
-    made = [chosen / "cvt_hpc-kernels", *(chosen / "cvt_hpc-kernels").iterdir()]
-    assert [folder.stat().st_mode & 0o777 for folder in made] == [0o700, 0o700]
+    place = chosen / "cvt_hpc-kernels"
+    modes = {(path.is_dir(), path.stat().st_mode & 0o777) for path in (place, *place.iterdir())}
+    assert modes == {(True, 0o700), (False, 0o600)}  # the file is that of claims
 
 
 def link(folder):
@@ -619,7 +666,7 @@ def test_a_new_folder_takes_the_place_of_those_that_nobody_asks_for(package, cho
 
 def test_asking_for_a_folder_renews_it_and_removes_none(package, chosen):
     load(package).kernel(plus_one)(1.0)
-    (asked,) = (chosen / "cvt_hpc-kernels").iterdir()
+    (asked,) = (path for path in (chosen / "cvt_hpc-kernels").iterdir() if path.is_dir())
     other = aged(asked.with_name("other"), 31.0)
     aged(asked, 31.0)
     function = load(package).kernel(plus_one)

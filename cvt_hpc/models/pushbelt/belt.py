@@ -237,6 +237,8 @@ class Workspace(NamedTuple):
         Inputs of the step.
     increments : (1 + 2 modes,) array
         `BeltState.increments` at its start.
+    kept : (2, STATE_FIELDS) array
+        States of two elements before the last correction.
     """
 
     step: LaneArray
@@ -248,6 +250,7 @@ class Workspace(NamedTuple):
     border: np.ndarray
     inputs: np.ndarray
     increments: np.ndarray
+    kept: np.ndarray
 
 
 # Fields of Workspace.step

@@ -182,4 +182,5 @@ def workspace(belt: Belt, nodes: int) -> Workspace:
         border=np.zeros((columns - 1, columns)),
         inputs=np.zeros(4),
         increments=np.zeros(columns - 1),
+        kept=np.zeros((2, STATE_FIELDS)),
     )
