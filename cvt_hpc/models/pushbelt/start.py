@@ -182,5 +182,6 @@ def workspace(belt: Belt, nodes: int) -> Workspace:
         reduced=np.zeros((4 * parts, 4 * parts + columns)),
         border=np.zeros((columns - 1, columns)),
         inputs=np.zeros(INPUTS),
+        increments=np.zeros(columns - 1),
         kept=np.zeros((2, STATE_FIELDS)),
     )
