@@ -15,7 +15,7 @@ from support.complementarity import solve_lcp
 from support.rcm import conserved, equations
 
 MASS, INERTIA = 0.01, 2e-7  # of an element [kg], [kg m^2]
-NO_INPUTS = np.zeros((2, 4))
+NO_INPUTS = np.zeros((2, b.INPUTS))
 
 
 def belt_with(**values):

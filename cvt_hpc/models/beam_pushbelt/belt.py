@@ -97,7 +97,7 @@ class Workspace(NamedTuple):
         Impulses that friction has added to those of the last step [N s].
     free : (n, 3) array
         Both speeds of the ring at the elements without them [m/s], and the saddles' impulses [N s].
-    inputs : (4,) array
+    inputs : (INPUTS,) array
         Inputs of the step.
     """
 

@@ -15,10 +15,12 @@ from cvt_hpc.models.pushbelt.record import coordinates, histories, judge
 # step, and per sample
 BEAM_COST, ELEMENT_COST, RUB_COST, SAMPLE_COST = 3e-6, 6e-7, 2e-7, 3e-4
 
+_OTHERWISE = {
+    "iterations": "sweeps over all contacts in a step, mean",
+    "numerical_damping": "0: what time steps damp is not told apart, but left in power_residual",
+}
 VARIABLES = tuple(
-    replace(variable, comment="sweeps over all contacts in a step, mean")
-    if variable.name == "iterations"
-    else variable
+    replace(variable, comment=_OTHERWISE.get(variable.name, variable.comment))
     for variable in pushbelt.VARIABLES
 )
 

@@ -20,6 +20,7 @@ from cvt_hpc.models.beam_pushbelt.belt import (
 from cvt_hpc.models.pushbelt.belt import (
     HEADING_Y,
     HEADING_Z,
+    INPUTS,
     LENGTH,
     OMEGA,
     TOTALS,
@@ -194,5 +195,5 @@ def workspace(ring: Chain, elements: int) -> Workspace:
         coupling=np.zeros((n, 2, whole)),
         impulses=np.zeros(whole),
         free=np.zeros((n, 3)),
-        inputs=np.zeros(4),
+        inputs=np.zeros(INPUTS),
     )

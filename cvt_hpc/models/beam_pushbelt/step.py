@@ -73,6 +73,7 @@ from cvt_hpc.models.pushbelt.belt import (
     HEADING_Z,
     IN_A_ROW,
     IN_DRIVEN_THRUST,
+    IN_DRIVING_SHIFT,
     IN_DRIVING_THRUST,
     IN_LOAD,
     IN_SPEED,
@@ -191,6 +192,7 @@ def _accept(belt, state, work, inputs, dt):
     for k in range(ring.q.size):
         ring.q[k] += dt * ring.u[k]
     driving = dt * belt.driving_rate * (inputs[IN_DRIVING_THRUST] - driving_thrust)
+    driving += dt * inputs[IN_DRIVING_SHIFT]
     driven = dt * belt.driven_rate * (inputs[IN_DRIVEN_THRUST] - driven_thrust)
     pulleys[DRIVING_RADIUS] += driving
     pulleys[DRIVEN_RADIUS] += driven
@@ -245,7 +247,7 @@ def advance(belt, proximal, state, work, inputs, steps, dt):
         The state at the start; at the end, of its last step.
     work : Workspace
         Work space.
-    inputs : (2, 4) array
+    inputs : (2, INPUTS) array
         As `pushbelt.step.advance` takes them.
     steps : int
         Number of steps.
@@ -261,7 +263,7 @@ def advance(belt, proximal, state, work, inputs, steps, dt):
     counters = state.counters
     for k in range(steps):
         share = (k + 1.0) / steps
-        for entry in range(4):
+        for entry in range(work.inputs.size):
             work.inputs[entry] = inputs[0, entry] + share * (inputs[1, entry] - inputs[0, entry])
         outcome = _step(belt, proximal, state, work, work.inputs, dt)
         counters[STEPS] += 1

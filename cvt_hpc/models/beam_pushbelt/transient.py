@@ -16,6 +16,7 @@ from cvt_hpc.models.pushbelt import belt as fields
 from cvt_hpc.models.pushbelt import transient as pushbelt
 from cvt_hpc.models.pushbelt.readings import Reading
 from cvt_hpc.multibody.rcm_beam import energies
+from cvt_hpc.variables import Status
 
 CHANNELS = pushbelt.CHANNELS
 
@@ -52,10 +53,18 @@ class Transient(pushbelt.Transient):
         of_ring = sum(sum(energies(ring.beam, ring.q[i : i + 8], ring.u[i : i + 8])) for i in parts)
         return of_ring + 0.5 * float(kinetic + pressed)
 
-    def _sound(self, record: dict[str, Any]) -> tuple[float, float]:
-        """As of `pushbelt`, but that theta above 1/2 may damp the ring's vibrations by any power."""
-        least, most = super()._sound(record)
-        return least, most if self._method.theta <= 0.5 else np.inf
+    def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
+        """As of `pushbelt`; but the balance holds what steps damp, which theta above 1/2 may do at will."""
+        unsolved, flow = record["unsolved_share"], max(abs(record["driving_power"]), record["loss"])
+        either = (self._most_damped() + pushbelt.OF_LOSS * record["loss"]) / flow
+        most = either if self._method.theta <= 0.5 else np.inf
+        if not unsolved <= pushbelt.MOST_UNSOLVED:
+            why = f"{unsolved:.1%} of the steps were not solved, the last {self._fault()}"
+        elif not -either <= record["power_residual"] <= most:
+            why = f"the power balance is open by {record['power_residual']:.3g}, not by {either:.3g} or less"
+        else:
+            return None
+        return Status.FAILED_NUMERICS, why
 
     def counters(self) -> dict[str, int]:
         """Work done so far: steps, sweeps as iterations, unsolved steps, corrections of impulses."""
