@@ -79,7 +79,7 @@ def write(array, values):
 
 
 def constant(thrust, load):
-    return np.array([[SPEED, 0.0, thrust, load]] * 2)
+    return np.array([[SPEED, 0.0, thrust, load, 0.0]] * 2)
 
 
 def shaken(seed, **changes):
@@ -262,7 +262,7 @@ def test_free_spinning_ring():
     f[:, b.LENGTH] = chord / (1.0 + tension / belt.ring_stiffness)
     write(state.elements, f)
     work = workspace(belt, NODES)
-    assert advance(belt, b.Newton(), state, work, np.zeros((2, 4)), 1000, STEP) == b.CONVERGED
+    assert advance(belt, b.Newton(), state, work, np.zeros((2, b.INPUTS)), 1000, STEP) == b.CONVERGED
     f = fields(state.elements)
     # 1e-4: speeds are those half a step before, whose start is not on the discrete orbit
     assert f[:, b.TENSION] == pytest.approx(tension, rel=1e-4)
@@ -286,7 +286,7 @@ def test_a_strand_decays_by_the_transverse_damping():
     def march(f, damping, steps):
         write(state.elements, f)
         damped = belt._replace(transverse_damping=damping * pitch)
-        assert advance(damped, b.Newton(), state, work, np.zeros((2, 4)), steps, STEP) == b.CONVERGED
+        assert advance(damped, b.Newton(), state, work, np.zeros((2, b.INPUTS)), steps, STEP) == b.CONVERGED
         return fields(state.elements)
 
     f = fields(state.elements)
@@ -337,7 +337,7 @@ def test_friction_is_read_at_a_speed_that_follows_with_memory():
     falling = {"friction_law": "stribeck", "friction_gradient": -0.4, "friction_memory": memory}
     belt, state, work = on_a_pulley(given(**falling), sliding, force)
     belt = belt._replace(mass=1e6, inertia=1e6)
-    inputs = np.array([[state.pulleys[b.DRIVING_SPEED], 0.0, 0.0, 0.0]] * 2)
+    inputs = np.array([[state.pulleys[b.DRIVING_SPEED], 0.0, 0.0, 0.0, 0.0]] * 2)
     for k in range(1, 11):
         assert advance(belt, b.Newton(), state, work, inputs, 10, STEP) == b.CONVERGED
         f = fields(state.elements)
@@ -602,7 +602,7 @@ def test_heads_touch_in_a_belt_bent_inside_out():
     belt = belt._replace(thickness=thickness)
     write(state.elements, f)
     work = workspace(belt, NODES)
-    assert advance(belt, b.Newton(), state, work, np.zeros((2, 4)), 1000, STEP) == b.CONVERGED
+    assert advance(belt, b.Newton(), state, work, np.zeros((2, b.INPUTS)), 1000, STEP) == b.CONVERGED
     f = fields(state.elements)
     # 1e-4 as of the ring without push; the push itself sets with the elements' tilt
     assert f[:, b.TENSION] - f[:, b.HEAD] == pytest.approx(centrifugal, rel=1e-4)

@@ -48,7 +48,8 @@ STATE_FIELDS = CHANGE + 4
 DRIVING_SPEED, DRIVEN_SPEED, DRIVING_RADIUS, DRIVEN_RADIUS = range(4)
 
 # Entries of the inputs, at the start and at the end of a call
-IN_SPEED, IN_DRIVING_THRUST, IN_DRIVEN_THRUST, IN_LOAD = range(4)
+IN_SPEED, IN_DRIVING_THRUST, IN_DRIVEN_THRUST, IN_LOAD, IN_DRIVING_SHIFT = range(5)
+INPUTS = IN_DRIVING_SHIFT + 1
 
 # Entries of the totals: time, and what adds up over it
 (

@@ -42,6 +42,7 @@ from cvt_hpc.models.pushbelt.belt import (
     HEADING_Z,
     IN_A_ROW,
     IN_DRIVEN_THRUST,
+    IN_DRIVING_SHIFT,
     IN_DRIVING_THRUST,
     IN_LOAD,
     IN_SPEED,
@@ -324,6 +325,7 @@ def _accept(belt, state, work, inputs, dt):
     for k in range(2 * modes):
         state.openings[k // modes, k % modes] += state.increments[1 + k]
     driving = dt * belt.driving_rate * (inputs[IN_DRIVING_THRUST] - driving_thrust)
+    driving += dt * inputs[IN_DRIVING_SHIFT]
     driven = dt * belt.driven_rate * (inputs[IN_DRIVEN_THRUST] - driven_thrust)
     pulleys[DRIVING_RADIUS] += driving
     pulleys[DRIVEN_RADIUS] += driven
@@ -349,9 +351,10 @@ def advance(belt, newton, state, work, inputs, steps, dt):
         The state at the start; at the end, of its last step.
     work : Workspace
         Work space.
-    inputs : (2, 4) array
-        Speed of the driving pulley [rad/s], thrust on a sheave of both pulleys [N], and torque of the load
-        [N m], at the start and at the end: between, they change linearly.
+    inputs : (2, INPUTS) array
+        Speed of the driving pulley [rad/s], thrust on a sheave of both pulleys [N], torque of the load [N m],
+        and speed of the driving radius by what moves the driving sheave [m/s], at the start and at the end:
+        between, they change linearly.
     steps : int
         Number of steps.
     dt : float
@@ -366,7 +369,7 @@ def advance(belt, newton, state, work, inputs, steps, dt):
     counters = state.counters
     for k in range(steps):
         share = (k + 1.0) / steps
-        for entry in range(4):
+        for entry in range(work.inputs.size):
             work.inputs[entry] = inputs[0, entry] + share * (inputs[1, entry] - inputs[0, entry])
         state.pulleys[DRIVING_SPEED] = work.inputs[IN_SPEED]
         for entry in range(work.increments.size):

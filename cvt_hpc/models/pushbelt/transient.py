@@ -11,10 +11,12 @@ from cvt_hpc.models.marched import Probe, batches_of_one
 from cvt_hpc.models.pushbelt import belt as fields
 from cvt_hpc.models.pushbelt.belt import CONTACTS, NOT_CONVERGED, Newton
 from cvt_hpc.models.pushbelt.parameters import MODES, path_length
+from cvt_hpc.models.pushbelt.profiles import multiple
 from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Reading, Readings
 from cvt_hpc.models.pushbelt.start import of_lanes, start, workspace
 from cvt_hpc.models.pushbelt.start_up import StartUps, fingerprint
 from cvt_hpc.models.pushbelt.step import advance
+from cvt_hpc.physics.geometry import driven_radius
 from cvt_hpc.recording import sample_count, start_up_samples
 from cvt_hpc.variables import Status
 from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, STRANDS
@@ -161,8 +163,19 @@ class Transient:
         self._march(self._inputs_along(0), 0)
 
     def _inputs_along(self, sample: int) -> np.ndarray:
-        """Inputs at the start and at the end of a sample, (2, 4)."""
-        return np.array([self._inputs((sample + end) * self.interval) for end in (0, 1)])
+        """Inputs at the start and at the end of a sample, (2, INPUTS)."""
+        ends = [(sample + end) * self.interval for end in (0, 1)]
+        shift = 0.0
+        if self._belt.driving_rate == 0.0 and self.parameters["ratio_profile"]:
+            before, after = map(self._prescribed_radius, ends)
+            shift = (after - before) / self.interval
+        return np.array([[*self._inputs(time), shift] for time in ends])
+
+    def _prescribed_radius(self, time: float) -> float:
+        """Radius to which the position of the driving sheave brings the belt at a time [m]."""
+        p = self.parameters
+        ratio = p["ratio"] * multiple(p, "ratio", time)
+        return driven_radius(ratio, self.path.path_length, p["centre_distance"]) / ratio
 
     def _inputs(self, time: float) -> tuple[float, float, float, float]:
         """Speed [rad/s], thrusts on both pulleys [N] and torque on the driven one [N m] at a time."""
@@ -175,9 +188,11 @@ class Transient:
             share = begun + (1.0 - begun) * min(max((time - rise) / (end - rise), 0.0), 1.0)
         clamped = load_course.py_func(time, CLAMPED * rise, rise, 1.0, 1.0)
         driving, driven = (
-            FIRST_THRUST + clamped * (thrust - FIRST_THRUST) for thrust in (p["driving_thrust"], p["thrust"])
+            FIRST_THRUST + clamped * (p[name] * multiple(p, name, time) - FIRST_THRUST)
+            for name in ("driving_thrust", "thrust")
         )
-        return share * p["driving_speed"], driving, driven, p["ratio"] * load
+        speed = share * p["driving_speed"] * multiple(p, "driving_speed", time)
+        return speed, driving, driven, p["ratio"] * load
 
     def load(self, time: float) -> float:
         """Torque at the driving pulley without losses [N m]."""
@@ -185,11 +200,12 @@ class Transient:
         begun = p["load_start"] if ramped(p) == "load" else p["load"]
         clamped = CLAMPED * p["rise_time"]
         rise, end = p["rise_time"] - clamped, p["duration"] - clamped
-        return load_course.py_func(max(time - clamped, 0.0), rise, end, begun, p["load"])
+        course = load_course.py_func(max(time - clamped, 0.0), rise, end, begun, p["load"])
+        return course * multiple(p, "load", time)
 
     def _take_sample(self, inputs: np.ndarray) -> None:
         found = Reading(self._readings, of_lanes(self._state.elements), self._state)
-        speed, _, _, torque = inputs
+        speed, torque = inputs[fields.IN_SPEED], inputs[fields.IN_LOAD]
         load = torque / self.parameters["ratio"]
         self._rows[self.done] = [*found.displacement(), load, speed, *found.scalars()]
         stored = np.nan
@@ -356,7 +372,9 @@ def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
         "driving_rate": p["sheave_rate"] if p["driving_thrust"] > 0.0 else 0.0,
         "driven_rate": p["sheave_rate"],
         "modal_stiffness": () if rigid else p["sheave_stiffness"] * np.array([p[key] for key in MODES]),
-        "driving_speed": p["speed_start"] if ramped(p) == "speed" else p["driving_speed"],
+        "driving_speed": p["speed_start"]
+        if ramped(p) == "speed"
+        else p["driving_speed"] * multiple(p, "driving_speed", 0.0),
     }
 
 
