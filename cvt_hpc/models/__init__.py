@@ -2,6 +2,7 @@
 
 MODELS = {
     "auto": "cvt_hpc.models.auto",
+    "belt_drive": "cvt_hpc.models.belt_drive",
     "criterion": "cvt_hpc.models.criterion",
     "elastic_belt": "cvt_hpc.models.elastic_belt",
     "linear_stability": "cvt_hpc.models.linear_stability",

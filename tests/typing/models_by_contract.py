@@ -2,6 +2,7 @@
 
 from cvt_hpc.models import (
     auto,
+    belt_drive,
     criterion,
     elastic_belt,
     linear_stability,
@@ -14,6 +15,8 @@ from cvt_hpc.models import (
 )
 from cvt_hpc.models.auto import record as auto_record
 from cvt_hpc.models.auto import transient as auto_transient
+from cvt_hpc.models.belt_drive import record as belt_drive_record
+from cvt_hpc.models.belt_drive import transient as belt_drive_transient
 from cvt_hpc.models.contract import Declaration, Recorded, Transient
 from cvt_hpc.models.criterion import record as criterion_record
 from cvt_hpc.models.elastic_belt import record as elastic_belt_record
@@ -31,6 +34,7 @@ from cvt_hpc.models.strand import record as strand_record
 
 declared: Declaration
 declared = auto
+declared = belt_drive
 declared = criterion
 declared = elastic_belt
 declared = linear_stability
@@ -43,6 +47,7 @@ declared = strand
 
 recorded: Recorded
 recorded = auto_record
+recorded = belt_drive_record
 recorded = criterion_record
 recorded = elastic_belt_record
 recorded = linear_stability_record
@@ -54,6 +59,7 @@ recorded = strand_record
 
 marched: Transient
 marched = auto_transient
+marched = belt_drive_transient
 marched = elastic_belt_transient
 marched = moving_string_transient
 marched = oscillator_transient
