@@ -66,4 +66,4 @@ def plan_lines(diagram: Diagram) -> Iterator[str]:
     ends = f", if vibration begins and ends once along each branch: {core_time_in_words(transient)}"
     yield f"runs: {f'about {runs}{ends}' if runs else 'none'}"
     total = core_time_in_words(steady + transient)
-    yield f"estimated cost: {total}, in one process, anew after an interruption"
+    yield f"estimated cost: {total}, in one process"

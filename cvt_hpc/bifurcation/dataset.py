@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
-from cvt_hpc.bifurcation.job import Diagram
+from cvt_hpc.bifurcation.job import LOAD, Diagram, load_attributes
 from cvt_hpc.models.linear_stability.branch import Branch, tracks
 from cvt_hpc.models.linear_stability.modes import Mode
 from cvt_hpc.models.steady_variator.forces import quantities
@@ -22,6 +22,8 @@ from cvt_hpc.vibration.criticality import Kind
 if TYPE_CHECKING:
     from cvt_hpc.bifurcation.followed import Followed
 
+    _Numbered = Sequence[tuple[int, Followed]]
+
 STRAND = "strand in which the mode is largest: 1 is t1, 2 is t2"
 OF_MODES = {  # what is told of a mode: value, unit, name for people, comment
     "growth_rate": (lambda mode: mode.growth, "s-1", "growth rate", "of the mode"),
@@ -32,7 +34,6 @@ OF_MODES = {  # what is told of a mode: value, unit, name for people, comment
 BRANCH = "number of the branch in the grid of the axes, counted in C order"
 OF_KIND = "why the Hopf point is found to be of its kind"
 START = "0: near the steady state; 1: the large disturbance"
-LOAD = "torque at the driving pulley"
 REASON = "why the run failed, or was found to vibrate or not"
 
 
@@ -52,15 +53,19 @@ class Direction(IntEnum):
     GROWS_BELOW = 1
 
 
-def diagram_dataset(diagram: Diagram, followed: Sequence[Followed]) -> xr.Dataset:
+def diagram_dataset(
+    diagram: Diagram, followed: Mapping[int, Followed], makers: Sequence[Mapping[str, Any]] = ()
+) -> xr.Dataset:
     """All branches in one dataset.
 
     Parameters
     ----------
     diagram : Diagram
         What was asked for.
-    followed : sequence of Followed
-        Its first branches, in the order of `diagram.branches`: all, or those that are done.
+    followed : mapping
+        Branches by their place in `diagram.branches`: all, or those that are done.
+    makers : sequence of mapping
+        By what they were computed, as `global_attributes` takes it.
 
     Returns
     -------
@@ -77,25 +82,26 @@ def diagram_dataset(diagram: Diagram, followed: Sequence[Followed]) -> xr.Datase
     for derived in diagram.job.derived:  # none of them along the load
         values = np.array(derived.values).reshape([lengths[name] for name in derived.axes])
         axes[derived.name] = derived.axes, values, derived_coordinate(derived, diagram.job).attributes
-    axes["load"] = ("load", list(diagram.loads), attributes("load", "N m", LOAD))
+    axes["load"] = ("load", list(diagram.loads), load_attributes(diagram.job))
     labels = {
         name: (name, c.values.astype(object), attributes(c.long_name, c.units, c.comment))
         for name, c in coordinates(diagram.job.parameters).items()
     }
     subject = f"bifurcations of model {diagram.job.model}"
-    told = {**global_attributes(diagram.job, diagram.resolved(), subject), CONTENT: DIAGRAM}
-    variables = _steady(diagram, followed) | _modes(diagram, followed) | _onsets(followed) | _runs(followed)
+    told = {**global_attributes(diagram.job, diagram.resolved(), subject, makers=makers), CONTENT: DIAGRAM}
+    rows = sorted(followed.items())
+    variables = _steady(diagram, rows) | _modes(diagram, rows) | _onsets(rows) | _runs(rows)
     return xr.Dataset(variables, axes | labels, told)
 
 
-def _steady(diagram: Diagram, followed: Sequence[Followed]) -> dict[str, Any]:
+def _steady(diagram: Diagram, followed: _Numbered) -> dict[str, Any]:
     """Numbers of the steady states over axes and load, and whether they are stable."""
     sizes = {name: c.values.size for name, c in coordinates(diagram.job.parameters).items()}
     grid, dims = _grid(diagram)
     stability = np.full((len(diagram.branches), len(diagram.loads)), Stability.NOT_COMPUTED, np.int8)
-    stability[: len(followed)] = Stability.NOT_FOUND
+    stability[[row for row, _ in followed]] = Stability.NOT_FOUND
     values = {v.name: np.full((*stability.shape, *(sizes[d] for d in v.dims)), np.nan) for v in VARIABLES}
-    for row, one in enumerate(followed):
+    for row, one in followed:
         for point in one.branch.points:
             place = row, diagram.loads.index(point.steady.load)
             stability[place] = Stability.UNSTABLE if point.growth > 0.0 else Stability.STABLE
@@ -110,15 +116,15 @@ def _steady(diagram: Diagram, followed: Sequence[Followed]) -> dict[str, Any]:
     return {"stability": (dims, stability.reshape(grid), flags)} | told
 
 
-def _modes(diagram: Diagram, followed: Sequence[Followed]) -> dict[str, Any]:
+def _modes(diagram: Diagram, followed: _Numbered) -> dict[str, Any]:
     """What is told of the modes over axes, load and mode."""
     grid, dims = _grid(diagram)
-    lines = [mode_lines(one.branch) for one in followed]
-    most = max((len(of_one) for of_one in lines), default=0)
+    lines = [(row, mode_lines(one.branch)) for row, one in followed]
+    most = max((len(of_one) for _, of_one in lines), default=0)
     told = {}
     for name, (value, *named) in OF_MODES.items():
         array = np.full((len(diagram.branches), len(diagram.loads), most), np.nan)
-        for row, of_one in enumerate(lines):
+        for row, of_one in lines:
             for column, line in enumerate(of_one):
                 for load, mode in line.items():
                     array[row, diagram.loads.index(load), column] = value(mode)
@@ -136,11 +142,11 @@ def mode_lines(branch: Branch) -> list[dict[float, Mode]]:
     return sorted(lines, key=lambda line: -max(mode.growth for mode in line.values()))
 
 
-def _onsets(followed: Sequence[Followed]) -> dict[str, Any]:
+def _onsets(followed: _Numbered) -> dict[str, Any]:
     """The Hopf points of all branches, one after the other."""
     rows = [
         (number, onset, kind)
-        for number, one in enumerate(followed)
+        for number, one in followed
         for onset, kind in zip(one.onsets, one.kinds, strict=True)
     ]
     columns = {
@@ -180,9 +186,9 @@ def _onsets(followed: Sequence[Followed]) -> dict[str, Any]:
     return told
 
 
-def _runs(followed: Sequence[Followed]) -> dict[str, Any]:
+def _runs(followed: _Numbered) -> dict[str, Any]:
     """The runs of all branches, one after the other."""
-    rows = [(number, run) for number, one in enumerate(followed) for run in one.runs]
+    rows = [(number, run) for number, one in followed for run in one.runs]
     columns = {
         "run_branch": ([n for n, _ in rows], np.int32, "1", "branch", BRANCH),
         "run_load": ([run.value for _, run in rows], float, "N m", "load", LOAD),

@@ -1,8 +1,8 @@
-"""A bifurcation diagram made: branches followed, Hopf points found and classified, written and drawn."""
+"""A bifurcation diagram made: branches followed, Hopf points found and classified, kept, written, drawn."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -18,6 +18,7 @@ from cvt_hpc.bifurcation.drawing import draw_branch
 from cvt_hpc.bifurcation.folder import DiagramFolder, picture_names
 from cvt_hpc.bifurcation.followed import Followed
 from cvt_hpc.bifurcation.job import Asked, Diagram
+from cvt_hpc.bifurcation.table import load_text
 from cvt_hpc.files import written_aside
 from cvt_hpc.models.elastic_belt.belt import State, mesh
 from cvt_hpc.models.linear_stability.branch import CLOSE, Branch, Onset, branch, onsets
@@ -60,9 +61,10 @@ class DiagramReport:
 def make_diagram(
     diagram: Diagram, out: Path, *, fresh: bool = False, tell: Callable[[str], None] = lambda line: None
 ) -> DiagramReport:
-    """Follow all branches, run beside them, and write dataset and pictures after each.
+    """Follow the branches that are not kept in the folder, run beside them, and write dataset and pictures.
 
-    A dataset of the same job that holds more branches, by an earlier start, is left until there are as many.
+    Each branch is kept, and in the dataset, once it is done. A dataset of the same job that holds more
+    branches than are kept, as of an earlier version, is left until there are as many.
 
     Parameters
     ----------
@@ -80,24 +82,39 @@ def make_diagram(
     InputError
         If the folder holds the diagram of another job or is in use, or the system refuses.
     """
-    folder, pictures = DiagramFolder(out), [out / name for name in picture_names(len(diagram.branches))]
-    followed: list[Followed] = []
-    costs = [predicted_cost(diagram, asked).total for asked in diagram.branches]
-    with folder.claimed(diagram, fresh=fresh), closing(Steps(costs, 0, "branch", tell)) as steps:
-        held, total = folder.branches(), len(diagram.branches)
-        if held:
-            words = "all are followed anew, and it is replaced once as many are done"
-            tell(f"{folder.dataset} holds {held} of {total} branches of an earlier start; {words}")
-        for number, asked in enumerate(diagram.branches, 1):
-            # matrices are small: threads of the linear algebra would wait for each other in loops
-            with threadpool_limits(1):
-                followed.append(_follow(diagram, asked))
-            if number >= held:
-                with written_aside(folder.dataset) as aside:
-                    write_netcdf(diagram_dataset(diagram, followed), aside)
-            draw_branch(diagram, followed[-1], pictures[number - 1])
-            steps.ended(f"branches: {len(followed[-1].onsets)} Hopf points")
-    return DiagramReport(tuple(followed), folder.dataset, tuple(pictures))
+    folder, branches = DiagramFolder(out, diagram), diagram.branches
+    pictures = [out / name for name in picture_names(len(branches))]
+    with folder.claimed(diagram, fresh=fresh):
+        loaded = ((number, folder.load_branch(number)) for number in range(len(branches)))
+        followed = {number: one for number, one in loaded if one is not None}
+        folder.branches.warn_of_others(folder.dataset)
+        stored = folder.stored_branches()
+        if stored > len(followed):
+            words = "all but those are followed anew, and it is replaced once as many are done"
+            tell(f"{folder.dataset} holds {stored} branches, {len(followed)} are kept beside it; {words}")
+        for number, one in followed.items():
+            draw_branch(diagram, one, pictures[number])
+        missing = [number for number in range(len(branches)) if number not in followed]
+        if not missing:
+            _write(diagram, folder, followed)
+        costs = [predicted_cost(diagram, branches[number]).total for number in missing]
+        with closing(Steps(costs, len(followed), "branch", tell)) as steps:
+            for number in missing:
+                # matrices are small: threads of the linear algebra would wait for each other in loops
+                with threadpool_limits(1):
+                    one = followed[number] = _follow(diagram, branches[number])
+                folder.save_branch(number, one)
+                if len(followed) >= stored:
+                    _write(diagram, folder, followed)
+                draw_branch(diagram, one, pictures[number])
+                steps.ended(f"branches: {len(one.onsets)} Hopf points")
+    return DiagramReport(tuple(one for _, one in sorted(followed.items())), folder.dataset, tuple(pictures))
+
+
+def _write(diagram: Diagram, folder: DiagramFolder, followed: Mapping[int, Followed]) -> None:
+    """Write the dataset of the branches that are done."""
+    with written_aside(folder.dataset) as aside:
+        write_netcdf(diagram_dataset(diagram, followed, folder.branches.makers), aside)
 
 
 def _follow(diagram: Diagram, asked: Asked) -> Followed:
@@ -114,7 +131,8 @@ def _follow(diagram: Diagram, asked: Asked) -> Followed:
         starts = (Start(small, partial(_steady_state, belt, found)), Start(large))
         places = [onset.load for onset in hopf if onset.mode.frequency >= lowest]
         runs = attractors(asked.runs, "load", starts, diagram.loads, places, diagram.resolution)
-    kinds = [judged(onset, hopf, hidden, runs, lowest) for onset in hopf]
+    in_words = partial(load_text, diagram)
+    kinds = [judged(onset, hopf, hidden, runs, lowest, in_words) for onset in hopf]
     return Followed(asked, grid, found, hopf, hidden, runs, kinds)
 
 
@@ -144,6 +162,7 @@ def judged(
     hidden: list[tuple[float, float]],
     runs: list[Attractor],
     lowest: float,
+    in_words: Callable[[float], str],
 ) -> Criticality:
     """Whether a Hopf point is super- or subcritical, of one whose mode is within what runs are judged by.
 
@@ -157,6 +176,8 @@ def judged(
         From near the steady state (start 0) and from the large start (1).
     lowest : float
         Lowest frequency of a mode that runs are judged by [Hz].
+    in_words : callable
+        Turns a load [N m] into words.
     """
     if not runs:
         return Criticality(Kind.UNDECIDED, np.nan, np.nan, "no runs were asked for")
@@ -186,4 +207,5 @@ def judged(
             max((load for load in ends if load <= onset.load), default=-np.inf),
             min((load for load in ends if load > onset.load), default=np.inf),
         ),
+        in_words=in_words,
     )

@@ -16,10 +16,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from cvt_hpc.analysis.figures import WIDTH, balanced, draw
+from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, draw
 from cvt_hpc.bifurcation.attractors import FROM, Attractor
 from cvt_hpc.bifurcation.dataset import mode_lines
-from cvt_hpc.bifurcation.job import Diagram
+from cvt_hpc.bifurcation.job import Diagram, load_attributes
 from cvt_hpc.bifurcation.table import gap_lines, place_text
 from cvt_hpc.models.linear_stability.branch import Onset, Point
 from cvt_hpc.vibration.classes import OccurrenceClass
@@ -54,18 +54,19 @@ def branch_figure(diagram: Diagram, followed: Followed) -> Figure:
     """Compose the picture of `draw_branch`; to be called within STYLE."""
     figure = Figure((WIDTH, 8.2), layout="constrained")
     upper, middle, lower = figure.subplots(3, 1, sharex=True, height_ratios=(1.2, 1.1, 1.0))
-    _draw_attractors(upper, followed)
-    _draw_modes(middle, lower, followed)
+    scale, unit = coordinate_unit(load_attributes(diagram.job))
+    _draw_attractors(upper, followed, scale)
+    _draw_modes(middle, lower, followed, scale)
     loads = np.array(diagram.loads)
     for axes in (upper, middle, lower):
         for low, high in _gaps(loads, followed):
-            axes.axvspan(low, high, color=GAP, linewidth=0, zorder=0)
+            axes.axvspan(scale * low, scale * high, color=GAP, linewidth=0, zorder=0)
         for onset in followed.onsets:
-            axes.axvline(onset.load, color=HOPF, linewidth=0.8, linestyle=":", zorder=1)
-        axes.set_xlim(loads[0], loads[-1])
-    lower.set_xlabel("load [N m]")
+            axes.axvline(scale * onset.load, color=HOPF, linewidth=0.8, linestyle=":", zorder=1)
+        axes.set_xlim(scale * loads[0], scale * loads[-1])
+    lower.set_xlabel(f"load [{unit}]")
     lines = [f"Steady states along the load: {diagram.job.name}", place_text(diagram, followed.asked)]
-    lines += gap_lines(followed)
+    lines += gap_lines(diagram, followed)
     figure.suptitle("\n".join(balanced(line, 90) for line in lines if line), fontsize=10)
     figure.legend(handles=_legend(followed), loc="outside lower center", ncols=2, frameon=False)
     return figure
@@ -94,12 +95,13 @@ def stable_parts(piece: list[Point], onsets: list[Onset]) -> list[tuple[float, f
     return list(zip(ends[:-1], ends[1:], stable, strict=True))
 
 
-def _draw_attractors(axes: Axes, followed: Followed) -> None:
-    """The steady state, its Hopf points, and what runs came to."""
+def _draw_attractors(axes: Axes, followed: Followed, scale: float) -> None:
+    """The steady state, its Hopf points, and what runs came to, over `scale` times the load."""
     for piece in followed.branch.pieces():
         for low, high, stable in stable_parts(piece, followed.onsets):
             style = "-" if stable else (0, (4, 3))
-            axes.plot([low, high], [0.0, 0.0], color="black", linewidth=1.8, linestyle=style, clip_on=False)
+            ends = [scale * low, scale * high]
+            axes.plot(ends, [0.0, 0.0], color="black", linewidth=1.8, linestyle=style, clip_on=False)
     for start, (mark, colour) in enumerate(STARTS):
         fills = (
             (OccurrenceClass.VIBRATING, colour),
@@ -109,7 +111,7 @@ def _draw_attractors(axes: Axes, followed: Followed) -> None:
         for kind, fill in fills:
             shown = [run for run in followed.runs if (run.start, run.occurrence) == (start, kind)]
             axes.plot(
-                [run.value for run in shown],
+                [scale * run.value for run in shown],
                 [run.amplitude * 1e6 for run in shown],
                 linestyle="",
                 marker=mark,
@@ -120,7 +122,7 @@ def _draw_attractors(axes: Axes, followed: Followed) -> None:
             )
     for run in _at_edge(followed):
         axes.plot(
-            run.value,
+            scale * run.value,
             EDGE[run.start],
             transform=axes.get_xaxis_transform(),
             marker=AT_EDGE[run.occurrence][0],
@@ -131,7 +133,7 @@ def _draw_attractors(axes: Axes, followed: Followed) -> None:
             zorder=6,
         )
     for onset, criticality in zip(followed.onsets, followed.kinds, strict=True):
-        axes.plot(onset.load, 0.0, color=HOPF, clip_on=False, zorder=6, **KINDS[criticality.kind])
+        axes.plot(scale * onset.load, 0.0, color=HOPF, clip_on=False, zorder=6, **KINDS[criticality.kind])
     axes.set_ylabel("amplitude [µm]")
     axes.set_ylim(bottom=0.0)
 
@@ -141,11 +143,11 @@ def _at_edge(followed: Followed) -> list[Attractor]:
     return [run for run in followed.runs if run.occurrence in AT_EDGE]
 
 
-def _draw_modes(growth: Axes, frequency: Axes, followed: Followed) -> None:
-    """Growth rate and frequency of the modes, those that become unstable drawn thick."""
+def _draw_modes(growth: Axes, frequency: Axes, followed: Followed, scale: float) -> None:
+    """Growth rate and frequency of the modes over `scale` times the load, unstable ones drawn thick."""
     growth.axhline(0.0, color="black", linewidth=0.8)
     for line in mode_lines(followed.branch):
-        loads, modes = list(line), list(line.values())
+        loads, modes = [scale * load for load in line], list(line.values())
         leading = max(modes, key=lambda mode: mode.growth)
         style = {"color": STRANDS[leading.strand], "marker": ".", "markersize": 4.0}
         style["linewidth"] = 1.8 if leading.growth > 0.0 else 0.8

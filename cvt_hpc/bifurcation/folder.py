@@ -14,8 +14,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from cvt_hpc.archives import Archives
 from cvt_hpc.bifurcation.dataset import Stability
+from cvt_hpc.bifurcation.followed import Followed
 from cvt_hpc.bifurcation.job import Diagram
+from cvt_hpc.bifurcation.kept import packed, unpacked
 from cvt_hpc.files import kind_of
 from cvt_hpc.netcdf import DIAGRAM, holds
 from cvt_hpc.output_folder import Kind, OutputFolder
@@ -24,6 +27,7 @@ from cvt_hpc.study.job_difference import another_job
 DATASET = "branch.nc"
 LABELS = ("name", "description")  # of a job, without effect on any number
 _PICTURE = re.compile(r"branch(?:_([1-9]\d{0,8}))?\.png", re.ASCII)
+_LIMIT = 1 << 30  # [bytes] of a branch; one of 20 loads at 160 stations has 3.4 MB
 _DAMAGE = (AttributeError, KeyError, OSError, RecursionError, RuntimeError, TypeError, ValueError)
 _logger = logging.getLogger(__name__)
 
@@ -40,20 +44,38 @@ class DiagramFolder(OutputFolder[Diagram]):
     ----------
     path : Path
         The folder; it need not exist.
+    diagram : Diagram
+        The diagram that is to be made in it.
+
+    Attributes
+    ----------
+    branches : Archives
+        Those that are done, by their number in the names of pictures.
     """
 
-    kind = Kind("bifurcation diagram", "branch.json", ".branch.lock", "cvt_hpc bifurcation 1")
+    kind = Kind("bifurcation diagram", "branch.json", ".branch.lock", "cvt_hpc bifurcation 1", ("branches",))
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, diagram: Diagram) -> None:
         super().__init__(path)
         self.dataset = self.path / DATASET
+        self.branches = Archives(self.path / "branches", _fingerprint(diagram), _LIMIT)
+        self._diagram = diagram
 
-    def branches(self) -> int:
+    def load_branch(self, number: int) -> Followed | None:
+        """Return branch `number`, counted from 0; None if it is not done, or cannot be read."""
+        asked, loads = self._diagram.branches[number], self._diagram.loads
+        return self.branches.load(f"branch_{number + 1}", lambda _, arrays: unpacked(asked, loads, arrays))
+
+    def save_branch(self, number: int, followed: Followed) -> None:
+        """Keep branch `number`."""
+        self.branches.save(f"branch_{number + 1}", None, packed(followed))
+
+    def stored_branches(self) -> int:
         """Return how many branches the dataset holds, 0 where none can be read."""
         if kind_of(self.dataset) is None:
             return 0
         try:
-            with xr.open_dataset(self._diagram(), engine="netcdf4", decode_cf=False) as dataset:
+            with xr.open_dataset(self._stored(), engine="netcdf4", decode_cf=False) as dataset:
                 computed = (dataset["stability"] != Stability.NOT_COMPUTED).all("load")
                 return int(np.count_nonzero(computed))
         except _DAMAGE as error:
@@ -70,8 +92,7 @@ class DiagramFolder(OutputFolder[Diagram]):
 
     def document(self, content: Diagram) -> dict[str, Any]:
         """Return what branch.json says of a diagram."""
-        numbers = json.dumps(_numbers(content.resolved()), sort_keys=True)
-        return {"fingerprint": hashlib.sha256(numbers.encode()).hexdigest(), "job": content.resolved()}
+        return {"fingerprint": _fingerprint(content), "job": content.resolved()}
 
     def accept(self, entry: dict[str, Any]) -> dict[str, Any]:
         """Return a sound branch.json."""
@@ -86,21 +107,32 @@ class DiagramFolder(OutputFolder[Diagram]):
             raise another_job(self.path, there, here)
 
     def unexplained(self) -> str | None:
-        """Return what is here that a dataset which is no diagram does not explain."""
-        return f"{DATASET}, which is no such diagram" if kind_of(self.dataset) else None
+        """Return what is here that neither a branch.json nor a dataset explains."""
+        if kind_of(self.dataset):
+            return f"{DATASET}, which is no such diagram"
+        return f"branches without a {self.job_file.name}" if self.branches.written() else None
 
     def results_tell(self) -> Callable[[Diagram], bool] | None:
-        """Return what tells whether the dataset is that of a diagram; None if it is none, of whatever job."""
+        """Return what tells whether dataset and branches are of a diagram; None if there are none.
+
+        None, too, if the dataset is something else, which is not to be written over.
+        """
         found = self._job_of_dataset()
-        if found is None:
+        if found is None and kind_of(self.dataset) is not None:
             return None
-        return lambda diagram: _numbers(found["job"]) == _numbers(diagram.resolved())
+        stored = None if found is None else _numbers(found["job"])
+        fingerprints = self.branches.fingerprints()
+        if stored is None and not fingerprints:
+            return None
+        return lambda diagram: (
+            stored in (None, _numbers(diagram.resolved())) and fingerprints <= {_fingerprint(diagram)}
+        )
 
     def written(self, found: dict[str, Any] | None) -> Iterator[Path]:
-        """Yield what a diagram has left: the dataset, and the pictures of as many branches as it has."""
+        """Yield what a diagram has left: branches, dataset, and pictures of as many branches as it has."""
         axes = found["job"]["axes"] if found else {}
         branches = prod(len(values) for name, values in axes.items() if name != "load")
-        yield self.dataset
+        yield from (*self.branches.written(), self.dataset)
         for path in self.path.iterdir():
             if (name := _PICTURE.fullmatch(path.name)) and int(name[1] or 1) <= branches:
                 yield path
@@ -109,7 +141,7 @@ class DiagramFolder(OutputFolder[Diagram]):
         """Return the half-written files of processes that died while they wrote."""
         return [*self.path.glob(f".{DATASET}.*.part"), *super().leftovers()]
 
-    def _diagram(self) -> Path:
+    def _stored(self) -> Path:
         """Return the dataset; ValueError if it is no diagram."""
         if not holds(self.dataset, DIAGRAM):
             raise ValueError("no bifurcation diagram")
@@ -117,10 +149,16 @@ class DiagramFolder(OutputFolder[Diagram]):
 
     def _job_of_dataset(self) -> dict[str, Any] | None:
         try:
-            with xr.open_dataset(self._diagram(), engine="netcdf4", decode_cf=False) as dataset:
+            with xr.open_dataset(self._stored(), engine="netcdf4", decode_cf=False) as dataset:
                 return self.accept({"fingerprint": "", "job": json.loads(dataset.attrs["job"])})
         except _DAMAGE:
             return None
+
+
+def _fingerprint(diagram: Diagram) -> str:
+    """Return the SHA-256 [hex] of what determines the numbers of a diagram."""
+    numbers = json.dumps(_numbers(diagram.resolved()), sort_keys=True)
+    return hashlib.sha256(numbers.encode()).hexdigest()
 
 
 def _numbers(job: dict[str, Any]) -> dict[str, Any]:

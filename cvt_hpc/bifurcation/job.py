@@ -13,10 +13,13 @@ from cvt_hpc.job.assignments import Assignments, split_assignments
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.document import read_document
 from cvt_hpc.job.rules import varied_by
+from cvt_hpc.job.shown import JOB_UNITS
 from cvt_hpc.job.tables import read_set, read_table
+from cvt_hpc.netcdf import attributes
 from cvt_hpc.parameters import Parameter, positive
 
 STEADY, TRANSIENT = "linear_stability", "elastic_belt"
+LOAD = "torque at the driving pulley"
 BRANCH = {
     "disturbance": Parameter(
         (1e-6, 3e-4),
@@ -87,6 +90,12 @@ class Diagram:
             "set": self.settings,
         }
         return {**self.job.resolved(), "branch": table}
+
+
+def load_attributes(job: Job) -> dict[str, Any]:
+    """Return the attributes of the loads, by which people read them in the unit of the job."""
+    unit = job.schema.units.get("load")
+    return attributes("load", "N m", LOAD) | ({JOB_UNITS: unit} if unit else {})
 
 
 def load_diagram(path: str | Path, overrides: Assignments = ()) -> Diagram:

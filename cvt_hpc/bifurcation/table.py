@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cvt_hpc.bifurcation.attractors import FROM, Attractor
-from cvt_hpc.bifurcation.job import Asked, Diagram
+from cvt_hpc.bifurcation.job import Asked, Diagram, load_attributes
 from cvt_hpc.errors import few_of
-from cvt_hpc.models.linear_stability.branch import Onset
+from cvt_hpc.job.shown import number_within, shown_number, shown_unit
+from cvt_hpc.models.linear_stability.branch import CLOSE, Onset
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Criticality, Kind
 
@@ -24,14 +25,14 @@ MOST_NAMED = 12  # loads in a row
 def branch_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
     """Yield the lines that tell of one branch."""
     yield f"{place_text(diagram, followed.asked)}:"
-    yield from onset_lines(followed)
+    yield from onset_lines(diagram, followed)
     if not followed.onsets:
         yield "no Hopf point between the loads that have a steady state"
-    yield from gap_lines(followed)
-    yield from left_out_lines(followed)
+    yield from gap_lines(diagram, followed)
+    yield from left_out_lines(diagram, followed)
     loads = sorted({run.value for run in followed.runs if run.occurrence == OccurrenceClass.SLIPPING})
     if loads:
-        yield f"the belt slips at {few_of([f'{load:g}' for load in loads], MOST_NAMED)} N m"
+        yield f"the belt slips at {load_text(diagram, *loads)}"
 
 
 def place_text(diagram: Diagram, asked: Asked) -> str:
@@ -43,14 +44,15 @@ def place_text(diagram: Diagram, asked: Asked) -> str:
     )
 
 
-def onset_lines(followed: Followed) -> Iterator[str]:
+def onset_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
     """Yield a line for each Hopf point."""
+    along = load_attributes(diagram.job)
     for onset, kind in zip(followed.onsets, followed.kinds, strict=True):
         mode = onset.mode
         waves = f"{mode.half_waves} half wave{'s' if mode.half_waves > 1 else ''} in t{mode.strand + 1}"
         yield (
-            f"Hopf point at {onset.load:.1f} N m, {mode.frequency:.0f} Hz, {waves}: {_direction(onset)}; "
-            f"{kind_text(kind)}"
+            f"Hopf point at {number_within(onset.load, CLOSE, along)} {shown_unit(along)}, "
+            f"{mode.frequency:.0f} Hz, {waves}: {_direction(onset)}; {kind_text(diagram, kind)}"
         )
 
 
@@ -60,40 +62,54 @@ def _direction(onset: Onset) -> str:
     return "stability lost" if onset.rising else "stability regained"
 
 
-def kind_text(kind: Criticality) -> str:
+def kind_text(diagram: Diagram, kind: Criticality) -> str:
     """Whether a Hopf point is super- or subcritical."""
+    along = load_attributes(diagram.job)
+    unit = shown_unit(along)
     if kind.kind is Kind.SUBCRITICAL:
-        size = f"more than {kind.width:.1f} N m"
-        if np.isfinite(kind.error):
-            size = f"{kind.width:.1f} +- {kind.error:.1f} N m"
-        return f"subcritical, hysteresis {size}"
+        width = number_within(kind.width, CLOSE, along)
+        if not np.isfinite(kind.error):
+            return f"subcritical, hysteresis more than {width} {unit}"
+        return f"subcritical, hysteresis {width} +- {number_within(kind.error, CLOSE, along)} {unit}"
     if kind.kind is Kind.SUPERCRITICAL:
-        return f"supercritical within {abs(kind.width) + kind.error:.1f} N m"
+        return f"supercritical within {number_within(abs(kind.width) + kind.error, CLOSE, along)} {unit}"
     return f"undecided whether subcritical, {kind.reason}"
 
 
-def gap_lines(followed: Followed) -> Iterator[str]:
+def gap_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
     """Yield the lines that say where states were not found, and where stability changes unseen."""
-    if followed.branch.missed:
-        loads = ", ".join(f"{load:g}" for load in sorted(followed.branch.missed))
-        yield f"no steady state found at {loads} N m"
+    missed = sorted(followed.branch.missed)
+    if missed:
+        yield f"no steady state found at {load_text(diagram, *missed, most=len(missed))}"
     for low, high in followed.hidden:
-        yield f"stability changes between {low:g} and {high:g} N m, where a steady state is not found"
+        between = f"{load_number(diagram, low)} and {load_text(diagram, high)}"
+        yield f"stability changes between {between}, where a steady state is not found"
 
 
-def left_out_lines(followed: Followed) -> Iterator[str]:
+def load_number(diagram: Diagram, load: float) -> str:
+    """A load [N m] in the unit of the job, without that unit."""
+    return f"{shown_number(load, load_attributes(diagram.job)):g}"
+
+
+def load_text(diagram: Diagram, *loads: float, most: int = MOST_NAMED) -> str:
+    """Loads [N m] in the unit of the job; of many the first ones and the last."""
+    numbers = [load_number(diagram, load) for load in loads]
+    return f"{few_of(numbers, most)} {shown_unit(load_attributes(diagram.job))}"
+
+
+def left_out_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
     """Yield the line that says where there is no run from the steady state, because none is found."""
     begun = {run.value for run in followed.runs if run.start == 0}
-    loads = [f"{run.value:g}" for run in followed.runs if run.start == 1 and run.value not in begun]
+    loads = [run.value for run in followed.runs if run.start == 1 and run.value not in begun]
     if loads:
-        yield f"no run {FROM[0]} at {few_of(loads, MOST_NAMED)} N m, where none is found"
+        yield f"no run {FROM[0]} at {load_text(diagram, *loads)}, where none is found"
 
 
 def failure_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
     """Yield a line for each run that failed."""
     place = place_text(diagram, followed.asked)
     for run in failed_runs(followed):
-        yield f"{place}: the run {FROM[run.start]} at {run.value:g} N m failed: {run.reason}"
+        yield f"{place}: the run {FROM[run.start]} at {load_text(diagram, run.value)} failed: {run.reason}"
 
 
 def failed_runs(followed: Followed) -> list[Attractor]:

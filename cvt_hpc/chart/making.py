@@ -90,7 +90,7 @@ def make_chart(
         with written_aside(folder.table) as aside:
             write_table(comparisons, aside)
         with written_aside(folder.dataset) as aside:
-            write_netcdf(chart_dataset(chart, comparisons, folder.makers), aside)
+            write_netcdf(chart_dataset(chart, comparisons, folder.points.makers), aside)
         pictures = [draw_scene(c, folder.picture(c.scene.name)) for c in comparisons]
         pictures += [draw_budget(c, folder.picture("budget")) for c in comparisons if c.choices]
     return ChartReport(comparisons, folder.table, folder.dataset, tuple(pictures))
@@ -101,7 +101,7 @@ def _fill(
 ) -> dict[str, Measurement]:
     """Measure the points that the folder does not hold yet, and return all by name."""
     loaded = {point.name: folder.load_point(point.name) for point in chart.points}
-    folder.warn_of_others()
+    folder.points.warn_of_others(folder.dataset)
     measurements = {name: found for name, found in loaded.items() if found is not None}
     missing = [point for point in chart.points if point.name not in measurements]
     missing.sort(key=lambda point: point.timed)  # the order in which they are done

@@ -83,6 +83,7 @@ def march(
     failures: list[Failure | None] = []
     seconds = simulated = 0.0
     for first in range(0, len(points), lanes):
+        load_model(model).forget()
         batch = load_model(model).batch(points[first : first + lanes], stepper)
         if led:
             batch.take_over(led[first : first + lanes])

@@ -72,7 +72,7 @@ def _ladder(arguments: argparse.Namespace) -> int:
     )
     if status < STALLED and speaks():
         report = report_ladder(job, rungs, out)
-        say(*ladder_lines(report.findings))
+        say(*ladder_lines(job, report.findings))
         say(f"table: {report.table}", f"dataset: {report.dataset}", f"picture: {report.picture}")
     return end_process(status)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
@@ -33,6 +34,12 @@ def shown_number(value: Any, attributes: Mapping[str, Any]) -> Any:
 def shown(value: Any, attributes: Mapping[str, Any]) -> str:
     """Return a value [SI] of a coordinate with its `shown_unit`, such as "3000 rpm"."""
     return in_words(value, si_unit(attributes), shown_unit(attributes))
+
+
+def number_within(value: float, closest: float, attributes: Mapping[str, Any]) -> str:
+    """Return `shown_number` of a value [SI] with as many decimals as show differences of `closest` [SI]."""
+    decimals = -math.floor(math.log10(shown_number(closest, attributes)) + 1e-9)
+    return f"{shown_number(value, attributes):.{max(decimals, 0)}f}"
 
 
 def shown_as_read(value: float, attributes: Mapping[str, Any]) -> str:

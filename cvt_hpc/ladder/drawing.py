@@ -13,8 +13,10 @@ from matplotlib.patches import Patch
 
 from cvt_hpc.analysis.error_axes import line_style, set_error_axis
 from cvt_hpc.analysis.figures import WIDTH, draw
+from cvt_hpc.job import Job
 from cvt_hpc.ladder.comparing import Finding
 from cvt_hpc.ladder.rungs import QUESTIONS, REFERENCE
+from cvt_hpc.ladder.table import in_job_unit
 
 HEIGHT = 7.2  # [inch]
 ROOM = 1.15  # length of a linear axis over its largest error
@@ -22,7 +24,7 @@ HATCHED = {"facecolor": "#f3f3f3", "edgecolor": "#d0d0d0", "hatch": "////", "lw"
 # Title of a panel, label and factor of its errors; those that may well be 0 stand on a linear axis.
 PANELS = {
     "occurrence": ("does it vibrate", "cells of the wrong class [%]", 100.0),
-    "onset": ("at which load it sets in or ends", "error of the load [N m]", 1.0),
+    "onset": ("at which load it sets in or ends", "error of the load [{unit}]", 1.0),
     "frequency": ("at which frequency", "relative error [%]", 100.0),
     "amplitude": ("how far", "relative error [%]", 100.0),
     "forces": ("mean forces", "error of the largest force [%]", 100.0),
@@ -30,23 +32,24 @@ PANELS = {
 LINEAR = ("occurrence", "onset")
 
 
-def draw_ladder(findings: Sequence[Finding], name: str, out: Path) -> Path:
+def draw_ladder(job: Job, findings: Sequence[Finding], out: Path) -> Path:
     """Draw error against cost.
 
     Parameters
     ----------
+    job : Job
+        Whose ladder it is.
     findings : sequence of Finding
-        Results of a ladder.
-    name : str
-        Of the job.
+        Its results.
     out : Path
         As for `save_figure`, with what it returns and raises.
     """
-    return draw(lambda: ladder_figure(findings, name), out)
+    return draw(lambda: ladder_figure(job, findings), out)
 
 
-def ladder_figure(findings: Sequence[Finding], name: str) -> Figure:
+def ladder_figure(job: Job, findings: Sequence[Finding]) -> Figure:
     """Compose the picture of `draw_ladder`; to be called within STYLE."""
+    findings, unit = in_job_unit(job, findings)
     costs = {f.rung: f.core_seconds for f in findings if f.rung != REFERENCE}
     styles = {
         rung: {**line_style(k), "ls": "", "ms": 6.5}
@@ -54,10 +57,10 @@ def ladder_figure(findings: Sequence[Finding], name: str) -> Figure:
     }
     styles[REFERENCE] = {"color": "black", "marker": "*", "ls": "", "ms": 8}
     figure = Figure((WIDTH, HEIGHT), layout="constrained")
-    figure.suptitle(f"{name}: error of each rung against its cost, lower left is better")
+    figure.suptitle(f"{job.name}: error of each rung against its cost, lower left is better")
     panels = figure.subplots(3, 2, sharey=True).flat
     for axes, question in zip(panels, QUESTIONS, strict=False):
-        _draw_panel(axes, question, [f for f in findings if f.question == question], styles)
+        _draw_panel(axes, question, [f for f in findings if f.question == question], styles, unit)
     panels[0].set_yscale("log")
     for axes in figure.axes[::2]:
         axes.set_ylabel("core-seconds per run")
@@ -67,7 +70,9 @@ def ladder_figure(findings: Sequence[Finding], name: str) -> Figure:
     return figure
 
 
-def _draw_panel(axes: Axes, question: str, findings: Sequence[Finding], styles: dict[str, dict]) -> None:
+def _draw_panel(
+    axes: Axes, question: str, findings: Sequence[Finding], styles: dict[str, dict], unit: str
+) -> None:
     title, label, factor = PANELS[question]
     spans = {finding: [factor * error for error in _span(finding)] for finding in findings}
     left = _scale(
@@ -81,7 +86,7 @@ def _draw_panel(axes: Axes, question: str, findings: Sequence[Finding], styles: 
         if finding.rung == REFERENCE and low > left:
             axes.axvspan(left, low, **HATCHED, zorder=0, gid="hatched")
     axes.set_title(f"{question}: {title}", loc="left", pad=3)
-    axes.set_xlabel(label)
+    axes.set_xlabel(label.format(unit=unit))
     axes.grid(which="major", color="#e4e4e4", lw=0.6)
     axes.set_axisbelow(True)
 

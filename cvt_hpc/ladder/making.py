@@ -124,8 +124,8 @@ def report_ladder(job: Job, rungs: Sequence[Rung], out: Path) -> LadderReport:
     findings = tuple(compare(rungs, results))
     report = LadderReport(findings, *(out / f"ladder.{suffix}" for suffix in ("csv", "nc", "png")))
     with written_aside(report.table) as aside:
-        write_ladder(findings, aside)
+        write_ladder(job, findings, aside)
     with written_aside(report.dataset) as aside:
         write_netcdf(ladder_dataset(job, rungs, findings), aside)
-    draw_ladder(findings, job.name, report.picture)
+    draw_ladder(job, findings, report.picture)
     return report

@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from cvt_hpc.analysis.figures import coordinate_unit
 from cvt_hpc.job import Job
+from cvt_hpc.job.shown import JOB_UNITS
 from cvt_hpc.ladder.comparing import Finding
 from cvt_hpc.ladder.rungs import QUESTIONS, Rung
 from cvt_hpc.netcdf import attributes, global_attributes
@@ -39,22 +41,38 @@ NUMBERS = {
 }
 
 
-def write_ladder(findings: Sequence[Finding], path: Path) -> None:
+def in_job_unit(job: Job, findings: Sequence[Finding]) -> tuple[list[Finding], str]:
+    """Return findings with errors of onsets in the unit in which the job gives the load, and that unit."""
+    scale, unit = coordinate_unit({"units": UNITS["onset"], JOB_UNITS: job.units.get("load", "")})
+    shown = []
+    for finding in findings:
+        if finding.question == "onset":
+            score = finding.score
+            score = score._replace(median=scale * score.median, high=scale * score.high)
+            finding = finding._replace(score=score)
+        shown.append(finding)
+    return shown, unit
+
+
+def write_ladder(job: Job, findings: Sequence[Finding], path: Path) -> None:
     """Write the findings as comma-separated values, a row for each rung and question."""
+    findings, unit = in_job_unit(job, findings)
+    units = UNITS | {"onset": unit}
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["question", "rung", "error_unit", *NUMBERS])
         for finding in findings:
             values = (number(value, 3) if isinstance(value, float) else value for value in _numbers(finding))
-            writer.writerow([finding.question, finding.rung, UNITS[finding.question], *values])
+            writer.writerow([finding.question, finding.rung, units[finding.question], *values])
 
 
-def ladder_lines(findings: Sequence[Finding]) -> Iterator[str]:
+def ladder_lines(job: Job, findings: Sequence[Finding]) -> Iterator[str]:
     """Yield the lines that show the findings to people."""
+    findings, of_onsets = in_job_unit(job, findings)
     heads = ["", "cells", "median", "95 %", "wrong", "silent", "more", "core-s/run", ""]
     for question in QUESTIONS:
         found = [finding for finding in findings if finding.question == question]
-        unit = "" if UNITS[question] == "1" else f" [{UNITS[question]}]"
+        unit = f" [{of_onsets}]" if question == "onset" else ""
         yield f"{question}: error{unit}; that of the reference is estimated"
         yield from columns([heads, *([f.rung, *_cells(f), ""] for f in found)])
 

@@ -13,6 +13,8 @@ A model leaves out what it has no use for; `Model` has the default of each such 
 A model with a transient may answer some runs without all of it. Its `record` then has `known(parameters)`,
 the values where no transient is needed, else None; `preliminary(parameters)`, the parameters of a cheaper
 transient that comes first, or None; and `settle(run)`, the values by that transient if it answers, else None.
+
+A `transient` whose runs leave later ones of the process a part of their march has `forget()`, which drops it.
 """
 
 from __future__ import annotations
@@ -319,6 +321,11 @@ class Model:
     def batch(self, points: Sequence[Parameters], stepper: str | None, paused: Sequence[Any] = ()) -> Batch:
         """Runs that advance together, from their starts or from where shorter ones ended."""
         return self._transient.batch(points, stepper, paused)
+
+    def forget(self) -> None:
+        """Have the next run march all by itself, as one must whose time is to tell of others."""
+        if self._offers("transient"):
+            _member(self._transient, "forget", lambda: None)()
 
     def exact(self, parameters: Parameters, times: np.ndarray) -> np.ndarray:
         """Displacement in closed form, (time, probe) [m].

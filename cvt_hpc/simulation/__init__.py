@@ -1,6 +1,6 @@
 """One run: a model marched by a stepper, or solved at once, judged, and turned into a record or a history."""
 
-from cvt_hpc.simulation.batches import estimate_cost, lane_groups, pilot_share, run_costs, turns
+from cvt_hpc.simulation.batches import estimate_cost, forget, lane_groups, pilot_share, run_costs, turns
 from cvt_hpc.simulation.history import run_points_keeping, simulate
 from cvt_hpc.simulation.record import record_coordinates, record_variables
 from cvt_hpc.simulation.running import Interrupted, run_point, run_points
@@ -8,6 +8,7 @@ from cvt_hpc.simulation.running import Interrupted, run_point, run_points
 __all__ = [
     "Interrupted",
     "estimate_cost",
+    "forget",
     "lane_groups",
     "pilot_share",
     "record_coordinates",

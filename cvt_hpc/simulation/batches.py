@@ -198,6 +198,11 @@ def turns(job: Job, runs: int) -> int:
     return -(-runs // load_model(job.model).lanes(job.parameters, job.stepper))
 
 
+def forget(job: Job) -> None:
+    """Have the next batch take its full time, whatever runs of the job's model before it have left."""
+    load_model(job.model).forget()
+
+
 def pilot_share(job: Job) -> float:
     """Share of a run's simulated time that tells what the whole run costs."""
     return load_model(job.model).pilot_share

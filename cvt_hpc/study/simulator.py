@@ -39,6 +39,9 @@ class Simulator(Protocol):
     def pilot_share(self, job: Job) -> float:
         """Return the share of a run's simulated time that tells what the whole run costs."""
 
+    def forget(self, job: Job) -> None:
+        """Have the next batch take its full time, whatever runs before it have left."""
+
     def run_points(
         self, job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
     ) -> Sequence[Mapping[str, Any]]:

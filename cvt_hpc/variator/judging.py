@@ -14,6 +14,7 @@ import numpy as np
 from cvt_hpc.variables import Vibrates
 from cvt_hpc.variator import PULLEYS, STRANDS
 from cvt_hpc.variator.slip import slid, with_slip
+from cvt_hpc.variator.variables import frequency_bins
 from cvt_hpc.vibration import assessment, ramp
 from cvt_hpc.vibration.occurrence import LONGEST_REASON
 from cvt_hpc.vibration.ramped import ramped
@@ -70,7 +71,7 @@ def pair(run: Any, name: str, labels: tuple[str, str] = PULLEYS) -> np.ndarray:
     return np.array([mean(run, f"{name} {label}") for label in labels])
 
 
-def evaluate(run: Any, strongest_probe: np.ndarray, bins: np.ndarray) -> dict[str, Any]:
+def evaluate(run: Any, strongest_probe: np.ndarray) -> dict[str, Any]:
     """Values of a finished run that all models of a variator have.
 
     Parameters
@@ -79,14 +80,12 @@ def evaluate(run: Any, strongest_probe: np.ndarray, bins: np.ndarray) -> dict[st
         With all samples recorded.
     strongest_probe : (2,) int array
         Column of the displacement that vibrates most, for each strand.
-    bins : array
-        Frequencies of the spectrum [Hz].
     """
     p, judged = run.parameters, run.judged
     axial, driven_speed = pair(run, "axial_force"), run.channel("driven_speed")[judged]
     moved = run.displacement[judged][:, strongest_probe]
     return {
-        "spectrum": amplitude_spectrum(moved, p["sampling_rate"], bins).T,
+        "spectrum": amplitude_spectrum(moved, p["sampling_rate"], frequency_bins(p).values).T,
         "mean_ring_tension": pair(run, "ring_tension", STRANDS),
         "mean_push_force": pair(run, "push_force", STRANDS),
         "axial_force": axial,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from cvt_hpc.variables import Coordinate, Variable
@@ -13,6 +16,14 @@ COORDINATES = {
 }
 
 _SHARED = (
+    Variable(
+        "spectrum",
+        ("strand", "frequency_bin"),
+        "f8",
+        "m",
+        "at the strongest probe",
+        words="amplitude spectrum",
+    ),
     Variable("mean_ring_tension", ("strand",), "f8", "N", "mean ring tension in the middle of the strand"),
     Variable("mean_push_force", ("strand",), "f8", "N", "mean push force in the middle of the strand"),
     Variable("axial_force", ("pulley",), "f8", "N", "mean axial force of the belt on a sheave"),
@@ -38,6 +49,18 @@ _SHARED = (
         "what the power balance leaves open, over the larger of drive and losses",
     ),
 )
+
+
+def frequency_bins(parameters: Mapping[str, Any]) -> Coordinate:
+    """Frequencies of the spectra of a transient [Hz].
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat parameters of the job or of a run [SI].
+    """
+    step = parameters["spectrum_step"]
+    return Coordinate(np.arange(0.0, parameters["band_high"] + step / 2, step), "Hz", "frequency")
 
 
 def shared(*names: str) -> tuple[Variable, ...]:

@@ -12,6 +12,7 @@ than a run tells. Two are asked for.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -64,6 +65,7 @@ def criticality(
     agreement: float,
     bracket: float = 0.0,
     limits: tuple[float, float] = (-np.inf, np.inf),
+    in_words: Callable[[float], str] = "{:.4g}".format,
 ) -> Criticality:
     """Say whether a Hopf point is super- or subcritical.
 
@@ -83,6 +85,8 @@ def criticality(
         How far from `hopf` the Hopf point may lie.
     limits : (float, float)
         Neighbouring Hopf points, beyond which other branches begin or the steady state is not stable.
+    in_words : callable
+        Turns a value of the parameter into words for `reason`.
     """
     values = np.asarray(values, dtype=float)
     sign = 1.0 if stable_above else -1.0
@@ -97,8 +101,8 @@ def criticality(
     first, last = min(turns, key=lambda turn: abs(away[turn[0]] + away[turn[1]]))
     turned, spread = _middle(away, first, last)
     if abs(turned) > agreement + spread:
-        place = hopf + sign * turned
-        return _undecided(f"runs from the small start turn quiet at {place:.4g}, not there")
+        place = in_words(hopf + sign * turned)
+        return _undecided(f"runs from the small start turn quiet at {place}, not there")
     ends = [turn for turn in _turns(large) if turn[1] > first]
     start, end = ends[0] if ends else (len(large) - 1, len(large))
     along = np.arange(len(away))
@@ -111,24 +115,25 @@ def criticality(
         reason = "both attractors as far as there are runs on that side"
         return Criticality(Kind.SUBCRITICAL, float(away[coexist][-1]) - bracket, np.inf, reason)
     if both.any() and coexist.sum() < 2:
+        where = _range(places[coexist if coexist.any() else both], in_words)
         if coexist.any():
-            return _undecided(f"both attractors {_range(places[coexist])} alone, closer runs would tell")
-        return _undecided(f"both attractors {_range(places[both])}, not where the steady state is stable")
+            return _undecided(f"both attractors {where} alone, closer runs would tell")
+        return _undecided(f"both attractors {where}, not where the steady state is stable")
     width, spacing = _middle(away, start, end)
     if coexist.any():
-        reason = f"both attractors {_range(places[coexist])}"
+        reason = f"both attractors {_range(places[coexist], in_words)}"
         return Criticality(Kind.SUBCRITICAL, width, spacing + bracket, reason)
     if end > last + 1:
         label = OccurrenceClass(int(large[last + 1])).label
-        return _undecided(f"the run from the large start at {places[last + 1]:.4g} is {label}")
+        return _undecided(f"the run from the large start at {in_words(places[last + 1])} is {label}")
     reason = "vibration ends at one place from either start"
     return Criticality(Kind.SUPERCRITICAL, width, spacing + bracket, reason)
 
 
-def _range(places: np.ndarray) -> str:
+def _range(places: np.ndarray, in_words: Callable[[float], str]) -> str:
     """Where runs are, in words."""
-    low, high = places.min(), places.max()
-    return f"at {low:.4g}" if low == high else f"from {low:.4g} to {high:.4g}"
+    low, high = in_words(places.min()), in_words(places.max())
+    return f"at {low}" if low == high else f"from {low} to {high}"
 
 
 def _turns(classes: np.ndarray) -> list[tuple[int, int]]:

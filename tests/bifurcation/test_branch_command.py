@@ -1,5 +1,7 @@
 """The command `branch` on a coarse belt: what it prints, keeps and draws, and what it refuses."""
 
+import shutil
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -77,6 +79,19 @@ def test_runs_lie_closely_beside_the_hopf_point_and_agree_with_it(made):
 
 def test_the_picture_is_there(made):
     assert (made[2] / "branch.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_branch_that_is_kept_is_the_same_to_the_last_bit(made, tmp_path, monkeypatch, capsys):
+    shutil.copytree(made[2], tmp_path / "out")
+    (tmp_path / "x.toml").write_text(JOB + RUNS)
+    monkeypatch.setattr("cvt_hpc.bifurcation.diagram._follow", None)
+    assert main(["branch", str(tmp_path / "x.toml"), "--out", str(tmp_path / "out")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    hopf = [line for line in lines if line.startswith("Hopf point")]
+    assert hopf == [line for line in made[1] if line.startswith("Hopf point")] != []
+    with xr.open_dataset(made[2] / "branch.nc") as one, xr.open_dataset(tmp_path / "out/branch.nc") as other:
+        assert one.equals(other)
+    assert (tmp_path / "out/branch.png").read_bytes() == (made[2] / "branch.png").read_bytes()
 
 
 def test_another_file_in_its_place_is_left_alone(tmp_path, capsys):

@@ -1,5 +1,6 @@
 """The picture of a branch, and branches with gaps, made up."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import matplotlib
@@ -40,8 +41,8 @@ ONSET = Onset(16.0, POINTS[1].modes[0], True, 0)
 FOUND = Branch(POINTS, {40.0: "no steady state found"})
 
 
-def diagram():
-    job = SimpleNamespace(name="x", schema=load_schema("linear_stability", None, "x"))
+def diagram(**units):
+    job = SimpleNamespace(name="x", schema=replace(load_schema("linear_stability", None, "x"), units=units))
     return SimpleNamespace(loads=(10.0, 20.0, 30.0, 40.0, 50.0, 60.0), axes=(), job=job)
 
 
@@ -159,12 +160,32 @@ def test_words_name_hopf_points_and_gaps(panels):
     ]
     title = panels[0].get_suptitle().replace("\n", " ").replace("\u00a0", " ")
     assert all(line.rstrip(":") in title for line in (*branch_lines(diagram(), followed()),)[:4:2])
-    assert list(gap_lines(followed()))[1] in title
+    assert list(gap_lines(diagram(), followed()))[1] in title
     assert list(failure_lines(diagram(), followed())) == [
         "friction gradient -0.8 s/m, sheave stiffness inf: the run from the steady state at 60 N m failed: slips",
         "friction gradient -0.8 s/m, sheave stiffness inf: the run from the large start at 60 N m failed: "
         "slips through",
     ]
+
+
+def test_loads_are_in_the_unit_of_the_job():
+    one, in_knm = followed(), diagram(load="kN m")
+    one.runs.append(run(60.0, 1, SLIPS))
+    assert list(branch_lines(in_knm, one))[1:] == [
+        "Hopf point at 0.0160 kN m, 420 Hz, 1 half wave in t1: stability lost; subcritical, "
+        "hysteresis 0.0060 +- 0.0010 kN m",
+        "no steady state found at 0.04 kN m",
+        "stability changes between 0.03 and 0.05 kN m, where a steady state is not found",
+        "no run from the steady state at 0.05 kN m, where none is found",
+        "the belt slips at 0.06 kN m",
+    ]
+    assert next(failure_lines(in_knm, one)).endswith("from the steady state at 0.06 kN m failed: slips")
+    with matplotlib.rc_context(STYLE):
+        *_, lower = (upper, *_) = branch_figure(in_knm, one).axes
+    assert lower.get_xlabel() == "load [kN m]" and lower.get_xlim() == pytest.approx((0.01, 0.06))
+    # steady states, the dots of runs with what stands at the upper edge, and modes, each at its own load
+    xs = {round(float(x), 6) for line in (*upper.lines, *lower.lines) for x in line.get_xdata()}
+    assert xs == {0.01, 0.016, 0.02, 0.03, 0.05, 0.06}
 
 
 def test_a_hopf_point_of_an_unstable_state_does_not_make_it_stable():

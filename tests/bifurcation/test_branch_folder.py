@@ -1,5 +1,10 @@
 """The folder of a diagram: whose it is, what an interruption leaves, and how failed runs are told of. Branches are made up."""
 
+import multiprocessing
+import os
+import shutil
+import signal
+
 import pytest
 import xarray as xr
 
@@ -25,18 +30,20 @@ load = ["90 N m", "105 N m"]
 def branch(tmp_path, monkeypatch):
     """The command, on branches without any steady state, whose runs end as `classes` says.
 
-    Pictures take most of the time: they are files without content unless `drawn`.
+    `end` is called where the second one is to be followed; `branch.followed` lists those that were. Pictures take most of the time: they are files without content unless `drawn`.
     """
     (tmp_path / "x.toml").write_text(JOB)
+    followed = []
 
-    def command(*options, classes=(OccurrenceClass.QUIET,) * 2, interrupted=False, drawn=False):
+    def command(*options, classes=(OccurrenceClass.QUIET,) * 2, end=None, drawn=False):
         left = iter(classes)
 
         def follow(diagram, asked):
             kind = next(left)
             run = Attractor(90.0, 1, kind, 0.0, 0.0, "slips")
-            if interrupted and asked is not diagram.branches[0]:
-                raise KeyboardInterrupt
+            if end is not None and asked is not diagram.branches[0]:
+                end()
+            followed.append(diagram.branches.index(asked))
             return Followed(asked, None, Branch([], dict.fromkeys(diagram.loads, "none")), [], [], [run], [])
 
         with monkeypatch.context() as patch:
@@ -45,7 +52,12 @@ def branch(tmp_path, monkeypatch):
                 patch.setattr(diagram, "draw_branch", lambda diagram, followed, out: out.touch())
             return main(["branch", str(tmp_path / "x.toml"), "--out", str(tmp_path / "out"), *options])
 
+    command.followed = followed
     return command
+
+
+def interrupt():
+    raise KeyboardInterrupt
 
 
 def names(folder):
@@ -61,7 +73,10 @@ def test_another_job_is_refused_and_fresh_leaves_none_of_its_pictures(branch, tm
     out = tmp_path / "out"
     assert branch() == 0
     (out / "branch_notes.png").write_text("mine")
-    assert names(out) == ["branch.json", "branch.nc", "branch_1.png", "branch_2.png", "branch_notes.png"]
+    assert names(out) == [
+        "branch.json", "branch.nc", "branch_1.png", "branch_2.png", "branch_notes.png", "branches",
+    ]  # fmt: skip
+    assert names(out / "branches") == ["branch_1.npz", "branch_2.npz"]
     before = (out / "branch.nc").read_bytes()
     assert branch("--set", "friction_gradient=-0.6") == 2
     error = capsys.readouterr().err
@@ -72,7 +87,8 @@ def test_another_job_is_refused_and_fresh_leaves_none_of_its_pictures(branch, tm
     )
     assert (out / "branch.nc").read_bytes() == before
     assert branch("--set", "friction_gradient=-0.6", "--fresh") == 0
-    assert names(out) == ["branch.json", "branch.nc", "branch.png", "branch_notes.png"]
+    assert names(out) == ["branch.json", "branch.nc", "branch.png", "branch_notes.png", "branches"]
+    assert names(out / "branches") == ["branch_1.npz"]
     (tmp_path / "x.toml").write_text(JOB + "[branch]\nresolution = 2\n")
     assert branch("--set", "friction_gradient=-0.6") == 2
     assert "branch.resolution is 1.0 there, 2.0 here" in capsys.readouterr().err
@@ -80,21 +96,67 @@ def test_another_job_is_refused_and_fresh_leaves_none_of_its_pictures(branch, tm
     assert branch("--set", "friction_gradient=-0.6") == 0  # the name is without effect on any number
 
 
-def test_an_interruption_keeps_the_branches_that_are_done(branch, tmp_path, capsys):
-    not_found, not_computed = [Stability.NOT_FOUND] * 2, [Stability.NOT_COMPUTED] * 2
-    assert branch(interrupted=True) == 130
-    assert stability(tmp_path / "out") == [not_found, not_computed]
-    assert "branches of an earlier start" not in capsys.readouterr().err
-    assert branch() == 0
-    assert (
-        "branch.nc holds 1 of 2 branches of an earlier start; all are followed anew"
-        in capsys.readouterr().err
+def test_a_diagram_goes_on_where_it_was_killed_between_two_branches(branch, tmp_path, capfd):
+    process = multiprocessing.get_context("fork").Process(
+        target=branch, kwargs={"end": lambda: os.kill(os.getpid(), signal.SIGKILL)}
     )
-    assert stability(tmp_path / "out") == [not_found, not_found]
-    assert branch(interrupted=True) == 130
-    assert stability(tmp_path / "out") == [not_found, not_found]
-    assert branch("--fresh", interrupted=True) == 130
-    assert stability(tmp_path / "out") == [not_found, not_computed]
+    process.start()
+    process.join()
+    assert process.exitcode == -signal.SIGKILL
+    assert stability(tmp_path / "out") == [[Stability.NOT_FOUND] * 2, [Stability.NOT_COMPUTED] * 2]
+    assert branch() == 0
+    assert branch.followed == [1]
+    assert "cvt-hpc: 2/2 branches: 0 Hopf points" in capfd.readouterr().err
+    assert stability(tmp_path / "out") == [[Stability.NOT_FOUND] * 2] * 2
+    with xr.open_dataset(tmp_path / "out" / "branch.nc") as dataset:
+        assert dataset["run_branch"].values.tolist() == [0, 1]
+    assert branch() == 0
+    assert branch.followed == [1]
+    assert branch("--fresh", end=interrupt) == 130
+    assert branch.followed == [1, 0]
+    assert stability(tmp_path / "out") == [[Stability.NOT_FOUND] * 2, [Stability.NOT_COMPUTED] * 2]
+
+
+def test_a_damaged_branch_is_named_and_followed_again(branch, tmp_path, caplog):
+    assert branch() == 0
+    kept = tmp_path / "out" / "branches"
+    whole = {name: (kept / name).read_bytes() for name in names(kept)}
+    for damaged in (whole["branch_1.npz"][:-1], b"", b"mine"):
+        (kept / "branch_1.npz").write_bytes(damaged)
+        branch.followed.clear()
+        assert branch() == 0
+        assert branch.followed == [0] and "branch_1.npz: damaged (" in caplog.text
+        assert {name: (kept / name).read_bytes() for name in names(kept)} == whole
+        caplog.clear()
+    # of as many runs, but along other loads
+    (tmp_path / "x.toml").write_text(JOB.replace("105", "104"))
+    assert branch("--out", str(tmp_path / "other")) == 0
+    shutil.copy(tmp_path / "other" / "branches" / "branch_1.npz", kept)
+    (tmp_path / "x.toml").write_text(JOB)
+    branch.followed.clear()
+    assert branch() == 0
+    assert branch.followed == [0] and "branch_1.npz: damaged (of another job)" in caplog.text
+
+
+def test_without_its_other_files_a_diagram_is_known_by_its_branches(branch, tmp_path, capsys):
+    assert branch() == 0
+    for name in ("branch.json", "branch.nc"):
+        (tmp_path / "out" / name).unlink()
+    assert branch("--set", "friction_gradient=-0.6") == 2
+    assert "found branches without a branch.json" in capsys.readouterr().err
+    branch.followed.clear()
+    assert branch() == 0
+    assert branch.followed == [] and stability(tmp_path / "out") == [[Stability.NOT_FOUND] * 2] * 2
+
+
+def test_a_dataset_of_an_earlier_version_is_left_until_as_many_branches_are_done(branch, tmp_path, capsys):
+    assert branch() == 0
+    for kept in (tmp_path / "out" / "branches").iterdir():
+        kept.unlink()
+    assert branch(end=interrupt) == 130
+    told = "branch.nc holds 2 branches, 0 are kept beside it; all but those are followed anew"
+    assert told in capsys.readouterr().err
+    assert stability(tmp_path / "out") == [[Stability.NOT_FOUND] * 2] * 2
 
 
 def test_failed_runs_are_named_and_make_the_exit_status(branch, tmp_path, capsys):

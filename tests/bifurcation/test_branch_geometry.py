@@ -42,7 +42,7 @@ def test_each_branch_and_its_runs_have_their_own_geometry(path):
 
 
 def test_the_dataset_has_what_follows_along_its_axes(path):
-    dataset = diagram_dataset(load_diagram(path), [])
+    dataset = diagram_dataset(load_diagram(path), {})
     assert dataset["driven_radius"].dims == ("ratio",)
     assert dataset["driven_radius"].values == pytest.approx(RADII, rel=1e-7)
     assert dataset["thrust"].values.tolist() == [40e3, 50e3]

@@ -31,12 +31,12 @@ def runs(start, first, without=()):
 def verdict(small=21, large=17, onset=None, others=(), hidden=(), without=()):
     onset = onset or hopf(20.3)
     found = [*runs(0, small, without), *runs(1, large)]
-    return judged(onset, sorted([onset, *others]), list(hidden), found, 200.0)
+    return judged(onset, sorted([onset, *others]), list(hidden), found, 200.0, "{:g} N m".format)
 
 
 def test_the_width_is_from_the_hopf_point_with_its_bracket_in_the_error():
     found = verdict()
-    assert found.kind is Kind.SUBCRITICAL and found.reason == "both attractors from 17 to 20"
+    assert found.kind is Kind.SUBCRITICAL and found.reason == "both attractors from 17 N m to 20 N m"
     assert (found.width, found.error) == pytest.approx((20.3 - 16.5, 0.5 + 0.5 * CLOSE))
 
 
@@ -44,7 +44,9 @@ def test_runs_from_the_steady_state_may_turn_quiet_so_far_from_the_hopf_point_al
     assert verdict(small=24, large=24).kind is Kind.SUPERCRITICAL
     far = int(20.3 + AGREEMENT + 2.0)
     assert far in LOADS
-    assert verdict(small=far, large=far).reason.startswith("runs from the small start turn quiet at 26.5")
+    assert verdict(small=far, large=far).reason.startswith(
+        "runs from the small start turn quiet at 26.5 N m,"
+    )
 
 
 def test_slow_modes_and_states_that_stay_unstable_are_not_judged():
@@ -56,18 +58,19 @@ def test_slow_modes_and_states_that_stay_unstable_are_not_judged():
 def test_a_slow_mode_ends_the_stable_side_and_not_the_other():
     slow = {"frequency": 150.0, "rising": False}
     assert (
-        verdict(others=[hopf(19.5, **slow)]).reason == "both attractors at 20 alone, closer runs would tell"
+        verdict(others=[hopf(19.5, **slow)]).reason
+        == "both attractors at 20 N m alone, closer runs would tell"
     )
     assert verdict(small=24, others=[hopf(22.0, **slow)]).kind is Kind.SUBCRITICAL
     assert verdict(small=24, others=[hopf(22.0, rising=False)]).kind is Kind.UNDECIDED
-    assert verdict(hidden=[(12.0, 19.5)]).reason == "both attractors at 20 alone, closer runs would tell"
+    assert verdict(hidden=[(12.0, 19.5)]).reason == "both attractors at 20 N m alone, closer runs would tell"
 
 
 def test_where_no_run_began_in_the_steady_state_nothing_is_concluded():
-    assert verdict(without=(17, 18, 19)).reason == "both attractors at 20 alone, closer runs would tell"
+    assert verdict(without=(17, 18, 19)).reason == "both attractors at 20 N m alone, closer runs would tell"
 
 
 def test_without_runs_nothing_is_decided():
-    found = judged(hopf(20.3), [hopf(20.3)], [], [], 200.0)
+    found = judged(hopf(20.3), [hopf(20.3)], [], [], 200.0, str)
     assert (found.kind, found.reason) == (Kind.UNDECIDED, "no runs were asked for")
     assert np.isnan(found.width)

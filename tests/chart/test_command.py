@@ -5,6 +5,7 @@ import re
 import pytest
 
 from cvt_hpc.cli import main
+from support.bells import JOB
 
 
 @pytest.fixture
@@ -77,6 +78,13 @@ def test_bad_input_is_one_line_and_nothing_is_written(write_chart, call, tmp_pat
         ["cvt-hpc: c.toml: --set loudnes: unknown key; did you mean loudness in [scene]?"],
     )
     assert call(write_chart(("occurrence = {}", "push_force = {}")))[0] == 2
+    assert call(write_chart(text=JOB.partition("[chart")[0])) == (
+        2,
+        [],
+        [
+            "cvt-hpc: c.toml: chart: expected a table [chart]; see `jobs/chart_oscillator.toml`, found nothing",
+        ],
+    )
     assert [path.name for path in tmp_path.iterdir()] == ["c.toml"]
 
 

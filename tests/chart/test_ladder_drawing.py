@@ -1,11 +1,14 @@
 """The picture of a ladder: every answer at its error and its cost."""
 
+from types import SimpleNamespace
+
 import matplotlib
 import pytest
 
 from cvt_hpc.analysis.figures import STYLE
 from cvt_hpc.ladder.comparing import Finding, Score
 from cvt_hpc.ladder.drawing import ladder_figure
+from cvt_hpc.ladder.table import ladder_lines, write_ladder
 
 FINDINGS = [
     Finding("occurrence", "cheap", Score(10, wrong=0.3, undecided=0.2), 0.01),
@@ -25,7 +28,7 @@ FINDINGS = [
 @pytest.fixture(scope="module")
 def panels():
     with matplotlib.rc_context(STYLE):
-        return ladder_figure(FINDINGS, "x").axes
+        return ladder_figure(SimpleNamespace(name="x", units={}), FINDINGS).axes
 
 
 def drawn(axes, gid):
@@ -57,3 +60,18 @@ def test_the_reference_is_hatched_as_far_as_it_is_not_known(panels):
 def test_every_rung_is_in_the_legend_once(panels):
     texts = [text.get_text() for text in panels[-1].get_legend().get_texts()]
     assert texts[:3] == ["cheap", "dear", "reference"] and len(texts) == 5
+
+
+def test_errors_of_onsets_are_in_the_unit_of_the_job(panels, tmp_path):
+    job = SimpleNamespace(name="x", units={"load": "kN m"})
+    with matplotlib.rc_context(STYLE):
+        onset = ladder_figure(job, FINDINGS).axes[1]
+    assert drawn(onset, "span")[0] == ((0.005, 1.0), (0.01, 1.0))
+    assert [axes.get_xlabel() for axes in (onset, panels[1])] == [
+        "error of the load [kN m]", "error of the load [N m]",
+    ]  # fmt: skip
+    lines = list(ladder_lines(job, FINDINGS))
+    at = lines.index("onset: error [kN m]; that of the reference is estimated")
+    assert lines[at + 2].split()[:4] == ["dear", "4", "0.005", "0.01"]
+    write_ladder(job, FINDINGS, tmp_path / "ladder.csv")
+    assert "\nonset,dear,kN m,4,0.005,0.01," in (tmp_path / "ladder.csv").read_text()

@@ -262,12 +262,12 @@ def test_points_by_other_versions_or_machines_are_named(
 ):
     job = write_chart()
     with monkeypatch.context() as earlier:
-        earlier.setattr(f"cvt_hpc.chart.store.{name}", lambda: value)
+        earlier.setattr(f"cvt_hpc.archives.{name}", lambda: value)
         made(job)
     assert not caplog.records
     (tmp_path / "out/bells/points/ringing-soft-3.npz").unlink()
     report = made(job)
-    assert caplog.text.count("earlier points were measured with other versions or on another machine") == 1
+    assert caplog.text.count("earlier points were made with other versions or on another machine") == 1
     with xr.open_dataset(report.dataset) as dataset:
         found = dataset.attrs[attribute]
     old, new = {
@@ -340,4 +340,4 @@ def test_a_point_that_unpacks_to_more_than_a_point_is_measured_again(report, tmp
     point = tmp_path / "out/bells/points/ringing-soft-3.npz"
     np.savez_compressed(point, head=np.zeros(1 << 25))  # 256 MiB in 300 kB
     assert made("c.toml").table.read_bytes() == before
-    assert "ringing-soft-3.npz: damaged (it holds more than a point)" in caplog.text
+    assert "ringing-soft-3.npz: damaged (it unpacks to more than it may)" in caplog.text

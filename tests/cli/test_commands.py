@@ -276,10 +276,6 @@ def test_simulate_of_a_run_that_fails_ends_with_1(write_job, call):
             '--run-limit: expected a time above 0, such as "2h30m", "90 min" or a bare number in s, found "10 N"',
         ),
         (["run", "x.toml", "--fast"], "unrecognized arguments: --fast; see `cvt-hpc --help`"),
-        (
-            ["chart", "x.toml"],
-            "x.toml: chart: expected a table [chart]; see `jobs/chart_oscillator.toml`, found nothing",
-        ),
         ([], "the following arguments are required: COMMAND; see `cvt-hpc --help`"),
     ],
 )

@@ -53,7 +53,8 @@ def test_forces_of_both_strands_give_the_torque(records):
     torque = found["driving_power"] / (100.0 * np.pi)
     ring = radius + 1.5e-3
     least, most = ((t2 - t1) * ring + (p1 - p2) * height for height in (radius, ring + 4e-3))
-    assert least < torque < most
+    # 1e-4: heads do not touch, so that the torque is the least but for what the middles of strands leave out
+    assert (1.0 - 1e-4) * least < torque < most
     assert torque == pytest.approx(60.0, rel=0.05)  # the driven pulley still swings, by 2.7 N m
 
 
@@ -128,6 +129,12 @@ def test_a_step_that_is_not_solved_fails_with_time_element_and_contact():
     found = record(load=60.0, most_iterations=2, speed_tolerance=1e-12)
     assert found["status"] == Status.FAILED_NUMERICS and found["simulated_seconds"] < 0.01
     assert "not solved, at the " in found["reason"] and " contact of element " in found["reason"]
+
+
+def test_a_state_that_is_not_a_number_names_no_contact():
+    run = Transient(job(load=60.0).point(0), "newton")
+    run._state.pulleys[b.DRIVEN_SPEED] = np.nan
+    assert run.advance(1) == (Status.FAILED_NUMERICS, "the state is not a number")
 
 
 @pytest.mark.parametrize(

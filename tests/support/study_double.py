@@ -129,6 +129,9 @@ class Simulator:
     def pilot_share(self, job: Job) -> float:
         return 0.25
 
+    def forget(self, job: Job) -> None:
+        pass
+
     def run_points(
         self, job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
     ) -> list[dict[str, Any]]:

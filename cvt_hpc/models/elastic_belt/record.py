@@ -16,7 +16,7 @@ from cvt_hpc.variator import PULLEYS, judging
 from cvt_hpc.variator.judging import assess, mean, pair, power_balance
 from cvt_hpc.variator.slip import VARIABLE as SLIP_MARGIN
 from cvt_hpc.variator.slip import slide, slip_margin
-from cvt_hpc.variator.variables import COORDINATES, shared
+from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared
 from cvt_hpc.vibration import assessment, ramp
 from cvt_hpc.vibration.signals import band_amplitude
 
@@ -59,15 +59,7 @@ VARIABLES = (
     Variable(
         "modal_amplitude", ("strand", "half_waves"), "f8", "m", "amplitude of each sine mode in the band"
     ),
-    Variable(
-        "spectrum",
-        ("strand", "frequency_bin"),
-        "f8",
-        "m",
-        "at the strongest probe",
-        words="amplitude spectrum",
-    ),
-    *shared("mean_ring_tension", "mean_push_force", "axial_force", "slip"),
+    *shared("spectrum", "mean_ring_tension", "mean_push_force", "axial_force", "slip"),
     SLIP_MARGIN,
     Variable("open_share", ("pulley",), "f8", "1", "mean, out of contact", words="open share of the wrap"),
     *shared(
@@ -108,8 +100,6 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     parameters : dict
         Flat parameters of the job.
     """
-    step = parameters["spectrum_step"]
-    bins = np.arange(0.0, parameters["band_high"] + step / 2, step)
     return {
         **COORDINATES,
         "arc_part": Coordinate(
@@ -117,7 +107,7 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
         ),
         "ramp_share": ramp.coordinate(),
         "half_waves": Coordinate(np.arange(1, MODES + 1), "1", "half waves", "along the strand"),
-        "frequency_bin": Coordinate(bins, "Hz", "frequency"),
+        "frequency_bin": frequency_bins(parameters),
     }
 
 
@@ -161,7 +151,7 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
     return {
         "mode": np.where(modal.max(axis=1) > 0.0, 1 + modal.argmax(axis=1), 0),
         "modal_amplitude": modal,
-        **judging.evaluate(run, strongest_probe, coordinates(p)["frequency_bin"].values),
+        **judging.evaluate(run, strongest_probe),
         SLIP_MARGIN.name: slip_margin(run, judged),
         "open_share": pair(run, "open_share"),
         **power_balance(driving, load, thrust, sum(losses.values()), storing),

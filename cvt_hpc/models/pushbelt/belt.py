@@ -225,6 +225,8 @@ class Workspace(NamedTuple):
         System of the border, its right side last.
     inputs : (4,) array
         Inputs of the step.
+    kept : (2, STATE_FIELDS) array
+        States of two elements before the last correction.
     """
 
     step: LaneArray
@@ -235,6 +237,7 @@ class Workspace(NamedTuple):
     reduced: np.ndarray
     border: np.ndarray
     inputs: np.ndarray
+    kept: np.ndarray
 
 
 # Fields of Workspace.step

@@ -20,7 +20,8 @@ LEAST_SHARE_OF_WIDTH = 1e-3  # of v_reg: below it friction is linear to 3e-7
 @register_jitable
 def pressed(gap, stiffness):
     """Force [N] of a one-sided elastic contact at a gap [m], and its decrease by the gap [N/m]."""
-    return maximum(-stiffness * gap, 0.0), select(gap < 0.0, like(stiffness, gap), 0.0)
+    # in this order a gap that is not a number gives a force that is none
+    return maximum(0.0, -stiffness * gap), select(gap < 0.0, like(stiffness, gap), 0.0)
 
 
 @register_jitable

@@ -15,7 +15,7 @@ from cvt_hpc.variator.judging import mean, power_balance
 from cvt_hpc.variator.path import REGIONS, regions
 from cvt_hpc.variator.slip import VARIABLE as SLIP_MARGIN
 from cvt_hpc.variator.slip import slide, slip_margin
-from cvt_hpc.variator.variables import COORDINATES, shared
+from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared
 from cvt_hpc.vibration import assessment, ramp
 
 if TYPE_CHECKING:
@@ -30,15 +30,7 @@ RIGID_COST, ELASTIC_COST, SAMPLE_COST = 5.2e-7, 9.3e-7, 2e-4
 VARIABLES = (
     *assessment.VARIABLES,
     *ramp.VARIABLES,
-    Variable(
-        "spectrum",
-        ("strand", "frequency_bin"),
-        "f8",
-        "m",
-        "at the strongest probe",
-        words="amplitude spectrum",
-    ),
-    *shared("mean_ring_tension", "mean_push_force", "axial_force", "slip"),
+    *shared("spectrum", "mean_ring_tension", "mean_push_force", "axial_force", "slip"),
     SLIP_MARGIN,
     *shared("flank_loss", "thrust_ratio", "speed_loss"),
     Variable(
@@ -84,12 +76,10 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     parameters : dict
         Flat parameters of the job.
     """
-    step = parameters["spectrum_step"]
-    bins = np.arange(0.0, parameters["band_high"] + step / 2, step)
     return {
         **COORDINATES,
         "ramp_share": ramp.coordinate(),
-        "frequency_bin": Coordinate(bins, "Hz", "frequency"),
+        "frequency_bin": frequency_bins(parameters),
     }
 
 
@@ -111,25 +101,12 @@ def judge(run: Transient) -> dict[str, Any]:
     if run.failure is not None:
         return judging.slipped(run) | _speeds(run, slide(run))
     found = judging.assess(run)
-    return found.record() | evaluate(run, found.strongest_probe)
+    return found.record() | _evaluate(run, found.strongest_probe)
 
 
-def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
-    """Values from a finished run of those VARIABLES that are the belt's own.
-
-    Parameters
-    ----------
-    run : Transient
-        With all samples recorded.
-    strongest_probe : (2,) int array
-        Column of the displacement that vibrates most, for each strand.
-
-    Returns
-    -------
-    dict
-        Value by name.
-    """
-    p, judged = run.parameters, run.judged
+def _evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
+    """Values of a finished run, of VARIABLES beyond the verdict; as `judging.evaluate`, which has a part."""
+    judged = run.judged
     driving, load = run.mean_rate(fields.WORK_IN), run.mean_rate(fields.WORK_OUT)
     ring = run.mean_rate(fields.RING_LOSS)
     belt, tilt = run.mean_rate(fields.BELT_LOSS), run.mean_rate(fields.DAMPING_LOSS)
@@ -140,7 +117,7 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     idle = ~(push > IDLE * largest)  # as well where no element has been
     work = run.counters()
     return {
-        **judging.evaluate(run, strongest_probe, coordinates(p)["frequency_bin"].values),
+        **judging.evaluate(run, strongest_probe),
         SLIP_MARGIN.name: slip_margin(run, judged),
         **_speeds(run, judged),
         **power_balance(driving, load, thrust, loss, storing),

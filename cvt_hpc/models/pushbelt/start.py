@@ -181,4 +181,5 @@ def workspace(belt: Belt, nodes: int) -> Workspace:
         reduced=np.zeros((4 * parts, 4 * parts + columns)),
         border=np.zeros((columns - 1, columns)),
         inputs=np.zeros(4),
+        kept=np.zeros((2, STATE_FIELDS)),
     )

@@ -131,9 +131,12 @@ def _solve_border(border):
 
 @kernel
 def _correct(elements, blocks, border, increments, scratch, share, omega_length):
-    """Take the iterate to the solution, or a share of the way; return the largest correction [m/s]."""
+    """Take the iterate to the solution, or a share of the way; return the largest correction [m/s].
+
+    Where any correction is not finite, nor is what is returned.
+    """
     size = border.shape[0]
-    largest = like(0.0, blocks[0, RIGHT])
+    largest = total = like(0.0, blocks[0, RIGHT])
     for j in range(blocks.rows):
         for r in range(4):
             change = blocks[j, RIGHT + r]
@@ -141,72 +144,147 @@ def _correct(elements, blocks, border, increments, scratch, share, omega_length)
                 change -= blocks[j, RIGHT + 4 * (1 + k) + r] * border[k, size]
             blocks[j, RIGHT + r] = change
             elements[j, CHANGE + r] += share * change
-            largest = maximum(absolute(change * omega_length) if r == 2 else absolute(change), largest)
+            change = absolute(change * omega_length) if r == 2 else absolute(change)
+            largest = maximum(change, largest)
+            total += change
     for k in range(size):
         increments[k] += share * border[k, size]
-    scratch[0, 0] = largest
-    found = 0.0
+    scratch[0, 0], scratch[0, 1] = largest, total
+    found, total_found = 0.0, 0.0
     for part in range(scratch.data.shape[2]):
-        value = scratch.data[0, 0, part]
-        # a comparison that also finds what is not a number
-        if not value <= found:
-            found = value
-    return found
+        found = max(found, scratch.data[0, 0, part])
+        total_found += scratch.data[0, 1, part]
+    # a maximum passes over what is not a number, a sum does not
+    return found if total_found < np.inf else total_found
 
 
 @kernel
-def _evaluate(belt, state, work, dt):
-    """Forces of the iterate."""
-    pair_forces(belt, state.elements, work.step, work.iterate, dt)
+def _prepare(belt, state, work, dt):
+    """What all iterates of a step have in common: geometry, directions, linear laws."""
+    predict(belt, state.elements, state.pulleys, work.step, dt)
+    link(belt, state.elements, work.step, dt)
     if belt.nose_clearance < np.inf:
-        nose_forces(belt, state.elements, work.step, work.iterate, dt)
-    element_forces(
+        predict_noses(belt, state.elements, work.step)
+    linear_blocks(belt, work.step, dt)
+    _shapes(belt, work.step, work.shapes)
+
+
+@kernel
+def _evaluate(belt, state, work, load, dt):
+    """Forces of the iterate, and the residuals that they leave; return the power residual [W]."""
+    elements, step, iterate = state.elements, work.step, work.iterate
+    pulleys, increments, openings, shapes = state.pulleys, state.increments, state.openings, work.shapes
+    pair_forces(belt, elements, step, iterate, dt)
+    if belt.nose_clearance < np.inf:
+        nose_forces(belt, elements, step, iterate, dt)
+    element_forces(belt, elements, pulleys, increments, openings, shapes, step, iterate, dt)
+    return residuals(
         belt,
-        state.elements,
-        state.pulleys,
-        state.increments,
-        state.openings,
-        work.shapes,
-        work.step,
-        work.iterate,
+        elements,
+        pulleys,
+        increments,
+        openings,
+        shapes,
+        load,
+        step,
+        iterate,
+        work.scratch,
+        work.border,
         dt,
     )
 
 
 @kernel
-def _newton(belt, newton, state, work, load, dt):
-    """Find the speeds of a step; iterations, the last correction [m/s] and the power residual [W]."""
+def _solve(belt, state, work, dt):
+    """Solve for the correction: of the border in its last column, of elements without its part in blocks."""
     elements, step, iterate = state.elements, work.step, work.iterate
+    assemble(belt, elements, work.shapes, step, iterate, work.blocks)
+    if belt.nose_clearance < np.inf:
+        add_nose_blocks(elements, step, iterate, work.blocks)
+    solve(work.blocks, work.scratch, work.reduced)
+    border_system(belt, elements, work.shapes, step, iterate, work.blocks, work.scratch, work.border, dt)
+    _solve_border(work.border)
+
+
+@kernel
+def _most_corrected(blocks, omega_length):
+    """The element with the largest correction."""
+    corrections = blocks.data
+    rows, parts = corrections.shape[0], corrections.shape[2]
+    largest, element = -1.0, 0
+    for part in range(parts):
+        for j in range(rows):
+            for r in range(4):
+                size = abs(corrections[j, RIGHT + r, part]) * (omega_length if r == 2 else 1.0)
+                if size > largest:
+                    largest, element = size, part * rows + j
+    return element
+
+
+@kernel
+def _keep_states(elements, element, kept):
+    """Keep the state of an element, and of the one behind it."""
+    rows, fields, parts = elements.data.shape
+    for k in range(2):
+        place = (element - k) % (rows * parts)
+        for field in range(fields):
+            kept[k, field] = elements.data[place % rows, field, place // rows]
+
+
+@kernel
+def _name_fault(state, element, kept):
+    """Enter the contact of an element whose force has changed most since its state was kept.
+
+    Contacts with the next element and with the one behind count, the latter as those of that element.
+    """
+    rows, fields, parts = state.elements.data.shape
+    for k in range(2):
+        place = (element - k) % (rows * parts)
+        for field in range(fields):
+            kept[k, field] = abs(state.elements.data[place % rows, field, place // rows] - kept[k, field])
+    flank = kept[0, FLANK] ** 2 + kept[0, FLANK_FRICTION_M] ** 2 + kept[0, FLANK_FRICTION_T] ** 2
+    of_itself = kept[0, EDGE], kept[0, HEAD], np.sqrt(flank), kept[0, RING_FRICTION], kept[0, NOSE]
+    changes = (*of_itself, kept[1, EDGE], kept[1, HEAD], 0.0, 0.0, kept[1, NOSE])  # as in CONTACTS
+    largest = 0
+    for k in range(len(changes)):
+        if changes[k] > changes[largest]:
+            largest = k
+    contacts = len(of_itself)
+    state.counters[FAILED_ELEMENT] = (element - largest // contacts) % (rows * parts)
+    state.counters[FAILED_CONTACT] = largest % contacts
+
+
+@kernel
+def _newton(belt, newton, state, work, load, dt):
+    """Find the speeds of a step; iterations, the last correction [m/s] and the power residual [W].
+
+    A step that is not solved leaves its fault in the counters.
+    """
     change, power = 0.0, 0.0
+    element = 0
     for iteration in range(newton.most_iterations + 1):
-        _evaluate(belt, state, work, dt)
-        power = residuals(
-            belt,
-            elements,
-            state.pulleys,
-            state.increments,
-            state.openings,
-            work.shapes,
-            load,
-            step,
-            iterate,
-            work.scratch,
-            work.border,
-            dt,
-        )
+        power = _evaluate(belt, state, work, load, dt)
+        is_finite = abs(power) < _LARGE and change < _LARGE
         enough = iteration > 0 and change < newton.tolerance and abs(power) < newton.power_tolerance
-        if enough or iteration == newton.most_iterations or not abs(power) < _LARGE:
+        if enough or not is_finite:
             return iteration, change, power
-        assemble(belt, elements, work.shapes, step, iterate, work.blocks)
-        if belt.nose_clearance < np.inf:
-            add_nose_blocks(elements, step, iterate, work.blocks)
-        solve(work.blocks, work.scratch, work.reduced)
-        border_system(belt, elements, work.shapes, step, iterate, work.blocks, work.scratch, work.border, dt)
-        _solve_border(work.border)
+        if iteration == newton.most_iterations:
+            _name_fault(state, element, work.kept)
+            return iteration, change, power
+        _solve(belt, state, work, dt)
         share = 0.5 if iteration >= newton.first_half_step else 1.0
         change = _correct(
-            elements, work.blocks, work.border, state.increments, work.scratch, share, newton.omega_length
+            state.elements,
+            work.blocks,
+            work.border,
+            state.increments,
+            work.scratch,
+            share,
+            newton.omega_length,
         )
+        if iteration == newton.most_iterations - 1:
+            element = _most_corrected(work.blocks, newton.omega_length)
+            _keep_states(state.elements, element, work.kept)
     return newton.most_iterations, change, power
 
 
@@ -287,45 +365,6 @@ def _accept(belt, state, work, inputs, dt):
 
 
 @kernel
-def _shift(state, work, share):
-    """Shift an iterate by a share of its last correction."""
-    for j in range(work.iterate.rows):
-        for r in range(4):
-            state.elements[j, CHANGE + r] += share * work.blocks[j, RIGHT + r]
-
-
-@kernel
-def _contact_at_fault(belt, newton, state, work, dt):
-    """Element with the largest last correction, and the contact whose force it changed most."""
-    solution = work.blocks.data
-    rows, parts = solution.shape[0], solution.shape[2]
-    worst, row, part = -1.0, 0, 0
-    for j in range(rows):
-        for p in range(parts):
-            for r in range(4):
-                size = abs(solution[j, RIGHT + r, p]) * (newton.omega_length if r == 2 else 1.0)
-                if not size <= worst:
-                    worst, row, part = size, j, p
-    forces = state.elements.data
-    edge, head, nose = forces[row, EDGE, part], forces[row, HEAD, part], forces[row, NOSE, part]
-    flank, ring = forces[row, FLANK_FRICTION_T, part], forces[row, RING_FRICTION, part]
-    _shift(state, work, -1.0)
-    _evaluate(belt, state, work, dt)
-    _shift(state, work, 1.0)
-    contact, most = 0, abs(forces[row, EDGE, part] - edge)
-    if abs(forces[row, HEAD, part] - head) > most:
-        contact, most = 1, abs(forces[row, HEAD, part] - head)
-    if abs(forces[row, FLANK_FRICTION_T, part] - flank) > most:
-        contact, most = 2, abs(forces[row, FLANK_FRICTION_T, part] - flank)
-    if abs(forces[row, RING_FRICTION, part] - ring) > most:
-        contact, most = 3, abs(forces[row, RING_FRICTION, part] - ring)
-    if abs(forces[row, NOSE, part] - nose) > most:
-        contact = 4
-    _evaluate(belt, state, work, dt)  # the state is to have the forces of the last iterate
-    return part * rows + row, contact
-
-
-@kernel
 def advance(belt, newton, state, work, inputs, steps, dt):
     """Advance a pushbelt by a number of steps, in place.
 
@@ -350,8 +389,8 @@ def advance(belt, newton, state, work, inputs, steps, dt):
     Returns
     -------
     int
-        CONVERGED; NOT_CONVERGED where `most_failures` steps in a row had not converged; NOT_FINITE. The
-        counters then name the element and the contact at fault.
+        CONVERGED; NOT_CONVERGED where `most_failures` steps in a row had not converged; NOT_FINITE. Of the
+        last step that had not converged the counters name the contact at fault, and its element.
     """
     counters = state.counters
     for k in range(steps):
@@ -359,12 +398,7 @@ def advance(belt, newton, state, work, inputs, steps, dt):
         for entry in range(4):
             work.inputs[entry] = inputs[0, entry] + share * (inputs[1, entry] - inputs[0, entry])
         state.pulleys[DRIVING_SPEED] = work.inputs[IN_SPEED]
-        predict(belt, state.elements, state.pulleys, work.step, dt)
-        link(belt, state.elements, work.step, dt)
-        if belt.nose_clearance < np.inf:
-            predict_noses(belt, state.elements, work.step)
-        linear_blocks(belt, work.step, dt)
-        _shapes(belt, work.step, work.shapes)
+        _prepare(belt, state, work, dt)
         iterations, change, power = _newton(belt, newton, state, work, work.inputs[IN_LOAD], dt)
         counters[STEPS] += 1
         counters[ITERATIONS] += iterations
@@ -373,8 +407,6 @@ def advance(belt, newton, state, work, inputs, steps, dt):
         counters[IN_A_ROW] = counters[IN_A_ROW] + 1 if failed else 0
         if failed:
             counters[FAILED_STEPS] += 1
-            element, contact = _contact_at_fault(belt, newton, state, work, dt)
-            counters[FAILED_ELEMENT], counters[FAILED_CONTACT] = element, contact
         if not finite or counters[IN_A_ROW] == newton.most_failures:
             counters[STATUS] = NOT_CONVERGED if finite else NOT_FINITE
             return counters[STATUS]

@@ -13,6 +13,7 @@ from cvt_hpc.models.pushbelt.belt import CONTACTS, NOT_CONVERGED, Newton
 from cvt_hpc.models.pushbelt.parameters import MODES, path_length
 from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Reading, Readings
 from cvt_hpc.models.pushbelt.start import of_lanes, start, workspace
+from cvt_hpc.models.pushbelt.start_up import StartUps, fingerprint
 from cvt_hpc.models.pushbelt.step import advance
 from cvt_hpc.recording import sample_count, start_up_samples
 from cvt_hpc.variables import Status
@@ -32,9 +33,14 @@ CLAMPED = 0.5  # of the rise time: until then the thrust rises, from then on the
 OF_ROTATION, OF_THRUST, OF_LOSS = 1.5, 10.0, 0.02  # [1], [1/s], [1]
 MOST_UNSOLVED = 0.02  # of the steps
 
+_start_ups = StartUps()
+forget = _start_ups.forget
+
 
 class Transient:
     """One run of the pushbelt, advanced sample by sample.
+
+    It begins at the end of its start-up where another run of this process has marched the same one.
 
     Parameters
     ----------
@@ -79,6 +85,10 @@ class Transient:
         self._rows = np.empty((0, len(self.probes) + len(CHANNELS)))
         self._totals = np.empty((0, fields.TOTALS + 1))
         self.prolong(p)
+        clamped = int(CLAMPED * p["rise_time"] / self.interval + 1e-9)
+        self._start_up = min(clamped, self.first_judged)
+        self._start_up_key = self._key_of_start_up()
+        self._go_on_from(_start_ups.find(self._start_up_key))
 
     def prolong(self, parameters: Mapping[str, Any]) -> None:
         """Make room for the samples of a longer duration.
@@ -112,22 +122,47 @@ class Transient:
         if samples == 0:
             self._compile()
         for _ in range(min(samples, self.samples - self.done)):
-            first, last = self._inputs(self.time), self._inputs(self.time + self.interval)
-            outcome = self._march(np.array([first, last]), self._steps_per_sample)
+            inputs = self._inputs_along(self.done)
+            outcome = self._march(inputs, self._steps_per_sample)
             if outcome:
                 self.failure = Status.FAILED_NUMERICS, self._why(outcome)
                 break
-            self._take_sample(last)
+            self._take_sample(inputs[1])
             if (slipped := self._slipped()) is not None:
                 self.failure = Status.DONE, slipped
                 break
+            if self.done == self._start_up:
+                _start_ups.keep(self._start_up_key, self._reached())
         return self.failure
+
+    def _key_of_start_up(self) -> str:
+        """All that the samples before the load acts follow from."""
+        course = [self._inputs_along(sample) for sample in range(self._start_up)]
+        marched = self._belt, self._newton, self._state, self.interval, self._steps_per_sample, course
+        return fingerprint(marched, self._readings, self.parameters["ratio"])
+
+    def _go_on_from(self, start_up: tuple[np.ndarray, ...] | None) -> None:
+        """Be at the end of the start-up, where another run has marched it."""
+        if start_up is None:
+            return
+        self.done = self._start_up
+        for own, kept in zip(self._reached(), start_up, strict=True):
+            own[...] = kept
+
+    def _reached(self) -> tuple[np.ndarray, ...]:
+        """Views of all that marching has changed so far, where nothing is judged yet."""
+        recorded = self._rows[: self.done], self._totals[: self.done]
+        return self._state.elements.data, *self._state[1:], *recorded
 
     def _march(self, inputs: np.ndarray, steps: int) -> int:
         return advance(self._belt, self._newton, self._state, self._work, inputs, steps, self.step)
 
     def _compile(self) -> None:
-        self._march(np.array([self._inputs(0.0)] * 2), 0)
+        self._march(self._inputs_along(0), 0)
+
+    def _inputs_along(self, sample: int) -> np.ndarray:
+        """Inputs at the start and at the end of a sample, (2, 4)."""
+        return np.array([self._inputs((sample + end) * self.interval) for end in (0, 1)])
 
     def _inputs(self, time: float) -> tuple[float, float, float, float]:
         """Speed [rad/s], thrusts on both pulleys [N] and torque on the driven one [N m] at a time."""
@@ -152,7 +187,7 @@ class Transient:
         rise, end = p["rise_time"] - clamped, p["duration"] - clamped
         return load_course.py_func(max(time - clamped, 0.0), rise, end, begun, p["load"])
 
-    def _take_sample(self, inputs: tuple[float, float, float, float]) -> None:
+    def _take_sample(self, inputs: np.ndarray) -> None:
         found = Reading(self._readings, of_lanes(self._state.elements), self._state)
         speed, _, _, torque = inputs
         load = torque / self.parameters["ratio"]
@@ -165,9 +200,9 @@ class Transient:
         self.done += 1
 
     def _why(self, outcome: int) -> str:
-        unsolved = outcome == NOT_CONVERGED
-        what = "the equations of a step were not solved" if unsolved else "the state is not a number"
-        return f"{what}, {self._fault()}"
+        if outcome == NOT_CONVERGED:
+            return f"the equations of a step were not solved, {self._fault()}"
+        return "the state is not a number"
 
     def _fault(self) -> str:
         """Where the last step that was not solved was not."""

@@ -98,6 +98,15 @@ class SteadyBelt:
                 return self._found(x, load)
         raise missed
 
+    def known(self, load: float, unknowns: np.ndarray) -> Steady:
+        """State under a load, by unknowns that were found before; ValueError if they are not of this belt."""
+        if unknowns.shape != self._equations.sizes.shape:
+            raise ValueError(f"{unknowns.shape} unknowns of a belt that has {self._equations.sizes.shape}")
+        self._friction(1.0)
+        self._bridge(1.0)
+        self._load(load)
+        return self._found(unknowns, load)
+
     def along(self, loads: Sequence[float]) -> Iterator[Steady]:
         """States under several loads in their order, each from the one before."""
         near = None

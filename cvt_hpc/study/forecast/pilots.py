@@ -100,6 +100,7 @@ def run_pilots(job: Job, simulator: Simulator, groups: Sequence[Batch], count: i
     task = Task(short, describe(short, simulator), simulator)
     model, history_bytes = CostModel(simulator.run_costs(short), turns=turns), math.nan
     for batch in chosen:
+        simulator.forget(job)
         for result in task.do(batch, lambda: None, lambda batch: None):
             if result.failed < len(result.records):
                 model.learn(result.batch, result.seconds)

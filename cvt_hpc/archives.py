@@ -1,0 +1,157 @@
+"""Parts of a long work that are done, each kept in an archive of its own until all are.
+
+An archive holds arrays, and a head in JSON types: of which job the part is, by what it was computed, and what
+is no array. It may come from somebody else: nothing in it is executed, and what cannot be read is damage.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import logging
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from cvt_hpc.files import StorageError, kind_of, read_regular, written_aside
+from cvt_hpc.provenance import git_revision, machine, versions
+
+_SUFFIX = ".npz"
+# what an archive raises depends on the byte that is damaged
+_DAMAGE = (
+    *(ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError),
+    *(struct.error, SyntaxError, TypeError, ValueError, zipfile.BadZipFile, zlib.error),
+)
+_logger = logging.getLogger(__name__)
+
+Arrays = dict[str, np.ndarray]
+Part = TypeVar("Part")
+
+
+class Archives:
+    """The archives of one job.
+
+    Parameters
+    ----------
+    folder : Path
+        Where they lie; nothing else does.
+    fingerprint : str
+        Of the job.
+    limit : int
+        Of an archive, and of what it holds unpacked [bytes].
+
+    Attributes
+    ----------
+    makers : list of dict
+        Versions, revision and machine by which the parts that were loaded or saved have been computed.
+    """
+
+    def __init__(self, folder: Path, fingerprint: str, limit: int) -> None:
+        self.folder = folder
+        self.makers: list[dict[str, Any]] = []
+        self._fingerprint, self._limit = fingerprint, limit
+        self._maker = {"versions": versions(), "git_revision": git_revision(), "machine": machine()}
+
+    def warn_of_others(self, dataset: Path) -> None:
+        """Warn if some parts were made by another program or machine than this; the dataset names both."""
+        if any(maker != self._maker for maker in self.makers):
+            _logger.warning(
+                "%s: earlier %s were made with other versions or on another machine (%s names them in its "
+                "attributes `versions`, `git_revision` and `machine`); --fresh repeats them",
+                dataset.parent,
+                self.folder.name,
+                dataset.name,
+            )
+
+    def written(self) -> list[Path]:
+        """Return the archives, half-written ones, too; none where a link stands in their folder's place."""
+        if kind_of(self.folder) != "a folder":
+            return []
+        return [*self.folder.glob(f"*{_SUFFIX}"), *self.folder.glob(f".*{_SUFFIX}.*.part")]
+
+    def fingerprints(self) -> set[str]:
+        """Return of which jobs there are sound archives."""
+        found = set()
+        for path in self.written():
+            try:
+                found.add(str(self._read(path)[0]["fingerprint"]))
+            except _DAMAGE:
+                continue
+        return found
+
+    def load(self, name: str, unpack: Callable[[Any, Arrays], Part]) -> Part | None:
+        """Return a part that is kept.
+
+        Parameters
+        ----------
+        name : str
+            Of the part.
+        unpack : callable
+            Makes the part of what `save` was given; it raises what it will of the usual errors, such as
+            ValueError and KeyError, where that is none.
+
+        Returns
+        -------
+        object or None
+            None if nothing is kept, or nothing that can be read: that is told.
+
+        Raises
+        ------
+        StorageError
+            If the system does not let the archive be read.
+        """
+        path = self._path(name)
+        if kind_of(path) is None:
+            return None
+        try:
+            head, arrays = self._read(path)
+            if head["fingerprint"] != self._fingerprint:
+                raise ValueError("of another job")
+            part, maker = unpack(head["plain"], arrays), _checked_maker(head["maker"])
+        except PermissionError as error:
+            raise StorageError(
+                f"{path}: expected a file that can be read, found: {error.strerror}"
+            ) from error
+        except _DAMAGE as error:
+            _logger.warning("%s: damaged (%s); done again", path, error or "it is empty")
+            return None
+        self._remember(maker)
+        return part
+
+    def save(self, name: str, plain: Any, arrays: Arrays) -> None:
+        """Keep a part: what is plain in JSON types, and its arrays."""
+        head = json.dumps({"plain": plain, "fingerprint": self._fingerprint, "maker": self._maker})
+        named: dict[str, Any] = {f"values {key}": array for key, array in arrays.items()}
+        with written_aside(self._path(name)) as aside, aside.open("wb") as file:
+            np.savez_compressed(file, head=np.array(head), **named)
+        self._remember(self._maker)
+
+    def _path(self, name: str) -> Path:
+        return self.folder / f"{name}{_SUFFIX}"
+
+    def _read(self, path: Path) -> tuple[dict[str, Any], Arrays]:
+        """Return head and arrays of an archive."""
+        data = read_regular(path, self._limit)
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > self._limit:
+                raise ValueError("it unpacks to more than it may")
+        with np.load(io.BytesIO(data)) as file:
+            arrays = {key.removeprefix("values "): file[key] for key in file.files if key != "head"}
+            return json.loads(str(file["head"])), arrays
+
+    def _remember(self, maker: dict[str, Any]) -> None:
+        if maker not in self.makers:
+            self.makers.append(maker)
+
+
+def _checked_maker(maker: Any) -> dict[str, Any]:
+    """Return versions, revision and machine by which a part was computed; ValueError if these are none."""
+    own = {"versions": dict, "git_revision": str, "machine": dict}
+    if not all(isinstance(maker[key], kind) for key, kind in own.items()):
+        raise ValueError("nobody has made it")
+    return maker
