@@ -97,8 +97,8 @@ def test_more_torque_than_friction_carries_slips_through():
     ("values", "message"),
     [
         (
-            {"elements": 12},
-            "[belt] elements: expected at least 14, two on the shortest arc or strand, found 12",
+            {"elements": 15},
+            "[belt] elements: expected at least 16, four on the shorter arc and two on a strand, found 15",
         ),
         (
             {"tension": 1e5},

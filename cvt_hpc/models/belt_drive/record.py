@@ -14,7 +14,7 @@ from cvt_hpc.variator import STRANDS, judging
 from cvt_hpc.variator.history import dataset
 from cvt_hpc.variator.judging import pair
 from cvt_hpc.variator.path import REGIONS, regions
-from cvt_hpc.variator.variables import COORDINATES, shared
+from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared
 from cvt_hpc.vibration import assessment
 from cvt_hpc.vibration.signals import amplitude_spectrum
 
@@ -28,14 +28,7 @@ STEP_COST, SAMPLE_COST = 8e-6, 3e-4
 
 VARIABLES = (
     *assessment.VARIABLES,
-    Variable(
-        "spectrum",
-        ("strand", "frequency_bin"),
-        "f8",
-        "m",
-        "at the strongest probe",
-        words="amplitude spectrum",
-    ),
+    *shared("spectrum"),
     Variable("strand_tension", ("strand",), "f8", "N", "mean tension in the middle half of the strand"),
     *shared("slip"),
     replace(
@@ -61,9 +54,7 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     parameters : dict
         Flat parameters of the job.
     """
-    step = parameters["spectrum_step"]
-    bins = np.arange(0.0, parameters["band_high"] + step / 2, step)
-    return {**COORDINATES, "frequency_bin": Coordinate(bins, "Hz", "frequency")}
+    return {**COORDINATES, "frequency_bin": frequency_bins(parameters)}
 
 
 def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
@@ -113,7 +104,7 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     powers = judging.power_balance(driving, load, 0.0, contact + belt + friction.sum(), storing)
     del powers["thrust_power"]
     return {
-        "spectrum": amplitude_spectrum(moved, p["sampling_rate"], coordinates(p)["frequency_bin"].values).T,
+        "spectrum": amplitude_spectrum(moved, p["sampling_rate"], frequency_bins(p).values).T,
         "strand_tension": pair(run, "tension", STRANDS),
         "slip": pair(run, "slip"),
         "speed_loss": 1.0

@@ -15,8 +15,8 @@ from cvt_hpc.solvers.generalised_alpha import Scheme
 from cvt_hpc.variator.path import points_at
 
 IMPLICIT_EULER = Scheme(1.0, 1.0, 1.0)
-# Steps towards equilibrium [s]: the first is short, as contacts close; a solved one is followed by a longer one,
-# a step that is not by a shorter one; the longest leave nothing to settle
+# Steps towards equilibrium [s]: the first is short, as contacts close; a step that is solved is followed by a
+# longer one, else by a shorter one; the longest leaves nothing to settle
 FIRST, LONGEST = 1e-5, 1.0
 LONGER, SHORTER = 4.0, 0.25
 MOST_STEPS = 500  # common belts need 20
