@@ -33,7 +33,7 @@ def add(commands: Any) -> None:
     pilots = "forecast by K batches that are done for it, shortened (default: by records, else by prediction)"
     check.add_argument("--pilots", type=int, default=0, metavar="K", help=pilots)
     check.add_argument("--plot", type=Path, metavar="PNG", help="picture of the forecast, 1 to 10 000 ranks")
-    command = "command that is to take the job (default: chart or branch by its table of that name, else run)"
+    command = "command that is to take the job (default: chart, branch or ladder by its table, else run)"
     check.add_argument("--for", dest="command_for", choices=(RUN, *_PLANS), help=command)
     add_assignments(check, "--set", REPLACE)
 
@@ -43,7 +43,7 @@ def _check(arguments: argparse.Namespace) -> int:
     from cvt_hpc.job.document import read_document
 
     tables = read_document(arguments.path)
-    command = arguments.command_for or next((name for name in ("chart", "branch") if name in tables), RUN)
+    command = arguments.command_for or next((name for name in _PLANS if name in tables), RUN)
     if command != RUN:
         if arguments.ranks or arguments.pilots or arguments.plot:
             raise mismatch(
@@ -90,12 +90,11 @@ def _chart_lines(arguments: argparse.Namespace) -> Iterator[str]:
 
 
 def _ladder_lines(arguments: argparse.Namespace) -> Iterator[str]:
-    from cvt_hpc.job import load_job
     from cvt_hpc.ladder.costs import plan_lines
-    from cvt_hpc.ladder.rungs import ladder
+    from cvt_hpc.ladder.loading import load_ladder
 
-    job = load_job(arguments.path, arguments.set)
-    return plan_lines(job, *ladder(job), output_folder(None, job))
+    asked = load_ladder(arguments.path, arguments.set)
+    return plan_lines(asked, output_folder(None, asked.job))
 
 
 def _branch_lines(arguments: argparse.Namespace) -> Iterator[str]:

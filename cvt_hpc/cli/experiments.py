@@ -29,7 +29,7 @@ def add(commands: Any) -> None:
     text = "do the runs of a job on every rung, and compare them"
     ladder = add_command(commands, "ladder", _ladder, text, "JOB")
     add_folder(ladder, "earlier results of all rungs")
-    add_assignments(ladder, "--set", REPLACE)
+    add_assignments(ladder, "--set", f"{REPLACE}; ladder.KEY replaces a key of [ladder]")
     text = "follow steady states along the load, to their Hopf points"
     branch = add_command(commands, "branch", _branch, text, "JOB")
     add_folder(branch, "an earlier diagram of the folder")
@@ -51,17 +51,15 @@ def _chart(arguments: argparse.Namespace) -> int:
 
 
 def _ladder(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.job import load_job
+    from cvt_hpc.ladder.loading import load_ladder
     from cvt_hpc.ladder.making import report_ladder, run_ladder
-    from cvt_hpc.ladder.rungs import ladder
     from cvt_hpc.ladder.table import ladder_lines
     from cvt_hpc.printing import trouble_lines
     from cvt_hpc.study.ranks.launch import end_process
     from cvt_hpc.study.report import STALLED
 
-    job = load_job(arguments.path, arguments.set)
+    job, rungs, refusals = load_ladder(arguments.path, arguments.set)
     out = output_folder(arguments.out, job)
-    rungs, refusals = ladder(job)
     complain(*(f"{name} left out: {why}" for name, why in refusals.items()))
     status = run_ladder(
         rungs,

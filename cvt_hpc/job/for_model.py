@@ -6,7 +6,7 @@ from typing import Any
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job.definition import Job
-from cvt_hpc.job.schema import known_keys
+from cvt_hpc.job.schema import load_schema
 from cvt_hpc.models.contract import load_model
 
 
@@ -41,16 +41,16 @@ def handed_to(job: Job, model: str, why: str) -> dict[str, Any]:
     InputError
         If an axis is nothing that the other model knows. A formula may still name what it does not know.
     """
-    document, known = job.resolved(), known_keys(model)
+    document, known = job.resolved(), load_schema(model, None, job.source).section_of
     for axis in job.axes:
         if axis.name not in known:
             where = f"{job.source}: [axes] {axis.name}"
             raise mismatch(where, f"a key of {model}, since {why}", "one without effect there")
-    tables = {
-        section: {key: document[section][key] for key in table if key in job.given and key in known}
-        for section, table in document.items()
-        if section in job.schema.sections
-    }
+    tables: dict[str, dict[str, Any]] = {}
+    for section in job.schema.sections:
+        for key, value in document[section].items():
+            if key in job.given and key in known:
+                tables.setdefault(known[key], {})[key] = value  # it may belong in another table there
     derived = {key: text for key, text in document.get("derived", {}).items() if key in known}
     linked = {
         axis: {key: values for key, values in table.items() if key in known}
@@ -60,4 +60,5 @@ def handed_to(job: Job, model: str, why: str) -> dict[str, Any]:
     head = {"name": job.name, "model": model, "description": text}
     rest = {key: document[key] for key in ("axes", "design") if key in document}
     tables |= {"derived": derived, "linked": {axis: table for axis, table in linked.items() if table}}
-    return head | {section: table for section, table in tables.items() if table} | rest
+    tables = {name: table for name, table in tables.items() if table}
+    return head | tables | rest

@@ -33,7 +33,7 @@ from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.units import unit_in
 from cvt_hpc.job.values import expectation, kind_of, read_value
 
-OF_COMMANDS = ("branch", "chart")  # tables that a command of the same name reads
+OF_COMMANDS = ("branch", "chart", "ladder")  # tables that a command of the same name reads
 _OF_DESIGN = "design."
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
@@ -60,7 +60,7 @@ def load_job(path: str | Path, overrides: Assignments = ()) -> Job:
         If anything is wrong with the file or an override.
     """
     job = build_job(read_document(Path(path)), str(path), overrides)
-    _refuse_what_is_compared_only(job)
+    refuse_what_is_compared_only(job)
     return job
 
 
@@ -259,7 +259,8 @@ def _settled(rules: Sequence[Rule], axes: tuple[Axis, ...]) -> set[str]:
     return {rule.key for rule in rules if isinstance(rule.source, Link) and rule.source.axis not in swept}
 
 
-def _refuse_what_is_compared_only(job: Job) -> None:
+def refuse_what_is_compared_only(job: Job) -> None:
+    """Raise InputError if a job of runs has a value that is there for `cvt-hpc chart` to compare."""
     varied: dict[str, Axis | Derived] = {axis.name: axis for axis in job.axes}
     varied |= {derived.name: derived for derived in job.derived}
     for key, parameter in job.schema.parameters.items():

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis.classes import at_strongest_strand, occurrence_classes
 from cvt_hpc.ladder.audit import FORCES
 from cvt_hpc.ladder.onsets import onsets, paired_errors
-from cvt_hpc.ladder.rungs import MODEL, REFERENCE, Rung
+from cvt_hpc.ladder.rungs import REFERENCE, Rung
 from cvt_hpc.models.linear_stability.modes import DECAY
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass
@@ -76,14 +76,15 @@ class Finding(NamedTuple):
 def compare(rungs: Sequence[Rung], results: Mapping[str, xr.Dataset]) -> Iterator[Finding]:
     """Yield what each rung makes of each question that it answers, the reference last.
 
-    The reference's own error is taken as large as the distance of the full run from it: it would be 0.8 of
-    that if all errors were of second order in mesh and step, and twice as much if of the first. No onset is
-    known more closely than half a step of the load.
+    The reference's own error is taken as large as the distance of the rung before it, of which it is a
+    refined one. Of the elastic belt it would be 0.8 of that if all errors were of second order in mesh and
+    step, and twice as much if of the first; of the pushbelt a third, and as much. No onset is known more
+    closely than half a step of the load.
 
     Parameters
     ----------
     rungs : sequence of Rung
-        With the full run and the reference among them.
+        As `ladder` returns them, the reference last.
     results : mapping
         Results of each rung, by its name.
     """
@@ -94,16 +95,16 @@ def compare(rungs: Sequence[Rung], results: Mapping[str, xr.Dataset]) -> Iterato
             if question in rung.answers:
                 found = score(_beside(results[rung.name], reference), reference)
                 yield Finding(question, rung.name, found, costs[rung.name])
-        full = score(_beside(results[MODEL], reference), reference)
-        yield Finding(question, REFERENCE, _own(question, full, reference), costs[REFERENCE])
+        # the rung before the reference answers all questions, and stands last
+        yield Finding(question, REFERENCE, _own(question, found, reference), costs[REFERENCE])
 
 
-def _own(question: str, full: Score, reference: xr.Dataset) -> Score:
-    """Estimated error of the reference, by the score of the full run."""
+def _own(question: str, coarser: Score, reference: xr.Dataset) -> Score:
+    """Estimated error of the reference, by the score of the rung of which it is a refined one."""
     if question == "onset":
         spacing = np.diff(np.sort(reference["load"].values)).max(initial=0.0)
-        return Score(full.cells, median=float(np.fmax(full.median, 0.5 * spacing)))
-    return Score(full.cells, median=full.median, wrong=full.wrong)
+        return Score(coarser.cells, median=float(np.fmax(coarser.median, 0.5 * spacing)))
+    return Score(coarser.cells, median=coarser.median, wrong=coarser.wrong)
 
 
 def _beside(dataset: xr.Dataset, reference: xr.Dataset) -> xr.Dataset:

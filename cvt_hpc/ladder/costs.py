@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
+from cvt_hpc.errors import InputError
 from cvt_hpc.job import Job
 from cvt_hpc.job.summary import core_time_in_words
+from cvt_hpc.ladder.loading import Ladder
+from cvt_hpc.ladder.pushbelt import PUSHBELT, pushbelt_jobs
 from cvt_hpc.ladder.rungs import Rung
 from cvt_hpc.simulation import run_costs
 from cvt_hpc.study.status import find_records
@@ -30,8 +33,9 @@ def cost_left(rung: Rung, out: Path | None) -> tuple[int, float]:
     return int(left.sum()), float(run_costs(rung.job)[left].sum())
 
 
-def plan_lines(job: Job, rungs: Sequence[Rung], refusals: Mapping[str, str], out: Path) -> Iterator[str]:
+def plan_lines(asked: Ladder, out: Path) -> Iterator[str]:
     """Yield the lines that say which runs a ladder does on each rung, and what they are expected to cost."""
+    job, rungs = asked.job, asked.rungs
     yield f"ladder {job.name} ({job.source}): {job.size} runs on {len(rungs)} rungs"
     if job.description:
         yield job.description
@@ -47,6 +51,18 @@ def plan_lines(job: Job, rungs: Sequence[Rung], refusals: Mapping[str, str], out
             ),
         ]
     )
-    yield from (f"{name} left out: {why}" for name, why in refusals.items())
+    yield from (f"{name} left out: {why}" for name, why in asked.refusals.items())
     total = sum(core_seconds for _, core_seconds in left.values())
     yield f"estimated cost of what is left: {core_time_in_words(total)}, shared by all ranks"
+    if rungs[-1].job.model != PUSHBELT:
+        yield f"with --set ladder.reference={PUSHBELT}: {_pushbelt_cost(job)}"
+
+
+def _pushbelt_cost(job: Job) -> str:
+    """What the pushbelt as the reference would cost beside that, or why it cannot take the job."""
+    try:
+        jobs = pushbelt_jobs(job, {})
+    except InputError as error:
+        return f"refused, {error}"
+    total = sum(float(run_costs(each).sum()) for each in jobs)
+    return f"{core_time_in_words(total)} more, for errors against a belt of rigid elements"

@@ -80,12 +80,13 @@ def run_ladder(
         check_start(rung.job, out / rung.name, fresh=fresh)
     left = {rung.name: cost_left(rung, None if fresh else out) for rung in rungs}
     done, spent = 0.0, 0.0
+    predicted = sum(cost for _, cost in left.values())
     for number, rung in enumerate(rungs, 1):
         runs, cost = left[rung.name]
         if runs:
             to_go = sum(left[later.name][1] for later in rungs[number - 1 :])
-            # by what earlier rungs have taken, else by prediction alone
-            to_go *= spent / done if spent else 1.0 / detect_launch().size
+            # by what earlier rungs have taken, as far as they count beside all; at first by prediction alone
+            to_go *= (spent + predicted / detect_launch().size) / (done + predicted)
             expected = f"{runs} runs, {show_duration(to_go)} to go in all"
             announce(f"rung {number}/{len(rungs)} {rung.name}: {expected}")
         started = time.monotonic()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.job import Job, known_keys, rebuild_job
 from cvt_hpc.job.for_model import handed_to
+from cvt_hpc.ladder.pushbelt import PUSHBELT, pushbelt_jobs
 from cvt_hpc.vibration.ramped import QUANTITIES
 
 QUESTIONS = ("occurrence", "onset", "frequency", "amplitude", "forces")
@@ -49,25 +51,28 @@ _LOWER: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
 }
 
 
-def ladder(job: Job) -> tuple[tuple[Rung, ...], dict[str, str]]:
+def ladder(job: Job, pushbelt: Mapping[str, Any] | None = None) -> tuple[tuple[Rung, ...], dict[str, str]]:
     """Return the rungs of a job, and why others refuse it.
 
     Parameters
     ----------
     job : Job
         Of the elastic belt, a grid with `load` among its axes.
+    pushbelt : mapping, optional
+        What else the pushbelt has, as `pushbelt_jobs` takes it: the reference is a pushbelt then.
 
     Returns
     -------
     rungs : tuple of Rung
-        The job itself last but one, the reference last.
+        From the cheapest up: the job itself, a pushbelt if asked for, the reference last. The reference is
+        the rung before it, refined.
     refusals : dict
         What was wrong, by the name of the rung.
 
     Raises
     ------
     InputError
-        If it is another job, or one that cannot be refined.
+        If it is another job, one that cannot be refined, or one that the pushbelt asked for cannot take.
     """
     _check(job)
     rungs, refusals = [], {}
@@ -76,8 +81,13 @@ def ladder(job: Job) -> tuple[tuple[Rung, ...], dict[str, str]]:
             rungs.append(Rung(name, answers, _handed(job, model, table)))
         except InputError as error:
             refusals[name] = str(error)
-    reference = rebuild_job(_refined(job), job.source, job.units)
-    return (*rungs, Rung(MODEL, QUESTIONS, job), Rung(REFERENCE, (), reference)), refusals
+    rungs.append(Rung(MODEL, QUESTIONS, job))
+    if pushbelt is None:
+        reference = rebuild_job(_refined(job), job.source, job.units)
+    else:
+        coarser, reference = pushbelt_jobs(job, pushbelt)
+        rungs.append(Rung(PUSHBELT, QUESTIONS, coarser))
+    return (*rungs, Rung(REFERENCE, (), reference)), refusals
 
 
 def _check(job: Job) -> None:

@@ -2,6 +2,8 @@
 
 import csv
 import json
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,6 @@ from cvt_hpc.job import load_job
 from cvt_hpc.ladder.costs import cost_left
 from cvt_hpc.ladder.rungs import ladder
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
-from cvt_hpc.study import run
 from support.cf import cf_findings
 
 JOB = """name = "small"
@@ -25,6 +26,20 @@ load = [100, 110]
 stations = 48
 [run]
 duration = "0.1 s"
+"""
+# One cell of as small a belt as there is, by steps as long as it bears: what a ladder leaves is the same of many
+TINY = """name = "tiny"
+model = "elastic_belt"
+[axes]
+friction_gradient = [-1.0]
+load = [110]
+[mesh]
+stations = 24
+[numerics]
+step = "12 us"
+[run]
+duration = "0.06 s"
+longest_duration = "0.06 s"
 """
 
 
@@ -67,6 +82,15 @@ def test_a_rung_that_refuses_the_job_is_named(job):
     rungs, refusals = ladder(load_job(job, ["friction_memory=0"]))
     assert "linear_stability" not in [rung.name for rung in rungs]
     assert list(refusals) == ["linear_stability"] and "friction_memory" in refusals["linear_stability"]
+
+
+def test_a_rung_has_the_keys_of_the_job_in_tables_of_its_own(job):
+    rungs, refusals = ladder(load_job(job, ["vibration.band_high=1200"]))
+    jobs = {rung.name: rung.job for rung in rungs}
+    assert refusals == {} and jobs["linear_stability"].schema.section_of["band_high"] == "judgement"
+    assert (
+        jobs["linear_stability"].parameters["band_high"] == jobs["coarse"].parameters["band_high"] == 1200.0
+    )
 
 
 @pytest.mark.parametrize(
@@ -130,16 +154,30 @@ def test_check_tells_the_runs_of_each_rung_and_what_is_left_of_them(job, capsys,
     assert float(rows["reference"][4]) == pytest.approx(4.5 * float(rows["elastic_belt"][4]), rel=0.1)
     assert any(line.startswith("linear_stability left out: ") for line in lines)
     assert not (job.parent / "out").exists()
-    cheapest = ladder(load_job(job))[0][0]
-    run(cheapest.job, "out/small/criterion", progress=False)
-    assert cost_left(cheapest, Path("out/small")) == (0, 0.0) and cost_left(cheapest, None)[0] == 1
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A ladder: its job, its folder, and what it has printed."""
+    folder = tmp_path_factory.mktemp("ladder")
+    path, out = folder / "tiny.toml", folder / "out"
+    path.write_text(TINY)
+    printed, told = StringIO(), StringIO()
+    with redirect_stdout(printed), redirect_stderr(told):
+        assert main(["ladder", str(path), "--out", str(out)]) == 0
+    return path, out, printed.getvalue(), told.getvalue()
 
 
 @pytest.mark.slow
-def test_a_ladder_leaves_its_studies_and_what_they_say(job, capsys):
-    out = job.parent / "out"
-    assert main(["ladder", str(job), "--out", str(out)]) == 0
-    printed, told = capsys.readouterr()
+def test_what_is_done_costs_nothing_more(made):
+    path, out, *_ = made
+    for rung in ladder(load_job(path))[0]:
+        assert cost_left(rung, out) == (0, 0.0) and cost_left(rung, None)[0] == 1
+
+
+@pytest.mark.slow
+def test_a_ladder_leaves_its_studies_and_what_they_say(made):
+    _, out, printed, told = made
     announced = [line for line in told.splitlines() if " to go in all" in line]
     assert [line.split()[1:4] for line in announced[:2]] == [
         ["rung", "1/8", "criterion:"],
@@ -165,11 +203,17 @@ def test_a_ladder_leaves_its_studies_and_what_they_say(job, capsys):
         cost = dataset["core_seconds"].sel(question="forces", rung="coarse").item()
         assert cost == pytest.approx(float(answers["forces", "coarse"]["core_seconds"]), rel=5e-3)  # 3 digits
         assert np.isnan(dataset["cells"].sel(question="amplitude", rung="strand"))
-        assert json.loads(dataset.attrs["rungs"])["reference"]["mesh"]["stations"] == 72
+        assert json.loads(dataset.attrs["rungs"])["reference"]["mesh"]["stations"] == 36
     with xr.open_dataset(out / "coarse" / "results.nc", decode_times=False) as dataset:
         assert cost == dataset["core_seconds"].mean()
     with xr.open_dataset(out / "strand" / "results.nc", decode_times=False) as dataset:
         assert dataset["status"].dims == ("load",)
+
+
+@pytest.mark.slow
+def test_an_ended_ladder_is_only_read_again(made, capsys, monkeypatch):
+    job, out, printed, _ = made
+    monkeypatch.setattr("cvt_hpc.ladder.making.draw_ladder", lambda *_: None)  # it is drawn
     records = sum(path.stat().st_size for path in out.glob("*/records/*"))
     assert main(["ladder", str(job), "--out", str(out)]) == 0  # nothing is done twice
     again = capsys.readouterr()

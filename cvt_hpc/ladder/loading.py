@@ -1,0 +1,70 @@
+"""A job for `cvt-hpc ladder`: an ordinary job of the elastic belt, with a table [ladder] or without."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from cvt_hpc.errors import mismatch, show
+from cvt_hpc.job import Job, build_job
+from cvt_hpc.job.assignments import Assignments, split_assignments, structured
+from cvt_hpc.job.document import read_document
+from cvt_hpc.job.loading import refuse_what_is_compared_only
+from cvt_hpc.job.tables import read_set, read_table
+from cvt_hpc.ladder.pushbelt import PUSHBELT
+from cvt_hpc.ladder.rungs import MODEL, Rung, ladder
+from cvt_hpc.parameters import Parameter
+
+TABLE = "ladder"
+_REFERENCE = Parameter(MODEL, "", "model of the reference", choices=(MODEL, PUSHBELT))
+
+
+class Ladder(NamedTuple):
+    """What a job asks for.
+
+    Attributes
+    ----------
+    job : Job
+        Of the elastic belt.
+    rungs : tuple of Rung
+        As `ladder` returns them.
+    refusals : dict
+        What was wrong, by the name of a rung that is left out.
+    """
+
+    job: Job
+    rungs: tuple[Rung, ...]
+    refusals: dict[str, str]
+
+
+def load_ladder(path: str | Path, overrides: Assignments = ()) -> Ladder:
+    """Read and validate a job, and return its ladder.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file. Its table [ladder] may have `reference`, elastic_belt or pushbelt, and for the pushbelt
+        `set`, a table of what else that has.
+    overrides : mapping, or sequence of "KEY=VALUE"
+        As `load_job` takes them; ladder.KEY replaces a key of the table.
+
+    Raises
+    ------
+    InputError
+        If anything is wrong with the file or an override, or there is no such ladder of the job.
+    """
+    source, document = str(path), read_document(Path(path))
+    where, prefix = f"{source}: [{TABLE}]", f"{TABLE}."
+    replaced = split_assignments(overrides, source, "--set")
+    own = {key.removeprefix(prefix): replaced.pop(key) for key in [*replaced] if key.startswith(prefix)}
+    table = document.pop(TABLE, {})
+    if isinstance(table, Mapping):
+        table = {**table, **{key: structured(value) for key, value in own.items()}}
+    reference = read_table({"reference": _REFERENCE}, table, where, ("set",))["reference"]
+    settings = read_set(table, where)
+    if settings and reference != PUSHBELT:
+        raise mismatch(f"{where} set", f'reference = "{PUSHBELT}", for which it is', show(reference))
+    job = build_job(document, source, replaced, "--set")
+    refuse_what_is_compared_only(job)
+    return Ladder(job, *ladder(job, settings if reference == PUSHBELT else None))

@@ -1,0 +1,120 @@
+"""The pushbelt of which a continuous belt is the continuum: what gives way, gives way alike."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cvt_hpc.chart import load_chart
+from cvt_hpc.job import known_keys, load_job
+from cvt_hpc.models.elastic_belt import PARAMETERS
+from cvt_hpc.models.pushbelt import inert
+from cvt_hpc.models.pushbelt.continuous import ABSENT, FOLLOWS, ONLY
+from cvt_hpc.physics.sheaves import flexibility, sheaves
+
+JOBS = Path(__file__).parents[2] / "jobs"
+ANGLE, RADII = np.radians(11.0), {"driving": 0.03, "driven": 0.075}
+BELT = {
+    "element_stiffness": 4e7, "flank_stiffness": 3e10, "local_stiffness": 4e9, "sheave_stiffness": 1.5,
+    "half_wedge_angle": ANGLE, "tilt_stiffness": 3e5, "ratio": 2.5, "driven_radius": RADII["driven"],
+    "sheave_lag": 2e-3, "lag_stiffness": 2e8,
+}  # fmt: skip
+
+
+def followed(belt):
+    return {key: value(belt) for key, (_, value) in FOLLOWS.items()}
+
+
+@pytest.mark.parametrize("stiffness", [1.0, 1.5, np.inf])
+@pytest.mark.parametrize("pulley", RADII)
+def test_sheaves_and_elements_open_alike_under_the_same_force(pulley, stiffness):
+    """A smooth line force on a part of an arc that is long beside the decay of local bending."""
+    radius, count = RADII[pulley], 801
+    spacing = 0.5 * radius / (count - 1)
+    given = BELT | {"sheave_stiffness": stiffness}
+    names = ("sheave_stiffness", "tilt_stiffness", "local_stiffness")
+    constants = [given[name] for name in names]
+    wrap = sheaves(spacing, count, radius, *constants, 10.0 * spacing, BELT["flank_stiffness"])
+    phi = np.arange(count) * spacing / radius
+    force = 1e5 * (1.0 + 0.5 * np.cos(2.0 * phi))
+    continuous = flexibility(wrap) @ force
+
+    found = followed(given)
+    shapes = np.array([np.ones(count), np.cos(phi), np.sin(phi)])
+    modal = stiffness * np.array(found[f"{pulley}_modal_stiffness"])
+    openings = (shapes @ (wrap.weight * force)) / modal  # of one flank
+    overlap = force / (found["flank_stiffness"] * np.cos(ANGLE))  # along its normal
+    pushbelt = 2.0 * (overlap / np.cos(ANGLE) + openings @ shapes)
+    # ends, where local bending reaches beyond the force, apart; it has ten stations, and the first mode opens
+    # by 1e-3 of the others
+    middle = slice(200, -200)
+    assert pushbelt[middle] == pytest.approx(continuous[middle], rel=3e-3)
+
+
+def test_the_driven_sheave_follows_the_thrust_alike():
+    excess = 1e3
+    opening = excess / (BELT["sheave_lag"] * BELT["lag_stiffness"])  # [m/s]
+    radius = followed(BELT)["sheave_rate"] * excess
+    assert 2.0 * np.tan(ANGLE) * radius == pytest.approx(opening)
+
+
+def test_a_pulley_that_cannot_tilt_is_rigid():
+    modes = followed(BELT | {"tilt_stiffness": np.inf})["driving_modal_stiffness"]
+    assert len(set(modes)) == 1 and modes[0] >= 1e12
+
+
+def test_every_parameter_of_the_continuous_belt_has_its_place():
+    own = {key for table in PARAMETERS.values() for key in table}
+    shared = own & {*known_keys("pushbelt")}
+    tables = {key for key in own if key.startswith("table_")}  # the pushbelt refuses a table of friction
+    led = {need for needs, _ in FOLLOWS.values() for need in needs} - shared
+    assert shared | tables | led | {*ABSENT} | {*ONLY} | {"stations"} == own
+    assert FOLLOWS.keys() <= {*known_keys("pushbelt")}
+
+
+def assert_the_same_belt(pushbelt, continuous, but=()):
+    assert "element_mass" in pushbelt and pushbelt.keys() >= FOLLOWS.keys()
+    of_belt = {key for name in ("scene", "belt", "sheaves", "friction") for key in PARAMETERS[name]}
+    expected = {key: continuous[key] for key in of_belt & pushbelt.keys() & continuous.keys()}
+    but = {*but, *inert(pushbelt)}
+    for key, value in (expected | followed(continuous)).items():
+        if key not in but:
+            # three digits in a job file
+            wanted = value if isinstance(value, str) else pytest.approx(value, rel=5e-3)
+            assert pushbelt[key] == wanted, key
+
+
+def test_the_job_of_vibration_has_the_belt_of_lebrecht_2004():
+    pushbelt = load_job(JOBS / "pushbelt_vibration.toml")
+    axes = {axis.name: list(axis.values) for axis in pushbelt.axes}
+    continuous = load_job(JOBS / "lebrecht_2004.toml", axes | {"sheave_stiffness": 1.0})
+    for index in (0, pushbelt.size - 1):
+        assert_the_same_belt(pushbelt.point(index), continuous.point(index))
+
+
+def test_the_chart_has_the_same_belt_between_rigid_sheaves():
+    """On elastic ones it goes the other way: the continuum's sheaves are fitted to the modes of the pushbelt."""
+    chart = load_chart(JOBS / "chart_pushbelt.toml")
+    points = {point.series: point.job.parameters for point in chart.points if point.scene == "rigid"}
+    # the chart's pushbelt has no transverse damping, and its own rate of the sheave
+    but = ("transverse_damping", "sheave_rate")
+    assert_the_same_belt(points["elements_216"], points["continuous"], but)
+    rings = points["continuous"]["reference_tension"] / points["continuous"]["ring_stiffness"]
+    assert rings == pytest.approx(1e-4)
+
+
+def test_the_chart_has_sheaves_that_open_nearly_alike():
+    """Between places on half a circle: 10 % of the opening, as the job says."""
+    table = tomllib.loads((JOBS / "chart_pushbelt.toml").read_text())
+    scene = table["chart"]["methods"]["continuous"]["set"]
+    tilt, local, length = (
+        float(scene[k].split()[0]) for k in ("tilt_stiffness", "local_stiffness", "local_length")
+    )
+    radius, length = 0.0556, 1e-3 * length
+    phi = np.linspace(0.0, np.pi, 91)
+    apart = np.abs(phi[:, None] - phi)
+    modes = 2.0 * (1.0 / 6e8 + np.cos(apart) / 3e8 + np.cos(2.0 * apart) / 9e8)
+    bending = np.exp(-radius * apart / length) / (2.0 * length * local)
+    continuum = radius**2 / tilt * np.cos(apart) + bending
+    assert np.linalg.norm(continuum - modes) < 0.105 * np.linalg.norm(modes)
