@@ -98,14 +98,18 @@ def evaluate(run: Any, strongest_probe: np.ndarray) -> dict[str, Any]:
 
 
 def power_balance(
-    driving: float, load: float, thrust: float, loss: float, storing: float
+    driving: float, load: float, thrust: float, loss: float, storing: float, damped: float = 0.0
 ) -> dict[str, float]:
-    """Powers of a run as its record names them [W], and what their balance leaves open."""
+    """Powers of a run as its record names them [W], and what their balance leaves open.
+
+    `damped` is what the time step takes by itself.
+    """
+    open_power = driving - load - thrust - loss - storing - damped
     return {
         "driving_power": driving,
         "load_power": load,
         "thrust_power": thrust,
         "storing_power": storing,
         "loss": loss,
-        "power_residual": (driving - load - thrust - loss - storing) / max(abs(driving), loss),
+        "power_residual": open_power / max(abs(driving), loss),
     }

@@ -104,7 +104,7 @@ def test_what_is_recorded_has_a_name_that_fits_an_axis_label(model):
             "[numerics] most_refinements: expected >= 0 and <= 10, found -1",
         ),
         (
-            {"run": {"duration": 0.08}, "vibration": {"judged_fraction": 0.1}},
+            {"run": {"duration": 0.14}, "vibration": {"judged_fraction": 0.1}},
             "[run] duration: expected a judged part of five periods",
         ),
     ],

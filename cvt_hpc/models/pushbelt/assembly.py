@@ -11,6 +11,7 @@ from cvt_hpc.models.pushbelt.belt import (
     CONTACT,
     CONTACT_I,
     CONTACT_J,
+    DEPTH_REACHED,
     DIAGONAL,
     DRIVEN,
     DRIVEN_R,
@@ -21,6 +22,7 @@ from cvt_hpc.models.pushbelt.belt import (
     EDGE_GAP,
     EDGE_LEVER_I,
     EDGE_LEVER_J,
+    EDGE_REACHED,
     FLANK,
     FLANK_DUAL_M,
     FLANK_DUAL_T,
@@ -34,6 +36,7 @@ from cvt_hpc.models.pushbelt.belt import (
     HEAD_GAP,
     HEAD_LEVER_I,
     HEAD_LEVER_J,
+    HEAD_REACHED,
     HEADING_Y,
     HEADING_Z,
     ITERATE_TENSION,
@@ -117,9 +120,13 @@ def pair_forces(belt, state, step, iterate, dt):
         x_y, x_z = ahead(state, j, HEADING_Y), ahead(state, j, HEADING_Z)
         closing = x_y * (jy - iy) + x_z * (jz - iz)
         a, b = step[j, EDGE_LEVER_I], step[j, EDGE_LEVER_J]
-        edge, k = pressed(step[j, EDGE_GAP] + dt * (closing + a * iw + b * jw), stiffness)
+        gap = step[j, EDGE_GAP] + dt * (closing + a * iw + b * jw)
+        edge, k = pressed(gap, stiffness)
+        iterate[j, EDGE_REACHED] = gap
         c, d = step[j, HEAD_LEVER_I], step[j, HEAD_LEVER_J]
-        head, m = pressed(step[j, HEAD_GAP] + dt * (closing + c * iw + d * jw), stiffness)
+        gap = step[j, HEAD_GAP] + dt * (closing + c * iw + d * jw)
+        head, m = pressed(gap, stiffness)
+        iterate[j, HEAD_REACHED] = gap
         state[j, EDGE], state[j, HEAD] = edge, head
         iterate[j, CONTACT] = edge + head
         iterate[j, CONTACT_I], iterate[j, CONTACT_J] = edge * a + head * c, edge * b + head * d
@@ -166,6 +173,7 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
             opening = driving + driven * (driven_one - driving)
             deep = deep - belt.cosine * opening * shapes[j, k]
         normal, stiff = pressed(-deep, belt.flank_stiffness)
+        iterate[j, DEPTH_REACHED] = deep
         m_y, m_z = step[j, MID_R_Y], step[j, MID_R_Z]
         mr_lever, mt_lever = step[j, MID_R_LEVER], step[j, MID_T_LEVER]
         radius = step[j, MID_RADIUS]

@@ -48,7 +48,8 @@ STATE_FIELDS = CHANGE + 4
 DRIVING_SPEED, DRIVEN_SPEED, DRIVING_RADIUS, DRIVEN_RADIUS = range(4)
 
 # Entries of the inputs, at the start and at the end of a call
-IN_SPEED, IN_DRIVING_THRUST, IN_DRIVEN_THRUST, IN_LOAD = range(4)
+IN_SPEED, IN_DRIVING_THRUST, IN_DRIVEN_THRUST, IN_LOAD, IN_DRIVING_SHIFT = range(5)
+INPUTS = IN_DRIVING_SHIFT + 1
 
 # Entries of the totals: time, and what adds up over it
 (
@@ -60,9 +61,19 @@ IN_SPEED, IN_DRIVING_THRUST, IN_DRIVEN_THRUST, IN_LOAD = range(4)
     RING_LOSS,  # [J]
     DAMPING_LOSS,  # of the rotation of elements against the ring [J]
     BELT_LOSS,  # of the transverse damping [J]
+    ELEMENT_DAMPED,  # by the step itself, at contacts and noses between elements (`power`) [J]
+    FLANK_DAMPED,  # at flanks and modes of the sheaves [J]
+    RING_DAMPED,  # by the stretching of the ring [J]
+    TILT_DAMPED,  # by the springs of the elements' tilt [J]
     POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
-) = range(9)
-TOTALS = 9
+) = range(13)
+TOTALS = 13
+DAMPED = {  # what the step damps by itself, by the springs and contacts at which it does
+    "elements": ELEMENT_DAMPED,
+    "flanks": FLANK_DAMPED,
+    "ring": RING_DAMPED,
+    "tilt": TILT_DAMPED,
+}
 
 # Entries of the counters
 STEPS, ITERATIONS, FAILED_STEPS, STATUS, FAILED_ELEMENT, FAILED_CONTACT, IN_A_ROW = range(7)
@@ -225,6 +236,8 @@ class Workspace(NamedTuple):
         System of the border, its right side last.
     inputs : (4,) array
         Inputs of the step.
+    increments : (1 + 2 modes,) array
+        `BeltState.increments` at its start.
     kept : (2, STATE_FIELDS) array
         States of two elements before the last correction.
     """
@@ -237,6 +250,7 @@ class Workspace(NamedTuple):
     reduced: np.ndarray
     border: np.ndarray
     inputs: np.ndarray
+    increments: np.ndarray
     kept: np.ndarray
 
 
@@ -310,8 +324,12 @@ STEP_FIELDS = LINK + 16
     OPENING_N,  # decrease of the normal force by it
     RING_SLOPE,  # decrease of the ring's friction by its slip
     NOSE_SLOPE,
-) = range(21)
-RESIDUAL = 21  # 4 fields: of an element's equations
+    EDGE_REACHED,  # gaps at both contacts, offset of the nose, penetration of the flanks [m]
+    HEAD_REACHED,
+    NOSE_REACHED,
+    DEPTH_REACHED,
+) = range(25)
+RESIDUAL = 25  # 4 fields: of an element's equations
 SLOPE_R = RESIDUAL + 4  # 3 fields: decrease of FORCE_R by U_Y, U_Z, OMEGA
 SLOPE_T = SLOPE_R + 3  # 3 fields
 ITERATE_FIELDS = SLOPE_T + 3

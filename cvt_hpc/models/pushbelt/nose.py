@@ -21,6 +21,7 @@ from cvt_hpc.models.pushbelt.belt import (
     NOSE_LEVER_I,
     NOSE_LEVER_J,
     NOSE_OFFSET,
+    NOSE_REACHED,
     NOSE_SLOPE,
     PREDICTED_HEADING_Y,
     PREDICTED_HEADING_Z,
@@ -71,6 +72,7 @@ def nose_forces(belt, state, step, iterate, dt):
         above, k = pressed(clearance - offset, stiffness)
         below, m = pressed(clearance + offset, stiffness)
         state[j, NOSE], iterate[j, NOSE_SLOPE] = above - below, dt * maximum(k, m)
+        iterate[j, NOSE_REACHED] = offset
 
 
 @kernel

@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.models.pushbelt import profiles
 from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
-from cvt_hpc.physics.geometry import variator, variator_problems
+from cvt_hpc.physics.geometry import driven_radius, variator, variator_problems
 from cvt_hpc.variator import PULLEYS
 from cvt_hpc.variator.scene import (
     FRICTION,
@@ -23,7 +24,6 @@ from cvt_hpc.variator.scene import (
     SCENE,
     TRANSVERSE_DAMPING,
     course_inert,
-    course_problems,
 )
 from cvt_hpc.vibration.ramped import ramped
 
@@ -59,8 +59,11 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "driven_radius": replace(SCENE["driven_radius"], default=0.063896),
         "driving_speed": replace(SCENE["driving_speed"], default=100.0 * np.pi),
         "thrust": replace(SCENE["thrust"], default=20e3),
+        # elements stick radially until they have come round: with less, a load near the limit slips through
         "rise_time": replace(
-            SCENE["rise_time"], description="start-up: thrust rises in its first half, load in its second"
+            SCENE["rise_time"],
+            default=0.12,
+            description="start-up: thrust rises in its first half, load in its second",
         ),
         "driving_thrust": not_negative(
             0.0,
@@ -69,6 +72,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             sensible=(500.0, 2000000.0),
         ),
     },
+    "profiles": profiles.PARAMETERS,
     "belt": {
         "elements": Parameter(432, "", "elements of the belt", minimum=32, maximum=4096),
         "coarse": Parameter(
@@ -217,20 +221,13 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     problems = variator_problems(p)
     if problems:
         return problems
-    radii = sorted((p["driven_radius"] / p["ratio"], p["driven_radius"]))
-    if not p["inner_radius"] <= radii[0] <= radii[1] <= p["outer_radius"]:
-        expected = f"radii within the sheaves, {p['inner_radius']:g} to {p['outer_radius']:g} m"
-        found = f"{p['ratio']:g}, and with it radii of {radii[0]:.5g} and {radii[1]:.5g} m"
-        problems.append(("ratio", expected, found))
-    pitch = path_length(p) / p["elements"]
+    length = path_length(p)
+    pitch = length / p["elements"]
     if p["play"] > pitch:
         problems.append(("play", f"less than the pitch of the elements, {pitch:.4g} m", f"{p['play']:g} m"))
-    psi = np.arcsin((p["ratio"] - 1.0) * p["driven_radius"] / p["ratio"] / p["centre_distance"])
-    least = min(p["driven_radius"], p["driven_radius"] / p["ratio"])
-    arc = (np.pi - 2.0 * abs(psi)) * least
-    if arc < 8.0 * pitch:
-        expected = f"at least {int(np.ceil(8.0 * path_length(p) / arc))}, eight on the shorter arc"
-        problems.append(("elements", expected, f"{p['elements']}"))
+    problems += profiles.problems(p)
+    for ratio in [] if problems else profiles.ratios(p):
+        problems += _ratio_problems(p, ratio)
     if p["elements"] < FEWEST_ELEMENTS and not p["coarse"]:
         expected = f"{FEWEST_ELEMENTS} or more, or coarse = true"
         problems.append(("elements", expected, f"{p['elements']}"))
@@ -243,7 +240,6 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         if not p[key] or len(p[key]) != len(p[MODES[0]]) or min(p[key]) <= 0.0:
             expected = "values above 0, as many of both pulleys"
             problems.append((key, expected, f"{list(p[key])}"))
-    problems += course_problems(p)
     limit = string_limit(p)
     if not problems and "step" in p and p["step"] > limit:
         expected = f"at most {limit:.3g} s, pitch over the speed of transverse waves under the thrust"
@@ -253,6 +249,7 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         expected = f"at most {limit:.3g} s, beyond which friction that falls so steeply has several solutions"
         problems.append(("step", expected, f"{p['step']:g} s"))
     # a sheave moves by an explicit step against the stiffness of the flanks on the longer arc
+    psi = np.arcsin((p["ratio"] - 1.0) * p["driven_radius"] / p["ratio"] / p["centre_distance"])
     angle, arc = (
         p["half_wedge_angle"],
         (np.pi + 2.0 * abs(psi)) * max(p["driven_radius"] / p["ratio"], p["driven_radius"]),
@@ -264,10 +261,36 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     return problems + friction_problems(p)
 
 
+def _ratio_problems(p: Mapping[str, Any], ratio: float) -> list[tuple[str, str, str]]:
+    """Problems of the radii at a ratio that the run has, or comes to along its profile."""
+    key = "ratio" if ratio == p["ratio"] else "ratio_profile"
+    length = path_length(p)
+    try:
+        driving = driven_radius(ratio, length, p["centre_distance"]) / ratio
+    except ValueError:
+        return [(key, "ratios at which the belt closes on pulleys that do not overlap", f"{ratio:g}")]
+    radii = sorted((driving, ratio * driving))
+    if not p["inner_radius"] <= radii[0] <= radii[1] <= p["outer_radius"]:
+        expected = f"radii within the sheaves, {p['inner_radius']:g} to {p['outer_radius']:g} m"
+        return [(key, expected, f"{ratio:g}, and with it radii of {radii[0]:.5g} and {radii[1]:.5g} m")]
+    wrap = np.pi - 2.0 * np.arcsin((radii[1] - radii[0]) / p["centre_distance"])
+    least = int(np.ceil(8.0 * length / (wrap * radii[0])))
+    if p["elements"] < least:
+        at = "" if key == "ratio" else f" at a ratio of {ratio:g}"
+        return [("elements", f"at least {least}, eight on the shorter arc{at}", f"{p['elements']}")]
+    return []
+
+
 def _driving_speeds(p: Mapping[str, Any]) -> tuple[float, float]:
     """Lowest and highest speed of the driving pulley once it is loaded [rad/s]."""
-    speeds = (p["driving_speed"], p["speed_start"] if ramped(p) == "speed" else p["driving_speed"])
-    return min(speeds), max(speeds)
+    least, most = profiles.extremes(p, "driving_speed")
+    begun = p["speed_start"] if ramped(p) == "speed" else least
+    return min(least, begun), max(most, begun)
+
+
+def _most_thrust(p: Mapping[str, Any]) -> float:
+    """Greatest axial force on either pulley [N]."""
+    return max(profiles.extremes(p, name)[1] for name in ("thrust", "driving_thrust"))
 
 
 def falling_limit(parameters: Mapping[str, Any]) -> float:
@@ -284,7 +307,7 @@ def falling_limit(parameters: Mapping[str, Any]) -> float:
     driving = p["driven_radius"] / p["ratio"]
     wrap = np.pi + 2.0 * np.arcsin((driving - p["driven_radius"]) / p["centre_distance"])
     arc = min(driving * wrap, p["driven_radius"] * (2.0 * np.pi - wrap))
-    pressed = max(p["thrust"], p["driving_thrust"]) / (arc * np.cos(p["half_wedge_angle"]))
+    pressed = _most_thrust(p) / (arc * np.cos(p["half_wedge_angle"]))
     without = p["element_mass"] / (2.0 * pressed * -p["friction_gradient"])
     return float(0.5 * without + np.sqrt(0.25 * without**2 + without * p["friction_memory"]))
 
@@ -301,8 +324,8 @@ def string_limit(parameters: Mapping[str, Any]) -> float:
     wrap = np.pi + 2.0 * np.arcsin((p["driven_radius"] - driving) / p["centre_distance"])
     mass = p["element_mass"] + p["ring_mass"]
     centrifugal = mass * (_driving_speeds(p)[1] * driving) ** 2
-    held = 2.0 * max(p["thrust"], p["driving_thrust"]) * np.tan(p["half_wedge_angle"]) / wrap + centrifugal
-    tension = 1.5 * (held + 0.5 * max(abs(p["load"]), abs(p["load_start"])) / driving)
+    held = 2.0 * _most_thrust(p) * np.tan(p["half_wedge_angle"]) / wrap + centrifugal
+    tension = 1.5 * (held + 0.5 * max(map(abs, (*profiles.extremes(p, "load"), p["load_start"]))) / driving)
     return float(path_length(p) / p["elements"] * np.sqrt(mass / tension))
 
 
@@ -332,4 +355,4 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         (True, "arc_probes", "model pushbelt, which is probed on its strands"),
     )
     found = {key: setting for holds, key, setting in cases if holds}
-    return friction_inert(p | dict.fromkeys(NO_TABLE, ())) | course_inert(p) | found
+    return friction_inert(p | dict.fromkeys(NO_TABLE, ())) | course_inert(p) | profiles.inert(p) | found

@@ -51,7 +51,16 @@ VARIABLES = (
     *shared("driven_speed_ripple", "driving_power", "load_power", "thrust_power"),
     *shared("storing_power", "ring_loss", "belt_loss"),
     Variable("tilt_loss", (), "f8", "W", "mean power of the dampers of the elements' tilt"),
-    *shared("loss", "power_residual"),
+    *shared("loss"),
+    Variable(
+        "numerical_damping",
+        ("spring",),
+        "f8",
+        "W",
+        "mean power that the time step damps by itself, no loss of the belt's",
+        words="numerical damping",
+    ),
+    *shared("power_residual"),
     Variable("efficiency", (), "f8", "1", "what is left of driving_power for load, thrust and storing"),
     Variable("largest_push_force", (), "f8", "N", "largest along the path, of means over the judged part"),
     Variable(
@@ -79,6 +88,7 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     return {
         **COORDINATES,
         "ramp_share": ramp.coordinate(),
+        "spring": Coordinate(np.array(tuple(fields.DAMPED)), "", "spring", "contact or elastic part"),
         "frequency_bin": frequency_bins(parameters),
     }
 
@@ -111,6 +121,7 @@ def _evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     ring = run.mean_rate(fields.RING_LOSS)
     belt, tilt = run.mean_rate(fields.BELT_LOSS), run.mean_rate(fields.DAMPING_LOSS)
     loss = run.mean_rate(fields.FLANK_LOSS) + ring + belt + tilt
+    damped = np.array([run.mean_rate(total) for total in fields.DAMPED.values()])
     thrust, storing = run.mean_rate(fields.THRUST_WORK), run.mean_rate(fields.TOTALS)
     push, where = run.profiles["push_force"], regions(run.path, run.places)
     largest = np.nanmax(push)
@@ -120,7 +131,8 @@ def _evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
         **judging.evaluate(run, strongest_probe),
         SLIP_MARGIN.name: slip_margin(run, judged),
         **_speeds(run, judged),
-        **power_balance(driving, load, thrust, loss, storing),
+        **power_balance(driving, load, thrust, loss, storing, damped.sum()),
+        "numerical_damping": damped,
         "ring_loss": ring,
         "belt_loss": belt,
         "tilt_loss": tilt,

@@ -13,6 +13,7 @@ from cvt_hpc.models.pushbelt.belt import (
     DRIVEN,
     HEADING_Y,
     HEADING_Z,
+    INPUTS,
     ITERATE_FIELDS,
     LENGTH,
     OMEGA,
@@ -180,6 +181,7 @@ def workspace(belt: Belt, nodes: int) -> Workspace:
         scratch=lanes(1, 48 + 4 * columns),
         reduced=np.zeros((4 * parts, 4 * parts + columns)),
         border=np.zeros((columns - 1, columns)),
-        inputs=np.zeros(4),
+        inputs=np.zeros(INPUTS),
+        increments=np.zeros(columns - 1),
         kept=np.zeros((2, STATE_FIELDS)),
     )

@@ -20,12 +20,8 @@ from cvt_hpc.models.pushbelt.assembly import (
     residuals,
 )
 from cvt_hpc.models.pushbelt.belt import (
-    ANGLE_I,
-    ANGLE_J,
-    BELT_LOSS,
     CHANGE,
     CONVERGED,
-    DAMPING_LOSS,
     DRIVEN,
     DRIVEN_RADIUS,
     DRIVEN_SPEED,
@@ -38,7 +34,6 @@ from cvt_hpc.models.pushbelt.belt import (
     FLANK,
     FLANK_FRICTION_M,
     FLANK_FRICTION_T,
-    FLANK_LOSS,
     FLANK_SLIP_M,
     FLANK_SLIP_T,
     FORCE_T,
@@ -47,6 +42,7 @@ from cvt_hpc.models.pushbelt.belt import (
     HEADING_Z,
     IN_A_ROW,
     IN_DRIVEN_THRUST,
+    IN_DRIVING_SHIFT,
     IN_DRIVING_THRUST,
     IN_LOAD,
     IN_SPEED,
@@ -54,8 +50,6 @@ from cvt_hpc.models.pushbelt.belt import (
     ITERATIONS,
     LENGTH,
     MID_RADIUS,
-    NORMAL_Y,
-    NORMAL_Z,
     NOSE,
     NOT_CONVERGED,
     NOT_FINITE,
@@ -64,7 +58,6 @@ from cvt_hpc.models.pushbelt.belt import (
     R_Y,
     R_Z,
     RING_FRICTION,
-    RING_LOSS,
     RING_SLIP,
     SADDLE,
     STATUS,
@@ -78,8 +71,6 @@ from cvt_hpc.models.pushbelt.belt import (
     TENSION_J_Z,
     THRUST_WORK,
     TIME,
-    TURN_Y,
-    TURN_Z,
     U_Y,
     U_Z,
     V_FILTERED,
@@ -93,6 +84,7 @@ from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
 from cvt_hpc.models.pushbelt.cyclic import solve
 from cvt_hpc.models.pushbelt.laws import remembered
 from cvt_hpc.models.pushbelt.nose import add_nose_blocks, nose_forces, predict_noses
+from cvt_hpc.models.pushbelt.power import book
 
 _LARGE = 1e100  # more than any speed or power that means something
 
@@ -293,21 +285,10 @@ def _accept(belt, state, work, inputs, dt):
     """Take the state to the end of the step, and add up what it has done."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     totals, pulleys = state.totals, state.pulleys
-    for k in range(7):
+    book(belt, state, work, dt)
+    for k in range(3):
         scratch[0, k] = 0.0
-    for j in range(step.rows):
-        change_y, change_z = (
-            elements[j, U_Y] + elements[j, CHANGE],
-            elements[j, U_Z] + elements[j, CHANGE + 1],
-        )
-        change_y = ahead(elements, j, U_Y) + ahead(elements, j, CHANGE) - change_y
-        change_z = ahead(elements, j, U_Z) + ahead(elements, j, CHANGE + 1) - change_z
-        turn = step[j, TURN_Y] * change_y + step[j, TURN_Z] * change_z
-        omega, next_omega = elements[j, OMEGA], ahead(elements, j, OMEGA)
-        rate_i = step[j, ANGLE_I] * (omega + elements[j, CHANGE + 2] - turn)
-        rate_j = step[j, ANGLE_J] * (next_omega + ahead(elements, j, CHANGE + 2) - turn)
-        scratch[0, 5] += 0.5 * belt.angle_damping * (rate_i * rate_i + rate_j * rate_j)
-    per_dt, square = 1.0 / dt, belt.cosine * belt.cosine
+    per_dt = 1.0 / dt
     for j in range(step.rows):
         t_y, t_z = step[j, T_Y], step[j, T_Z]
         ahead_of_it, tension = iterate[j, ITERATE_TENSION], behind(iterate, j, ITERATE_TENSION)
@@ -322,26 +303,21 @@ def _accept(belt, state, work, inputs, dt):
         omega = elements[j, OMEGA] + elements[j, CHANGE + 2]
         elements[j, U_Y], elements[j, U_Z], elements[j, OMEGA] = u_y, u_z, omega
         elements[j, V] += elements[j, CHANGE + 3]
-        across = step[j, NORMAL_Y] * u_y + step[j, NORMAL_Z] * u_z
-        scratch[0, 6] += belt.transverse_damping * across * across
         elements[j, Y] += dt * u_y
         elements[j, Z] += dt * u_z
         x_y, x_z = turned(elements[j, HEADING_Y], elements[j, HEADING_Z], dt * omega)
         elements[j, HEADING_Y], elements[j, HEADING_Z] = x_y, x_z
 
-        grip_m, grip_t = elements[j, FLANK_FRICTION_M], elements[j, FLANK_FRICTION_T]
         driven = elements[j, DRIVEN]
-        thrust = elements[j, FLANK] * belt.cosine + grip_m * belt.sine
+        thrust = elements[j, FLANK] * belt.cosine + elements[j, FLANK_FRICTION_M] * belt.sine
         scratch[0, 0] += (1.0 - driven) * thrust
         scratch[0, 1] += driven * thrust
         scratch[0, 2] += (1.0 - driven) * step[j, MID_RADIUS] * iterate[j, FORCE_T]
         slip_m, slip_t = elements[j, FLANK_SLIP_M], elements[j, FLANK_SLIP_T]
-        scratch[0, 3] += 2.0 * (square * grip_m * slip_m + grip_t * slip_t)
         size = sqrt(slip_m * slip_m + slip_t * slip_t)
         filtered, _ = remembered(elements[j, V_FILTERED], size, belt.friction_memory, dt)
         elements[j, V_FILTERED] = select(elements[j, FLANK] > 0.0, filtered, size)
-        scratch[0, 4] += elements[j, RING_FRICTION] * elements[j, RING_SLIP]
-    for k in range(7):
+    for k in range(3):
         scratch[0, k] = around(scratch[0, k])
     driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]
     pulleys[DRIVEN_SPEED] += state.increments[0]
@@ -349,19 +325,16 @@ def _accept(belt, state, work, inputs, dt):
     for k in range(2 * modes):
         state.openings[k // modes, k % modes] += state.increments[1 + k]
     driving = dt * belt.driving_rate * (inputs[IN_DRIVING_THRUST] - driving_thrust)
+    driving += dt * inputs[IN_DRIVING_SHIFT]
     driven = dt * belt.driven_rate * (inputs[IN_DRIVEN_THRUST] - driven_thrust)
     pulleys[DRIVING_RADIUS] += driving
     pulleys[DRIVEN_RADIUS] += driven
     totals[TIME] += dt
     totals[WORK_IN] += dt * scratch.data[0, 2, 0] * pulleys[DRIVING_SPEED]
-    totals[WORK_OUT] += dt * inputs[IN_LOAD] * pulleys[DRIVEN_SPEED]
+    totals[WORK_OUT] += dt * inputs[IN_LOAD] * (pulleys[DRIVEN_SPEED] - 0.5 * state.increments[0])
     # both sheaves of a pulley close by the tangent of the wedge angle
     closing = 2.0 * belt.sine / belt.cosine
     totals[THRUST_WORK] -= closing * (driving_thrust * driving + driven_thrust * driven)
-    totals[FLANK_LOSS] += dt * scratch.data[0, 3, 0]
-    totals[RING_LOSS] += dt * scratch.data[0, 4, 0]
-    totals[DAMPING_LOSS] += dt * scratch.data[0, 5, 0]
-    totals[BELT_LOSS] += dt * scratch.data[0, 6, 0]
 
 
 @kernel
@@ -378,9 +351,10 @@ def advance(belt, newton, state, work, inputs, steps, dt):
         The state at the start; at the end, of its last step.
     work : Workspace
         Work space.
-    inputs : (2, 4) array
-        Speed of the driving pulley [rad/s], thrust on a sheave of both pulleys [N], and torque of the load
-        [N m], at the start and at the end: between, they change linearly.
+    inputs : (2, INPUTS) array
+        Speed of the driving pulley [rad/s], thrust on a sheave of both pulleys [N], torque of the load [N m],
+        and speed of the driving radius by what moves the driving sheave [m/s], at the start and at the end:
+        between, they change linearly.
     steps : int
         Number of steps.
     dt : float
@@ -395,9 +369,11 @@ def advance(belt, newton, state, work, inputs, steps, dt):
     counters = state.counters
     for k in range(steps):
         share = (k + 1.0) / steps
-        for entry in range(4):
+        for entry in range(work.inputs.size):
             work.inputs[entry] = inputs[0, entry] + share * (inputs[1, entry] - inputs[0, entry])
         state.pulleys[DRIVING_SPEED] = work.inputs[IN_SPEED]
+        for entry in range(work.increments.size):
+            work.increments[entry] = state.increments[entry]
         _prepare(belt, state, work, dt)
         iterations, change, power = _newton(belt, newton, state, work, work.inputs[IN_LOAD], dt)
         counters[STEPS] += 1
