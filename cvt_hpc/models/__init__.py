@@ -3,6 +3,7 @@
 MODELS = {
     "auto": "cvt_hpc.models.auto",
     "beam_pushbelt": "cvt_hpc.models.beam_pushbelt",
+    "belt_drive": "cvt_hpc.models.belt_drive",
     "criterion": "cvt_hpc.models.criterion",
     "elastic_belt": "cvt_hpc.models.elastic_belt",
     "linear_stability": "cvt_hpc.models.linear_stability",

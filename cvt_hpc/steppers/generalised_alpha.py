@@ -19,6 +19,7 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.parameters import Parameter
+from cvt_hpc.solvers.generalised_alpha import generalised_alpha, stage_length
 from cvt_hpc.steppers.facts import RATES, Facts, Result
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.frozen_jacobian import Frozen, frozen
@@ -92,17 +93,15 @@ def _advance(
         counts[RATES] += 1
         if not system.rates(system.constants, t, y, work.rates):
             return NO_VALUE
-    r = control.spectral_radius
-    of_rates, of_states = 0.5 * (3.0 - r) / (1.0 + r), 1.0 / (1.0 + r)
-    weight = 0.5 + of_rates - of_states
-    shift = of_states * weight / of_rates * step
+    scheme = generalised_alpha(control.spectral_radius)
+    shift = stage_length(scheme, step)
     for i in range(y.size):
-        work.base[i] = y[i] + (of_states * step - shift) * work.rates[i]
+        work.base[i] = y[i] + (scheme.alpha_f * step - shift) * work.rates[i]
         work.stage[i] = y[i]
     outcome = solve_stage(
         system,
         work.frozen,
-        t + of_states * step,
+        t + scheme.alpha_f * step,
         work.base,
         shift,
         control.solver_tolerance,
@@ -110,8 +109,8 @@ def _advance(
         counts,
     )
     for i in range(y.size):
-        y[i] += (work.stage[i] - y[i]) / of_states
-        work.rates[i] += ((work.stage[i] - work.base[i]) / shift - work.rates[i]) / of_rates
+        y[i] += (work.stage[i] - y[i]) / scheme.alpha_f
+        work.rates[i] += ((work.stage[i] - work.base[i]) / shift - work.rates[i]) / scheme.alpha_m
         work.last[i] = y[i]
     return outcome
 

@@ -121,7 +121,8 @@ def test_every_stepper_is_taken_or_refused_with_a_reason(model):
     assert not asked.refused.keys() & asked.steppers.keys()
     assert asked.default_stepper in asked.steppers
     for stepper in (STEPPERS | OWN).keys() - asked.steppers.keys():
-        owner = {"newton": "pushbelt", "proximal": "beam_pushbelt"}.get(stepper, "elastic_belt")
+        own = {"newton": "pushbelt", "proximal": "beam_pushbelt", "cyclic_alpha": "belt_drive"}
+        owner = own.get(stepper, "elastic_belt")
         reason = asked.refused.get(stepper, f"it is {owner}'s own step")
         assert len(reason.split()) > 3, stepper
         assert stepper in OWN or stepper in asked.refused

@@ -3,6 +3,7 @@
 from cvt_hpc.models import (
     auto,
     beam_pushbelt,
+    belt_drive,
     criterion,
     elastic_belt,
     linear_stability,
@@ -17,6 +18,8 @@ from cvt_hpc.models.auto import record as auto_record
 from cvt_hpc.models.auto import transient as auto_transient
 from cvt_hpc.models.beam_pushbelt import record as beam_pushbelt_record
 from cvt_hpc.models.beam_pushbelt import transient as beam_pushbelt_transient
+from cvt_hpc.models.belt_drive import record as belt_drive_record
+from cvt_hpc.models.belt_drive import transient as belt_drive_transient
 from cvt_hpc.models.contract import Declaration, Recorded, Transient
 from cvt_hpc.models.criterion import record as criterion_record
 from cvt_hpc.models.elastic_belt import record as elastic_belt_record
@@ -35,6 +38,7 @@ from cvt_hpc.models.strand import record as strand_record
 declared: Declaration
 declared = auto
 declared = beam_pushbelt
+declared = belt_drive
 declared = criterion
 declared = elastic_belt
 declared = linear_stability
@@ -48,6 +52,7 @@ declared = strand
 recorded: Recorded
 recorded = auto_record
 recorded = beam_pushbelt_record
+recorded = belt_drive_record
 recorded = criterion_record
 recorded = elastic_belt_record
 recorded = linear_stability_record
@@ -60,6 +65,7 @@ recorded = strand_record
 marched: Transient
 marched = auto_transient
 marched = beam_pushbelt_transient
+marched = belt_drive_transient
 marched = elastic_belt_transient
 marched = moving_string_transient
 marched = oscillator_transient

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.pushbelt import profiles
+from cvt_hpc.models.pushbelt.profiles import PARAMETERS as PROFILES
+from cvt_hpc.models.pushbelt.profiles import extremes, profile_inert, profile_problems, ratios_along
 from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
 from cvt_hpc.physics.geometry import driven_radius, variator, variator_problems
@@ -72,7 +73,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             sensible=(500.0, 2000000.0),
         ),
     },
-    "profiles": profiles.PARAMETERS,
+    "profiles": PROFILES,
     "belt": {
         "elements": Parameter(432, "", "elements of the belt", minimum=32, maximum=4096),
         "coarse": Parameter(
@@ -225,8 +226,8 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     pitch = length / p["elements"]
     if p["play"] > pitch:
         problems.append(("play", f"less than the pitch of the elements, {pitch:.4g} m", f"{p['play']:g} m"))
-    problems += profiles.problems(p)
-    for ratio in [] if problems else profiles.ratios(p):
+    problems += profile_problems(p)
+    for ratio in [] if problems else ratios_along(p):
         problems += _ratio_problems(p, ratio)
     if p["elements"] < FEWEST_ELEMENTS and not p["coarse"]:
         expected = f"{FEWEST_ELEMENTS} or more, or coarse = true"
@@ -283,14 +284,14 @@ def _ratio_problems(p: Mapping[str, Any], ratio: float) -> list[tuple[str, str, 
 
 def _driving_speeds(p: Mapping[str, Any]) -> tuple[float, float]:
     """Lowest and highest speed of the driving pulley once it is loaded [rad/s]."""
-    least, most = profiles.extremes(p, "driving_speed")
+    least, most = extremes(p, "driving_speed")
     begun = p["speed_start"] if ramped(p) == "speed" else least
     return min(least, begun), max(most, begun)
 
 
 def _most_thrust(p: Mapping[str, Any]) -> float:
     """Greatest axial force on either pulley [N]."""
-    return max(profiles.extremes(p, name)[1] for name in ("thrust", "driving_thrust"))
+    return max(extremes(p, name)[1] for name in ("thrust", "driving_thrust"))
 
 
 def falling_limit(parameters: Mapping[str, Any]) -> float:
@@ -325,7 +326,7 @@ def string_limit(parameters: Mapping[str, Any]) -> float:
     mass = p["element_mass"] + p["ring_mass"]
     centrifugal = mass * (_driving_speeds(p)[1] * driving) ** 2
     held = 2.0 * _most_thrust(p) * np.tan(p["half_wedge_angle"]) / wrap + centrifugal
-    tension = 1.5 * (held + 0.5 * max(map(abs, (*profiles.extremes(p, "load"), p["load_start"]))) / driving)
+    tension = 1.5 * (held + 0.5 * max(map(abs, (*extremes(p, "load"), p["load_start"]))) / driving)
     return float(path_length(p) / p["elements"] * np.sqrt(mass / tension))
 
 
@@ -355,4 +356,4 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         (True, "arc_probes", "model pushbelt, which is probed on its strands"),
     )
     found = {key: setting for holds, key, setting in cases if holds}
-    return friction_inert(p | dict.fromkeys(NO_TABLE, ())) | course_inert(p) | profiles.inert(p) | found
+    return friction_inert(p | dict.fromkeys(NO_TABLE, ())) | course_inert(p) | profile_inert(p) | found

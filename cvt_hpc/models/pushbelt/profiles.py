@@ -46,12 +46,12 @@ def extremes(parameters: Mapping[str, Any], name: str) -> tuple[float, float]:
     return min(values), max(values)
 
 
-def ratios(parameters: Mapping[str, Any]) -> list[float]:
+def ratios_along(parameters: Mapping[str, Any]) -> list[float]:
     """The ratio, and the least and greatest along its profile if there is one."""
     return sorted({parameters["ratio"], *extremes(parameters, "ratio")})
 
 
-def problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def profile_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Problems of courses in time, in the form of a model's check: (key, expected, found).
 
     Parameters
@@ -85,7 +85,7 @@ def problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     return found
 
 
-def inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def profile_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
     """Profiles without effect, each with the setting that makes it so."""
     if parameters["driving_thrust"] > 0.0:
         return {"ratio_profile": "driving_thrust above 0"}

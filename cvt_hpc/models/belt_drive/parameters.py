@@ -1,0 +1,133 @@
+"""What a job may set of the belt drive, with units, bounds and defaults.
+
+Radii, centre distance, line mass, stiffness and damping of the belt (five ribs) and the inertia of the
+pulleys are those of Cepon and Boltezar 2011, table 1; elements, contact points and the scatter of lengths are
+those of their sec. 2.2. The belt's own length follows from the tension at rest. Assumptions are friction
+coefficient and contact stiffness, which they measured but do not print as numbers, and the contact's damping.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.parameters import Parameter, not_negative, positive
+from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
+from cvt_hpc.physics.geometry import variator, variator_problems
+from cvt_hpc.variator.scene import FRICTION, SCENE
+
+RIBS = 5.0
+
+PARAMETERS: dict[str, dict[str, Parameter]] = {
+    "scene": {
+        "ratio": replace(SCENE["ratio"], default=1.0, description="speed ratio, driven / driving radius"),
+        "driven_radius": replace(
+            SCENE["driven_radius"],
+            default=0.05,
+            description="radius of the driven pulley, at the belt's cord",
+        ),
+        "centre_distance": replace(SCENE["centre_distance"], default=0.45),
+        "driving_speed": replace(
+            SCENE["driving_speed"], default=62.8, description="speed of the driving pulley, prescribed"
+        ),
+        "load": SCENE["load"],
+        "rise_time": replace(SCENE["rise_time"], description="start-up: load rises smoothly"),
+        "driven_inertia": positive(
+            0.013, "kg m^2", "moment of inertia of the driven pulley", sensible=(1e-6, 100.0)
+        ),
+    },
+    "belt": {
+        "tension": positive(310.0, "N", "mean tension of the strands at rest", sensible=(1.0, 1e5)),
+        "line_mass": positive(0.096, "kg/m", "mass per length", sensible=(1e-3, 10.0)),
+        "axial_stiffness": positive(RIBS * 30400.0, "N", "longitudinal stiffness EA", sensible=(1e2, 1e9)),
+        "bending_stiffness": positive(RIBS * 5.2e-3, "N m^2", "bending stiffness EI", sensible=(1e-6, 1e3)),
+        "axial_damping": not_negative(
+            RIBS * 4.1, "N s", "viscous damping along the belt, force by strain rate", sensible=(1e-3, 1e4)
+        ),
+        "mass_damping": not_negative(
+            2.8,
+            "1/s",
+            "damping of motion across the belt over its mass (Rayleigh's alpha)",
+            sensible=(1e-3, 1e4),
+        ),
+        "bending_damping": not_negative(
+            1.8e-3, "s", "damping of bending over its stiffness (Rayleigh's beta)", sensible=(1e-7, 1.0)
+        ),
+        "elements": Parameter(48, "", "elements of the belt", minimum=8, maximum=2048),
+        "length_scatter": Parameter(
+            0.12, "", "largest share by which the lengths of elements differ", minimum=0.0, maximum=0.5
+        ),
+        "seed": Parameter(1, "", "seed of these lengths", minimum=0),
+    },
+    "contact": {
+        "contact_points": Parameter(
+            3, "", "points of an element that may touch a pulley", minimum=1, maximum=16
+        ),
+        "contact_stiffness": positive(
+            1.2e9, "N/m^2", "normal force per length and depth of a contact", sensible=(1e5, 1e13)
+        ),
+        "contact_damping": not_negative(
+            2e3, "N s/m^2", "normal force per length and speed of a contact", sensible=(1e-2, 1e8)
+        ),
+    },
+    "friction": {
+        **{key: entry for key, entry in FRICTION.items() if key != "friction_memory"},
+        "friction_law": replace(
+            FRICTION["friction_law"], default="coulomb", description="friction over sliding speed"
+        ),
+        "friction_gradient": replace(FRICTION["friction_gradient"], default=0.0),
+        "kinetic_friction": replace(FRICTION["kinetic_friction"], default=0.5),
+        "friction_speed": replace(
+            FRICTION["friction_speed"], default=3e-4, description="regularisation speed of friction"
+        ),
+    },
+}
+
+
+def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems that lie between parameters.
+
+    Parameters
+    ----------
+    parameters : dict
+        Values by name, in SI units.
+
+    Returns
+    -------
+    list of (key, expected, found)
+        Empty where all is well.
+    """
+    p = parameters
+    problems = variator_problems(p)
+    if problems:
+        return problems
+    path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
+    driving, strand, driven, _ = path.lengths
+    longest = min(driving / 4.0, driven / 4.0, strand / 2.0)
+    element = path.path_length / p["elements"] * (1.0 + p["length_scatter"])
+    if element > longest:
+        least = int(np.ceil(path.path_length * (1.0 + p["length_scatter"]) / longest))
+        expected = f"at least {least}, four on the shorter arc and two on a strand"
+        problems.append(("elements", expected, f"{p['elements']}"))
+    strain = p["tension"] / p["axial_stiffness"]
+    if strain > 0.5:
+        most = 0.5 * p["axial_stiffness"]
+        problems.append(("tension", f"at most {most:g} N, half of axial_stiffness", f"{p['tension']:g} N"))
+    return problems + friction_problems(p)
+
+
+def inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+    """Parameters without effect on a run, each with the setting that makes it so.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Values by name, in SI units.
+    """
+    found = {"arc_probes": "model belt_drive, which is probed on its strands"}
+    if parameters["length_scatter"] == 0.0:
+        found["seed"] = "length_scatter 0"
+    return friction_inert(parameters) | found

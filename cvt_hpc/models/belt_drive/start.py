@@ -1,0 +1,122 @@
+"""The static start: a belt around its pulleys at a given tension, then moving along itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.models.belt_drive.drive import UNSOLVED, Drive, State, advance, contact_shapes, state
+from cvt_hpc.multibody.ancf_beam import beam, random_lengths
+from cvt_hpc.physics.friction import friction_law, given_law
+from cvt_hpc.physics.geometry import variator
+from cvt_hpc.solvers.generalised_alpha import Scheme
+from cvt_hpc.variator.path import points_at
+
+IMPLICIT_EULER = Scheme(1.0, 1.0, 1.0)
+# Steps towards equilibrium [s]: the first is short, as contacts close; a step that is solved is followed by a
+# longer one, else by a shorter one; the longest leaves nothing to settle
+FIRST, LONGEST = 1e-5, 1.0
+LONGER, SHORTER = 4.0, 0.25
+MOST_STEPS = 500  # common belts need 20
+SETTLED, MOST_ITERATIONS = 1e-8, 30  # [m/s]
+FRICTIONLESS = 1e-9
+CORRECTIONS = 3  # of the belt's length by its tension, each of which leaves a few percent of the error
+
+
+def start(parameters: Mapping[str, Any], tension_of: Callable[[Drive, State], float]) -> tuple[Drive, State]:
+    """Constants and first state of a run.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat parameters of a run [SI].
+    tension_of : callable
+        Mean tension of both strands [N], from a drive and its state.
+
+    Returns
+    -------
+    (Drive, State)
+        Belt and pulleys move as if nothing slid.
+    """
+    p = parameters
+    path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
+    length = path.path_length / _stretch(p["tension"], p["axial_stiffness"])
+    for correction in range(CORRECTIONS + 1):
+        drive = _drive(p, length)
+        found = _settled(drive, p)
+        if correction < CORRECTIONS:
+            length *= 1.0 + (tension_of(drive, found) - p["tension"]) / p["axial_stiffness"]
+    return drive, _moving(drive, found, p)
+
+
+def _stretch(tension: float, stiffness: float) -> float:
+    """Length under a tension over that without: the root of EA (x^2 - 1) x / 2 = T."""
+    x = 1.0 + tension / stiffness
+    for _ in range(20):
+        x -= (0.5 * (x**2 - 1.0) * x - tension / stiffness) / (1.5 * x**2 - 0.5)
+    return x
+
+
+def _drive(p: Mapping[str, Any], length: float) -> Drive:
+    belt = beam(
+        random_lengths(length, p["elements"], p["length_scatter"], p["seed"]),
+        p["line_mass"],
+        p["axial_stiffness"],
+        p["bending_stiffness"],
+        p["axial_damping"],
+        p["mass_damping"],
+        p["bending_damping"],
+    )
+    return Drive(
+        belt,
+        np.array([[0.0, 0.0], [p["centre_distance"], 0.0]]),
+        np.array([p["driven_radius"] / p["ratio"], p["driven_radius"]]),
+        np.array([0.0, p["driven_inertia"]]),
+        contact_shapes(p["contact_points"]),
+        p["contact_stiffness"],
+        p["contact_damping"],
+        given_law(p),
+        p["friction_speed"],
+    )
+
+
+def _settled(drive: Drive, p: Mapping[str, Any]) -> State:
+    """At rest in equilibrium, without friction."""
+    path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
+    lengths = drive.beam.lengths
+    share = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) / lengths.sum()
+    points, angle, _ = points_at(path, p["centre_distance"], share * path.path_length)
+    along = path.path_length / lengths.sum() * np.stack([np.cos(angle), np.sin(angle)], 1)
+    q = np.concatenate([points, along], 1)
+    smooth = drive._replace(law=friction_law("coulomb", FRICTIONLESS, 0.0, 1.0))
+    found = state(smooth, q, np.zeros_like(q), np.zeros(2))
+    step = FIRST
+    for _ in range(MOST_STEPS):
+        before = found.chain.q.copy()
+        for numbers in (found.chain.v, found.speed, found.dual, found.counters):
+            numbers[:] = 0
+        at_rest = np.zeros((2, 2))
+        finite = advance(smooth, found, IMPLICIT_EULER, at_rest, step, 1, SETTLED, MOST_ITERATIONS)
+        if finite and found.counters[UNSOLVED] == 0:
+            if step >= LONGEST:
+                return found
+            step *= LONGER
+        else:
+            found.chain.q[:] = before
+            step *= SHORTER
+    raise ValueError("the belt finds no equilibrium on its pulleys")
+
+
+def _moving(drive: Drive, settled: State, p: Mapping[str, Any]) -> State:
+    """The same line, along which the belt runs with the driving pulley."""
+    path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
+    q, lengths = settled.chain.q, drive.beam.lengths
+    stretch = path.path_length / lengths.sum()
+    share = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) / lengths.sum()
+    _, angle, curvature = points_at(path, p["centre_distance"], share * path.path_length)
+    bend = stretch**2 * curvature[:, None] * np.stack([-np.sin(angle), np.cos(angle)], 1)
+    speed = p["driving_speed"] * path.driving_radius / stretch
+    v = speed * np.concatenate([q[:, 2:], bend], 1)
+    return state(drive, q, v, p["driving_speed"] * np.array([1.0, 1.0 / p["ratio"]]))

@@ -1,0 +1,255 @@
+"""A transient run of the belt drive: it starts in motion from its static tension, is loaded, and recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.models.belt_drive import drive as fields
+from cvt_hpc.models.belt_drive.drive import advance
+from cvt_hpc.models.belt_drive.readings import PLACES, PROFILES, SCALARS, Reading, Readings
+from cvt_hpc.models.belt_drive.start import start
+from cvt_hpc.models.marched import Probe, batches_of_one
+from cvt_hpc.recording import sample_count, start_up_samples
+from cvt_hpc.solvers.generalised_alpha import generalised_alpha
+from cvt_hpc.variables import Status
+from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, STRANDS
+from cvt_hpc.variator.course import load_course
+from cvt_hpc.variator.slip import GAINED, LOST
+
+CHANNELS = ("load", "driving_speed", *SCALARS)
+MOST_UNSOLVED = 0.02  # of the steps
+MOST_OPEN = 0.02  # of the larger of drive and losses; sound runs leave less than a tenth of it
+
+
+class Transient:
+    """One run of the belt drive, advanced sample by sample.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Resolved parameters of the run [SI], those of the stepper among them.
+    stepper : str
+        "cyclic_alpha".
+
+    Attributes
+    ----------
+    parameters
+        As given.
+    probes : tuple of Probe
+        On the strands, equally spaced between their ends.
+    interval : float
+        Sampling interval [s].
+    samples, done, kick : int
+        Samples of the whole run, those recorded so far, and those before the load has risen.
+    failure : (Status, str) or None
+        Why the run does not go on: what has gone wrong, or that the belt slips through, with the status done.
+    """
+
+    def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
+        p = parameters
+        self.interval = 1.0 / p["sampling_rate"]
+        self._steps_per_sample = max(1, int(np.ceil(self.interval / p["step"] * (1.0 - 1e-9))))
+        self._scheme = generalised_alpha(p["spectral_radius"])
+        self._readings = Readings(p)
+        self._drive, self._state = start(p, self._readings.mean_tension)
+        self.probes = tuple(
+            Probe(f"{strand} {k + 1}", float(position))
+            for strand, positions in zip(STRANDS, self._readings.probes, strict=True)
+            for k, position in enumerate(positions)
+        )
+        # of the kernel for these types: to find them out takes as long as twenty corrections, in each call
+        self._entry: Callable[..., bool] | None = None
+        self.done = 0
+        self.failure: tuple[Status, str] | None = None
+        self._rows = np.empty((0, len(self.probes) + len(CHANNELS)))
+        self._totals = np.empty((0, self._state.totals.size + 1))
+        self.prolong(p)
+
+    def prolong(self, parameters: Mapping[str, Any]) -> None:
+        """Make room for the samples of a longer duration.
+
+        Parameters
+        ----------
+        parameters : mapping
+            Those of the run but for `duration` and `judged_fraction`.
+        """
+        self.parameters = parameters
+        self.samples, self.kick = sample_count(parameters), start_up_samples(parameters)
+        self.first_judged = self.samples - round(parameters["judged_fraction"] * self.samples)
+        more = self.samples - len(self._rows)
+        self._rows = np.concatenate([self._rows, np.full((more, self._rows.shape[1]), np.nan)])
+        self._totals = np.concatenate([self._totals, np.full((more, self._totals.shape[1]), np.nan)])
+        self._sums = np.zeros((len(PROFILES) + 2, PLACES))
+
+    def advance(self, samples: int) -> tuple[Status, str] | None:
+        """March on.
+
+        Parameters
+        ----------
+        samples : int
+            How many samples at most; 0 compiles only.
+
+        Returns
+        -------
+        (Status, str) or None
+            Why the run ends here.
+        """
+        for _ in range(min(samples, self.samples - self.done)):
+            inputs = np.array([self._inputs(self.time), self._inputs(self.time + self.interval)])
+            if not self._march(inputs):
+                self.failure = Status.FAILED_NUMERICS, "the equations of a step have no solution in numbers"
+                break
+            self._take_sample()
+            if (slipped := self._slipped()) is not None:
+                self.failure = Status.DONE, slipped
+                break
+        return self.failure
+
+    def _march(self, inputs: np.ndarray) -> bool:
+        p = self.parameters
+        settings = self.step, self._steps_per_sample, p["speed_tolerance"], p["most_iterations"]
+        arguments = self._drive, self._state, self._scheme, inputs, *settings
+        if self._entry is not None:
+            return self._entry(*arguments)
+        is_sound = advance(*arguments)
+        self._entry = advance.overloads[tuple(map(advance.typeof_pyval, arguments))].entry_point
+        return is_sound
+
+    def _inputs(self, time: float) -> tuple[float, float]:
+        """Speed of the driving pulley [rad/s] and torque on the driven one [N m] at a time."""
+        return self.parameters["driving_speed"], -self.parameters["ratio"] * self.load(time)
+
+    def load(self, time: float) -> float:
+        """Torque at the driving pulley without losses [N m]."""
+        load, rise = self.parameters["load"], self.parameters["rise_time"]
+        return load_course.py_func(time, rise, rise, load, load)
+
+    def _take_sample(self) -> None:
+        found = Reading(self._readings, self._drive, self._state)
+        time = self.time
+        speed = self.parameters["driving_speed"]
+        self._rows[self.done] = [*found.displacement(), self.load(time), speed, *found.scalars()]
+        stored = np.nan
+        if self.done >= self.first_judged:
+            self._sums += found.profiles()
+        if self.done in (self.first_judged, self.samples - 1):
+            stored = found.stored_energy()
+        self._totals[self.done] = [*self._state.totals, stored]
+        self.done += 1
+
+    def _slipped(self) -> str | None:
+        """Whether the driven pulley runs far from its speed without slip."""
+        p = self.parameters
+        share = p["ratio"] * self._state.speed[0, 1] / p["driving_speed"]
+        if share < LEAST_SPEED:
+            return LOST
+        return GAINED if share > MOST_SPEED else None
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.steps * self.step
+
+    @property
+    def step(self) -> float:
+        """Time step [s]."""
+        return self.interval / self._steps_per_sample
+
+    @property
+    def steps(self) -> int:
+        """Steps taken so far."""
+        return int(self._state.counters[fields.STEPS])
+
+    @property
+    def contact_solves(self) -> int:
+        """Solves of the contact problem so far: iterations."""
+        return int(self._state.counters[fields.ITERATIONS])
+
+    def counters(self) -> dict[str, int]:
+        """Work done so far: steps, iterations, and steps that were not solved to the tolerance."""
+        return dict(zip(("steps", "iterations", "unsolved"), self._state.counters.tolist(), strict=True))
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Displacement at the probes, outwards, (done, probe) [m]."""
+        return self._rows[: self.done, : len(self.probes)]
+
+    def channel(self, name: str) -> np.ndarray:
+        """History of one of CHANNELS, (done,)."""
+        return self._rows[: self.done, len(self.probes) + CHANNELS.index(name)]
+
+    def mean_driving_speed(self, samples: slice) -> float:
+        """Mean speed of the driving pulley in some samples [rad/s]."""
+        return float(self.channel("driving_speed")[samples].mean())
+
+    @property
+    def judged(self) -> slice:
+        """Samples of the judged part."""
+        return slice(self.first_judged, self.samples)
+
+    @property
+    def turns(self) -> int:
+        """Whole turns of the belt in the judged part."""
+        return int((self.samples - self.first_judged) / self._turn)
+
+    @property
+    def whole_turns(self) -> slice:
+        """Samples of the last of these turns; of the judged part where there is none."""
+        first = self.samples - round(self.turns * self._turn)
+        return slice(first, self.samples) if self.turns else self.judged
+
+    @property
+    def _turn(self) -> float:
+        """Samples of a turn of the belt."""
+        speed = self.parameters["driving_speed"] * self.path.driving_radius
+        return self.path.path_length / (speed * self.interval)
+
+    def mean_rate(self, total: int) -> float:
+        """Mean rate over the judged part of one of the totals, by its index; -1: of the stored energy."""
+        part = self._totals[self.judged]
+        return float((part[-1, total] - part[0, total]) / ((len(part) - 1) * self.interval))
+
+    @property
+    def profiles(self) -> dict[str, np.ndarray]:
+        """PROFILES at places along the path, (place,), means of the judged part; nan where none is."""
+        length, tension, offset, normal, friction, samples = self._sums
+        with np.errstate(invalid="ignore", divide="ignore"):
+            means = tension / length, normal / samples, friction / samples, offset / length
+        return dict(zip(PROFILES, means, strict=True))
+
+    @property
+    def path(self) -> Any:
+        """The reference path."""
+        return self._readings.path
+
+    @property
+    def places(self) -> np.ndarray:
+        """Path coordinates of the profiles, (place,) [m]."""
+        return self._readings.places
+
+    def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
+        """Why a run that reached its end is not to be trusted, by its values; None where it is.
+
+        Parameters
+        ----------
+        record : dict
+            With `unsolved_share` and `power_residual`.
+        """
+        unsolved, open_power = record["unsolved_share"], record["power_residual"]
+        if not unsolved <= MOST_UNSOLVED:
+            why = f"{unsolved:.1%} of the steps were not solved"
+        elif not abs(open_power) <= MOST_OPEN:
+            why = f"the power balance is open by {open_power:.3g}, not by at most {MOST_OPEN:g}"
+        else:
+            return None
+        return Status.FAILED_NUMERICS, why
+
+    def paused(self) -> Transient:
+        """What a batch of the same point over a longer time goes on from: the run itself."""
+        return self
+
+
+batch = batches_of_one(Transient)

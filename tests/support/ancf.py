@@ -1,0 +1,112 @@
+"""Chains of ANCF elements as whole matrices, and their definition for complex numbers."""
+
+import numpy as np
+
+from cvt_hpc.multibody.ancf_beam import PER_NODE, assemble
+from cvt_hpc.multibody.ancf_chain import chain
+from cvt_hpc.solvers.cyclic_blocks import LOWER, UPPER
+
+
+def equations(beam, q, u, start=None, tau=1e-12, power=False):
+    """Matrix (4 n, 4 n) and right-hand side (4 n,) of a correction; by default the forces, as tau is tiny.
+
+    With `power` what damping takes instead [W].
+    """
+    work = chain(q, u)
+    lost = assemble(
+        beam, work.q, work.v, work.v if start is None else start, tau, work.blocks, work.columns, 0
+    )
+    if power:
+        return lost
+    return whole(work.blocks), work.columns.data[:-1, :, 0].ravel().copy()
+
+
+def whole(blocks):
+    """Matrix (4 n, 4 n) of the blocks of a closed chain, or an open one."""
+    n = blocks.data.shape[0] - 1
+    matrix = np.zeros((n, PER_NODE, n, PER_NODE))
+    for i in range(n):
+        for block, j in ((0, i), (LOWER, i - 1), (UPPER, (i + 1) % n)):
+            matrix[i, :, j] += blocks.data[i, PER_NODE * block : PER_NODE * (block + 1)]
+    return matrix.reshape(PER_NODE * n, -1)
+
+
+def mass_and_stiffness(beam, q):
+    """Matrices (4 n, 4 n) of small motions about rest at q, without damping."""
+    rest = np.zeros_like(q)
+    mass = equations(beam._replace(axial_stiffness=0.0, bending_stiffness=0.0), q, rest, tau=1.0)[0]
+    return mass, equations(beam, q, rest, tau=1.0)[0] - mass
+
+
+def straight(lengths, stretch=1.0):
+    """Nodes (k + 1, 4) of an open chain along x."""
+    s = np.concatenate([[0.0], np.cumsum(lengths)])
+    nothing = np.zeros_like(s)
+    return np.stack([stretch * s, nothing, stretch + nothing, nothing], 1)
+
+
+def ring(lengths, stretch=1.0):
+    """Nodes (k, 4) of a closed chain on a circle."""
+    angle = 2.0 * np.pi * np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) / lengths.sum()
+    radius, c, s = stretch * lengths.sum() / (2.0 * np.pi), np.cos(angle), np.sin(angle)
+    return np.stack([radius * c, radius * s, -stretch * s, stretch * c], 1)
+
+
+# The definition, for complex numbers: a derivative by a complex step is exact.
+
+
+def _points(beam, q):
+    """Weights, and r, r', r'' at seven Gauss points of each element."""
+    x, weight = np.polynomial.legendre.leggauss(7)
+    x, weight = 0.5 + 0.5 * x, 0.5 * weight
+    hermite = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], float)
+    for i, l0 in enumerate(beam.lengths):
+        a, b = q[i], q[(i + 1) % len(q)]
+        ends = np.stack([a[:2], l0 * a[2:], b[:2], l0 * b[2:]])
+        along = [np.polynomial.Polynomial(c) for c in (hermite.T @ ends).T]
+        yield (
+            l0 * weight,
+            *(np.stack([c.deriv(k)(x) if k else c(x) for c in along], -1) / l0**k for k in range(3)),
+        )
+
+
+def potential(beam, q):
+    total = 0.0
+    for w, r, slope, bend in _points(beam, q):
+        strain = 0.5 * ((slope**2).sum(-1) - 1.0)
+        stored = 0.5 * beam.axial_stiffness * strain**2 + 0.5 * beam.bending_stiffness * (bend**2).sum(-1)
+        total += (w * (stored - beam.line_mass * r @ np.array(beam.gravity))).sum()
+    return total
+
+
+def lost(beam, q, u):
+    """Power that damping takes, for real q."""
+    total = 0.0
+    for (w, _, slope, bend), (_, speed, turn, bending) in zip(
+        _points(beam, q), _points(beam, u), strict=True
+    ):
+        strain_rate = (slope * turn).sum(-1)
+        rate = cross(turn, bend) + cross(slope, bending)
+        across = cross(slope, speed) / np.sqrt((slope**2).sum(-1))
+        power = beam.axial_damping * strain_rate**2
+        power = power + beam.bending_damping * beam.bending_stiffness * rate**2
+        total += (w * (power + beam.mass_damping * beam.line_mass * across**2)).sum()
+    return total
+
+
+def kinetic(beam, u):
+    return sum((0.5 * beam.line_mass * w * (speed**2).sum(-1)).sum() for w, speed, *_ in _points(beam, u))
+
+
+def cross(a, b):
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def gradient(function, at):
+    """Derivatives of a function of an (n, 4) array, (4 n,)."""
+    found = np.empty(at.size)
+    for k in range(at.size):
+        moved = at.astype(complex)
+        moved.ravel()[k] += 1e-30j
+        found[k] = np.imag(function(moved)) / 1e-30
+    return found
