@@ -91,6 +91,24 @@ def merged_kernel(function: Callable[..., Any]) -> Any:
     return _compiled(function, _OPTIONS | {"inline": "always"})
 
 
+def called_alike(compiled: Any) -> Callable[..., Any]:
+    """Return a kernel for calls whose arguments have the types of the first call's, as in a loop of samples.
+
+    No later call looks at the types, which takes a millisecond where there are tuples of many arrays.
+    """
+    entry: Callable[..., Any] | None = None
+
+    def call(*arguments: Any) -> Any:
+        nonlocal entry
+        if entry is not None:
+            return entry(*arguments)
+        found = compiled(*arguments)
+        entry = compiled.overloads[tuple(map(compiled.typeof_pyval, arguments))].entry_point
+        return found
+
+    return call
+
+
 class _Library(JITCodeLibrary):
     """The LLVM code of a function; optimised and made machine code once an address in it is asked for."""
 

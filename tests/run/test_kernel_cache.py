@@ -503,6 +503,23 @@ def test_kernels_that_take_lanes_neither_make_nor_return_arrays():
         passed_with_lanes(lanes, np.ones(2))
 
 
+def test_calls_after_the_first_go_to_the_machine_code_for_its_types(package, chosen):
+    compiled = load(package).kernel(plus_one)
+    assert [compiled(x) for x in (1, 1.0)] == [2.0, 2.0]
+    called = []
+
+    class Counted:
+        overloads, typeof_pyval = compiled.overloads, compiled.typeof_pyval
+
+        def __call__(self, x):
+            called.append(x)
+            return compiled(x)
+
+    call = kernels.called_alike(Counted())
+    assert [call(x) for x in (1.5, 2.5, 3.5)] == [2.5, 3.5, 4.5]
+    assert called == [1.5]
+
+
 def test_garbage_is_collected_again_after_compiling():
     assert gc.isenabled()
     with pytest.raises(numba.TypingError):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.beam_pushbelt.belt import CORRECTIONS, Proximal
 from cvt_hpc.models.beam_pushbelt.parameters import as_pushbelt
 from cvt_hpc.models.beam_pushbelt.start import start, workspace
@@ -27,12 +28,10 @@ class Transient(pushbelt.Transient):
     def _begin(self, p: Mapping[str, Any]) -> None:
         given = pushbelt.given(as_pushbelt(p))
         given |= {"ring_beams": p["ring_beams"], "bending_stiffness": p["ring_bending_stiffness"]}
+        self._advance = called_alike(advance)
         self._belt, self._state = start(given)
         self._work = workspace(self._state.ring, p["elements"])
         self._method = Proximal(p["theta"], p["law_tolerance"], p["most_sweeps"])
-
-    def _march(self, inputs: np.ndarray, steps: int) -> int:
-        return advance(self._belt, self._method, self._state, self._work, inputs, steps, self.step)
 
     def _reached(self) -> tuple[np.ndarray, ...]:
         elements, ring = self._state.elements, self._state.ring

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.belt_drive import drive as fields
 from cvt_hpc.models.belt_drive.drive import advance
 from cvt_hpc.models.belt_drive.readings import PLACES, PROFILES, SCALARS, Reading, Readings
@@ -60,8 +61,7 @@ class Transient:
             for strand, positions in zip(STRANDS, self._readings.probes, strict=True)
             for k, position in enumerate(positions)
         )
-        # of the kernel for these types: to find them out takes as long as twenty corrections, in each call
-        self._entry: Callable[..., bool] | None = None
+        self._advance = called_alike(advance)
         self.done = 0
         self.failure: tuple[Status, str] | None = None
         self._rows = np.empty((0, len(self.probes) + len(CHANNELS)))
@@ -111,12 +111,7 @@ class Transient:
     def _march(self, inputs: np.ndarray) -> bool:
         p = self.parameters
         settings = self.step, self._steps_per_sample, p["speed_tolerance"], p["most_iterations"]
-        arguments = self._drive, self._state, self._scheme, inputs, *settings
-        if self._entry is not None:
-            return self._entry(*arguments)
-        is_sound = advance(*arguments)
-        self._entry = advance.overloads[tuple(map(advance.typeof_pyval, arguments))].entry_point
-        return is_sound
+        return self._advance(self._drive, self._state, self._scheme, inputs, *settings)
 
     def _inputs(self, time: float) -> tuple[float, float]:
         """Speed of the driving pulley [rad/s] and torque on the driven one [N m] at a time."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
+from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.marched import Probe, batches_of_one
 from cvt_hpc.models.pushbelt import belt as fields
 from cvt_hpc.models.pushbelt.belt import CONTACTS, NOT_CONVERGED, Belt, Newton
@@ -66,9 +67,10 @@ class Transient:
     """
 
     _belt: Belt
-    _method: Any  # how steps are solved, state and work space, as `_march` takes them
+    _method: Any  # how steps are solved, state and work space, as `_advance` takes them
     _state: Any
     _work: Any
+    _advance: Callable[..., int]
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
         p = parameters
@@ -92,6 +94,7 @@ class Transient:
         self._go_on_from(_start_ups.find(self._start_up_key))
 
     def _begin(self, p: Mapping[str, Any]) -> None:
+        self._advance = called_alike(advance)
         self._belt, self._state = start(given(p))
         self._work = workspace(self._belt, p["elements"])
         self._method = Newton(
@@ -165,7 +168,7 @@ class Transient:
         return self._state.elements.data, *self._state[1:], *recorded
 
     def _march(self, inputs: np.ndarray, steps: int) -> int:
-        return advance(self._belt, self._method, self._state, self._work, inputs, steps, self.step)
+        return self._advance(self._belt, self._method, self._state, self._work, inputs, steps, self.step)
 
     def _compile(self) -> None:
         self._march(self._inputs_along(0), 0)
