@@ -327,9 +327,9 @@ class Transient:
             With `power_residual`, `numerical_damping`, `driving_power`, `loss` and `unsolved_share`.
         """
         unsolved, open_power = record["unsolved_share"], abs(record["power_residual"])
-        damped, most_damped = record["numerical_damping"].sum(), self._most_damped()
-        flow = max(abs(record["driving_power"]), record["loss"])
-        most_open = (OF_LOSS * record["loss"] + self.parameters["power_tolerance"]) / flow
+        flow, small = max(abs(record["driving_power"]), record["loss"]), OF_LOSS * record["loss"]
+        damped, most_damped = record["numerical_damping"].sum(), self._most_damped() + small
+        most_open = (small + self.parameters["power_tolerance"]) / flow
         if not unsolved <= MOST_UNSOLVED:
             why = f"{unsolved:.1%} of the steps were not solved, the last {self._fault()}"
         elif not open_power <= most_open:
@@ -341,7 +341,7 @@ class Transient:
         return Status.FAILED_NUMERICS, why
 
     def _most_damped(self) -> float:
-        """Most that the steps of a sound run damp by themselves [W]."""
+        """Most that the steps of a sound run without vibration damp by themselves [W]."""
         p, belt, path = self.parameters, self._belt, self.path
         speed = self.mean_driving_speed(self.judged) * path.driving_radius
         passing = speed / self._readings.pitch
