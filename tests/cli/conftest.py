@@ -68,6 +68,7 @@ def mechanics(monkeypatch):
         run_costs=lambda job: np.ones(job.size),
         lane_groups=lambda job, indices: [(index,) for index in indices],
         turns=lambda job, runs: 1,
+        forget=lambda job: None,
         pilot_share=lambda job: 0.25,
         run_points=run_points,
         simulate=simulate,

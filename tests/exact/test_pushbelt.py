@@ -402,8 +402,8 @@ def driven_in(dt, **changes):
 
 def stored(belt, state):
     where = SimpleNamespace(belt=belt)
-    reading = SimpleNamespace(_where=where, _elements=fields(state.elements), _state=state)
-    return Reading.stored_energy(reading)
+    reading = SimpleNamespace(_where=where, _elements=fields(state.elements), _pulleys=state.pulleys)
+    return Reading.stored_energy(reading, state.openings)
 
 
 def observed(belt, state, work, dt, duration=0.0448):

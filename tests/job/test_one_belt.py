@@ -14,7 +14,8 @@ from cvt_hpc.models import MODELS
 from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.physics.geometry import variator
 
-OF_VARIATORS = [model for model in MODELS if "driven_radius" in known_keys(model)]
+OF_VARIATORS = [model for model in MODELS if "belt_length" in known_keys(model)]
+FEW_ELEMENTS = {"beam_pushbelt": {"vibration": {"band_high": "600 Hz"}}}  # pass at few times that
 RATIOS, SHARES = [0.5, 1.0, 2.0, 2.5], [0.0, -0.2, 0.6]
 DRIVEN = [36.35e-3, 55.89e-3, 72.71e-3, 76.718e-3]  # [m], published, to 5 um
 ONE_BELT = {"belt_length": "661.195 mm", "centre_distance": "155 mm"}
@@ -41,7 +42,7 @@ def test_these_are_the_models_of_a_variator():
 
 @pytest.mark.parametrize("model", OF_VARIATORS)
 def test_one_belt_has_its_radii_at_each_ratio(model):
-    asked = job(model)
+    asked = job(model, **FEW_ELEMENTS.get(model, {}))
     for index in range(asked.size):
         point = asked.point(index)
         place = RATIOS.index(point["ratio"])
