@@ -3,7 +3,7 @@
 With y_f = y + alpha_f (y+ - y) and y'_m = y' + alpha_m (y'+ - y'), where y+ = y + h y' + h gamma (y'+ - y'),
 a step solves y'_m = f(y_f). Elimination of y+ and y'+ leaves a step of the implicit Euler method,
 
-    y_f = y_a + tau y'_m,    y_a = y + (alpha_f h - tau) y',    tau = alpha_f gamma / alpha_m h,
+    y_f = y_a + tau y'_m,    y_a = y + (alpha_f h - tau) y',    tau = h alpha_f gamma / alpha_m,
 
 from which y+ = y + (y_f - y) / alpha_f and y'+ = y' + (y'_m - y') / alpha_m. Applied to positions as well as
 to speeds of a mechanical system it does not overshoot (Kadapa, Dettmer and Peric 2017).

@@ -26,7 +26,7 @@ SCENE = {
     "longest_duration": 0.3,
     "most_refinements": 0,
 }
-# what friction carries at most, Euler and Eytelwein, of the centrifugal force relieved: 2 (T0 - m v^2) R tanh(mu pi / 2)
+# what friction carries at most, by Euler and Eytelwein less the centrifugal force: 2 (T0 - m v^2) R tanh(mu pi / 2)
 TENSION, RADIUS, SPEED, MU = 310.0, 0.1, 80.0 * 0.1, 0.5
 CENTRIFUGAL = 0.096 * SPEED**2  # [N]
 SLIP_TORQUE = 2.0 * (TENSION - CENTRIFUGAL) * RADIUS * np.tanh(0.5 * np.pi * MU)

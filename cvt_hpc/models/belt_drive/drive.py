@@ -1,7 +1,8 @@
 """The belt on its pulleys: contact forces at points along the belt, and the step in time.
 
-Each element has points at equal distances that may touch each pulley. A point of the belt at distance d from
-the pulley's axis is pressed by R - d into the pulley's rim of radius R, with the normal force per length
+Each element has points at equal distances that may touch each pulley. A point of the belt at distance
+d < R from the pulley's axis is pressed by R - d into the pulley's rim of radius R, with the normal force per
+length
 
     p = max(stiffness (R - d) + damping d/dt (R - d), 0).
 

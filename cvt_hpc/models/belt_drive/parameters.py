@@ -3,7 +3,8 @@
 Radii, centre distance, line mass, stiffness and damping of the belt (five ribs) and the inertia of the
 pulleys are those of Cepon and Boltezar 2011, table 1; elements, contact points and the scatter of lengths are
 those of their sec. 2.2. The belt's own length follows from the tension at rest. Assumptions are friction
-coefficient and contact stiffness, which they measured but do not print as numbers, and the contact's damping.
+coefficient and contact stiffness, which they measured but do not print as numbers, the contact's damping and
+friction_speed, and rise_time.
 """
 
 from __future__ import annotations
