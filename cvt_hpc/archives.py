@@ -27,6 +27,7 @@ _DAMAGE = (
     *(ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError),
     *(struct.error, SyntaxError, TypeError, ValueError, zipfile.BadZipFile, zlib.error),
 )
+_COMPRESSION = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _logger = logging.getLogger(__name__)
 
 Arrays = dict[str, np.ndarray]
@@ -79,7 +80,8 @@ class Archives:
         found = set()
         for path in self.written():
             try:
-                found.add(str(self._read(path)[0]["fingerprint"]))
+                with self._opened(path) as file:
+                    found.add(str(_head(file)["fingerprint"]))
             except _DAMAGE:
                 continue
         return found
@@ -109,9 +111,13 @@ class Archives:
         if kind_of(path) is None:
             return None
         try:
-            head, arrays = self._read(path)
-            if head["fingerprint"] != self._fingerprint:
-                raise ValueError("of another job")
+            with self._opened(path) as file:
+                head = _head(file)
+                if head["fingerprint"] != self._fingerprint:
+                    raise ValueError("of another job")
+                arrays = {
+                    key.removeprefix("values "): _array(file, key) for key in file.files if key != "head"
+                }
             part, maker = unpack(head["plain"], arrays), _checked_maker(head["maker"])
         except PermissionError as error:
             raise StorageError(
@@ -134,19 +140,34 @@ class Archives:
     def _path(self, name: str) -> Path:
         return self.folder / f"{name}{_SUFFIX}"
 
-    def _read(self, path: Path) -> tuple[dict[str, Any], Arrays]:
-        """Return head and arrays of an archive."""
+    def _opened(self, path: Path) -> np.lib.npyio.NpzFile:
+        """Return an archive that unpacks to no more than it may, none of its arrays read yet."""
         data = read_regular(path, self._limit)
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            if sum(entry.file_size for entry in archive.infolist()) > self._limit:
-                raise ValueError("it unpacks to more than it may")
-        with np.load(io.BytesIO(data)) as file:
-            arrays = {key.removeprefix("values "): file[key] for key in file.files if key != "head"}
-            return json.loads(str(file["head"])), arrays
+            entries = archive.infolist()
+        if sum(entry.file_size for entry in entries) > self._limit:
+            raise ValueError("it unpacks to more than it may")
+        if any(entry.compress_type not in _COMPRESSION for entry in entries):
+            raise ValueError("compressed as no archive is")
+        return np.load(io.BytesIO(data))
 
     def _remember(self, maker: dict[str, Any]) -> None:
         if maker not in self.makers:
             self.makers.append(maker)
+
+
+def _head(file: np.lib.npyio.NpzFile) -> dict[str, Any]:
+    """Return the head of an archive, as `save` writes it."""
+    return json.loads(str(file["head"]))
+
+
+def _array(file: np.lib.npyio.NpzFile, key: str) -> np.ndarray:
+    """Return an array; ValueError if it has rows or items that take no byte."""
+    array = file[key]
+    # of such a short header declares any number, and whoever goes through them never ends
+    if array.nbytes == 0 and array.shape[:1] != (0,):
+        raise ValueError(f"{key} of the shape {array.shape} has no content")
+    return array
 
 
 def _checked_maker(maker: Any) -> dict[str, Any]:
@@ -154,4 +175,6 @@ def _checked_maker(maker: Any) -> dict[str, Any]:
     own = {"versions": dict, "git_revision": str, "machine": dict}
     if not all(isinstance(maker[key], kind) for key, kind in own.items()):
         raise ValueError("nobody has made it")
+    if not all(isinstance(version, str) for version in maker["versions"].values()):
+        raise ValueError("made by versions that are no texts")
     return maker
