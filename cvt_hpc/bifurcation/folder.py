@@ -63,8 +63,8 @@ class DiagramFolder(OutputFolder[Diagram]):
 
     def load_branch(self, number: int) -> Followed | None:
         """Return branch `number`, counted from 0; None if it is not done, or cannot be read."""
-        asked, loads = self._diagram.branches[number], self._diagram.loads
-        return self.branches.load(f"branch_{number + 1}", lambda _, arrays: unpacked(asked, loads, arrays))
+        diagram, asked = self._diagram, self._diagram.branches[number]
+        return self.branches.load(f"branch_{number + 1}", lambda _, arrays: unpacked(diagram, asked, arrays))
 
     def save_branch(self, number: int, followed: Followed) -> None:
         """Keep branch `number`."""

@@ -1,24 +1,27 @@
-"""A branch with all that was found of it, as arrays that are kept, and back."""
+"""A branch with what was found of it, as arrays that are kept, and back; the kinds of Hopf points follow."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from enum import IntEnum
-from itertools import islice
+from itertools import chain, islice
 from typing import Any, TypeVar, get_type_hints
 
 import numpy as np
 
 from cvt_hpc.archives import Arrays
-from cvt_hpc.bifurcation.attractors import Attractor
+from cvt_hpc.bifurcation.attractors import FROM, Attractor
 from cvt_hpc.bifurcation.followed import Followed
-from cvt_hpc.bifurcation.job import Asked
+from cvt_hpc.bifurcation.job import Asked, Diagram
+from cvt_hpc.bifurcation.kinds import kinds_of
 from cvt_hpc.models.elastic_belt.belt import mesh
+from cvt_hpc.models.elastic_belt.one_system import flat_belt
 from cvt_hpc.models.linear_stability.branch import Branch, Onset, Point
 from cvt_hpc.models.linear_stability.modes import Mode
-from cvt_hpc.models.steady_variator.walking import SteadyBelt
-from cvt_hpc.vibration.criticality import Criticality
+from cvt_hpc.models.steady_variator.equations import LATE
+from cvt_hpc.models.steady_variator.walking import Steady, SteadyBelt
 
+_MOST = np.iinfo(np.int8).max  # of the counts in the dataset
 Row = TypeVar("Row")  # a named tuple
 
 
@@ -39,56 +42,92 @@ def packed(followed: Followed) -> Arrays:
         "hidden": np.array(followed.hidden, float).reshape(-1, 2),
         **_columns("mode", Mode, modes),
         **_columns("run", Attractor, followed.runs),
-        **_columns("kind", Criticality, followed.kinds),
     }
 
 
-def unpacked(asked: Asked, loads: Sequence[float], arrays: Arrays) -> Followed:
+def unpacked(diagram: Diagram, asked: Asked, arrays: Arrays) -> Followed:
     """Return the branch that `packed` has made arrays of.
 
     Parameters
     ----------
-    asked : Asked
-        What was asked for.
-    loads : sequence of float
-        Of the diagram [N m].
+    diagram, asked : Diagram, Asked
+        What was asked for: the diagram, and the branch of it.
     arrays : dict
-        The arrays.
+        The arrays; they may come from somebody else.
 
     Raises
     ------
     KeyError, ValueError, TypeError
         If they are not of such a branch.
     """
-    known = arrays["point load"].tolist()
-    missed = _pairs(arrays["missed load"], arrays["missed reason"])
-    if sorted([*known, *(load for load, _ in missed)]) != [*loads]:
+    known = _values(float, arrays["point load"])
+    missed = dict(_pairs((float, str), arrays["missed load"], arrays["missed reason"]))
+    if known != sorted(known) or sorted([*known, *missed]) != [*diagram.loads]:
         raise ValueError("of other loads")
-    belt, modes = SteadyBelt(asked.parameters), iter(_rows("mode", Mode, arrays))
-    points = [
-        Point(belt.known(load, unknowns), [*islice(modes, int(count))])
-        for load, unknowns, count in zip(known, arrays["point unknowns"], arrays["point modes"], strict=True)
+    belt, unknowns, modes = (
+        SteadyBelt(asked.parameters),
+        arrays["point unknowns"],
+        _rows("mode", Mode, arrays),
+    )
+    _require(unknowns.dtype.kind == "f" and np.isfinite(unknowns).all(), "unknowns")
+    states = [belt.known(load, own) for load, own in zip(known, unknowns, strict=True)]
+    _check_modes(modes, states)
+    left, counts = iter(modes), _values(int, arrays["point modes"])
+    points = [Point(state, [*islice(left, count)]) for state, count in zip(states, counts, strict=True)]
+    kinds = (float, bool, int)
+    columns = [
+        _values(kind, arrays[f"onset {name}"])
+        for kind, name in zip(kinds, ("load", "rising", "others"), strict=True)
     ]
-    columns = (arrays[f"onset {name}"].tolist() for name in ("load", "rising", "others"))
     onsets = [
-        Onset(load, mode, rising, others) for load, rising, others, mode in zip(*columns, modes, strict=True)
+        Onset(load, mode, rising, others) for load, rising, others, mode in zip(*columns, left, strict=True)
     ]
-    kinds = _rows("kind", Criticality, arrays)
-    if len(kinds) != len(onsets):
-        raise ValueError("not one kind for each Hopf point")
+    _require(all(0 <= onset.others <= _MOST for onset in onsets), "other modes")
+    _require(arrays["hidden"].shape[1:] == (2,), "hidden changes of stability")
+    hidden, runs = _pairs((float, float), *arrays["hidden"].T), _rows("run", Attractor, arrays)
+    _require(all(run.start in range(len(FROM)) for run in runs), "starts")
+    loads = chain((onset.load for onset in onsets), *hidden, (run.value for run in runs))
+    _require(all(diagram.loads[0] <= load <= diagram.loads[-1] for load in loads), "loads")
     return Followed(
         asked,
         mesh(asked.parameters),
-        Branch(points, dict(missed)),
+        Branch(points, missed),
         onsets,
-        _pairs(*arrays["hidden"].T),
-        _rows("run", Attractor, arrays),
-        kinds,
+        hidden,
+        runs,
+        kinds_of(diagram, asked, onsets, hidden, runs),
     )
 
 
-def _pairs(one: np.ndarray, other: np.ndarray) -> list[tuple[Any, Any]]:
-    return list(zip(one.tolist(), other.tolist(), strict=True))
+def _check_modes(modes: list[Mode], states: list[Steady]) -> None:
+    """Raise ValueError unless these may be modes of a belt with such steady states."""
+    if not states:
+        return _require(not modes, "modes")
+    belt = states[0].belt
+    shapes = {
+        "amplitudes": (4,),
+        "fed": belt.cell.shape,
+        "displacement": belt.cell.shape,
+        "vector": flat_belt(belt, LATE).origin.shape,
+    }
+    for mode in modes:
+        for name, shape in shapes.items():
+            array = getattr(mode, name)
+            kind = "c" if name in ("displacement", "vector") else "f"
+            _require(array.dtype.kind == kind and array.shape == shape, name)
+        _require(abs(np.abs(mode.displacement).max() - 1.0) < 1e-6, "displacement")  # by round-off alone
+        _require(mode.strand in (0, 1) and 1 <= mode.half_waves <= _MOST, "strands or half waves")
+        _require(np.isfinite([mode.growth, mode.frequency]).all(), "growth rates or frequencies")
+
+
+def _require(holds: Any, name: str) -> None:
+    """Raise ValueError with the name of what cannot be so unless it holds."""
+    if not holds:
+        raise ValueError(f"{name} as no branch has them")
+
+
+def _pairs(kinds: tuple[type, type], one: np.ndarray, other: np.ndarray) -> list[tuple[Any, Any]]:
+    return list(zip(_values(kinds[0], one), _values(kinds[1], other), strict=True))
 
 
 def _columns(name: str, kind: Callable[..., Row], rows: Iterable[Row]) -> Arrays:
@@ -98,15 +137,16 @@ def _columns(name: str, kind: Callable[..., Row], rows: Iterable[Row]) -> Arrays
 
 def _rows(name: str, kind: Callable[..., Row], arrays: Arrays) -> list[Row]:
     """Return the named tuples that `_columns` has made arrays of."""
-    columns = [
-        [_value(hint, value) for value in arrays[f"{name} {key}"]]
-        for key, hint in get_type_hints(kind).items()
-    ]
+    columns = [_values(hint, arrays[f"{name} {key}"]) for key, hint in get_type_hints(kind).items()]
     return [kind(*values) for values in zip(*columns, strict=True)]
 
 
-def _value(kind: Any, value: Any) -> Any:
-    """Return a field of such a type."""
+def _values(kind: Any, array: np.ndarray) -> list[Any]:
+    """Return the values of an array, all of such a type; TypeError if they are of another."""
     if kind is np.ndarray:
-        return value
-    return kind(int(value)) if issubclass(kind, IntEnum) else kind(value)
+        return [*array]
+    values = array.tolist()
+    plain = int if issubclass(kind, IntEnum) else kind
+    if not all(type(value) is plain for value in values):
+        raise TypeError(f"{array.dtype} in the place of {plain.__name__}")
+    return [kind(value) for value in values] if plain is not kind else values
