@@ -348,7 +348,8 @@ class Transient:
         passing = speed / self._readings.pitch
         turning = path.driving_radius**-2 + path.driven_radius**-2
         rotation = 0.5 * belt.inertia * passing * speed**2 * turning
-        return OF_ROTATION * rotation + OF_THRUST * self.step * p["thrust"] * speed
+        thrust = p["thrust"] * multiple(p, "thrust", p["duration"])  # a profile ends before the judged part
+        return OF_ROTATION * rotation + OF_THRUST * self.step * thrust * speed
 
     def paused(self) -> Transient:
         """What a batch of the same point over a longer time goes on from: the run itself."""
