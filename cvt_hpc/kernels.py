@@ -449,7 +449,8 @@ def _make(folder: Path) -> None:
     folder.mkdir(mode=0o700, exist_ok=True)
     for other in folder.parent.iterdir():
         with suppress(OSError):
-            if time.time() - other.stat().st_mtime > _MONTH:
+            # not the file of claims: to open and close it would drop those of this process
+            if other.is_dir() and time.time() - other.stat().st_mtime > _MONTH:
                 shutil.rmtree(other, ignore_errors=True)
 
 

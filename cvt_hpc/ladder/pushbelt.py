@@ -13,6 +13,7 @@ from cvt_hpc.job.for_model import handed_to
 from cvt_hpc.job.rules import varied_by
 from cvt_hpc.job.schema import known_keys, load_schema
 from cvt_hpc.models.pushbelt.continuous import FOLLOWS, ONLY
+from cvt_hpc.models.pushbelt.profiles import PARAMETERS as PROFILES
 
 PUSHBELT = "pushbelt"
 # Of the rung below the reference: half as many elements as a belt has, at the default step
@@ -52,7 +53,7 @@ def pushbelt_jobs(job: Job, settings: Mapping[str, Any]) -> tuple[Job, Job]:
 def _check_settings(job: Job, settings: Mapping[str, Any], where: str) -> None:
     """Refuse what the elastic belt knows as well: both would be different belts."""
     schema = load_schema(PUSHBELT, None, job.source)
-    own = {*known_keys(PUSHBELT)} - {*known_keys(job.model, job.stepper)} | {*FOLLOWS, *COARSER}
+    own = {*known_keys(PUSHBELT)} - {*known_keys(job.model, job.stepper), *PROFILES} | {*FOLLOWS, *COARSER}
     for name in settings:
         if schema.find(name, f"{where} {name}") not in own:
             expected = "a key that the elastic belt does not know, since all else is that belt's"

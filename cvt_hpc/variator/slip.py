@@ -80,7 +80,8 @@ def slip_margin(run: Any, samples: slice) -> float:
     p, path = run.parameters, run.path
     axial = np.array([run.channel(f"axial_force {pulley}")[samples].mean() for pulley in PULLEYS])
     # a run may slip through before a constant load has risen to its value
-    load = p["load"] if p["load_history"] == "constant" else run.channel("load")[samples].mean()
+    is_constant = p["load_history"] == "constant" and not p.get("load_profile")
+    load = p["load"] if is_constant else run.channel("load")[samples].mean()
     carried = largest_torque(
         given_law(dict.fromkeys(TABLE_PARAMETERS, ()) | p),  # not every model has tables
         p["half_wedge_angle"],

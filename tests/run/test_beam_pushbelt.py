@@ -1,7 +1,9 @@
 """Runs of the pushbelt on a ring of beams, against the laws of its contacts and against the pushbelt's."""
 
 import numpy as np
+import pytest
 
+from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.beam_pushbelt.record import judge
 from cvt_hpc.models.beam_pushbelt.transient import Transient
@@ -83,3 +85,18 @@ def test_laws_of_friction():
     assert again.done == 20
     again.advance(10)
     np.testing.assert_array_equal(again._elements(), run._elements())
+
+
+@pytest.mark.parametrize(
+    ("values", "complaint"),
+    [
+        ({"ring_beams": 8}, "ring_beams: expected at least 14, so that none turns by more than 60 degrees"),
+        ({"step": 20e-6}, "step: expected at most .* of elements that press on each other"),
+        ({"theta": 0.3}, "theta: expected 0, or 0.5 to 1, found 0.3"),
+    ],
+)
+def test_what_cannot_be_is_refused(values, complaint):
+    with pytest.raises(InputError, match=complaint):
+        build_job(
+            {"name": "x", "model": "beam_pushbelt"}, "x.toml", BELT | BEAMS | {"step": 2e-6} | values
+        ).point(0)

@@ -200,6 +200,9 @@ def test_profiles_shift_the_ratio_and_change_load_speed_and_thrust():
         ratio, rel=0.02
     )
     assert record["axial_force"][1] == pytest.approx(0.8 * 20e3, rel=0.01)
+    # Bullinger et al. 2005, eq. 2, at the radius of the start
+    carried = 2.0 * 0.09 * record["axial_force"].min() * 0.063896 / 1.35 / np.cos(np.deg2rad(11.0))
+    assert record["slip_margin"] == pytest.approx(30.0 / carried - 1.0, rel=1e-3)
 
 
 def test_what_the_power_balance_may_leave_open():
@@ -268,6 +271,9 @@ def test_profiles_and_histories_agree_with_the_record(records):
         ({"friction_gradient": -0.8, "friction_memory": 0.0}, "step"),
         ({"rise_time": 0.025}, "rise_time"),
         ({"load_profile": (1.0, 2.0)}, "profile_time: expected ascending times from rise_time on"),
+        (PROFILE | {"load_profile": ((1.0, 2.0), (1.0, 2.0))}, "load_profile: expected a list of numbers"),
+        ({"driving_modal_stiffness": ((1e8,), (1e8,))}, "driving_modal_stiffness: expected values above 0"),
+        (PROFILE | {"ratio_profile": (1.0, 2.0)}, "band_high: expected at most .* at a ratio of 2.7"),
         (PROFILE | {"load_profile": (1.0,)}, "load_profile: expected as many values as profile_time has, 2"),
         (PROFILE | {"profile_time": (0.018, 0.012)}, "profile_time: expected ascending"),
         (PROFILE | {"profile_time": (0.012, 0.03)}, "until the run is judged, 0.01 to 0.02 s"),

@@ -78,6 +78,8 @@ def ring_on_path(
         parts = np.diff(nodes) * (1.0 + strains.mean()) / (1.0 + strains)
         nodes = np.concatenate([[0.0], np.cumsum(parts * around / parts.sum())])
         length *= (1.0 + strains.mean()) / (1.0 + strain)
+    else:
+        raise ValueError("the ring's beams cannot all have one strain along this path")
     ring = relaxed_ring(beam._replace(length=length), beams)
     ring.q[:] = q
     ahead = 1e-6 * around  # of which all differences are above rounding

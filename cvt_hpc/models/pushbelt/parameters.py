@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.models.pushbelt.profiles import PARAMETERS as PROFILES
-from cvt_hpc.models.pushbelt.profiles import extremes, profile_inert, profile_problems, ratios_along
+from cvt_hpc.models.pushbelt.profiles import extremes, nested, profile_inert, profile_problems, ratios_along
 from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
 from cvt_hpc.physics.geometry import driven_radius, variator, variator_problems
@@ -219,67 +219,61 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         Empty where all is well.
     """
     p = parameters
-    problems = variator_problems(p)
+    problems = variator_problems(p) or profile_problems(p)
     if problems:
         return problems
-    length = path_length(p)
-    pitch = length / p["elements"]
+    pitch = path_length(p) / p["elements"]
     if p["play"] > pitch:
         problems.append(("play", f"less than the pitch of the elements, {pitch:.4g} m", f"{p['play']:g} m"))
-    problems += profile_problems(p)
-    for ratio in [] if problems else ratios_along(p):
-        problems += _ratio_problems(p, ratio)
     if p["elements"] < FEWEST_ELEMENTS and not p["coarse"]:
         expected = f"{FEWEST_ELEMENTS} or more, or coarse = true"
         problems.append(("elements", expected, f"{p['elements']}"))
-    # the polygon of the elements shakes strands as they pass, and by the change of stiffness at half of that
-    half = 0.5 * _driving_speeds(p)[0] * p["driven_radius"] / p["ratio"] / pitch
-    if BELOW_PASSAGE * half < p["band_high"]:
-        most = f"{BELOW_PASSAGE * half:.4g} Hz, below half of the frequency at which elements pass"
-        problems.append(("band_high", f"at most {most}, or more elements", f"{p['band_high']:g} Hz"))
     for key in MODES:
-        if not p[key] or len(p[key]) != len(p[MODES[0]]) or min(p[key]) <= 0.0:
+        if nested(p[key]) or not p[key] or len(p[key]) != len(p[MODES[0]]) or min(p[key]) <= 0.0:
             expected = "values above 0, as many of both pulleys"
             problems.append((key, expected, f"{list(p[key])}"))
-    limit = string_limit(p)
-    if not problems and "step" in p and p["step"] > limit:
-        expected = f"at most {limit:.3g} s, pitch over the speed of transverse waves under the thrust"
-        problems.append(("step", expected, f"{p['step']:g} s"))
-    limit = falling_limit(p)
-    if not problems and "step" in p and p["step"] > limit:
-        expected = f"at most {limit:.3g} s, beyond which friction that falls so steeply has several solutions"
-        problems.append(("step", expected, f"{p['step']:g} s"))
-    # a sheave moves by an explicit step against the stiffness of the flanks on the longer arc
-    psi = np.arcsin((p["ratio"] - 1.0) * p["driven_radius"] / p["ratio"] / p["centre_distance"])
-    angle, arc = (
-        p["half_wedge_angle"],
-        (np.pi + 2.0 * abs(psi)) * max(p["driven_radius"] / p["ratio"], p["driven_radius"]),
-    )
-    fastest = 1.0 / (p.get("step", 0.0) * p["flank_stiffness"] * arc * np.sin(angle) * np.cos(angle) + 1e-300)
-    if p["sheave_rate"] > fastest:
-        expected = f"at most {fastest:.3g} m/(N s) at this step, beyond which the sheave does not settle"
-        problems.append(("sheave_rate", expected, f"{p['sheave_rate']:g} m/(N s)"))
+    for ratio in ratios_along(p):
+        problems = problems or _problems_at(p, ratio)
     return problems + friction_problems(p)
 
 
-def _ratio_problems(p: Mapping[str, Any], ratio: float) -> list[tuple[str, str, str]]:
-    """Problems of the radii at a ratio that the run has, or comes to along its profile."""
-    key = "ratio" if ratio == p["ratio"] else "ratio_profile"
-    length = path_length(p)
+def _problems_at(parameters: Mapping[str, Any], ratio: float) -> list[tuple[str, str, str]]:
+    """Problems at a ratio that the run has, or comes to along its profile."""
+    key = "ratio" if ratio == parameters["ratio"] else "ratio_profile"
+    at = "" if key == "ratio" else f" at a ratio of {ratio:g}"
+    length = path_length(parameters)
     try:
-        driving = driven_radius(ratio, length, p["centre_distance"]) / ratio
+        driven = driven_radius(ratio, length, parameters["centre_distance"])
     except ValueError:
         return [(key, "ratios at which the belt closes on pulleys that do not overlap", f"{ratio:g}")]
-    radii = sorted((driving, ratio * driving))
+    p = {**parameters, "ratio": ratio, "driven_radius": driven if at else parameters["driven_radius"]}
+    radii = sorted((driven / ratio, driven))
     if not p["inner_radius"] <= radii[0] <= radii[1] <= p["outer_radius"]:
         expected = f"radii within the sheaves, {p['inner_radius']:g} to {p['outer_radius']:g} m"
         return [(key, expected, f"{ratio:g}, and with it radii of {radii[0]:.5g} and {radii[1]:.5g} m")]
-    wrap = np.pi - 2.0 * np.arcsin((radii[1] - radii[0]) / p["centre_distance"])
-    least = int(np.ceil(8.0 * length / (wrap * radii[0])))
+    psi = np.arcsin((radii[1] - radii[0]) / p["centre_distance"])
+    least = int(np.ceil(8.0 * length / ((np.pi - 2.0 * psi) * radii[0])))
     if p["elements"] < least:
-        at = "" if key == "ratio" else f" at a ratio of {ratio:g}"
         return [("elements", f"at least {least}, eight on the shorter arc{at}", f"{p['elements']}")]
-    return []
+    problems = []
+    # the polygon of the elements shakes strands as they pass, and by the change of stiffness at half of that
+    half = 0.5 * _driving_speeds(p)[0] * driven / ratio * p["elements"] / length
+    if BELOW_PASSAGE * half < p["band_high"]:
+        most = f"{BELOW_PASSAGE * half:.4g} Hz, below half of the frequency at which elements pass{at}"
+        problems.append(("band_high", f"at most {most}, or more elements", f"{p['band_high']:g} Hz"))
+    step, why = p.get("step", 0.0), "pitch over the speed of transverse waves under the thrust"
+    if not problems and step > (limit := string_limit(p)):
+        problems.append(("step", f"at most {limit:.3g} s, {why}{at}", f"{step:g} s"))
+    why = "beyond which friction that falls so steeply has several solutions"
+    if not problems and step > (limit := falling_limit(p)):
+        problems.append(("step", f"at most {limit:.3g} s, {why}{at}", f"{step:g} s"))
+    # a sheave moves by an explicit step against the stiffness of the flanks on the longer arc
+    angle, arc = p["half_wedge_angle"], (np.pi + 2.0 * psi) * radii[1]
+    fastest = 1.0 / (step * p["flank_stiffness"] * arc * np.sin(angle) * np.cos(angle) + 1e-300)
+    if p["sheave_rate"] > fastest:
+        expected = f"at most {fastest:.3g} m/(N s) at this step, beyond which the sheave does not settle{at}"
+        problems.append(("sheave_rate", expected, f"{p['sheave_rate']:g} m/(N s)"))
+    return problems
 
 
 def _driving_speeds(p: Mapping[str, Any]) -> tuple[float, float]:

@@ -5,7 +5,7 @@ Between the times of a profile multiples are linear, before the first and after 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -47,8 +47,14 @@ def extremes(parameters: Mapping[str, Any], name: str) -> tuple[float, float]:
 
 
 def ratios_along(parameters: Mapping[str, Any]) -> list[float]:
-    """The ratio, and the least and greatest along its profile if there is one."""
-    return sorted({parameters["ratio"], *extremes(parameters, "ratio")})
+    """The ratio first, then the least and greatest along its profile if that has an effect."""
+    ratio, others = parameters["ratio"], extremes(parameters, "ratio")
+    return [ratio, *(other for other in others if other != ratio and parameters["driving_thrust"] == 0.0)]
+
+
+def nested(values: Sequence[Any]) -> bool:
+    """Whether values are lists in their turn."""
+    return any(isinstance(value, Sequence) for value in values)
 
 
 def profile_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
@@ -64,6 +70,10 @@ def profile_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]
     times = p["profile_time"]
     if not (profiles or times):
         return found
+    lists = {"profile_time": times} | {f"{name}_profile": values for name, values in profiles.items()}
+    for key, values in lists.items():
+        if nested(values):
+            return [(key, "a list of numbers", f"{list(values)}")]
     judged = (1.0 - p["judged_fraction"]) * p["duration"] * (1.0 + 1e-9)
     inside = [p["rise_time"], *times, judged]
     if not times or any(np.diff(times) <= 0.0) or any(np.diff(inside) < 0.0):

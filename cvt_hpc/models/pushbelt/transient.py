@@ -31,8 +31,9 @@ CLAMPED = 0.5  # of the rise time: until then the thrust rises, from then on the
 # What the power balance may leave open beside the equations' tolerance: elastic sheaves lean along the arc,
 # which has no part in the elements' forces. Sound runs leave up to 0.5 % of the losses.
 OF_LOSS = 0.02  # [1]
-# What the step may damp by itself: a share of the energy of rotation of elements that meet and leave an arc,
-# and of thrust times belt speed, by step. Sound runs damp by up to 85 % of both.
+# What the step may damp by itself beside that share of the losses: one of the energy of rotation of elements
+# that meet and leave an arc, and of thrust times belt speed, by step. Without vibration sound runs damp by up
+# to 85 % of these two.
 OF_ROTATION, OF_THRUST = 1.5, 10.0  # [1], [1/s]
 MOST_UNSOLVED = 0.02  # of the steps
 
@@ -347,7 +348,8 @@ class Transient:
         passing = speed / self._readings.pitch
         turning = path.driving_radius**-2 + path.driven_radius**-2
         rotation = 0.5 * belt.inertia * passing * speed**2 * turning
-        return OF_ROTATION * rotation + OF_THRUST * self.step * p["thrust"] * speed
+        thrust = p["thrust"] * multiple(p, "thrust", p["duration"])  # a profile ends before the judged part
+        return OF_ROTATION * rotation + OF_THRUST * self.step * thrust * speed
 
     def paused(self) -> Transient:
         """What a batch of the same point over a longer time goes on from: the run itself."""
