@@ -148,7 +148,7 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     Returns
     -------
     Schema
-        Of both, and of what all transients share.
+        Of both, and of what all transients share; of this a model may declare keys with defaults of its own.
 
     Raises
     ------
@@ -166,7 +166,8 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     sections: dict[str, dict[str, Parameter]] = {}
     for sectioned in tables:
         for section, table in sectioned.items():
-            sections.setdefault(section, {}).update(table)
+            known = sections.setdefault(section, {})
+            known.update({key: parameter for key, parameter in table.items() if key not in known})
     for key, substitute in loaded.gives.get(stepper or "", {}).items():
         section = next(name for name, table in sections.items() if key in table)
         sections[section][key] = replace(sections[section][key], gives=substitute)

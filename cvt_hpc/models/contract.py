@@ -151,7 +151,7 @@ class Declaration(Protocol):
 
     @property
     def PARAMETERS(self) -> dict[str, dict[str, Parameter]]:  # noqa: N802
-        """By table and key."""
+        """By table and key; one of those that all runs share stands here with the model's own default."""
 
     @property
     def DEFAULT_STEPPER(self) -> str | None:  # noqa: N802

@@ -1,4 +1,4 @@
-"""Chains of planar ANCF elements, open or closed, and steps in time of a chain that nothing holds."""
+"""Chains of planar ANCF elements, open or closed, and the stages of their steps in time."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray
-from cvt_hpc.multibody.ancf_beam import PER_NODE, AncfBeam, assemble
-from cvt_hpc.solvers.cyclic_blocks import block_size, empty_blocks, empty_columns, factor, solve
+from cvt_hpc.multibody.ancf_beam import PER_NODE
+from cvt_hpc.solvers.cyclic_blocks import block_size, empty_blocks, empty_columns
 from cvt_hpc.solvers.generalised_alpha import Scheme, begin, finish, stage_length
 
 SIZE = block_size(PER_NODE)
-INSTANT = 1e-12  # [s]: a stage so short that nothing but mass counts in its matrix
 
 
 class Chain(NamedTuple):
@@ -46,7 +45,7 @@ class Chain(NamedTuple):
 
 
 def chain(q: np.ndarray, v: np.ndarray, columns: int = 1) -> Chain:
-    """A chain at positions and speeds (n, 4); its accelerations are 0 until `accelerate` finds them.
+    """A chain at positions and speeds (n, 4); its accelerations are 0.
 
     Parameters
     ----------
@@ -64,73 +63,6 @@ def chain(q: np.ndarray, v: np.ndarray, columns: int = 1) -> Chain:
     dv, stage_q, stage_v, start_q, start_v = np.zeros((5, *q.shape))
     equations = empty_blocks(len(q), PER_NODE), empty_columns(len(q), PER_NODE, columns)
     return Chain(q, v, v.copy(), dv, stage_q, stage_v, start_q, start_v, *equations)
-
-
-@kernel
-def accelerate(beam: AncfBeam, chain: Chain) -> bool:
-    """Find the accelerations of a chain that nothing holds; without them the first step errs by its size.
-
-    Returns
-    -------
-    bool
-        Whether they could be found.
-    """
-    assemble(beam, chain.q, chain.v, chain.v, INSTANT, chain.blocks, chain.columns, 0)
-    if not factor(chain.blocks, SIZE):
-        return False
-    solve(chain.blocks, chain.columns, SIZE)
-    for i in range(chain.q.shape[0]):
-        for k in range(PER_NODE):
-            chain.dv[i, k] = chain.columns.data[i, k, 0] / INSTANT
-    return True
-
-
-@kernel
-def advance(
-    beam: AncfBeam, chain: Chain, scheme: Scheme, dt: float, steps: int, tolerance: float, most: int
-) -> int:
-    """Advance a chain that nothing holds.
-
-    Parameters
-    ----------
-    beam : AncfBeam
-        Its constants.
-    chain : Chain
-        At a state; then at the last one.
-    scheme : Scheme
-        Of the step. The midpoint rule conserves momentum, angular momentum and energy.
-    dt : float
-        Step [s].
-    steps : int
-        How many.
-    tolerance : float
-        Largest correction of a speed with which a stage counts as solved [m/s].
-    most : int
-        Corrections of a stage.
-
-    Returns
-    -------
-    int
-        Steps done; fewer than `steps` where a stage was not solved.
-    """
-    tau = stage_length(scheme, dt)
-    for step in range(steps):
-        begin_stage(chain, scheme, dt)
-        solved = False
-        for _ in range(most):
-            place(chain, tau)
-            assemble(beam, chain.stage_q, chain.stage_v, chain.start_v, tau, chain.blocks, chain.columns, 0)
-            if not factor(chain.blocks, SIZE):
-                return step
-            solve(chain.blocks, chain.columns, SIZE)
-            largest = correct(chain, 0)
-            solved = largest <= tolerance
-            if solved or not np.isfinite(largest):
-                break
-        if not solved:
-            return step
-        finish_stage(chain, scheme, dt)
-    return steps
 
 
 @kernel

@@ -13,7 +13,7 @@ import numpy as np
 
 from cvt_hpc.variables import Vibrates
 from cvt_hpc.variator import PULLEYS, STRANDS
-from cvt_hpc.variator.slip import slid, with_slip
+from cvt_hpc.variator.slip import slid, speed_loss, with_slip
 from cvt_hpc.variator.variables import frequency_bins
 from cvt_hpc.vibration import assessment, ramp
 from cvt_hpc.vibration.occurrence import LONGEST_REASON
@@ -50,10 +50,15 @@ def _on_strands(run: Any) -> tuple[np.ndarray, list[str]]:
     return np.array(columns), [regions[k] for k in columns]
 
 
+def slipped_through(run: Any) -> dict[str, Any]:
+    """The verdict on a run that has slipped through before its end."""
+    status, why = run.failure
+    return {"status": status, "vibrates": Vibrates.SLIPS, "reason": f"at {run.time * 1e3:.4g} ms: {why}"}
+
+
 def slipped(run: Any) -> dict[str, Any]:
     """The record of a run that has slipped through before its end: what is known until then."""
-    status, why = run.failure
-    found = {"status": status, "vibrates": Vibrates.SLIPS, "reason": f"at {run.time * 1e3:.4g} ms: {why}"}
+    found = slipped_through(run)
     before = _assess_ramp(run) if ramped(run.parameters) else None
     if before is not None:
         reason = f"{found['reason']}; before: {before.reason}"[:LONGEST_REASON]
@@ -71,6 +76,18 @@ def pair(run: Any, name: str, labels: tuple[str, str] = PULLEYS) -> np.ndarray:
     return np.array([mean(run, f"{name} {label}") for label in labels])
 
 
+def motion(run: Any, strongest_probe: np.ndarray) -> dict[str, Any]:
+    """Values of a finished run of any belt on two pulleys; arguments as of `evaluate`."""
+    p, judged = run.parameters, run.judged
+    moved = run.displacement[judged][:, strongest_probe]
+    return {
+        "spectrum": amplitude_spectrum(moved, p["sampling_rate"], frequency_bins(p).values).T,
+        "slip": pair(run, "slip"),
+        "speed_loss": speed_loss(run, judged),
+        "driven_speed_ripple": run.channel("driven_speed")[judged].std(),
+    }
+
+
 def evaluate(run: Any, strongest_probe: np.ndarray) -> dict[str, Any]:
     """Values of a finished run that all models of a variator have.
 
@@ -81,26 +98,21 @@ def evaluate(run: Any, strongest_probe: np.ndarray) -> dict[str, Any]:
     strongest_probe : (2,) int array
         Column of the displacement that vibrates most, for each strand.
     """
-    p, judged = run.parameters, run.judged
-    axial, driven_speed = pair(run, "axial_force"), run.channel("driven_speed")[judged]
-    moved = run.displacement[judged][:, strongest_probe]
+    axial = pair(run, "axial_force")
     return {
-        "spectrum": amplitude_spectrum(moved, p["sampling_rate"], frequency_bins(p).values).T,
+        **motion(run, strongest_probe),
         "mean_ring_tension": pair(run, "ring_tension", STRANDS),
         "mean_push_force": pair(run, "push_force", STRANDS),
         "axial_force": axial,
-        "slip": pair(run, "slip"),
         "flank_loss": np.array([mean(run, f"{pulley}_flank_loss") for pulley in PULLEYS]),
         "thrust_ratio": axial[0] / axial[1],
-        "speed_loss": 1.0 - p["ratio"] * driven_speed.mean() / run.mean_driving_speed(judged),
-        "driven_speed_ripple": driven_speed.std(),
     }
 
 
 def power_balance(
-    driving: float, load: float, thrust: float, loss: float, storing: float, damped: float = 0.0
+    driving: float, load: float, loss: float, storing: float, thrust: float = 0.0, damped: float = 0.0
 ) -> dict[str, float]:
-    """Powers of a run as its record names them [W], and what their balance leaves open.
+    """Powers of a run as its record names them [W], but that of a thrust, and what their balance leaves open.
 
     `damped` is what the time step takes by itself.
     """
@@ -108,7 +120,6 @@ def power_balance(
     return {
         "driving_power": driving,
         "load_power": load,
-        "thrust_power": thrust,
         "storing_power": storing,
         "loss": loss,
         "power_residual": open_power / max(abs(driving), loss),

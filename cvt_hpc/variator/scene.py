@@ -89,6 +89,22 @@ SCENE: dict[str, Parameter] = {
 }
 
 
+def rise_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems of a load that rises, in the form of a model's check: (key, expected, found).
+
+    Parameters
+    ----------
+    parameters : mapping
+        Values by name [SI], of which `rise_time`, `duration` and `judged_fraction` count.
+    """
+    p = parameters
+    before = (1.0 - p["judged_fraction"]) * p["duration"]
+    if p["rise_time"] <= before * (1.0 + 1e-9):
+        return []
+    expected = f"a load that has risen before the run is judged, within {before:g} s"
+    return [("rise_time", expected, f"{p['rise_time']:g} s")]
+
+
 def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Problems of a run's courses of load and speed, in the form of a model's check: (key, expected, found).
 
@@ -97,11 +113,7 @@ def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]
     parameters : mapping
         Values by name [SI], of which those of SCENE, `duration` and `judged_fraction` count.
     """
-    p, problems = parameters, []
-    before = (1.0 - p["judged_fraction"]) * p["duration"]
-    if p["rise_time"] > before * (1.0 + 1e-9):
-        expected = f"a load that has risen before the run is judged, within {before:g} s"
-        problems.append(("rise_time", expected, f"{p['rise_time']:g} s"))
+    p, problems = parameters, rise_problems(parameters)
     if p["load_history"] == p["speed_history"] == "ramp":
         problems.append(("speed_history", 'constant under load_history = "ramp": one ramp a run', "ramp"))
     return problems

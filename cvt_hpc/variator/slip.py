@@ -117,6 +117,12 @@ def slide(run: Any) -> slice:
     return slice(min(int(first), max(run.done - 1, 0)), run.done)
 
 
+def speed_loss(run: Any, samples: slice) -> float:
+    """What sliding and creep take from the driven speed in some samples, over what it is without [1]."""
+    driven_speed = run.channel("driven_speed")[samples].mean()
+    return 1.0 - run.parameters["ratio"] * driven_speed / run.mean_driving_speed(samples)
+
+
 def slid(run: Any) -> dict[str, Any]:
     """What is known of a run that has slipped through before its end: means over its slide."""
     samples = slide(run)
@@ -124,11 +130,11 @@ def slid(run: Any) -> dict[str, Any]:
     def pair(name: str) -> np.ndarray:
         return np.array([run.channel(f"{name} {pulley}")[samples].mean() for pulley in PULLEYS])
 
-    axial, driven_speed = pair("axial_force"), run.channel("driven_speed")[samples].mean()
+    axial = pair("axial_force")
     return {
         "slip": pair("slip"),
         "axial_force": axial,
         "thrust_ratio": axial[0] / axial[1],
-        "speed_loss": 1.0 - run.parameters["ratio"] * driven_speed / run.mean_driving_speed(samples),
+        "speed_loss": speed_loss(run, samples),
         VARIABLE.name: slip_margin(run, samples),
     }

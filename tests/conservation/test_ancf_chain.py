@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from cvt_hpc.multibody.ancf_beam import SHAPES, WEIGHTS, at_places, beam, energies
-from cvt_hpc.multibody.ancf_chain import accelerate, advance, chain
+from cvt_hpc.multibody.ancf_chain import chain
 from cvt_hpc.solvers.generalised_alpha import Scheme, generalised_alpha
-from support.ancf import cross, ring, straight
+from support.ancf import accelerate, advance, cross, ring, straight
 
 LENGTHS = np.array([0.09, 0.12, 0.1, 0.08, 0.11, 0.1])
 GRAVITY = np.array([2.0, -9.81])

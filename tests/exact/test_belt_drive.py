@@ -92,7 +92,8 @@ def rest():
     values = {"driven_radius": 0.08, "centre_distance": 0.3, "ratio": 1.25, "bending_stiffness": 0.01}
     p = build_job({"name": "x", "model": "belt_drive"}, "x", values).point(0)
     where = Readings(p)
-    made, begun = start(p, where.mean_tension)
+    made, begun, is_settled = start(p, where.mean_tension)
+    assert is_settled
     body = made.beam._replace(axial_damping=0.0, mass_damping=0.0, bending_damping=0.0)
     made = made._replace(beam=body, law=friction_law("coulomb", 1e-9, 0.0, 1.0), damping=0.0)
     found = state(made, begun.chain.q, np.zeros_like(begun.chain.q), np.zeros(2))

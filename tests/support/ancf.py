@@ -1,13 +1,56 @@
-"""Chains of ANCF elements as whole matrices, and their definition for complex numbers."""
+"""Chains of ANCF elements that nothing holds, as whole matrices, and their definition for complex numbers."""
 
 import numpy as np
 
+from cvt_hpc.kernels import kernel
 from cvt_hpc.multibody.ancf_beam import PER_NODE, assemble
-from cvt_hpc.multibody.ancf_chain import chain
-from cvt_hpc.solvers.cyclic_blocks import LOWER, UPPER
+from cvt_hpc.multibody.ancf_chain import SIZE, begin_stage, chain, correct, finish_stage, place
+from cvt_hpc.solvers.cyclic_blocks import LOWER, UPPER, factor, solve
+from cvt_hpc.solvers.generalised_alpha import stage_length
+
+INSTANT = 1e-12  # [s]: a stage so short that nothing but mass counts in its matrix
 
 
-def equations(beam, q, u, start=None, tau=1e-12, power=False):
+@kernel
+def accelerate(beam, chain):
+    """Find the accelerations of a chain; without them the first step errs by its size. Whether they were found."""
+    assemble(beam, chain.q, chain.v, chain.v, INSTANT, chain.blocks, chain.columns, 0)
+    if not factor(chain.blocks, SIZE):
+        return False
+    solve(chain.blocks, chain.columns, SIZE)
+    for i in range(chain.q.shape[0]):
+        for k in range(PER_NODE):
+            chain.dv[i, k] = chain.columns.data[i, k, 0] / INSTANT
+    return True
+
+
+@kernel
+def advance(beam, chain, scheme, dt, steps, tolerance, most):
+    """Advance a chain by steps of dt [s]; the steps done, fewer where a stage was not solved.
+
+    A stage is solved when no correction of a speed is beyond a tolerance [m/s], after so many at most.
+    """
+    tau = stage_length(scheme, dt)
+    for step in range(steps):
+        begin_stage(chain, scheme, dt)
+        solved = False
+        for _ in range(most):
+            place(chain, tau)
+            assemble(beam, chain.stage_q, chain.stage_v, chain.start_v, tau, chain.blocks, chain.columns, 0)
+            if not factor(chain.blocks, SIZE):
+                return step
+            solve(chain.blocks, chain.columns, SIZE)
+            largest = correct(chain, 0)
+            solved = largest <= tolerance
+            if solved or not np.isfinite(largest):
+                break
+        if not solved:
+            return step
+        finish_stage(chain, scheme, dt)
+    return steps
+
+
+def equations(beam, q, u, start=None, tau=INSTANT, power=False):
     """Matrix (4 n, 4 n) and right-hand side (4 n,) of a correction; by default the forces, as tau is tiny.
 
     With `power` what damping takes instead [W].

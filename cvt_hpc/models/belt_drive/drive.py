@@ -19,10 +19,10 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray
-from cvt_hpc.models.pushbelt.laws import dual_of, friction
 from cvt_hpc.multibody.ancf_beam import PER_NODE, AncfBeam, assemble, shapes
 from cvt_hpc.multibody.ancf_chain import SIZE, Chain, begin_stage, chain, correct, finish_stage, place
 from cvt_hpc.physics.friction import FrictionLaw, friction_coefficient
+from cvt_hpc.physics.primal_dual import dual_of, friction
 from cvt_hpc.solvers.cyclic_blocks import DIAGONAL, LOWER, UPPER, empty_corner, factor, solve_bordered
 from cvt_hpc.solvers.generalised_alpha import Scheme, begin, finish, stage_length
 

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.models.belt_drive import drive as fields
-from cvt_hpc.variables import Coordinate, Variable, Vibrates
+from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import STRANDS, judging
 from cvt_hpc.variator.history import dataset
 from cvt_hpc.variator.judging import pair
 from cvt_hpc.variator.path import REGIONS, regions
+from cvt_hpc.variator.slip import speed_loss
 from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared
 from cvt_hpc.vibration import assessment
-from cvt_hpc.vibration.signals import amplitude_spectrum
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -60,7 +60,8 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
 def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
     """Core-seconds of a run; of parameters that are arrays, an array."""
     p = parameters
-    return p["duration"] * (STEP_COST * p["elements"] / p["step"] + SAMPLE_COST * p["sampling_rate"])
+    step = np.minimum(p["step"], 1.0 / p["sampling_rate"])
+    return p["duration"] * (STEP_COST * p["elements"] / step + SAMPLE_COST * p["sampling_rate"])
 
 
 def judge(run: Transient) -> dict[str, Any]:
@@ -72,9 +73,7 @@ def judge(run: Transient) -> dict[str, Any]:
         With all samples recorded, or those until it slipped through.
     """
     if run.failure is not None:
-        status, why = run.failure
-        reason = f"at {run.time * 1e3:.4g} ms: {why}"
-        return {"status": status, "vibrates": Vibrates.SLIPS, "reason": reason}
+        return judging.slipped_through(run)
     found = judging.assess(run)
     return found.record() | evaluate(run, found.strongest_probe)
 
@@ -94,26 +93,19 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     dict
         Value by name.
     """
-    p, judged = run.parameters, run.judged
     driving, load = run.mean_rate(fields.WORK_IN), run.mean_rate(fields.WORK_OUT)
     contact, belt = run.mean_rate(fields.CONTACT_LOSS), run.mean_rate(fields.BELT_LOSS)
     friction = np.array([run.mean_rate(fields.FRICTION_LOSS + k) for k in range(2)])
     storing = run.mean_rate(-1)
-    moved = run.displacement[judged][:, strongest_probe]
-    whole, work = run.whole_turns, run.counters()
-    powers = judging.power_balance(driving, load, 0.0, contact + belt + friction.sum(), storing)
-    del powers["thrust_power"]
+    work = run.counters()
     return {
-        "spectrum": amplitude_spectrum(moved, p["sampling_rate"], frequency_bins(p).values).T,
+        **judging.motion(run, strongest_probe),
+        "speed_loss": speed_loss(run, run.whole_turns),
         "strand_tension": pair(run, "tension", STRANDS),
-        "slip": pair(run, "slip"),
-        "speed_loss": 1.0
-        - p["ratio"] * run.channel("driven_speed")[whole].mean() / run.mean_driving_speed(whole),
-        "driven_speed_ripple": run.channel("driven_speed")[judged].std(),
         "friction_loss": friction,
         "contact_loss": contact,
         "belt_loss": belt,
-        **powers,
+        **judging.power_balance(driving, load, contact + belt + friction.sum(), storing),
         "efficiency": (load + storing) / driving if driving > 0.0 else np.nan,
         "turns": run.turns,
         "unsolved_share": work["unsolved"] / max(work["steps"], 1),

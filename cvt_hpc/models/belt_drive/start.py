@@ -22,10 +22,13 @@ LONGER, SHORTER = 4.0, 0.25
 MOST_STEPS = 500  # common belts need 20
 SETTLED, MOST_ITERATIONS = 1e-8, 30  # [m/s]
 FRICTIONLESS = 1e-9
-CORRECTIONS = 3  # of the belt's length by its tension, each of which leaves a few percent of the error
+# Of the belt's length by its tension: they leave 0.2 % of this on the softest contacts, 1e-5 on common ones
+CORRECTIONS = 3
 
 
-def start(parameters: Mapping[str, Any], tension_of: Callable[[Drive, State], float]) -> tuple[Drive, State]:
+def start(
+    parameters: Mapping[str, Any], tension_of: Callable[[Drive, State], float]
+) -> tuple[Drive, State, bool]:
     """Constants and first state of a run.
 
     Parameters
@@ -37,18 +40,24 @@ def start(parameters: Mapping[str, Any], tension_of: Callable[[Drive, State], fl
 
     Returns
     -------
-    (Drive, State)
-        Belt and pulleys move as if nothing slid.
+    (Drive, State, bool)
+        Belt and pulleys, which move as if nothing slid, and whether equilibria were found.
     """
     p = parameters
     path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
-    length = path.path_length / _stretch(p["tension"], p["axial_stiffness"])
+    # belt and contacts in series: contacts sink in by tension / (R stiffness), over the angle of an arc
+    arcs = ((path.lengths[0], path.driving_radius), (path.lengths[2], p["driven_radius"]))
+    give = sum(arc / radius**2 for arc, radius in arcs) / p["contact_stiffness"]
+    compliance = 1.0 / p["axial_stiffness"] + give / path.path_length
+    length = (path.path_length - give * p["tension"]) / _stretch(p["tension"], p["axial_stiffness"])
     for correction in range(CORRECTIONS + 1):
         drive = _drive(p, length)
-        found = _settled(drive, p)
+        found, is_settled = _settled(drive, p)
+        if not is_settled:
+            break
         if correction < CORRECTIONS:
-            length *= 1.0 + (tension_of(drive, found) - p["tension"]) / p["axial_stiffness"]
-    return drive, _moving(drive, found, p)
+            length *= 1.0 + (tension_of(drive, found) - p["tension"]) * compliance
+    return drive, _moving(drive, found, p), is_settled
 
 
 def _stretch(tension: float, stiffness: float) -> float:
@@ -82,8 +91,8 @@ def _drive(p: Mapping[str, Any], length: float) -> Drive:
     )
 
 
-def _settled(drive: Drive, p: Mapping[str, Any]) -> State:
-    """At rest in equilibrium, without friction."""
+def _settled(drive: Drive, p: Mapping[str, Any]) -> tuple[State, bool]:
+    """At rest in equilibrium, without friction; and whether that was found."""
     path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
     lengths = drive.beam.lengths
     share = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) / lengths.sum()
@@ -101,12 +110,12 @@ def _settled(drive: Drive, p: Mapping[str, Any]) -> State:
         finite = advance(smooth, found, IMPLICIT_EULER, at_rest, step, 1, SETTLED, MOST_ITERATIONS)
         if finite and found.counters[UNSOLVED] == 0:
             if step >= LONGEST:
-                return found
+                return found, True
             step *= LONGER
         else:
             found.chain.q[:] = before
             step *= SHORTER
-    raise ValueError("the belt finds no equilibrium on its pulleys")
+    return found, False
 
 
 def _moving(drive: Drive, settled: State, p: Mapping[str, Any]) -> State:

@@ -55,7 +55,7 @@ class Transient:
         self._steps_per_sample = max(1, int(np.ceil(self.interval / p["step"] * (1.0 - 1e-9))))
         self._scheme = generalised_alpha(p["spectral_radius"])
         self._readings = Readings(p)
-        self._drive, self._state = start(p, self._readings.mean_tension)
+        self._drive, self._state, is_settled = start(p, self._readings.mean_tension)
         self.probes = tuple(
             Probe(f"{strand} {k + 1}", float(position))
             for strand, positions in zip(STRANDS, self._readings.probes, strict=True)
@@ -64,6 +64,8 @@ class Transient:
         self._advance = called_alike(advance)
         self.done = 0
         self.failure: tuple[Status, str] | None = None
+        if not is_settled:
+            self.failure = Status.FAILED_NUMERICS, "the belt finds no equilibrium on its pulleys"
         self._rows = np.empty((0, len(self.probes) + len(CHANNELS)))
         self._totals = np.empty((0, self._state.totals.size + 1))
         self.prolong(p)
