@@ -9,7 +9,7 @@ import numpy as np
 
 from cvt_hpc.models.belt_drive.contact import Contact, contact_shapes
 from cvt_hpc.models.belt_drive.drive import UNSOLVED, Drive, State, advance, state
-from cvt_hpc.models.belt_drive.pulleys import Pulleys
+from cvt_hpc.models.belt_drive.pulleys import Pulleys, no_arms
 from cvt_hpc.multibody.ancf_beam import beam, random_lengths
 from cvt_hpc.physics.friction import friction_law, given_law
 from cvt_hpc.physics.geometry import variator
@@ -84,6 +84,8 @@ def _drive(p: Mapping[str, Any], length: float) -> Drive:
         np.array([[0.0, 0.0], [p["centre_distance"], 0.0]]),
         np.array([p["driven_radius"] / p["ratio"], p["driven_radius"]]),
         np.array([0.0, p["driven_inertia"]]),
+        np.full(2, -1),
+        no_arms(),
     )
     contact = Contact(
         contact_shapes(p["contact_points"]),
