@@ -5,10 +5,10 @@ import pytest
 from scipy.linalg import eigh
 
 from cvt_hpc.job import build_job
-from cvt_hpc.models.belt_drive import drive as d
-from cvt_hpc.models.belt_drive.drive import Drive, add_contacts, add_pulleys, state
+from cvt_hpc.models.belt_drive import contact, pulleys
+from cvt_hpc.models.belt_drive.drive import Drive, state
 from cvt_hpc.models.belt_drive.readings import Reading, Readings
-from cvt_hpc.models.belt_drive.start import start
+from cvt_hpc.models.belt_drive.start import FRICTIONLESS, start
 from cvt_hpc.multibody.ancf_beam import at_places, beam
 from cvt_hpc.physics.friction import friction_law
 from support.ancf import mass_and_stiffness, ring, whole
@@ -22,8 +22,14 @@ def drive(**values):
     law = friction_law("stribeck", 0.3, -0.5, 0.4)
     body = beam(LENGTHS, 0.9, 300.0, 2.0)
     centre, radius = np.array([[0.0, 0.0], [0.15, 0.01]]), np.array([0.11, 0.09])
-    made = Drive(body, centre, radius, np.array([0.0, 0.02]), d.contact_shapes(3), 4e4, 300.0, law, 0.2)
-    return made._replace(**values)
+    touching = contact.Contact(contact.contact_shapes(3), 4e4, 300.0, law, 0.2)._replace(**values)
+    return Drive(body, pulleys.Pulleys(centre, radius, np.array([0.0, 0.02])), touching)
+
+
+def add(made, found, tau):
+    """Add the contacts as those of a first iterate."""
+    wheels, lengths = found.wheels, made.beam.lengths
+    contact.add_contacts(made.contact, found.touch, lengths, found.chain, made.pulleys, wheels, tau, False)
 
 
 def moving():
@@ -35,31 +41,32 @@ def moving():
 def at(made, q, u, speeds):
     """A state in a stage, with the duals of friction that belong to it."""
     found = state(made, q, u, speeds)
-    found.chain.stage_q[:], found.chain.stage_v[:], found.stage_speed[0] = q, u, speeds
-    add_contacts(made, found, TAU, False)
-    found.dual[:] = np.tanh(found.slip / made.friction_speed)
-    found.chain.blocks.data[:], found.chain.columns.data[:], found.power[:] = 0.0, 0.0, 0.0
-    add_pulleys(made, found, np.zeros((2, 2)), 0.0, TAU)
-    found.corner.data[:] = 0.0
-    add_contacts(made, found, TAU, False)
+    chain, wheels, touch = found.chain, found.wheels, found.touch
+    chain.stage_q[:], chain.stage_v[:], wheels.stage_speed[0] = q, u, speeds
+    add(made, found, TAU)
+    touch.dual[:] = np.tanh(touch.slip / made.contact.friction_speed)
+    chain.blocks.data[:], chain.columns.data[:], wheels.power[:] = 0.0, 0.0, 0.0
+    pulleys.add_pulleys(made.pulleys, wheels, np.zeros((2, 2)), 0.0, TAU)
+    wheels.corner.data[:] = 0.0
+    add(made, found, TAU)
     return found
 
 
 def forces(made, q, u, speeds):
     """On the coordinates of the belt, and the moment on the second pulley."""
     found = at(made, q, u, speeds)
-    return np.append(found.chain.columns.data[:6, :, 1].ravel(), found.corner.data[0, 0, 1])
+    return np.append(found.chain.columns.data[:6, :, 1].ravel(), found.wheels.corner.data[0, 0, 1])
 
 
 def test_slopes_of_contacts_are_those_of_their_forces():
     """By central differences of a stage, in which positions follow speeds; friction does not fall with force."""
     made, (q, u, speeds) = drive(), moving()
     found = at(made, q, u, speeds)
-    assert (found.normal.sum(axis=(1, 2)) > 1.0).all() and (found.normal == 0.0).any()
+    assert (found.touch.normal.sum(axis=(1, 2)) > 1.0).all() and (found.touch.normal == 0.0).any()
     matrix = np.zeros((25, 25))
     matrix[:24, :24] = whole(found.chain.blocks)
     matrix[:24, 24] = found.chain.columns.data[:6, :, 0].ravel()
-    matrix[24, :24], matrix[24, 24] = found.rows[:, 0].ravel(), found.corner.data[0, 0, 0]
+    matrix[24, :24], matrix[24, 24] = found.wheels.rows[:, 0].ravel(), found.wheels.corner.data[0, 0, 0]
     h = 1e-6  # contacts do not open or close within it
     for k in range(25):
         sides = []
@@ -80,10 +87,11 @@ def test_contacts_give_pulleys_what_they_take_of_the_belt_but_for_losses():
     made, (q, u, speeds) = drive(stiffness=0.0), moving()
     found = at(made, q, u, speeds)
     of_belt = (found.chain.columns.data[:6, :, 1] * u).sum()
-    of_pulley = found.corner.data[0, 0, 1] * speeds[1]
-    lost = found.power[d.CONTACT_LOSS] + found.power[d.FRICTION_LOSS :].sum()
-    assert of_belt + of_pulley - found.power[d.WORK_IN] == pytest.approx(-lost, rel=1e-12)
-    assert lost > 0.1 and abs(found.power[d.WORK_IN]) > 0.01
+    of_pulley = found.wheels.corner.data[0, 0, 1] * speeds[1]
+    power = found.wheels.power
+    lost = power[pulleys.CONTACT_LOSS] + power[pulleys.FRICTION_LOSS :].sum()
+    assert of_belt + of_pulley - power[pulleys.WORK_IN] == pytest.approx(-lost, rel=1e-12)
+    assert lost > 0.1 and abs(power[pulleys.WORK_IN]) > 0.01
 
 
 @pytest.fixture(scope="module")
@@ -95,10 +103,10 @@ def rest():
     made, begun, is_settled = start(p, where.mean_tension)
     assert is_settled
     body = made.beam._replace(axial_damping=0.0, mass_damping=0.0, bending_damping=0.0)
-    made = made._replace(beam=body, law=friction_law("coulomb", 1e-9, 0.0, 1.0), damping=0.0)
+    made = made._replace(beam=body, contact=made.contact._replace(law=FRICTIONLESS, damping=0.0))
     found = state(made, begun.chain.q, np.zeros_like(begun.chain.q), np.zeros(2))
     found.chain.stage_q[:] = found.chain.q
-    add_contacts(made, found, 1.0, False)
+    add(made, found, 1.0)
     return p, where, made, found
 
 
@@ -112,12 +120,12 @@ def test_the_static_start_has_its_tension(rest):
 def test_pulleys_carry_both_strands(rest):
     """Along the line of the shafts, each the tension by the cosine of its tilt; 0.2 % by bending and mesh."""
     p, where, made, found = rest
-    points = at_places(made.beam, found.chain.q, made.shape)
+    points = at_places(made.beam, found.chain.q, made.contact.shape)
     along = np.cos(0.5 * (where.path.driven_wrap - np.pi))
     for pulley, side in enumerate((-1.0, 1.0)):
-        outward = points - made.centre[pulley]
+        outward = points - made.pulleys.centre[pulley]
         outward /= np.hypot(*np.moveaxis(outward, -1, 0))[..., None]
-        force = (found.normal[pulley][..., None] * outward).sum((0, 1))
+        force = (found.touch.normal[pulley][..., None] * outward).sum((0, 1))
         np.testing.assert_allclose(force, [side * 2.0 * p["tension"] * along, 0.0], rtol=0, atol=1.2)
 
 

@@ -92,14 +92,15 @@ class Reading:
 
     def scalars(self) -> list[float]:
         """SCALARS."""
-        s, path = self._state, self._where.path
-        pressed = np.maximum(s.normal.sum(axis=(1, 2)), 1e-9)
-        slip = (s.normal * s.slip).sum(axis=(1, 2)) / pressed / (s.speed[0, 0] * path.driving_radius)
-        return [float(s.speed[0, 1]), *self.strand_tensions(), *slip]
+        touch, path = self._state.touch, self._where.path
+        driving, driven = self._state.wheels.speed[0]
+        pressed = np.maximum(touch.normal.sum(axis=(1, 2)), 1e-9)
+        slip = (touch.normal * touch.slip).sum(axis=(1, 2)) / pressed / (driving * path.driving_radius)
+        return [float(driven), *self.strand_tensions(), *slip]
 
     def profiles(self) -> np.ndarray:
         """Sums at each place, (6, place): length, tension and offset by it, forces, and samples."""
-        where, s = self._where, self._state
+        where, touch = self._where, self._state.touch
         width = where.path.path_length / PLACES
         place = np.minimum((self._position / width).astype(int), PLACES - 1)
         weight = self._weight
@@ -107,13 +108,13 @@ class Reading:
             np.bincount(place, row, PLACES) for row in (weight, weight * self._tension, weight * self._offset)
         ]
         contacts = self._contacts()
-        for forces in (s.normal, s.tangential):
+        for forces in (touch.normal, touch.tangential):
             rows.append(np.bincount(contacts, forces.sum(axis=0).ravel() / width, PLACES))
         return np.array([*rows, np.ones(PLACES)])
 
     def _contacts(self) -> np.ndarray:
         """Places of the contact points, (k C,)."""
-        points = at_places(self._drive.beam, self._state.chain.stage_q, self._drive.shape)
+        points = at_places(self._drive.beam, self._state.chain.stage_q, self._drive.contact.shape)
         position, _ = along(self._where.path, self._where.centre_distance, points.reshape(-1, 2))
         share = position / self._where.path.path_length
         return np.minimum((share * PLACES).astype(int), PLACES - 1)
@@ -121,5 +122,5 @@ class Reading:
     def stored_energy(self) -> float:
         """Kinetic and elastic energy of belt and driven pulley [J], without what contacts store."""
         kinetic, elastic, _ = energies(self._drive.beam, self._state.chain.q, self._state.chain.v)
-        driven = 0.5 * self._drive.inertia[1] * self._state.speed[0, 1] ** 2
+        driven = 0.5 * self._drive.pulleys.inertia[1] * self._state.wheels.speed[0, 1] ** 2
         return kinetic + elastic + float(driven)

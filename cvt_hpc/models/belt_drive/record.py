@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.models.belt_drive import drive as fields
+from cvt_hpc.models.belt_drive import pulleys as fields
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import STRANDS, judging
 from cvt_hpc.variator.history import dataset

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.belt_drive.drive import UNSOLVED, Drive, State, advance, contact_shapes, state
+from cvt_hpc.models.belt_drive.contact import Contact, contact_shapes
+from cvt_hpc.models.belt_drive.drive import UNSOLVED, Drive, State, advance, state
+from cvt_hpc.models.belt_drive.pulleys import Pulleys
 from cvt_hpc.multibody.ancf_beam import beam, random_lengths
 from cvt_hpc.physics.friction import friction_law, given_law
 from cvt_hpc.physics.geometry import variator
@@ -21,7 +23,7 @@ FIRST, LONGEST = 1e-5, 1.0
 LONGER, SHORTER = 4.0, 0.25
 MOST_STEPS = 500  # common belts need 20
 SETTLED, MOST_ITERATIONS = 1e-8, 30  # [m/s]
-FRICTIONLESS = 1e-9
+FRICTIONLESS = friction_law("coulomb", 1e-9, 0.0, 1.0)
 # Of the belt's length by its tension: they leave 0.2 % of this on the softest contacts, 1e-5 on common ones
 CORRECTIONS = 3
 
@@ -78,17 +80,19 @@ def _drive(p: Mapping[str, Any], length: float) -> Drive:
         p["mass_damping"],
         p["bending_damping"],
     )
-    return Drive(
-        belt,
+    pulleys = Pulleys(
         np.array([[0.0, 0.0], [p["centre_distance"], 0.0]]),
         np.array([p["driven_radius"] / p["ratio"], p["driven_radius"]]),
         np.array([0.0, p["driven_inertia"]]),
+    )
+    contact = Contact(
         contact_shapes(p["contact_points"]),
         p["contact_stiffness"],
         p["contact_damping"],
         given_law(p),
         p["friction_speed"],
     )
+    return Drive(belt, pulleys, contact)
 
 
 def _settled(drive: Drive, p: Mapping[str, Any]) -> tuple[State, bool]:
@@ -99,12 +103,12 @@ def _settled(drive: Drive, p: Mapping[str, Any]) -> tuple[State, bool]:
     points, angle, _ = points_at(path, p["centre_distance"], share * path.path_length)
     along = path.path_length / lengths.sum() * np.stack([np.cos(angle), np.sin(angle)], 1)
     q = np.concatenate([points, along], 1)
-    smooth = drive._replace(law=friction_law("coulomb", FRICTIONLESS, 0.0, 1.0))
+    smooth = drive._replace(contact=drive.contact._replace(law=FRICTIONLESS))
     found = state(smooth, q, np.zeros_like(q), np.zeros(2))
     step = FIRST
     for _ in range(MOST_STEPS):
         before = found.chain.q.copy()
-        for numbers in (found.chain.v, found.speed, found.dual, found.counters):
+        for numbers in (found.chain.v, found.wheels.speed, found.touch.dual, found.counters):
             numbers[:] = 0
         at_rest = np.zeros((2, 2))
         finite = advance(smooth, found, IMPLICIT_EULER, at_rest, step, 1, SETTLED, MOST_ITERATIONS)

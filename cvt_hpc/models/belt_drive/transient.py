@@ -140,7 +140,7 @@ class Transient:
     def _slipped(self) -> str | None:
         """Whether the driven pulley runs far from its speed without slip."""
         p = self.parameters
-        share = p["ratio"] * self._state.speed[0, 1] / p["driving_speed"]
+        share = p["ratio"] * self._state.wheels.speed[0, 1] / p["driving_speed"]
         if share < LEAST_SPEED:
             return LOST
         return GAINED if share > MOST_SPEED else None
