@@ -81,7 +81,7 @@ def belt_path(centre: np.ndarray, radius: np.ndarray, turn: np.ndarray) -> BeltP
         If circles overlap, or the belt does not close around them; the text says where.
     """
     centre, radius, turn = (np.array(values, float) for values in (centre, radius, turn))
-    pulleys = np.arange(len(radius))
+    pulleys = range(len(radius))
     for i in pulleys:
         for j in range(i):
             distance = np.hypot(*(centre[i] - centre[j]))

@@ -104,7 +104,8 @@ class Wheels(NamedTuple):
 
 def no_arms() -> Arms:
     """The arms of pulleys that all have fixed axes."""
-    return Arms(np.zeros((0, 2)), *np.zeros((6, 0)), 0.0)
+    none = np.zeros(0)
+    return Arms(np.zeros((0, 2)), none, none, none, none, none, none, 0.0)
 
 
 def wheels_at(pulleys: Pulleys, speeds: np.ndarray, angles: np.ndarray, nodes: int) -> Wheels:
@@ -114,11 +115,19 @@ def wheels_at(pulleys: Pulleys, speeds: np.ndarray, angles: np.ndarray, nodes: i
     speed, acceleration, stage_speed, start_speed = np.zeros((4, 1, count + arms))
     angle, turning, stage_angle, start_angle = np.zeros((4, 1, arms))
     speed[0, :count], angle[0], stage_angle[0] = speeds, angles, angles
+    centre_speed, lever = np.zeros((2, count, 2))
     found = Wheels(
-        *(speed, acceleration, stage_speed, start_speed),
-        *(angle, turning, stage_angle, start_angle),
+        speed,
+        acceleration,
+        stage_speed,
+        start_speed,
+        angle,
+        turning,
+        stage_angle,
+        start_angle,
         pulleys.centre.copy(),
-        *np.zeros((2, count, 2)),
+        centre_speed,
+        lever,
         np.zeros((nodes, border, PER_NODE)),
         empty_corner(border, border + 1),
         np.zeros(FRICTION_LOSS + count),
