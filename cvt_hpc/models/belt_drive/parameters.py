@@ -129,8 +129,8 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if problems:
         return problems
     path = layout(p).path
-    # on an arc of less than a radius and a third as many as turn by a third of a radian each
-    longest = min(np.maximum(path.arcs / 4.0, path.radius / 3.0).min(), path.spans.min() / 2.0)
+    # on a short arc an element turns by half a radian
+    longest = min(np.maximum(path.arcs / 4.0, path.radius / 2.0).min(), path.spans.min() / 2.0)
     element = path.path_length / p["elements"] * (1.0 + p["length_scatter"])
     if element > longest:
         least = int(np.ceil(path.path_length * (1.0 + p["length_scatter"]) / longest))
