@@ -156,7 +156,7 @@ class Transient:
         stored = np.nan
         if self.done >= self.first_judged:
             self._sums += found.profiles()
-        if self.done in (self.first_judged, self.samples - 1):
+        if self.done in (self.whole_turns.start, self.samples - 1):
             stored = found.stored_energy()
         self._totals[self.done] = [*self._state.totals, stored]
         self.done += 1
@@ -249,8 +249,8 @@ class Transient:
         return self.path.path_length / (self._readings.belt_speed * self.interval)
 
     def mean_rate(self, total: int) -> float:
-        """Mean rate over the judged part of one of the totals, by its index; -1: of the stored energy."""
-        part = self._totals[self.judged]
+        """Mean rate over whole turns of one of the totals, by its index; -1: of the stored energy."""
+        part = self._totals[self.whole_turns]
         return float((part[-1, total] - part[0, total]) / ((len(part) - 1) * self.interval))
 
     @property
