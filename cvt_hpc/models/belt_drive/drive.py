@@ -8,6 +8,7 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.belt_drive.contact import Contact, Touch, add_contacts, first_touch
+from cvt_hpc.models.belt_drive.friction import begin_friction, finish_friction
 from cvt_hpc.models.belt_drive.pulleys import BELT_LOSS, Pulleys, Wheels, add_pulleys, wheels_at
 from cvt_hpc.multibody.ancf_beam import AncfBeam, assemble
 from cvt_hpc.multibody.ancf_chain import SIZE, Chain, begin_stage, chain, correct, finish_stage, place
@@ -107,15 +108,17 @@ def advance(
         Whether the state is of numbers.
     """
     belt, wheels, tau = state.chain, state.wheels, stage_length(scheme, dt)
+    friction, memory = drive.contact.friction, state.touch.memory
     last = drive.pulleys.radius.size - 1
     for step in range(steps):
         begin_stage(belt, scheme, dt)
+        begin_friction(friction, memory, scheme, dt)
         begin(scheme, dt, wheels.speed, wheels.acceleration, wheels.start_speed)
         share = (step + scheme.alpha_f) / steps
         for p in range(1, last + 1):
             wheels.stage_speed[0, p] = wheels.speed[0, p]
         wheels.stage_speed[0, 0] = inputs[0, 0] + share * (inputs[1, 0] - inputs[0, 0])
-        largest = np.inf
+        is_solved = False
         for iteration in range(most):
             place(belt, tau)
             lost = assemble(
@@ -124,7 +127,7 @@ def advance(
             wheels.power[:] = 0.0
             wheels.power[BELT_LOSS] = lost
             add_pulleys(drive.pulleys, wheels, inputs, share, tau)
-            add_contacts(
+            laws_hold = add_contacts(
                 drive.contact,
                 state.touch,
                 drive.beam.lengths,
@@ -144,13 +147,15 @@ def advance(
                 wheels.stage_speed[0, p + 1] += wheels.corner.data[0, p, last]
             if not np.isfinite(largest):
                 return False
-            if largest <= tolerance:
+            is_solved = laws_hold and largest <= tolerance
+            if is_solved:
                 break
         finish_stage(belt, scheme, dt)
+        finish_friction(friction, memory, state.touch.normal, scheme, dt)
         finish(scheme, dt, wheels.stage_speed, wheels.start_speed, wheels.speed, wheels.acceleration)
         for k in range(state.totals.size):
             state.totals[k] += dt * wheels.power[k]
         state.counters[STEPS] += 1
-        if largest > tolerance:
+        if not is_solved:
             state.counters[UNSOLVED] += 1
     return True

@@ -24,6 +24,7 @@ from cvt_hpc.variator.scene import FRICTION, SCENE, rise_problems
 from cvt_hpc.vibration import settings
 
 RIBS = 5.0
+TREATMENTS = ("regularised", "set_valued", "bristle")  # of friction
 DEEPEST = 0.1  # of the smaller radius: so far the tension at rest may press the belt into a rim
 
 RECORD, VIBRATION = recording.PARAMETERS["record"], settings.PARAMETERS["vibration"]
@@ -87,8 +88,17 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "friction_gradient": replace(FRICTION["friction_gradient"], default=0.0),
         "kinetic_friction": replace(FRICTION["kinetic_friction"], default=0.5),
+        "friction_treatment": Parameter(
+            TREATMENTS[0],
+            "",
+            "Coulomb's law with tanh(speed / friction_speed); itself; or bristles that shear up to it",
+            choices=TREATMENTS,
+        ),
         "friction_speed": replace(
             FRICTION["friction_speed"], default=3e-4, description="regularisation speed of friction"
+        ),
+        "shear_stiffness": positive(
+            2e7, "N/m^2", "of the bristles: force per length by shear of the rubber", sensible=(1e4, 1e12)
         ),
     },
     "record": {"sampling_rate": replace(RECORD["sampling_rate"], default=2e3)},

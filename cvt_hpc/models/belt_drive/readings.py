@@ -95,7 +95,7 @@ class Reading:
         touch, path = self._state.touch, self._where.path
         driving, driven = self._state.wheels.speed[0]
         pressed = np.maximum(touch.normal.sum(axis=(1, 2)), 1e-9)
-        slip = (touch.normal * touch.slip).sum(axis=(1, 2)) / pressed / (driving * path.driving_radius)
+        slip = (touch.normal * touch.memory.slip).sum(axis=(1, 2)) / pressed / (driving * path.driving_radius)
         return [float(driven), *self.strand_tensions(), *slip]
 
     def profiles(self) -> np.ndarray:

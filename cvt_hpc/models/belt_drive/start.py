@@ -9,6 +9,7 @@ import numpy as np
 
 from cvt_hpc.models.belt_drive.contact import Contact, contact_shapes
 from cvt_hpc.models.belt_drive.drive import UNSOLVED, Drive, State, advance, state
+from cvt_hpc.models.belt_drive.friction import Friction, Treatment
 from cvt_hpc.models.belt_drive.pulleys import Pulleys
 from cvt_hpc.multibody.ancf_beam import beam, random_lengths
 from cvt_hpc.physics.friction import friction_law, given_law
@@ -24,6 +25,9 @@ LONGER, SHORTER = 4.0, 0.25
 MOST_STEPS = 500  # common belts need 20
 SETTLED, MOST_ITERATIONS = 1e-8, 30  # [m/s]
 FRICTIONLESS = friction_law("coulomb", 1e-9, 0.0, 1.0)
+# Of sticking contacts [m/s]: the speed at which the grip has the normal force of a belt at rest. Less makes five points
+# of an element, which stick more often than its four coordinates let them, change for ever; more costs iterations.
+GRIP_SPEED = 1e-4
 # Of the belt's length by its tension: they leave 0.2 % of this on the softest contacts, 1e-5 on common ones
 CORRECTIONS = 3
 
@@ -89,10 +93,18 @@ def _drive(p: Mapping[str, Any], length: float) -> Drive:
         contact_shapes(p["contact_points"]),
         p["contact_stiffness"],
         p["contact_damping"],
-        given_law(p),
-        p["friction_speed"],
+        _friction(p),
     )
     return Drive(belt, pulleys, contact)
+
+
+def _friction(p: Mapping[str, Any]) -> Friction:
+    smaller = p["driven_radius"] * min(1.0, 1.0 / p["ratio"])
+    grip = p["tension"] / smaller / GRIP_SPEED
+    treatment = Treatment[p["friction_treatment"].upper()]
+    return Friction(
+        treatment, given_law(p), p["friction_speed"], grip, p["speed_tolerance"], p["shear_stiffness"]
+    )
 
 
 def _settled(drive: Drive, p: Mapping[str, Any]) -> tuple[State, bool]:
@@ -103,12 +115,13 @@ def _settled(drive: Drive, p: Mapping[str, Any]) -> tuple[State, bool]:
     points, angle, _ = points_at(path, p["centre_distance"], share * path.path_length)
     along = path.path_length / lengths.sum() * np.stack([np.cos(angle), np.sin(angle)], 1)
     q = np.concatenate([points, along], 1)
-    smooth = drive._replace(contact=drive.contact._replace(law=FRICTIONLESS))
+    friction = drive.contact.friction._replace(treatment=Treatment.REGULARISED, law=FRICTIONLESS)
+    smooth = drive._replace(contact=drive.contact._replace(friction=friction))
     found = state(smooth, q, np.zeros_like(q), np.zeros(2))
     step = FIRST
     for _ in range(MOST_STEPS):
         before = found.chain.q.copy()
-        for numbers in (found.chain.v, found.wheels.speed, found.touch.dual, found.counters):
+        for numbers in (found.chain.v, found.wheels.speed, found.touch.memory.dual, found.counters):
             numbers[:] = 0
         at_rest = np.zeros((2, 2))
         finite = advance(smooth, found, IMPLICIT_EULER, at_rest, step, 1, SETTLED, MOST_ITERATIONS)
