@@ -1,28 +1,32 @@
 """Friction of the belt's contacts, in three treatments.
 
-A contact slides by the speed g of the belt's cord over the pulley, and is pressed by the force p per length. The
-friction force per length q acts against g, and all treatments bound it by mu(|g|, p) p.
+A contact slides by the speed g of the belt's cord over the pulley, and is pressed by the force p per
+length. The friction force per length q acts against g, and all treatments bound it by mu(|g|, p) p.
 
-Regularised: q = mu p tanh(g / friction_speed), with slopes by `cvt_hpc.physics.primal_dual`. What carries a force
-creeps.
+Regularised: q = mu p tanh(g / friction_speed), with slopes by `cvt_hpc.physics.primal_dual`. What carries a
+force creeps.
 
-Set-valued: Coulomb's law. Either g = 0 and |q| <= mu(0, p) p: the contact sticks; or q = mu p g / |g|: it slides.
+Set-valued: Coulomb's law. Either g = 0 and |q| <= mu(0, p) p: the contact sticks; or q = mu p g / |g|: it
+slides.
 
-Bristles: the layer of rubber between cord and rim shears by z, and q = shear_stiffness z. Either dz/dt = g and
-|q| <= mu p: the rim sticks; or |q| = mu p: it slides. z belongs to a material point of the belt, as its contact does.
-It is integrated as the belt's positions are, with a return to the bound in each stage and at the end of each step.
+Bristles: the layer of rubber between cord and rim shears by z, and q = shear_stiffness z. Either dz/dt = g
+and |q| <= mu p: the rim sticks; or |q| = mu p: it slides. z belongs to a material point of the belt, as its
+contact does. It is integrated as the belt's positions are, with a return to the bound in each stage and at
+the end of each step.
 
-The latter two know in each iterate which contacts slide, and to which side. These have the force of their bound. The
-others have
+The latter two know in each iterate which contacts slide, and to which side. These have the force of their
+bound. The others have
 
     q = q_0 + grip g.
 
-With bristles q_0 is the force before the stage, and grip = tau shear_stiffness. Set-valued, q_0 is the force of the
-iterate before: this is a step of the proximal point method (Rockafellar 1976), by which g -> 0 as q settles. Newton's
-method solves these equations. Then the contacts whose law does not hold change: one that sticks beyond its bound
-slides, one that slides backwards sticks. Where all but friction is linear, that is block principal pivoting of the
-linear complementarity problem with bounds (Judice and Pires 1994); as there, one contact changes at a time after the
-number of wrong ones has failed to fall (Murty 1974).
+With bristles q_0 is the force before the stage, and grip = tau shear_stiffness. Set-valued, q_0 is the
+force of the iterate before: this is a step of the proximal point method (Rockafellar 1976), by which g -> 0
+as q settles, whatever `grip` is. Newton's method solves these equations. Then the contacts whose law does
+not hold change: one that sticks beyond its bound slides, one that slides backwards sticks. Where all but
+friction is linear, this is block principal pivoting of the linear complementarity problem with bounds
+(Judice and Pires 1994). It may go around in circles where contacts lie closer to each other than the belt
+has coordinates. A softer grip, which comes when the number of wrong contacts fails to fall, brings it out
+of them. The laws hold to `slack`.
 """
 
 from __future__ import annotations
@@ -38,8 +42,8 @@ from cvt_hpc.physics.primal_dual import dual_of
 from cvt_hpc.physics.primal_dual import friction as smooth_friction
 from cvt_hpc.solvers.generalised_alpha import Scheme, begin, finish
 
-PATIENCE = 4  # iterates that may have no fewer wrong contacts than one before, until contacts change one by one
-WRONG, FEWEST, LEFT = range(3)  # pivots of a memory
+PATIENCE, SOFTER = 3, 0.3  # iterates in which no fewer contacts are wrong, until the grip is so much softer
+WRONG, LOOSE, FEWEST, LEFT = range(4)  # pivots of a memory
 
 
 class Treatment(IntEnum):
@@ -62,8 +66,8 @@ class Friction(NamedTuple):
     friction_speed : float
         Of the regularisation [m/s].
     grip, slack : float
-        Set-valued: force per length by speed of a contact that sticks [N s/m^2]; speed up to which one that slides
-        may go backwards [m/s].
+        Set-valued: force per length by speed of a contact that sticks, at first [N s/m^2]; speed that such a
+        one may keep, or up to which one that slides may go backwards [m/s].
     shear_stiffness : float
         Of bristles, force per length by shear [N/m^2].
     """
@@ -89,9 +93,11 @@ class Memory(NamedTuple):
         0 of contacts that stick, 1 or -1 of those that slide.
     shear, shear_rate, shear_start, shear_stage : (P, k C) arrays
         Of bristles, after the last step [m], [m/s], at the start of a stage, and in it [m].
-    pivots : (3,) int array
-        Contacts that were WRONG in the last iterate, the FEWEST in one of this stage, and how many iterates are
-        LEFT to have fewer.
+    pivots : (4,) int array
+        Contacts that were WRONG in the last iterate, and those that stuck but were not yet still (LOOSE); the
+        FEWEST wrong ones in an iterate of this stage, and how many iterates are LEFT to have fewer.
+    grip : (1,) array
+        Of this iterate [N s/m^2].
     """
 
     slip: np.ndarray
@@ -102,13 +108,16 @@ class Memory(NamedTuple):
     shear_start: np.ndarray
     shear_stage: np.ndarray
     pivots: np.ndarray
+    grip: np.ndarray
 
 
 def empty_memory(pulleys: int, elements: int, points: int) -> Memory:
     """Memory of contacts that touch nothing."""
     shape = pulleys, elements, points
-    shear = np.zeros((4, pulleys, elements * points))
-    return Memory(*np.zeros((2, *shape)), np.zeros(shape, np.int64), *shear, np.zeros(3, np.int64))
+    slip, dual = np.zeros((2, *shape))
+    shear, rate, start, stage = np.zeros((4, pulleys, elements * points))
+    side, pivots = np.zeros(shape, np.int64), np.zeros(4, np.int64)
+    return Memory(slip, dual, side, shear, rate, start, stage, pivots, np.zeros(1))
 
 
 class Rub(NamedTuple):
@@ -132,8 +141,15 @@ class Rub(NamedTuple):
 def begin_friction(friction: Friction, memory: Memory, scheme: Scheme, dt: float) -> None:
     """Begin a step of dt [s]."""
     memory.pivots[FEWEST], memory.pivots[LEFT] = memory.slip.size + 1, PATIENCE
+    memory.grip[0] = friction.grip
     if friction.treatment == Treatment.BRISTLE:
         begin(scheme, dt, memory.shear, memory.shear_rate, memory.shear_start)
+
+
+@kernel
+def begin_iterate(memory: Memory) -> None:
+    """Begin an iterate of a stage."""
+    memory.pivots[WRONG] = memory.pivots[LOOSE] = 0
 
 
 @kernel
@@ -196,7 +212,7 @@ def _rub_or_stick(friction, memory, p, i, c, slip, pressure, tau, is_known):
         settled = before + grip * slip
         is_backwards = side * settled < bound
     else:
-        grip, before = friction.grip, memory.dual[p, i, c]
+        grip, before = memory.grip[0], memory.dual[p, i, c]
         if is_known and side == 0:
             before += grip * slip
         elif side == 0:
@@ -211,8 +227,7 @@ def _rub_or_stick(friction, memory, p, i, c, slip, pressure, tau, is_known):
             to = 0
         if to != side:
             memory.pivots[WRONG] += 1
-            if memory.pivots[LEFT] >= 0 or memory.pivots[WRONG] == 1:
-                side = memory.side[p, i, c] = to
+            side = memory.side[p, i, c] = to
     force, by_slip, by_pressure = before + grip * slip, grip, 0.0
     if side != 0:
         force = settled = before = side * bound
@@ -220,6 +235,8 @@ def _rub_or_stick(friction, memory, p, i, c, slip, pressure, tau, is_known):
     memory.dual[p, i, c] = before
     if friction.treatment == Treatment.BRISTLE:
         memory.shear_stage[p, k] = force / friction.shear_stiffness
+    elif side == 0 and abs(slip) > friction.slack:
+        memory.pivots[LOOSE] += 1
     return Rub(force, settled, by_slip, by_pressure)
 
 
@@ -235,11 +252,16 @@ def laws_hold(friction: Friction, memory: Memory, is_known: bool) -> bool:
         pivots[FEWEST], pivots[LEFT] = pivots[WRONG], PATIENCE
     else:
         pivots[LEFT] -= 1
-    return pivots[WRONG] == 0
+        if pivots[LEFT] < 0:
+            pivots[LEFT] = PATIENCE
+            memory.grip[0] *= SOFTER
+    return pivots[WRONG] + pivots[LOOSE] == 0
 
 
 @kernel
-def finish_friction(friction: Friction, memory: Memory, normal: np.ndarray, scheme: Scheme, dt: float) -> None:
+def finish_friction(
+    friction: Friction, memory: Memory, normal: np.ndarray, scheme: Scheme, dt: float
+) -> None:
     """Finish a step of dt [s]; contacts without a normal force (P, k, C) forget."""
     has_bristles = friction.treatment == Treatment.BRISTLE
     if has_bristles:

@@ -159,4 +159,8 @@ def inert(parameters: Mapping[str, Any]) -> dict[str, str]:
     found = {"arc_probes": "model belt_drive, which is probed on its strands"}
     if parameters["length_scatter"] == 0.0:
         found["seed"] = "length_scatter 0"
+    treatment = parameters["friction_treatment"]
+    for key, its_own in (("friction_speed", "regularised"), ("shear_stiffness", "bristle")):
+        if treatment != its_own:
+            found[key] = f"friction_treatment {treatment}"
     return friction_inert(parameters) | found

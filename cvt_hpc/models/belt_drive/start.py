@@ -10,7 +10,7 @@ import numpy as np
 from cvt_hpc.models.belt_drive.contact import Contact, contact_shapes
 from cvt_hpc.models.belt_drive.drive import UNSOLVED, Drive, State, advance, state
 from cvt_hpc.models.belt_drive.friction import Friction, Treatment
-from cvt_hpc.models.belt_drive.pulleys import Pulleys
+from cvt_hpc.models.belt_drive.pulleys import Pulleys, no_arms
 from cvt_hpc.multibody.ancf_beam import beam, random_lengths
 from cvt_hpc.physics.friction import friction_law, given_law
 from cvt_hpc.physics.geometry import variator
@@ -25,8 +25,8 @@ LONGER, SHORTER = 4.0, 0.25
 MOST_STEPS = 500  # common belts need 20
 SETTLED, MOST_ITERATIONS = 1e-8, 30  # [m/s]
 FRICTIONLESS = friction_law("coulomb", 1e-9, 0.0, 1.0)
-# Of sticking contacts [m/s]: the speed at which the grip has the normal force of a belt at rest. Less makes five points
-# of an element, which stick more often than its four coordinates let them, change for ever; more costs iterations.
+# Of contacts that stick [m/s]: the speed at which their grip has the normal force of a belt at rest. At less
+# the five points of an element, which adds four coordinates, change without end; more costs iterations.
 GRIP_SPEED = 1e-4
 # Of the belt's length by its tension: they leave 0.2 % of this on the softest contacts, 1e-5 on common ones
 CORRECTIONS = 3
@@ -88,6 +88,8 @@ def _drive(p: Mapping[str, Any], length: float) -> Drive:
         np.array([[0.0, 0.0], [p["centre_distance"], 0.0]]),
         np.array([p["driven_radius"] / p["ratio"], p["driven_radius"]]),
         np.array([0.0, p["driven_inertia"]]),
+        np.full(2, -1),
+        no_arms(),
     )
     contact = Contact(
         contact_shapes(p["contact_points"]),
