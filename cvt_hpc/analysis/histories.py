@@ -65,6 +65,7 @@ def history_figure(dataset: xr.Dataset) -> Figure:
             (1.2, [(place, panels.draw_course, dataset[name].assign_attrs(units.get(name, {})))
                    for place, name in places])
         )  # fmt: skip
+    rows += [(1.6, [(WHOLE, panels.draw_group, group)]) for group in panels.groups(dataset)]
     if with_spectrum:
         rows.append((2.1, [(WHOLE, panels.draw_spectra, with_spectrum)]))
     if _is_known(dataset, "ring_tension") or _is_known(dataset, "push_force"):

@@ -8,6 +8,7 @@ from cvt_hpc.job import build_job
 from cvt_hpc.models.belt_drive import contact, pulleys
 from cvt_hpc.models.belt_drive.drive import Drive, state
 from cvt_hpc.models.belt_drive.friction import Friction, Treatment
+from cvt_hpc.models.belt_drive.layout import layout
 from cvt_hpc.models.belt_drive.readings import Reading, Readings
 from cvt_hpc.models.belt_drive.start import FRICTIONLESS, start
 from cvt_hpc.multibody.ancf_beam import at_places, beam
@@ -120,8 +121,9 @@ def rest():
     """A belt at rest on a smaller and a larger pulley without friction and damping, with its readings."""
     values = {"driven_radius": 0.08, "centre_distance": 0.3, "ratio": 1.25, "bending_stiffness": 0.01}
     p = build_job({"name": "x", "model": "belt_drive"}, "x", values).point(0)
-    where = Readings(p)
-    made, begun, is_settled = start(p, where.mean_tension)
+    drawn = layout(p)
+    where = Readings(p, drawn)
+    made, begun, is_settled = start(p, drawn, where.mean_tension)
     assert is_settled
     body = made.beam._replace(axial_damping=0.0, mass_damping=0.0, bending_damping=0.0)
     friction = made.contact.friction._replace(law=FRICTIONLESS)
@@ -143,7 +145,7 @@ def test_pulleys_carry_both_strands(rest):
     """Along the line of the shafts, each the tension by the cosine of its tilt; 0.2 % by bending and mesh."""
     p, where, made, found = rest
     points = at_places(made.beam, found.chain.q, made.contact.shape)
-    along = np.cos(0.5 * (where.path.driven_wrap - np.pi))
+    along = np.cos(0.5 * (where.drawn.path.wrap[1] - np.pi))
     for pulley, side in enumerate((-1.0, 1.0)):
         outward = points - made.pulleys.centre[pulley]
         outward /= np.hypot(*np.moveaxis(outward, -1, 0))[..., None]
@@ -160,9 +162,9 @@ def test_strands_vibrate_as_stiff_strings(rest):
     mass, stiffness = mass_and_stiffness(made.beam, found.chain.q)
     stiffness += whole(found.chain.blocks)
     squares = eigh(0.5 * (stiffness + stiffness.T), mass, eigvals_only=True)
-    k = np.arange(1, 4) * np.pi / where.path.strand_length
+    k = np.arange(1, 4) * np.pi / where.drawn.path.spans[0]
     exact = np.sqrt((p["tension"] * k**2 + p["bending_stiffness"] * k**4) / p["line_mass"])
     ratio = np.sqrt(squares[1:7]) / np.repeat(exact, 2)
-    shorter = np.sqrt(p["bending_stiffness"] / p["tension"]) / where.path.strand_length
+    shorter = np.sqrt(p["bending_stiffness"] / p["tension"]) / where.drawn.path.spans[0]
     assert abs(squares[0]) < 0.2**2 * exact[0] ** 2  # the belt runs around
     assert (ratio > 1.0).all() and (ratio < 1.0 + shorter).all()
