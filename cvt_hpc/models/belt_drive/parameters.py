@@ -3,9 +3,10 @@
 Radii, centre distance, line mass, stiffness and damping of the belt (five ribs) and the inertia of the
 pulleys are those of Cepon and Boltezar 2011, table 1; elements, contact points and the scatter of lengths are
 those of their sec. 2.2. The belt's own length follows from the tension at rest. Assumptions are friction
-coefficient and contact stiffness, which they measured but do not print as numbers, the contact's damping and
-friction_speed, shear_stiffness, rise_time, and the amplitude from which a strand vibrates: 96 elements shake the strands by
-30 um. The band holds the first modes of the strands, 63 to 193 Hz.
+coefficient and contact stiffness, which they measured but do not print as numbers, the contact's damping,
+friction_speed, shear_stiffness (rubber of 3 MPa, 18 mm wide and 3 mm thick), rise_time, and the amplitude
+from which a strand vibrates: 96 elements shake the strands by 30 um. The band holds the first modes of the
+strands, 63 to 193 Hz.
 """
 
 from __future__ import annotations
