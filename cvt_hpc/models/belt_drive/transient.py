@@ -11,6 +11,7 @@ from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.belt_drive import courses
 from cvt_hpc.models.belt_drive import drive as fields
 from cvt_hpc.models.belt_drive.drive import advance
+from cvt_hpc.models.belt_drive.kick import kick
 from cvt_hpc.models.belt_drive.layout import layout
 from cvt_hpc.models.belt_drive.pulleys import Pulleys
 from cvt_hpc.models.belt_drive.readings import PLACES, PROFILES, Reading, Readings, scalars_of
@@ -117,6 +118,9 @@ class Transient:
             Why the run ends here.
         """
         for _ in range(min(samples, self.samples - self.done)):
+            if self.done == self.first_judged and self.parameters["kick"] > 0.0:
+                chain = self._state.chain
+                kick(self.path, self.parameters["line_mass"], self.parameters["kick"], chain.q, chain.v)
             inputs = np.array([self._inputs(self.time), self._inputs(self.time + self.interval)])
             if not self._march(inputs):
                 self.failure = Status.FAILED_NUMERICS, "the equations of a step have no solution in numbers"
