@@ -8,12 +8,12 @@ statement and each variable takes longer than the rest.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from typing import Any
 from weakref import WeakKeyDictionary
 
 from numba import types
-from numba.core import ir, ssa
+from numba.core import event, ir, ssa
 from numba.core.base import BaseContext
 from numba.core.inline_closurecall import InlineWorker
 
@@ -54,6 +54,11 @@ def _call_type(function: types.Function, typing: Any, arguments: Any, named: Any
     if function._impl_keys[found.args] is function.typing_key and not named:
         _signatures[key] = found
     return found
+
+
+def _no_timer(kind: str, callback: Callable[[float], None]) -> AbstractContextManager[None]:
+    """Nothing in the place of a clock; each kernel has two, which those that it calls keep starting."""
+    return nullcontext()
 
 
 _refresh = BaseContext.refresh
@@ -135,6 +140,7 @@ def _add_variables(value: Any, found: list[ir.Var]) -> None:
 _WITHOUT_VARIABLES = {str, int, float, bool, type(None), ir.Loc, ir.Scope, type(ir.UNDEFINED)}
 _SHORTCUTS: tuple[tuple[Any, str, Any], ...] = (
     (types.Function, "get_call_type", _call_type),
+    (event, "install_timer", _no_timer),
     (BaseContext, "refresh", _refresh_if_declared),
     (InlineWorker, "run_untyped_passes", _run_untyped_passes_once),
     (ssa, "_run_block_rewrite", _run_block_rewrite_where_named),
