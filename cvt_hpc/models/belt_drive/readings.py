@@ -106,7 +106,7 @@ class Reading:
         touch, wheels, drawn = self._state.touch, self._state.wheels, self._where.drawn
         speeds = drawn.path.turn * wheels.speed[0, : len(drawn.pulleys)]
         pressed = np.maximum(touch.normal.sum(axis=(1, 2)), 1e-9)
-        slid = (touch.normal * touch.slip).sum(axis=(1, 2)) / pressed
+        slid = (touch.normal * touch.memory.slip).sum(axis=(1, 2)) / pressed
         slip = drawn.path.turn * slid / self._where.belt_speed
         found = [float(speeds[drawn.driven]), *self.strand_tensions(), *slip]
         return [*found, *(speeds if len(speeds) > 2 else ()), *wheels.angle[0]]
