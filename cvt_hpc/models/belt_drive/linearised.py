@@ -4,12 +4,12 @@
 
 over the coordinates of the belt's nodes and the angles of all pulleys but the first, with K the slope of all
 elastic forces: those of the belt at its tensions, of contacts across the rim with their direction, and of
-contacts that stick, which tie the belt to its pulley. Contacts that slide carry a friction that does not change.
-Damping, and what the belt's running adds (v^2 / c^2 of a frequency, 0.3 % of the default drive), are left out,
-and arms stand still.
+contacts that stick, which tie the belt to its pulley. Contacts that slide carry a friction that does not
+change. Damping, and what the belt's running adds (v^2 / c^2 of a frequency, 0.3 % of the default drive), are
+left out, and arms stand still.
 
-Strands that bend where they leave a pulley are curved there. So their vibration pulls at the belt to the first
-order and turns the driven pulleys, as of serpentine drives Kong and Parker (2003) found.
+Strands that bend where they leave a pulley are curved there. So their vibration pulls at the belt to the
+first order and turns the driven pulleys, as Kong and Parker (2003) found of serpentine drives.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ import numpy as np
 from scipy.sparse import csc_matrix, lil_matrix
 from scipy.sparse.linalg import eigsh
 
+from cvt_hpc.models.belt_drive.contact import Contact
 from cvt_hpc.models.belt_drive.drive import Drive, State
+from cvt_hpc.models.belt_drive.friction import Memory, Treatment
 from cvt_hpc.multibody.ancf_beam import PER_NODE, AncfBeam, assemble, at_places
 from cvt_hpc.multibody.ancf_chain import chain
 from cvt_hpc.solvers.cyclic_blocks import LOWER, UPPER
@@ -83,10 +85,10 @@ def _of_belt(beam: AncfBeam, q: np.ndarray, size: int) -> lil_matrix:
 
 
 def _contacts(drive: Drive, state: State, size: int) -> tuple[csc_matrix, csc_matrix, csc_matrix]:
-    """Rows whose squares are stiffnesses: across the rim, of contacts that stick, of normal forces that turn."""
+    """Rows whose squares are stiffnesses: across the rim, of what sticks, of normal forces that turn."""
     q, contact, lengths = state.chain.q, drive.contact, drive.beam.lengths
     points = at_places(drive.beam, q, contact.shape)
-    touching = np.argwhere(state.touch.normal > 0.0)
+    touching, ties = np.argwhere(state.touch.normal > 0.0), _ties(contact, state.touch.memory)
     across, tied, turning = (lil_matrix((len(touching), size)) for _ in range(3))
     for row, (p, i, c) in enumerate(touching):
         j = (i + 1) % len(q)
@@ -94,9 +96,8 @@ def _contacts(drive: Drive, state: State, size: int) -> tuple[csc_matrix, csc_ma
         distance = np.hypot(*away)
         normal = away / distance
         tangent = np.array([-normal[1], normal[0]])
-        root = np.sqrt(lengths[i] / len(contact.shape) * contact.stiffness)
-        sticks = abs(state.touch.slip[p, i, c]) < STUCK * contact.friction_speed
-        tie = np.sqrt(TIED) * root if sticks else 0.0
+        weight = lengths[i] / len(contact.shape)
+        root, tie = np.sqrt(weight * contact.stiffness), np.sqrt(weight * ties[p, i, c])
         turn = np.sqrt(state.touch.normal[p, i, c] / distance)
         s = contact.shape[c] * [1.0, lengths[i], 1.0, lengths[i]]
         for node, shape in ((i, s[:2]), (j, s[2:])):
@@ -108,3 +109,15 @@ def _contacts(drive: Drive, state: State, size: int) -> tuple[csc_matrix, csc_ma
         if p > 0:
             tied[row, PER_NODE * len(q) + p - 1] = -tie * distance
     return csc_matrix(across), csc_matrix(tied), csc_matrix(turning)
+
+
+def _ties(contact: Contact, memory: Memory) -> np.ndarray:
+    """Stiffness per length by which contacts tie the belt to their pulley, (P, k, C) [N/m^2]."""
+    friction = contact.friction
+    sticks = memory.side == 0
+    if friction.treatment == Treatment.REGULARISED:
+        sticks = np.abs(memory.slip) < STUCK * friction.friction_speed
+    rigid = TIED * contact.stiffness
+    return np.where(
+        sticks, friction.shear_stiffness if friction.treatment == Treatment.BRISTLE else rigid, 0.0
+    )
