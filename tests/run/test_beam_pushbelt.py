@@ -44,8 +44,8 @@ def test_forces_are_those_of_the_pushbelt():
         asked = job(model, **values, **without, longest_duration=0.04)
         run = kind(asked.point(0), asked.stepper)
         assert run.advance(run.samples) is None
-        pull, push = (judging.pair(run, name, STRANDS) for name in ("ring_tension", "push_force"))
-        forces.append(np.append(pull - push, judging.pair(run, "axial_force")))
+        pull, push = (judging.each(run, name, STRANDS) for name in ("ring_tension", "push_force"))
+        forces.append(np.append(pull - push, judging.each(run, "axial_force")))
         if model == "beam_pushbelt":
             found = judge(run)
             assert run.numerical_doubt(found) is None

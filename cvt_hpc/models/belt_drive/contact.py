@@ -139,8 +139,7 @@ def add_contacts(
         Whether slip and dual are those of an iterate of this stage; else the slip of this one is taken.
     """
     q, u, n = chain.stage_q, chain.stage_v, chain.q.shape[0]
-    blocks, columns = chain.blocks.data, chain.columns.data
-    last, points = pulleys.radius.size - 1, contact.shape.shape[0]
+    last, points = wheels.speed.shape[1] - 1, contact.shape.shape[0]
     touch.normal[:] = 0.0
     touch.tangential[:] = 0.0
     for i in range(n):
@@ -156,12 +155,13 @@ def add_contacts(
             )
             x = s0 * q[i, 0] + s1 * q[i, 2] + s2 * q[j, 0] + s3 * q[j, 2]
             y = s0 * q[i, 1] + s1 * q[i, 3] + s2 * q[j, 1] + s3 * q[j, 3]
-            for p in range(last + 1):
-                away_x, away_y, radius = x - pulleys.centre[p, 0], y - pulleys.centre[p, 1], pulleys.radius[p]
+            for p in range(pulleys.radius.size):
+                away_x, away_y, radius = x - wheels.centre[p, 0], y - wheels.centre[p, 1], pulleys.radius[p]
                 if away_x * away_x + away_y * away_y >= radius * radius:
                     continue
                 vx = s0 * u[i, 0] + s1 * u[i, 2] + s2 * u[j, 0] + s3 * u[j, 2]
                 vy = s0 * u[i, 1] + s1 * u[i, 3] + s2 * u[j, 1] + s3 * u[j, 3]
+                vx, vy = vx - wheels.centre_speed[p, 0], vy - wheels.centre_speed[p, 1]
                 distance = np.sqrt(away_x * away_x + away_y * away_y)
                 nx, ny = away_x / distance, away_y / distance
                 outward, around = nx * vx + ny * vy, nx * vy - ny * vx
@@ -195,35 +195,85 @@ def add_contacts(
                 moment_n = distance * by_normal + tau * traction
                 moment_t = distance * by_around
                 mx, my = moment_n * nx - moment_t * ny, moment_n * ny + moment_t * nx
+                at_point = (s0, s1, s2, s3)
+                _add_to_belt(chain, i, j, at_point, last, (fx, fy), (xx, xy, yx, yy))
+                corner, lever = wheels.corner.data[0], steep * distance
                 if p > 0:
-                    corner = wheels.corner.data
-                    corner[0, p - 1, p - 1] -= steep * distance * distance
-                    corner[0, p - 1, last] -= traction * distance
-                lever = steep * distance
-                for node in range(2):
-                    at = i if node == 0 else j
-                    for kind in range(2):
-                        s = (s0 if kind == 0 else s1) if node == 0 else (s2 if kind == 0 else s3)
-                        k = 2 * kind
-                        columns[at, k, last] += s * fx
-                        columns[at, k + 1, last] += s * fy
-                        if p > 0:
-                            columns[at, k, p - 1] -= s * lever * ny
-                            columns[at, k + 1, p - 1] += s * lever * nx
-                            wheels.rows[at, p - 1, k] += s * mx
-                            wheels.rows[at, p - 1, k + 1] += s * my
-                        for other in range(2):
-                            block = DIAGONAL
-                            if other != node:
-                                block = UPPER if node == 0 else LOWER
-                            row = block * PER_NODE + k
-                            a = s * (s0 if other == 0 else s2)
-                            b = s * (s1 if other == 0 else s3)
-                            blocks[at, row, 0] += a * xx
-                            blocks[at, row, 1] += a * xy
-                            blocks[at, row, 2] += b * xx
-                            blocks[at, row, 3] += b * xy
-                            blocks[at, row + 1, 0] += a * yx
-                            blocks[at, row + 1, 1] += a * yy
-                            blocks[at, row + 1, 2] += b * yx
-                            blocks[at, row + 1, 3] += b * yy
+                    corner[p - 1, p - 1] -= steep * distance * distance
+                    corner[p - 1, last] -= traction * distance
+                    _add_to_border(chain, wheels, i, j, at_point, p - 1, (-lever * ny, lever * nx), (mx, my))
+                if pulleys.arm[p] < 0:
+                    continue
+                # by the arm's rate the axis moves along (ex, ey), and its speed turns with the arm as well
+                arm = pulleys.radius.size - 1 + pulleys.arm[p]
+                ex, ey = wheels.lever[p, 0], wheels.lever[p, 1]
+                turned = tau * wheels.stage_speed[0, arm + 1]
+                damping = weight * contact.damping * turned * (nx * ey - ny * ex)
+                by_n, by_t = -damping, by_force * damping - steep * turned * (nx * ex + ny * ey)
+                by_x = xx * ex + xy * ey + by_n * nx - by_t * ny
+                by_y = yx * ex + yy * ey + by_n * ny + by_t * nx
+                ax, ay = -(ex * xx + ey * yx), -(ex * xy + ey * yy)
+                _add_to_border(chain, wheels, i, j, at_point, arm, (-by_x, -by_y), (ax, ay))
+                corner[arm, arm] += ex * by_x + ey * by_y - tau * (fx * ey - fy * ex)
+                corner[arm, last] -= fx * ex + fy * ey
+                if p > 0:
+                    corner[p - 1, arm] += distance * by_t - (mx * ex + my * ey)
+                    corner[arm, p - 1] -= lever * (ey * nx - ex * ny)
+
+
+@kernel
+def _add_to_belt(
+    chain: Chain,
+    i: int,
+    j: int,
+    shape: tuple[float, float, float, float],
+    last: int,
+    force: tuple[float, float],
+    matrix: tuple[float, float, float, float],
+) -> None:
+    """Add a force at a point between nodes i and j, and the matrix (xx, xy, yx, yy) of its slopes."""
+    blocks, columns = chain.blocks.data, chain.columns.data
+    xx, xy, yx, yy = matrix
+    for node in range(2):
+        at = i if node == 0 else j
+        for kind in range(2):
+            s, k = shape[2 * node + kind], 2 * kind
+            columns[at, k, last] += s * force[0]
+            columns[at, k + 1, last] += s * force[1]
+            for other in range(2):
+                block = DIAGONAL
+                if other != node:
+                    block = UPPER if node == 0 else LOWER
+                row = block * PER_NODE + k
+                a, b = s * shape[2 * other], s * shape[2 * other + 1]
+                blocks[at, row, 0] += a * xx
+                blocks[at, row, 1] += a * xy
+                blocks[at, row, 2] += b * xx
+                blocks[at, row, 3] += b * xy
+                blocks[at, row + 1, 0] += a * yx
+                blocks[at, row + 1, 1] += a * yy
+                blocks[at, row + 1, 2] += b * yx
+                blocks[at, row + 1, 3] += b * yy
+
+
+@kernel
+def _add_to_border(
+    chain: Chain,
+    wheels: Wheels,
+    i: int,
+    j: int,
+    shape: tuple[float, float, float, float],
+    k: int,
+    column: tuple[float, float],
+    row: tuple[float, float],
+) -> None:
+    """Add to column and row k of the border what an unknown there and a point between i and j share."""
+    columns = chain.columns.data
+    for node in range(2):
+        at = i if node == 0 else j
+        for kind in range(2):
+            s, x = shape[2 * node + kind], 2 * kind
+            columns[at, x, k] += s * column[0]
+            columns[at, x + 1, k] += s * column[1]
+            wheels.rows[at, k, x] += s * row[0]
+            wheels.rows[at, k, x + 1] += s * row[1]

@@ -8,11 +8,21 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.belt_drive.contact import Contact, Touch, add_contacts, first_touch
-from cvt_hpc.models.belt_drive.pulleys import BELT_LOSS, Pulleys, Wheels, add_pulleys, wheels_at
+from cvt_hpc.models.belt_drive.pulleys import (
+    BELT_LOSS,
+    Pulleys,
+    Wheels,
+    add_pulleys,
+    begin_wheels,
+    correct_wheels,
+    finish_wheels,
+    place_wheels,
+    wheels_at,
+)
 from cvt_hpc.multibody.ancf_beam import AncfBeam
 from cvt_hpc.multibody.ancf_chain import SIZE, Chain, begin_stage, chain, correct, finish_stage, place, set_up
 from cvt_hpc.solvers.cyclic_blocks import factor, solve_bordered
-from cvt_hpc.solvers.generalised_alpha import Scheme, begin, finish, stage_length
+from cvt_hpc.solvers.generalised_alpha import Scheme, stage_length
 
 STEPS, ITERATIONS, UNSOLVED = range(3)  # counters of a state
 
@@ -46,7 +56,7 @@ class State(NamedTuple):
         Of the pulleys.
     touch : Touch
         Of the contacts.
-    counters, totals : (3,) int array, (4 + P,) array
+    counters, totals : (3,) int array, (5 + P,) array
         Work done [J].
     """
 
@@ -57,14 +67,30 @@ class State(NamedTuple):
     totals: np.ndarray
 
 
-def state(drive: Drive, q: np.ndarray, v: np.ndarray, speeds: np.ndarray) -> State:
-    """Begin with positions and speeds (n, 4) of the belt and speeds (P,) of the pulleys [rad/s]."""
-    pulleys, n = len(speeds), len(q)
-    turning = wheels_at(speeds, n)
+def state(
+    drive: Drive, q: np.ndarray, v: np.ndarray, speeds: np.ndarray, angles: np.ndarray | None = None
+) -> State:
+    """Begin a motion.
+
+    Parameters
+    ----------
+    drive : Drive
+        What moves.
+    q, v : (n, 4) arrays
+        Positions [m, 1] and speeds [m/s, 1/s] of the belt.
+    speeds : (P,) array
+        Of the pulleys [rad/s].
+    angles : (A,) array, optional
+        Of the arms [rad]; by default as drawn.
+    """
+    count, n = len(speeds), len(q)
+    turning = wheels_at(
+        drive.pulleys, speeds, np.zeros(len(drive.pulleys.arms.pivot)) if angles is None else angles, n
+    )
     return State(
-        chain(q, v, columns=pulleys),
+        chain(q, v, columns=turning.speed.shape[1]),
         turning,
-        first_touch(pulleys, n, len(drive.contact.shape)),
+        first_touch(count, n, len(drive.contact.shape)),
         np.zeros(3, np.int64),
         np.zeros_like(turning.power),
     )
@@ -107,17 +133,15 @@ def advance(
         Whether the state is of numbers.
     """
     belt, wheels, tau = state.chain, state.wheels, stage_length(scheme, dt)
-    last = drive.pulleys.radius.size - 1
+    last = wheels.speed.shape[1] - 1
     for step in range(steps):
         begin_stage(belt, scheme, dt)
-        begin(scheme, dt, wheels.speed, wheels.acceleration, wheels.start_speed)
         share = (step + scheme.alpha_f) / steps
-        for p in range(1, last + 1):
-            wheels.stage_speed[0, p] = wheels.speed[0, p]
-        wheels.stage_speed[0, 0] = inputs[0, 0] + share * (inputs[1, 0] - inputs[0, 0])
+        begin_wheels(wheels, scheme, dt, inputs[0, 0] + share * (inputs[1, 0] - inputs[0, 0]))
         largest = np.inf
         for iteration in range(most):
             place(belt, tau)
+            place_wheels(drive.pulleys, wheels, tau)
             wheels.power[:] = 0.0
             wheels.power[BELT_LOSS] = set_up(drive.beam, belt, tau, last)
             add_pulleys(drive.pulleys, wheels, inputs, share, tau)
@@ -137,14 +161,13 @@ def advance(
             if not solve_bordered(belt.blocks, belt.columns, wheels.rows, wheels.corner, SIZE):
                 return False
             largest = correct(belt, last)
-            for p in range(last):
-                wheels.stage_speed[0, p + 1] += wheels.corner.data[0, p, last]
+            correct_wheels(wheels)
             if not np.isfinite(largest):
                 return False
             if largest <= tolerance:
                 break
         finish_stage(belt, scheme, dt)
-        finish(scheme, dt, wheels.stage_speed, wheels.start_speed, wheels.speed, wheels.acceleration)
+        finish_wheels(drive.pulleys, wheels, scheme, dt)
         for k in range(state.totals.size):
             state.totals[k] += dt * wheels.power[k]
         state.counters[STEPS] += 1

@@ -17,9 +17,12 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc import recording
+from cvt_hpc.models.belt_drive.courses import PARAMETERS as COURSES
+from cvt_hpc.models.belt_drive.courses import course_inert, course_problems
+from cvt_hpc.models.belt_drive.layout import LAYOUT, TENSIONER, layout, layout_inert, layout_problems
+from cvt_hpc.models.belt_drive.preload import free_length
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
-from cvt_hpc.physics.geometry import variator, variator_problems
 from cvt_hpc.variator.scene import FRICTION, SCENE, rise_problems
 from cvt_hpc.vibration import settings
 
@@ -45,9 +48,16 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "driven_inertia": positive(
             0.013, "kg m^2", "moment of inertia of the driven pulley", sensible=(1e-6, 100.0)
         ),
+        "crossed": Parameter(False, "", "the belt crosses itself: the driven pulley turns the other way"),
     },
+    "layout": LAYOUT,
+    "tensioner": TENSIONER,
+    "profiles": COURSES,
     "belt": {
-        "tension": positive(310.0, "N", "mean tension of the strands at rest", sensible=(1.0, 1e5)),
+        "tension": positive(
+            310.0, "N", "mean tension of the strands at rest, with arms as drawn", sensible=(1.0, 1e5)
+        ),
+        "free_length": free_length(),
         "line_mass": positive(0.096, "kg/m", "mass per length", sensible=(1e-3, 10.0)),
         "axial_stiffness": positive(RIBS * 30400.0, "N", "longitudinal stiffness EA", sensible=(1e2, 1e9)),
         "bending_stiffness": positive(RIBS * 5.2e-3, "N m^2", "bending stiffness EI", sensible=(1e-6, 1e3)),
@@ -115,12 +125,12 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         Empty where all is well.
     """
     p = parameters
-    problems = variator_problems(p)
+    problems = layout_problems(p)
     if problems:
         return problems
-    path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
-    driving, strand, driven, _ = path.lengths
-    longest = min(driving / 4.0, driven / 4.0, strand / 2.0)
+    path = layout(p).path
+    # on a short arc an element turns by half a radian
+    longest = min(np.maximum(path.arcs / 4.0, path.radius / 2.0).min(), path.spans.min() / 2.0)
     element = path.path_length / p["elements"] * (1.0 + p["length_scatter"])
     if element > longest:
         least = int(np.ceil(path.path_length * (1.0 + p["length_scatter"]) / longest))
@@ -130,12 +140,11 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if strain > 0.5:
         most = 0.5 * p["axial_stiffness"]
         problems.append(("tension", f"at most {most:g} N, half of axial_stiffness", f"{p['tension']:g} N"))
-    radius = p["driven_radius"] * min(1.0, 1.0 / p["ratio"])
-    stiffness = p["tension"] / (DEEPEST * radius**2)
+    stiffness = p["tension"] / (DEEPEST * path.radius.min() ** 2)
     if p["contact_stiffness"] < stiffness:
         expected = f"at least {stiffness:g} N/m^2, by which the belt sinks in by {DEEPEST:.0%} of the radius"
         problems.append(("contact_stiffness", expected, f"{p['contact_stiffness']:g} N/m^2"))
-    return problems + rise_problems(p) + friction_problems(p)
+    return problems + rise_problems(p) + course_problems(p) + friction_problems(p)
 
 
 def inert(parameters: Mapping[str, Any]) -> dict[str, str]:
@@ -149,4 +158,4 @@ def inert(parameters: Mapping[str, Any]) -> dict[str, str]:
     found = {"arc_probes": "model belt_drive, which is probed on its strands"}
     if parameters["length_scatter"] == 0.0:
         found["seed"] = "length_scatter 0"
-    return friction_inert(parameters) | found
+    return friction_inert(parameters) | layout_inert(parameters) | course_inert(parameters) | found

@@ -1,4 +1,8 @@
-"""The pulleys of a belt drive: their inertia and torques, in the border of the belt's equations."""
+"""The pulleys of a belt drive and the arms that carry some of them, in the border of the belt's equations.
+
+An arm turns about its pivot, which moves the axis of its pulley. By its angle from where it is drawn, it has
+the moment M - k angle - c angle', and beyond its travel a stiff stop pushes it back.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +14,37 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.multibody.ancf_beam import PER_NODE
 from cvt_hpc.solvers.cyclic_blocks import empty_corner
+from cvt_hpc.solvers.generalised_alpha import Scheme, begin, finish, stage_length
 
 # powers of a stage [W], and their totals [J]
-WORK_IN, WORK_OUT, CONTACT_LOSS, BELT_LOSS, FRICTION_LOSS = range(5)  # of each pulley from the last one on
+WORK_IN, WORK_OUT, CONTACT_LOSS, BELT_LOSS, ARM_LOSS, FRICTION_LOSS = range(6)  # the last of each pulley
+
+
+class Arms(NamedTuple):
+    """Constants of A arms; (A,) arrays but for the pivots.
+
+    Attributes
+    ----------
+    pivot : (A, 2) array
+        [m]
+    inertia : array
+        Of the arm with the mass of its pulley, about the pivot [kg m^2].
+    moment, stiffness, damping : arrays
+        Of the spring as drawn [N m], of spring and dashpot [N m/rad], [N m s/rad].
+    lowest, highest : arrays
+        Ends of the travel [rad].
+    stop : float
+        Stiffness beyond them [N m/rad].
+    """
+
+    pivot: np.ndarray
+    inertia: np.ndarray
+    moment: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    lowest: np.ndarray
+    highest: np.ndarray
+    stop: float
 
 
 class Pulleys(NamedTuple):
@@ -21,26 +53,36 @@ class Pulleys(NamedTuple):
     Attributes
     ----------
     centre : (P, 2) array
-        Axes [m].
+        Axes as drawn [m].
     radius, inertia : (P,) arrays
         [m], [kg m^2]; the inertia of the first is not read.
+    arm : (P,) int array
+        Which of the arms carries a pulley, or -1.
+    arms : Arms
+        Of tensioners.
     """
 
     centre: np.ndarray
     radius: np.ndarray
     inertia: np.ndarray
+    arm: np.ndarray
+    arms: Arms
 
 
 class Wheels(NamedTuple):
-    """Motion of the pulleys, and what they add to the equations of a stage.
+    """Motion of P pulleys and A arms, and what they add to the equations of a stage.
 
     Attributes
     ----------
-    speed, acceleration, stage_speed, start_speed : (1, P) arrays
-        Counter-clockwise [rad/s], [rad/s^2], as those of a chain.
-    rows, corner : (n, P - 1, 4) array, (1, P - 1) LaneArray
-        Border of the equations: the pulleys but the first.
-    power : (4 + P,) array
+    speed, acceleration, stage_speed, start_speed : (1, P + A) arrays
+        Of pulleys, then arms, counter-clockwise [rad/s], [rad/s^2], as those of a chain.
+    angle, turning, stage_angle, start_angle : (1, A) arrays
+        Of the arms from where they are drawn [rad], and its rate [rad/s], as those of a chain.
+    centre, centre_speed, lever : (P, 2) arrays
+        Axes in a stage [m], their speeds [m/s], and slopes by the angle of the arm [m].
+    rows, corner : (n, P - 1 + A, 4) array, (1, P - 1 + A) LaneArray
+        Border of the equations: the pulleys but the first, then the arms.
+    power : (5 + P,) array
         Of the last stage, in the order of the totals [W].
     """
 
@@ -48,25 +90,106 @@ class Wheels(NamedTuple):
     acceleration: np.ndarray
     stage_speed: np.ndarray
     start_speed: np.ndarray
+    angle: np.ndarray
+    turning: np.ndarray
+    stage_angle: np.ndarray
+    start_angle: np.ndarray
+    centre: np.ndarray
+    centre_speed: np.ndarray
+    lever: np.ndarray
     rows: np.ndarray
     corner: LaneArray
     power: np.ndarray
 
 
-def wheels_at(speeds: np.ndarray, nodes: int) -> Wheels:
-    """Pulleys at speeds (P,) [rad/s], around which a belt of some nodes runs."""
-    pulleys = len(speeds)
-    speed, acceleration, stage_speed, start_speed = np.zeros((4, 1, pulleys))
-    speed[0] = speeds
-    rows = np.zeros((nodes, pulleys - 1, PER_NODE))
-    corner = empty_corner(pulleys - 1, pulleys)
-    power = np.zeros(FRICTION_LOSS + pulleys)
-    return Wheels(speed, acceleration, stage_speed, start_speed, rows, corner, power)
+def no_arms() -> Arms:
+    """The arms of pulleys that all have fixed axes."""
+    none = np.zeros(0)
+    return Arms(np.zeros((0, 2)), none, none, none, none, none, none, 0.0)
+
+
+def wheels_at(pulleys: Pulleys, speeds: np.ndarray, angles: np.ndarray, nodes: int) -> Wheels:
+    """Pulleys at speeds (P,) [rad/s], arms at rest at angles (A,) [rad], and a belt of some nodes."""
+    count, arms = len(speeds), len(angles)
+    border = count - 1 + arms
+    speed, acceleration, stage_speed, start_speed = np.zeros((4, 1, count + arms))
+    angle, turning, stage_angle, start_angle = np.zeros((4, 1, arms))
+    speed[0, :count], angle[0], stage_angle[0] = speeds, angles, angles
+    centre_speed, lever = np.zeros((2, count, 2))
+    found = Wheels(
+        speed,
+        acceleration,
+        stage_speed,
+        start_speed,
+        angle,
+        turning,
+        stage_angle,
+        start_angle,
+        pulleys.centre.copy(),
+        centre_speed,
+        lever,
+        np.zeros((nodes, border, PER_NODE)),
+        empty_corner(border, border + 1),
+        np.zeros(FRICTION_LOSS + count),
+    )
+    place_axes(pulleys, found)
+    return found
+
+
+@kernel
+def place_axes(pulleys: Pulleys, wheels: Wheels) -> None:
+    """Axes of a stage by the angles and the speeds of the arms in it."""
+    count = pulleys.radius.size
+    for p in range(count):
+        a = pulleys.arm[p]
+        if a < 0:
+            continue
+        pivot, angle, rate = pulleys.arms.pivot, wheels.stage_angle[0, a], wheels.stage_speed[0, count + a]
+        x, y = pulleys.centre[p, 0] - pivot[a, 0], pulleys.centre[p, 1] - pivot[a, 1]
+        away_x, away_y = x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)
+        wheels.centre[p, 0], wheels.centre[p, 1] = pivot[a, 0] + away_x, pivot[a, 1] + away_y
+        wheels.lever[p, 0], wheels.lever[p, 1] = -away_y, away_x
+        wheels.centre_speed[p, 0], wheels.centre_speed[p, 1] = -away_y * rate, away_x * rate
+
+
+@kernel
+def begin_wheels(wheels: Wheels, scheme: Scheme, dt: float, driving_speed: float) -> None:
+    """Begin a stage with the speeds at the begin of a step, and the prescribed one [rad/s] of the stage."""
+    begin(scheme, dt, wheels.speed, wheels.acceleration, wheels.start_speed)
+    begin(scheme, dt, wheels.angle, wheels.turning, wheels.start_angle)
+    for k in range(1, wheels.speed.shape[1]):
+        wheels.stage_speed[0, k] = wheels.speed[0, k]
+    wheels.stage_speed[0, 0] = driving_speed
+
+
+@kernel
+def place_wheels(pulleys: Pulleys, wheels: Wheels, tau: float) -> None:
+    """Angles and axes of a stage by its speeds."""
+    count = pulleys.radius.size
+    for a in range(wheels.angle.shape[1]):
+        wheels.stage_angle[0, a] = wheels.start_angle[0, a] + tau * wheels.stage_speed[0, count + a]
+    place_axes(pulleys, wheels)
+
+
+@kernel
+def correct_wheels(wheels: Wheels) -> None:
+    """Add a solution to the speeds of a stage."""
+    last = wheels.speed.shape[1] - 1
+    for k in range(last):
+        wheels.stage_speed[0, k + 1] += wheels.corner.data[0, k, last]
+
+
+@kernel
+def finish_wheels(pulleys: Pulleys, wheels: Wheels, scheme: Scheme, dt: float) -> None:
+    """Angles and speeds at the end of a step, by the speeds of its stage."""
+    place_wheels(pulleys, wheels, stage_length(scheme, dt))
+    finish(scheme, dt, wheels.stage_angle, wheels.start_angle, wheels.angle, wheels.turning)
+    finish(scheme, dt, wheels.stage_speed, wheels.start_speed, wheels.speed, wheels.acceleration)
 
 
 @kernel
 def add_pulleys(pulleys: Pulleys, wheels: Wheels, inputs: np.ndarray, share: float, tau: float) -> None:
-    """Put the inertia of the pulleys and the torques that act on them into the border.
+    """Put the inertia of pulleys and arms, and what acts on them beside the belt, into the border.
 
     Parameters
     ----------
@@ -81,10 +204,31 @@ def add_pulleys(pulleys: Pulleys, wheels: Wheels, inputs: np.ndarray, share: flo
     """
     wheels.rows[:] = 0.0
     wheels.corner.data[:] = 0.0
-    last = pulleys.radius.size - 1
-    for p in range(last):
+    count = pulleys.radius.size
+    corner, last = wheels.corner.data, wheels.speed.shape[1] - 1
+    for p in range(count - 1):
         torque = inputs[0, p + 1] + share * (inputs[1, p + 1] - inputs[0, p + 1])
         speed, inertia = wheels.stage_speed[0, p + 1], pulleys.inertia[p + 1]
-        wheels.corner.data[0, p, p] = inertia / tau
-        wheels.corner.data[0, p, last] = torque - inertia * (speed - wheels.start_speed[0, p + 1]) / tau
+        corner[0, p, p] = inertia / tau
+        corner[0, p, last] = torque - inertia * (speed - wheels.start_speed[0, p + 1]) / tau
         wheels.power[WORK_OUT] -= torque * speed
+    arms = pulleys.arms
+    for a in range(wheels.angle.shape[1]):
+        k = count + a
+        angle, rate = wheels.stage_angle[0, a], wheels.stage_speed[0, k]
+        moment, stiffness = arms.moment[a] - arms.stiffness[a] * angle, arms.stiffness[a]
+        beyond = angle - min(max(angle, arms.lowest[a]), arms.highest[a])
+        if beyond != 0.0:
+            moment, stiffness = moment - arms.stop * beyond, stiffness + arms.stop
+        damping, inertia = arms.damping[a], arms.inertia[a]
+        corner[0, k - 1, k - 1] = inertia / tau + damping + tau * stiffness
+        started = wheels.start_speed[0, k]
+        corner[0, k - 1, last] = moment - damping * rate - inertia * (rate - started) / tau
+        wheels.power[ARM_LOSS] += damping * rate * rate
+
+
+def arms_energy(arms: Arms, angle: np.ndarray, rate: np.ndarray) -> float:
+    """Kinetic and elastic energy of arms at angles and rates (A,) [J]; that of a spring is 0 as drawn."""
+    beyond = angle - np.clip(angle, arms.lowest, arms.highest)
+    elastic = (0.5 * arms.stiffness * angle - arms.moment) * angle + 0.5 * arms.stop * beyond**2
+    return float((0.5 * arms.inertia * rate**2 + elastic).sum())

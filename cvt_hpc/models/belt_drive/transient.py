@@ -8,19 +8,27 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.kernels import called_alike
+from cvt_hpc.models.belt_drive import courses
 from cvt_hpc.models.belt_drive import drive as fields
 from cvt_hpc.models.belt_drive.drive import advance
-from cvt_hpc.models.belt_drive.readings import PLACES, PROFILES, SCALARS, Reading, Readings
+from cvt_hpc.models.belt_drive.layout import layout
+from cvt_hpc.models.belt_drive.pulleys import Pulleys
+from cvt_hpc.models.belt_drive.readings import PLACES, PROFILES, Reading, Readings, scalars_of
 from cvt_hpc.models.belt_drive.start import start
 from cvt_hpc.models.marched import Probe, batches_of_one
 from cvt_hpc.recording import sample_count, start_up_samples
 from cvt_hpc.solvers.generalised_alpha import generalised_alpha
 from cvt_hpc.variables import Status
-from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, STRANDS
-from cvt_hpc.variator.course import load_course
+from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, PULLEYS, STRANDS
 from cvt_hpc.variator.slip import GAINED, LOST
 
-CHANNELS = ("load", "driving_speed", *SCALARS)
+# of two pulleys; those of more are a run's own
+CHANNELS = (
+    *("load", "driving_speed", "driven_speed"),
+    *(f"tension {strand}" for strand in STRANDS),
+    *(f"slip {pulley}" for pulley in PULLEYS),
+)
+MOST_LIFTED = 0.01  # [s] that a pulley may be without the belt
 MOST_UNSOLVED = 0.02  # of the steps
 MOST_OPEN = 0.02  # of the larger of drive and losses; sound runs leave up to 0.004, without load
 
@@ -39,6 +47,10 @@ class Transient:
     ----------
     parameters
         As given.
+    drawn : Layout
+        Pulleys and reference path.
+    channels : tuple of str
+        Names of the histories beside displacement.
     probes : tuple of Probe
         On the strands, equally spaced between their ends.
     interval : float
@@ -54,19 +66,24 @@ class Transient:
         self.interval = 1.0 / p["sampling_rate"]
         self._steps_per_sample = max(1, int(np.ceil(self.interval / p["step"] * (1.0 - 1e-9))))
         self._scheme = generalised_alpha(p["spectral_radius"])
-        self._readings = Readings(p)
-        self._drive, self._state, is_settled = start(p, self._readings.mean_tension)
+        self.drawn = layout(p)
+        self._readings = Readings(p, self.drawn)
+        self._drive, self._state, is_settled = start(p, self.drawn, self._readings.mean_tension)
+        arms = self._drive.pulleys.arms
+        self.channels = ("load", "driving_speed", *scalars_of(self.drawn, len(arms.pivot)))
         self.probes = tuple(
             Probe(f"{strand} {k + 1}", float(position))
-            for strand, positions in zip(STRANDS, self._readings.probes, strict=True)
+            for strand, positions in zip(self.drawn.spans, self._readings.probes, strict=True)
             for k, position in enumerate(positions)
         )
         self._advance = called_alike(advance)
         self.done = 0
         self.failure: tuple[Status, str] | None = None
-        if not is_settled:
+        self._lifted = np.zeros(len(self.drawn.pulleys), int)
+        if not is_settled:  # as it would be at any step
+            p = {**p, "most_refinements": 0}
             self.failure = Status.FAILED_NUMERICS, "the belt finds no equilibrium on its pulleys"
-        self._rows = np.empty((0, len(self.probes) + len(CHANNELS)))
+        self._rows = np.empty((0, len(self.probes) + len(self.channels)))
         self._totals = np.empty((0, self._state.totals.size + 1))
         self.prolong(p)
 
@@ -105,8 +122,8 @@ class Transient:
                 self.failure = Status.FAILED_NUMERICS, "the equations of a step have no solution in numbers"
                 break
             self._take_sample()
-            if (slipped := self._slipped()) is not None:
-                self.failure = Status.DONE, slipped
+            if (ended := self._slipped() or self._left()) is not None:
+                self.failure = Status.DONE, ended
                 break
         return self.failure
 
@@ -115,20 +132,27 @@ class Transient:
         settings = self.step, self._steps_per_sample, p["speed_tolerance"], p["most_iterations"]
         return self._advance(self._drive, self._state, self._scheme, inputs, *settings)
 
-    def _inputs(self, time: float) -> tuple[float, float]:
-        """Speed of the driving pulley [rad/s] and torque on the driven one [N m] at a time."""
-        return self.parameters["driving_speed"], -self.parameters["ratio"] * self.load(time)
+    def _inputs(self, time: float) -> np.ndarray:
+        """Speed of the driving pulley [rad/s] and torques on the others [N m] at a time, (P,)."""
+        turn = self.drawn.path.turn
+        inputs = -turn * self.drawn.load * self.load(time)
+        inputs[0] = turn[0] * self.driving_speed(time)
+        return inputs
+
+    def driving_speed(self, time: float) -> float:
+        """Speed of the driving pulley [rad/s]."""
+        return courses.driving_speed(self.parameters, time)
 
     def load(self, time: float) -> float:
-        """Torque at the driving pulley without losses [N m]."""
-        load, rise = self.parameters["load"], self.parameters["rise_time"]
-        return load_course.py_func(time, rise, rise, load, load)
+        """Torque at the driving pulley without losses, or what `pulley_load` counts in [N m]."""
+        return courses.load(self.parameters, time)
 
     def _take_sample(self) -> None:
         found = Reading(self._readings, self._drive, self._state)
         time = self.time
-        speed = self.parameters["driving_speed"]
+        speed = self.driving_speed(time)
         self._rows[self.done] = [*found.displacement(), self.load(time), speed, *found.scalars()]
+        self._lifted = np.where(found.lifted(), self._lifted + 1, 0)
         stored = np.nan
         if self.done >= self.first_judged:
             self._sums += found.profiles()
@@ -138,12 +162,23 @@ class Transient:
         self.done += 1
 
     def _slipped(self) -> str | None:
-        """Whether the driven pulley runs far from its speed without slip."""
-        p = self.parameters
-        share = p["ratio"] * self._state.wheels.speed[0, 1] / p["driving_speed"]
+        """Whether the driven pulley runs far from its speed without slip, where the drive is under way."""
+        row = self.done - 1
+        driving, driven = (self.channel(f"{name}_speed")[row] for name in PULLEYS)
+        if driving < LEAST_SPEED * self.parameters["driving_speed"]:
+            return None
+        share = self.drawn.ratio * driven / driving
         if share < LEAST_SPEED:
             return LOST
         return GAINED if share > MOST_SPEED else None
+
+    def _left(self) -> str | None:
+        """Whether the belt has left a pulley."""
+        k = int(np.argmax(self._lifted))
+        if self._lifted[k] * self.interval <= MOST_LIFTED:
+            return None
+        name = self.drawn.pulleys[k]
+        return f"the belt lifts off: it has not touched the {name} pulley for {MOST_LIFTED:g} s"
 
     @property
     def time(self) -> float:
@@ -175,8 +210,18 @@ class Transient:
         return self._rows[: self.done, : len(self.probes)]
 
     def channel(self, name: str) -> np.ndarray:
-        """History of one of CHANNELS, (done,)."""
-        return self._rows[: self.done, len(self.probes) + CHANNELS.index(name)]
+        """History of one of `channels`, (done,)."""
+        return self._rows[: self.done, len(self.probes) + self.channels.index(name)]
+
+    def speed_loss(self, samples: slice) -> float:
+        """What sliding and creep take from the driven speed in some samples, over what it is without [1]."""
+        driven = self.channel("driven_speed")[samples].mean()
+        return float(1.0 - self.drawn.ratio * driven / self.mean_driving_speed(samples))
+
+    @property
+    def pulleys(self) -> Pulleys:
+        """Constants of pulleys and arms."""
+        return self._drive.pulleys
 
     def mean_driving_speed(self, samples: slice) -> float:
         """Mean speed of the driving pulley in some samples [rad/s]."""
@@ -201,8 +246,7 @@ class Transient:
     @property
     def _turn(self) -> float:
         """Samples of a turn of the belt."""
-        speed = self.parameters["driving_speed"] * self.path.driving_radius
-        return self.path.path_length / (speed * self.interval)
+        return self.path.path_length / (self._readings.belt_speed * self.interval)
 
     def mean_rate(self, total: int) -> float:
         """Mean rate over the judged part of one of the totals, by its index; -1: of the stored energy."""
@@ -220,7 +264,7 @@ class Transient:
     @property
     def path(self) -> Any:
         """The reference path."""
-        return self._readings.path
+        return self.drawn.path
 
     @property
     def places(self) -> np.ndarray:

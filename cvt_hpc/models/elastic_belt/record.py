@@ -13,7 +13,7 @@ from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.models.elastic_belt.history import histories
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, judging
-from cvt_hpc.variator.judging import assess, mean, pair, power_balance
+from cvt_hpc.variator.judging import assess, each, mean, power_balance
 from cvt_hpc.variator.slip import VARIABLE as SLIP_MARGIN
 from cvt_hpc.variator.slip import slide, slip_margin
 from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared
@@ -153,7 +153,7 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
         "modal_amplitude": modal,
         **judging.evaluate(run, strongest_probe),
         SLIP_MARGIN.name: slip_margin(run, judged),
-        "open_share": pair(run, "open_share"),
+        "open_share": each(run, "open_share"),
         **power_balance(driving, load, sum(losses.values()), storing, thrust),
         "thrust_power": thrust,
         **{name: loss for name, loss in losses.items() if "flank" not in name},
