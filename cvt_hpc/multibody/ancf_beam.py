@@ -25,6 +25,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 
 PER_NODE = 4
 POINTS = 5  # exact to degree 9
@@ -153,15 +154,26 @@ def at_places(beam: AncfBeam, nodes: np.ndarray, shape: np.ndarray) -> np.ndarra
     return shape @ np.stack(ends, 1)
 
 
-def strains(beam: AncfBeam, q: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Axial strain (k, m) at places (m,) of each element, from positions (n, 4) of the nodes."""
+@register_jitable
+def strain_at(place, mean, first, second):
+    """Value at a place from 0 to 1 of the parabola with a mean and with values at both ends."""
+    x = 2.0 * place - 1.0
+    return mean + 0.5 * (second - first) * x + (0.5 * (first + second) - mean) * (1.5 * x * x - 0.5)
+
+
+@register_jitable
+def tension_of(axial_stiffness, strain):
+    """Force along the belt against the area without load [N], EA e |r'|."""
+    return axial_stiffness * strain * np.sqrt(1.0 + 2.0 * strain)
+
+
+def strains(beam: AncfBeam, q: np.ndarray) -> np.ndarray:
+    """Axial strain at the Gauss points, (k, POINTS), from positions (n, 4) of the nodes."""
     square = (at_places(beam, q, SHAPES[:, 1]) ** 2).sum(-1) / beam.lengths[:, None] ** 2
     nodes = 0.5 * ((q[:, 2:] ** 2).sum(-1) - 1.0)
     first = np.arange(beam.lengths.size)
-    mean, one, other = 0.5 * (square @ WEIGHTS - 1.0), nodes[first], nodes[(first + 1) % len(q)]
-    x = 2.0 * np.asarray(places) - 1.0
-    curved = 0.5 * (one + other) - mean
-    return mean[:, None] + np.outer(0.5 * (other - one), x) + np.outer(curved, 1.5 * x**2 - 0.5)
+    ends = nodes[first], nodes[(first + 1) % len(q)]
+    return strain_at(PLACES, *(values[:, None] for values in (0.5 * (square @ WEIGHTS - 1.0), *ends)))
 
 
 def energies(beam: AncfBeam, q: np.ndarray, u: np.ndarray) -> tuple[float, float, float]:
@@ -170,7 +182,7 @@ def energies(beam: AncfBeam, q: np.ndarray, u: np.ndarray) -> tuple[float, float
     weight = lengths * WEIGHTS
     position, speed = (at_places(beam, nodes, SHAPES[:, 0]) for nodes in (q, u))
     bend = at_places(beam, q, SHAPES[:, 2])
-    stored = beam.axial_stiffness * strains(beam, q, PLACES) ** 2
+    stored = beam.axial_stiffness * strains(beam, q) ** 2
     stored += beam.bending_stiffness * (bend**2).sum(-1) / lengths**4
     kinetic = 0.5 * beam.line_mass * (weight * (speed**2).sum(-1)).sum()
     fallen = -beam.line_mass * (weight * (position @ np.array(beam.gravity))).sum()
@@ -178,9 +190,5 @@ def energies(beam: AncfBeam, q: np.ndarray, u: np.ndarray) -> tuple[float, float
 
 
 def tensions(beam: AncfBeam, q: np.ndarray) -> np.ndarray:
-    """Elastic force along the belt at the Gauss points [N], (k, POINTS), from positions (n, 4) of the nodes.
-
-    That is EA e sqrt(1 + 2 e), against the area without load.
-    """
-    strain = strains(beam, q, PLACES)
-    return beam.axial_stiffness * strain * np.sqrt(1.0 + 2.0 * strain)
+    """Elastic force along the belt at the Gauss points [N], (k, POINTS), from positions (n, 4) of the nodes."""
+    return tension_of(beam.axial_stiffness, strains(beam, q))

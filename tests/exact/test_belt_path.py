@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.physics.belt_path import along, belt_path, points_at, regions
+from cvt_hpc.physics.belt_path import belt_path, points_at, regions
+from cvt_hpc.physics.nearest_on_path import along
 from cvt_hpc.physics.geometry import variator
 
 # three pulleys around which a belt runs counter-clockwise, and one that presses from outside

@@ -151,11 +151,11 @@ class Transient:
         found = Reading(self._readings, self._drive, self._state)
         time = self.time
         speed = self.driving_speed(time)
-        self._rows[self.done] = [*found.displacement(), self.load(time), speed, *found.scalars()]
-        self._lifted = np.where(found.lifted(), self._lifted + 1, 0)
+        self._rows[self.done] = [*found.displacement, self.load(time), speed, *found.scalars()]
+        self._lifted = np.where(found.lifted, self._lifted + 1, 0)
         stored = np.nan
         if self.done >= self.first_judged:
-            self._sums += found.profiles()
+            found.add_profiles(self._sums)
         if self.done in (self.first_judged, self.samples - 1):
             stored = found.stored_energy()
         self._totals[self.done] = [*self._state.totals, stored]
