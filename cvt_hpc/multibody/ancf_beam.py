@@ -56,6 +56,7 @@ def shapes(place: float | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 SHAPES = np.stack(shapes(PLACES), 1)  # at the Gauss points: (point, derivative, shape)
 
+
 class AncfBeam(NamedTuple):
     """Constants of a chain of elements.
 

@@ -113,6 +113,4 @@ def along(path: BeltPath, points: np.ndarray, running: np.ndarray) -> tuple[np.n
 @kernel
 def _along(way, points, running, position, offset):
     for i in range(points.shape[0]):
-        position[i], offset[i] = nearest(
-            way, points[i, 0], points[i, 1], running[i, 0], running[i, 1]
-        )
+        position[i], offset[i] = nearest(way, points[i, 0], points[i, 1], running[i, 0], running[i, 1])
