@@ -48,6 +48,9 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "driven_inertia": positive(
             0.013, "kg m^2", "moment of inertia of the driven pulley", sensible=(1e-6, 100.0)
         ),
+        "kick": not_negative(
+            0.0, "N s", "impulse across each strand when the judged part begins", sensible=(1e-6, 10.0)
+        ),
         "crossed": Parameter(False, "", "the belt crosses itself: the driven pulley turns the other way"),
     },
     "layout": LAYOUT,

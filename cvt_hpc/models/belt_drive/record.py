@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.models.belt_drive import pulleys as fields
+from cvt_hpc.models.belt_drive.kick import answers
 from cvt_hpc.models.belt_drive.layout import layout
+from cvt_hpc.models.belt_drive.theory import (
+    MODES,
+    creep_loss,
+    expected_loss,
+    sliding_tension,
+    strand_frequencies,
+    wrap_angles,
+)
 from cvt_hpc.physics.belt_path import regions
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import judging
@@ -17,6 +26,8 @@ from cvt_hpc.variator.history import dataset
 from cvt_hpc.variator.judging import each
 from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared
 from cvt_hpc.vibration import assessment
+from cvt_hpc.vibration.settings import SHORTEST_SEGMENT
+from cvt_hpc.vibration.signals import amplitude_spectrum
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,12 +39,42 @@ STEP_COST, SAMPLE_COST = 4e-6, 6e-4
 
 VARIABLES = (
     *assessment.VARIABLES,
-    *shared("spectrum"),
+    replace(shared("spectrum")[0], comment="largest of the strand's probes"),
     Variable("strand_tension", ("strand",), "f8", "N", "mean tension in the middle half of the strand"),
     Variable("tension_ripple", ("strand",), "f8", "N", "standard deviation of that mean"),
     *shared("slip"),
     replace(
         shared("speed_loss")[0], comment="1 - ratio x driven speed / driving speed, mean of whole belt turns"
+    ),
+    Variable(
+        "expected_speed_loss",
+        (),
+        "f8",
+        "1",
+        "by creep and radial compliance, with the mean tensions of the strands",
+        words="creep and compliance",
+    ),
+    Variable(
+        "creep_speed_loss",
+        (),
+        "f8",
+        "1",
+        "by creep alone, from tension at rest and torque; of two pulleys",
+        words="creep alone",
+    ),
+    Variable(
+        "eigenfrequency",
+        ("strand", "half_waves"),
+        "f8",
+        "Hz",
+        "of a running beam under the strand's mean tension, pinned where tangents touch the pulleys",
+    ),
+    Variable(
+        "answered_frequency",
+        ("strand", "half_waves"),
+        "f8",
+        "Hz",
+        "peak near each eigenfrequency after a kick, where it exceeds three times the unrest before",
     ),
     Variable("arm_angle", ("pulley",), "f8", "rad", "mean rotation of the arm from where it is drawn"),
     Variable("arm_ripple", ("pulley",), "f8", "rad", "standard deviation of that rotation"),
@@ -64,7 +105,8 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
         "strand": _named("strand", drawn.spans),
         "pulley": _named("pulley", drawn.pulleys),
     }
-    return {**names, "frequency_bin": frequency_bins(parameters)}
+    half_waves = Coordinate(np.arange(1, MODES + 1), "1", "half waves", "along the strand")
+    return {**names, "frequency_bin": frequency_bins(parameters), "half_waves": half_waves}
 
 
 def _named(dimension: str, names: tuple[str, ...]) -> Coordinate:
@@ -112,12 +154,18 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     arm_loss, drawn = run.mean_rate(fields.ARM_LOSS), run.drawn
     friction = np.array([run.mean_rate(fields.FRICTION_LOSS + k) for k in range(len(drawn.pulleys))])
     storing = run.mean_rate(-1)
-    work = run.counters()
+    work, tension = run.counters(), each(run, "tension", drawn.spans)
+    frequencies = strand_frequencies(run.parameters, run.path, tension)
     return {
         **judging.motion(run, strongest_probe, drawn.pulleys),
+        "spectrum": _spectrum(run),
         **_of_arms(run),
         "speed_loss": run.speed_loss(run.whole_turns),
-        "strand_tension": each(run, "tension", drawn.spans),
+        "expected_speed_loss": expected_loss(run.parameters, drawn, tension),
+        "creep_speed_loss": creep_loss(run.parameters, drawn),
+        "strand_tension": tension,
+        "eigenfrequency": frequencies,
+        "answered_frequency": _answered(run, frequencies),
         "tension_ripple": np.array([run.channel(f"tension {k}")[run.judged].std() for k in drawn.spans]),
         "friction_loss": friction,
         "contact_loss": contact,
@@ -145,6 +193,29 @@ def _of_arms(run: Transient) -> dict[str, np.ndarray]:
     return found
 
 
+def _spectrum(run: Transient) -> np.ndarray:
+    """Of each strand the largest of its probes, (strand, bin) [m]: one alone may sit on a node of a shape."""
+    p = run.parameters
+    spectra = amplitude_spectrum(_moved(run)[run.judged], p["sampling_rate"], frequency_bins(p).values)
+    largest: np.ndarray = spectra.max(axis=2).T
+    return largest
+
+
+def _moved(run: Transient) -> np.ndarray:
+    """Displacement, (done, strand, probe) [m]."""
+    return run.displacement.reshape(run.done, len(run.drawn.spans), -1)
+
+
+def _answered(run: Transient, expected: np.ndarray) -> np.ndarray:
+    """Frequencies (strand, mode) [Hz] at which strands answer a kick; nan without one."""
+    moved = _moved(run)
+    before, after = moved[run.kick : run.first_judged], moved[run.judged]
+    if run.parameters["kick"] == 0.0 or len(before) < SHORTEST_SEGMENT:
+        return np.full(expected.shape, np.nan)
+    rate = run.parameters["sampling_rate"]
+    return np.array([answers(before[:, k], after[:, k], rate, modes) for k, modes in enumerate(expected)])
+
+
 def histories(run: Transient) -> xr.Dataset:
     """Histories over `time` and means by `position` of a run, finished or failed.
 
@@ -167,6 +238,18 @@ def histories(run: Transient) -> xr.Dataset:
     names = [name for name in run.channels if name.startswith("arm ")]
     over_time |= {name: (name, "rad", "rotation from where it is drawn") for name in names}
     profiles = {name: (values, *PROFILES[name]) for name, values in run.profiles.items()}
+    tension = np.array([_late(run, f"tension {k}") for k in run.drawn.spans])
+    sliding = sliding_tension(run.parameters, run.path, tension, run.places)
+    words = "tension where it slides", "N", "by Euler and Eytelwein, from the strands' tensions"
+    profiles["sliding_tension"] = sliding, *words
+    words = "wrap angle", "rad", "from the inlet of the arc"
+    profiles["wrap_angle"] = wrap_angles(run.path, run.places), *words
     names = [name for pair in zip(run.drawn.pulleys, run.drawn.spans, strict=True) for name in pair]
     region = np.array(names)[regions(run.path, run.places)]
     return dataset(run, over_time, profiles, run.places, region)
+
+
+def _late(run: Transient, name: str) -> float:
+    """Mean of a channel over the judged part as far as the run has come; nan before it."""
+    values = run.channel(name)[run.first_judged :]
+    return float(values.mean()) if values.size else np.nan

@@ -11,6 +11,7 @@ from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.belt_drive import courses
 from cvt_hpc.models.belt_drive import drive as fields
 from cvt_hpc.models.belt_drive.drive import advance
+from cvt_hpc.models.belt_drive.kick import kick
 from cvt_hpc.models.belt_drive.layout import layout
 from cvt_hpc.models.belt_drive.pulleys import Pulleys
 from cvt_hpc.models.belt_drive.readings import PLACES, PROFILES, Reading, Readings, scalars_of
@@ -117,6 +118,9 @@ class Transient:
             Why the run ends here.
         """
         for _ in range(min(samples, self.samples - self.done)):
+            if self.done == self.first_judged and self.parameters["kick"] > 0.0:
+                chain = self._state.chain
+                kick(self.path, self.parameters["line_mass"], self.parameters["kick"], chain.q, chain.v)
             inputs = np.array([self._inputs(self.time), self._inputs(self.time + self.interval)])
             if not self._march(inputs):
                 self.failure = Status.FAILED_NUMERICS, "the equations of a step have no solution in numbers"
@@ -156,7 +160,7 @@ class Transient:
         stored = np.nan
         if self.done >= self.first_judged:
             found.add_profiles(self._sums)
-        if self.done in (self.first_judged, self.samples - 1):
+        if self.done in (self.whole_turns.start, self.samples - 1):
             stored = found.stored_energy()
         self._totals[self.done] = [*self._state.totals, stored]
         self.done += 1
@@ -249,8 +253,8 @@ class Transient:
         return self.path.path_length / (self._readings.belt_speed * self.interval)
 
     def mean_rate(self, total: int) -> float:
-        """Mean rate over the judged part of one of the totals, by its index; -1: of the stored energy."""
-        part = self._totals[self.judged]
+        """Mean rate over whole turns of one of the totals, by its index; -1: of the stored energy."""
+        part = self._totals[self.whole_turns]
         return float((part[-1, total] - part[0, total]) / ((len(part) - 1) * self.interval))
 
     @property
