@@ -4,7 +4,7 @@ A node has its position r and the gradient r' = dr/ds by the length s without lo
 element of length l between two nodes is the cubic of Hermite through both, so that positions and gradients
 are continuous and the shapes S_i(s) make r' = sum S_i' q_i. There is no shear. Energy and what is lost of it,
 
-    W = int [EA/2 e^2 + EI/2 |r''|^2] ds,    e ~ (r' . r' - 1) / 2,
+    W = int [EA/2 e^2 + EI/2 |r''|^2] ds,    e = (r' . r' - 1) / 2,
     P = int [cA (de/dt)^2 + beta EI (dk/dt)^2 + alpha m (n . dr/dt)^2] ds,    k ~ r' x r'',
 
 with n across the beam, do not depend on the frame: a rigid motion stores nothing, and loses nothing but what
@@ -13,11 +13,11 @@ negligible where EI / EA is small beside the square of an element's length. The 
 Kelvin and Voigt; alpha and beta stand for Rayleigh's, but a belt that runs along itself around a pulley
 loses nothing by them.
 
-A cubic that bends unevenly cannot keep |r'| = 1 all along. So the strain itself, of fourth degree, would lock
-the curvature and wave along the element (Gerstmayr and Irschik 2008). Therefore e is the parabola that has
-the strain's values at both nodes and its mean: these three can vanish in any bend, and no other motion makes
-them vanish together. Likewise k is the line nearest to the curvature, through its values at two Gauss points;
-alpha's integral is that of these points. All other integrals are exact.
+The curvature k is the line nearest to r' x r'', through its values at two Gauss points, as the element bends
+by lines; alpha's integral is that of these points. All other integrals are exact.
+
+A cubic that bends unevenly cannot keep e even, so that e waves along an element that is as long as a bend.
+The force that it transmits is the line nearest to EA e, its mean and its slope, which `tensions` gives.
 """
 
 from __future__ import annotations
@@ -55,6 +55,10 @@ def shapes(place: float | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 SHAPES = np.stack(shapes(PLACES), 1)  # at the Gauss points: (point, derivative, shape)
+
+
+# values at the Gauss points of the line nearest to values there, (point, point)
+LINE = WEIGHTS * (1.0 + 3.0 * np.outer(_X, _X))
 
 
 class AncfBeam(NamedTuple):
@@ -156,13 +160,6 @@ def at_places(beam: AncfBeam, nodes: np.ndarray, shape: np.ndarray) -> np.ndarra
 
 
 @register_jitable
-def strain_at(place, mean, first, second):
-    """Value at a place from 0 to 1 of the parabola with a mean and with values at both ends."""
-    x = 2.0 * place - 1.0
-    return mean + 0.5 * (second - first) * x + (0.5 * (first + second) - mean) * (1.5 * x * x - 0.5)
-
-
-@register_jitable
 def tension_of(axial_stiffness, strain):
     """Force along the belt against the area without load [N], EA e |r'|."""
     return axial_stiffness * strain * np.sqrt(1.0 + 2.0 * strain)
@@ -171,10 +168,7 @@ def tension_of(axial_stiffness, strain):
 def strains(beam: AncfBeam, q: np.ndarray) -> np.ndarray:
     """Axial strain at the Gauss points, (k, POINTS), from positions (n, 4) of the nodes."""
     square = (at_places(beam, q, SHAPES[:, 1]) ** 2).sum(-1) / beam.lengths[:, None] ** 2
-    nodes = 0.5 * ((q[:, 2:] ** 2).sum(-1) - 1.0)
-    first = np.arange(beam.lengths.size)
-    ends = nodes[first], nodes[(first + 1) % len(q)]
-    return strain_at(PLACES, *(values[:, None] for values in (0.5 * (square @ WEIGHTS - 1.0), *ends)))
+    return 0.5 * (square - 1.0)
 
 
 def energies(beam: AncfBeam, q: np.ndarray, u: np.ndarray) -> tuple[float, float, float]:
@@ -191,5 +185,8 @@ def energies(beam: AncfBeam, q: np.ndarray, u: np.ndarray) -> tuple[float, float
 
 
 def tensions(beam: AncfBeam, q: np.ndarray) -> np.ndarray:
-    """Elastic force along the belt at the Gauss points [N], (k, POINTS), from positions (n, 4) of the nodes."""
-    return tension_of(beam.axial_stiffness, strains(beam, q))
+    """Elastic force along the belt [N], (k, POINTS), from positions (n, 4) of the nodes.
+
+    That is EA e |r'| against the area without load, at the Gauss points of the line nearest to e.
+    """
+    return tension_of(beam.axial_stiffness, strains(beam, q) @ LINE.T)

@@ -1,12 +1,11 @@
 """Equations of a correction of the speeds of ANCF elements, several elements at a time.
 
 Of an element with ends r1, r2, gradients g1, g2 and length l all forces but those of mass and alpha follow
-from z = (d, a, b) = (r2 - r1, l g1, l g2) and its rate. Strains and curvatures are quadratic in z,
+from z = (d, a, b) = (r2 - r1, l g1, l g2) and its rate. Strain and curvature at a point are quadratic in z,
 
     m = z . H z / 2 + const,    dm/dt = h . dz/dt,    h = H z,
 
 with constant H, so that forces are sums of h, and the slopes of dm/dt by the speeds are H (z + tau dz/dt).
-They are the strain at both ends and its mean, and the curvature r' x r'' at both Gauss points.
 """
 
 from __future__ import annotations
@@ -16,17 +15,17 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, fma
-from cvt_hpc.multibody.ancf_beam import PER_NODE, AncfBeam, shapes
+from cvt_hpc.multibody.ancf_beam import PER_NODE, POINTS, SHAPES, WEIGHTS, AncfBeam, shapes
 from cvt_hpc.solvers.cyclic_blocks import DIAGONAL, LOWER, UPPER
 
 SIDE_BY_SIDE = 8  # elements in lanes
 # Fields of an element: what it is called with, then what becomes of that
 EXTENT, Z, RATE, SPEED, ACCELERATION = 0, 4, 10, 16, 24
-GRADIENTS, LATER, SLOPES = 32, 50, 68  # of three measures by z, those at z + tau dz/dt, and their slopes
-INNER = 98  # slopes of the forces on z, (6, 6)
-FORCE, MATRIX = 134, 142  # on r1, g1, r2, g2, and its slopes, (8, 8)
-LOST = 206
-
+GRADIENTS, LATER = 32, 44  # of both curvatures by z, and those at z + tau dz/dt
+INNER = 56  # slopes of the forces on z, (6, 6)
+PULL = 92  # of the inside on z
+FORCE, MATRIX = 98, 106  # on r1, g1, r2, g2, and its slopes, (8, 8)
+LOST = 170
 GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
 VALUE = shapes(np.array(GAUSS))[0]  # (point, shape)
 MASS = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) / 420.0
@@ -129,74 +128,64 @@ def _compute(beam, w, tau):
     m, ea, ei, ca = beam.line_mass, beam.axial_stiffness, beam.bending_stiffness, beam.axial_damping
     l0 = w[0, EXTENT + 1]
     per = 1.0 / l0
-    per_square = per * per
-    _gradients(w, Z, GRADIENTS, per)
-    _gradients(w, RATE, LATER, per)
-    # strains: mean, and at both ends
-    ax, ay, bx, by = w[0, Z + 2], w[0, Z + 3], w[0, Z + 4], w[0, Z + 5]
-    ux, uy, vx, vy = w[0, RATE + 2], w[0, RATE + 3], w[0, RATE + 4], w[0, RATE + 5]
-    mean, later, rate = _dot(w, Z, GRADIENTS), _dot(w, RATE, LATER), _dot(w, RATE, GRADIENTS)
-    mean = 0.5 * (mean + tau * tau * later - 1.0)
-    strain_1 = 0.5 * (per_square * (ax * ax + ay * ay + tau * tau * (ux * ux + uy * uy)) - 1.0)
-    strain_2 = 0.5 * (per_square * (bx * bx + by * by + tau * tau * (vx * vx + vy * vy)) - 1.0)
-    rate_1, rate_2 = per_square * (ax * ux + ay * uy), per_square * (bx * vx + by * vy)
-    elastic, viscous = _weighted(l0, mean, strain_1, strain_2), _weighted(l0, rate, rate_1, rate_2)
-    normal = ea * elastic[0] + ca * viscous[0]
-    normal_1, normal_2 = ea * elastic[1] + ca * viscous[1], ea * elastic[2] + ca * viscous[2]
-    lost = ca * (rate * viscous[0] + rate_1 * viscous[1] + rate_2 * viscous[2])
-    # curvatures
-    damped = 0.5 * l0 * beam.bending_damping * ei
-    turn_1, turn_2 = _dot(w, RATE, GRADIENTS + 6), _dot(w, RATE, GRADIENTS + 12)
+    cube = per * per * per
+    _curve(w, Z, GRADIENTS, cube)
+    _curve(w, RATE, LATER, cube)
+    # bending: its linear part, and damping of both curvatures
+    damped, bend = 0.5 * l0 * beam.bending_damping * ei, ei * cube
+    turn_1, turn_2 = _dot(w, RATE, GRADIENTS), _dot(w, RATE, GRADIENTS + 6)
     moment_1, moment_2 = damped * turn_1, damped * turn_2
-    lost = lost + moment_1 * turn_1 + moment_2 * turn_2
-    # slopes of normal forces and moments by the rate of z, with h at z + tau dz/dt
-    stretch = (tau * ea + ca) * l0
-    for c in range(6):
-        for measure in range(3):
-            field = LATER + 6 * measure + c
-            w[0, field] = fma(tau, w[0, field], w[0, GRADIENTS + 6 * measure + c])
-        w[0, SLOPES + 6 + c] = damped * w[0, LATER + 6 + c]
-        w[0, SLOPES + 12 + c] = damped * w[0, LATER + 12 + c]
-        w[0, SLOPES + c] = 1.2 * stretch * w[0, LATER + c]
-        of_ends = -0.1 * stretch * w[0, LATER + c]
-        w[0, SLOPES + 18 + c] = of_ends
-        w[0, SLOPES + 24 + c] = of_ends
+    lost = moment_1 * turn_1 + moment_2 * turn_2
     for x in range(2):
-        of_1 = stretch * per_square * fma(tau, w[0, RATE + 2 + x], w[0, Z + 2 + x])
-        of_2 = stretch * per_square * fma(tau, w[0, RATE + 4 + x], w[0, Z + 4 + x])
-        w[0, SLOPES + 2 + x] = w[0, SLOPES + 2 + x] - 0.1 * of_1
-        w[0, SLOPES + 4 + x] = w[0, SLOPES + 4 + x] - 0.1 * of_2
-        w[0, SLOPES + 20 + x] = w[0, SLOPES + 20 + x] + 2.0 / 15.0 * of_1
-        w[0, SLOPES + 22 + x] = w[0, SLOPES + 22 + x] - 1.0 / 30.0 * of_2
-        w[0, SLOPES + 26 + x] = w[0, SLOPES + 26 + x] - 1.0 / 30.0 * of_1
-        w[0, SLOPES + 28 + x] = w[0, SLOPES + 28 + x] + 2.0 / 15.0 * of_2
+        d, a, b = w[0, Z + x], w[0, Z + 2 + x], w[0, Z + 4 + x]
+        w[0, PULL + x] = bend * (12.0 * d - 6.0 * (a + b))
+        w[0, PULL + 2 + x] = bend * (4.0 * a + 2.0 * b - 6.0 * d)
+        w[0, PULL + 4 + x] = bend * (4.0 * b + 2.0 * a - 6.0 * d)
     for r in range(6):
-        h0, h1, h2 = w[0, GRADIENTS + r], w[0, GRADIENTS + 6 + r], w[0, GRADIENTS + 12 + r]
+        h1, h2 = w[0, GRADIENTS + r], w[0, GRADIENTS + 6 + r]
+        w[0, PULL + r] = fma(moment_1, h1, fma(moment_2, h2, w[0, PULL + r]))
+        h1, h2 = damped * h1, damped * h2
         for c in range(6):
-            total = h0 * w[0, SLOPES + c]
-            total = fma(h1, w[0, SLOPES + 6 + c], fma(h2, w[0, SLOPES + 12 + c], total))
-            w[0, INNER + 6 * r + c] = total
-    for r in range(2, 6):
-        end = per_square * w[0, Z + r]
-        for c in range(6):
-            slope = w[0, SLOPES + 18 + 6 * ((r - 2) // 2) + c]
-            w[0, INNER + 6 * r + c] = fma(end, slope, w[0, INNER + 6 * r + c])
-    # slopes at constant normal forces and moments, and the linear part of bending
-    bend, tight = ei * per * per_square, per_square * normal
-    first = tau * per * per_square * (FIRST[0] * moment_1 + FIRST[1] * moment_2)
-    second = tau * per * per_square * (SECOND[0] * moment_1 + SECOND[1] * moment_2)
-    third = tau * per * per_square * (moment_1 + moment_2)
-    _add_even(w, 0, 0, tau * (1.2 * tight + 12.0 * bend))
-    _add_even(w, 1, 1, tau * (2.0 / 15.0 * tight + per_square * normal_1 + 4.0 * bend))
-    _add_even(w, 2, 2, tau * (2.0 / 15.0 * tight + per_square * normal_2 + 4.0 * bend))
+            later_1 = fma(tau, w[0, LATER + c], w[0, GRADIENTS + c])
+            later_2 = fma(tau, w[0, LATER + 6 + c], w[0, GRADIENTS + 6 + c])
+            w[0, INNER + 6 * r + c] = fma(h1, later_1, h2 * later_2)
+    bend = tau * bend
+    _add_even(w, 0, 0, 12.0 * bend)
     for end in range(1, 3):
-        coupling = -tau * (0.1 * tight + 6.0 * bend)
-        _add_even(w, 0, end, coupling)
-        _add_even(w, end, 0, coupling)
-        _add_even(w, end, 3 - end, tau * (2.0 * bend - 1.0 / 30.0 * tight))
-    _add_odd(w, 0, 1, first)
-    _add_odd(w, 0, 2, second)
-    _add_odd(w, 1, 2, -third)
+        _add_even(w, end, end, 4.0 * bend)
+        _add_even(w, end, 3 - end, 2.0 * bend)
+        _add_even(w, 0, end, -6.0 * bend)
+        _add_even(w, end, 0, -6.0 * bend)
+    _add_odd(w, 0, 1, tau * cube * (FIRST[0] * moment_1 + FIRST[1] * moment_2))
+    _add_odd(w, 0, 2, tau * cube * (SECOND[0] * moment_1 + SECOND[1] * moment_2))
+    _add_odd(w, 1, 2, -tau * cube * (moment_1 + moment_2))
+    # strain
+    for p in range(POINTS):
+        s0, s1, s2 = SHAPES[p, 1, 2], SHAPES[p, 1, 1], SHAPES[p, 1, 3]
+        slopes = (s0, s1, s2)
+        px = per * fma(s0, w[0, Z], fma(s1, w[0, Z + 2], s2 * w[0, Z + 4]))
+        py = per * fma(s0, w[0, Z + 1], fma(s1, w[0, Z + 3], s2 * w[0, Z + 5]))
+        ux = per * fma(s0, w[0, RATE], fma(s1, w[0, RATE + 2], s2 * w[0, RATE + 4]))
+        uy = per * fma(s0, w[0, RATE + 1], fma(s1, w[0, RATE + 3], s2 * w[0, RATE + 5]))
+        strain = 0.5 * (px * px + py * py - 1.0 + tau * tau * (ux * ux + uy * uy))
+        rate = px * ux + py * uy
+        weight = WEIGHTS[p] * l0
+        tension = weight * (ea * strain + ca * rate)
+        lost = lost + weight * ca * rate * rate
+        stretch = weight * (tau * ea + ca) * per * per
+        ax, ay = stretch * px, stretch * py
+        lx, ly, tight = fma(tau, ux, px), fma(tau, uy, py), tau * per * per * tension
+        xx, xy, yx, yy = fma(ax, lx, tight), ax * ly, ay * lx, fma(ay, ly, tight)
+        for r in range(3):
+            pull = slopes[r] * per * tension
+            w[0, PULL + 2 * r] = fma(pull, px, w[0, PULL + 2 * r])
+            w[0, PULL + 2 * r + 1] = fma(pull, py, w[0, PULL + 2 * r + 1])
+            for c in range(3):
+                both, field = slopes[r] * slopes[c], INNER + 12 * r + 2 * c
+                w[0, field] = fma(both, xx, w[0, field])
+                w[0, field + 1] = fma(both, xy, w[0, field + 1])
+                w[0, field + 6] = fma(both, yx, w[0, field + 6])
+                w[0, field + 7] = fma(both, yy, w[0, field + 7])
     # of mass; then of what is inside the element
     for r in range(PER_NODE):
         for x in range(2):
@@ -207,15 +196,10 @@ def _compute(beam, w, tau):
     lost = lost + _damp_across(w, 0.5 * beam.mass_damping * m * l0)
     w[0, LOST] = lost
     for x in range(2):
-        dx, gx, hx = w[0, Z + x], w[0, Z + 2 + x], w[0, Z + 4 + x]
-        on_d = bend * (12.0 * dx - 6.0 * (gx + hx))
-        on_a = bend * (4.0 * gx + 2.0 * hx - 6.0 * dx) + normal_1 * per_square * gx
-        on_b = bend * (4.0 * hx + 2.0 * gx - 6.0 * dx) + normal_2 * per_square * hx
-        on_d = on_d + _pull(w, x, normal, moment_1, moment_2)
-        w[0, FORCE + x] = w[0, FORCE + x] + on_d
-        w[0, FORCE + 4 + x] = w[0, FORCE + 4 + x] - on_d
-        w[0, FORCE + 2 + x] = l0 * (w[0, FORCE + 2 + x] - on_a - _pull(w, 2 + x, normal, moment_1, moment_2))
-        w[0, FORCE + 6 + x] = l0 * (w[0, FORCE + 6 + x] - on_b - _pull(w, 4 + x, normal, moment_1, moment_2))
+        w[0, FORCE + x] = w[0, FORCE + x] + w[0, PULL + x]
+        w[0, FORCE + 4 + x] = w[0, FORCE + 4 + x] - w[0, PULL + x]
+        w[0, FORCE + 2 + x] = l0 * (w[0, FORCE + 2 + x] - w[0, PULL + 2 + x])
+        w[0, FORCE + 6 + x] = l0 * (w[0, FORCE + 6 + x] - w[0, PULL + 4 + x])
     for r in range(PER_NODE):
         of_r = 0 if r % 2 == 0 else r - r // 2
         for c in range(PER_NODE):
@@ -233,19 +217,11 @@ def _compute(beam, w, tau):
 
 
 @register_jitable
-def _gradients(w, z, to, per):
-    """H z of the mean strain and of both curvatures."""
+def _curve(w, z, to, cube):
+    """H z of both curvatures."""
     dx, dy, ax, ay, bx, by = w[0, z], w[0, z + 1], w[0, z + 2], w[0, z + 3], w[0, z + 4], w[0, z + 5]
-    square = per * per
-    for x in range(2):
-        d, a, b = w[0, z + x], w[0, z + 2 + x], w[0, z + 4 + x]
-        w[0, to + x] = square * (1.2 * d - 0.1 * (a + b))
-        w[0, to + 2 + x] = square * (2.0 / 15.0 * a - 1.0 / 30.0 * b - 0.1 * d)
-        w[0, to + 4 + x] = square * (2.0 / 15.0 * b - 1.0 / 30.0 * a - 0.1 * d)
-    cube = square * per
     for point in range(2):
-        at = to + 6 + 6 * point
-        first, second = FIRST[point] * cube, SECOND[point] * cube
+        at, first, second = to + 6 * point, FIRST[point] * cube, SECOND[point] * cube
         w[0, at], w[0, at + 1] = first * ay + second * by, -(first * ax + second * bx)
         w[0, at + 2], w[0, at + 3] = -first * dy - cube * by, first * dx + cube * bx
         w[0, at + 4], w[0, at + 5] = -second * dy + cube * ay, second * dx - cube * ax
@@ -257,23 +233,6 @@ def _dot(w, one, other):
     for c in range(1, 6):
         total = fma(w[0, one + c], w[0, other + c], total)
     return total
-
-
-@register_jitable
-def _weighted(l0, mean, first, second):
-    """Slopes of l/2 times the mean square of a parabola, by its mean and its values at both ends."""
-    ends = 0.1 * (first + second)
-    return (
-        l0 * (1.2 * mean - ends),
-        l0 * (2.0 / 15.0 * first - 1.0 / 30.0 * second - 0.1 * mean),
-        l0 * (2.0 / 15.0 * second - 1.0 / 30.0 * first - 0.1 * mean),
-    )
-
-
-@register_jitable
-def _pull(w, c, normal, moment_1, moment_2):
-    total = normal * w[0, GRADIENTS + c]
-    return fma(moment_1, w[0, GRADIENTS + 6 + c], fma(moment_2, w[0, GRADIENTS + 12 + c], total))
 
 
 @register_jitable

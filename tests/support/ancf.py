@@ -114,15 +114,6 @@ def _points(beam, q, count=7):
         )
 
 
-def strain_of(x, weight, q, i, slope):
-    """The parabola with the values of the strain at both ends and its mean."""
-    strain = 0.5 * ((slope**2).sum(-1) - 1.0)
-    ends = 0.5 * ((q[[i, (i + 1) % len(q)], 2:] ** 2).sum(-1) - 1.0)
-    mean = weight @ strain / weight.sum()
-    matrix = [[1, 0, 0], [1, 1, 1], [1, 1 / 2, 1 / 3]]
-    return np.linalg.solve(matrix, [ends[0], ends[1], mean]) @ np.stack([x**0, x, x**2])
-
-
 def nearest_line(x, weight, values):
     """Projection on 1 and x in the mean square."""
     basis = np.stack([x**0, x])
@@ -131,8 +122,8 @@ def nearest_line(x, weight, values):
 
 def potential(beam, q):
     total = 0.0
-    for i, (x, w, r, slope, bend) in enumerate(_points(beam, q)):
-        strain = strain_of(x, w, q, i, slope)
+    for _, w, r, slope, bend in _points(beam, q):
+        strain = 0.5 * ((slope**2).sum(-1) - 1.0)
         stored = 0.5 * beam.axial_stiffness * strain**2 + 0.5 * beam.bending_stiffness * (bend**2).sum(-1)
         total += (w * (stored - beam.line_mass * r @ np.array(beam.gravity))).sum()
     return total
@@ -142,10 +133,8 @@ def lost(beam, q, u):
     """Power that damping takes, for real q."""
     total = 0.0
     bends, moved = (list(_points(beam, nodes)) for nodes in (q, u))
-    for i, ((x, w, _, slope, bend), (*_, turn, bending)) in enumerate(zip(bends, moved, strict=True)):
-        # exact, as strains are quadratic
-        sides = [strain_of(x, w, q + h * u, i, slope + h * turn) for h in (0.5, -0.5)]
-        rate = sides[0] - sides[1]
+    for (x, w, _, slope, bend), (*_, turn, bending) in zip(bends, moved, strict=True):
+        rate = (slope * turn).sum(-1)
         bent = nearest_line(x, w, cross(turn, bend) + cross(slope, bending))
         power = beam.axial_damping * rate**2
         power = power + beam.bending_damping * beam.bending_stiffness * bent**2

@@ -8,7 +8,8 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.belt_drive.contact import Contact, Touch
-from cvt_hpc.multibody.ancf_beam import PLACES, POINTS, SHAPES, WEIGHTS, AncfBeam, strain_at, tension_of
+from cvt_hpc.multibody.ancf_beam import PLACES, POINTS, SHAPES, WEIGHTS, AncfBeam, tension_of
+from cvt_hpc.multibody.ancf_chain import Chain
 from cvt_hpc.physics.nearest_on_path import Way, nearest
 
 
@@ -63,11 +64,14 @@ def empty_sample(probes: int, pulleys: int) -> Sample:
 def read(
     way: Way,
     beam: AncfBeam,
-    q: np.ndarray,
+    chain: Chain,
+    contact: Contact,
     touch: Touch,
+    slopes: np.ndarray,
     probes: np.ndarray,
     line: Line,
     sample: Sample,
+    sums: np.ndarray,
 ) -> None:
     """Read a sample.
 
@@ -75,16 +79,21 @@ def read(
     ----------
     way : Way
         The reference path.
-    beam, q : AncfBeam, (n, 4) array
-        The belt, and positions of its nodes [m, 1].
-    touch : Touch
+    beam, chain : AncfBeam, Chain
+        The belt, and its motion.
+    contact, touch : Contact, Touch
         Its contacts.
+    slopes : (C, 4) array
+        Derivatives of the shapes at the contact points.
     probes : (p,) array
         Path coordinates [m].
     line, sample : Line, Sample
         What is found.
+    sums : (6, place) array
+        To which profiles are added at equal shares of the path: length, tension and offset by it, normal
+        force and force forwards per length, samples; none at no places.
     """
-    _locate(way, beam, q, line)
+    _locate(way, beam, chain.q, line)
     _displace(line, probes, way.length, sample.displacement)
     for p in range(sample.tension.size):
         middle, quarter = way.begins[p, 1] + 0.5 * way.spans[p], 0.25 * way.spans[p]
@@ -103,6 +112,8 @@ def read(
                 slid += force * touch.slip[p, i, c]
                 largest = max(largest, force)
         sample.slip[p], sample.largest[p] = slid / max(pressed, 1e-9), largest
+    if sums.shape[1] > 0:
+        _add_profiles(way, beam, chain.stage_q, contact, slopes, touch, line, sums)
 
 
 @kernel
@@ -110,16 +121,16 @@ def _locate(way, beam, q, line):
     n = q.shape[0]
     for i in range(beam.lengths.size):
         j, l0 = (i + 1) % n, beam.lengths[i]
-        mean = 0.0
+        mean, slope = 0.0, 0.0
         for c in range(POINTS):
             x, y = _at(SHAPES[c, 0], q, i, j, l0)
             sx, sy = _at(SHAPES[c, 1], q, i, j, l0)
             line.position[i, c], line.offset[i, c] = nearest(way, x, y, sx, sy)
-            mean += 0.5 * WEIGHTS[c] * ((sx * sx + sy * sy) / (l0 * l0) - 1.0)
-        first = 0.5 * (q[i, 2] * q[i, 2] + q[i, 3] * q[i, 3] - 1.0)
-        second = 0.5 * (q[j, 2] * q[j, 2] + q[j, 3] * q[j, 3] - 1.0)
+            strain = 0.5 * WEIGHTS[c] * ((sx * sx + sy * sy) / (l0 * l0) - 1.0)
+            mean, slope = mean + strain, slope + 12.0 * (PLACES[c] - 0.5) * strain
         for c in range(POINTS):
-            line.tension[i, c] = tension_of(beam.axial_stiffness, strain_at(PLACES[c], mean, first, second))
+            strain = mean + slope * (PLACES[c] - 0.5)
+            line.tension[i, c] = tension_of(beam.axial_stiffness, strain)
 
 
 @kernel
@@ -146,27 +157,7 @@ def _displace(line, probes, length, found):
 
 
 @kernel
-def add_profiles(
-    way: Way,
-    beam: AncfBeam,
-    q: np.ndarray,
-    contact: Contact,
-    slopes: np.ndarray,
-    touch: Touch,
-    line: Line,
-    sums: np.ndarray,
-) -> None:
-    """Add a sample to sums at equal shares of the path: of lengths, of what they weigh, of forces.
-
-    Parameters
-    ----------
-    way, beam, q, contact, touch, line
-        As those of `read`, with the positions in which the contacts have their forces.
-    slopes : (C, 4) array
-        Derivatives of the shapes at the contact points.
-    sums : (6, place) array
-        Length, tension and offset by it, normal force and force forwards per length, samples.
-    """
+def _add_profiles(way, beam, q, contact, slopes, touch, line, sums):
     places = sums.shape[1]
     per = places / way.length
     for i in range(beam.lengths.size):

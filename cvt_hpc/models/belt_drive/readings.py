@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.kernels import called_alike
-from cvt_hpc.models.belt_drive.along_belt import add_profiles, empty_line, empty_sample, read
+from cvt_hpc.models.belt_drive.along_belt import empty_line, empty_sample, read
 from cvt_hpc.models.belt_drive.drive import Drive, State
 from cvt_hpc.models.belt_drive.layout import Layout
 from cvt_hpc.models.belt_drive.pulleys import arms_energy
@@ -63,7 +63,7 @@ class Readings:
         self.probes = starts[:, None] + path.spans[:, None] * shares
         self._way, self._line = way(path), empty_line(p["elements"])
         self._sample = empty_sample(self.probes.size, len(path.radius))
-        self._read, self._add_profiles = called_alike(read), called_alike(add_profiles)
+        self._read = called_alike(read)
         self._slopes = shapes((np.arange(p["contact_points"]) + 0.5) / p["contact_points"])[1]
         self.places = (np.arange(PLACES) + 0.5) * (path.path_length / PLACES)
 
@@ -81,6 +81,8 @@ class Reading:
         Where it is read.
     drive, state : Drive, State
         What moves, and its motion.
+    sums : (6, PLACES) array, optional
+        To which profiles are added: length, tension and offset by it, forces, and samples at each place.
 
     Attributes
     ----------
@@ -92,12 +94,12 @@ class Reading:
         Whether no point of the belt touches a pulley.
     """
 
-    def __init__(self, where: Readings, drive: Drive, state: State) -> None:
+    def __init__(self, where: Readings, drive: Drive, state: State, sums: np.ndarray | None = None) -> None:
         self._where, self._drive, self._state = where, drive, state
-        found = where._sample
-        where._read(
-            where._way, drive.beam, state.chain.q, state.touch, where.probes.ravel(), where._line, found
-        )
+        sums = np.zeros((len(PROFILES) + 2, 0)) if sums is None else sums
+        belt, contacts = (drive.beam, state.chain), (drive.contact, state.touch)
+        found, points = where._sample, (where._slopes, where.probes.ravel())
+        where._read(where._way, *belt, *contacts, *points, where._line, found, sums)
         self.displacement, self.strand_tensions, self._slip = found.displacement, found.tension, found.slip
         self.lifted = found.largest <= 0.0
 
@@ -108,12 +110,6 @@ class Reading:
         slip = drawn.path.turn * self._slip / self._where.belt_speed
         found = [float(speeds[drawn.driven]), *self.strand_tensions, *slip]
         return [*found, *(speeds if len(speeds) > 2 else ()), *wheels.angle[0]]
-
-    def add_profiles(self, sums: np.ndarray) -> None:
-        """Add to sums at each place, (6, place): length, tension and offset by it, forces, and samples."""
-        where, contact, touch = self._where, self._drive.contact, self._state.touch
-        belt = self._drive.beam, self._state.chain.stage_q
-        where._add_profiles(where._way, *belt, contact, where._slopes, touch, where._line, sums)
 
     def stored_energy(self) -> float:
         """Kinetic and elastic energy of belt, driven pulleys and arms [J], without what contacts store."""
