@@ -149,8 +149,9 @@ def test_a_step_is_no_longer_than_a_sample_in_the_cost_of_a_run():
 
 def test_a_belt_without_equilibrium_is_a_failed_run(monkeypatch):
     monkeypatch.setattr(start, "MOST_STEPS", 2)
-    found = simulate(job(), {})
+    found = simulate(job(most_refinements=3), {})
     assert found.status == Status.FAILED_NUMERICS and found.sizes["time"] == 0
+    assert found.refinements == 0  # no shorter step would help
     assert str(found.reason.values).startswith("at 0 ms: the belt finds no equilibrium on its pulleys")
 
 

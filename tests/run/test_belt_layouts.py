@@ -112,17 +112,19 @@ def test_a_belt_of_a_given_length_has_its_tension(held):
     assert given["tension"] == pytest.approx(p["tension"], rel=0.01)  # of bending EI / R^2
 
 
+COURSES = {
+    "driving_speed": 60.0,
+    "driving_speed_profile": (0.0, 1.0),
+    "profile_time": (0.0, 0.1),
+    "speed_ripple": 5.0,
+    "load": 8.0,
+}
+
+
 @pytest.fixture(scope="module")
 def started():
     """From rest to 60 rad/s and a ripple, with a tensioner."""
-    courses = {
-        "driving_speed": 60.0,
-        "driving_speed_profile": (0.0, 1.0),
-        "profile_time": (0.0, 0.1),
-        "speed_ripple": 5.0,
-        "load": 8.0,
-    }
-    return simulate(job(**SERPENTINE, **courses), {})
+    return simulate(job(**SERPENTINE, **COURSES), {})
 
 
 def test_a_drive_starts_from_rest_and_follows_its_courses(started):
@@ -147,6 +149,24 @@ def test_a_tensioner_evens_out_the_slack_spans(started):
     slack, behind, tight = started.strand_tension.values
     assert tight - 0.5 * (slack + behind) == pytest.approx(8.0 / 0.1, rel=0.05)
     assert (started.tension_ripple.values[:2] < 0.8 * started.tension_ripple.values[2]).all()
+
+
+def test_a_mirrored_drive_turns_the_other_way(started):
+    """Nothing tells left from right but the signs; rounding alone differs."""
+    mirrored = {"pulley_y": (0.0, 0.1, 0.0), "pulley_turn": (-1.0, 1.0, -1.0), "tensioner_y": (0.1,)}
+    found = simulate(job(**SERPENTINE | COURSES | mirrored), {})
+    for name in ("strand_tension", "slip", "friction_loss", "driven_speed", "friction_force"):
+        np.testing.assert_allclose(found[name], started[name], rtol=1e-6, atol=1e-9)
+    for name in ("arm_angle", "displacement"):
+        np.testing.assert_allclose(-found[name], started[name], rtol=1e-6, atol=1e-12)
+
+
+def test_a_file_gives_the_pulleys(tmp_path):
+    lines = ["x [mm],y [mm],radius [mm],turn,inertia [kg m^2],load", "0,0,100,1,0,0", "120,-100,40,-1,1e-4,0"]
+    (tmp_path / "pulleys.csv").write_text("\n".join([*lines, "240,0,100,1,5e-3,1"]))
+    tables = {"layout": {"pulley_file": "pulleys.csv"}, "belt": {"elements": 64}}
+    found = build_job({"name": "x", "model": "belt_drive"} | tables, str(tmp_path / "x.toml")).point(0)
+    assert {key: found[key] for key in PULLEYS} == PULLEYS
 
 
 def test_a_crossed_belt_turns_the_driven_pulley_the_other_way():

@@ -109,7 +109,7 @@ def read(
             for c in range(touch.normal.shape[2]):
                 force = touch.normal[p, i, c]
                 pressed += force
-                slid += force * touch.slip[p, i, c]
+                slid += force * touch.memory.slip[p, i, c]
                 largest = max(largest, force)
         sample.slip[p], sample.largest[p] = slid / max(pressed, 1e-9), largest
     if sums.shape[1] > 0:

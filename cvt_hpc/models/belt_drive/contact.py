@@ -6,9 +6,9 @@ length
 
     p = max(stiffness (R - d) + damping d/dt (R - d), 0).
 
-The rubber between the belt's cord and the rim turns with the pulley, so that the cord slides by the speed
-v = t . dr/dt - w d over it, and friction -mu(|v|, p) p tanh(|v| / friction_speed) v / |v| acts at the radius
-d: its moment turns the pulley.
+A point that approaches is pressed shortly before it is there, so that p has no jump. The rubber between the
+belt's cord and the rim turns with the pulley, so that the cord slides by the speed t . dr/dt - w d over it.
+Friction (`cvt_hpc.models.belt_drive.friction`) acts at the radius d: its moment turns the pulley.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
+from cvt_hpc.models.belt_drive.friction import Friction, Memory, begin_iterate, empty_memory, laws_hold, rub
 from cvt_hpc.models.belt_drive.pulleys import CONTACT_LOSS, FRICTION_LOSS, WORK_IN, Pulleys, Wheels
 from cvt_hpc.multibody.ancf_beam import PER_NODE, shapes
 from cvt_hpc.multibody.ancf_chain import Chain
-from cvt_hpc.physics.friction import FrictionLaw, friction_coefficient
-from cvt_hpc.physics.primal_dual import dual_of, friction
 from cvt_hpc.solvers.cyclic_blocks import DIAGONAL, LOWER, UPPER
+
+NEAR = 1.05  # radii of a pulley, beyond which nothing touches it
 
 
 class Contact(NamedTuple):
@@ -35,32 +36,28 @@ class Contact(NamedTuple):
         Shapes at the C points of an element of length 1.
     stiffness, damping : float
         Per length [N/m^2], [N s/m^2].
-    law : FrictionLaw
-        mu over speed and normal force per length.
-    friction_speed : float
-        Of the regularisation [m/s].
+    friction : Friction
+        How they rub.
     """
 
     shape: np.ndarray
     stiffness: float
     damping: float
-    law: FrictionLaw
-    friction_speed: float
+    friction: Friction
 
 
 class Touch(NamedTuple):
-    """What the contacts of P pulleys and k elements remember, and their forces; (P, k, C) arrays.
+    """What the contacts of P pulleys and k elements remember, and their forces.
 
     Attributes
     ----------
-    slip, dual : arrays
-        Sliding speed of the last iterate [m/s], and the dual of friction.
-    normal, tangential : arrays
+    memory : Memory
+        Of friction.
+    normal, tangential : (P, k, C) arrays
         Forces on the belt in the last stage, outwards and counter-clockwise [N].
     """
 
-    slip: np.ndarray
-    dual: np.ndarray
+    memory: Memory
     normal: np.ndarray
     tangential: np.ndarray
 
@@ -72,42 +69,7 @@ def contact_shapes(points: int) -> np.ndarray:
 
 def first_touch(pulleys: int, elements: int, points: int) -> Touch:
     """Contacts that remember nothing."""
-    return Touch(*np.zeros((4, pulleys, elements, points)))
-
-
-@kernel
-def rub(
-    contact: Contact, touch: Touch, p: int, i: int, c: int, slip: float, pressure: float, is_known: bool
-) -> tuple[float, float, float]:
-    """Friction of one contact.
-
-    Parameters
-    ----------
-    contact, touch : Contact, Touch
-        Law of friction, and what the contacts remember.
-    p, i, c : int
-        Pulley, element and point.
-    slip : float
-        Sliding speed of the belt over the pulley [m/s].
-    pressure : float
-        Normal force per length, above 0 [N/m].
-    is_known : bool
-        Whether `touch` is of an iterate of this stage; else the slip of this one is taken.
-
-    Returns
-    -------
-    (float, float, float)
-        Against the slip: friction force over normal force [1], and that ratio's slope by the slip [s/m];
-        slope of the friction force by the normal force [1].
-    """
-    mu, mu_slope = friction_coefficient(contact.law, abs(slip), pressure)
-    dual = touch.dual[p, i, c]
-    if is_known:
-        dual = dual_of(slip, 0.0, touch.slip[p, i, c], 0.0, dual, 0.0, contact.friction_speed)[0]
-        touch.dual[p, i, c] = dual
-    touch.slip[p, i, c] = slip
-    found = friction(slip, 0.0, abs(slip), dual, 0.0, mu, mu_slope, contact.friction_speed)
-    return found[0], found[2], found[0]
+    return Touch(empty_memory(pulleys, elements, points), *np.zeros((2, pulleys, elements, points)))
 
 
 @kernel
@@ -120,7 +82,7 @@ def add_contacts(
     wheels: Wheels,
     tau: float,
     is_known: bool,
-) -> None:
+) -> bool:
     """Add the forces of contacts, and their slopes, to the equations of a stage.
 
     Parameters
@@ -136,10 +98,16 @@ def add_contacts(
     tau : float
         [s]
     is_known : bool
-        Whether slip and dual are those of an iterate of this stage; else the slip of this one is taken.
+        Whether `touch` is of an iterate of this stage.
+
+    Returns
+    -------
+    bool
+        Whether the laws of friction held in that iterate.
     """
     q, u, n = chain.stage_q, chain.stage_v, chain.q.shape[0]
     last, points = wheels.speed.shape[1] - 1, contact.shape.shape[0]
+    begin_iterate(touch.memory)
     touch.normal[:] = 0.0
     touch.tangential[:] = 0.0
     for i in range(n):
@@ -159,7 +127,7 @@ def add_contacts(
             y = s0 * q[i, 1] + s1 * q[i, 3] + s2 * q[j, 1] + s3 * q[j, 3]
             for p in range(pulleys.radius.size):
                 away_x, away_y, radius = x - wheels.centre[p, 0], y - wheels.centre[p, 1], pulleys.radius[p]
-                if away_x * away_x + away_y * away_y >= radius * radius:
+                if away_x * away_x + away_y * away_y >= (NEAR * radius) ** 2:
                     continue
                 vx = s0 * u[i, 0] + s1 * u[i, 2] + s2 * u[j, 0] + s3 * u[j, 2]
                 vy = s0 * u[i, 1] + s1 * u[i, 3] + s2 * u[j, 1] + s3 * u[j, 3]
@@ -172,21 +140,21 @@ def add_contacts(
                 if pressure <= 0.0:
                     continue
                 slip = around - wheels.stage_speed[0, p] * distance
-                share, by_slip, by_force = rub(contact, touch, p, i, c, slip, pressure, is_known)
-                force, traction = weight * pressure, -weight * pressure * share
-                touch.normal[p, i, c], touch.tangential[p, i, c] = force, traction
-                wheels.power[FRICTION_LOSS + p] -= traction * slip
+                found = rub(contact.friction, touch.memory, p, i, c, slip, pressure, tau, is_known)
+                force, traction, settled = weight * pressure, -weight * found.force, -weight * found.settled
+                touch.normal[p, i, c], touch.tangential[p, i, c] = force, settled
+                wheels.power[FRICTION_LOSS + p] -= settled * slip
                 wheels.power[CONTACT_LOSS] += weight * contact.damping * outward * outward
                 if p == 0:
-                    wheels.power[WORK_IN] += traction * distance * wheels.stage_speed[0, 0]
+                    wheels.power[WORK_IN] += settled * distance * wheels.stage_speed[0, 0]
                 # slopes by speeds of the belt: of the force, of the slip, of traction and its moment
-                steep = -weight * pressure * by_slip
+                steep = -weight * found.by_slip
                 of_normal = -weight * (contact.stiffness * tau + contact.damping)
                 of_around = -weight * contact.damping * tau * around / distance
-                by_normal = steep * -tau * wheels.stage_speed[0, p] - by_force * of_normal
-                by_around = steep * (1.0 - tau * outward / distance) - by_force * of_around
+                by_normal = steep * -tau * wheels.stage_speed[0, p] - found.by_pressure * of_normal
+                by_around = steep * (1.0 - tau * outward / distance) - found.by_pressure * of_around
                 turn = tau / distance  # of the normal
-                nn, nt = of_normal, of_around - traction * turn
+                nn, nt = of_normal, of_around - settled * turn
                 tn, tt = by_normal, by_around + force * turn
                 # with tangent (-ny, nx)
                 xx = -(nx * nx * nn - nx * ny * (nt + tn) + ny * ny * tt)
@@ -194,7 +162,7 @@ def add_contacts(
                 yx = -(nx * ny * (nn - tt) + nx * nx * tn - ny * ny * nt)
                 yy = -(ny * ny * nn + nx * ny * (nt + tn) + nx * nx * tt)
                 fx, fy = force * nx - traction * ny, force * ny + traction * nx
-                moment_n = distance * by_normal + tau * traction
+                moment_n = distance * by_normal + tau * settled
                 moment_t = distance * by_around
                 mx, my = moment_n * nx - moment_t * ny, moment_n * ny + moment_t * nx
                 at_point = (s0, s1, s2, s3)
@@ -211,7 +179,7 @@ def add_contacts(
                 ex, ey = wheels.lever[p, 0], wheels.lever[p, 1]
                 turned = tau * wheels.stage_speed[0, arm + 1]
                 damping = weight * contact.damping * turned * (nx * ey - ny * ex)
-                by_n, by_t = -damping, by_force * damping - steep * turned * (nx * ex + ny * ey)
+                by_n, by_t = -damping, found.by_pressure * damping - steep * turned * (nx * ex + ny * ey)
                 by_x = xx * ex + xy * ey + by_n * nx - by_t * ny
                 by_y = yx * ex + yy * ey + by_n * ny + by_t * nx
                 ax, ay = -(ex * xx + ey * yx), -(ex * xy + ey * yy)
@@ -221,6 +189,7 @@ def add_contacts(
                 if p > 0:
                     corner[p - 1, arm] += distance * by_t - (mx * ex + my * ey)
                     corner[arm, p - 1] -= lever * (ey * nx - ex * ny)
+    return laws_hold(contact.friction, touch.memory, is_known)
 
 
 @kernel

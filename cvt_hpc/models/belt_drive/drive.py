@@ -8,6 +8,7 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.belt_drive.contact import Contact, Touch, add_contacts, first_touch
+from cvt_hpc.models.belt_drive.friction import begin_friction, finish_friction
 from cvt_hpc.models.belt_drive.pulleys import (
     BELT_LOSS,
     Pulleys,
@@ -133,19 +134,21 @@ def advance(
         Whether the state is of numbers.
     """
     belt, wheels, tau = state.chain, state.wheels, stage_length(scheme, dt)
+    friction, memory = drive.contact.friction, state.touch.memory
     last = wheels.speed.shape[1] - 1
     for step in range(steps):
         begin_stage(belt, scheme, dt)
+        begin_friction(friction, memory, scheme, dt)
         share = (step + scheme.alpha_f) / steps
         begin_wheels(wheels, scheme, dt, inputs[0, 0] + share * (inputs[1, 0] - inputs[0, 0]))
-        largest = np.inf
+        is_solved = False
         for iteration in range(most):
             place(belt, tau)
             place_wheels(drive.pulleys, wheels, tau)
             wheels.power[:] = 0.0
             wheels.power[BELT_LOSS] = set_up(drive.beam, belt, tau, last)
             add_pulleys(drive.pulleys, wheels, inputs, share, tau)
-            add_contacts(
+            laws_hold = add_contacts(
                 drive.contact,
                 state.touch,
                 drive.beam.lengths,
@@ -164,13 +167,15 @@ def advance(
             correct_wheels(wheels)
             if not np.isfinite(largest):
                 return False
-            if largest <= tolerance:
+            is_solved = laws_hold and largest <= tolerance
+            if is_solved:
                 break
         finish_stage(belt, scheme, dt)
+        finish_friction(friction, memory, state.touch.normal, scheme, dt)
         finish_wheels(drive.pulleys, wheels, scheme, dt)
         for k in range(state.totals.size):
             state.totals[k] += dt * wheels.power[k]
         state.counters[STEPS] += 1
-        if largest > tolerance:
+        if not is_solved:
             state.counters[UNSOLVED] += 1
     return True

@@ -3,9 +3,10 @@
 Radii, centre distance, line mass, stiffness and damping of the belt (five ribs) and the inertia of the
 pulleys are those of Cepon and Boltezar 2011, table 1; elements, contact points and the scatter of lengths are
 those of their sec. 2.2. The belt's own length follows from the tension at rest. Assumptions are friction
-coefficient and contact stiffness, which they measured but do not print as numbers, the contact's damping and
-friction_speed, rise_time, and the amplitude from which a strand vibrates: 96 elements shake the strands by
-30 um. The band holds the first modes of the strands, 63 to 193 Hz.
+coefficient and contact stiffness, which they measured but do not print as numbers, the contact's damping,
+friction_speed, shear_stiffness (rubber of 3 MPa, 18 mm wide and 3 mm thick), rise_time, and the amplitude
+from which a strand vibrates: 96 elements shake the strands by 30 um. The band holds the first modes of the
+strands, 63 to 193 Hz.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from cvt_hpc.variator.scene import FRICTION, SCENE, rise_problems
 from cvt_hpc.vibration import settings
 
 RIBS = 5.0
+TREATMENTS = ("regularised", "set_valued", "bristle")  # of friction
 DEEPEST = 0.1  # of the smaller radius: so far the tension at rest may press the belt into a rim
 
 RECORD, VIBRATION = recording.PARAMETERS["record"], settings.PARAMETERS["vibration"]
@@ -100,8 +102,17 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "friction_gradient": replace(FRICTION["friction_gradient"], default=0.0),
         "kinetic_friction": replace(FRICTION["kinetic_friction"], default=0.5),
+        "friction_treatment": Parameter(
+            TREATMENTS[0],
+            "",
+            "Coulomb's law with tanh(speed / friction_speed); itself; or bristles that shear up to it",
+            choices=TREATMENTS,
+        ),
         "friction_speed": replace(
             FRICTION["friction_speed"], default=3e-4, description="regularisation speed of friction"
+        ),
+        "shear_stiffness": positive(
+            2e7, "N/m^2", "of the bristles: force per length by shear of the rubber", sensible=(1e4, 1e12)
         ),
     },
     "record": {"sampling_rate": replace(RECORD["sampling_rate"], default=2e3)},
@@ -161,4 +172,8 @@ def inert(parameters: Mapping[str, Any]) -> dict[str, str]:
     found = {"arc_probes": "model belt_drive, which is probed on its strands"}
     if parameters["length_scatter"] == 0.0:
         found["seed"] = "length_scatter 0"
+    treatment = parameters["friction_treatment"]
+    for key, its_own in (("friction_speed", "regularised"), ("shear_stiffness", "bristle")):
+        if treatment != its_own:
+            found[key] = f"friction_treatment {treatment}"
     return friction_inert(parameters) | layout_inert(parameters) | course_inert(parameters) | found

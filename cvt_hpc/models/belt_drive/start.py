@@ -14,6 +14,7 @@ import numpy as np
 from cvt_hpc.models.belt_drive.contact import Contact, contact_shapes
 from cvt_hpc.models.belt_drive.courses import driving_speed
 from cvt_hpc.models.belt_drive.drive import UNSOLVED, Drive, State, advance, state
+from cvt_hpc.models.belt_drive.friction import Friction, Treatment
 from cvt_hpc.models.belt_drive.layout import Layout, pulleys_of
 from cvt_hpc.models.belt_drive.preload import give, length_at
 from cvt_hpc.multibody.ancf_beam import at_places, beam, random_lengths
@@ -31,6 +32,9 @@ SETTLED, MOST_ITERATIONS = 1e-8, 30  # [m/s]
 FRICTIONLESS = friction_law("coulomb", 1e-9, 0.0, 1.0)
 # Of the belt's length by its tension: they leave 0.2 % of this on the softest contacts, 1e-5 on common ones
 CORRECTIONS = 3
+# Of contacts that stick [m/s]: the speed at which their grip has the normal force of a belt at rest. At less
+# the five points of an element, which adds four coordinates, change without end; more costs iterations.
+GRIP_SPEED = 1e-4
 HELD = 1e12  # [kg m^2]: an arm that stays where it is drawn
 
 
@@ -85,10 +89,17 @@ def _drive(p: Mapping[str, Any], drawn: Layout, length: float) -> Drive:
         contact_shapes(p["contact_points"]),
         p["contact_stiffness"],
         p["contact_damping"],
-        given_law(p),
-        p["friction_speed"],
+        _friction(p, drawn),
     )
     return Drive(belt, pulleys_of(p, drawn), contact)
+
+
+def _friction(p: Mapping[str, Any], drawn: Layout) -> Friction:
+    grip = p["tension"] / min(drawn.path.radius) / GRIP_SPEED
+    treatment = Treatment[p["friction_treatment"].upper()]
+    return Friction(
+        treatment, given_law(p), p["friction_speed"], grip, p["speed_tolerance"], p["shear_stiffness"]
+    )
 
 
 def _with_arms(drive: Drive, **values: Any) -> Drive:
@@ -116,12 +127,13 @@ def _laid(drive: Drive, drawn: Layout) -> State:
 
 def _settle(drive: Drive, found: State) -> bool:
     """Bring a state to rest in equilibrium, without friction; and whether that was found."""
-    smooth = drive._replace(contact=drive.contact._replace(law=FRICTIONLESS))
+    friction = drive.contact.friction._replace(treatment=Treatment.REGULARISED, law=FRICTIONLESS)
+    smooth = drive._replace(contact=drive.contact._replace(friction=friction))
     at_rest = np.zeros((2, len(drive.pulleys.radius)))
     step = FIRST
     for _ in range(MOST_STEPS):
         before = found.chain.q.copy(), found.wheels.angle.copy()
-        for numbers in (found.chain.v, found.wheels.speed, found.touch.dual, found.counters):
+        for numbers in (found.chain.v, found.wheels.speed, found.touch.memory.dual, found.counters):
             numbers[:] = 0
         finite = advance(smooth, found, IMPLICIT_EULER, at_rest, step, 1, SETTLED, MOST_ITERATIONS)
         if finite and found.counters[UNSOLVED] == 0:

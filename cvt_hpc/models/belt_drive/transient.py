@@ -9,15 +9,15 @@ import numpy as np
 
 from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.belt_drive import courses
-from cvt_hpc.models.belt_drive import drive as fields
 from cvt_hpc.models.belt_drive.drive import advance
 from cvt_hpc.models.belt_drive.kick import kick
 from cvt_hpc.models.belt_drive.layout import layout
+from cvt_hpc.models.belt_drive.linearised import drive_frequencies
 from cvt_hpc.models.belt_drive.pulleys import Pulleys
 from cvt_hpc.models.belt_drive.readings import PLACES, PROFILES, Reading, Readings, scalars_of
 from cvt_hpc.models.belt_drive.start import start
-from cvt_hpc.models.marched import Probe, batches_of_one
-from cvt_hpc.recording import sample_count, start_up_samples
+from cvt_hpc.models.marched import batches_of_one
+from cvt_hpc.models.sampled import SampledRun
 from cvt_hpc.solvers.generalised_alpha import generalised_alpha
 from cvt_hpc.variables import Status
 from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, PULLEYS, STRANDS
@@ -34,7 +34,7 @@ MOST_UNSOLVED = 0.02  # of the steps
 MOST_OPEN = 0.02  # of the larger of drive and losses; sound runs leave up to 0.004, without load
 
 
-class Transient:
+class Transient(SampledRun):
     """One run of the belt drive, advanced sample by sample.
 
     Parameters
@@ -46,63 +46,25 @@ class Transient:
 
     Attributes
     ----------
-    parameters
-        As given.
     drawn : Layout
         Pulleys and reference path.
-    channels : tuple of str
-        Names of the histories beside displacement.
-    probes : tuple of Probe
-        On the strands, equally spaced between their ends.
-    interval : float
-        Sampling interval [s].
-    samples, done, kick : int
-        Samples of the whole run, those recorded so far, and those before the load has risen.
-    failure : (Status, str) or None
-        Why the run does not go on: what has gone wrong, or that the belt slips through, with the status done.
     """
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
         p = parameters
-        self.interval = 1.0 / p["sampling_rate"]
-        self._steps_per_sample = max(1, int(np.ceil(self.interval / p["step"] * (1.0 - 1e-9))))
+        super().__init__(p)
         self._scheme = generalised_alpha(p["spectral_radius"])
         self.drawn = layout(p)
         self._readings = Readings(p, self.drawn)
         self._drive, self._state, is_settled = start(p, self.drawn, self._readings.mean_tension)
-        arms = self._drive.pulleys.arms
-        self.channels = ("load", "driving_speed", *scalars_of(self.drawn, len(arms.pivot)))
-        self.probes = tuple(
-            Probe(f"{strand} {k + 1}", float(position))
-            for strand, positions in zip(self.drawn.spans, self._readings.probes, strict=True)
-            for k, position in enumerate(positions)
-        )
+        channels = ("load", "driving_speed", *scalars_of(self.drawn, len(self.pulleys.arms.pivot)))
+        sums, totals = (len(PROFILES) + 2, PLACES), self._state.totals.size + 1
+        self._record(channels, self.drawn.spans, self._readings.probes, totals, sums)
         self._advance = called_alike(advance)
-        self.done = 0
-        self.failure: tuple[Status, str] | None = None
         self._lifted = np.zeros(len(self.drawn.pulleys), int)
         if not is_settled:  # as it would be at any step
-            p = {**p, "most_refinements": 0}
+            self.parameters = {**p, "most_refinements": 0}
             self.failure = Status.FAILED_NUMERICS, "the belt finds no equilibrium on its pulleys"
-        self._rows = np.empty((0, len(self.probes) + len(self.channels)))
-        self._totals = np.empty((0, self._state.totals.size + 1))
-        self.prolong(p)
-
-    def prolong(self, parameters: Mapping[str, Any]) -> None:
-        """Make room for the samples of a longer duration.
-
-        Parameters
-        ----------
-        parameters : mapping
-            Those of the run but for `duration` and `judged_fraction`.
-        """
-        self.parameters = parameters
-        self.samples, self.kick = sample_count(parameters), start_up_samples(parameters)
-        self.first_judged = self.samples - round(parameters["judged_fraction"] * self.samples)
-        more = self.samples - len(self._rows)
-        self._rows = np.concatenate([self._rows, np.full((more, self._rows.shape[1]), np.nan)])
-        self._totals = np.concatenate([self._totals, np.full((more, self._totals.shape[1]), np.nan)])
-        self._sums = np.zeros((len(PROFILES) + 2, PLACES))
 
     def advance(self, samples: int) -> tuple[Status, str] | None:
         """March on.
@@ -188,52 +150,19 @@ class Transient:
         """Simulated time [s]."""
         return self.steps * self.step
 
-    @property
-    def step(self) -> float:
-        """Time step [s]."""
-        return self.interval / self._steps_per_sample
-
-    @property
-    def steps(self) -> int:
-        """Steps taken so far."""
-        return int(self._state.counters[fields.STEPS])
-
-    @property
-    def contact_solves(self) -> int:
-        """Solves of the contact problem so far: iterations."""
-        return int(self._state.counters[fields.ITERATIONS])
-
-    def counters(self) -> dict[str, int]:
-        """Work done so far: steps, iterations, and steps that were not solved to the tolerance."""
-        return dict(zip(("steps", "iterations", "unsolved"), self._state.counters.tolist(), strict=True))
-
-    @property
-    def displacement(self) -> np.ndarray:
-        """Displacement at the probes, outwards, (done, probe) [m]."""
-        return self._rows[: self.done, : len(self.probes)]
-
-    def channel(self, name: str) -> np.ndarray:
-        """History of one of `channels`, (done,)."""
-        return self._rows[: self.done, len(self.probes) + self.channels.index(name)]
-
     def speed_loss(self, samples: slice) -> float:
         """What sliding and creep take from the driven speed in some samples, over what it is without [1]."""
         driven = self.channel("driven_speed")[samples].mean()
         return float(1.0 - self.drawn.ratio * driven / self.mean_driving_speed(samples))
 
+    def drive_frequencies(self, count: int) -> np.ndarray:
+        """Lowest frequencies of the drive about where it is, (count,) [Hz]."""
+        return drive_frequencies(self._drive, self._state, count)
+
     @property
     def pulleys(self) -> Pulleys:
         """Constants of pulleys and arms."""
         return self._drive.pulleys
-
-    def mean_driving_speed(self, samples: slice) -> float:
-        """Mean speed of the driving pulley in some samples [rad/s]."""
-        return float(self.channel("driving_speed")[samples].mean())
-
-    @property
-    def judged(self) -> slice:
-        """Samples of the judged part."""
-        return slice(self.first_judged, self.samples)
 
     @property
     def turns(self) -> int:
@@ -290,10 +219,6 @@ class Transient:
         else:
             return None
         return Status.FAILED_NUMERICS, why
-
-    def paused(self) -> Transient:
-        """What a batch of the same point over a longer time goes on from: the run itself."""
-        return self
 
 
 batch = batches_of_one(Transient)
