@@ -16,8 +16,10 @@ loses nothing by them.
 The curvature k is the line nearest to r' x r'', through its values at two Gauss points, as the element bends
 by lines; alpha's integral is that of these points. All other integrals are exact.
 
-A cubic that bends unevenly cannot keep e even, so that e waves along an element that is as long as a bend.
-The force that it transmits is the line nearest to EA e, its mean and its slope, which `tensions` gives.
+A cubic that bends unevenly cannot keep e even: e waves along an element as long as a bend. A strain of less
+degree would take the waves out of the forces alone, not out of the speeds along the belt, on which friction
+acts: with the parabola of the mean strain and its values at the nodes, belts that stick on a pulley slide
+more, not less, than they should.
 """
 
 from __future__ import annotations
@@ -55,10 +57,6 @@ def shapes(place: float | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 SHAPES = np.stack(shapes(PLACES), 1)  # at the Gauss points: (point, derivative, shape)
-
-
-# values at the Gauss points of the line nearest to values there, (point, point)
-LINE = WEIGHTS * (1.0 + 3.0 * np.outer(_X, _X))
 
 
 class AncfBeam(NamedTuple):
@@ -185,8 +183,8 @@ def energies(beam: AncfBeam, q: np.ndarray, u: np.ndarray) -> tuple[float, float
 
 
 def tensions(beam: AncfBeam, q: np.ndarray) -> np.ndarray:
-    """Elastic force along the belt [N], (k, POINTS), from positions (n, 4) of the nodes.
+    """Elastic force along the belt at the Gauss points [N], (k, POINTS), from positions (n, 4) of the nodes.
 
-    That is EA e |r'| against the area without load, at the Gauss points of the line nearest to e.
+    That is EA e |r'|, against the area without load.
     """
-    return tension_of(beam.axial_stiffness, strains(beam, q) @ LINE.T)
+    return tension_of(beam.axial_stiffness, strains(beam, q))

@@ -8,7 +8,7 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.belt_drive.contact import Contact, Touch
-from cvt_hpc.multibody.ancf_beam import PLACES, POINTS, SHAPES, WEIGHTS, AncfBeam, tension_of
+from cvt_hpc.multibody.ancf_beam import POINTS, SHAPES, WEIGHTS, AncfBeam, tension_of
 from cvt_hpc.multibody.ancf_chain import Chain
 from cvt_hpc.physics.nearest_on_path import Way, nearest
 
@@ -121,15 +121,11 @@ def _locate(way, beam, q, line):
     n = q.shape[0]
     for i in range(beam.lengths.size):
         j, l0 = (i + 1) % n, beam.lengths[i]
-        mean, slope = 0.0, 0.0
         for c in range(POINTS):
             x, y = _at(SHAPES[c, 0], q, i, j, l0)
             sx, sy = _at(SHAPES[c, 1], q, i, j, l0)
             line.position[i, c], line.offset[i, c] = nearest(way, x, y, sx, sy)
-            strain = 0.5 * WEIGHTS[c] * ((sx * sx + sy * sy) / (l0 * l0) - 1.0)
-            mean, slope = mean + strain, slope + 12.0 * (PLACES[c] - 0.5) * strain
-        for c in range(POINTS):
-            strain = mean + slope * (PLACES[c] - 0.5)
+            strain = 0.5 * ((sx * sx + sy * sy) / (l0 * l0) - 1.0)
             line.tension[i, c] = tension_of(beam.axial_stiffness, strain)
 
 
