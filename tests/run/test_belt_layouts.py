@@ -218,6 +218,11 @@ def test_a_tensioner_that_turns_away_lets_the_belt_go():
         ),
         ({"free_length": 1.5}, "[belt] free_length: expected more than"),
         ({"profile_time": (0.1, 0.0)}, "[profiles] profile_time: expected ascending times"),
+        ({"elements": 24}, "[belt] elements: expected at least 63, which turn by half a radian"),
+        (
+            {"profile_time": (0.0,), "driving_speed_profile": (0.5,)},
+            "[profiles] driving_speed_profile: expected 1 at last",
+        ),
         ({"load_profile": (1.0,)}, "[profiles] load_profile: expected as many values as profile_time has, 0"),
     ],
 )
