@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 # Measured on one core of an EPYC beside other work: core-seconds per element and step, and per sample
 STEP_COST, SAMPLE_COST = 4e-6, 6e-4
 
+DRIVE_MODES = 8
+
 VARIABLES = (
     *assessment.VARIABLES,
     replace(shared("spectrum")[0], comment="largest of the strand's probes"),
@@ -68,6 +70,13 @@ VARIABLES = (
         "f8",
         "Hz",
         "of a running beam under the strand's mean tension, pinned where tangents touch the pulleys",
+    ),
+    Variable(
+        "drive_frequency",
+        ("drive_mode",),
+        "f8",
+        "Hz",
+        "of strands, sticking arcs and driven pulleys together, linearised at the end",
     ),
     Variable(
         "answered_frequency",
@@ -106,7 +115,9 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
         "pulley": _named("pulley", drawn.pulleys),
     }
     half_waves = Coordinate(np.arange(1, MODES + 1), "1", "half waves", "along the strand")
-    return {**names, "frequency_bin": frequency_bins(parameters), "half_waves": half_waves}
+    modes = Coordinate(np.arange(1, DRIVE_MODES + 1), "1", "mode of the drive")
+    bins = frequency_bins(parameters)
+    return {**names, "frequency_bin": bins, "half_waves": half_waves, "drive_mode": modes}
 
 
 def _named(dimension: str, names: tuple[str, ...]) -> Coordinate:
@@ -166,6 +177,7 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
         "creep_speed_loss": creep_loss(run.parameters, drawn),
         "strand_tension": tension,
         "eigenfrequency": frequencies,
+        "drive_frequency": run.drive_frequencies(DRIVE_MODES),
         "answered_frequency": _answered(run, frequencies),
         "tension_ripple": np.array([run.channel(f"tension {k}")[run.judged].std() for k in drawn.spans]),
         "friction_loss": friction,

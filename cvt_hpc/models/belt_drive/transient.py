@@ -12,6 +12,7 @@ from cvt_hpc.models.belt_drive import courses
 from cvt_hpc.models.belt_drive.drive import advance
 from cvt_hpc.models.belt_drive.kick import kick
 from cvt_hpc.models.belt_drive.layout import layout
+from cvt_hpc.models.belt_drive.linearised import drive_frequencies
 from cvt_hpc.models.belt_drive.pulleys import Pulleys
 from cvt_hpc.models.belt_drive.readings import PLACES, PROFILES, Reading, Readings, scalars_of
 from cvt_hpc.models.belt_drive.start import start
@@ -154,6 +155,10 @@ class Transient(SampledRun):
         """What sliding and creep take from the driven speed in some samples, over what it is without [1]."""
         driven = self.channel("driven_speed")[samples].mean()
         return float(1.0 - self.drawn.ratio * driven / self.mean_driving_speed(samples))
+
+    def drive_frequencies(self, count: int) -> np.ndarray:
+        """Lowest frequencies of the drive about where it is, (count,) [Hz]."""
+        return drive_frequencies(self._drive, self._state, count)
 
     @property
     def pulleys(self) -> Pulleys:
