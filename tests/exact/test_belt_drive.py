@@ -150,7 +150,7 @@ def rest():
 
 def test_the_static_start_has_its_tension(rest):
     p, where, made, found = rest
-    t1, t2 = Reading(where, made, found).strand_tensions()
+    t1, t2 = Reading(where, made, found).strand_tensions
     assert t1 == pytest.approx(t2, rel=1e-3)  # points of contact, unlike arcs, hold it a little
     assert 0.5 * (t1 + t2) == pytest.approx(p["tension"], rel=1e-4)
 
