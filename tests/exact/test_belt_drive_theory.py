@@ -111,6 +111,10 @@ def test_a_kick_is_an_impulse_outwards_on_each_strand():
         np.testing.assert_allclose(momentum[inside].sum(0), 0.02 * outward, atol=2e-5)
         middle = start + MIDDLE * path.spans[strand]
         assert (momentum[inside] @ outward) @ where[inside] / 0.02 == pytest.approx(middle, rel=1e-3)
+        phase = 2.0 * np.pi * (where[inside] - middle) / (WIDTH * path.spans[strand])
+        bell = np.where(np.abs(phase) < np.pi, 1.0 + np.cos(phase), 0.0)
+        most = 2.0 * 0.02 / (p["line_mass"] * WIDTH * path.spans[strand])
+        np.testing.assert_allclose(speed[inside] @ outward, 0.5 * most * bell, atol=2e-3 * most)
         beyond = np.abs(where - middle) > 0.5 * WIDTH * path.spans[strand] + lengths[0]
         assert (speed[inside & beyond] == 0.0).all()
 
