@@ -40,7 +40,7 @@ from cvt_hpc.models.belt_drive.preload import stretch
 from cvt_hpc.models.belt_drive.theory import expected_loss, strand_frequencies
 from cvt_hpc.models.belt_drive.transient import Transient
 from cvt_hpc.multibody.ancf_beam import SHAPES, WEIGHTS, at_places
-from cvt_hpc.physics.belt_path import along
+from cvt_hpc.physics.nearest_on_path import along
 
 HERE = Path(__file__).parent
 LOAD, DURATION, INTERVAL, IMPULSE = 8.0, 0.65, 1e-3, 0.01

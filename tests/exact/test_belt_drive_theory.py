@@ -125,3 +125,25 @@ def test_answers_are_peaks_that_exceed_the_unrest_before():
     unrest = 0.2 * np.sin(2.0 * np.pi * 118.0 * time)[:, None] * [1.0, 1.0]
     found = answers(unrest, tone + 2.0 * unrest, 1e3, np.array([60.0, 120.0, 600.0]))
     assert found[0] == pytest.approx(63.0, abs=0.05) and np.isnan(found[1:]).all()
+
+
+@pytest.mark.parametrize(("inlet", "outlet"), [(400.0, 235.0), (235.0, 400.0), (300.0, 320.0)])
+@pytest.mark.parametrize("stiffness", [2e7, 2e8])
+def test_rubber_that_shears_takes_the_tension_from_inlet_to_outlet(inlet, outlet, stiffness):
+    """Forwards by small steps, with the shear held at the bound."""
+    p, drawn = scene(shear_stiffness=stiffness)
+    radius, wrap = drawn.path.radius[0], drawn.path.wrap[0]
+    apparent = theory.unsheared_tension(p, inlet, outlet, radius, wrap)
+    give = 1.0 / p["axial_stiffness"] + 1.0 / (radius**2 * p["contact_stiffness"])
+    count = 20000
+    ds, tension, shear = radius * wrap / count, inlet, 0.0
+    for _ in range(count):
+        bound = p["kinetic_friction"] * tension / (radius * stiffness)
+        shear = np.clip(shear + ds * give * (tension - apparent), -bound, bound)
+        tension += ds * stiffness * shear
+    assert tension == pytest.approx(outlet, rel=1e-3)
+
+
+def test_more_than_friction_carries_has_no_tension_without_shear():
+    p, drawn = scene()
+    assert np.isnan(theory.unsheared_tension(p, 500.0, 500.0 * np.exp(-1.6), drawn.path.radius[0], np.pi))
