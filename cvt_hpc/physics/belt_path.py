@@ -99,7 +99,7 @@ def belt_path(centre: np.ndarray, radius: np.ndarray, turn: np.ndarray) -> BeltP
     if abs(around) > 1:
         raise ValueError(f"a belt that winds around them {abs(around)} times")
     for i in pulleys:
-        start, direction = _starts(path)[i], _directions(leaving)[i]
+        start, direction = span_starts(path)[i], directions(leaving)[i]
         for j in pulleys:
             if j not in (i, (i + 1) % len(radius)):
                 along = np.clip((centre[j] - start) @ direction, 0.0, path.spans[i])
@@ -108,7 +108,8 @@ def belt_path(centre: np.ndarray, radius: np.ndarray, turn: np.ndarray) -> BeltP
     return path
 
 
-def _directions(angle: np.ndarray) -> np.ndarray:
+def directions(angle: np.ndarray) -> np.ndarray:
+    """Unit vectors at angles (...), (..., 2)."""
     return np.stack([np.cos(angle), np.sin(angle)], -1)
 
 
@@ -117,7 +118,7 @@ def _normals(angle: np.ndarray) -> np.ndarray:
     return np.stack([np.sin(angle), -np.cos(angle)], -1)
 
 
-def _starts(path: BeltPath) -> np.ndarray:
+def span_starts(path: BeltPath) -> np.ndarray:
     """Where the spans begin, (P, 2) [m]."""
     return path.centre + (path.turn * path.radius)[:, None] * _normals(path.leaving)
 
@@ -144,54 +145,7 @@ def points_at(path: BeltPath, position: np.ndarray) -> tuple[np.ndarray, np.ndar
     curvature = np.where(on_arc, path.turn[i] / path.radius[i], 0.0)
     angle = np.where(on_arc, path.angle[i] + curvature * local, path.leaving[i])
     points = path.centre[i] + (path.turn * path.radius)[i][:, None] * _normals(angle)
-    return points + np.where(on_arc, 0.0, local)[:, None] * _directions(angle), angle, curvature
-
-
-def along(path: BeltPath, points: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Path coordinates of points near a path, and their distances from it.
-
-    Of two places of the path that are equally near, as where a belt crosses itself, the one counts at which
-    the belt runs in the direction of the point.
-
-    Parameters
-    ----------
-    path : BeltPath
-        The path.
-    points, directions : (n, 2) arrays
-        [m]; of any length, in which the belt runs there.
-
-    Returns
-    -------
-    position : (n,) array
-        Less than the path's length [m].
-    offset : (n,) array
-        To the right of the running direction [m].
-    """
-    points = points[:, None]
-    away = points - path.centre
-    # arcs: where the radius through the point meets them, or the nearer end
-    angle = np.arctan2(path.turn * away[..., 0], -path.turn * away[..., 1])
-    turned = np.mod(path.turn * (angle - path.angle), 2.0 * np.pi)
-    is_past = turned > path.wrap
-    end = np.where(turned - path.wrap < 2.0 * np.pi - turned, path.wrap, 0.0)
-    turned = np.where(is_past, end, turned)
-    angle = path.angle + path.turn * turned
-    nearest = path.centre + (path.turn * path.radius)[:, None] * _normals(angle)
-    # spans
-    start, reach = _starts(path), np.broadcast_to(path.leaving, angle.shape)
-    local = np.clip(((points - start) * _directions(path.leaving)).sum(-1), 0.0, path.spans)
-    on_span = start + local[..., None] * _directions(path.leaving)
-    candidates = np.stack([nearest, on_span], 2).reshape(len(points), -1, 2)
-    angle = np.stack([angle, reach], 2).reshape(len(points), -1)
-    ends = path.ends
-    position = np.stack([path.radius * turned, local], 2).reshape(len(points), -1)
-    position = position + np.concatenate([[0.0], ends[:-1]])
-    apart = points - candidates
-    aligned = (_directions(angle) * directions[:, None]).sum(-1) / np.hypot(*directions.T)[:, None]
-    badness = (apart**2).sum(-1) + path.radius.min() ** 2 * (1.0 - aligned)
-    best = np.arange(len(points)), np.argmin(badness, 1)
-    offset = (apart[best] * _normals(angle[best])).sum(-1)
-    return np.mod(position[best], ends[-1]), offset
+    return points + np.where(on_arc, 0.0, local)[:, None] * directions(angle), angle, curvature
 
 
 def regions(path: BeltPath, position: np.ndarray) -> np.ndarray:

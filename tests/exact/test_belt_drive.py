@@ -20,9 +20,11 @@ LENGTHS = np.array([0.09, 0.1, 0.12, 0.08, 0.1, 0.11])
 
 
 # in its stop, so that this has a slope too
-ARM = pulleys.Arms(
-    np.array([[0.16, 0.07]]), *np.array([[0.003], [2.0], [30.0], [0.4], [-0.1], [-0.02]]), 500.0
+PIVOT = np.array([[0.16, 0.07]])
+STRUT = pulleys.struts(
+    PIVOT, np.array([[0.3, 0.1]]), np.array([[0.12, 0.2]]), np.array([500.0]), np.array([3.0])
 )
+ARM = pulleys.Arms(PIVOT, *np.array([[0.003], [2.0], [30.0], [0.4], [-0.1], [-0.02]]), 500.0, STRUT)
 ANGLE = np.array([0.05])
 
 
@@ -104,7 +106,8 @@ def test_slopes_of_contacts_are_those_of_their_forces(treatment):
 def test_contacts_give_pulleys_what_they_take_of_the_belt_but_for_losses():
     """Contacts of dampers alone store nothing."""
     made, (q, u, speeds) = drive(stiffness=0.0), moving()
-    free = ARM._replace(moment=np.zeros(1), stiffness=np.zeros(1), damping=np.zeros(1), stop=0.0)
+    zero = np.zeros(1)
+    free = ARM._replace(moment=zero, stiffness=zero, damping=zero, stop=0.0, struts=pulleys.no_struts(1))
     made = made._replace(pulleys=made.pulleys._replace(arms=free))
     found = at(made, q, u, speeds)
     of_belt = (found.chain.columns.data[:6, :, 2] * u).sum()
@@ -114,6 +117,17 @@ def test_contacts_give_pulleys_what_they_take_of_the_belt_but_for_losses():
     lost = power[pulleys.CONTACT_LOSS] + power[pulleys.FRICTION_LOSS :].sum()
     assert of_belt + of_pulley + of_arm - power[pulleys.WORK_IN] == pytest.approx(-lost, rel=1e-12)
     assert lost > 0.1 and abs(power[pulleys.WORK_IN]) > 0.01
+
+
+def test_an_arm_has_the_moment_by_its_energy_but_for_what_dashpots_take():
+    """Moment by central differences of the energy, and power of the damping, at a rate of 0.7 rad/s."""
+    made, h = drive(), 1e-6
+    wheels = pulleys.wheels_at(made.pulleys, np.zeros(2), ANGLE, 1)
+    wheels.stage_speed[0, 2] = wheels.start_speed[0, 2] = 0.7
+    pulleys.add_pulleys(made.pulleys, wheels, np.zeros((2, 2)), 0.0, TAU)
+    elastic = -(pulleys.arms_energy(ARM, ANGLE + h, 0.0) - pulleys.arms_energy(ARM, ANGLE - h, 0.0)) / (2 * h)
+    damped = wheels.power[pulleys.ARM_LOSS] / 0.7
+    assert damped > 0.4 * 0.7 and wheels.corner.data[0, 1, 2] == pytest.approx(elastic - damped, rel=1e-8)
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +150,7 @@ def rest():
 
 def test_the_static_start_has_its_tension(rest):
     p, where, made, found = rest
-    t1, t2 = Reading(where, made, found).strand_tensions()
+    t1, t2 = Reading(where, made, found).strand_tensions
     assert t1 == pytest.approx(t2, rel=1e-3)  # points of contact, unlike arcs, hold it a little
     assert 0.5 * (t1 + t2) == pytest.approx(p["tension"], rel=1e-4)
 

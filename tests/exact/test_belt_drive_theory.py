@@ -11,7 +11,8 @@ from cvt_hpc.models.belt_drive import theory
 from cvt_hpc.models.belt_drive.kick import MIDDLE, WIDTH, answers, kick
 from cvt_hpc.models.belt_drive.layout import layout
 from cvt_hpc.multibody.ancf_beam import SHAPES, WEIGHTS, at_places, beam
-from cvt_hpc.physics.belt_path import along, points_at, regions
+from cvt_hpc.physics.belt_path import points_at, regions
+from cvt_hpc.physics.nearest_on_path import along
 
 TENSION = np.array([230.0, 395.0])
 
@@ -110,6 +111,10 @@ def test_a_kick_is_an_impulse_outwards_on_each_strand():
         np.testing.assert_allclose(momentum[inside].sum(0), 0.02 * outward, atol=2e-5)
         middle = start + MIDDLE * path.spans[strand]
         assert (momentum[inside] @ outward) @ where[inside] / 0.02 == pytest.approx(middle, rel=1e-3)
+        phase = 2.0 * np.pi * (where[inside] - middle) / (WIDTH * path.spans[strand])
+        bell = np.where(np.abs(phase) < np.pi, 1.0 + np.cos(phase), 0.0)
+        most = 2.0 * 0.02 / (p["line_mass"] * WIDTH * path.spans[strand])
+        np.testing.assert_allclose(speed[inside] @ outward, 0.5 * most * bell, atol=2e-3 * most)
         beyond = np.abs(where - middle) > 0.5 * WIDTH * path.spans[strand] + lengths[0]
         assert (speed[inside & beyond] == 0.0).all()
 
@@ -120,3 +125,25 @@ def test_answers_are_peaks_that_exceed_the_unrest_before():
     unrest = 0.2 * np.sin(2.0 * np.pi * 118.0 * time)[:, None] * [1.0, 1.0]
     found = answers(unrest, tone + 2.0 * unrest, 1e3, np.array([60.0, 120.0, 600.0]))
     assert found[0] == pytest.approx(63.0, abs=0.05) and np.isnan(found[1:]).all()
+
+
+@pytest.mark.parametrize(("inlet", "outlet"), [(400.0, 235.0), (235.0, 400.0), (300.0, 320.0)])
+@pytest.mark.parametrize("stiffness", [2e7, 2e8])
+def test_rubber_that_shears_takes_the_tension_from_inlet_to_outlet(inlet, outlet, stiffness):
+    """Forwards by small steps, with the shear held at the bound."""
+    p, drawn = scene(shear_stiffness=stiffness)
+    radius, wrap = drawn.path.radius[0], drawn.path.wrap[0]
+    apparent = theory.unsheared_tension(p, inlet, outlet, radius, wrap)
+    give = 1.0 / p["axial_stiffness"] + 1.0 / (radius**2 * p["contact_stiffness"])
+    count = 20000
+    ds, tension, shear = radius * wrap / count, inlet, 0.0
+    for _ in range(count):
+        bound = p["kinetic_friction"] * tension / (radius * stiffness)
+        shear = np.clip(shear + ds * give * (tension - apparent), -bound, bound)
+        tension += ds * stiffness * shear
+    assert tension == pytest.approx(outlet, rel=1e-3)
+
+
+def test_more_than_friction_carries_has_no_tension_without_shear():
+    p, drawn = scene()
+    assert np.isnan(theory.unsheared_tension(p, 500.0, 500.0 * np.exp(-1.6), drawn.path.radius[0], np.pi))

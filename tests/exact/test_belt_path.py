@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.physics.belt_path import along, belt_path, points_at, regions
+from cvt_hpc.physics.belt_path import belt_path, points_at, regions
 from cvt_hpc.physics.geometry import variator
+from cvt_hpc.physics.nearest_on_path import along
 
 # three pulleys around which a belt runs counter-clockwise, and one that presses from outside
 CENTRES = np.array([[0.0, 0.0], [0.3, 0.05], [0.2, 0.3], [0.08, 0.16]])

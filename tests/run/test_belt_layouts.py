@@ -8,6 +8,7 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.belt_drive.layout import layout
 from cvt_hpc.models.belt_drive.preload import length_at
+from cvt_hpc.models.belt_drive.pulleys import arms_energy
 from cvt_hpc.models.belt_drive.readings import Readings
 from cvt_hpc.models.belt_drive.start import start
 from cvt_hpc.physics.belt_path import belt_path
@@ -33,6 +34,14 @@ TENSIONER = {
     "tensioner_damping": (0.5,),
     "tensioner_lowest": (-0.4,),
     "tensioner_highest": (0.4,),
+}
+STRUT = {
+    "strut_fixed_x": (0.16,),
+    "strut_fixed_y": (-0.3,),
+    "strut_held_x": (0.12,),
+    "strut_held_y": (-0.1,),
+    "strut_stiffness": (8e3,),
+    "strut_damping": (60.0,),
 }
 SERPENTINE = (
     PULLEYS
@@ -84,8 +93,9 @@ def test_the_spring_holds_the_arm_where_it_is_drawn(held):
     assert float(drive.pulleys.arms.moment[0]) == pytest.approx(exact, rel=0.01)
 
 
-def test_a_given_spring_turns_the_arm_into_equilibrium(held):
-    """Where M - k angle = T dL/dangle, with the tension of a belt of one length."""
+@pytest.mark.parametrize("strut", [{}, STRUT])
+def test_a_given_spring_turns_the_arm_into_equilibrium(held, strut):
+    """Where its moment is T dL/dangle, with the tension of a belt of one length."""
     p, where, drive, _ = held
     pivot, moment = drive.pulleys.arms.pivot[0], 2.0 * float(drive.pulleys.arms.moment[0])
     length = length_at(where.drawn.path, p["tension"], p)
@@ -94,11 +104,13 @@ def test_a_given_spring_turns_the_arm_into_equilibrium(held):
         path = turned(where.drawn, pivot, angle)
         return brentq(lambda force: length_at(path, force, p) - length, -2e4, 5e4)
 
-    def open_moment(angle):
-        spring = moment - p["tensioner_stiffness"][0] * angle
-        return spring - tension(angle) * lengthening(where.drawn, pivot, angle)
+    _, found, released, state = begun(**SERPENTINE, **strut, tensioner_moment=(moment,))
 
-    _, found, released, state = begun(**SERPENTINE, tensioner_moment=(moment,))
+    def open_moment(angle):
+        arms, h = released.pulleys.arms, 1e-6
+        less, more = (arms_energy(arms, np.array([angle + side]), np.zeros(1)) for side in (-h, h))
+        return (less - more) / (2 * h) - tension(angle) * lengthening(where.drawn, pivot, angle)
+
     angle = brentq(open_moment, -0.08, 0.04)
     assert abs(angle) > 5e-3
     assert state.wheels.angle[0, 0] == pytest.approx(angle, rel=0.02)
@@ -216,8 +228,21 @@ def test_a_tensioner_that_turns_away_lets_the_belt_go():
             {"tensioner_damping": ()},
             "[tensioner] tensioner_damping: expected as many values as tensioner_pulley",
         ),
+        (
+            STRUT | {"strut_held_x": ()},
+            "[tensioner] strut_held_x: expected as many values as tensioner_pulley",
+        ),
+        (
+            STRUT | {"strut_held_x": (0.2,)},
+            "[tensioner] strut_held_x: expected a spring that does not point at the pivot",
+        ),
         ({"free_length": 1.5}, "[belt] free_length: expected more than"),
         ({"profile_time": (0.1, 0.0)}, "[profiles] profile_time: expected ascending times"),
+        ({"elements": 24}, "[belt] elements: expected at least 63, which turn by half a radian"),
+        (
+            {"profile_time": (0.0,), "driving_speed_profile": (0.5,)},
+            "[profiles] driving_speed_profile: expected 1 at last",
+        ),
         ({"load_profile": (1.0,)}, "[profiles] load_profile: expected as many values as profile_time has, 0"),
     ],
 )

@@ -113,6 +113,8 @@ def add_contacts(
     for i in range(n):
         j = (i + 1) % n
         l0 = lengths[i]
+        if not _may_touch(q, i, j, l0, pulleys, wheels):
+            continue
         weight = l0 / points
         for c in range(points):
             s0, s1, s2, s3 = (
@@ -188,6 +190,26 @@ def add_contacts(
                     corner[p - 1, arm] += distance * by_t - (mx * ex + my * ey)
                     corner[arm, p - 1] -= lever * (ey * nx - ex * ny)
     return laws_hold(contact.friction, touch.memory, is_known)
+
+
+@kernel
+def _may_touch(q: np.ndarray, i: int, j: int, l0: float, pulleys: Pulleys, wheels: Wheels) -> bool:
+    """Whether an element between nodes i and j may reach into a pulley.
+
+    A cubic lies within the hull of its ends and of the points a third of the end's derivative inwards, and
+    so within a circle around its first node.
+    """
+    dx, dy = q[j, 0] - q[i, 0], q[j, 1] - q[i, 1]
+    share = l0 / 3.0
+    bx, by = dx - share * q[j, 2], dy - share * q[j, 3]
+    first = share * share * (q[i, 2] * q[i, 2] + q[i, 3] * q[i, 3])
+    reach = np.sqrt(max(dx * dx + dy * dy, max(bx * bx + by * by, first)))
+    for p in range(pulleys.radius.size):
+        ax, ay = q[i, 0] - wheels.centre[p, 0], q[i, 1] - wheels.centre[p, 1]
+        near = pulleys.radius[p] + reach
+        if ax * ax + ay * ay < near * near:
+            return True
+    return False
 
 
 @kernel

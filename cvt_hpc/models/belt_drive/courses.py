@@ -21,7 +21,10 @@ PARAMETERS: dict[str, Parameter] = {
         (), "s", "times of the profiles, ascending", minimum=0.0, sensible=(1e-4, 200.0)
     ),
     "driving_speed_profile": Parameter(
-        (), "", "multiples at these times of driving_speed; 0 at first for a start at rest", minimum=0.0
+        (),
+        "",
+        "multiples at these times of driving_speed, 1 at last; 0 at first for a start at rest",
+        minimum=0.0,
     ),
     "load_profile": Parameter((), "", "multiples at these times of load"),
     "speed_ripple": not_negative(
@@ -75,6 +78,10 @@ def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]
     for key in profiles:
         if len(p[key]) != len(times):
             found.append((key, f"as many values as profile_time has, {len(times)}", f"{len(p[key])}"))
+    last = p["driving_speed_profile"][-1:]
+    if not found and last not in ((), (1.0,)):
+        expected = "1 at last, since driving_speed is that of the judged part"
+        found.append(("driving_speed_profile", expected, f"{last[0]:g}"))
     return found
 
 

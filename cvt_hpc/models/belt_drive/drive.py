@@ -20,8 +20,8 @@ from cvt_hpc.models.belt_drive.pulleys import (
     place_wheels,
     wheels_at,
 )
-from cvt_hpc.multibody.ancf_beam import AncfBeam, assemble
-from cvt_hpc.multibody.ancf_chain import SIZE, Chain, begin_stage, chain, correct, finish_stage, place
+from cvt_hpc.multibody.ancf_beam import AncfBeam
+from cvt_hpc.multibody.ancf_chain import SIZE, Chain, begin_stage, chain, correct, finish_stage, place, set_up
 from cvt_hpc.solvers.cyclic_blocks import factor, solve_bordered
 from cvt_hpc.solvers.generalised_alpha import Scheme, stage_length
 
@@ -145,11 +145,8 @@ def advance(
         for iteration in range(most):
             place(belt, tau)
             place_wheels(drive.pulleys, wheels, tau)
-            lost = assemble(
-                drive.beam, belt.stage_q, belt.stage_v, belt.start_v, tau, belt.blocks, belt.columns, last
-            )
             wheels.power[:] = 0.0
-            wheels.power[BELT_LOSS] = lost
+            wheels.power[BELT_LOSS] = set_up(drive.beam, belt, tau, last)
             add_pulleys(drive.pulleys, wheels, inputs, share, tau)
             laws_hold = add_contacts(
                 drive.contact,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cvt_hpc.physics.belt_path import BeltPath, along, regions
+from cvt_hpc.physics.belt_path import BeltPath, regions
+from cvt_hpc.physics.nearest_on_path import along
 from cvt_hpc.vibration.signals import band_amplitude, dominant_frequency
 
 MIDDLE, WIDTH = 0.3, 0.25  # of the strand: there no shape of up to five half waves has a node

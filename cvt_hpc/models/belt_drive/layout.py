@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.models.belt_drive.pulleys import Arms, Pulleys
+from cvt_hpc.models.belt_drive.pulleys import Arms, Pulleys, no_struts, struts
 from cvt_hpc.parameters import Column, FromFile, Parameter
 from cvt_hpc.physics.belt_path import BeltPath, belt_path
 from cvt_hpc.physics.geometry import variator_problems
@@ -68,6 +68,14 @@ TENSIONER: dict[str, Parameter] = {
     "tensioner_moment": _list(
         "N m", "moments of the springs as drawn, which turn the arms; else those that hold them", (1e-3, 1e4)
     ),
+    "strut_fixed_x": _list(
+        "m", "fixed ends of springs that pull at the arms, if they have such", (1e-3, 10.0)
+    ),
+    "strut_fixed_y": _list("m", "the same along y", (1e-3, 10.0)),
+    "strut_held_x": _list("m", "ends of these on the arms, as drawn", (1e-3, 10.0)),
+    "strut_held_y": _list("m", "the same along y", (1e-3, 10.0)),
+    "strut_stiffness": _list("N/m", "force of such a spring by its length", (1.0, 1e9), minimum=0.0),
+    "strut_damping": _list("N s/m", "force of a dashpot beside it by the speed", (1e-3, 1e6), minimum=0.0),
     "tensioner_lowest": _list("rad", "clockwise end of the travel", (1e-3, 7.0)),
     "tensioner_highest": _list("rad", "counter-clockwise end of the travel", (1e-3, 7.0)),
     "stop_stiffness": Parameter(
@@ -79,7 +87,10 @@ TENSIONER: dict[str, Parameter] = {
         sensible=(1.0, 1e8),
     ),
 }
-_ARM_LISTS = tuple(key for key in TENSIONER if key not in ("tensioner_moment", "stop_stiffness"))
+_STRUT_LISTS = tuple(key for key in TENSIONER if key.startswith("strut_"))
+_ARM_LISTS = tuple(
+    key for key in TENSIONER if key not in ("tensioner_moment", "stop_stiffness", *_STRUT_LISTS)
+)
 
 
 class Layout(NamedTuple):
@@ -140,7 +151,12 @@ def arms_of(parameters: Mapping[str, Any]) -> Arms:
     values = {name: np.array(p[f"tensioner_{name}"], float) for name in names}
     if not p["tensioner_moment"]:
         values["moment"] = np.zeros(len(pivot))
-    return Arms(pivot, **values, stop=p["stop_stiffness"])
+    fixed_x, fixed_y, held_x, held_y, stiffness, damping = (np.array(p[key], float) for key in _STRUT_LISTS)
+    pulling = no_struts(len(pivot))
+    if p["strut_stiffness"]:
+        fixed, held = np.stack([fixed_x, fixed_y], 1), np.stack([held_x, held_y], 1)
+        pulling = struts(pivot, fixed, held, stiffness, damping)
+    return Arms(pivot, **values, stop=p["stop_stiffness"], struts=pulling)
 
 
 def pulleys_of(parameters: Mapping[str, Any], drawn: Layout) -> Pulleys:
@@ -167,8 +183,9 @@ def layout_problems(parameters: Mapping[str, Any]) -> list[Problem]:
         return found
     if p["pulley_x"]:
         found = _pulley_problems(p)
-    if not found and any(p[key] for key in (*_ARM_LISTS, "tensioner_moment")):
-        found = _list_problems(p, _ARM_LISTS) or _arm_problems(p)
+    if not found and any(p[key] for key in (*_ARM_LISTS, *_STRUT_LISTS, "tensioner_moment")):
+        given = (*_ARM_LISTS, *_STRUT_LISTS) if any(p[key] for key in _STRUT_LISTS) else _ARM_LISTS
+        found = _list_problems(p, given) or _arm_problems(p)
     return found
 
 
@@ -222,6 +239,10 @@ def _arm_problems(p: Mapping[str, Any]) -> list[Problem]:
     for a, number in enumerate(numbers):
         if np.hypot(*(pulleys.centre[int(number) - 1] - pulleys.arms.pivot[a])) == 0.0:
             return [("tensioner_x", "a pivot beside the pulley's axis", f"that of pulley {number:g}")]
+        if p["strut_stiffness"] and not abs(pulleys.arms.struts.lever[a]) > 0.0:
+            return [
+                ("strut_held_x", "a spring that does not point at the pivot", f"that of pulley {number:g}")
+            ]
     return []
 
 

@@ -21,8 +21,9 @@ from scipy.sparse.linalg import eigsh
 from cvt_hpc.models.belt_drive.contact import Contact
 from cvt_hpc.models.belt_drive.drive import Drive, State
 from cvt_hpc.models.belt_drive.friction import Memory, Treatment
-from cvt_hpc.multibody.ancf_beam import PER_NODE, AncfBeam, assemble, at_places
+from cvt_hpc.multibody.ancf_beam import PER_NODE, AncfBeam, at_places
 from cvt_hpc.multibody.ancf_chain import chain
+from cvt_hpc.multibody.ancf_equations import assemble
 from cvt_hpc.solvers.cyclic_blocks import LOWER, UPPER
 
 STUCK = 1.5  # friction_speed: slower contacts stick
@@ -73,7 +74,7 @@ def _of_belt(beam: AncfBeam, q: np.ndarray, size: int) -> lil_matrix:
     """M + K of the belt alone: the matrix of a stage of 1 s at rest."""
     rest = np.zeros_like(q)
     work = chain(q, rest)
-    assemble(beam, work.q, work.v, work.v, 1.0, work.blocks, work.columns, 0)
+    assemble(beam, work.work, work.q, work.v, work.v, 1.0, work.blocks, work.columns, 0)
     matrix, n = lil_matrix((size, size)), len(q)
     for i in range(n):
         rows = slice(PER_NODE * i, PER_NODE * (i + 1))

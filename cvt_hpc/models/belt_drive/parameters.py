@@ -149,6 +149,8 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     if element > longest:
         least = int(np.ceil(path.path_length * (1.0 + p["length_scatter"]) / longest))
         expected = f"at least {least}, four on the shorter arc and two on a strand"
+        if path.wrap.min() < 2.0:
+            expected = f"at least {least}, which turn by half a radian and lie two on a strand"
         problems.append(("elements", expected, f"{p['elements']}"))
     strain = p["tension"] / p["axial_stiffness"]
     if strain > 0.5:

@@ -1,7 +1,9 @@
 """The pulleys of a belt drive and the arms that carry some of them, in the border of the belt's equations.
 
 An arm turns about its pivot, which moves the axis of its pulley. By its angle from where it is drawn, it has
-the moment M - k angle - c angle', and beyond its travel a stiff stop pushes it back.
+the moment M - k angle - c angle', and beyond its travel a stiff stop pushes it back. A strut between a fixed
+point and one of the arm, of the length l, pulls by F = F0 + k_l (l - l0) + c_l l'; its moment is
+-F dl/dangle, and F0 takes the place of M.
 """
 
 from __future__ import annotations
@@ -20,6 +22,26 @@ from cvt_hpc.solvers.generalised_alpha import Scheme, begin, finish, stage_lengt
 WORK_IN, WORK_OUT, CONTACT_LOSS, BELT_LOSS, ARM_LOSS, FRICTION_LOSS = range(6)  # the last of each pulley
 
 
+class Struts(NamedTuple):
+    """Springs and dashpots between fixed points and A arms; (A,) arrays but for the points.
+
+    Attributes
+    ----------
+    fixed, held : (A, 2) arrays
+        Ends on the ground and, as drawn, on the arms [m].
+    stiffness, damping : arrays
+        [N/m], [N s/m]
+    lever : array
+        Slope of the length by the arm's angle as drawn [m]; 0 where there is no strut.
+    """
+
+    fixed: np.ndarray
+    held: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    lever: np.ndarray
+
+
 class Arms(NamedTuple):
     """Constants of A arms; (A,) arrays but for the pivots.
 
@@ -30,11 +52,13 @@ class Arms(NamedTuple):
     inertia : array
         Of the arm with the mass of its pulley, about the pivot [kg m^2].
     moment, stiffness, damping : arrays
-        Of the spring as drawn [N m], of spring and dashpot [N m/rad], [N m s/rad].
+        Of the spring or the strut as drawn [N m], of spring and dashpot at the pivot [N m/rad], [N m s/rad].
     lowest, highest : arrays
         Ends of the travel [rad].
     stop : float
         Stiffness beyond them [N m/rad].
+    struts : Struts
+        Between arms and ground.
     """
 
     pivot: np.ndarray
@@ -45,6 +69,7 @@ class Arms(NamedTuple):
     lowest: np.ndarray
     highest: np.ndarray
     stop: float
+    struts: Struts
 
 
 class Pulleys(NamedTuple):
@@ -102,10 +127,18 @@ class Wheels(NamedTuple):
     power: np.ndarray
 
 
-def no_arms() -> Arms:
-    """The arms of pulleys that all have fixed axes."""
-    none = np.zeros(0)
-    return Arms(np.zeros((0, 2)), none, none, none, none, none, none, 0.0)
+def struts(
+    pivot: np.ndarray, fixed: np.ndarray, held: np.ndarray, stiffness: np.ndarray, damping: np.ndarray
+) -> Struts:
+    """Struts between fixed points and points of arms as drawn; see `Struts`."""
+    (x, y), (along_x, along_y) = (held - pivot).T, (held - fixed).T
+    return Struts(fixed, held, stiffness, damping, (along_y * x - along_x * y) / np.hypot(along_x, along_y))
+
+
+def no_struts(arms: int) -> Struts:
+    """Of arms that have none."""
+    none = np.zeros(arms)
+    return Struts(np.zeros((arms, 2)), np.zeros((arms, 2)), none, none, none)
 
 
 def wheels_at(pulleys: Pulleys, speeds: np.ndarray, angles: np.ndarray, nodes: int) -> Wheels:
@@ -216,19 +249,54 @@ def add_pulleys(pulleys: Pulleys, wheels: Wheels, inputs: np.ndarray, share: flo
     for a in range(wheels.angle.shape[1]):
         k = count + a
         angle, rate = wheels.stage_angle[0, a], wheels.stage_speed[0, k]
-        moment, stiffness = arms.moment[a] - arms.stiffness[a] * angle, arms.stiffness[a]
+        moment, by_rate, lost = strut_moment(arms, a, angle, rate, tau)
+        moment, stiffness = moment - arms.stiffness[a] * angle, arms.stiffness[a]
         beyond = angle - min(max(angle, arms.lowest[a]), arms.highest[a])
         if beyond != 0.0:
             moment, stiffness = moment - arms.stop * beyond, stiffness + arms.stop
         damping, inertia = arms.damping[a], arms.inertia[a]
-        corner[0, k - 1, k - 1] = inertia / tau + damping + tau * stiffness
+        corner[0, k - 1, k - 1] = inertia / tau + damping + tau * stiffness - by_rate
         started = wheels.start_speed[0, k]
         corner[0, k - 1, last] = moment - damping * rate - inertia * (rate - started) / tau
-        wheels.power[ARM_LOSS] += damping * rate * rate
+        wheels.power[ARM_LOSS] += damping * rate * rate + lost
+
+
+@kernel
+def strut_moment(arms: Arms, a: int, angle: float, rate: float, tau: float) -> tuple[float, float, float]:
+    """Moment of the strut on arm a, or the constant M [N m]; its slope by the rate; power lost [W]."""
+    strut = arms.struts
+    if strut.lever[a] == 0.0:
+        return arms.moment[a], 0.0, 0.0
+    fixed_x, fixed_y = strut.fixed[a, 0] - arms.pivot[a, 0], strut.fixed[a, 1] - arms.pivot[a, 1]
+    x, y = strut.held[a, 0] - arms.pivot[a, 0], strut.held[a, 1] - arms.pivot[a, 1]
+    drawn = np.hypot(x - fixed_x, y - fixed_y)
+    x, y = x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)
+    along_x, along_y = x - fixed_x, y - fixed_y
+    length = np.hypot(along_x, along_y)
+    lever = (along_y * x - along_x * y) / length
+    bend = (x * x + y * y - along_x * x - along_y * y - lever * lever) / length  # slope of the lever
+    force = strut.stiffness[a] * (length - drawn) + strut.damping[a] * lever * rate
+    force -= arms.moment[a] / strut.lever[a]
+    by_rate = tau * (strut.stiffness[a] * lever + strut.damping[a] * bend * rate) + strut.damping[a] * lever
+    lost = strut.damping[a] * (lever * rate) ** 2
+    return -force * lever, -by_rate * lever - force * tau * bend, lost
+
+
+def strut_lengths(arms: Arms, angle: np.ndarray) -> np.ndarray:
+    """Lengths of struts at angles (A,) of the arms [m]."""
+    x, y = (arms.struts.held - arms.pivot).T
+    sine, cosine = np.sin(angle), np.cos(angle)
+    held = arms.pivot + np.stack([x * cosine - y * sine, x * sine + y * cosine], 1)
+    return np.hypot(*(held - arms.struts.fixed).T)
 
 
 def arms_energy(arms: Arms, angle: np.ndarray, rate: np.ndarray) -> float:
     """Kinetic and elastic energy of arms at angles and rates (A,) [J]; that of a spring is 0 as drawn."""
     beyond = angle - np.clip(angle, arms.lowest, arms.highest)
-    elastic = (0.5 * arms.stiffness * angle - arms.moment) * angle + 0.5 * arms.stop * beyond**2
+    elastic = 0.5 * arms.stiffness * angle**2 + 0.5 * arms.stop * beyond**2
+    longer = strut_lengths(arms, angle) - strut_lengths(arms, np.zeros_like(angle))
+    is_strut = arms.struts.lever != 0.0
+    per_length = np.divide(arms.moment, arms.struts.lever, where=is_strut, out=np.zeros_like(angle))
+    of_strut = 0.5 * arms.struts.stiffness * longer**2 - per_length * longer
+    elastic += np.where(is_strut, of_strut, -arms.moment * angle)
     return float((0.5 * arms.inertia * rate**2 + elastic).sum())

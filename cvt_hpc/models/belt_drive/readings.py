@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.kernels import called_alike
+from cvt_hpc.models.belt_drive.along_belt import empty_line, empty_sample, read
 from cvt_hpc.models.belt_drive.drive import Drive, State
 from cvt_hpc.models.belt_drive.layout import Layout
 from cvt_hpc.models.belt_drive.pulleys import arms_energy
-from cvt_hpc.multibody.ancf_beam import SHAPES, WEIGHTS, at_places, energies, shapes, tensions
-from cvt_hpc.physics.belt_path import along
+from cvt_hpc.multibody.ancf_beam import energies, shapes
+from cvt_hpc.physics.nearest_on_path import way
 
 PROFILES = {
     "tension": ("tension", "N", "mean"),
@@ -59,17 +61,19 @@ class Readings:
         starts = path.ends[::2]
         shares = np.arange(1, p["strand_probes"] + 1) / (p["strand_probes"] + 1.0)
         self.probes = starts[:, None] + path.spans[:, None] * shares
-        self._middles = starts + 0.5 * path.spans
-        self._contacts = shapes((np.arange(p["contact_points"]) + 0.5) / p["contact_points"])[1]
+        self._way, self._line = way(path), empty_line(p["elements"])
+        self._sample = empty_sample(self.probes.size, len(path.radius))
+        self._read = called_alike(read)
+        self._slopes = shapes((np.arange(p["contact_points"]) + 0.5) / p["contact_points"])[1]
         self.places = (np.arange(PLACES) + 0.5) * (path.path_length / PLACES)
 
     def mean_tension(self, drive: Drive, state: State) -> float:
         """Mean tension of all strands [N]."""
-        return float(np.mean(Reading(self, drive, state).strand_tensions()))
+        return float(Reading(self, drive, state).strand_tensions.mean())
 
 
 class Reading:
-    """What is read at one sample.
+    """What is read at one sample, until the next one is.
 
     Parameters
     ----------
@@ -77,66 +81,35 @@ class Reading:
         Where it is read.
     drive, state : Drive, State
         What moves, and its motion.
+    sums : (6, PLACES) array, optional
+        To which profiles are added: length, tension and offset by it, forces, and samples at each place.
+
+    Attributes
+    ----------
+    displacement : (P p,) array
+        At the probes, to the right of the belt's way [m].
+    strand_tensions : (P,) array
+        Means over the middle half of the strands [N].
+    lifted : (P,) array
+        Whether no point of the belt touches a pulley.
     """
 
-    def __init__(self, where: Readings, drive: Drive, state: State) -> None:
+    def __init__(self, where: Readings, drive: Drive, state: State, sums: np.ndarray | None = None) -> None:
         self._where, self._drive, self._state = where, drive, state
-        self._path = where.drawn.path
-        places = (at_places(drive.beam, state.chain.q, SHAPES[:, k]).reshape(-1, 2) for k in (0, 1))
-        self._position, self._offset = along(self._path, *places)
-        self._tension = tensions(drive.beam, state.chain.q).ravel()
-        self._weight = (drive.beam.lengths[:, None] * WEIGHTS).ravel()
-
-    def displacement(self) -> np.ndarray:
-        """Displacement at the probes, to the right of the belt's way, (P p,) [m]."""
-        order, length = np.argsort(self._position), self._path.path_length
-        return np.interp(
-            self._where.probes.ravel(), self._position[order], self._offset[order], period=length
-        )
-
-    def strand_tensions(self) -> np.ndarray:
-        """Mean tension over the middle half of the strands, (P,) [N]."""
-        quarter = 0.25 * self._path.spans[:, None]
-        inside = np.abs(self._position - self._where._middles[:, None]) < quarter
-        weights = inside * self._weight
-        return weights @ self._tension / weights.sum(axis=1)
+        sums = np.zeros((len(PROFILES) + 2, 0)) if sums is None else sums
+        belt, contacts = (drive.beam, state.chain), (drive.contact, state.touch)
+        found, points = where._sample, (where._slopes, where.probes.ravel())
+        where._read(where._way, *belt, *contacts, *points, where._line, found, sums)
+        self.displacement, self.strand_tensions, self._slip = found.displacement, found.tension, found.slip
+        self.lifted = found.largest <= 0.0
 
     def scalars(self) -> list[float]:
         """What `scalars_of` names."""
-        touch, wheels, drawn = self._state.touch, self._state.wheels, self._where.drawn
+        wheels, drawn = self._state.wheels, self._where.drawn
         speeds = drawn.path.turn * wheels.speed[0, : len(drawn.pulleys)]
-        pressed = np.maximum(touch.normal.sum(axis=(1, 2)), 1e-9)
-        slid = (touch.normal * touch.memory.slip).sum(axis=(1, 2)) / pressed
-        slip = drawn.path.turn * slid / self._where.belt_speed
-        found = [float(speeds[drawn.driven]), *self.strand_tensions(), *slip]
+        slip = drawn.path.turn * self._slip / self._where.belt_speed
+        found = [float(speeds[drawn.driven]), *self.strand_tensions, *slip]
         return [*found, *(speeds if len(speeds) > 2 else ()), *wheels.angle[0]]
-
-    def lifted(self) -> np.ndarray:
-        """Whether no point of the belt touches a pulley, (P,)."""
-        found: np.ndarray = self._state.touch.normal.max(axis=(1, 2)) <= 0.0
-        return found
-
-    def profiles(self) -> np.ndarray:
-        """Sums at each place, (6, place): length, tension and offset by it, forces, and samples."""
-        touch = self._state.touch
-        width = self._path.path_length / PLACES
-        place = np.minimum((self._position / width).astype(int), PLACES - 1)
-        weight = self._weight
-        rows = [
-            np.bincount(place, row, PLACES) for row in (weight, weight * self._tension, weight * self._offset)
-        ]
-        contacts = self._contacts()
-        forwards = self._path.turn[:, None, None] * touch.tangential
-        for forces in (touch.normal, forwards):
-            rows.append(np.bincount(contacts, forces.sum(axis=0).ravel() / width, PLACES))
-        return np.array([*rows, np.ones(PLACES)])
-
-    def _contacts(self) -> np.ndarray:
-        """Places of the contact points, (k C,)."""
-        q, both = self._state.chain.stage_q, (self._drive.contact.shape, self._where._contacts)
-        places = (at_places(self._drive.beam, q, shape).reshape(-1, 2) for shape in both)
-        share = along(self._path, *places)[0] / self._path.path_length
-        return np.minimum((share * PLACES).astype(int), PLACES - 1)
 
     def stored_energy(self) -> float:
         """Kinetic and elastic energy of belt, driven pulleys and arms [J], without what contacts store."""

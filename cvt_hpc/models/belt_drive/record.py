@@ -121,7 +121,8 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
 
 
 def _named(dimension: str, names: tuple[str, ...]) -> Coordinate:
-    return COORDINATES[dimension]._replace(values=np.array(names))
+    comment = COORDINATES[dimension].comment if len(names) == 2 else "in the order in which the belt runs"
+    return COORDINATES[dimension]._replace(values=np.array(names), comment=comment)
 
 
 def cost(parameters: Mapping[str, Any], stepper: str) -> Any:

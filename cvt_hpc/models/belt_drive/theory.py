@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from cvt_hpc.models.belt_drive.layout import Layout
 from cvt_hpc.models.belt_drive.preload import stretch
@@ -40,11 +41,11 @@ def creep_loss(parameters: Mapping[str, Any], drawn: Layout) -> float:
 
 
 def expected_loss(parameters: Mapping[str, Any], drawn: Layout, tension: np.ndarray) -> float:
-    """Speed loss by creep and radial compliance, from the tensions of a run.
+    """Speed loss by creep, radial compliance and shear of bristles, from the tensions of a run.
 
     The belt sticks where it runs onto a pulley. The rubber under its cord turns with the pulley, so that
-    w (R - depth) / stretch is the same on all, with depth = (T - m v^2) / (R k) and the tension of the strand
-    that runs on.
+    w (R - depth) / stretch is the same on all, with depth = (T - m v^2) / (R k) and the tension T of the
+    strand that runs on; where bristles shear, with that of `unsheared_tension`.
 
     Parameters
     ----------
@@ -56,11 +57,71 @@ def expected_loss(parameters: Mapping[str, Any], drawn: Layout, tension: np.ndar
         Of the strands [N].
     """
     p, radius = parameters, drawn.path.radius
-    running_on = np.roll(tension, 1)
-    depth = (running_on - _centrifugal(p, drawn.path)) / (radius * p["contact_stiffness"])
+    running_on, centrifugal = np.roll(tension, 1), _centrifugal(p, drawn.path)
+    if p["friction_treatment"] == "bristle":
+        running_on = np.array(
+            [
+                unsheared_tension(p, *arc) + centrifugal
+                for arc in zip(
+                    running_on - centrifugal, tension - centrifugal, radius, drawn.path.wrap, strict=True
+                )
+            ]
+        )
+    depth = (running_on - centrifugal) / (radius * p["contact_stiffness"])
     stretched = np.array([stretch(float(force), p["axial_stiffness"]) for force in running_on])
     per_angle = (radius - depth) / stretched
     return float(1.0 - drawn.ratio * per_angle[0] / per_angle[drawn.driven])
+
+
+def unsheared_tension(
+    parameters: Mapping[str, Any], inlet: float, outlet: float, radius: float, wrap: float
+) -> float:
+    """Tension at which a belt of the same speed would run onto a pulley without shearing its rubber.
+
+    Of N = T - m v^2 along the arc: dN/ds = q = shear_stiffness z and dz/ds = (N - N_c) C, where N_c is what
+    is sought and C = 1 / EA + 1 / (R^2 k) of belt and contacts. From z = 0 at the inlet on
+
+        N = N_c + (N_inlet - N_c) cosh(s sqrt(shear_stiffness C))
+
+    up to where |q| = mu N / R, beyond which the rim slides, as by Euler and Eytelwein (Firbank 1970; the
+    contacts' compliance acts as the belt's own).
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat parameters of a run [SI].
+    inlet, outlet : float
+        T - m v^2 where the belt runs on and off [N].
+    radius, wrap : float
+        Of the pulley and its arc [m], [rad].
+
+    Returns
+    -------
+    float
+        N_c [N]; nan where friction cannot carry the difference, or its coefficient is not constant.
+    """
+    p, mu = parameters, parameters["kinetic_friction"]
+    give = 1.0 / p["axial_stiffness"] + 1.0 / (radius**2 * p["contact_stiffness"])
+    rate, length = np.sqrt(p["shear_stiffness"] * give), radius * wrap
+    if not _has_one_coefficient(p) or abs(np.log(outlet / inlet)) >= mu * wrap:
+        return np.nan
+    if outlet == inlet:
+        return inlet
+    side = mu * np.copysign(1.0, outlet - inlet) / radius  # of dN/ds over N where the rim slides
+
+    def rise(stuck: float) -> tuple[float, float]:
+        """Of N over the part that sticks: what it is, and what the shear at its end gives."""
+        last = outlet * np.exp(-side * (length - stuck))
+        return last - inlet, side * last * np.tanh(0.5 * rate * stuck) / rate
+
+    stuck = length
+    if abs(rise(length)[0]) > abs(rise(length)[1]):
+        stuck = brentq(lambda at: np.subtract(*rise(at)), 1e-9 * length, length)
+    return inlet - rise(stuck)[0] / (np.cosh(rate * stuck) - 1.0)
+
+
+def _has_one_coefficient(p: Mapping[str, Any]) -> bool:
+    return bool(p["friction_law"] == "coulomb" and p["friction_gradient"] == 0.0)
 
 
 def _centrifugal(p: Mapping[str, Any], path: BeltPath) -> float:
@@ -102,7 +163,7 @@ def sliding_tension(
         [N]; nan on strands, and everywhere unless the coefficient of friction is constant.
     """
     p = parameters
-    if p["friction_law"] != "coulomb" or p["friction_gradient"] != 0.0:
+    if not _has_one_coefficient(p):
         return np.full(len(position), np.nan)
     centrifugal, pulley = _centrifugal(p, path), regions(path, position) // 2
     inlet, outlet = np.roll(tension, 1)[pulley] - centrifugal, np.asarray(tension)[pulley] - centrifugal

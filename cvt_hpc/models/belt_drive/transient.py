@@ -114,14 +114,13 @@ class Transient(SampledRun):
         return courses.load(self.parameters, time)
 
     def _take_sample(self) -> None:
-        found = Reading(self._readings, self._drive, self._state)
+        sums = self._sums if self.done >= self.first_judged else None
+        found = Reading(self._readings, self._drive, self._state, sums)
         time = self.time
         speed = self.driving_speed(time)
-        self._rows[self.done] = [*found.displacement(), self.load(time), speed, *found.scalars()]
-        self._lifted = np.where(found.lifted(), self._lifted + 1, 0)
+        self._rows[self.done] = [*found.displacement, self.load(time), speed, *found.scalars()]
+        self._lifted = np.where(found.lifted, self._lifted + 1, 0)
         stored = np.nan
-        if self.done >= self.first_judged:
-            self._sums += found.profiles()
         if self.done in (self.whole_turns.start, self.samples - 1):
             stored = found.stored_energy()
         self._totals[self.done] = [*self._state.totals, stored]
