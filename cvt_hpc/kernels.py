@@ -59,6 +59,7 @@ from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 from numba.core.targetconfig import ConfigStack
 
+from cvt_hpc.compiler_shortcuts import replaced, shortcuts
 from cvt_hpc.lanes.kinds import LaneArrayKind
 
 _PACKAGE = Path(__file__).parent
@@ -155,42 +156,6 @@ class _Library(JITCodeLibrary):
 _WITHOUT_ADDRESS = SimpleNamespace(set_env=lambda name, environment: None)
 
 
-def _call_type(function: types.Function, typing: Any, arguments: Any, named: Any) -> Any:
-    """Type the call of an operator, or the like; only once, as to try its implementations takes 1 ms."""
-    key = function, tuple(arguments)
-    if not named and (found := _signatures.get(key)):
-        return found
-    found = types.BaseFunction.get_call_type(function, typing, arguments, named)
-    # one with a key of its own has code of its own, compiled anew for other options of the caller
-    if function._impl_keys[found.args] is function.typing_key and not named:
-        _signatures[key] = found
-    return found
-
-
-class _Memo(dict):
-    """What a process remembers; a pickle of the code around it, which may name any type, leaves it out."""
-
-    def __reduce__(self) -> tuple:
-        return _Memo, ()
-
-
-_signatures: dict[tuple, Any] = _Memo()
-
-
-@contextmanager
-def _replaced(owner: Any, name: str, value: Any) -> Iterator[None]:
-    """Give an object or a class another attribute for a while."""
-    own = vars(owner).get(name)
-    setattr(owner, name, value)
-    try:
-        yield
-    finally:
-        if own is None:
-            delattr(owner, name)
-        else:
-            setattr(owner, name, own)
-
-
 class _Kernel(CPUDispatcher):
     """A function and its machine code, with an entry from Python where Python has called it."""
 
@@ -225,10 +190,10 @@ class _Kernel(CPUDispatcher):
                 del self.overloads[kinds]
             self._takes_lanes = any(_holds(kind, LaneArrayKind) for kind in kinds)
             with (
-                _replaced(self.targetctx.codegen(), "_library_class", _Library),
-                _replaced(types.Function, "get_call_type", _call_type),
+                shortcuts(),
+                replaced(self.targetctx.codegen(), "_library_class", _Library),
                 ExitStack() as claims,  # kept until the code is saved, or failed to compile
-                _replaced(self, "_claims", claims),
+                replaced(self, "_claims", claims),
             ):
                 return super().compile(sig)
 

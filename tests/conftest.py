@@ -1,5 +1,6 @@
 """For all tests: a model and a stepper without physics, which say what a job file may set and run nothing."""
 
+import gc
 import os
 import sys
 from types import ModuleType
@@ -76,6 +77,12 @@ def pytest_collection_modifyitems(items):
     """
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: (item.path.parent.name != "slurm", item.path not in slow))
+
+
+def pytest_collection_finish():
+    """Leave what the collected tests hold out of later searches for garbage: it stays to the end."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture

@@ -91,6 +91,16 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> Arrangem
     return Arrangement(dataset, x, y, panel, tuple(notes))
 
 
+def along_x(arrangement: Arrangement) -> tuple[xr.Dataset, list[str]]:
+    """The first row of the first panel of an arrangement, and what is fixed, in words."""
+    dataset, notes = arrangement.dataset, list(arrangement.notes)
+    for name in filter(None, (arrangement.y, arrangement.panel)):
+        count = dataset.sizes[name]
+        notes.append(f"{in_words(dataset[name])} = {value_text(dataset[name], 0)} (first of {count})")
+        dataset = dataset.isel({name: 0})
+    return dataset, notes
+
+
 def _take(names: list[str], preferred: str, avoid: str = "") -> str | None:
     """Take the preferred name off the list, else the first, one to avoid last."""
     if not names:

@@ -77,14 +77,14 @@ LINES: dict[str, Any] = {"facecolor": "none", "edgecolor": "#8a8a8a", "linewidth
 INFERRED_VIBRATION = "#d795ab"
 
 
-def _part_of(name: str, start: float, stop: float) -> Colormap:
+def colours_of(name: str, start: float, stop: float) -> Colormap:
     """Part of a colour map of the plotting library, in steps that an eye finds again on the colour bar."""
     return ListedColormap(matplotlib.colormaps[name](np.linspace(start, stop, 24)), name)
 
 
 # Both fall in lightness all the way and begin darker than undecided cells.
-AMPLITUDE_COLOURS = _part_of("inferno_r", 0.27, 0.92)
-FREQUENCY_COLOURS = _part_of("viridis_r", 0.30, 1.0)
+AMPLITUDE_COLOURS = colours_of("inferno_r", 0.27, 0.92)
+FREQUENCY_COLOURS = colours_of("viridis_r", 0.30, 1.0)
 
 
 @dataclass(frozen=True)

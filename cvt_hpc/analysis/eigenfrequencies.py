@@ -10,8 +10,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.arrangement import Arrangement, arrange, ruler, value_text
-from cvt_hpc.analysis.figures import WIDTH, axis_label, in_words
+from cvt_hpc.analysis.arrangement import along_x, arrange, ruler
+from cvt_hpc.analysis.figures import WIDTH, axis_label
 from cvt_hpc.errors import one_line
 
 COLOUR = "#1f4e8c"
@@ -36,7 +36,7 @@ def eigenfrequency_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: st
         Where a strand holds no shape its lines have gaps.
     """
     arrangement = arrange(dataset, at, source)
-    shown, notes = _along_x(arrangement)
+    shown, notes = along_x(arrangement)
     along = ruler(shown[arrangement.x])
     figure = Figure((WIDTH, HEIGHT), layout="constrained")
     strands = shown["strand"].values
@@ -54,16 +54,6 @@ def eigenfrequency_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: st
     lines = [headline, *notes, "beside the lines: half waves along the strand"]
     figure.suptitle("\n".join(fill(line, 72) for line in lines))
     return figure
-
-
-def _along_x(arrangement: Arrangement) -> tuple[xr.Dataset, list[str]]:
-    """The first row of the first panel, and what is fixed, in words."""
-    dataset, notes = arrangement.dataset, list(arrangement.notes)
-    for name in filter(None, (arrangement.y, arrangement.panel)):
-        count = dataset.sizes[name]
-        notes.append(f"{in_words(dataset[name])} = {value_text(dataset[name], 0)} (first of {count})")
-        dataset = dataset.isel({name: 0})
-    return dataset, notes
 
 
 def _draw_strand(axes: Axes, x: Any, frequency: xr.DataArray) -> None:

@@ -65,6 +65,7 @@ def history_figure(dataset: xr.Dataset) -> Figure:
             (1.2, [(place, panels.draw_course, dataset[name].assign_attrs(units.get(name, {})))
                    for place, name in places])
         )  # fmt: skip
+    rows += [(1.6, [(WHOLE, panels.draw_group, group)]) for group in panels.groups(dataset)]
     if with_spectrum:
         rows.append((2.1, [(WHOLE, panels.draw_spectra, with_spectrum)]))
     if _is_known(dataset, "ring_tension") or _is_known(dataset, "push_force"):
@@ -114,7 +115,7 @@ def _title(dataset: xr.Dataset) -> str:
     """Which run, and what became of it."""
     name = one_line(dataset.attrs.get("job_name", ""))
     lines = [f"One run: {name}" if name else "One run"]
-    if place := _place(dataset.attrs):
+    if place := place_of(dataset.attrs):
         lines.append(place)
     if "rung" in dataset:
         rung = flag_in_words(dataset["rung"])
@@ -130,7 +131,7 @@ def _title(dataset: xr.Dataset) -> str:
     return "\n".join(balanced(line, 76) for line in lines)
 
 
-def _place(attributes: Mapping[str, Any]) -> str:
+def place_of(attributes: Mapping[str, Any]) -> str:
     """Where a run stands: its values on the axes of the job, and where else it departs from the job."""
     if not {"job", "point"} <= attributes.keys():
         return ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 from textwrap import fill
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -23,6 +24,8 @@ CLOSE_UP = 0.01  # [s]: six periods at 600 Hz
 MOST_PEAKS = 3
 COLOURS = {"t1": "#b5460f", "t2": "#1f4e8c"}  # of like lightness, so line styles tell them apart in grey
 LINES = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))  # one for each probe of a strand, by default
+GROUPS = ("tension_", "speed_", "arm_")  # how the names of histories begin that share a panel
+_GROUP_COLOURS = ("#b5460f", "#1f4e8c", "#333333", "#2a7f62", "#8c5aa8")
 COURSES = ("driving_speed", "load")  # what a run may change
 FEEDS = {
     "flank_feed": ("friction of the flanks", "#b5460f", "-"),
@@ -173,6 +176,7 @@ def draw_close_up(axes: Axes, strand: Strand) -> None:
 def draw_spectra(axes: Axes, strands: list[Strand]) -> None:
     """Amplitude spectra of the strongest probes over the judged part, dominant peaks marked."""
     top = 0.0
+    few = len(strands) <= 2  # of more, peaks at one frequency would cover each other's labels
     for i, strand in enumerate(strands):
         bins = np.arange(0.0, strand.band[1] + BIN_WIDTH / 2, BIN_WIDTH)
         signal = strand.judged[:, strand.strongest]
@@ -181,6 +185,8 @@ def draw_spectra(axes: Axes, strands: list[Strand]) -> None:
         axes.plot(bins, spectrum, ls=LINES[i % len(LINES)], color=strand.colour, linewidth=1.2, label=label)
         for frequency, amplitude in _peaks(signal, strand, bins, spectrum):
             axes.plot(frequency, amplitude, "v", color=strand.colour, markersize=5)
+            if not few:
+                continue
             # strands often vibrate at one frequency: the first is labelled on the left, others right
             is_left = frequency > _MARGINS[i > 0] * strand.band[1]
             axes.annotate(
@@ -197,7 +203,8 @@ def draw_spectra(axes: Axes, strands: list[Strand]) -> None:
     axes.set(xlim=(0, strands[0].band[1]), ylim=(0, 1.1 * top or 1.0))
     axes.set(xlabel="frequency [Hz]", ylabel="amplitude [µm]")
     axes.set_title("spectrum of the judged part", loc="left", pad=3)
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=len(strands), frameon=False)
+    place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.97), "ncols": len(strands)}
+    axes.legend(**(place if few else {"loc": "upper right"}), frameon=False)
 
 
 def _peaks(signal: Array, strand: Strand, bins: Array, spectrum: Array) -> list[tuple[float, float]]:
@@ -219,6 +226,24 @@ def draw_course(axes: Axes, course: xr.DataArray) -> None:
     axes.plot(time, factor * course.values, color=_OTHER_COLOUR, linewidth=1.2)
     label = fill(axis_label(course, unit), 14)  # what the height of the panel holds
     axes.set(xlabel="time [ms]", ylabel=label, xlim=time[[0, -1]])
+
+
+def groups(dataset: xr.Dataset) -> list[list[xr.DataArray]]:
+    """Histories that belong into one panel: those whose names begin alike, as GROUPS has them."""
+    courses = {str(name): values for name, values in dataset.items() if values.dims == ("time",)}
+    found = ([values for name, values in courses.items() if name.startswith(prefix)] for prefix in GROUPS)
+    return [group for group in found if group]
+
+
+def draw_group(axes: Axes, group: list[xr.DataArray]) -> None:
+    """Histories of one kind over time: forces of the strands, speeds of the pulleys, angles of the arms."""
+    for k, course in enumerate(group):
+        factor, unit = coordinate_unit(course.attrs)
+        kind, _, label = str(course.name).partition("_")
+        style = {"ls": LINES[k % len(LINES)], "color": _GROUP_COLOURS[k % len(_GROUP_COLOURS)]}
+        axes.plot(1e3 * course["time"].values, factor * course.values, label=label, linewidth=1.0, **style)
+    axes.set(xlabel="time [ms]", ylabel=f"{kind} [{unit}]", xlim=1e3 * course["time"].values[[0, -1]])
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=len(group), frameon=False, fontsize=8)
 
 
 def draw_forces(axes: Axes, dataset: xr.Dataset) -> None:

@@ -61,9 +61,9 @@ def map_figure(dataset: xr.Dataset, at: Mapping[str, Any] | None = None, source:
         Results of a study, as `open_results` returns them: `status` and `vibrates` over the job's axes;
         `amplitude` [m] and `frequency` [Hz], per strand, where known; `inferred_class` of a trace. The
         stronger strand is shown. Of a study of samples the axes lie along `run`: each run is a mark, and
-        there is a panel for each pair of axes. Results that hold `eigenfrequency` are drawn as lines over
-        the axis that else runs along x. Of a study with the axis `disturbance` the runs from the smallest
-        and the largest value make one cell.
+        there is a panel for each pair of axes. Results that hold `eigenfrequency` but no `amplitude` are
+        drawn as lines over the axis that else runs along x. Of a study with the axis `disturbance` the runs
+        from the smallest and the largest value make one cell.
     at : mapping, optional
         Axes to fix: name -> value, as a number [SI] or a text.
     source : str, optional
@@ -83,7 +83,7 @@ def map_figure(dataset: xr.Dataset, at: Mapping[str, Any] | None = None, source:
     check_results(dataset, source)
     if is_sampled(dataset):
         return scatter_figure(dataset, at or {}, source)
-    if "eigenfrequency" in dataset:
+    if "eigenfrequency" in dataset and "amplitude" not in dataset:
         return eigenfrequency_figure(dataset, at or {}, source)
     if has_starts(dataset, at or {}):
         dataset = join_starts(dataset)

@@ -148,6 +148,11 @@ def _means(unit: str, title: str, *channels: str) -> Kind:
     return Kind(unit, title, values, channels=channels)
 
 
+def _speed_loss(history: History, quantity: Quantity) -> Array:
+    driven, driving = (history.channel(f"{name}_speed")[history.judged] for name in ("driven", "driving"))
+    return np.array([1.0 - history.parameters["ratio"] * driven.mean() / driving.mean()])
+
+
 _TIMES = (1e-6, 1e3)  # [s]
 KINDS: dict[str, Kind] = {
     "trajectory": Kind("m", "trajectory", _trajectory, takes_part=True, needs_part=True),
@@ -158,6 +163,8 @@ KINDS: dict[str, Kind] = {
     "onset": Kind("N m", "onset load", _onset, takes_part=True),
     "push_force": _means("N", "push force", "push_force t1", "push_force t2"),
     "ring_tension": _means("N", "ring tension", "ring_tension t1", "ring_tension t2"),
+    "strand_tension": _means("N", "strand tension", "tension t1", "tension t2"),
+    "speed_loss": Kind("1", "speed loss", _speed_loss, channels=("driven_speed", "driving_speed")),
     "friction_loss": _means("W", "friction losses", "driving_flank_loss", "driven_flank_loss", "ring_loss"),
 }
 

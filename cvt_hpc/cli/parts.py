@@ -24,6 +24,7 @@ _SUBJECTS = {
     "JOB": "job file (TOML)",
     "DIR": "output folder of a run",
     "RESULTS": "output folder of a run, or a dataset (.nc)",
+    "HISTORY": "dataset of one run (.nc), as simulate --out writes it",
 }
 
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray
-from cvt_hpc.multibody.ancf_beam import PER_NODE
+from cvt_hpc.multibody.ancf_beam import PER_NODE, AncfBeam
+from cvt_hpc.multibody.ancf_equations import assemble, empty_work
 from cvt_hpc.solvers.cyclic_blocks import block_size, empty_blocks, empty_columns
 from cvt_hpc.solvers.generalised_alpha import Scheme, begin, finish, stage_length
 
@@ -30,6 +31,8 @@ class Chain(NamedTuple):
         What its implicit Euler step began with.
     blocks, columns : LaneArrays
         Equations of `cyclic_blocks`.
+    work : LaneArray
+        Of `assemble`.
     """
 
     q: np.ndarray
@@ -42,6 +45,7 @@ class Chain(NamedTuple):
     start_v: np.ndarray
     blocks: LaneArray
     columns: LaneArray
+    work: LaneArray
 
 
 def chain(q: np.ndarray, v: np.ndarray, columns: int = 1) -> Chain:
@@ -62,7 +66,7 @@ def chain(q: np.ndarray, v: np.ndarray, columns: int = 1) -> Chain:
     q, v = np.array(q, float), np.array(v, float)
     dv, stage_q, stage_v, start_q, start_v = np.zeros((5, *q.shape))
     equations = empty_blocks(len(q), PER_NODE), empty_columns(len(q), PER_NODE, columns)
-    return Chain(q, v, v.copy(), dv, stage_q, stage_v, start_q, start_v, *equations)
+    return Chain(q, v, v.copy(), dv, stage_q, stage_v, start_q, start_v, *equations, empty_work())
 
 
 @kernel
@@ -89,6 +93,22 @@ def place(chain: Chain, tau: float) -> None:
     for i in range(chain.q.shape[0]):
         for k in range(PER_NODE):
             chain.stage_q[i, k] = chain.start_q[i, k] + tau * chain.stage_v[i, k]
+
+
+@kernel
+def set_up(beam: AncfBeam, chain: Chain, tau: float, column: int) -> float:
+    """Set up a correction of the speeds of a stage, by `assemble`; the power that damping takes [W]."""
+    return assemble(
+        beam,
+        chain.work,
+        chain.stage_q,
+        chain.stage_v,
+        chain.start_v,
+        tau,
+        chain.blocks,
+        chain.columns,
+        column,
+    )
 
 
 @kernel

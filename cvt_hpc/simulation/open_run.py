@@ -108,7 +108,7 @@ class OpenRun:
 
     def _finer(self, run: Any) -> dict[str, Any] | None:
         """The point at half the step of a run; None where it has no step, or has been refined enough."""
-        if "step" not in self._point or self._refinements >= self._point["most_refinements"]:
+        if "step" not in self._point or self._refinements >= run.parameters["most_refinements"]:
             return None
         steps = max(math.ceil(run.interval / run.parameters["step"] - 1e-9), 1)
         return self._point | {"step": run.interval / (2 * steps)}

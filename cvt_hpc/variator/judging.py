@@ -6,6 +6,7 @@ A run is as `slip` takes it, and has `displacement`, `probes` with labels, `fail
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,14 +24,24 @@ from cvt_hpc.vibration.signals import amplitude_spectrum
 RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by what a ramp changes
 
 
-def assess(run: Any) -> assessment.Occurrence:
-    """Whether and how a run vibrates that has reached its end; its probes are columns of the displacement."""
+def assess(
+    run: Any, names: Sequence[str] = STRANDS, pulleys: Sequence[str] = PULLEYS
+) -> assessment.Occurrence:
+    """Whether and how a run vibrates that has reached its end; its probes are columns of the displacement.
+
+    Parameters
+    ----------
+    run : object
+        With all samples recorded.
+    names, pulleys : sequences of str
+        Of its strands, and of the pulleys whose slip it records.
+    """
     p = run.parameters
     if ramped(p):
         return with_slip(run, _assess_ramp(run))  # type: ignore[arg-type]  # None is of a run before its end
-    columns, strands = _on_strands(run)
+    columns, strands = _on_strands(run, names)
     found = assessment.assess(run.displacement[:, columns], p["sampling_rate"], strands, p)
-    return with_slip(run, replace(found, strongest_probe=columns[found.strongest_probe]))
+    return with_slip(run, replace(found, strongest_probe=columns[found.strongest_probe]), pulleys)
 
 
 def _assess_ramp(run: Any) -> ramp.RampOccurrence | None:
@@ -43,10 +54,10 @@ def _assess_ramp(run: Any) -> ramp.RampOccurrence | None:
     return found and replace(found, strongest_probe=columns[found.strongest_probe])
 
 
-def _on_strands(run: Any) -> tuple[np.ndarray, list[str]]:
+def _on_strands(run: Any, names: Sequence[str] = STRANDS) -> tuple[np.ndarray, list[str]]:
     """Columns of the displacement whose probes lie on strands, and on which."""
     regions = [probe.label.split()[0] for probe in run.probes]
-    columns = [k for k, region in enumerate(regions) if region in STRANDS]
+    columns = [k for k, region in enumerate(regions) if region in names]
     return np.array(columns), [regions[k] for k in columns]
 
 
@@ -71,18 +82,18 @@ def mean(run: Any, name: str) -> float:
     return float(run.channel(name)[run.judged].mean())
 
 
-def pair(run: Any, name: str, labels: tuple[str, str] = PULLEYS) -> np.ndarray:
-    """Means of a channel of both pulleys, or strands."""
+def each(run: Any, name: str, labels: Sequence[str] = PULLEYS) -> np.ndarray:
+    """Means of a channel of each pulley, or strand."""
     return np.array([mean(run, f"{name} {label}") for label in labels])
 
 
-def motion(run: Any, strongest_probe: np.ndarray) -> dict[str, Any]:
-    """Values of a finished run of any belt on two pulleys; arguments as of `evaluate`."""
+def motion(run: Any, strongest_probe: np.ndarray, pulleys: Sequence[str] = PULLEYS) -> dict[str, Any]:
+    """Values of a finished run of any belt on pulleys of these names; arguments as of `evaluate`."""
     p, judged = run.parameters, run.judged
     moved = run.displacement[judged][:, strongest_probe]
     return {
         "spectrum": amplitude_spectrum(moved, p["sampling_rate"], frequency_bins(p).values).T,
-        "slip": pair(run, "slip"),
+        "slip": each(run, "slip", pulleys),
         "speed_loss": speed_loss(run, judged),
         "driven_speed_ripple": run.channel("driven_speed")[judged].std(),
     }
@@ -98,11 +109,11 @@ def evaluate(run: Any, strongest_probe: np.ndarray) -> dict[str, Any]:
     strongest_probe : (2,) int array
         Column of the displacement that vibrates most, for each strand.
     """
-    axial = pair(run, "axial_force")
+    axial = each(run, "axial_force")
     return {
         **motion(run, strongest_probe),
-        "mean_ring_tension": pair(run, "ring_tension", STRANDS),
-        "mean_push_force": pair(run, "push_force", STRANDS),
+        "mean_ring_tension": each(run, "ring_tension", STRANDS),
+        "mean_push_force": each(run, "push_force", STRANDS),
         "axial_force": axial,
         "flank_loss": np.array([mean(run, f"{pulley}_flank_loss") for pulley in PULLEYS]),
         "thrust_ratio": axial[0] / axial[1],

@@ -22,6 +22,7 @@ pulleys.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -108,19 +109,19 @@ def capacity(run: Any, samples: slice) -> dict[str, float]:
     return against_slip(load, carried)
 
 
-def with_slip(run: Any, found: Occurrence) -> Occurrence:
+def with_slip(run: Any, found: Occurrence, pulleys: Sequence[str] = PULLEYS) -> Occurrence:
     """What was found of the vibration of a run that reached its end, with gross slip where there is some.
 
     The margin is that to gross slip, where this is nearer than the one of the amplitude.
     """
     late = slice((run.judged.start + run.samples) // 2, run.samples)
-    slips = np.array([run.channel(f"slip {pulley}")[late].mean() for pulley in PULLEYS])
+    slips = np.array([run.channel(f"slip {pulley}")[late].mean() for pulley in pulleys])
     k = int(np.argmax(np.abs(slips)))
     with np.errstate(divide="ignore"):
         beyond = float(np.log(abs(slips[k]) / GROSS_SLIP))
     if beyond <= 0.0:
         return replace(found, margin=min(found.margin, -beyond))
-    reason = f"the {PULLEYS[k]} pulley slips by {abs(slips[k]):.3g} of the belt's speed; {found.reason}"
+    reason = f"the {pulleys[k]} pulley slips by {abs(slips[k]):.3g} of the belt's speed; {found.reason}"
     return replace(found, vibrates=Vibrates.SLIPS, reason=reason[:LONGEST_REASON], margin=beyond)
 
 

@@ -37,7 +37,9 @@ def test_run_status_gather_and_map_of_one_study(write_job, call, tmp_path):
         assert results["vibrates"][:].tolist() == [[0, 0]] * 2 + [[1, 1]] * 3
     assert call("map", "out/x", "--at", "sheave_stiffness=3") == (0, ["map: out/x/map.png"], [])
     assert call("map", "out/x/results.nc", "--out", "y.png") == (0, ["map: y.png"], [])
-    for picture in ("out/x/map.png", "y.png"):
+    curve = "plot", "curve", "out/x", "vibrates", "--at", "sheave_stiffness=3"
+    assert call(*curve) == (0, ["picture: out/x/curve.png"], [])
+    for picture in ("out/x/map.png", "y.png", "out/x/curve.png"):
         assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
 
 
@@ -270,6 +272,14 @@ def test_simulate_of_a_run_that_fails_ends_with_1(write_job, call):
         (["status", "out/x"], "out/x: expected the output folder of a run, found nothing"),
         (["gather", "x.toml"], "x.toml: expected the output folder of a run, found a file"),
         (["map", "out/x"], None),
+        (
+            ["plot", "wrap", "notes.nc"],
+            "notes.nc: expected a history written by `cvt-hpc simulate --out`, found another file, or none",
+        ),
+        (
+            ["plot", "waterfall", "out/x", "--out", "h"],
+            "h: expected a file name in .png, .svg, .pdf, found no suffix",
+        ),
         (["run"], "the following arguments are required: JOB; see `cvt-hpc run --help`"),
         (
             ["run", "x.toml", "--run-limit", "10 N"],

@@ -26,7 +26,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.extending import register_jitable
 
 import cvt_hpc
-from cvt_hpc import kernels
+from cvt_hpc import compiler_shortcuts, kernels
 from cvt_hpc.lanes import LaneArray
 
 PACKAGE = Path(kernels.__file__).parent
@@ -360,7 +360,6 @@ def has_machine_code(function):
 def test_a_kernel_that_kernels_have_called_can_be_called_from_python(package, chosen):
     for loaded in (False, True):
         module = load(package)
-        module._signatures[None] = (k for k in ())  # as types may hold what cannot be pickled
         inner = module.kernel(plus_one)
         caller = module.kernel(twice(inner))
         assert caller(1.0) == 4.0
@@ -401,7 +400,7 @@ def test_other_processes_take_in_a_kernel_that_they_find(tmp_path):
 SLOW = """
 import logging, sys
 from numba.extending import overload
-from cvt_hpc import kernels
+from cvt_hpc import compiler_shortcuts, kernels
 logging.basicConfig(level=logging.INFO, stream=sys.stdout, format="%(message)s")
 kernels._LONG = 0.0
 def plus(x): pass
@@ -458,7 +457,7 @@ def test_functions_of_other_people_are_compiled_as_always(package, chosen):
 
 def test_an_operator_is_typed_once_for_each_kind_of_operands(package, chosen, monkeypatch):
     typed = []
-
+    monkeypatch.setattr(compiler_shortcuts, "_signatures", {})
     ask = numba.types.BaseFunction.get_call_type
 
     def get_call_type(function, context, arguments, named):
@@ -470,6 +469,43 @@ def test_an_operator_is_typed_once_for_each_kind_of_operands(package, chosen, mo
     real, whole = numba.types.float64, numba.types.int64
     kinds = [(mul, real, real), (mul, whole, whole), (mul, whole, real), (add, real, real)]
     assert sorted(map(str, typed)) == sorted(map(str, kinds))
+
+
+@pytest.mark.parametrize("name", ["rise_and_fall", "outer"])
+def test_shortcuts_change_no_machine_code(package, chosen, monkeypatch, name):
+    found = []
+    for shortcuts in (compiler_shortcuts._SHORTCUTS, ()):
+        monkeypatch.setattr(compiler_shortcuts, "_SHORTCUTS", shortcuts)
+        # where machine code is found nothing is compiled
+        monkeypatch.setattr(numba.config, "CACHE_DIR", str(package.parent / f"{len(shortcuts)}"))
+        module = load(package)
+        inner = module.merged_kernel(rise_and_fall)
+        compiled = inner if name == "rise_and_fall" else module.kernel(outer(inner))
+        assert compiled(7.0, 3) == compiled.py_func(7.0, 3)
+        (code,) = compiled.overloads.values()
+        instructions = [line for line in code.library.get_asm_str().splitlines() if line[:1] == "\t"]
+        # names are numbered through as kernels are made
+        found.append([re.sub(r"_ZN\S*|\.\S*?\d\S*", "", line) for line in instructions])
+    assert found[0] == found[1] and len(found[0]) > 50
+
+
+def rise_and_fall(x, n):
+    total, last = 0.0, x
+    for k in range(n):
+        step = np.sqrt(x + k) if k % 2 else -x
+        while total + step > 3.0:
+            step, last = 0.5 * step, total
+        total = total + step if last > 1.0 else total - step
+    return total + last
+
+
+def outer(inner):
+    def both(x, n):
+        first = inner(x, n)
+        second = inner(first, n + 1)
+        return max(first, second)
+
+    return both
 
 
 @kernels.kernel

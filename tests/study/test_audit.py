@@ -24,6 +24,8 @@ thrust = "50 kN"
 stations = 96
 [run]
 duration = "0.3 s"
+[numerics]
+step = "7.6 us"
 """
 
 

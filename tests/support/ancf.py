@@ -3,8 +3,9 @@
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.multibody.ancf_beam import PER_NODE, assemble
-from cvt_hpc.multibody.ancf_chain import SIZE, begin_stage, chain, correct, finish_stage, place
+from cvt_hpc.multibody.ancf_beam import PER_NODE
+from cvt_hpc.multibody.ancf_chain import SIZE, begin_stage, chain, correct, finish_stage, place, set_up
+from cvt_hpc.multibody.ancf_equations import assemble
 from cvt_hpc.solvers.cyclic_blocks import LOWER, UPPER, factor, solve
 from cvt_hpc.solvers.generalised_alpha import stage_length
 
@@ -14,7 +15,7 @@ INSTANT = 1e-12  # [s]: a stage so short that nothing but mass counts in its mat
 @kernel
 def accelerate(beam, chain):
     """Find the accelerations of a chain; without them the first step errs by its size. Whether they were found."""
-    assemble(beam, chain.q, chain.v, chain.v, INSTANT, chain.blocks, chain.columns, 0)
+    assemble(beam, chain.work, chain.q, chain.v, chain.v, INSTANT, chain.blocks, chain.columns, 0)
     if not factor(chain.blocks, SIZE):
         return False
     solve(chain.blocks, chain.columns, SIZE)
@@ -36,7 +37,7 @@ def advance(beam, chain, scheme, dt, steps, tolerance, most):
         solved = False
         for _ in range(most):
             place(chain, tau)
-            assemble(beam, chain.stage_q, chain.stage_v, chain.start_v, tau, chain.blocks, chain.columns, 0)
+            set_up(beam, chain, tau, 0)
             if not factor(chain.blocks, SIZE):
                 return step
             solve(chain.blocks, chain.columns, SIZE)
@@ -56,9 +57,8 @@ def equations(beam, q, u, start=None, tau=INSTANT, power=False):
     With `power` what damping takes instead [W].
     """
     work = chain(q, u)
-    lost = assemble(
-        beam, work.q, work.v, work.v if start is None else start, tau, work.blocks, work.columns, 0
-    )
+    start = work.v if start is None else start
+    lost = assemble(beam, work.work, work.q, work.v, start, tau, work.blocks, work.columns, 0)
     if power:
         return lost
     return whole(work.blocks), work.columns.data[:-1, :, 0].ravel().copy()
@@ -98,9 +98,9 @@ def ring(lengths, stretch=1.0):
 # The definition, for complex numbers: a derivative by a complex step is exact.
 
 
-def _points(beam, q):
-    """Weights, and r, r', r'' at seven Gauss points of each element."""
-    x, weight = np.polynomial.legendre.leggauss(7)
+def _points(beam, q, count=7):
+    """Places, weights, and r, r', r'' at Gauss points of each element."""
+    x, weight = np.polynomial.legendre.leggauss(count)
     x, weight = 0.5 + 0.5 * x, 0.5 * weight
     hermite = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], float)
     for i, l0 in enumerate(beam.lengths):
@@ -108,14 +108,21 @@ def _points(beam, q):
         ends = np.stack([a[:2], l0 * a[2:], b[:2], l0 * b[2:]])
         along = [np.polynomial.Polynomial(c) for c in (hermite.T @ ends).T]
         yield (
+            x,
             l0 * weight,
             *(np.stack([c.deriv(k)(x) if k else c(x) for c in along], -1) / l0**k for k in range(3)),
         )
 
 
+def nearest_line(x, weight, values):
+    """Projection on 1 and x in the mean square."""
+    basis = np.stack([x**0, x])
+    return np.linalg.solve(basis * weight @ basis.T, basis * weight @ values) @ basis
+
+
 def potential(beam, q):
     total = 0.0
-    for w, r, slope, bend in _points(beam, q):
+    for _, w, r, slope, bend in _points(beam, q):
         strain = 0.5 * ((slope**2).sum(-1) - 1.0)
         stored = 0.5 * beam.axial_stiffness * strain**2 + 0.5 * beam.bending_stiffness * (bend**2).sum(-1)
         total += (w * (stored - beam.line_mass * r @ np.array(beam.gravity))).sum()
@@ -125,20 +132,22 @@ def potential(beam, q):
 def lost(beam, q, u):
     """Power that damping takes, for real q."""
     total = 0.0
-    for (w, _, slope, bend), (_, speed, turn, bending) in zip(
-        _points(beam, q), _points(beam, u), strict=True
-    ):
-        strain_rate = (slope * turn).sum(-1)
-        rate = cross(turn, bend) + cross(slope, bending)
+    bends, moved = (list(_points(beam, nodes)) for nodes in (q, u))
+    for (x, w, _, slope, bend), (*_, turn, bending) in zip(bends, moved, strict=True):
+        rate = (slope * turn).sum(-1)
+        bent = nearest_line(x, w, cross(turn, bend) + cross(slope, bending))
+        power = beam.axial_damping * rate**2
+        power = power + beam.bending_damping * beam.bending_stiffness * bent**2
+        total += (w * power).sum()
+    bends, moved = (_points(beam, nodes, 2) for nodes in (q, u))
+    for (_, w, _, slope, _), (_, _, speed, *_) in zip(bends, moved, strict=True):
         across = cross(slope, speed) / np.sqrt((slope**2).sum(-1))
-        power = beam.axial_damping * strain_rate**2
-        power = power + beam.bending_damping * beam.bending_stiffness * rate**2
-        total += (w * (power + beam.mass_damping * beam.line_mass * across**2)).sum()
+        total += (w * beam.mass_damping * beam.line_mass * across**2).sum()
     return total
 
 
 def kinetic(beam, u):
-    return sum((0.5 * beam.line_mass * w * (speed**2).sum(-1)).sum() for w, speed, *_ in _points(beam, u))
+    return sum((0.5 * beam.line_mass * w * (speed**2).sum(-1)).sum() for _, w, speed, *_ in _points(beam, u))
 
 
 def cross(a, b):

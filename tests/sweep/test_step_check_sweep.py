@@ -17,7 +17,7 @@ rise_time = "10 ms"
 [friction]
 friction_gradient = -1.0
 [mesh]
-stations = 64
+stations = 32
 [run]
 duration = "40 ms"
 """

@@ -3,9 +3,10 @@
 Radii, centre distance, line mass, stiffness and damping of the belt (five ribs) and the inertia of the
 pulleys are those of Cepon and Boltezar 2011, table 1; elements, contact points and the scatter of lengths are
 those of their sec. 2.2. The belt's own length follows from the tension at rest. Assumptions are friction
-coefficient and contact stiffness, which they measured but do not print as numbers, the contact's damping and
-friction_speed, rise_time, and the amplitude from which a strand vibrates: 96 elements shake the strands by
-30 um. The band holds the first modes of the strands, 63 to 193 Hz.
+coefficient and contact stiffness, which they measured but do not print as numbers, the contact's damping,
+friction_speed, shear_stiffness (rubber of 3 MPa, 18 mm wide and 3 mm thick), rise_time, and the amplitude
+from which a strand vibrates: 96 elements shake the strands by 30 um. The band holds the first modes of the
+strands, 63 to 193 Hz.
 """
 
 from __future__ import annotations
@@ -17,13 +18,17 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc import recording
+from cvt_hpc.models.belt_drive.courses import PARAMETERS as COURSES
+from cvt_hpc.models.belt_drive.courses import course_inert, course_problems
+from cvt_hpc.models.belt_drive.layout import LAYOUT, TENSIONER, layout, layout_inert, layout_problems
+from cvt_hpc.models.belt_drive.preload import free_length
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
-from cvt_hpc.physics.geometry import variator, variator_problems
 from cvt_hpc.variator.scene import FRICTION, SCENE, rise_problems
 from cvt_hpc.vibration import settings
 
 RIBS = 5.0
+TREATMENTS = ("regularised", "set_valued", "bristle")  # of friction
 DEEPEST = 0.1  # of the smaller radius: so far the tension at rest may press the belt into a rim
 
 RECORD, VIBRATION = recording.PARAMETERS["record"], settings.PARAMETERS["vibration"]
@@ -45,9 +50,19 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "driven_inertia": positive(
             0.013, "kg m^2", "moment of inertia of the driven pulley", sensible=(1e-6, 100.0)
         ),
+        "kick": not_negative(
+            0.0, "N s", "impulse across each strand when the judged part begins", sensible=(1e-6, 10.0)
+        ),
+        "crossed": Parameter(False, "", "the belt crosses itself: the driven pulley turns the other way"),
     },
+    "layout": LAYOUT,
+    "tensioner": TENSIONER,
+    "profiles": COURSES,
     "belt": {
-        "tension": positive(310.0, "N", "mean tension of the strands at rest", sensible=(1.0, 1e5)),
+        "tension": positive(
+            310.0, "N", "mean tension of the strands at rest, with arms as drawn", sensible=(1.0, 1e5)
+        ),
+        "free_length": free_length(),
         "line_mass": positive(0.096, "kg/m", "mass per length", sensible=(1e-3, 10.0)),
         "axial_stiffness": positive(RIBS * 30400.0, "N", "longitudinal stiffness EA", sensible=(1e2, 1e9)),
         "bending_stiffness": positive(RIBS * 5.2e-3, "N m^2", "bending stiffness EI", sensible=(1e-6, 1e3)),
@@ -87,8 +102,17 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "friction_gradient": replace(FRICTION["friction_gradient"], default=0.0),
         "kinetic_friction": replace(FRICTION["kinetic_friction"], default=0.5),
+        "friction_treatment": Parameter(
+            TREATMENTS[0],
+            "",
+            "Coulomb's law with tanh(speed / friction_speed); itself; or bristles that shear up to it",
+            choices=TREATMENTS,
+        ),
         "friction_speed": replace(
             FRICTION["friction_speed"], default=3e-4, description="regularisation speed of friction"
+        ),
+        "shear_stiffness": positive(
+            2e7, "N/m^2", "of the bristles: force per length by shear of the rubber", sensible=(1e4, 1e12)
         ),
     },
     "record": {"sampling_rate": replace(RECORD["sampling_rate"], default=2e3)},
@@ -115,27 +139,28 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         Empty where all is well.
     """
     p = parameters
-    problems = variator_problems(p)
+    problems = layout_problems(p)
     if problems:
         return problems
-    path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
-    driving, strand, driven, _ = path.lengths
-    longest = min(driving / 4.0, driven / 4.0, strand / 2.0)
+    path = layout(p).path
+    # on a short arc an element turns by half a radian
+    longest = min(np.maximum(path.arcs / 4.0, path.radius / 2.0).min(), path.spans.min() / 2.0)
     element = path.path_length / p["elements"] * (1.0 + p["length_scatter"])
     if element > longest:
         least = int(np.ceil(path.path_length * (1.0 + p["length_scatter"]) / longest))
         expected = f"at least {least}, four on the shorter arc and two on a strand"
+        if path.wrap.min() < 2.0:
+            expected = f"at least {least}, which turn by half a radian and lie two on a strand"
         problems.append(("elements", expected, f"{p['elements']}"))
     strain = p["tension"] / p["axial_stiffness"]
     if strain > 0.5:
         most = 0.5 * p["axial_stiffness"]
         problems.append(("tension", f"at most {most:g} N, half of axial_stiffness", f"{p['tension']:g} N"))
-    radius = p["driven_radius"] * min(1.0, 1.0 / p["ratio"])
-    stiffness = p["tension"] / (DEEPEST * radius**2)
+    stiffness = p["tension"] / (DEEPEST * path.radius.min() ** 2)
     if p["contact_stiffness"] < stiffness:
         expected = f"at least {stiffness:g} N/m^2, by which the belt sinks in by {DEEPEST:.0%} of the radius"
         problems.append(("contact_stiffness", expected, f"{p['contact_stiffness']:g} N/m^2"))
-    return problems + rise_problems(p) + friction_problems(p)
+    return problems + rise_problems(p) + course_problems(p) + friction_problems(p)
 
 
 def inert(parameters: Mapping[str, Any]) -> dict[str, str]:
@@ -149,4 +174,8 @@ def inert(parameters: Mapping[str, Any]) -> dict[str, str]:
     found = {"arc_probes": "model belt_drive, which is probed on its strands"}
     if parameters["length_scatter"] == 0.0:
         found["seed"] = "length_scatter 0"
-    return friction_inert(parameters) | found
+    treatment = parameters["friction_treatment"]
+    for key, its_own in (("friction_speed", "regularised"), ("shear_stiffness", "bristle")):
+        if treatment != its_own:
+            found[key] = f"friction_treatment {treatment}"
+    return friction_inert(parameters) | layout_inert(parameters) | course_inert(parameters) | found

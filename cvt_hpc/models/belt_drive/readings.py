@@ -7,19 +7,30 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.kernels import called_alike
+from cvt_hpc.models.belt_drive.along_belt import empty_line, empty_sample, read
 from cvt_hpc.models.belt_drive.drive import Drive, State
-from cvt_hpc.multibody.ancf_beam import SHAPES, WEIGHTS, at_places, energies, tensions
-from cvt_hpc.physics.geometry import variator
-from cvt_hpc.variator.path import along
+from cvt_hpc.models.belt_drive.layout import Layout
+from cvt_hpc.models.belt_drive.pulleys import arms_energy
+from cvt_hpc.multibody.ancf_beam import energies, shapes
+from cvt_hpc.physics.nearest_on_path import way
 
-SCALARS = ("driven_speed", "tension t1", "tension t2", "slip driving", "slip driven")
 PROFILES = {
     "tension": ("tension", "N", "mean"),
-    "normal_force": ("normal force", "N m-1", "mean line force, outwards"),
+    "normal_force": ("normal force", "N m-1", "mean line force, outwards of the pulley"),
     "friction_force": ("friction force", "N m-1", "mean line force on the belt, forwards"),
-    "mean_displacement": ("mean displacement", "m", "off the reference path, outward"),
+    "mean_displacement": ("mean displacement", "m", "off the reference path, to the right of the belt's way"),
 }
 PLACES = 240  # along the path, at which profiles are recorded: 5 mm of a belt of 1.2 m
+
+
+def scalars_of(drawn: Layout, arms: int) -> tuple[str, ...]:
+    """Names of what is read at a sample beside displacement."""
+    names = ["driven_speed", *(f"tension {span}" for span in drawn.spans)]
+    names += [f"slip {pulley}" for pulley in drawn.pulleys]
+    if len(drawn.pulleys) > 2:
+        names += [f"speed {pulley}" for pulley in drawn.pulleys]
+    return *names, *(f"arm T{a + 1}" for a in range(arms))
 
 
 class Readings:
@@ -29,37 +40,40 @@ class Readings:
     ----------
     parameters : mapping
         Resolved parameters of the run [SI].
+    drawn : Layout
+        Its pulleys.
 
     Attributes
     ----------
-    path : Variator
-        The reference path.
-    centre_distance : float
-        [m]
-    probes : (2, p) array
-        Path coordinates on both strands [m].
+    drawn : Layout
+        With the reference path.
+    belt_speed : float
+        Of the driving pulley's rim at the speed that the job gives [m/s].
+    probes : (P, p) array
+        Path coordinates on the strands [m].
     places : (PLACES,) array
         Path coordinates of profiles [m].
     """
 
-    def __init__(self, parameters: Mapping[str, Any]) -> None:
-        p = parameters
-        self.path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
-        self.centre_distance = p["centre_distance"]
-        driving, strand, driven, _ = self.path.lengths
-        starts = np.array([driving, driving + strand + driven])
+    def __init__(self, parameters: Mapping[str, Any], drawn: Layout) -> None:
+        p, path = parameters, drawn.path
+        self.drawn, self.belt_speed = drawn, p["driving_speed"] * float(path.radius[0])
+        starts = path.ends[::2]
         shares = np.arange(1, p["strand_probes"] + 1) / (p["strand_probes"] + 1.0)
-        self.probes = starts[:, None] + strand * shares
-        self._middles = starts + 0.5 * strand
-        self.places = (np.arange(PLACES) + 0.5) * (self.path.path_length / PLACES)
+        self.probes = starts[:, None] + path.spans[:, None] * shares
+        self._way, self._line = way(path), empty_line(p["elements"])
+        self._sample = empty_sample(self.probes.size, len(path.radius))
+        self._read = called_alike(read)
+        self._slopes = shapes((np.arange(p["contact_points"]) + 0.5) / p["contact_points"])[1]
+        self.places = (np.arange(PLACES) + 0.5) * (path.path_length / PLACES)
 
     def mean_tension(self, drive: Drive, state: State) -> float:
-        """Mean tension of both strands [N]."""
-        return float(np.mean(Reading(self, drive, state).strand_tensions()))
+        """Mean tension of all strands [N]."""
+        return float(Reading(self, drive, state).strand_tensions.mean())
 
 
 class Reading:
-    """What is read at one sample.
+    """What is read at one sample, until the next one is.
 
     Parameters
     ----------
@@ -67,59 +81,41 @@ class Reading:
         Where it is read.
     drive, state : Drive, State
         What moves, and its motion.
+    sums : (6, PLACES) array, optional
+        To which profiles are added: length, tension and offset by it, forces, and samples at each place.
+
+    Attributes
+    ----------
+    displacement : (P p,) array
+        At the probes, to the right of the belt's way [m].
+    strand_tensions : (P,) array
+        Means over the middle half of the strands [N].
+    lifted : (P,) array
+        Whether no point of the belt touches a pulley.
     """
 
-    def __init__(self, where: Readings, drive: Drive, state: State) -> None:
+    def __init__(self, where: Readings, drive: Drive, state: State, sums: np.ndarray | None = None) -> None:
         self._where, self._drive, self._state = where, drive, state
-        points = at_places(drive.beam, state.chain.q, SHAPES[:, 0]).reshape(-1, 2)
-        self._position, self._offset = along(where.path, where.centre_distance, points)
-        self._tension = tensions(drive.beam, state.chain.q).ravel()
-        self._weight = (drive.beam.lengths[:, None] * WEIGHTS).ravel()
-
-    def displacement(self) -> np.ndarray:
-        """Displacement at the probes, outwards, (2 p,) [m]."""
-        order, length = np.argsort(self._position), self._where.path.path_length
-        return np.interp(
-            self._where.probes.ravel(), self._position[order], self._offset[order], period=length
-        )
-
-    def strand_tensions(self) -> np.ndarray:
-        """Mean tension over the middle half of both strands, (2,) [N]."""
-        quarter = 0.25 * self._where.path.strand_length
-        inside = np.abs(self._position - self._where._middles[:, None]) < quarter
-        weights = inside * self._weight
-        return weights @ self._tension / weights.sum(axis=1)
+        sums = np.zeros((len(PROFILES) + 2, 0)) if sums is None else sums
+        belt, contacts = (drive.beam, state.chain), (drive.contact, state.touch)
+        found, points = where._sample, (where._slopes, where.probes.ravel())
+        where._read(where._way, *belt, *contacts, *points, where._line, found, sums)
+        self.displacement, self.strand_tensions, self._slip = found.displacement, found.tension, found.slip
+        self.lifted = found.largest <= 0.0
 
     def scalars(self) -> list[float]:
-        """SCALARS."""
-        s, path = self._state, self._where.path
-        pressed = np.maximum(s.normal.sum(axis=(1, 2)), 1e-9)
-        slip = (s.normal * s.slip).sum(axis=(1, 2)) / pressed / (s.speed[0, 0] * path.driving_radius)
-        return [float(s.speed[0, 1]), *self.strand_tensions(), *slip]
-
-    def profiles(self) -> np.ndarray:
-        """Sums at each place, (6, place): length, tension and offset by it, forces, and samples."""
-        where, s = self._where, self._state
-        width = where.path.path_length / PLACES
-        place = np.minimum((self._position / width).astype(int), PLACES - 1)
-        weight = self._weight
-        rows = [
-            np.bincount(place, row, PLACES) for row in (weight, weight * self._tension, weight * self._offset)
-        ]
-        contacts = self._contacts()
-        for forces in (s.normal, s.tangential):
-            rows.append(np.bincount(contacts, forces.sum(axis=0).ravel() / width, PLACES))
-        return np.array([*rows, np.ones(PLACES)])
-
-    def _contacts(self) -> np.ndarray:
-        """Places of the contact points, (k C,)."""
-        points = at_places(self._drive.beam, self._state.chain.stage_q, self._drive.shape)
-        position, _ = along(self._where.path, self._where.centre_distance, points.reshape(-1, 2))
-        share = position / self._where.path.path_length
-        return np.minimum((share * PLACES).astype(int), PLACES - 1)
+        """What `scalars_of` names."""
+        wheels, drawn = self._state.wheels, self._where.drawn
+        speeds = drawn.path.turn * wheels.speed[0, : len(drawn.pulleys)]
+        slip = drawn.path.turn * self._slip / self._where.belt_speed
+        found = [float(speeds[drawn.driven]), *self.strand_tensions, *slip]
+        return [*found, *(speeds if len(speeds) > 2 else ()), *wheels.angle[0]]
 
     def stored_energy(self) -> float:
-        """Kinetic and elastic energy of belt and driven pulley [J], without what contacts store."""
+        """Kinetic and elastic energy of belt, driven pulleys and arms [J], without what contacts store."""
         kinetic, elastic, _ = energies(self._drive.beam, self._state.chain.q, self._state.chain.v)
-        driven = 0.5 * self._drive.inertia[1] * self._state.speed[0, 1] ** 2
-        return kinetic + elastic + float(driven)
+        pulleys, wheels = self._drive.pulleys, self._state.wheels
+        count = len(pulleys.radius)
+        turning = 0.5 * (pulleys.inertia[1:] * wheels.speed[0, 1:count] ** 2).sum()
+        arms = arms_energy(pulleys.arms, wheels.angle[0], wheels.speed[0, count:])
+        return kinetic + elastic + float(turning) + arms

@@ -8,15 +8,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.models.belt_drive import drive as fields
+from cvt_hpc.models.belt_drive import pulleys as fields
+from cvt_hpc.models.belt_drive.kick import answers
+from cvt_hpc.models.belt_drive.layout import layout
+from cvt_hpc.models.belt_drive.theory import (
+    MODES,
+    creep_loss,
+    expected_loss,
+    sliding_tension,
+    strand_frequencies,
+    wrap_angles,
+)
+from cvt_hpc.physics.belt_path import regions
 from cvt_hpc.variables import Coordinate, Variable
-from cvt_hpc.variator import STRANDS, judging
+from cvt_hpc.variator import judging
 from cvt_hpc.variator.history import dataset
-from cvt_hpc.variator.judging import pair
-from cvt_hpc.variator.path import REGIONS, regions
-from cvt_hpc.variator.slip import speed_loss
+from cvt_hpc.variator.judging import each
 from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared
 from cvt_hpc.vibration import assessment
+from cvt_hpc.vibration.settings import SHORTEST_SEGMENT
+from cvt_hpc.vibration.signals import amplitude_spectrum
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,19 +37,63 @@ if TYPE_CHECKING:
 # Measured on one core of an EPYC beside other work: core-seconds per element and step, and per sample
 STEP_COST, SAMPLE_COST = 4e-6, 6e-4
 
+DRIVE_MODES = 8
+
 VARIABLES = (
     *assessment.VARIABLES,
-    *shared("spectrum"),
+    replace(shared("spectrum")[0], comment="largest of the strand's probes"),
     Variable("strand_tension", ("strand",), "f8", "N", "mean tension in the middle half of the strand"),
+    Variable("tension_ripple", ("strand",), "f8", "N", "standard deviation of that mean"),
     *shared("slip"),
     replace(
         shared("speed_loss")[0], comment="1 - ratio x driven speed / driving speed, mean of whole belt turns"
     ),
+    Variable(
+        "expected_speed_loss",
+        (),
+        "f8",
+        "1",
+        "by creep and radial compliance, with the mean tensions of the strands",
+        words="creep and compliance",
+    ),
+    Variable(
+        "creep_speed_loss",
+        (),
+        "f8",
+        "1",
+        "by creep alone, from tension at rest and torque; of two pulleys",
+        words="creep alone",
+    ),
+    Variable(
+        "eigenfrequency",
+        ("strand", "half_waves"),
+        "f8",
+        "Hz",
+        "of a running beam under the strand's mean tension, pinned where tangents touch the pulleys",
+    ),
+    Variable(
+        "drive_frequency",
+        ("drive_mode",),
+        "f8",
+        "Hz",
+        "of strands, sticking arcs and driven pulleys together, linearised at the end",
+    ),
+    Variable(
+        "answered_frequency",
+        ("strand", "half_waves"),
+        "f8",
+        "Hz",
+        "peak near each eigenfrequency after a kick, where it exceeds three times the unrest before",
+    ),
+    Variable("arm_angle", ("pulley",), "f8", "rad", "mean rotation of the arm from where it is drawn"),
+    Variable("arm_ripple", ("pulley",), "f8", "rad", "standard deviation of that rotation"),
+    Variable("stop_share", ("pulley",), "f8", "1", "share of the judged part in which the arm is at a stop"),
     *shared("driven_speed_ripple"),
     Variable("friction_loss", ("pulley",), "f8", "W", "mean friction power of the belt on the pulley"),
     Variable("contact_loss", (), "f8", "W", "mean power of the contacts' normal damping"),
     replace(shared("belt_loss")[0], comment="mean power of the belt's damping along, across and in bending"),
     *shared("driving_power", "load_power", "storing_power", "loss", "power_residual"),
+    Variable("arm_loss", (), "f8", "W", "mean power of the tensioners' dashpots"),
     Variable("efficiency", (), "f8", "1", "what is left of driving_power for load and storing"),
     Variable("turns", (), "i8", "1", "whole turns of the belt that speed_loss is the mean of"),
     Variable("unsolved_share", (), "f8", "1", "share of steps that were not solved to the tolerance"),
@@ -54,7 +109,20 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     parameters : dict
         Flat parameters of the job.
     """
-    return {**COORDINATES, "frequency_bin": frequency_bins(parameters)}
+    drawn = layout(parameters)
+    names = {
+        "strand": _named("strand", drawn.spans),
+        "pulley": _named("pulley", drawn.pulleys),
+    }
+    half_waves = Coordinate(np.arange(1, MODES + 1), "1", "half waves", "along the strand")
+    modes = Coordinate(np.arange(1, DRIVE_MODES + 1), "1", "mode of the drive")
+    bins = frequency_bins(parameters)
+    return {**names, "frequency_bin": bins, "half_waves": half_waves, "drive_mode": modes}
+
+
+def _named(dimension: str, names: tuple[str, ...]) -> Coordinate:
+    comment = COORDINATES[dimension].comment if len(names) == 2 else "in the order in which the belt runs"
+    return COORDINATES[dimension]._replace(values=np.array(names), comment=comment)
 
 
 def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
@@ -74,7 +142,7 @@ def judge(run: Transient) -> dict[str, Any]:
     """
     if run.failure is not None:
         return judging.slipped_through(run)
-    found = judging.assess(run)
+    found = judging.assess(run, run.drawn.spans, run.drawn.pulleys)
     return found.record() | evaluate(run, found.strongest_probe)
 
 
@@ -95,22 +163,70 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     """
     driving, load = run.mean_rate(fields.WORK_IN), run.mean_rate(fields.WORK_OUT)
     contact, belt = run.mean_rate(fields.CONTACT_LOSS), run.mean_rate(fields.BELT_LOSS)
-    friction = np.array([run.mean_rate(fields.FRICTION_LOSS + k) for k in range(2)])
+    arm_loss, drawn = run.mean_rate(fields.ARM_LOSS), run.drawn
+    friction = np.array([run.mean_rate(fields.FRICTION_LOSS + k) for k in range(len(drawn.pulleys))])
     storing = run.mean_rate(-1)
-    work = run.counters()
+    work, tension = run.counters(), each(run, "tension", drawn.spans)
+    frequencies = strand_frequencies(run.parameters, run.path, tension)
     return {
-        **judging.motion(run, strongest_probe),
-        "speed_loss": speed_loss(run, run.whole_turns),
-        "strand_tension": pair(run, "tension", STRANDS),
+        **judging.motion(run, strongest_probe, drawn.pulleys),
+        "spectrum": _spectrum(run),
+        **_of_arms(run),
+        "speed_loss": run.speed_loss(run.whole_turns),
+        "expected_speed_loss": expected_loss(run.parameters, drawn, tension),
+        "creep_speed_loss": creep_loss(run.parameters, drawn),
+        "strand_tension": tension,
+        "eigenfrequency": frequencies,
+        "drive_frequency": run.drive_frequencies(DRIVE_MODES),
+        "answered_frequency": _answered(run, frequencies),
+        "tension_ripple": np.array([run.channel(f"tension {k}")[run.judged].std() for k in drawn.spans]),
         "friction_loss": friction,
         "contact_loss": contact,
         "belt_loss": belt,
-        **judging.power_balance(driving, load, contact + belt + friction.sum(), storing),
+        "arm_loss": arm_loss,
+        **judging.power_balance(driving, load, contact + belt + arm_loss + friction.sum(), storing),
         "efficiency": (load + storing) / driving if driving > 0.0 else np.nan,
         "turns": run.turns,
         "unsolved_share": work["unsolved"] / max(work["steps"], 1),
         "iterations": work["iterations"] / max(work["steps"], 1),
     }
+
+
+def _of_arms(run: Transient) -> dict[str, np.ndarray]:
+    """What is known of the arms, for the pulleys that they carry; nan of others."""
+    pulleys, judged = run.pulleys, run.judged
+    found = {name: np.full(len(pulleys.arm), np.nan) for name in ("arm_angle", "arm_ripple", "stop_share")}
+    for p in np.flatnonzero(pulleys.arm >= 0):
+        a = pulleys.arm[p]
+        angle = run.channel(f"arm T{a + 1}")[judged]
+        inside = (pulleys.arms.lowest[a] < angle) & (angle < pulleys.arms.highest[a])
+        values = angle.mean(), angle.std(), 1.0 - inside.mean()
+        for name, value in zip(found, values, strict=True):
+            found[name][p] = value
+    return found
+
+
+def _spectrum(run: Transient) -> np.ndarray:
+    """Of each strand the largest of its probes, (strand, bin) [m]: one alone may sit on a node of a shape."""
+    p = run.parameters
+    spectra = amplitude_spectrum(_moved(run)[run.judged], p["sampling_rate"], frequency_bins(p).values)
+    largest: np.ndarray = spectra.max(axis=2).T
+    return largest
+
+
+def _moved(run: Transient) -> np.ndarray:
+    """Displacement, (done, strand, probe) [m]."""
+    return run.displacement.reshape(run.done, len(run.drawn.spans), -1)
+
+
+def _answered(run: Transient, expected: np.ndarray) -> np.ndarray:
+    """Frequencies (strand, mode) [Hz] at which strands answer a kick; nan without one."""
+    moved = _moved(run)
+    before, after = moved[run.kick : run.first_judged], moved[run.judged]
+    if run.parameters["kick"] == 0.0 or len(before) < SHORTEST_SEGMENT:
+        return np.full(expected.shape, np.nan)
+    rate = run.parameters["sampling_rate"]
+    return np.array([answers(before[:, k], after[:, k], rate, modes) for k, modes in enumerate(expected)])
 
 
 def histories(run: Transient) -> xr.Dataset:
@@ -129,7 +245,24 @@ def histories(run: Transient) -> xr.Dataset:
     from cvt_hpc.models.belt_drive.readings import PROFILES
 
     comment = "mean over the middle half of the strand"
-    over_time = {f"tension {k}": (f"tension {k}", "N", comment) for k in STRANDS}
+    over_time = {f"tension {k}": (f"tension {k}", "N", comment) for k in run.drawn.spans}
+    names = [name for name in run.channels if name.startswith("speed ")]
+    over_time |= {name: (name, "rad s-1", "in the belt's direction") for name in names}
+    names = [name for name in run.channels if name.startswith("arm ")]
+    over_time |= {name: (name, "rad", "rotation from where it is drawn") for name in names}
     profiles = {name: (values, *PROFILES[name]) for name, values in run.profiles.items()}
-    region = np.array(REGIONS)[regions(run.path, run.places)]
+    tension = np.array([_late(run, f"tension {k}") for k in run.drawn.spans])
+    sliding = sliding_tension(run.parameters, run.path, tension, run.places)
+    words = "tension where it slides", "N", "by Euler and Eytelwein, from the strands' tensions"
+    profiles["sliding_tension"] = sliding, *words
+    words = "wrap angle", "rad", "from the inlet of the arc"
+    profiles["wrap_angle"] = wrap_angles(run.path, run.places), *words
+    names = [name for pair in zip(run.drawn.pulleys, run.drawn.spans, strict=True) for name in pair]
+    region = np.array(names)[regions(run.path, run.places)]
     return dataset(run, over_time, profiles, run.places, region)
+
+
+def _late(run: Transient, name: str) -> float:
+    """Mean of a channel over the judged part as far as the run has come; nan before it."""
+    values = run.channel(name)[run.first_judged :]
+    return float(values.mean()) if values.size else np.nan

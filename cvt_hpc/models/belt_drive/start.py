@@ -1,4 +1,8 @@
-"""The static start: a belt around its pulleys at a given tension, then moving along itself."""
+"""The static start: a belt around its pulleys at a given tension, then moving along itself.
+
+The length of the belt follows from its tension with the arms of tensioners as drawn. Then their springs get
+the moments that hold them there; or, where these moments are given, the arms turn into equilibrium.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.belt_drive.drive import UNSOLVED, Drive, State, advance, contact_shapes, state
-from cvt_hpc.multibody.ancf_beam import beam, random_lengths
+from cvt_hpc.models.belt_drive.contact import Contact, contact_shapes
+from cvt_hpc.models.belt_drive.courses import driving_speed
+from cvt_hpc.models.belt_drive.drive import UNSOLVED, Drive, State, advance, state
+from cvt_hpc.models.belt_drive.friction import Friction, Treatment
+from cvt_hpc.models.belt_drive.layout import Layout, pulleys_of
+from cvt_hpc.models.belt_drive.preload import give, length_at
+from cvt_hpc.multibody.ancf_beam import at_places, beam, random_lengths
+from cvt_hpc.physics.belt_path import points_at
 from cvt_hpc.physics.friction import friction_law, given_law
-from cvt_hpc.physics.geometry import variator
 from cvt_hpc.solvers.generalised_alpha import Scheme
-from cvt_hpc.variator.path import points_at
 
 IMPLICIT_EULER = Scheme(1.0, 1.0, 1.0)
 # Steps towards equilibrium [s]: the first is short, as contacts close; a step that is solved is followed by a
@@ -21,13 +29,17 @@ FIRST, LONGEST = 1e-5, 1.0
 LONGER, SHORTER = 4.0, 0.25
 MOST_STEPS = 500  # common belts need 20
 SETTLED, MOST_ITERATIONS = 1e-8, 30  # [m/s]
-FRICTIONLESS = 1e-9
+FRICTIONLESS = friction_law("coulomb", 1e-9, 0.0, 1.0)
 # Of the belt's length by its tension: they leave 0.2 % of this on the softest contacts, 1e-5 on common ones
 CORRECTIONS = 3
+# Of contacts that stick [m/s]: the speed at which their grip has the normal force of a belt at rest. At less
+# the five points of an element, which adds four coordinates, change without end; more costs iterations.
+GRIP_SPEED = 1e-4
+HELD = 1e12  # [kg m^2]: an arm that stays where it is drawn
 
 
 def start(
-    parameters: Mapping[str, Any], tension_of: Callable[[Drive, State], float]
+    parameters: Mapping[str, Any], drawn: Layout, tension_of: Callable[[Drive, State], float]
 ) -> tuple[Drive, State, bool]:
     """Constants and first state of a run.
 
@@ -35,40 +47,35 @@ def start(
     ----------
     parameters : mapping
         Flat parameters of a run [SI].
+    drawn : Layout
+        Its pulleys.
     tension_of : callable
-        Mean tension of both strands [N], from a drive and its state.
+        Mean tension of all strands [N], from a drive and its state.
 
     Returns
     -------
     (Drive, State, bool)
         Belt and pulleys, which move as if nothing slid, and whether equilibria were found.
     """
-    p = parameters
-    path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
-    # belt and contacts in series: contacts sink in by tension / (R stiffness), over the angle of an arc
-    arcs = ((path.lengths[0], path.driving_radius), (path.lengths[2], p["driven_radius"]))
-    give = sum(arc / radius**2 for arc, radius in arcs) / p["contact_stiffness"]
-    compliance = 1.0 / p["axial_stiffness"] + give / path.path_length
-    length = (path.path_length - give * p["tension"]) / _stretch(p["tension"], p["axial_stiffness"])
+    p, path = parameters, drawn.path
+    compliance = 1.0 / p["axial_stiffness"] + give(path, p["contact_stiffness"]) / path.path_length
+    length = length_at(path, p["tension"], p)
     for correction in range(CORRECTIONS + 1):
-        drive = _drive(p, length)
-        found, is_settled = _settled(drive, p)
+        drive = _drive(p, drawn, length)
+        found = _laid(drive, drawn)
+        is_settled = _settle(_with_arms(drive, inertia=HELD, stiffness=0.0, moment=0.0), found)
         if not is_settled:
             break
         if correction < CORRECTIONS:
             length *= 1.0 + (tension_of(drive, found) - p["tension"]) * compliance
-    return drive, _moving(drive, found, p), is_settled
+    if is_settled and p["tensioner_moment"]:
+        is_settled = _settle(drive, found)
+    elif is_settled:
+        drive = _with_arms(drive, moment=-_moments(drive, found))
+    return drive, _moving(drive, found, p, drawn), is_settled
 
 
-def _stretch(tension: float, stiffness: float) -> float:
-    """Length under a tension over that without: the root of EA (x^2 - 1) x / 2 = T."""
-    x = 1.0 + tension / stiffness
-    for _ in range(20):
-        x -= (0.5 * (x**2 - 1.0) * x - tension / stiffness) / (1.5 * x**2 - 0.5)
-    return x
-
-
-def _drive(p: Mapping[str, Any], length: float) -> Drive:
+def _drive(p: Mapping[str, Any], drawn: Layout, length: float) -> Drive:
     belt = beam(
         random_lengths(length, p["elements"], p["length_scatter"], p["seed"]),
         p["line_mass"],
@@ -78,54 +85,87 @@ def _drive(p: Mapping[str, Any], length: float) -> Drive:
         p["mass_damping"],
         p["bending_damping"],
     )
-    return Drive(
-        belt,
-        np.array([[0.0, 0.0], [p["centre_distance"], 0.0]]),
-        np.array([p["driven_radius"] / p["ratio"], p["driven_radius"]]),
-        np.array([0.0, p["driven_inertia"]]),
+    contact = Contact(
         contact_shapes(p["contact_points"]),
         p["contact_stiffness"],
         p["contact_damping"],
-        given_law(p),
-        p["friction_speed"],
+        _friction(p, drawn),
+    )
+    return Drive(belt, pulleys_of(p, drawn), contact)
+
+
+def _friction(p: Mapping[str, Any], drawn: Layout) -> Friction:
+    grip = p["tension"] / min(drawn.path.radius) / GRIP_SPEED
+    treatment = Treatment[p["friction_treatment"].upper()]
+    return Friction(
+        treatment, given_law(p), p["friction_speed"], grip, p["speed_tolerance"], p["shear_stiffness"]
     )
 
 
-def _settled(drive: Drive, p: Mapping[str, Any]) -> tuple[State, bool]:
-    """At rest in equilibrium, without friction; and whether that was found."""
-    path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
+def _with_arms(drive: Drive, **values: Any) -> Drive:
+    """A drive with other constants of its arms."""
+    arms = drive.pulleys.arms
+    count = len(arms.pivot)
+    changed: dict[str, Any] = {key: np.broadcast_to(value, count).copy() for key, value in values.items()}
+    return drive._replace(pulleys=drive.pulleys._replace(arms=arms._replace(**changed)))
+
+
+def _shares(drive: Drive) -> np.ndarray:
+    """Where the nodes are along the belt, over its length."""
     lengths = drive.beam.lengths
-    share = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) / lengths.sum()
-    points, angle, _ = points_at(path, p["centre_distance"], share * path.path_length)
-    along = path.path_length / lengths.sum() * np.stack([np.cos(angle), np.sin(angle)], 1)
+    return np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) / lengths.sum()
+
+
+def _laid(drive: Drive, drawn: Layout) -> State:
+    """At rest along the path, evenly stretched."""
+    path = drawn.path
+    points, angle, _ = points_at(path, _shares(drive) * path.path_length)
+    along = path.path_length / drive.beam.lengths.sum() * np.stack([np.cos(angle), np.sin(angle)], 1)
     q = np.concatenate([points, along], 1)
-    smooth = drive._replace(law=friction_law("coulomb", FRICTIONLESS, 0.0, 1.0))
-    found = state(smooth, q, np.zeros_like(q), np.zeros(2))
+    return state(drive, q, np.zeros_like(q), np.zeros(len(path.radius)))
+
+
+def _settle(drive: Drive, found: State) -> bool:
+    """Bring a state to rest in equilibrium, without friction; and whether that was found."""
+    friction = drive.contact.friction._replace(treatment=Treatment.REGULARISED, law=FRICTIONLESS)
+    smooth = drive._replace(contact=drive.contact._replace(friction=friction))
+    at_rest = np.zeros((2, len(drive.pulleys.radius)))
     step = FIRST
     for _ in range(MOST_STEPS):
-        before = found.chain.q.copy()
-        for numbers in (found.chain.v, found.speed, found.dual, found.counters):
+        before = found.chain.q.copy(), found.wheels.angle.copy()
+        for numbers in (found.chain.v, found.wheels.speed, found.touch.memory.dual, found.counters):
             numbers[:] = 0
-        at_rest = np.zeros((2, 2))
         finite = advance(smooth, found, IMPLICIT_EULER, at_rest, step, 1, SETTLED, MOST_ITERATIONS)
         if finite and found.counters[UNSOLVED] == 0:
             if step >= LONGEST:
-                return found, True
+                return True
             step *= LONGER
         else:
-            found.chain.q[:] = before
+            found.chain.q[:], found.wheels.angle[:] = before
             step *= SHORTER
-    return found, False
+    return False
 
 
-def _moving(drive: Drive, settled: State, p: Mapping[str, Any]) -> State:
+def _moments(drive: Drive, settled: State) -> np.ndarray:
+    """Moments of the belt on the arms, (A,) [N m]."""
+    wheels, touch, pulleys = settled.wheels, settled.touch, drive.pulleys
+    points = at_places(drive.beam, settled.chain.q, drive.contact.shape)
+    found = np.zeros(len(pulleys.arms.pivot))
+    for p in np.flatnonzero(pulleys.arm >= 0):
+        outward = points - wheels.centre[p]
+        outward /= np.hypot(*np.moveaxis(outward, -1, 0))[..., None]
+        around = np.stack([-outward[..., 1], outward[..., 0]], -1)
+        force = touch.normal[p][..., None] * outward + touch.tangential[p][..., None] * around
+        found[pulleys.arm[p]] = -force.sum((0, 1)) @ wheels.lever[p]
+    return found
+
+
+def _moving(drive: Drive, settled: State, p: Mapping[str, Any], drawn: Layout) -> State:
     """The same line, along which the belt runs with the driving pulley."""
-    path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
-    q, lengths = settled.chain.q, drive.beam.lengths
-    stretch = path.path_length / lengths.sum()
-    share = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) / lengths.sum()
-    _, angle, curvature = points_at(path, p["centre_distance"], share * path.path_length)
+    path, q = drawn.path, settled.chain.q
+    stretch = path.path_length / drive.beam.lengths.sum()
+    _, angle, curvature = points_at(path, _shares(drive) * path.path_length)
     bend = stretch**2 * curvature[:, None] * np.stack([-np.sin(angle), np.cos(angle)], 1)
-    speed = p["driving_speed"] * path.driving_radius / stretch
-    v = speed * np.concatenate([q[:, 2:], bend], 1)
-    return state(drive, q, v, p["driving_speed"] * np.array([1.0, 1.0 / p["ratio"]]))
+    belt_speed = driving_speed(p, 0.0) * path.radius[0]
+    v = belt_speed / stretch * np.concatenate([q[:, 2:], bend], 1)
+    return state(drive, q, v, belt_speed * path.turn / path.radius, settled.wheels.angle[0])

@@ -8,24 +8,33 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.kernels import called_alike
-from cvt_hpc.models.belt_drive import drive as fields
+from cvt_hpc.models.belt_drive import courses
 from cvt_hpc.models.belt_drive.drive import advance
-from cvt_hpc.models.belt_drive.readings import PLACES, PROFILES, SCALARS, Reading, Readings
+from cvt_hpc.models.belt_drive.kick import kick
+from cvt_hpc.models.belt_drive.layout import layout
+from cvt_hpc.models.belt_drive.linearised import drive_frequencies
+from cvt_hpc.models.belt_drive.pulleys import Pulleys
+from cvt_hpc.models.belt_drive.readings import PLACES, PROFILES, Reading, Readings, scalars_of
 from cvt_hpc.models.belt_drive.start import start
-from cvt_hpc.models.marched import Probe, batches_of_one
-from cvt_hpc.recording import sample_count, start_up_samples
+from cvt_hpc.models.marched import batches_of_one
+from cvt_hpc.models.sampled import SampledRun
 from cvt_hpc.solvers.generalised_alpha import generalised_alpha
 from cvt_hpc.variables import Status
-from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, STRANDS
-from cvt_hpc.variator.course import load_course
+from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, PULLEYS, STRANDS
 from cvt_hpc.variator.slip import GAINED, LOST
 
-CHANNELS = ("load", "driving_speed", *SCALARS)
+# of two pulleys; those of more are a run's own
+CHANNELS = (
+    *("load", "driving_speed", "driven_speed"),
+    *(f"tension {strand}" for strand in STRANDS),
+    *(f"slip {pulley}" for pulley in PULLEYS),
+)
+MOST_LIFTED = 0.01  # [s] that a pulley may be without the belt
 MOST_UNSOLVED = 0.02  # of the steps
 MOST_OPEN = 0.02  # of the larger of drive and losses; sound runs leave up to 0.004, without load
 
 
-class Transient:
+class Transient(SampledRun):
     """One run of the belt drive, advanced sample by sample.
 
     Parameters
@@ -37,54 +46,25 @@ class Transient:
 
     Attributes
     ----------
-    parameters
-        As given.
-    probes : tuple of Probe
-        On the strands, equally spaced between their ends.
-    interval : float
-        Sampling interval [s].
-    samples, done, kick : int
-        Samples of the whole run, those recorded so far, and those before the load has risen.
-    failure : (Status, str) or None
-        Why the run does not go on: what has gone wrong, or that the belt slips through, with the status done.
+    drawn : Layout
+        Pulleys and reference path.
     """
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
         p = parameters
-        self.interval = 1.0 / p["sampling_rate"]
-        self._steps_per_sample = max(1, int(np.ceil(self.interval / p["step"] * (1.0 - 1e-9))))
+        super().__init__(p)
         self._scheme = generalised_alpha(p["spectral_radius"])
-        self._readings = Readings(p)
-        self._drive, self._state, is_settled = start(p, self._readings.mean_tension)
-        self.probes = tuple(
-            Probe(f"{strand} {k + 1}", float(position))
-            for strand, positions in zip(STRANDS, self._readings.probes, strict=True)
-            for k, position in enumerate(positions)
-        )
+        self.drawn = layout(p)
+        self._readings = Readings(p, self.drawn)
+        self._drive, self._state, is_settled = start(p, self.drawn, self._readings.mean_tension)
+        channels = ("load", "driving_speed", *scalars_of(self.drawn, len(self.pulleys.arms.pivot)))
+        sums, totals = (len(PROFILES) + 2, PLACES), self._state.totals.size + 1
+        self._record(channels, self.drawn.spans, self._readings.probes, totals, sums)
         self._advance = called_alike(advance)
-        self.done = 0
-        self.failure: tuple[Status, str] | None = None
-        if not is_settled:
+        self._lifted = np.zeros(len(self.drawn.pulleys), int)
+        if not is_settled:  # as it would be at any step
+            self.parameters = {**p, "most_refinements": 0}
             self.failure = Status.FAILED_NUMERICS, "the belt finds no equilibrium on its pulleys"
-        self._rows = np.empty((0, len(self.probes) + len(CHANNELS)))
-        self._totals = np.empty((0, self._state.totals.size + 1))
-        self.prolong(p)
-
-    def prolong(self, parameters: Mapping[str, Any]) -> None:
-        """Make room for the samples of a longer duration.
-
-        Parameters
-        ----------
-        parameters : mapping
-            Those of the run but for `duration` and `judged_fraction`.
-        """
-        self.parameters = parameters
-        self.samples, self.kick = sample_count(parameters), start_up_samples(parameters)
-        self.first_judged = self.samples - round(parameters["judged_fraction"] * self.samples)
-        more = self.samples - len(self._rows)
-        self._rows = np.concatenate([self._rows, np.full((more, self._rows.shape[1]), np.nan)])
-        self._totals = np.concatenate([self._totals, np.full((more, self._totals.shape[1]), np.nan)])
-        self._sums = np.zeros((len(PROFILES) + 2, PLACES))
 
     def advance(self, samples: int) -> tuple[Status, str] | None:
         """March on.
@@ -100,13 +80,16 @@ class Transient:
             Why the run ends here.
         """
         for _ in range(min(samples, self.samples - self.done)):
+            if self.done == self.first_judged and self.parameters["kick"] > 0.0:
+                chain = self._state.chain
+                kick(self.path, self.parameters["line_mass"], self.parameters["kick"], chain.q, chain.v)
             inputs = np.array([self._inputs(self.time), self._inputs(self.time + self.interval)])
             if not self._march(inputs):
                 self.failure = Status.FAILED_NUMERICS, "the equations of a step have no solution in numbers"
                 break
             self._take_sample()
-            if (slipped := self._slipped()) is not None:
-                self.failure = Status.DONE, slipped
+            if (ended := self._slipped() or self._left()) is not None:
+                self.failure = Status.DONE, ended
                 break
         return self.failure
 
@@ -115,77 +98,71 @@ class Transient:
         settings = self.step, self._steps_per_sample, p["speed_tolerance"], p["most_iterations"]
         return self._advance(self._drive, self._state, self._scheme, inputs, *settings)
 
-    def _inputs(self, time: float) -> tuple[float, float]:
-        """Speed of the driving pulley [rad/s] and torque on the driven one [N m] at a time."""
-        return self.parameters["driving_speed"], -self.parameters["ratio"] * self.load(time)
+    def _inputs(self, time: float) -> np.ndarray:
+        """Speed of the driving pulley [rad/s] and torques on the others [N m] at a time, (P,)."""
+        turn = self.drawn.path.turn
+        inputs = -turn * self.drawn.load * self.load(time)
+        inputs[0] = turn[0] * self.driving_speed(time)
+        return inputs
+
+    def driving_speed(self, time: float) -> float:
+        """Speed of the driving pulley [rad/s]."""
+        return courses.driving_speed(self.parameters, time)
 
     def load(self, time: float) -> float:
-        """Torque at the driving pulley without losses [N m]."""
-        load, rise = self.parameters["load"], self.parameters["rise_time"]
-        return load_course.py_func(time, rise, rise, load, load)
+        """Torque at the driving pulley without losses, or what `pulley_load` counts in [N m]."""
+        return courses.load(self.parameters, time)
 
     def _take_sample(self) -> None:
-        found = Reading(self._readings, self._drive, self._state)
+        sums = self._sums if self.done >= self.first_judged else None
+        found = Reading(self._readings, self._drive, self._state, sums)
         time = self.time
-        speed = self.parameters["driving_speed"]
-        self._rows[self.done] = [*found.displacement(), self.load(time), speed, *found.scalars()]
+        speed = self.driving_speed(time)
+        self._rows[self.done] = [*found.displacement, self.load(time), speed, *found.scalars()]
+        self._lifted = np.where(found.lifted, self._lifted + 1, 0)
         stored = np.nan
-        if self.done >= self.first_judged:
-            self._sums += found.profiles()
-        if self.done in (self.first_judged, self.samples - 1):
+        if self.done in (self.whole_turns.start, self.samples - 1):
             stored = found.stored_energy()
         self._totals[self.done] = [*self._state.totals, stored]
         self.done += 1
 
     def _slipped(self) -> str | None:
-        """Whether the driven pulley runs far from its speed without slip."""
-        p = self.parameters
-        share = p["ratio"] * self._state.speed[0, 1] / p["driving_speed"]
+        """Whether the driven pulley runs far from its speed without slip, where the drive is under way."""
+        row = self.done - 1
+        driving, driven = (self.channel(f"{name}_speed")[row] for name in PULLEYS)
+        if driving < LEAST_SPEED * self.parameters["driving_speed"]:
+            return None
+        share = self.drawn.ratio * driven / driving
         if share < LEAST_SPEED:
             return LOST
         return GAINED if share > MOST_SPEED else None
+
+    def _left(self) -> str | None:
+        """Whether the belt has left a pulley."""
+        k = int(np.argmax(self._lifted))
+        if self._lifted[k] * self.interval <= MOST_LIFTED:
+            return None
+        name = self.drawn.pulleys[k]
+        return f"the belt lifts off: it has not touched the {name} pulley for {MOST_LIFTED:g} s"
 
     @property
     def time(self) -> float:
         """Simulated time [s]."""
         return self.steps * self.step
 
-    @property
-    def step(self) -> float:
-        """Time step [s]."""
-        return self.interval / self._steps_per_sample
+    def speed_loss(self, samples: slice) -> float:
+        """What sliding and creep take from the driven speed in some samples, over what it is without [1]."""
+        driven = self.channel("driven_speed")[samples].mean()
+        return float(1.0 - self.drawn.ratio * driven / self.mean_driving_speed(samples))
+
+    def drive_frequencies(self, count: int) -> np.ndarray:
+        """Lowest frequencies of the drive about where it is, (count,) [Hz]."""
+        return drive_frequencies(self._drive, self._state, count)
 
     @property
-    def steps(self) -> int:
-        """Steps taken so far."""
-        return int(self._state.counters[fields.STEPS])
-
-    @property
-    def contact_solves(self) -> int:
-        """Solves of the contact problem so far: iterations."""
-        return int(self._state.counters[fields.ITERATIONS])
-
-    def counters(self) -> dict[str, int]:
-        """Work done so far: steps, iterations, and steps that were not solved to the tolerance."""
-        return dict(zip(("steps", "iterations", "unsolved"), self._state.counters.tolist(), strict=True))
-
-    @property
-    def displacement(self) -> np.ndarray:
-        """Displacement at the probes, outwards, (done, probe) [m]."""
-        return self._rows[: self.done, : len(self.probes)]
-
-    def channel(self, name: str) -> np.ndarray:
-        """History of one of CHANNELS, (done,)."""
-        return self._rows[: self.done, len(self.probes) + CHANNELS.index(name)]
-
-    def mean_driving_speed(self, samples: slice) -> float:
-        """Mean speed of the driving pulley in some samples [rad/s]."""
-        return float(self.channel("driving_speed")[samples].mean())
-
-    @property
-    def judged(self) -> slice:
-        """Samples of the judged part."""
-        return slice(self.first_judged, self.samples)
+    def pulleys(self) -> Pulleys:
+        """Constants of pulleys and arms."""
+        return self._drive.pulleys
 
     @property
     def turns(self) -> int:
@@ -201,12 +178,11 @@ class Transient:
     @property
     def _turn(self) -> float:
         """Samples of a turn of the belt."""
-        speed = self.parameters["driving_speed"] * self.path.driving_radius
-        return self.path.path_length / (speed * self.interval)
+        return self.path.path_length / (self._readings.belt_speed * self.interval)
 
     def mean_rate(self, total: int) -> float:
-        """Mean rate over the judged part of one of the totals, by its index; -1: of the stored energy."""
-        part = self._totals[self.judged]
+        """Mean rate over whole turns of one of the totals, by its index; -1: of the stored energy."""
+        part = self._totals[self.whole_turns]
         return float((part[-1, total] - part[0, total]) / ((len(part) - 1) * self.interval))
 
     @property
@@ -220,7 +196,7 @@ class Transient:
     @property
     def path(self) -> Any:
         """The reference path."""
-        return self._readings.path
+        return self.drawn.path
 
     @property
     def places(self) -> np.ndarray:
@@ -243,10 +219,6 @@ class Transient:
         else:
             return None
         return Status.FAILED_NUMERICS, why
-
-    def paused(self) -> Transient:
-        """What a batch of the same point over a longer time goes on from: the run itself."""
-        return self
 
 
 batch = batches_of_one(Transient)

@@ -13,7 +13,7 @@ from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.models.elastic_belt.history import histories
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, judging
-from cvt_hpc.variator.judging import assess, efficiency, mean, pair, power_balance
+from cvt_hpc.variator.judging import assess, each, efficiency, mean, power_balance
 from cvt_hpc.variator.slip import VARIABLES as AGAINST_SLIP
 from cvt_hpc.variator.slip import capacity, slide
 from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared
@@ -151,7 +151,7 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
         "modal_amplitude": modal,
         **judging.evaluate(run, strongest_probe),
         **capacity(run, judged),
-        "open_share": pair(run, "open_share"),
+        "open_share": each(run, "open_share"),
         **power_balance(driving, load, loss, storing, thrust),
         "efficiency": efficiency(driving, load, loss),
         "thrust_power": thrust,

@@ -20,7 +20,7 @@ from cvt_hpc.models.oscillator.motion import (
     X,
     friction_at_rest,
     largest_rate,
-    regularised_friction,
+    regularised_frictions,
 )
 from cvt_hpc.steppers.facts import Facts
 
@@ -78,7 +78,7 @@ def peak(o: Oscillator) -> Peak | None:
     if o.normal_stiffness != 0.0 and o.law.table_force.size > 1:
         return None
     sliding = np.linspace(0.0, REACH * o.width, POINTS)
-    mu = np.array([regularised_friction(o, s, o.normal_load) for s in sliding]) / o.normal_load
+    mu = regularised_frictions(o, sliding, np.full(POINTS, o.normal_load)) / o.normal_load
     top = int(mu.argmax())
     return Peak(float(sliding[top]), float(mu[top])) if top < POINTS - 1 else None
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.kernels import called_alike
-from cvt_hpc.models.marched import Probe, batches_of_one
+from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import belt as fields
 from cvt_hpc.models.pushbelt.belt import CONTACTS, NOT_CONVERGED, Belt, Newton
 from cvt_hpc.models.pushbelt.parameters import MODES, path_length
@@ -17,8 +17,8 @@ from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Reading, Reading
 from cvt_hpc.models.pushbelt.start import of_lanes, start, workspace
 from cvt_hpc.models.pushbelt.start_up import StartUps, fingerprint
 from cvt_hpc.models.pushbelt.step import advance
+from cvt_hpc.models.sampled import SampledRun
 from cvt_hpc.physics.geometry import driven_radius
-from cvt_hpc.recording import sample_count, start_up_samples
 from cvt_hpc.variables import Status
 from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, STRANDS
 from cvt_hpc.variator.course import load_course
@@ -41,7 +41,7 @@ _start_ups = StartUps()
 forget = _start_ups.forget
 
 
-class Transient:
+class Transient(SampledRun):
     """One run of the pushbelt, advanced sample by sample.
 
     It begins at the end of its start-up where another run of this process has marched the same one.
@@ -53,18 +53,6 @@ class Transient:
     stepper : str
         "newton".
 
-    Attributes
-    ----------
-    parameters
-        As given.
-    probes : tuple of Probe
-        On the strands, equally spaced between their ends.
-    interval : float
-        Sampling interval [s].
-    samples, done, kick : int
-        Samples of the whole run, those recorded so far, and those before the load has risen.
-    failure : (Status, str) or None
-        Why the run does not go on: what has gone wrong, or that the belt slips through, with the status done.
     """
 
     _belt: Belt
@@ -75,20 +63,11 @@ class Transient:
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
         p = parameters
-        self.interval = 1.0 / p["sampling_rate"]
-        self._steps_per_sample = max(1, int(np.ceil(self.interval / p["step"] * (1.0 - 1e-9))))
+        super().__init__(p)
         self._begin(p)
         self._readings = Readings(p, self._belt)
-        self.probes = tuple(
-            Probe(f"{strand} {k + 1}", float(position))
-            for strand, positions in zip(STRANDS, self._readings.probes, strict=True)
-            for k, position in enumerate(positions)
-        )
-        self.done = 0
-        self.failure: tuple[Status, str] | None = None
-        self._rows = np.empty((0, len(self.probes) + len(CHANNELS)))
-        self._totals = np.empty((0, fields.TOTALS + 1))
-        self.prolong(p)
+        sums = len(PROFILES) + 1, self._readings.places.size
+        self._record(CHANNELS, STRANDS, self._readings.probes, fields.TOTALS + 1, sums)
         clamped = int(CLAMPED * p["rise_time"] / self.interval + 1e-9)
         self._start_up = min(clamped, self.first_judged)
         self._start_up_key = self._key_of_start_up()
@@ -103,22 +82,6 @@ class Transient:
             power_tolerance=p["power_tolerance"],
             most_iterations=p["most_iterations"],
         )
-
-    def prolong(self, parameters: Mapping[str, Any]) -> None:
-        """Make room for the samples of a longer duration.
-
-        Parameters
-        ----------
-        parameters : mapping
-            Those of the run but for `duration` and `judged_fraction`.
-        """
-        self.parameters = parameters
-        self.samples, self.kick = sample_count(parameters), start_up_samples(parameters)
-        self.first_judged = self.samples - round(parameters["judged_fraction"] * self.samples)
-        more = self.samples - len(self._rows)
-        self._rows = np.concatenate([self._rows, np.full((more, self._rows.shape[1]), np.nan)])
-        self._totals = np.concatenate([self._totals, np.full((more, self._totals.shape[1]), np.nan)])
-        self._sums = np.zeros((len(PROFILES) + 1, self._readings.places.size))
 
     def advance(self, samples: int) -> tuple[Status, str] | None:
         """March on.
@@ -259,44 +222,6 @@ class Transient:
         """Simulated time [s]."""
         return float(self._state.totals[fields.TIME])
 
-    @property
-    def step(self) -> float:
-        """Time step [s]."""
-        return self.interval / self._steps_per_sample
-
-    @property
-    def steps(self) -> int:
-        """Steps taken so far."""
-        return int(self._state.counters[fields.STEPS])
-
-    @property
-    def contact_solves(self) -> int:
-        """Solves of the contact problem so far: iterations."""
-        return int(self._state.counters[fields.ITERATIONS])
-
-    def counters(self) -> dict[str, int]:
-        """Work done so far: steps, iterations, and steps that were not solved to the tolerance."""
-        names = ("steps", "iterations", "unsolved")
-        return dict(zip(names, self._state.counters[: len(names)].tolist(), strict=True))
-
-    @property
-    def displacement(self) -> np.ndarray:
-        """Displacement at the probes, outwards, (done, probe) [m]."""
-        return self._rows[: self.done, : len(self.probes)]
-
-    def channel(self, name: str) -> np.ndarray:
-        """History of one of CHANNELS, (done,)."""
-        return self._rows[: self.done, len(self.probes) + CHANNELS.index(name)]
-
-    def mean_driving_speed(self, samples: slice) -> float:
-        """Mean speed of the driving pulley in some samples [rad/s]."""
-        return float(self.channel("driving_speed")[samples].mean())
-
-    @property
-    def judged(self) -> slice:
-        """Samples of the judged part."""
-        return slice(self.first_judged, self.samples)
-
     def mean_rate(self, total: int) -> float:
         """Mean rate over the judged part of one of the totals, by its index; TOTALS: of the stored energy."""
         part = self._totals[self.judged]
@@ -350,10 +275,6 @@ class Transient:
         rotation = 0.5 * belt.inertia * passing * speed**2 * turning
         thrust = p["thrust"] * multiple(p, "thrust", p["duration"])  # a profile ends before the judged part
         return OF_ROTATION * rotation + OF_THRUST * self.step * thrust * speed
-
-    def paused(self) -> Transient:
-        """What a batch of the same point over a longer time goes on from: the run itself."""
-        return self
 
 
 def given(parameters: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,0 +1,190 @@
+"""Quantities of a study over one of its axes: what runs give as marks, what stands beside them as lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+from pathlib import Path
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cvt_hpc.analysis.arrangement import Arrangement, arrange, ruler, value_text
+from cvt_hpc.analysis.cells import STYLES
+from cvt_hpc.analysis.classes import OccurrenceClass, check_results
+from cvt_hpc.analysis.error_axes import COLOURS, MARKERS
+from cvt_hpc.analysis.figures import WIDTH, draw, in_words, styled
+from cvt_hpc.errors import mismatch, one_line, unknown
+from cvt_hpc.variables import Status, Vibrates
+
+HEIGHT = 3.8  # [inch]
+MOST_PANELS = 3  # side by side
+BESIDE = ("-", "--", ":", "-.")
+
+
+def draw_curve(
+    dataset: xr.Dataset,
+    quantities: Sequence[str],
+    out: Path,
+    at: Mapping[str, Any] | None = None,
+    source: str = "results",
+) -> Path:
+    """Write the figure of `curve_figure`, with its arguments and errors, as `save_figure` does."""
+    return draw(lambda: curve_figure(dataset, quantities, at, source), out)
+
+
+@styled
+def curve_figure(
+    dataset: xr.Dataset,
+    quantities: Sequence[str],
+    at: Mapping[str, Any] | None = None,
+    source: str = "results",
+) -> Figure:
+    """Draw quantities over an axis.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        Results of a study, as `open_results` returns them. The axis that runs along x in a map does so here;
+        there is a panel for each value of the one that runs along y.
+    quantities : sequence of str
+        Numeric variables of one unit. The first is drawn by marks, the others by lines beside it; one with
+        further dimensions, such as `strand`, gives a curve for each of their labels.
+    at : mapping, optional
+        Axes to fix: name -> value, as a number [SI] or a text.
+    source : str, optional
+        Where the results are from, for the errors.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Unknown to pyplot; `figure.savefig(path)` writes it.
+
+    Raises
+    ------
+    InputError
+        The dataset holds no results, a single run or no such quantity; quantities differ in unit; `at` names
+        no axis or no value on it; or there would be more than MOST_PANELS panels.
+    """
+    check_results(dataset, source)
+    _check_quantities(dataset, quantities, source)
+    arrangement = arrange(dataset, at or {}, source)
+    panels, notes = _panels(arrangement, source)
+    figure = Figure((WIDTH, HEIGHT), layout="constrained")
+    all_axes = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
+    x = ruler(arrangement.dataset[arrangement.x])
+    factor, unit = _scale(arrangement.dataset, quantities)
+    for axes, (title, shown) in zip(all_axes, panels, strict=True):
+        curves = [curve for name in quantities for curve in _curves(shown[name], factor, arrangement.x)]
+        _draw_curves(axes, x.centres, shown, curves)
+        axes.set_title(title, loc="left", pad=3)
+        axes.set_xlabel(x.label)
+        axes.grid(linewidth=0.4, alpha=0.5)
+    label = _common_words(dataset, quantities)
+    all_axes[0].set_ylabel(f"{label} [{unit}]" if unit else label)
+    legend: dict[str, Any] = {}
+    for axes in all_axes:
+        handles, labels = axes.get_legend_handles_labels()
+        legend |= dict(zip(labels, handles, strict=True))
+    figure.legend(
+        legend.values(), legend.keys(), loc="outside lower center", frameon=False, ncols=min(len(legend), 4)
+    )
+    job = one_line(dataset.attrs.get("job_name", ""))
+    title = f"{label[0].upper()}{label[1:]}: {job}".rstrip(": ")
+    figure.suptitle("\n".join(fill(line, 72) for line in [title, *notes]))
+    return figure
+
+
+def _check_quantities(dataset: xr.Dataset, quantities: Sequence[str], source: str) -> None:
+    numeric = [str(name) for name, array in dataset.data_vars.items() if array.dtype.kind in "iuf"]
+    for name in quantities:
+        if name not in numeric:
+            raise unknown(f"{source}: {name}", "numeric variable of the results", name, numeric)
+        units = [dataset[key].attrs.get("units", "") for key in (quantities[0], name)]
+        if units[0] != units[1]:
+            raise mismatch(f"{source}: {name}", f"the unit of {quantities[0]}, {units[0]}", str(units[1]))
+
+
+def _panels(arrangement: Arrangement, source: str) -> tuple[list[tuple[str, xr.Dataset]], list[str]]:
+    """Title and results over x of each panel, and what is fixed, in words."""
+    dataset, notes = arrangement.dataset, list(arrangement.notes)
+    if arrangement.panel:
+        notes.append(
+            f"{in_words(dataset[arrangement.panel])} = {value_text(dataset[arrangement.panel], 0)} (first)"
+        )
+        dataset = dataset.isel({arrangement.panel: 0})
+    if arrangement.y is None:
+        return [("", dataset)], notes
+    y = dataset[arrangement.y]
+    if y.size > MOST_PANELS:
+        raise mismatch(
+            f"{source}: {arrangement.y}", f"at most {MOST_PANELS} values, or one that --at fixes", f"{y.size}"
+        )
+    titles = [f"{in_words(y)} {value_text(y, k)}" for k in range(y.size)]
+    return [(title, dataset.isel({arrangement.y: k})) for k, title in enumerate(titles)], notes
+
+
+def _curves(array: xr.DataArray, factor: float, x: str) -> Iterator[tuple[str, str, np.ndarray]]:
+    """Name of the quantity, label of the curve, and values over x by a factor."""
+    extra = [str(dim) for dim in array.dims if dim != x]
+    for place in product(*(range(array.sizes[dim]) for dim in extra)):
+        at = dict(zip(extra, place, strict=True))
+        labels = [str(array[dim].values[k]) for dim, k in at.items()]
+        yield str(array.name), " ".join([in_words(array), *labels]), factor * array.isel(at).values
+
+
+def _scale(dataset: xr.Dataset, quantities: Sequence[str]) -> tuple[float, str]:
+    """Factor that gives numbers of up to three digits before the point, and the unit with it, for a label."""
+    unit = str(dataset[quantities[0]].attrs.get("units", "")).replace("rad s-1", "rad/s")
+    unit = "" if unit == "1" else unit
+    largest = max(float(np.abs(dataset[name]).max()) for name in quantities)
+    if not (np.isfinite(largest) and largest > 0.0) or 0.1 <= largest < 1e4:
+        return 1.0, unit
+    power = 3 * int(np.floor(np.log10(largest) / 3.0))
+    return 10.0**-power, f"$10^{{{power}}}$ {unit}".strip()
+
+
+def _draw_curves(
+    axes: Axes, x: np.ndarray, shown: xr.Dataset, curves: Sequence[tuple[str, str, np.ndarray]]
+) -> None:
+    """Marks of the first quantity and lines of the others; marks along the top for runs that slip through."""
+    is_done = shown["status"].values == Status.DONE
+    first, marks = curves[0][0], 0
+    for k, (name, label, values) in enumerate(curves):
+        colour = COLOURS[k % len(COLOURS)]
+        if name == first:
+            known = np.where(is_done, values, np.nan)
+            axes.plot(x, known, ls="", marker=MARKERS[marks % len(MARKERS)], ms=5, color=colour, label=label)
+            marks += 1
+        else:
+            axes.plot(
+                x, values, ls=BESIDE[(k - marks) % len(BESIDE)], lw=1.4, color=colour, label=label, zorder=1.5
+            )
+    slips = is_done & (shown["vibrates"].values == Vibrates.SLIPS)
+    if slips.any():
+        style = STYLES[OccurrenceClass.SLIPPING]
+        top = np.full(slips.sum(), 0.96)
+        axes.plot(
+            x[slips],
+            top,
+            ls="",
+            marker=style.mark,
+            color=style.ink,
+            transform=axes.get_xaxis_transform(),
+            label="slips",
+        )
+
+
+def _common_words(dataset: xr.Dataset, quantities: Sequence[str]) -> str:
+    """Words that the names of all quantities end with, else the name of the first."""
+    words = [in_words(dataset[name]).split() for name in quantities]
+    common: list[str] = []
+    for column in zip(*(reversed(each) for each in words), strict=False):
+        if len(set(column)) > 1:
+            break
+        common.insert(0, column[0])
+    return " ".join(common or words[0])

@@ -1,0 +1,127 @@
+"""Spectra of the strands over an axis of a study, as figs 11 and 12 of Cepon and Boltezar 2011."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.patheffects import Normal, withStroke
+from numpy.typing import NDArray
+
+from cvt_hpc.analysis.arrangement import Ruler, along_x, arrange, ruler
+from cvt_hpc.analysis.cells import colours_of
+from cvt_hpc.analysis.classes import check_results
+from cvt_hpc.analysis.figures import WIDTH, draw, styled
+from cvt_hpc.errors import few_of, mismatch, one_line
+
+HEIGHT = 4.0  # [inch]
+COLOURS = colours_of("inferno_r", 0.0, 0.95)
+DEEPEST = 1e-2  # of the largest amplitude: what is smaller has the lightest colour
+UNKNOWN = "#d0d4d8"  # of runs without a spectrum
+LINE = "#123a6b"
+
+
+def draw_waterfall(
+    dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None, source: str = "results"
+) -> Path:
+    """Write the figure of `waterfall_figure`, with its arguments and errors, as `save_figure` does."""
+    return draw(lambda: waterfall_figure(dataset, at, source), out)
+
+
+@styled
+def waterfall_figure(
+    dataset: xr.Dataset, at: Mapping[str, Any] | None = None, source: str = "results"
+) -> Figure:
+    """Draw spectra of all strands over an axis, with the eigenfrequencies where they are known.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        Results of a study, as `open_results` returns them: `status`, `vibrates` and `spectrum` [m] over
+        the job's axes, `strand` and `frequency_bin` [Hz]. `eigenfrequency` [Hz] over the axes, `strand` and
+        `half_waves` is drawn as lines.
+    at : mapping, optional
+        Axes to fix: name -> value, as a number [SI] or a text. Of the others the one that runs along x in a
+        map does so here, and the rest are fixed at their first value.
+    source : str, optional
+        Where the results are from, for the errors.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Unknown to pyplot; `figure.savefig(path)` writes it.
+
+    Raises
+    ------
+    InputError
+        The dataset holds no results, no spectra or a single run, or `at` names no axis or no value on it.
+    """
+    check_results(dataset, source)
+    if "spectrum" not in dataset or "frequency_bin" not in dataset["spectrum"].dims:
+        found = few_of(list(map(str, dataset.data_vars)), 6)
+        raise mismatch(source, "results with the variable spectrum", found)
+    arrangement = arrange(dataset, at or {}, source)
+    shown, notes = along_x(arrangement)
+    x = ruler(shown[arrangement.x])
+    amplitude = 1e6 * shown["spectrum"].transpose("strand", "frequency_bin", arrangement.x).values
+    largest = np.nanmax(amplitude, initial=0.0) or 1.0
+    norm = LogNorm(DEEPEST * largest, largest)
+    figure = Figure((WIDTH, HEIGHT), layout="constrained")
+    strands = [str(name) for name in shown["strand"].values]
+    panels = figure.subplots(1, len(strands), sharex=True, sharey=True, squeeze=False)[0]
+    y = ruler(shown["frequency_bin"])
+    for axes, strand, values in zip(panels, strands, amplitude, strict=True):
+        _draw_spectra(axes, x, y, values, norm)
+        if "eigenfrequency" in shown:
+            known = shown["eigenfrequency"].sel(strand=strand).transpose("half_waves", arrangement.x)
+            _draw_eigenfrequencies(axes, x, known)
+        axes.set_title(f"strand {strand}", loc="left", pad=3)
+        axes.set_xlabel(x.label)
+        if x.ticks is not None:
+            axes.set_xticks(x.ticks, x.tick_labels)
+    panels[0].set_ylabel("frequency [Hz]")
+    panels[0].set_ylim(0.0, y.edges[-1])
+    bar = figure.colorbar(ScalarMappable(norm, COLOURS), ax=panels, pad=0.02, extend="min")
+    bar.set_label("amplitude [µm]")
+    job = one_line(dataset.attrs.get("job_name", ""))
+    lines = [f"Spectra of the strands: {job}".rstrip(": "), *notes]
+    if "eigenfrequency" in shown:
+        lines.append("dashed: eigenfrequencies, with their half waves along the strand")
+    if np.isnan(amplitude).any():
+        lines.append("grey: the belt slips through, or the run failed")
+    figure.suptitle("\n".join(fill(line, 72) for line in lines))
+    return figure
+
+
+def _draw_spectra(axes: Axes, x: Ruler, y: Ruler, values: NDArray[np.float64], norm: LogNorm) -> None:
+    """Cells of one strand, of amplitudes (frequency, x) [um]."""
+    axes.set_facecolor(UNKNOWN)
+    cells = np.ma.masked_invalid(np.maximum(values, norm.vmin))  # zero has no logarithm
+    axes.pcolormesh(x.edges, y.edges, cells, norm=norm, cmap=COLOURS, rasterized=True)
+
+
+def _draw_eigenfrequencies(axes: Axes, x: Ruler, lines: xr.DataArray) -> None:
+    """Dashes that let the ridges show through, each line with its number where it ends."""
+    outline = [withStroke(linewidth=2.2, foreground="white"), Normal()]
+    for number, line in zip(lines["half_waves"].values, lines.values, strict=True):
+        known = np.flatnonzero(np.isfinite(line) & (line < axes.dataLim.ymax))
+        if known.size == 0:
+            continue
+        axes.plot(x.centres, line, color=LINE, ls=(0, (3, 5)), lw=1.1, path_effects=outline)
+        axes.annotate(
+            str(number),
+            (x.centres[known[0]], line[known[0]]),
+            (2, 5),
+            textcoords="offset points",
+            color=LINE,
+            fontsize=9,
+            path_effects=outline,
+        )

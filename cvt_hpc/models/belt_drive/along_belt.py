@@ -1,0 +1,177 @@
+"""What is read at a sample, at points along the belt: where they lie, tension, contacts; for kernels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.models.belt_drive.contact import Contact, Touch
+from cvt_hpc.multibody.ancf_beam import POINTS, SHAPES, WEIGHTS, AncfBeam, tension_of
+from cvt_hpc.multibody.ancf_chain import Chain
+from cvt_hpc.physics.nearest_on_path import Way, nearest
+
+
+class Line(NamedTuple):
+    """The belt at the Gauss points of its k elements, (k, POINTS) arrays.
+
+    Attributes
+    ----------
+    position, offset : arrays
+        Path coordinate, and distance from the path to the right of the belt's way [m].
+    tension : array
+        [N]
+    """
+
+    position: np.ndarray
+    offset: np.ndarray
+    tension: np.ndarray
+
+
+class Sample(NamedTuple):
+    """What is read of a belt on P pulleys at p probes.
+
+    Attributes
+    ----------
+    displacement : (p,) array
+        To the right of the belt's way [m].
+    tension : (P,) array
+        Mean over the middle half of the spans [N].
+    slip : (P,) array
+        Mean sliding speed, counter-clockwise, weighed by normal forces [m/s].
+    largest : (P,) array
+        Normal force of the contact that is pressed most [N].
+    """
+
+    displacement: np.ndarray
+    tension: np.ndarray
+    slip: np.ndarray
+    largest: np.ndarray
+
+
+def empty_line(elements: int) -> Line:
+    """Room for a belt."""
+    return Line(*np.zeros((3, elements, POINTS)))
+
+
+def empty_sample(probes: int, pulleys: int) -> Sample:
+    """Room for a sample."""
+    return Sample(np.zeros(probes), *np.zeros((3, pulleys)))
+
+
+@kernel
+def read(
+    way: Way,
+    beam: AncfBeam,
+    chain: Chain,
+    contact: Contact,
+    touch: Touch,
+    slopes: np.ndarray,
+    probes: np.ndarray,
+    line: Line,
+    sample: Sample,
+    sums: np.ndarray,
+) -> None:
+    """Read a sample.
+
+    Parameters
+    ----------
+    way : Way
+        The reference path.
+    beam, chain : AncfBeam, Chain
+        The belt, and its motion.
+    contact, touch : Contact, Touch
+        Its contacts.
+    slopes : (C, 4) array
+        Derivatives of the shapes at the contact points.
+    probes : (p,) array
+        Path coordinates [m].
+    line, sample : Line, Sample
+        What is found.
+    sums : (6, place) array
+        To which profiles are added at equal shares of the path: length, tension and offset by it, normal
+        force and force forwards per length, samples; none at no places.
+    """
+    _locate(way, beam, chain.q, line)
+    _displace(line, probes, way.length, sample.displacement)
+    for p in range(sample.tension.size):
+        middle, quarter = way.begins[p, 1] + 0.5 * way.spans[p], 0.25 * way.spans[p]
+        pull, length = 0.0, 0.0
+        for i in range(beam.lengths.size):
+            for c in range(POINTS):
+                if abs(line.position[i, c] - middle) < quarter:
+                    pull += beam.lengths[i] * WEIGHTS[c] * line.tension[i, c]
+                    length += beam.lengths[i] * WEIGHTS[c]
+        sample.tension[p] = pull / length
+        pressed, slid, largest = 0.0, 0.0, 0.0
+        for i in range(beam.lengths.size):
+            for c in range(touch.normal.shape[2]):
+                force = touch.normal[p, i, c]
+                pressed += force
+                slid += force * touch.memory.slip[p, i, c]
+                largest = max(largest, force)
+        sample.slip[p], sample.largest[p] = slid / max(pressed, 1e-9), largest
+    if sums.shape[1] > 0:
+        _add_profiles(way, beam, chain.stage_q, contact, slopes, touch, line, sums)
+
+
+@kernel
+def _locate(way, beam, q, line):
+    n = q.shape[0]
+    for i in range(beam.lengths.size):
+        j, l0 = (i + 1) % n, beam.lengths[i]
+        for c in range(POINTS):
+            x, y = _at(SHAPES[c, 0], q, i, j, l0)
+            sx, sy = _at(SHAPES[c, 1], q, i, j, l0)
+            line.position[i, c], line.offset[i, c] = nearest(way, x, y, sx, sy)
+            strain = 0.5 * ((sx * sx + sy * sy) / (l0 * l0) - 1.0)
+            line.tension[i, c] = tension_of(beam.axial_stiffness, strain)
+
+
+@kernel
+def _at(shape, q, i, j, l0):
+    x = shape[0] * q[i, 0] + shape[2] * q[j, 0] + l0 * (shape[1] * q[i, 2] + shape[3] * q[j, 2])
+    y = shape[0] * q[i, 1] + shape[2] * q[j, 1] + l0 * (shape[1] * q[i, 3] + shape[3] * q[j, 3])
+    return x, y
+
+
+@kernel
+def _displace(line, probes, length, found):
+    """Offsets at probes, linear between the points before and behind."""
+    for p in range(probes.size):
+        before, behind, of_before, of_behind = length, length, 0.0, 0.0
+        for i in range(line.position.shape[0]):
+            for c in range(POINTS):
+                ahead = line.position[i, c] - probes[p]
+                ahead = ahead + length if ahead < 0.0 else ahead
+                if ahead < behind:
+                    behind, of_behind = ahead, line.offset[i, c]
+                if length - ahead < before:
+                    before, of_before = length - ahead, line.offset[i, c]
+        found[p] = (of_before * behind + of_behind * before) / (before + behind)
+
+
+@kernel
+def _add_profiles(way, beam, q, contact, slopes, touch, line, sums):
+    places = sums.shape[1]
+    per = places / way.length
+    for i in range(beam.lengths.size):
+        for c in range(POINTS):
+            place, weight = min(int(line.position[i, c] * per), places - 1), beam.lengths[i] * WEIGHTS[c]
+            sums[0, place] += weight
+            sums[1, place] += weight * line.tension[i, c]
+            sums[2, place] += weight * line.offset[i, c]
+        j, l0 = (i + 1) % q.shape[0], beam.lengths[i]
+        for c in range(contact.shape.shape[0]):
+            normal, forwards = 0.0, 0.0
+            for p in range(way.turn.size):
+                normal += touch.normal[p, i, c]
+                forwards += way.turn[p] * touch.tangential[p, i, c]
+            if normal > 0.0:
+                x, y = _at(contact.shape[c], q, i, j, l0)
+                sx, sy = _at(slopes[c], q, i, j, l0)
+                place = min(int(nearest(way, x, y, sx, sy)[0] * per), places - 1)
+                sums[3, place] += per * normal
+                sums[4, place] += per * forwards
+    sums[5] += 1.0

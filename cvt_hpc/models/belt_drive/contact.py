@@ -1,0 +1,270 @@
+"""Contacts of the belt with its pulleys: forces at points along the belt, and their slopes.
+
+Each element has points at equal distances that may touch each pulley. A point of the belt at distance
+d < R from the pulley's axis is pressed by R - d into the pulley's rim of radius R, with the normal force per
+length
+
+    p = max(stiffness (R - d) + damping d/dt (R - d), 0).
+
+A point that approaches is pressed shortly before it is there, so that p has no jump. The rubber between the
+belt's cord and the rim turns with the pulley, so that the cord slides by the speed t . dr/dt - w d over it.
+Friction (`cvt_hpc.models.belt_drive.friction`) acts at the radius d: its moment turns the pulley.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.models.belt_drive.friction import Friction, Memory, begin_iterate, empty_memory, laws_hold, rub
+from cvt_hpc.models.belt_drive.pulleys import CONTACT_LOSS, FRICTION_LOSS, WORK_IN, Pulleys, Wheels
+from cvt_hpc.multibody.ancf_beam import PER_NODE, shapes
+from cvt_hpc.multibody.ancf_chain import Chain
+from cvt_hpc.solvers.cyclic_blocks import DIAGONAL, LOWER, UPPER
+
+NEAR = 1.05  # radii of a pulley, beyond which nothing touches it
+
+
+class Contact(NamedTuple):
+    """Constants of the contacts.
+
+    Attributes
+    ----------
+    shape : (C, 4) array
+        Shapes at the C points of an element of length 1.
+    stiffness, damping : float
+        Per length [N/m^2], [N s/m^2].
+    friction : Friction
+        How they rub.
+    """
+
+    shape: np.ndarray
+    stiffness: float
+    damping: float
+    friction: Friction
+
+
+class Touch(NamedTuple):
+    """What the contacts of P pulleys and k elements remember, and their forces.
+
+    Attributes
+    ----------
+    memory : Memory
+        Of friction.
+    normal, tangential : (P, k, C) arrays
+        Forces on the belt in the last stage, outwards and counter-clockwise [N].
+    """
+
+    memory: Memory
+    normal: np.ndarray
+    tangential: np.ndarray
+
+
+def contact_shapes(points: int) -> np.ndarray:
+    """Shapes (C, 4) at C points, each in the middle of its share of an element."""
+    return shapes((np.arange(points) + 0.5) / points)[0]
+
+
+def first_touch(pulleys: int, elements: int, points: int) -> Touch:
+    """Contacts that remember nothing."""
+    return Touch(empty_memory(pulleys, elements, points), *np.zeros((2, pulleys, elements, points)))
+
+
+@kernel
+def add_contacts(
+    contact: Contact,
+    touch: Touch,
+    lengths: np.ndarray,
+    chain: Chain,
+    pulleys: Pulleys,
+    wheels: Wheels,
+    tau: float,
+    is_known: bool,
+) -> bool:
+    """Add the forces of contacts, and their slopes, to the equations of a stage.
+
+    Parameters
+    ----------
+    contact, touch : Contact, Touch
+        What the contacts are, and what they remember.
+    lengths : (k,) array
+        Of the elements [m].
+    chain : Chain
+        The belt.
+    pulleys, wheels : Pulleys, Wheels
+        What it runs around.
+    tau : float
+        [s]
+    is_known : bool
+        Whether `touch` is of an iterate of this stage.
+
+    Returns
+    -------
+    bool
+        Whether the laws of friction held in that iterate.
+    """
+    q, u, n = chain.stage_q, chain.stage_v, chain.q.shape[0]
+    last, points = wheels.speed.shape[1] - 1, contact.shape.shape[0]
+    begin_iterate(touch.memory)
+    touch.normal[:] = 0.0
+    touch.tangential[:] = 0.0
+    for i in range(n):
+        j = (i + 1) % n
+        l0 = lengths[i]
+        if not _may_touch(q, i, j, l0, pulleys, wheels):
+            continue
+        weight = l0 / points
+        for c in range(points):
+            s0, s1, s2, s3 = (
+                contact.shape[c, 0],
+                l0 * contact.shape[c, 1],
+                contact.shape[c, 2],
+                l0 * contact.shape[c, 3],
+            )
+            x = s0 * q[i, 0] + s1 * q[i, 2] + s2 * q[j, 0] + s3 * q[j, 2]
+            y = s0 * q[i, 1] + s1 * q[i, 3] + s2 * q[j, 1] + s3 * q[j, 3]
+            for p in range(pulleys.radius.size):
+                away_x, away_y, radius = x - wheels.centre[p, 0], y - wheels.centre[p, 1], pulleys.radius[p]
+                if away_x * away_x + away_y * away_y >= (NEAR * radius) ** 2:
+                    continue
+                vx = s0 * u[i, 0] + s1 * u[i, 2] + s2 * u[j, 0] + s3 * u[j, 2]
+                vy = s0 * u[i, 1] + s1 * u[i, 3] + s2 * u[j, 1] + s3 * u[j, 3]
+                vx, vy = vx - wheels.centre_speed[p, 0], vy - wheels.centre_speed[p, 1]
+                distance = np.sqrt(away_x * away_x + away_y * away_y)
+                nx, ny = away_x / distance, away_y / distance
+                outward, around = nx * vx + ny * vy, nx * vy - ny * vx
+                depth = radius - distance
+                pressure = contact.stiffness * depth - contact.damping * outward
+                if pressure <= 0.0:
+                    continue
+                slip = around - wheels.stage_speed[0, p] * distance
+                found = rub(contact.friction, touch.memory, p, i, c, slip, pressure, tau, is_known)
+                force, traction, settled = weight * pressure, -weight * found.force, -weight * found.settled
+                touch.normal[p, i, c], touch.tangential[p, i, c] = force, settled
+                wheels.power[FRICTION_LOSS + p] -= settled * slip
+                wheels.power[CONTACT_LOSS] += weight * contact.damping * outward * outward
+                if p == 0:
+                    wheels.power[WORK_IN] += settled * distance * wheels.stage_speed[0, 0]
+                # slopes by speeds of the belt: of the force, of the slip, of traction and its moment
+                steep = -weight * found.by_slip
+                of_normal = -weight * (contact.stiffness * tau + contact.damping)
+                of_around = -weight * contact.damping * tau * around / distance
+                by_normal = steep * -tau * wheels.stage_speed[0, p] - found.by_pressure * of_normal
+                by_around = steep * (1.0 - tau * outward / distance) - found.by_pressure * of_around
+                turn = tau / distance  # of the normal
+                nn, nt = of_normal, of_around - settled * turn
+                tn, tt = by_normal, by_around + force * turn
+                # with tangent (-ny, nx)
+                xx = -(nx * nx * nn - nx * ny * (nt + tn) + ny * ny * tt)
+                xy = -(nx * ny * (nn - tt) + nx * nx * nt - ny * ny * tn)
+                yx = -(nx * ny * (nn - tt) + nx * nx * tn - ny * ny * nt)
+                yy = -(ny * ny * nn + nx * ny * (nt + tn) + nx * nx * tt)
+                fx, fy = force * nx - traction * ny, force * ny + traction * nx
+                moment_n = distance * by_normal + tau * settled
+                moment_t = distance * by_around
+                mx, my = moment_n * nx - moment_t * ny, moment_n * ny + moment_t * nx
+                at_point = (s0, s1, s2, s3)
+                _add_to_belt(chain, i, j, at_point, last, (fx, fy), (xx, xy, yx, yy))
+                corner, lever = wheels.corner.data[0], steep * distance
+                if p > 0:
+                    corner[p - 1, p - 1] -= steep * distance * distance
+                    corner[p - 1, last] -= traction * distance
+                    _add_to_border(chain, wheels, i, j, at_point, p - 1, (-lever * ny, lever * nx), (mx, my))
+                if pulleys.arm[p] < 0:
+                    continue
+                # by the arm's rate the axis moves along (ex, ey), and its speed turns with the arm as well
+                arm = pulleys.radius.size - 1 + pulleys.arm[p]
+                ex, ey = wheels.lever[p, 0], wheels.lever[p, 1]
+                turned = tau * wheels.stage_speed[0, arm + 1]
+                damping = weight * contact.damping * turned * (nx * ey - ny * ex)
+                by_n, by_t = -damping, found.by_pressure * damping - steep * turned * (nx * ex + ny * ey)
+                by_x = xx * ex + xy * ey + by_n * nx - by_t * ny
+                by_y = yx * ex + yy * ey + by_n * ny + by_t * nx
+                ax, ay = -(ex * xx + ey * yx), -(ex * xy + ey * yy)
+                _add_to_border(chain, wheels, i, j, at_point, arm, (-by_x, -by_y), (ax, ay))
+                corner[arm, arm] += ex * by_x + ey * by_y - tau * (fx * ey - fy * ex)
+                corner[arm, last] -= fx * ex + fy * ey
+                if p > 0:
+                    corner[p - 1, arm] += distance * by_t - (mx * ex + my * ey)
+                    corner[arm, p - 1] -= lever * (ey * nx - ex * ny)
+    return laws_hold(contact.friction, touch.memory, is_known)
+
+
+@kernel
+def _may_touch(q: np.ndarray, i: int, j: int, l0: float, pulleys: Pulleys, wheels: Wheels) -> bool:
+    """Whether an element between nodes i and j may reach into a pulley.
+
+    A cubic lies within the hull of its ends and of the points a third of the end's derivative inwards, and
+    so within a circle around its first node.
+    """
+    dx, dy = q[j, 0] - q[i, 0], q[j, 1] - q[i, 1]
+    share = l0 / 3.0
+    bx, by = dx - share * q[j, 2], dy - share * q[j, 3]
+    first = share * share * (q[i, 2] * q[i, 2] + q[i, 3] * q[i, 3])
+    reach = np.sqrt(max(dx * dx + dy * dy, max(bx * bx + by * by, first)))
+    for p in range(pulleys.radius.size):
+        ax, ay = q[i, 0] - wheels.centre[p, 0], q[i, 1] - wheels.centre[p, 1]
+        near = pulleys.radius[p] + reach
+        if ax * ax + ay * ay < near * near:
+            return True
+    return False
+
+
+@kernel
+def _add_to_belt(
+    chain: Chain,
+    i: int,
+    j: int,
+    shape: tuple[float, float, float, float],
+    last: int,
+    force: tuple[float, float],
+    matrix: tuple[float, float, float, float],
+) -> None:
+    """Add a force at a point between nodes i and j, and the matrix (xx, xy, yx, yy) of its slopes."""
+    blocks, columns = chain.blocks.data, chain.columns.data
+    xx, xy, yx, yy = matrix
+    for node in range(2):
+        at = i if node == 0 else j
+        for kind in range(2):
+            s, k = shape[2 * node + kind], 2 * kind
+            columns[at, k, last] += s * force[0]
+            columns[at, k + 1, last] += s * force[1]
+            for other in range(2):
+                block = DIAGONAL
+                if other != node:
+                    block = UPPER if node == 0 else LOWER
+                row = block * PER_NODE + k
+                a, b = s * shape[2 * other], s * shape[2 * other + 1]
+                blocks[at, row, 0] += a * xx
+                blocks[at, row, 1] += a * xy
+                blocks[at, row, 2] += b * xx
+                blocks[at, row, 3] += b * xy
+                blocks[at, row + 1, 0] += a * yx
+                blocks[at, row + 1, 1] += a * yy
+                blocks[at, row + 1, 2] += b * yx
+                blocks[at, row + 1, 3] += b * yy
+
+
+@kernel
+def _add_to_border(
+    chain: Chain,
+    wheels: Wheels,
+    i: int,
+    j: int,
+    shape: tuple[float, float, float, float],
+    k: int,
+    column: tuple[float, float],
+    row: tuple[float, float],
+) -> None:
+    """Add to column and row k of the border what an unknown there and a point between i and j share."""
+    columns = chain.columns.data
+    for node in range(2):
+        at = i if node == 0 else j
+        for kind in range(2):
+            s, x = shape[2 * node + kind], 2 * kind
+            columns[at, x, k] += s * column[0]
+            columns[at, x + 1, k] += s * column[1]
+            wheels.rows[at, k, x] += s * row[0]
+            wheels.rows[at, k, x + 1] += s * row[1]

@@ -1,0 +1,258 @@
+"""The layout of a drive: two pulleys by ratio and distance, or any number by lists; and arms of tensioners.
+
+The belt runs around the pulleys in the order of the lists; the first one drives. Where a pulley is on an arm,
+it stands in the lists as at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cvt_hpc.models.belt_drive.pulleys import Arms, Pulleys, no_struts, struts
+from cvt_hpc.parameters import Column, FromFile, Parameter
+from cvt_hpc.physics.belt_path import BeltPath, belt_path
+from cvt_hpc.physics.geometry import variator_problems
+from cvt_hpc.variator import PULLEYS, STRANDS
+
+Problem = tuple[str, str, str]  # key, expected, found
+
+COLUMNS = {"x": ("m",), "y": ("m",), "radius": ("m",), "turn": ("",), "inertia": ("kg m^2",), "load": ("",)}
+PULLEY_LISTS = tuple(f"pulley_{name}" for name in COLUMNS)
+TWO = (
+    "ratio",
+    "driven_radius",
+    "centre_distance",
+    "driven_inertia",
+    "crossed",
+)  # what lists take the place of
+
+
+def _arranged(columns: Mapping[str, Column]) -> dict[str, Any]:
+    return {f"pulley_{name}": list(column.values) for name, column in columns.items()}
+
+
+def _list(
+    unit: str, description: str, sensible: tuple[float, float] | None = None, **bounds: Any
+) -> Parameter:
+    return Parameter((), unit, description, sensible=sensible, **bounds)
+
+
+LAYOUT: dict[str, Parameter] = {
+    "pulley_file": Parameter(
+        "",
+        "",
+        f"CSV file of pulleys in the place of lists; a row for each, columns {', '.join(COLUMNS)}",
+        file=FromFile(COLUMNS, tuple(COLUMNS), PULLEY_LISTS, _arranged),
+    ),
+    "pulley_x": _list("m", "axes of the pulleys, the driving one first, as the belt runs", (1e-3, 10.0)),
+    "pulley_y": _list("m", "the same along y", (1e-3, 10.0)),
+    "pulley_radius": _list("m", "radii at the belt's cord", (5e-3, 1.0), minimum=0.0, exclusive=True),
+    "pulley_turn": _list("", "1 where the belt turns a pulley counter-clockwise, -1 where clockwise"),
+    "pulley_inertia": _list(
+        "kg m^2", "moments of inertia; not read of the first", (1e-6, 100.0), minimum=0.0
+    ),
+    "pulley_load": _list("", "what each pulley is braked by over load; 0 of the first"),
+}
+TENSIONER: dict[str, Parameter] = {
+    "tensioner_pulley": _list("", "numbers of the pulleys that arms carry, from 2 on"),
+    "tensioner_x": _list("m", "pivots of the arms", (1e-3, 10.0)),
+    "tensioner_y": _list("m", "the same along y", (1e-3, 10.0)),
+    "tensioner_inertia": _list(
+        "kg m^2", "of arm and pulley's mass, about the pivot", (1e-7, 100.0), minimum=0.0, exclusive=True
+    ),
+    "tensioner_stiffness": _list("N m", "moment of the spring by the angle [rad]", (1e-3, 1e5), minimum=0.0),
+    "tensioner_damping": _list("N m s", "moment of the dashpot by the speed", (1e-5, 1e3), minimum=0.0),
+    "tensioner_moment": _list(
+        "N m", "moments of the springs as drawn, which turn the arms; else those that hold them", (1e-3, 1e4)
+    ),
+    "strut_fixed_x": _list(
+        "m", "fixed ends of springs that pull at the arms, if they have such", (1e-3, 10.0)
+    ),
+    "strut_fixed_y": _list("m", "the same along y", (1e-3, 10.0)),
+    "strut_held_x": _list("m", "ends of these on the arms, as drawn", (1e-3, 10.0)),
+    "strut_held_y": _list("m", "the same along y", (1e-3, 10.0)),
+    "strut_stiffness": _list("N/m", "force of such a spring by its length", (1.0, 1e9), minimum=0.0),
+    "strut_damping": _list("N s/m", "force of a dashpot beside it by the speed", (1e-3, 1e6), minimum=0.0),
+    "tensioner_lowest": _list("rad", "clockwise end of the travel", (1e-3, 7.0)),
+    "tensioner_highest": _list("rad", "counter-clockwise end of the travel", (1e-3, 7.0)),
+    "stop_stiffness": Parameter(
+        1e4,
+        "N m",
+        "moment of the stops at the ends by the angle [rad]",
+        minimum=0.0,
+        exclusive=True,
+        sensible=(1.0, 1e8),
+    ),
+}
+_STRUT_LISTS = tuple(key for key in TENSIONER if key.startswith("strut_"))
+_ARM_LISTS = tuple(
+    key for key in TENSIONER if key not in ("tensioner_moment", "stop_stiffness", *_STRUT_LISTS)
+)
+
+
+class Layout(NamedTuple):
+    """Pulleys as drawn, and the belt's path around them.
+
+    Attributes
+    ----------
+    path : BeltPath
+        The reference path.
+    pulleys, spans : (P,) tuples of str
+        Names; a span is behind its pulley.
+    inertia, load : (P,) arrays
+        [kg m^2]; torque that brakes a pulley over the load.
+    driven : int
+        The pulley that takes most of the load.
+    """
+
+    path: BeltPath
+    pulleys: tuple[str, ...]
+    spans: tuple[str, ...]
+    inertia: np.ndarray
+    load: np.ndarray
+    driven: int
+
+    @property
+    def ratio(self) -> float:
+        """Speed of the driving pulley over that of the driven one, without slip."""
+        return float(self.path.radius[self.driven] / self.path.radius[0])
+
+
+def layout(parameters: Mapping[str, Any]) -> Layout:
+    """Layout of a drive.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Values by name [SI], without problems.
+    """
+    p = parameters
+    if not p["pulley_x"]:
+        centre = np.array([[0.0, 0.0], [p["centre_distance"], 0.0]])
+        radius = np.array([p["driven_radius"] / p["ratio"], p["driven_radius"]])
+        path = belt_path(centre, radius, np.array([1.0, -1.0 if p["crossed"] else 1.0]))
+        inertia, load = np.array([0.0, p["driven_inertia"]]), np.array([0.0, p["ratio"]])
+        return Layout(path, PULLEYS, STRANDS, inertia, load, 1)
+    x, y, radius, turn, inertia, load = (np.array(p[key]) for key in PULLEY_LISTS)
+    names = tuple(f"P{k + 1}" for k in range(len(x)))
+    spans = tuple(f"{name}-{after}" for name, after in zip(names, (*names[1:], names[0]), strict=True))
+    path = belt_path(np.stack([x, y], 1), radius, turn)
+    return Layout(path, names, spans, inertia, load, 1 + int(np.argmax(np.abs(load[1:]))))
+
+
+def arms_of(parameters: Mapping[str, Any]) -> Arms:
+    """Arms of a drive; without `tensioner_moment` the moments of their springs are 0."""
+    p = parameters
+    pivot = np.array([p["tensioner_x"], p["tensioner_y"]]).T.reshape(-1, 2)
+    names = ("inertia", "moment", "stiffness", "damping", "lowest", "highest")
+    values = {name: np.array(p[f"tensioner_{name}"], float) for name in names}
+    if not p["tensioner_moment"]:
+        values["moment"] = np.zeros(len(pivot))
+    fixed_x, fixed_y, held_x, held_y, stiffness, damping = (np.array(p[key], float) for key in _STRUT_LISTS)
+    pulling = no_struts(len(pivot))
+    if p["strut_stiffness"]:
+        fixed, held = np.stack([fixed_x, fixed_y], 1), np.stack([held_x, held_y], 1)
+        pulling = struts(pivot, fixed, held, stiffness, damping)
+    return Arms(pivot, **values, stop=p["stop_stiffness"], struts=pulling)
+
+
+def pulleys_of(parameters: Mapping[str, Any], drawn: Layout) -> Pulleys:
+    """Pulleys of a drive, on their axes and arms."""
+    arm = np.full(len(drawn.inertia), -1)
+    for a, number in enumerate(parameters["tensioner_pulley"]):
+        arm[int(number) - 1] = a
+    return Pulleys(drawn.path.centre, drawn.path.radius, drawn.inertia, arm, arms_of(parameters))
+
+
+def layout_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+    """Problems of a layout, in the form of a model's check: (key, expected, found).
+
+    Parameters
+    ----------
+    parameters : mapping
+        Values by name [SI].
+    """
+    p = parameters
+    found = (
+        _list_problems(p, PULLEY_LISTS) if any(p[key] for key in PULLEY_LISTS) else variator_problems(dict(p))
+    )
+    if found:
+        return found
+    if p["pulley_x"]:
+        found = _pulley_problems(p)
+    if not found and any(p[key] for key in (*_ARM_LISTS, *_STRUT_LISTS, "tensioner_moment")):
+        given = (*_ARM_LISTS, *_STRUT_LISTS) if any(p[key] for key in _STRUT_LISTS) else _ARM_LISTS
+        found = _list_problems(p, given) or _arm_problems(p)
+    return found
+
+
+def _list_problems(p: Mapping[str, Any], keys: Sequence[str]) -> list[Problem]:
+    """Lists that are none of numbers, or not as long as the first of them."""
+    for key in keys:
+        if any(isinstance(value, Sequence) for value in p[key]):
+            return [(key, "a list of numbers", f"{list(p[key])}")]
+    count = len(p[keys[0]])
+    return [
+        (key, f"as many values as {keys[0]} has, {count}", f"{len(p[key])}")
+        for key in keys
+        if len(p[key]) != count
+    ]
+
+
+def _pulley_problems(p: Mapping[str, Any]) -> list[Problem]:
+    count = len(p["pulley_x"])
+    if count < 2:
+        return [("pulley_x", "two pulleys or more", f"{count}")]
+    for turn in p["pulley_turn"]:
+        if turn not in (1.0, -1.0):
+            return [("pulley_turn", "1 or -1 for each pulley", f"{turn:g}")]
+    if min(p["pulley_inertia"][1:]) <= 0.0:
+        expected = "moments of inertia above 0 of all but the first"
+        return [("pulley_inertia", expected, f"{min(p['pulley_inertia'][1:]):g}")]
+    if p["pulley_load"][0] != 0.0:
+        return [("pulley_load", "0 of the first pulley, which drives", f"{p['pulley_load'][0]:g}")]
+    try:
+        layout(p)
+    except ValueError as error:
+        key = "pulley_x" if "overlap" in str(error) else "pulley_turn"
+        expected = "pulleys that do not overlap" if key == "pulley_x" else "a belt that closes on its pulleys"
+        return [(key, expected, str(error).removeprefix("overlap: "))]
+    return []
+
+
+def _arm_problems(p: Mapping[str, Any]) -> list[Problem]:
+    count, numbers = len(p["pulley_x"]) or 2, p["tensioner_pulley"]
+    for number in numbers:
+        if number not in range(2, count + 1) or numbers.count(number) > 1:
+            return [("tensioner_pulley", f"different whole numbers, 2 to {count}", f"{list(numbers)}")]
+    for low, high in zip(p["tensioner_lowest"], p["tensioner_highest"], strict=True):
+        if not low < 0.0 < high:
+            expected = "travel on both sides: tensioner_lowest < 0 < tensioner_highest"
+            return [("tensioner_lowest", expected, f"{low:g} to {high:g} rad")]
+    if len(p["tensioner_moment"]) not in (0, len(numbers)):
+        expected = f"as many values as tensioner_pulley has, {len(numbers)}, or none"
+        return [("tensioner_moment", expected, f"{len(p['tensioner_moment'])}")]
+    pulleys = pulleys_of(p, layout(p))
+    for a, number in enumerate(numbers):
+        if np.hypot(*(pulleys.centre[int(number) - 1] - pulleys.arms.pivot[a])) == 0.0:
+            return [("tensioner_x", "a pivot beside the pulley's axis", f"that of pulley {number:g}")]
+        if p["strut_stiffness"] and not abs(pulleys.arms.struts.lever[a]) > 0.0:
+            return [
+                ("strut_held_x", "a spring that does not point at the pivot", f"that of pulley {number:g}")
+            ]
+    return []
+
+
+def layout_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+    """Parameters of layouts without effect, each with the setting that makes it so."""
+    p = parameters
+    if p["pulley_x"]:
+        found = dict.fromkeys(TWO, "pulley_x, which gives all pulleys")
+    else:
+        found = {}
+    if not p["tensioner_pulley"]:
+        found |= dict.fromkeys(TENSIONER.keys() - {"tensioner_pulley"}, "no tensioner_pulley")
+    return found

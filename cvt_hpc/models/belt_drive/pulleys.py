@@ -1,0 +1,302 @@
+"""The pulleys of a belt drive and the arms that carry some of them, in the border of the belt's equations.
+
+An arm turns about its pivot, which moves the axis of its pulley. By its angle from where it is drawn, it has
+the moment M - k angle - c angle', and beyond its travel a stiff stop pushes it back. A strut between a fixed
+point and one of the arm, of the length l, pulls by F = F0 + k_l (l - l0) + c_l l'; its moment is
+-F dl/dangle, and F0 takes the place of M.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.lanes import LaneArray
+from cvt_hpc.multibody.ancf_beam import PER_NODE
+from cvt_hpc.solvers.cyclic_blocks import empty_corner
+from cvt_hpc.solvers.generalised_alpha import Scheme, begin, finish, stage_length
+
+# powers of a stage [W], and their totals [J]
+WORK_IN, WORK_OUT, CONTACT_LOSS, BELT_LOSS, ARM_LOSS, FRICTION_LOSS = range(6)  # the last of each pulley
+
+
+class Struts(NamedTuple):
+    """Springs and dashpots between fixed points and A arms; (A,) arrays but for the points.
+
+    Attributes
+    ----------
+    fixed, held : (A, 2) arrays
+        Ends on the ground and, as drawn, on the arms [m].
+    stiffness, damping : arrays
+        [N/m], [N s/m]
+    lever : array
+        Slope of the length by the arm's angle as drawn [m]; 0 where there is no strut.
+    """
+
+    fixed: np.ndarray
+    held: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    lever: np.ndarray
+
+
+class Arms(NamedTuple):
+    """Constants of A arms; (A,) arrays but for the pivots.
+
+    Attributes
+    ----------
+    pivot : (A, 2) array
+        [m]
+    inertia : array
+        Of the arm with the mass of its pulley, about the pivot [kg m^2].
+    moment, stiffness, damping : arrays
+        Of the spring or the strut as drawn [N m], of spring and dashpot at the pivot [N m/rad], [N m s/rad].
+    lowest, highest : arrays
+        Ends of the travel [rad].
+    stop : float
+        Stiffness beyond them [N m/rad].
+    struts : Struts
+        Between arms and ground.
+    """
+
+    pivot: np.ndarray
+    inertia: np.ndarray
+    moment: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    lowest: np.ndarray
+    highest: np.ndarray
+    stop: float
+    struts: Struts
+
+
+class Pulleys(NamedTuple):
+    """Constants of P pulleys, the first of which has a prescribed speed.
+
+    Attributes
+    ----------
+    centre : (P, 2) array
+        Axes as drawn [m].
+    radius, inertia : (P,) arrays
+        [m], [kg m^2]; the inertia of the first is not read.
+    arm : (P,) int array
+        Which of the arms carries a pulley, or -1.
+    arms : Arms
+        Of tensioners.
+    """
+
+    centre: np.ndarray
+    radius: np.ndarray
+    inertia: np.ndarray
+    arm: np.ndarray
+    arms: Arms
+
+
+class Wheels(NamedTuple):
+    """Motion of P pulleys and A arms, and what they add to the equations of a stage.
+
+    Attributes
+    ----------
+    speed, acceleration, stage_speed, start_speed : (1, P + A) arrays
+        Of pulleys, then arms, counter-clockwise [rad/s], [rad/s^2], as those of a chain.
+    angle, turning, stage_angle, start_angle : (1, A) arrays
+        Of the arms from where they are drawn [rad], and its rate [rad/s], as those of a chain.
+    centre, centre_speed, lever : (P, 2) arrays
+        Axes in a stage [m], their speeds [m/s], and slopes by the angle of the arm [m].
+    rows, corner : (n, P - 1 + A, 4) array, (1, P - 1 + A) LaneArray
+        Border of the equations: the pulleys but the first, then the arms.
+    power : (5 + P,) array
+        Of the last stage, in the order of the totals [W].
+    """
+
+    speed: np.ndarray
+    acceleration: np.ndarray
+    stage_speed: np.ndarray
+    start_speed: np.ndarray
+    angle: np.ndarray
+    turning: np.ndarray
+    stage_angle: np.ndarray
+    start_angle: np.ndarray
+    centre: np.ndarray
+    centre_speed: np.ndarray
+    lever: np.ndarray
+    rows: np.ndarray
+    corner: LaneArray
+    power: np.ndarray
+
+
+def struts(
+    pivot: np.ndarray, fixed: np.ndarray, held: np.ndarray, stiffness: np.ndarray, damping: np.ndarray
+) -> Struts:
+    """Struts between fixed points and points of arms as drawn; see `Struts`."""
+    (x, y), (along_x, along_y) = (held - pivot).T, (held - fixed).T
+    return Struts(fixed, held, stiffness, damping, (along_y * x - along_x * y) / np.hypot(along_x, along_y))
+
+
+def no_struts(arms: int) -> Struts:
+    """Of arms that have none."""
+    none = np.zeros(arms)
+    return Struts(np.zeros((arms, 2)), np.zeros((arms, 2)), none, none, none)
+
+
+def wheels_at(pulleys: Pulleys, speeds: np.ndarray, angles: np.ndarray, nodes: int) -> Wheels:
+    """Pulleys at speeds (P,) [rad/s], arms at rest at angles (A,) [rad], and a belt of some nodes."""
+    count, arms = len(speeds), len(angles)
+    border = count - 1 + arms
+    speed, acceleration, stage_speed, start_speed = np.zeros((4, 1, count + arms))
+    angle, turning, stage_angle, start_angle = np.zeros((4, 1, arms))
+    speed[0, :count], angle[0], stage_angle[0] = speeds, angles, angles
+    centre_speed, lever = np.zeros((2, count, 2))
+    found = Wheels(
+        speed,
+        acceleration,
+        stage_speed,
+        start_speed,
+        angle,
+        turning,
+        stage_angle,
+        start_angle,
+        pulleys.centre.copy(),
+        centre_speed,
+        lever,
+        np.zeros((nodes, border, PER_NODE)),
+        empty_corner(border, border + 1),
+        np.zeros(FRICTION_LOSS + count),
+    )
+    place_axes(pulleys, found)
+    return found
+
+
+@kernel
+def place_axes(pulleys: Pulleys, wheels: Wheels) -> None:
+    """Axes of a stage by the angles and the speeds of the arms in it."""
+    count = pulleys.radius.size
+    for p in range(count):
+        a = pulleys.arm[p]
+        if a < 0:
+            continue
+        pivot, angle, rate = pulleys.arms.pivot, wheels.stage_angle[0, a], wheels.stage_speed[0, count + a]
+        x, y = pulleys.centre[p, 0] - pivot[a, 0], pulleys.centre[p, 1] - pivot[a, 1]
+        away_x, away_y = x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)
+        wheels.centre[p, 0], wheels.centre[p, 1] = pivot[a, 0] + away_x, pivot[a, 1] + away_y
+        wheels.lever[p, 0], wheels.lever[p, 1] = -away_y, away_x
+        wheels.centre_speed[p, 0], wheels.centre_speed[p, 1] = -away_y * rate, away_x * rate
+
+
+@kernel
+def begin_wheels(wheels: Wheels, scheme: Scheme, dt: float, driving_speed: float) -> None:
+    """Begin a stage with the speeds at the begin of a step, and the prescribed one [rad/s] of the stage."""
+    begin(scheme, dt, wheels.speed, wheels.acceleration, wheels.start_speed)
+    begin(scheme, dt, wheels.angle, wheels.turning, wheels.start_angle)
+    for k in range(1, wheels.speed.shape[1]):
+        wheels.stage_speed[0, k] = wheels.speed[0, k]
+    wheels.stage_speed[0, 0] = driving_speed
+
+
+@kernel
+def place_wheels(pulleys: Pulleys, wheels: Wheels, tau: float) -> None:
+    """Angles and axes of a stage by its speeds."""
+    count = pulleys.radius.size
+    for a in range(wheels.angle.shape[1]):
+        wheels.stage_angle[0, a] = wheels.start_angle[0, a] + tau * wheels.stage_speed[0, count + a]
+    place_axes(pulleys, wheels)
+
+
+@kernel
+def correct_wheels(wheels: Wheels) -> None:
+    """Add a solution to the speeds of a stage."""
+    last = wheels.speed.shape[1] - 1
+    for k in range(last):
+        wheels.stage_speed[0, k + 1] += wheels.corner.data[0, k, last]
+
+
+@kernel
+def finish_wheels(pulleys: Pulleys, wheels: Wheels, scheme: Scheme, dt: float) -> None:
+    """Angles and speeds at the end of a step, by the speeds of its stage."""
+    place_wheels(pulleys, wheels, stage_length(scheme, dt))
+    finish(scheme, dt, wheels.stage_angle, wheels.start_angle, wheels.angle, wheels.turning)
+    finish(scheme, dt, wheels.stage_speed, wheels.start_speed, wheels.speed, wheels.acceleration)
+
+
+@kernel
+def add_pulleys(pulleys: Pulleys, wheels: Wheels, inputs: np.ndarray, share: float, tau: float) -> None:
+    """Put the inertia of pulleys and arms, and what acts on them beside the belt, into the border.
+
+    Parameters
+    ----------
+    pulleys, wheels : Pulleys, Wheels
+        What turns, and its motion.
+    inputs : (2, P) array
+        Speed of the first pulley [rad/s] and torques on the others [N m], at the begin and the end of steps.
+    share : float
+        Where between both.
+    tau : float
+        [s]
+    """
+    wheels.rows[:] = 0.0
+    wheels.corner.data[:] = 0.0
+    count = pulleys.radius.size
+    corner, last = wheels.corner.data, wheels.speed.shape[1] - 1
+    for p in range(count - 1):
+        torque = inputs[0, p + 1] + share * (inputs[1, p + 1] - inputs[0, p + 1])
+        speed, inertia = wheels.stage_speed[0, p + 1], pulleys.inertia[p + 1]
+        corner[0, p, p] = inertia / tau
+        corner[0, p, last] = torque - inertia * (speed - wheels.start_speed[0, p + 1]) / tau
+        wheels.power[WORK_OUT] -= torque * speed
+    arms = pulleys.arms
+    for a in range(wheels.angle.shape[1]):
+        k = count + a
+        angle, rate = wheels.stage_angle[0, a], wheels.stage_speed[0, k]
+        moment, by_rate, lost = strut_moment(arms, a, angle, rate, tau)
+        moment, stiffness = moment - arms.stiffness[a] * angle, arms.stiffness[a]
+        beyond = angle - min(max(angle, arms.lowest[a]), arms.highest[a])
+        if beyond != 0.0:
+            moment, stiffness = moment - arms.stop * beyond, stiffness + arms.stop
+        damping, inertia = arms.damping[a], arms.inertia[a]
+        corner[0, k - 1, k - 1] = inertia / tau + damping + tau * stiffness - by_rate
+        started = wheels.start_speed[0, k]
+        corner[0, k - 1, last] = moment - damping * rate - inertia * (rate - started) / tau
+        wheels.power[ARM_LOSS] += damping * rate * rate + lost
+
+
+@kernel
+def strut_moment(arms: Arms, a: int, angle: float, rate: float, tau: float) -> tuple[float, float, float]:
+    """Moment of the strut on arm a, or the constant M [N m]; its slope by the rate; power lost [W]."""
+    strut = arms.struts
+    if strut.lever[a] == 0.0:
+        return arms.moment[a], 0.0, 0.0
+    fixed_x, fixed_y = strut.fixed[a, 0] - arms.pivot[a, 0], strut.fixed[a, 1] - arms.pivot[a, 1]
+    x, y = strut.held[a, 0] - arms.pivot[a, 0], strut.held[a, 1] - arms.pivot[a, 1]
+    drawn = np.hypot(x - fixed_x, y - fixed_y)
+    x, y = x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)
+    along_x, along_y = x - fixed_x, y - fixed_y
+    length = np.hypot(along_x, along_y)
+    lever = (along_y * x - along_x * y) / length
+    bend = (x * x + y * y - along_x * x - along_y * y - lever * lever) / length  # slope of the lever
+    force = strut.stiffness[a] * (length - drawn) + strut.damping[a] * lever * rate
+    force -= arms.moment[a] / strut.lever[a]
+    by_rate = tau * (strut.stiffness[a] * lever + strut.damping[a] * bend * rate) + strut.damping[a] * lever
+    lost = strut.damping[a] * (lever * rate) ** 2
+    return -force * lever, -by_rate * lever - force * tau * bend, lost
+
+
+def strut_lengths(arms: Arms, angle: np.ndarray) -> np.ndarray:
+    """Lengths of struts at angles (A,) of the arms [m]."""
+    x, y = (arms.struts.held - arms.pivot).T
+    sine, cosine = np.sin(angle), np.cos(angle)
+    held = arms.pivot + np.stack([x * cosine - y * sine, x * sine + y * cosine], 1)
+    return np.hypot(*(held - arms.struts.fixed).T)
+
+
+def arms_energy(arms: Arms, angle: np.ndarray, rate: np.ndarray) -> float:
+    """Kinetic and elastic energy of arms at angles and rates (A,) [J]; that of a spring is 0 as drawn."""
+    beyond = angle - np.clip(angle, arms.lowest, arms.highest)
+    elastic = 0.5 * arms.stiffness * angle**2 + 0.5 * arms.stop * beyond**2
+    longer = strut_lengths(arms, angle) - strut_lengths(arms, np.zeros_like(angle))
+    is_strut = arms.struts.lever != 0.0
+    per_length = np.divide(arms.moment, arms.struts.lever, where=is_strut, out=np.zeros_like(angle))
+    of_strut = 0.5 * arms.struts.stiffness * longer**2 - per_length * longer
+    elastic += np.where(is_strut, of_strut, -arms.moment * angle)
+    return float((0.5 * arms.inertia * rate**2 + elastic).sum())

@@ -1,0 +1,205 @@
+"""What theory says of a drive: speed loss, tension where the belt slides, frequencies of the strands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from cvt_hpc.models.belt_drive.layout import Layout
+from cvt_hpc.models.belt_drive.preload import stretch
+from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies
+from cvt_hpc.physics.belt_path import BeltPath, regions
+
+MODES = 5
+FUNCTIONS = 24  # sines of the Ritz model: more change no recorded frequency by 1e-6
+
+
+def creep_loss(parameters: Mapping[str, Any], drawn: Layout) -> float:
+    """Speed loss by creep alone, by the tension at rest and the torque (Cepon and Boltezar 2011, eq. 4).
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat parameters of a run [SI].
+    drawn : Layout
+        Its pulleys.
+
+    Returns
+    -------
+    float
+        1 - (2 T0 R + 2 R EA - M) / (2 T0 R + 2 R EA + M), with radius and torque of the driving pulley; nan
+        of more than two pulleys.
+    """
+    p = parameters
+    if len(drawn.pulleys) > 2:
+        return np.nan
+    held = 2.0 * float(drawn.path.radius[0]) * (p["tension"] + p["axial_stiffness"])
+    return 1.0 - (held - p["load"]) / (held + p["load"])
+
+
+def expected_loss(parameters: Mapping[str, Any], drawn: Layout, tension: np.ndarray) -> float:
+    """Speed loss by creep, radial compliance and shear of bristles, from the tensions of a run.
+
+    The belt sticks where it runs onto a pulley. The rubber under its cord turns with the pulley, so that
+    w (R - depth) / stretch is the same on all, with depth = (T - m v^2) / (R k) and the tension T of the
+    strand that runs on; where bristles shear, with that of `unsheared_tension`.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat parameters of a run [SI].
+    drawn : Layout
+        Its pulleys.
+    tension : (P,) array
+        Of the strands [N].
+    """
+    p, radius = parameters, drawn.path.radius
+    running_on, centrifugal = np.roll(tension, 1), _centrifugal(p, drawn.path)
+    if p["friction_treatment"] == "bristle":
+        running_on = np.array(
+            [
+                unsheared_tension(p, *arc) + centrifugal
+                for arc in zip(
+                    running_on - centrifugal, tension - centrifugal, radius, drawn.path.wrap, strict=True
+                )
+            ]
+        )
+    depth = (running_on - centrifugal) / (radius * p["contact_stiffness"])
+    stretched = np.array([stretch(float(force), p["axial_stiffness"]) for force in running_on])
+    per_angle = (radius - depth) / stretched
+    return float(1.0 - drawn.ratio * per_angle[0] / per_angle[drawn.driven])
+
+
+def unsheared_tension(
+    parameters: Mapping[str, Any], inlet: float, outlet: float, radius: float, wrap: float
+) -> float:
+    """Tension at which a belt of the same speed would run onto a pulley without shearing its rubber.
+
+    Of N = T - m v^2 along the arc: dN/ds = q = shear_stiffness z and dz/ds = (N - N_c) C, where N_c is what
+    is sought and C = 1 / EA + 1 / (R^2 k) of belt and contacts. From z = 0 at the inlet on
+
+        N = N_c + (N_inlet - N_c) cosh(s sqrt(shear_stiffness C))
+
+    up to where |q| = mu N / R, beyond which the rim slides, as by Euler and Eytelwein (Firbank 1970; the
+    contacts' compliance acts as the belt's own).
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat parameters of a run [SI].
+    inlet, outlet : float
+        T - m v^2 where the belt runs on and off [N].
+    radius, wrap : float
+        Of the pulley and its arc [m], [rad].
+
+    Returns
+    -------
+    float
+        N_c [N]; nan where friction cannot carry the difference, or its coefficient is not constant.
+    """
+    p, mu = parameters, parameters["kinetic_friction"]
+    give = 1.0 / p["axial_stiffness"] + 1.0 / (radius**2 * p["contact_stiffness"])
+    rate, length = np.sqrt(p["shear_stiffness"] * give), radius * wrap
+    if not _has_one_coefficient(p) or abs(np.log(outlet / inlet)) >= mu * wrap:
+        return np.nan
+    if outlet == inlet:
+        return inlet
+    side = mu * np.copysign(1.0, outlet - inlet) / radius  # of dN/ds over N where the rim slides
+
+    def rise(stuck: float) -> tuple[float, float]:
+        """Of N over the part that sticks: what it is, and what the shear at its end gives."""
+        last = outlet * np.exp(-side * (length - stuck))
+        return last - inlet, side * last * np.tanh(0.5 * rate * stuck) / rate
+
+    stuck = length
+    if abs(rise(length)[0]) > abs(rise(length)[1]):
+        stuck = brentq(lambda at: np.subtract(*rise(at)), 1e-9 * length, length)
+    return inlet - rise(stuck)[0] / (np.cosh(rate * stuck) - 1.0)
+
+
+def _has_one_coefficient(p: Mapping[str, Any]) -> bool:
+    return bool(p["friction_law"] == "coulomb" and p["friction_gradient"] == 0.0)
+
+
+def _centrifugal(p: Mapping[str, Any], path: BeltPath) -> float:
+    """M v^2 [N]."""
+    return float(p["line_mass"] * (p["driving_speed"] * path.radius[0]) ** 2)
+
+
+def wrap_angles(path: BeltPath, position: np.ndarray) -> np.ndarray:
+    """Angle of path coordinates (n,) [m] from the inlet of their arc [rad]; nan on spans."""
+    where = regions(path, position)
+    first = np.concatenate([[0.0], path.ends[:-1]])[where]
+    angle: np.ndarray = np.where(where % 2 == 0, (position - first) / path.radius[where // 2], np.nan)
+    return angle
+
+
+def sliding_tension(
+    parameters: Mapping[str, Any], path: BeltPath, tension: np.ndarray, position: np.ndarray
+) -> np.ndarray:
+    """Tension over the wraps by Euler and Eytelwein.
+
+    Up to where bending lifts the belt off a pulley d ln(T - m v^2) / dphi is the coefficient of friction,
+    with the sign that takes T to that of the strand that leaves. Before, where the belt sticks, T is that of
+    the strand that runs on.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat parameters of a run [SI].
+    path : BeltPath
+        The reference path.
+    tension : (P,) array
+        Of the strands [N].
+    position : (place,) array
+        Path coordinates [m].
+
+    Returns
+    -------
+    (place,) array
+        [N]; nan on strands, and everywhere unless the coefficient of friction is constant.
+    """
+    p = parameters
+    if not _has_one_coefficient(p):
+        return np.full(len(position), np.nan)
+    centrifugal, pulley = _centrifugal(p, path), regions(path, position) // 2
+    inlet, outlet = np.roll(tension, 1)[pulley] - centrifugal, np.asarray(tension)[pulley] - centrifugal
+    lifted = np.sqrt(p["bending_stiffness"] / outlet) / path.radius[pulley]
+    left = path.wrap[pulley] - lifted - wrap_angles(path, position)
+    grown = np.exp(p["kinetic_friction"] * np.maximum(left, 0.0))
+    slid = np.where(outlet < inlet, np.minimum(outlet * grown, inlet), np.maximum(outlet / grown, inlet))
+    found: np.ndarray = slid + centrifugal
+    return found
+
+
+def strand_frequencies(parameters: Mapping[str, Any], path: BeltPath, tension: np.ndarray) -> np.ndarray:
+    """Eigenfrequencies of the strands as running beams, pinned where the tangents touch the pulleys.
+
+    Bending lifts the belt off a pulley by d = sqrt(EI / (T - m v^2)) before that point. There it is clamped,
+    since the pulley holds its place and its slope, which shortens by d what vibrates. Both together change
+    the frequency of n half waves by about 5/3 (n pi d / L)^3 / (n pi).
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat parameters of a run [SI].
+    path : BeltPath
+        The reference path.
+    tension : (P,) array
+        Of the strands [N].
+
+    Returns
+    -------
+    (P, MODES) array
+        [Hz]; nan where a strand holds no shape.
+    """
+    p = parameters
+    speed = float(p["driving_speed"] * path.radius[0])
+    strands = [
+        Strand(float(length), p["line_mass"], speed, float(force), p["bending_stiffness"])
+        for length, force in zip(path.spans, tension, strict=True)
+    ]
+    return np.array([eigenfrequencies(strand, FUNCTIONS)[:MODES] for strand in strands])

@@ -1,0 +1,153 @@
+"""The path of a belt around any number of circles: arcs, and the tangents between them, of either kind.
+
+A belt runs around circle i counter-clockwise (turn s_i = 1) or clockwise (-1). With the running direction a
+and the normal n(a) = (sin a, -cos a) to its right it touches the circle at c_i + s_i R_i n(a).
+The tangent from circle i to circle j at the distance D in the direction phi has
+
+    sin(a - phi) = (s_i R_i - s_j R_j) / D,    length = D cos(a - phi),
+
+which is an outer tangent for equal turns and an inner one for opposite turns. A path begins where the belt
+runs onto the first circle, and offsets count to its right: outwards of a belt that runs counter-clockwise.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class BeltPath(NamedTuple):
+    """A closed path around P circles, in the order in which the belt runs around them.
+
+    Attributes
+    ----------
+    centre : (P, 2) array
+        Of the circles [m].
+    radius, turn : (P,) arrays
+        [m]; 1 where the belt runs counter-clockwise, else -1.
+    angle, wrap : (P,) arrays
+        Running direction where the belt runs on, and angle over which it touches the circle [rad].
+    spans : (P,) array
+        Length of the span that leaves each circle [m].
+    """
+
+    centre: np.ndarray
+    radius: np.ndarray
+    turn: np.ndarray
+    angle: np.ndarray
+    wrap: np.ndarray
+    spans: np.ndarray
+
+    @property
+    def arcs(self) -> np.ndarray:
+        """Lengths of the arcs, (P,) [m]."""
+        return self.radius * self.wrap
+
+    @property
+    def ends(self) -> np.ndarray:
+        """Path coordinates where arc, span, arc and so on end, (2 P,) [m]."""
+        return np.cumsum(np.stack([self.arcs, self.spans], 1))
+
+    @property
+    def path_length(self) -> float:
+        """Length of the whole path [m]."""
+        return float(self.ends[-1])
+
+    @property
+    def leaving(self) -> np.ndarray:
+        """Running direction of the spans, (P,) [rad]."""
+        return self.angle + self.turn * self.wrap
+
+
+def belt_path(centre: np.ndarray, radius: np.ndarray, turn: np.ndarray) -> BeltPath:
+    """Lay a belt around circles.
+
+    Parameters
+    ----------
+    centre : (P, 2) array
+        Of two circles or more [m].
+    radius, turn : (P,) arrays
+        [m]; 1 where the belt runs counter-clockwise, else -1.
+
+    Returns
+    -------
+    BeltPath
+        Of a belt that winds around all together once, or not at all if it crosses itself.
+
+    Raises
+    ------
+    ValueError
+        If circles overlap, or the belt does not close around them; the text says where.
+    """
+    centre, radius, turn = (np.array(values, float) for values in (centre, radius, turn))
+    pulleys = range(len(radius))
+    for i in pulleys:
+        for j in range(i):
+            distance = np.hypot(*(centre[i] - centre[j]))
+            if distance <= radius[i] + radius[j]:
+                told = f"pulleys {j + 1} and {i + 1} at a distance of {distance:g} m, radii {radius[j]:g}"
+                raise ValueError(f"overlap: {told} and {radius[i]:g} m")
+    after = np.roll(centre, -1, 0) - centre
+    distance = np.hypot(*after.T)
+    steep = np.arcsin((turn * radius - np.roll(turn * radius, -1)) / distance)
+    leaving = np.arctan2(after[:, 1], after[:, 0]) + steep
+    angle = np.roll(leaving, 1)
+    wrap = np.mod(turn * (leaving - angle), 2.0 * np.pi)
+    path = BeltPath(centre, radius, turn, angle, wrap, distance * np.cos(steep))
+    around = round(float(turn @ wrap) / (2.0 * np.pi))
+    if abs(around) > 1:
+        raise ValueError(f"a belt that winds around them {abs(around)} times")
+    for i in pulleys:
+        start, direction = span_starts(path)[i], directions(leaving)[i]
+        for j in pulleys:
+            if j not in (i, (i + 1) % len(radius)):
+                along = np.clip((centre[j] - start) @ direction, 0.0, path.spans[i])
+                if np.hypot(*(centre[j] - start - along * direction)) <= radius[j]:
+                    raise ValueError(f"a span behind pulley {i + 1} that runs into pulley {j + 1}")
+    return path
+
+
+def directions(angle: np.ndarray) -> np.ndarray:
+    """Unit vectors at angles (...), (..., 2)."""
+    return np.stack([np.cos(angle), np.sin(angle)], -1)
+
+
+def _normals(angle: np.ndarray) -> np.ndarray:
+    """To the right of a direction."""
+    return np.stack([np.sin(angle), -np.cos(angle)], -1)
+
+
+def span_starts(path: BeltPath) -> np.ndarray:
+    """Where the spans begin, (P, 2) [m]."""
+    return path.centre + (path.turn * path.radius)[:, None] * _normals(path.leaving)
+
+
+def points_at(path: BeltPath, position: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points of a path, angles of the running direction, and curvatures to the left.
+
+    Parameters
+    ----------
+    path : BeltPath
+        The path.
+    position : (n,) array
+        Path coordinates [m].
+
+    Returns
+    -------
+    (n, 2), (n,), (n,) arrays
+        [m], [rad], [1/m]
+    """
+    s = np.mod(position, path.path_length)
+    where = regions(path, s)
+    i, on_arc = where // 2, where % 2 == 0
+    local = s - np.concatenate([[0.0], path.ends[:-1]])[where]
+    curvature = np.where(on_arc, path.turn[i] / path.radius[i], 0.0)
+    angle = np.where(on_arc, path.angle[i] + curvature * local, path.leaving[i])
+    points = path.centre[i] + (path.turn * path.radius)[i][:, None] * _normals(angle)
+    return points + np.where(on_arc, 0.0, local)[:, None] * directions(angle), angle, curvature
+
+
+def regions(path: BeltPath, position: np.ndarray) -> np.ndarray:
+    """Index of the region of path coordinates (n,) [m]: 2 i on the arc of circle i, 2 i + 1 behind it."""
+    return np.searchsorted(path.ends[:-1], position, side="right")

@@ -1,0 +1,116 @@
+"""Where points lie along the path of a belt, and how far off: for kernels, and for arrays."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.physics.belt_path import BeltPath, directions, span_starts
+
+
+class Way(NamedTuple):
+    """A path as kernels take it, P circles.
+
+    Attributes
+    ----------
+    centre, start : (P, 2) arrays
+        Of the circles, and of the spans that leave them [m].
+    radius, turn, angle, wrap, spans : (P,) arrays
+        As those of `BeltPath`.
+    onto, off : (P, 2) arrays
+        Running directions where the belt runs on, and of the spans.
+    begins : (P, 2) array
+        Path coordinates where arcs and spans begin [m].
+    length : float
+        Of the whole path [m].
+    """
+
+    centre: np.ndarray
+    start: np.ndarray
+    radius: np.ndarray
+    turn: np.ndarray
+    angle: np.ndarray
+    wrap: np.ndarray
+    spans: np.ndarray
+    onto: np.ndarray
+    off: np.ndarray
+    begins: np.ndarray
+    length: float
+
+
+def way(path: BeltPath) -> Way:
+    """The same path for kernels."""
+    begins = np.concatenate([[0.0], path.ends[:-1]]).reshape(-1, 2)
+    onto, off = directions(path.angle), directions(path.leaving)
+    circles = path.radius, path.turn, path.angle, path.wrap, path.spans
+    return Way(path.centre, span_starts(path), *circles, onto, off, begins, path.path_length)
+
+
+@kernel
+def nearest(way: Way, x: float, y: float, along_x: float, along_y: float) -> tuple[float, float]:
+    """Path coordinate and offset [m] of one point, as `along` gives them."""
+    per = 1.0 / np.sqrt(along_x * along_x + along_y * along_y)
+    along_x, along_y = per * along_x, per * along_y
+    aside = way.radius.min() ** 2  # what it counts to run across the path
+    least, position, offset = np.inf, 0.0, 0.0
+    for i in range(way.radius.size):
+        tx, ty = way.off[i, 0], way.off[i, 1]
+        dx, dy = x - way.start[i, 0], y - way.start[i, 1]
+        local = min(max(dx * tx + dy * ty, 0.0), way.spans[i])
+        dx, dy = dx - local * tx, dy - local * ty
+        badness = dx * dx + dy * dy + aside * (1.0 - tx * along_x - ty * along_y)
+        if badness < least:
+            least, position, offset = badness, way.begins[i, 1] + local, dx * ty - dy * tx
+    for i in range(way.radius.size):
+        radius, turn = way.radius[i], way.turn[i]
+        dx, dy = x - way.centre[i, 0], y - way.centre[i, 1]
+        distance = np.sqrt(dx * dx + dy * dy)
+        if not (distance - radius) ** 2 < least:
+            continue
+        # where the radius through the point meets the arc, or the nearer end
+        turned = turn * (np.arctan2(turn * dx, -turn * dy) - way.angle[i])
+        turned -= 2.0 * np.pi * np.floor(turned / (2.0 * np.pi))
+        if turned <= way.wrap[i]:
+            tx, ty = -turn * dy / distance, turn * dx / distance
+        elif turned - way.wrap[i] < 2.0 * np.pi - turned:
+            turned, tx, ty = way.wrap[i], way.off[i, 0], way.off[i, 1]
+        else:
+            turned, tx, ty = 0.0, way.onto[i, 0], way.onto[i, 1]
+        dx, dy = dx - turn * radius * ty, dy + turn * radius * tx
+        badness = dx * dx + dy * dy + aside * (1.0 - tx * along_x - ty * along_y)
+        if badness < least:
+            least, position, offset = badness, way.begins[i, 0] + radius * turned, dx * ty - dy * tx
+    return (position if position < way.length else position - way.length), offset
+
+
+def along(path: BeltPath, points: np.ndarray, running: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Path coordinates of points near a path, and their distances from it.
+
+    Of two places of the path that are equally near, as where a belt crosses itself, the one counts at which
+    the belt runs in the direction of the point.
+
+    Parameters
+    ----------
+    path : BeltPath
+        The path.
+    points, running : (n, 2) arrays
+        [m]; of any length, in which the belt runs there.
+
+    Returns
+    -------
+    position : (n,) array
+        Less than the path's length [m].
+    offset : (n,) array
+        To the right of the running direction [m].
+    """
+    position, offset = np.empty((2, len(points)))
+    _along(way(path), np.array(points, float), np.array(running, float), position, offset)
+    return position, offset
+
+
+@kernel
+def _along(way, points, running, position, offset):
+    for i in range(points.shape[0]):
+        position[i], offset[i] = nearest(way, points[i, 0], points[i, 1], running[i, 0], running[i, 1])

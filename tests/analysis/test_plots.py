@@ -1,0 +1,167 @@
+"""Pictures of spectra, curves and forces over the wrap: what is drawn where, and what is refused."""
+
+import matplotlib
+import numpy as np
+import pytest
+import xarray as xr
+
+from cvt_hpc.analysis.curves import curve_figure
+from cvt_hpc.analysis.figures import STYLE
+from cvt_hpc.analysis.waterfall import waterfall_figure
+from cvt_hpc.analysis.wraps import wrap_figure
+from cvt_hpc.errors import InputError
+from cvt_hpc.variables import Vibrates
+
+LOADS, SPEEDS, BINS = [0.0, 2.0, 4.0], [20.0, 60.0], np.arange(0.0, 110.0, 10.0)
+
+
+@pytest.fixture
+def results():
+    """Of six runs, with a ridge of the spectrum at 30 Hz; the last run has slipped through."""
+    draw = np.random.default_rng(1)
+    shape = (len(SPEEDS), len(LOADS))
+    spectrum = np.full((*shape, 2, BINS.size), 1e-7)
+    spectrum[..., 3] = 1e-5
+    spectrum[-1, -1] = np.nan
+    over = ("driving_speed", "load")
+    loss = draw.random(shape)
+    loss[-1, -1] = np.nan
+    variables = {
+        "status": (over, np.ones(shape, np.int8)),
+        "vibrates": (over, np.zeros(shape, np.int8)),
+        "spectrum": ((*over, "strand", "frequency_bin"), spectrum, {"units": "m"}),
+        "eigenfrequency": ((*over, "strand", "half_waves"), 20.0 + 30.0 * draw.random((*shape, 2, 2))),
+        "speed_loss": (over, loss, {"units": "1"}),
+        "expected_speed_loss": (
+            over,
+            draw.random(shape),
+            {"units": "1", "long_name": "creep and compliance"},
+        ),
+        "strand_tension": ((*over, "strand"), draw.random((*shape, 2)), {"units": "N"}),
+    }
+    coordinates = {
+        "driving_speed": ("driving_speed", SPEEDS, {"units": "rad s-1"}),
+        "load": ("load", LOADS, {"units": "N m"}),
+        "strand": ["t1", "t2"],
+        "frequency_bin": ("frequency_bin", BINS, {"units": "Hz"}),
+        "half_waves": [1, 2],
+    }
+    return xr.Dataset(variables, coordinates, {"job_name": "test"})
+
+
+def test_a_waterfall_shows_each_spectrum_at_its_place(results):
+    figure = waterfall_figure(results, {"driving_speed": 60.0})
+    first, second, bar = figure.axes
+    assert [axes.get_title(loc="left") for axes in (first, second)] == ["strand t1", "strand t2"]
+    assert (first.get_xlabel(), first.get_ylabel()) == ("load [N m]", "frequency [Hz]")
+    assert bar.get_ylabel() == "amplitude [µm]"
+    for axes in (first, second):
+        (mesh,) = axes.collections
+        shown = mesh.get_array().reshape(BINS.size, len(LOADS))
+        assert shown.mask[:, -1].all() and not shown.mask[:, :-1].any()
+        assert (shown[:, :-1].argmax(axis=0) == 3).all() and shown.max() == pytest.approx(10.0)
+        top, left = mesh.get_coordinates()[-1, 0], mesh.get_coordinates()[0, 0]
+        assert (left[0], top[1]) == (-1.0, 105.0)  # cells reach halfway to their neighbours
+    assert "grey: the belt slips through" in figure.get_suptitle()
+
+
+def test_eigenfrequencies_lie_over_the_spectra(results):
+    figure = waterfall_figure(results, {"driving_speed": 20.0})
+    for strand, axes in zip(("t1", "t2"), figure.axes, strict=False):
+        wanted = results["eigenfrequency"].sel(driving_speed=20.0, strand=strand)
+        lines = [line.get_ydata() for line in axes.lines]
+        np.testing.assert_array_equal(lines, wanted.transpose("half_waves", "load"))
+        assert [text.get_text() for text in axes.texts] == ["1", "2"]
+    assert not waterfall_figure(results.drop_vars("eigenfrequency")).axes[0].lines
+
+
+def test_a_curve_has_marks_of_runs_and_lines_of_theory(results):
+    results["status"][0, 0] = 2  # what a failed run has left is no result
+    results["vibrates"][-1, -1] = Vibrates.SLIPS
+    figure = curve_figure(results, ["speed_loss", "expected_speed_loss"])
+    assert [axes.get_title(loc="left") for axes in figure.axes] == [
+        "driving speed 190.986 rpm",
+        "driving speed 572.958 rpm",
+    ]
+    for k, axes in enumerate(figure.axes):
+        marks, line, *slips = axes.lines
+        assert [mark.get_xdata().tolist() for mark in slips] == [[4.0]] * k
+        assert (marks.get_linestyle(), line.get_linestyle()) == ("None", "-")
+        np.testing.assert_array_equal(line.get_ydata(), results["expected_speed_loss"][k])
+        known = results["speed_loss"][k].where(results["status"][k] == 1)
+        np.testing.assert_array_equal(marks.get_ydata(), known)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["speed loss", "creep and compliance", "slips"]
+    assert figure.get_suptitle() == "Speed loss: test"
+
+
+def test_small_numbers_have_their_power_of_ten_on_the_axis(results):
+    results["speed_loss"] = (1e-4 * results["speed_loss"]).assign_attrs(units="1")
+    axes = curve_figure(results, ["speed_loss"], {"driving_speed": 20.0}).axes[0]
+    assert axes.get_ylabel() == "speed loss [$10^{-6}$]"
+    np.testing.assert_allclose(axes.lines[0].get_ydata(), 1e6 * results["speed_loss"].sel(driving_speed=20.0))
+
+
+def test_a_quantity_of_each_strand_gives_a_curve_of_each(results):
+    figure = curve_figure(results, ["strand_tension"], {"driving_speed": 20.0})
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["strand tension t1", "strand tension t2"]
+    assert figure.axes[0].get_ylabel() == "strand tension [N]"
+
+
+@pytest.fixture
+def history():
+    """A belt that slides over the last part of both wraps."""
+    angle = np.concatenate([np.linspace(0.1, 3.0, 9), [np.nan] * 3, np.linspace(0.1, 3.0, 9), [np.nan] * 3])
+    names = ["driving"] * 9 + ["t1"] * 3 + ["driven"] * 9 + ["t2"] * 3
+    places = np.arange(angle.size)
+    forces = {
+        key: ("position", 1e3 * places, {"units": "N m-1"}) for key in ("normal_force", "friction_force")
+    }
+    forces |= {"tension": ("position", 2.0 * places), "sliding_tension": ("position", 3.0 * places)}
+    forces["wrap_angle"] = ("position", angle)
+    return xr.Dataset(forces, {"position": 0.01 * places, "region": ("position", names)})
+
+
+def test_forces_are_drawn_over_the_wrap_of_each_pulley(history):
+    figure = wrap_figure([history, history], ["one", "two"])
+    assert [axes.get_title(loc="left") for axes in figure.axes[:2]] == ["driving pulley", "driven pulley"]
+    normal, tension = figure.axes[1], figure.axes[5]
+    assert normal.get_ylabel() == "" and figure.axes[0].get_ylabel() == "normal [N/mm]"
+    angle, force = normal.lines[0].get_data()
+    np.testing.assert_allclose(angle, np.degrees(np.linspace(0.1, 3.0, 9)))
+    np.testing.assert_allclose(force, np.arange(12, 21))
+    assert len(normal.lines) == 2 and len(tension.lines) == 3
+    np.testing.assert_allclose(tension.lines[2].get_ydata(), 3.0 * np.arange(12, 21))
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["one", "two", "Euler and Eytelwein"]
+
+
+@pytest.mark.parametrize(
+    ("compose", "message"),
+    [
+        (
+            lambda d, h: waterfall_figure(d.drop_vars("spectrum")),
+            "results: expected results with the variable",
+        ),
+        (lambda d, h: waterfall_figure(d, {"load": 3.0}), "results: at load: expected a value of that axis"),
+        (lambda d, h: curve_figure(d, ["loss"]), "results: loss: unknown numeric variable of the results"),
+        (
+            lambda d, h: curve_figure(d, ["speed_loss", "strand_tension"]),
+            "results: strand_tension: expected the unit of speed_loss, 1, found N",
+        ),
+        (
+            lambda d, h: curve_figure(xr.concat([d, d], "driving_speed"), ["speed_loss"]),
+            "results: driving_speed: expected at most 3 values, or one that --at fixes, found 4",
+        ),
+        (lambda d, h: wrap_figure([]), "wrap: expected one history or more, found none"),
+        (
+            lambda d, h: wrap_figure([h.drop_vars("wrap_angle")], ["h.nc"]),
+            "h.nc: expected the history of a run with normal_force and wrap_angle, found no wrap_angle",
+        ),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(results, history, compose, message):
+    with matplotlib.rc_context(STYLE), pytest.raises(InputError) as caught:
+        compose(results, history)
+    assert str(caught.value).startswith(message)
