@@ -20,7 +20,7 @@ def random_scenes(count):
     force falls: there the load is at most 0.3 of it. Below 0.15 the push changes strands somewhere, and at some
     loads where neither strand pushes no state is found (README of the model).
     """
-    for x in qmc.Sobol(6, seed=5).random_base2(4)[:count]:
+    for x in qmc.Sobol(6, seed=5).random_base2(3)[:count]:
         ratio = 0.4 * 6.5 ** x[0]
         share = np.copysign(0.15 + 1.2 * abs(x[3] - 0.5), x[3] - 0.5)
         yield {
@@ -33,7 +33,7 @@ def random_scenes(count):
         }
 
 
-@pytest.mark.parametrize("scene", list(random_scenes(16)), ids=lambda scene: f"{scene['ratio']:.2f}")
+@pytest.mark.parametrize("scene", list(random_scenes(8)), ids=lambda scene: f"{scene['ratio']:.2f}")
 def test_random_scenes_have_a_state_in_balance(scene):
     found = rung_record("steady_variator", **BELT, **scene)
     assert found["status"] == Status.DONE, found["reason"]
@@ -44,9 +44,7 @@ def test_random_scenes_have_a_state_in_balance(scene):
     assert 0.0 <= found["efficiency"] < 1.0
 
 
-@pytest.mark.parametrize(
-    ("ratio", "share"), [(0.5, 0.0), (0.5, 0.9), (1.0, 0.0), (1.0, 0.95), (2.0, 0.0), (2.0, 0.7), (2.0, -0.3)]
-)
+@pytest.mark.parametrize(("ratio", "share"), [(0.5, 0.0), (0.5, 0.9), (1.0, 0.95), (2.0, -0.3)])
 def test_it_is_the_state_that_a_transient_comes_to(ratio, share):
     scene = BELT | {"ratio": ratio, "load_share": share, "friction_gradient": 0.0}
     steady = rung_record("steady_variator", **scene)

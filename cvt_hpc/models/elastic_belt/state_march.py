@@ -44,8 +44,8 @@ class StateMarch:
         n, width = belts[0].cell.size, len(belts)
         nowhere = np.zeros(2, dtype=np.int64)
         # an interval of 1 s: the dampers' mean power is their work since the last sample
-        none = np.zeros((0, n), dtype)
-        self._sensing = Sensors(none, nowhere, nowhere, nowhere, nowhere, nowhere, 1.0)
+        no_weights: np.ndarray = np.zeros((0, n), dtype)
+        self._sensing = Sensors(no_weights, nowhere, nowhere, nowhere, nowhere, nowhere, 1.0)
         self._rows = LaneArray(1, len(CHANNELS), width)
         self._profiles = LaneArray(n, len(PROFILES), width)
         self._ended = LaneArray(1, len(ENDED), width)
