@@ -16,10 +16,9 @@ loses nothing by them.
 The curvature k is the line nearest to r' x r'', through its values at two Gauss points, as the element bends
 by lines; alpha's integral is that of these points. All other integrals are exact.
 
-A cubic that bends unevenly cannot keep e even: e waves along an element as long as a bend. A strain of less
-degree would take the waves out of the forces alone, not out of the speeds along the belt, on which friction
-acts: with the parabola of the mean strain and its values at the nodes, belts that stick on a pulley slide
-more, not less, than they should.
+A cubic that bends unevenly cannot keep e even: e waves along an element that is as long as a bend. A strain
+of less degree (Gerstmayr and Irschik 2008) smooths the forces, but not the speeds along the belt, on which
+friction acts; the README of the belt drive says what that leads to.
 """
 
 from __future__ import annotations

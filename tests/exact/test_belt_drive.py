@@ -9,10 +9,11 @@ from cvt_hpc.models.belt_drive import contact, pulleys
 from cvt_hpc.models.belt_drive.drive import Drive, state
 from cvt_hpc.models.belt_drive.friction import Friction, Treatment
 from cvt_hpc.models.belt_drive.layout import layout
-from cvt_hpc.models.belt_drive.readings import Reading, Readings
+from cvt_hpc.models.belt_drive.readings import PLACES, Reading, Readings
 from cvt_hpc.models.belt_drive.start import FRICTIONLESS, start
-from cvt_hpc.multibody.ancf_beam import at_places, beam
+from cvt_hpc.multibody.ancf_beam import SHAPES, WEIGHTS, at_places, beam, shapes, tensions
 from cvt_hpc.physics.friction import friction_law
+from cvt_hpc.physics.nearest_on_path import along
 from support.ancf import mass_and_stiffness, ring, whole
 
 TAU = 1e-4
@@ -146,6 +147,45 @@ def rest():
     found.chain.stage_q[:] = found.chain.q
     add(made, found, 1.0)
     return p, where, made, found
+
+
+def test_a_sample_is_what_its_definition_reads(rest):
+    """Offsets between the points before and behind a probe, tension over the middle half of a strand, forces."""
+    _, where, made, found = rest
+    sums = np.zeros((6, PLACES))
+    read = Reading(where, made, found, sums)
+    path, belt = where.drawn.path, made.beam
+    points = (at_places(belt, found.chain.q, SHAPES[:, k]).reshape(-1, 2) for k in (0, 1))
+    position, offset = along(path, *points)
+    weight, order = (belt.lengths[:, None] * WEIGHTS).ravel(), np.argsort(position)
+    tension = tensions(belt, found.chain.q).ravel()
+    expected = np.interp(where.probes.ravel(), position[order], offset[order], period=path.path_length)
+    np.testing.assert_allclose(read.displacement, expected, rtol=0, atol=1e-15)
+    middle = (path.ends[::2] + 0.5 * path.spans)[:, None]
+    inside = weight * (abs(position - middle) < 0.25 * path.spans[:, None])
+    np.testing.assert_allclose(read.strand_tensions, inside @ tension / inside.sum(1), rtol=1e-12)
+    share = path.path_length / PLACES
+    assert sums[0].sum() == pytest.approx(weight.sum(), rel=1e-12)
+    assert sums[1].sum() == pytest.approx(weight @ tension, rel=1e-12)
+    assert sums[3].sum() * share == pytest.approx(found.touch.normal.sum(), rel=1e-12)
+    assert (sums[5] == 1.0).all() and not read.lifted.any()
+
+
+def test_an_element_that_is_left_out_touches_no_pulley():
+    """Of random elements: what reaches into a circle, by 200 points of each, is never left out."""
+    draw = np.random.default_rng(2)
+    made, (still, _, speeds) = drive(), moving()
+    wheels = state(made, still, 0.0 * still, speeds[:2], ANGLE).wheels
+    body, at_200 = beam(np.array([0.1]), 1.0, 1.0, 1.0), shapes(np.linspace(0.0, 1.0, 200))[0]
+    kept = reaching = 0
+    for _ in range(300):
+        q = draw.normal(scale=[0.3, 0.3, 1.5, 1.5], size=(2, 4))
+        away = at_places(body, q, at_200)[0][:, None] - wheels.centre
+        reaches = (np.hypot(*np.moveaxis(away, -1, 0)) < made.pulleys.radius).any()
+        may = contact._may_touch(q, 0, 1, 0.1, made.pulleys, wheels)
+        assert may or not reaches
+        kept, reaching = kept + may, reaching + reaches
+    assert 10 < reaching <= kept < 290
 
 
 def test_the_static_start_has_its_tension(rest):

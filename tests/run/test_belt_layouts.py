@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from cvt_hpc.analysis.histories import history_figure
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.belt_drive.layout import layout
@@ -250,3 +251,8 @@ def test_layouts_that_cannot_be_are_refused(values, message):
     with pytest.raises(InputError) as caught:
         job(**SERPENTINE | values)
     assert message in str(caught.value)
+
+
+def test_a_picture_shows_forces_speeds_and_arms(started):
+    panels = [axes.get_ylabel().split(" [")[0] for axes in history_figure(started).axes]
+    assert [name for name in panels if name in ("tension", "speed", "arm")] == ["tension", "speed", "arm"]
