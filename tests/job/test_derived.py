@@ -238,11 +238,12 @@ def test_of_a_huge_grid_few_values_are_evaluated_before_its_runs(write_job, monk
     assert "half_wedge_angle  0.25 to 0.3 rad" in told
     assert "varies with ratio, driving_speed, friction_gradient" in told
     # a single value, in the middle of all axes: told of when the runs begin, with its place
-    hidden = "0.1 + 2 * max(0, 1 - 1e3 * abs(ratio - 1.501253) - abs(driving_speed - 126) - abs(friction_gradient + 0.5))"
-    job = load_job(write_job(HUGE.format(hidden).replace("count = 100", "count = 3")))
-    assert job.size == 300_000
+    hidden = "0.1 + 2 * max(0, 1 - 1e3 * abs(ratio - 1.5) - abs(driving_speed - 126) - abs(friction_gradient + 0.5))"
+    few = HUGE.replace("count = 100", "count = 3").replace("count = 400", "count = 41")
+    job = load_job(write_job(few.format(hidden)))
+    assert job.size == 41 * 250 * 3
     with pytest.raises(
-        InputError, match=r"half_wedge_angle: expected >= 0 and <= 1 rad, found .* \(at ratio = 1.50"
+        InputError, match=r"half_wedge_angle: expected >= 0 and <= 1 rad, found .* \(at ratio = 1.5,"
     ):
         _ = job.derived[0].values
 

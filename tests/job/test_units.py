@@ -90,7 +90,10 @@ def test_a_unit_moves_the_point_and_nothing_else(number, scale):
     assert to_si(f"{number} {unit}", "m") == float(number / factor)
 
 
-@given(st.text(max_size=20) | st.from_regex(r"[0-9]{1,3} [kmNsrad/*()^ 12-]{0,12}", fullmatch=True))
+@given(
+    st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
+    | st.from_regex(r"[0-9]{1,3} [kmNsrad/*()^ 12-]{0,12}", fullmatch=True)
+)
 def test_any_text_is_a_number_or_a_unit_error(text):
     try:
         value = to_si(text, "N m")
