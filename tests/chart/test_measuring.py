@@ -265,3 +265,13 @@ def test_forces_and_losses_are_means_of_the_judged_part():
     found = observe(still, asked, True)
     assert found["ring_tension"] == pytest.approx([2.0, 3.0])
     assert found["friction_loss"] == pytest.approx([7.0, 11.0, 5.0])
+
+
+def test_speed_loss_is_that_of_the_mean_speeds():
+    levels = {"driving_speed": 60.0, "driven_speed": 23.76, "tension t1": 100.0, "tension t2": 300.0}
+    parameters = {**PARAMETERS, "ratio": 2.5}
+    steady = History(np.zeros((4000, 2)), ("t1", "t2"), lambda name: np.full(4000, levels[name]), parameters)
+    asked = [Quantity(name, math.inf, 0.0) for name in ("speed_loss", "strand_tension")]
+    found = observe(steady, asked, True)
+    assert found["speed_loss"] == pytest.approx([0.01])
+    assert found["strand_tension"] == pytest.approx([100.0, 300.0])
