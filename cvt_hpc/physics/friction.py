@@ -116,6 +116,12 @@ def given_law(parameters: Mapping[str, Any]) -> FrictionLaw:
     return friction_law(parameters["friction_law"], *(parameters[key] for key in keys))
 
 
+def softened(law: FrictionLaw, share: float) -> FrictionLaw:
+    """Law that falls by a share of what a law does; 0: constant, for a table its least coefficient."""
+    least = law.table_mu.min() if law.table_mu.size else 0.0
+    return law._replace(gradient=share * law.gradient, table_mu=least + share * (law.table_mu - least))
+
+
 FORMULAS: dict[Law, Callable[..., Any]] = {}  # asked for in this order
 
 

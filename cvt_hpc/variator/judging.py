@@ -135,3 +135,17 @@ def power_balance(
         "loss": loss,
         "power_residual": open_power / max(abs(driving), loss),
     }
+
+
+def efficiency(driving: float, load: float, loss: float) -> float:
+    """What losses leave of the power put in [1]: 0 without load; not a number where nothing is put in.
+
+    Parameters
+    ----------
+    driving, load : float
+        Power of the driving pulley, and what the load takes [W]; negative where power flows backwards.
+    loss : float
+        [W]
+    """
+    put_in = max(driving, 0.0) + max(-load, 0.0)
+    return 1.0 - loss / put_in if put_in > 0.0 else np.nan

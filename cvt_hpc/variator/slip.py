@@ -40,12 +40,16 @@ from cvt_hpc.vibration.occurrence import LONGEST_REASON
 LOST = f"the belt slips through: the driven pulley has lost {1 - LEAST_SPEED:.0%} of its speed"
 GAINED = f"the belt slips through: the driven pulley has gained {MOST_SPEED - 1:.0%} of its speed"
 
-VARIABLE = Variable(
-    "slip_margin",
-    (),
-    "f8",
-    "1",
-    "load over what friction carries at nominal radii under these axial forces, less 1; slips from about 0",
+VARIABLES = (
+    Variable(
+        "carried_torque",
+        (),
+        "f8",
+        "N m",
+        "at the driving pulley, what friction carries at nominal radii under these axial forces",
+    ),
+    Variable("torque_ratio", (), "f8", "1", "load over carried_torque, with the load's sign"),
+    Variable("slip_margin", (), "f8", "1", "size of torque_ratio, less 1; slips from about 0"),
 )
 
 
@@ -73,11 +77,23 @@ def largest_torque(
     return float(torque_limit(mu, axial_force, path.driving_radius, half_wedge_angle).min())
 
 
-def slip_margin(run: Any, samples: slice) -> float:
-    """Load over the largest torque that friction carries, less 1, by the means of some samples.
+def against_slip(load: float, carried: float) -> dict[str, float]:
+    """Values of VARIABLES.
 
-    Without any friction it is infinite, or without load either not a number.
+    Without any friction ratio and margin are infinite, or without load either not numbers.
+
+    Parameters
+    ----------
+    load, carried : float
+        Torque at the driving pulley, and the largest one that friction carries [N m].
     """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = float(np.divide(load, carried))
+    return {"carried_torque": carried, "torque_ratio": ratio, "slip_margin": abs(ratio) - 1.0}
+
+
+def capacity(run: Any, samples: slice) -> dict[str, float]:
+    """Values of VARIABLES by the means of some samples."""
     p, path = run.parameters, run.path
     axial = np.array([run.channel(f"axial_force {pulley}")[samples].mean() for pulley in PULLEYS])
     # a run may slip through before a constant load has risen to its value
@@ -90,8 +106,7 @@ def slip_margin(run: Any, samples: slice) -> float:
         run.mean_driving_speed(samples) * path.driving_radius,
         axial,
     )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return float(np.divide(abs(load), carried) - 1.0)
+    return against_slip(load, carried)
 
 
 def with_slip(run: Any, found: Occurrence, pulleys: Sequence[str] = PULLEYS) -> Occurrence:
@@ -137,5 +152,5 @@ def slid(run: Any) -> dict[str, Any]:
         "axial_force": axial,
         "thrust_ratio": axial[0] / axial[1],
         "speed_loss": speed_loss(run, samples),
-        VARIABLE.name: slip_margin(run, samples),
+        **capacity(run, samples),
     }

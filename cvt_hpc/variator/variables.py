@@ -40,7 +40,18 @@ _SHARED = (
     Variable("storing_power", (), "f8", "W", "mean rate of the stored energy"),
     Variable("ring_loss", (), "f8", "W", "mean friction power between rings and elements"),
     Variable("belt_loss", (), "f8", "W", "mean power of the belt's transverse damping"),
+    Variable("layer_loss", (), "f8", "W", "mean power of the layers' longitudinal dampers"),
+    Variable(
+        "seating_loss", (), "f8", "W", "mean elastic power carried out of the contact at the arcs' ends"
+    ),
     Variable("loss", (), "f8", "W", "mean of all losses", words="total loss"),
+    Variable(
+        "efficiency",
+        (),
+        "f8",
+        "1",
+        "what losses leave of the power put in, by the driving pulley or by a load that drives",
+    ),
     Variable(
         "power_residual",
         (),

@@ -20,7 +20,8 @@ ENDINGS = {
 }
 ALONG_RAMPS = {variable.name for variable in ramp.VARIABLES}
 # known of a run that has slipped through before its end
-OF_THE_SLIDE = {"slip", "axial_force", "open_share", "thrust_ratio", "speed_loss", "slip_margin"}
+OF_THE_SLIDE = {"slip", "axial_force", "open_share", "thrust_ratio", "speed_loss"}
+OF_THE_SLIDE |= {"carried_torque", "torque_ratio", "slip_margin"}
 COST = {"core_seconds", "simulated_seconds", "time_step", "steps", "contact_solves"}
 
 

@@ -9,13 +9,14 @@ from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.physics.friction import friction_law
 from cvt_hpc.physics.geometry import variator
 from cvt_hpc.variables import Vibrates
+from cvt_hpc.variator.judging import efficiency
 from cvt_hpc.variator.slip import (
     GROSS_SLIP,
     PULLEYS,
+    capacity,
     largest_torque,
     slid,
     slide,
-    slip_margin,
     with_slip,
 )
 from cvt_hpc.vibration.assessment import Occurrence
@@ -79,16 +80,35 @@ def run(channels=None, *, samples=8, judged=0, done=None, **parameters):
 def test_the_margin_is_the_load_over_the_torque_less_one():
     limit = carried(0.1, 40e3)
     for load in (90.0, -90.0):
-        assert slip_margin(run(load=load), ALL) == pytest.approx(90.0 / limit - 1.0, rel=1e-12)
+        found = capacity(run(load=load), ALL)
+        assert found["carried_torque"] == pytest.approx(limit, rel=1e-12)
+        assert found["torque_ratio"] == pytest.approx(load / limit, rel=1e-12)
+        assert found["slip_margin"] == pytest.approx(90.0 / limit - 1.0, rel=1e-12)
     # gross slip is in proportion to the belt's speed, that of the driving pulley's rim
     falling = run(friction_law="hyperbolic", friction_gradient=-0.8, driving_speed=300.0)
     mu = 0.1 / (1.0 + 8.0 * GROSS_SLIP * 300.0 * PATH.driving_radius)
-    assert slip_margin(falling, ALL) == pytest.approx(90.0 / carried(mu, 40e3) - 1.0, rel=1e-12)
+    assert capacity(falling, ALL)["slip_margin"] == pytest.approx(90.0 / carried(mu, 40e3) - 1.0, rel=1e-12)
     # along a ramp it is the mean load of the samples, as are the axial forces
-    ramp = run(
-        {"load": np.arange(8.0), "axial_force driven": np.linspace(10e3, 80e3, 8)}, load_history="ramp"
-    )
-    assert slip_margin(ramp, slice(0, 2)) == pytest.approx(0.5 / carried(0.1, 15e3) - 1.0, rel=1e-12)
+    channels = {"load": np.arange(8.0), "axial_force driven": np.linspace(10e3, 80e3, 8)}
+    found = capacity(run(channels, load_history="ramp"), slice(0, 2))
+    assert found["torque_ratio"] == pytest.approx(0.5 / carried(0.1, 15e3), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("driving", "load", "loss", "expected"),
+    [
+        (100.0, 90.0, 10.0, 0.9),
+        (-72.0, -80.0, 8.0, 0.9),  # the load drives
+        (5.0, 0.0, 5.0, 0.0),
+        (3.0, -2.0, 5.0, 0.0),  # both put in what is lost
+    ],
+)
+def test_efficiency_has_the_sign_of_power(driving, load, loss, expected):
+    assert efficiency(driving, load, loss) == pytest.approx(expected)
+
+
+def test_a_belt_at_rest_has_no_efficiency():
+    assert np.isnan(efficiency(0.0, 0.0, 0.0))
 
 
 def judged(driving, driven=0.0, vibrates=Vibrates.YES, margin=2.0):

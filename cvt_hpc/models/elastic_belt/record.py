@@ -13,9 +13,9 @@ from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.models.elastic_belt.history import histories
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, judging
-from cvt_hpc.variator.judging import assess, each, mean, power_balance
-from cvt_hpc.variator.slip import VARIABLE as SLIP_MARGIN
-from cvt_hpc.variator.slip import slide, slip_margin
+from cvt_hpc.variator.judging import assess, each, efficiency, mean, power_balance
+from cvt_hpc.variator.slip import VARIABLES as AGAINST_SLIP
+from cvt_hpc.variator.slip import capacity, slide
 from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared
 from cvt_hpc.vibration import assessment, ramp
 from cvt_hpc.vibration.signals import band_amplitude
@@ -60,7 +60,7 @@ VARIABLES = (
         "modal_amplitude", ("strand", "half_waves"), "f8", "m", "amplitude of each sine mode in the band"
     ),
     *shared("spectrum", "mean_ring_tension", "mean_push_force", "axial_force", "slip"),
-    SLIP_MARGIN,
+    *AGAINST_SLIP,
     Variable("open_share", ("pulley",), "f8", "1", "mean, out of contact", words="open share of the wrap"),
     *shared(
         "flank_loss",
@@ -74,12 +74,9 @@ VARIABLES = (
         "ring_loss",
         "belt_loss",
     ),
-    Variable("layer_loss", (), "f8", "W", "mean power of the layers' longitudinal dampers"),
+    *shared("layer_loss"),
     Variable("lag_loss", (), "f8", "W", "mean power of the driven sheave's lag"),
-    Variable(
-        "seating_loss", (), "f8", "W", "mean elastic power carried out of the contact at the arcs' ends"
-    ),
-    *shared("loss", "power_residual"),
+    *shared("seating_loss", "loss", "efficiency", "power_residual"),
     Variable(
         "step_ripple",
         (),
@@ -148,13 +145,15 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
     stored = run.channel("stored_energy")[judged]
     storing = (stored[-1] - stored[0]) / ((stored.size - 1) * run.interval)
     driving, load, thrust = (mean(run, f"{name}_power") for name in ("driving", "load", "thrust"))
+    loss = sum(losses.values())
     return {
         "mode": np.where(modal.max(axis=1) > 0.0, 1 + modal.argmax(axis=1), 0),
         "modal_amplitude": modal,
         **judging.evaluate(run, strongest_probe),
-        SLIP_MARGIN.name: slip_margin(run, judged),
+        **capacity(run, judged),
         "open_share": each(run, "open_share"),
-        **power_balance(driving, load, sum(losses.values()), storing, thrust),
+        **power_balance(driving, load, loss, storing, thrust),
+        "efficiency": efficiency(driving, load, loss),
         "thrust_power": thrust,
         **{name: loss for name, loss in losses.items() if "flank" not in name},
         "step_ripple": np.sqrt(np.mean(run.channel("step_ripple")[judged] ** 2)),

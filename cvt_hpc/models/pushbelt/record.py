@@ -13,8 +13,8 @@ from cvt_hpc.variator import PULLEYS, STRANDS, judging
 from cvt_hpc.variator.history import dataset
 from cvt_hpc.variator.judging import mean, power_balance
 from cvt_hpc.variator.path import REGIONS, regions
-from cvt_hpc.variator.slip import VARIABLE as SLIP_MARGIN
-from cvt_hpc.variator.slip import slide, slip_margin
+from cvt_hpc.variator.slip import VARIABLES as AGAINST_SLIP
+from cvt_hpc.variator.slip import capacity, slide
 from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared
 from cvt_hpc.vibration import assessment, ramp
 
@@ -31,7 +31,7 @@ VARIABLES = (
     *assessment.VARIABLES,
     *ramp.VARIABLES,
     *shared("spectrum", "mean_ring_tension", "mean_push_force", "axial_force", "slip"),
-    SLIP_MARGIN,
+    *AGAINST_SLIP,
     *shared("flank_loss", "thrust_ratio", "speed_loss"),
     Variable(
         "slip_loss",
@@ -129,7 +129,7 @@ def _evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     work = run.counters()
     return {
         **judging.evaluate(run, strongest_probe),
-        SLIP_MARGIN.name: slip_margin(run, judged),
+        **capacity(run, judged),
         **_speeds(run, judged),
         **power_balance(driving, load, loss, storing, thrust, damped.sum()),
         "thrust_power": thrust,

@@ -29,8 +29,9 @@ def largest_load(
     start: float,
     tolerance: float,
     within: float,
+    most: float = np.inf,
 ) -> tuple[np.ndarray, float] | None:
-    """State at the fold that comes next as the load rises.
+    """State at the fold that comes next as the load grows, in the direction that it has.
 
     Parameters
     ----------
@@ -46,19 +47,23 @@ def largest_load(
         Root mean square of Newton's last step, over the unknowns' sizes.
     within : float
         How closely the largest load is found [N m].
+    most : float
+        Size of a load where the curve need not be followed further [N m].
 
     Returns
     -------
     ((n,) array, float) or None
-        The unknowns, and the load [N m]; None where the curve cannot be followed that far.
+        The unknowns, and the load [N m]: at the fold, or the first beyond `most`; None where the curve cannot
+        be followed that far.
     """
+    sign = -1.0 if start < 0.0 else 1.0
     curve = _Curve(equations, load, tolerance)
     z = np.append(x, start)
     known = curve.factors(z, curve.upwards)
     if known is None:
         return None
-    tangent = curve.tangent(known[0], curve.upwards)
-    step = first = FIRST / LOAD_SIZE / tangent[-1]
+    tangent = curve.tangent(known[0], sign * curve.upwards)
+    step = first = FIRST / LOAD_SIZE / abs(tangent[-1])
     for _ in range(MOST):
         found = curve.ahead(z, tangent, step)
         if found is None or (turned := curve.tangent(found[1], tangent)) @ tangent < SHARPEST:
@@ -66,12 +71,14 @@ def largest_load(
             if step < SHORTEST * first:
                 return None
             continue
-        if turned[-1] <= 0.0:
-            if step * tangent[-1] * LOAD_SIZE < within:
+        if sign * turned[-1] <= 0.0:
+            if step * sign * tangent[-1] * LOAD_SIZE < within:
                 return z[:-1], float(z[-1])
             step *= 0.25
             continue
         z, tangent, step = found[0], turned, 1.5 * step
+        if sign * z[-1] >= most:
+            return z[:-1], float(z[-1])
     return None
 
 

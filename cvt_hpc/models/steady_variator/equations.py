@@ -41,6 +41,7 @@ from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.steady_variator.linearised import Linearisation
 
 LATE = 1e9  # [s]: load and damping are those after any start-up
+TYPICAL_SPEED = 100.0  # [rad/s]: of the driving pulley, from which on the sizes of speeds are those below
 TYPICAL_SLIDING = 0.1  # [m/s]: filtered speed to begin with
 # what counts alike in each unknown: w, eps_0, eps_1, v_f; Q_0, Q_1, driven speed, position
 SIZES = (1e-4, 1e-3, 1e-4, 0.1)
@@ -78,6 +79,7 @@ class Equations:
         self._initial = first
         counts = (n, n, n, self._memories)
         self.sizes = np.concatenate([np.repeat(SIZES, counts), SIZES_OF_SCALARS])
+        self.sizes[3 * n : -1] *= min(belt.driving_speed / TYPICAL_SPEED, 1.0)
         # of the rates: those of u, v_element and v_ring, of the filtered speeds and of the pulley
         self._rates = np.r_[n : 4 * n, len(ROWS) * n : self._flat.origin.size]
         self._out = np.empty(self._flat.origin.size)

@@ -1,4 +1,7 @@
-"""What a steady state means: forces and speeds around the belt, and what follows for strands and pulleys."""
+"""What a steady state means: forces and speeds around the belt, and what follows for strands and pulleys.
+
+Powers and the contact's means are those that a transient of the belt records in this state.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,13 @@ import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import DRIVEN_POSITION, DRIVEN_SPEED, V_ELEMENT, V_RING, Mesh, W
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
+from cvt_hpc.models.elastic_belt.state_march import StateMarch
 from cvt_hpc.models.steady_variator.walking import Steady
-from cvt_hpc.variator.slip import largest_torque
+from cvt_hpc.variator import PULLEYS
+from cvt_hpc.variator.judging import efficiency, power_balance
+from cvt_hpc.variator.slip import against_slip, largest_torque
+
+LOSSES = ("driving_flank_loss", "driven_flank_loss", "ring_loss", "belt_loss", "seating_loss")
 
 
 class Distributions(NamedTuple):
@@ -60,26 +68,53 @@ def distributions(steady: Steady) -> Distributions:
     )
 
 
+def layer_loss(steady: Steady) -> float:
+    """Power of the layers' dampers [W]; the elements' act up to where their push has ended."""
+    belt, fields = steady.belt, steady.state.fields
+    eps = np.empty((2, belt.cell.size))
+    strains(belt, fields, eps)
+    opening, stretching = (np.roll(v, -1) - v for v in fields[V_ELEMENT : V_RING + 1])
+    elastic = -belt.element_stiffness * eps[0]
+    pushed = np.maximum(elastic - belt.element_damping * opening / belt.cell, 0.0)
+    rings = belt.ring_damping * stretching**2 / belt.cell
+    return float((rings - (pushed - np.maximum(elastic, 0.0)) * opening).sum())
+
+
 def quantities(steady: Steady, grid: Mesh) -> dict[str, Any]:
     """Numbers of strands (t1, t2) and pulleys (driving, driven), named as in the elastic belt's record."""
     belt, around = steady.belt, distributions(steady)
     middles = [grid.starts[region] + grid.counts[region] // 2 for region in (1, 3)]
-    axial, slip, opened = np.empty(2), np.empty(2), np.empty(2)
-    for k, (first, sheave) in enumerate(((0, belt.driving), (belt.driven_start, belt.driven))):
-        arc = slice(first, first + sheave.weight.size)
-        pressing = sheave.weight * around.contact_force[arc]
-        axial[k] = pressing.sum()
-        slip[k] = pressing @ around.tangential_sliding[arc] / (axial[k] * belt.belt_speed)
-        opened[k] = sheave.weight[around.contact_force[arc] == 0.0].sum() / sheave.weight.sum()
+    sampled = StateMarch([belt], [steady.state])
+    sampled.advance(0, 1.0)
+    seen = sampled.channels()
+    axial, slip, opened, flanks = (
+        np.array([seen[name.format(pulley)] for pulley in PULLEYS])
+        for name in ("axial_force {}", "slip {}", "open_share {}", "{}_flank_loss")
+    )
+    layers = layer_loss(steady)
+    driving, load, loss = (
+        seen["driving_power"],
+        seen["load_power"],
+        layers + sum(seen[name] for name in LOSSES),
+    )
+    powers = power_balance(driving, load, loss, 0.0)
+    del powers["storing_power"]
     carried = largest_torque(belt.law, belt.half_wedge_angle, grid.path, belt.belt_speed, axial)
     return {
         "mean_ring_tension": around.ring_tension[middles],
         "mean_push_force": around.push_force[middles],
         "axial_force": axial,
         "slip": slip,
-        "slip_margin": abs(steady.load) / carried - 1.0,
+        **against_slip(steady.load, carried),
         "open_share": opened,
         "thrust_ratio": axial[0] / axial[1],
         "speed_loss": 1.0 - belt.ratio * steady.state.scalars[DRIVEN_SPEED] / belt.driving_speed,
         "driven_position": steady.state.scalars[DRIVEN_POSITION],
+        "flank_loss": flanks,
+        "ring_loss": seen["ring_loss"],
+        "belt_loss": seen["belt_loss"],
+        "layer_loss": layers,
+        "seating_loss": seen["seating_loss"],
+        **powers,
+        "efficiency": efficiency(driving, load, loss),
     }

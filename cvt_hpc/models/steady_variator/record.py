@@ -9,19 +9,21 @@ import numpy as np
 
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 from cvt_hpc.variator import GROSS_SLIP
-from cvt_hpc.variator.slip import VARIABLE as SLIP_MARGIN
-from cvt_hpc.variator.variables import COORDINATES
+from cvt_hpc.variator.slip import VARIABLES as AGAINST_SLIP
+from cvt_hpc.variator.variables import COORDINATES, shared
 
 VARIABLES = (
     Variable("mean_ring_tension", ("strand",), "f8", "N", "ring tension in the middle of the strand"),
     Variable("mean_push_force", ("strand",), "f8", "N", "push force in the middle of the strand"),
     Variable("axial_force", ("pulley",), "f8", "N", "axial force of the belt on a sheave"),
     Variable("slip", ("pulley",), "f8", "1", "tangential sliding over belt speed, weighted by contact force"),
-    SLIP_MARGIN,
+    *AGAINST_SLIP,
     Variable("open_share", ("pulley",), "f8", "1", "out of contact", words="open share of the wrap"),
     Variable("thrust_ratio", (), "f8", "1", "axial force of the driving over that of the driven pulley"),
     Variable("speed_loss", (), "f8", "1", "1 - ratio x driven speed / driving speed"),
     Variable("driven_position", (), "f8", "m", "axial opening of the driven pulley"),
+    *shared("flank_loss", "driving_power", "load_power", "ring_loss", "belt_loss"),
+    *shared("layer_loss", "seating_loss", "loss", "efficiency", "power_residual"),
 )
 
 

@@ -1,10 +1,10 @@
-"""Steady states by walking: a first one with friction widened, then narrowed; further ones along load.
+"""Steady states: a first one by the transient, narrowed to the belt's own friction; further ones by load.
 
-Where friction is regularised over a wide range of sliding, the equations are all but linear without load, and
-the belt in its grooves is a start from which Newton's iteration finds the state: with the corner of the push
-force rounded off first, then less and less. Until friction is narrowed, dampers reach across gaps, which
-evens out how elements follow each other there; then they are drawn back. But for the first state corners
-are sharp; each state begins at the one before, and a step that fails is made again in quarters.
+The march is one with constant friction over wide ranges of sliding. Until friction is narrowed, dampers reach
+across gaps, which evens out how elements follow each other there; then they are drawn back. Corners are sharp
+from then on: each state begins at the one before, and a step that fails is made again in quarters. Where a
+march does not settle, the belt in its grooves without load is the start, the corner of the push force rounded
+off first, then less and less.
 """
 
 from __future__ import annotations
@@ -15,23 +15,45 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants
+from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.steady_variator.arclength import largest_load
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.newton import newton
 from cvt_hpc.models.steady_variator.parameters import OF_THE_COURSE
+from cvt_hpc.models.steady_variator.settling import settled
+from cvt_hpc.physics.capacity import carried_torque
+from cvt_hpc.physics.friction import softened
 
-WIDE, RING_WIDE = 0.3, 10.0  # [m/s]: regularisation speeds of flanks and rings to begin with
 BRIDGING = 10.0  # [N]: dampers push by 100 N or so, which a gap's strain times this does not reach
-ROUNDINGS = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 0.0)  # strains; rings' are 1e-3
 ON_THE_WAY, AT_HOME = 1e-4, 1e-7  # of the unknowns' sizes: 10 nm and 10 pm of w
 SHORTEST = 1e-3  # of a path: shorter steps are not tried
-
 NARROWING, LOADING = 0.3, 0.5  # first steps, of the whole path
+ROUNDINGS = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 0.0)  # strains; rings' are 1e-3
+# [m/s]: regularisation speeds of flanks and rings to begin with. In a march by the belt's own, gaps and
+# pushes of a fine mesh can go round for ever
+WIDE, RING_WIDE = 0.3, 10.0
 NEAR_FOLD = 1.0  # [N m]: where so short a step along the load fails, a fold is near
+DAMPERS = ("element_damping", "ring_damping", "transverse_damping")
+# What is marched under where a march under a load does not lead to a state: shares of a load under which the
+# belt slips through; loads beside one under which it does not settle, in shares of what friction carries.
+LESS, BESIDE = 0.8 ** np.arange(1, 8), (0.02, -0.02, 0.04, -0.04)
+SLOWEST_MARCH = 100.0  # [rad/s]: a slower belt takes too long to settle, and a faster one like it is marched
 
 
 class NoSteadyState(ValueError):
     """None was found; the text says where the walk ended."""
+
+
+class _PathEnds(NoSteadyState):
+    """A path could not be followed to its end: the last solution, and the share of the path where it is."""
+
+    def __init__(self, name: str, x: np.ndarray, share: float) -> None:
+        super().__init__(f"no steady state found: {name}, the walk ends at {share:.3g} of it")
+        self.x, self.share = x, share
+
+
+class _SlipsThrough(NoSteadyState):
+    """The load is more than constant friction carries."""
 
 
 class Steady(NamedTuple):
@@ -65,10 +87,11 @@ class SteadyBelt:
     """
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
-        p = {**parameters, **OF_THE_COURSE, "load": 0.0}
-        belt = belt_constants(p)
-        self._law, self._widths = belt.law, (belt.friction_speed, belt.ring_friction_speed)
-        self._equations = Equations(p, belt)
+        self._parameters = {**parameters, **OF_THE_COURSE, "load": 0.0}
+        self._whole = belt = belt_constants(self._parameters)
+        # of both regularisation speeds, over the belt's own
+        self._wide = max(WIDE / belt.friction_speed, 1.0), max(RING_WIDE / belt.ring_friction_speed, 1.0)
+        self._equations = Equations(self._parameters, belt)
 
     def at(self, load: float, near: Steady | None = None) -> Steady:
         """State under a load.
@@ -86,24 +109,18 @@ class SteadyBelt:
         NoSteadyState
             Where no walk comes through.
         """
-        ways = [] if near is None else [lambda: self._walk(near.unknowns, near.load, load)]
-        # loaded while friction is widened: past loads at which gaps move from one strand to the other
-        ways += [lambda: self._first(load), lambda: self._walk(self._first(0.0), 0.0, load)]
-        for way in ways:
+        if near is not None:
             try:
-                x = way()
-            except NoSteadyState as error:
-                missed = error
-            else:
-                return self._found(x, load)
-        raise missed
+                return self._found(self._walk(near.unknowns, near.load, load), load)
+            except NoSteadyState:
+                pass
+        return self._found(self._first(load), load)
 
     def known(self, load: float, unknowns: np.ndarray) -> Steady:
         """State under a load, by unknowns that were found before; ValueError if they are not of this belt."""
         if unknowns.shape != self._equations.sizes.shape:
             raise ValueError(f"{unknowns.shape} unknowns of a belt that has {self._equations.sizes.shape}")
-        self._friction(1.0)
-        self._bridge(1.0)
+        self._own()
         self._load(load)
         return self._found(unknowns, load)
 
@@ -153,8 +170,49 @@ class SteadyBelt:
         return Steady(load, belt, self._equations.state(x), x)
 
     def _first(self, load: float) -> np.ndarray:
-        """Unknowns by widened friction: without load, under the load, then with the true friction."""
-        self._friction(0.0)
+        """Unknowns without a state nearby: marched under the load, or walked from another one."""
+        missed: NoSteadyState
+        try:
+            return self._settle(load)
+        except _SlipsThrough as error:
+            missed, others = error, [share * load for share in LESS]
+        except NoSteadyState as error:
+            try:
+                return self._widened(load)
+            except NoSteadyState:
+                missed, others = error, [load + part * carried_torque(self._parameters) for part in BESIDE]
+        for other in others:
+            try:
+                x = self._settle(other)
+            except NoSteadyState:
+                continue
+            return self._rise(x, other, load)
+        raise missed
+
+    def _settle(self, load: float) -> np.ndarray:
+        """Unknowns by the transient with constant friction over wide ranges of sliding, and by what it is."""
+        self._load(load)
+        self._bridge(0.0)
+        faster = max(SLOWEST_MARCH / self._whole.driving_speed, 1.0)
+        self._friction(0.0, self._wide)
+        self._faster(faster, 0.0, self._wide)
+        x = settled(self._parameters, self._equations, ON_THE_WAY)
+        if isinstance(x, Outcome):
+            if x in (Outcome.SLIPPED_THROUGH, Outcome.RAN_AWAY):
+                raise _SlipsThrough(f"no steady state found: the belt slips through under {load:g} N m")
+            raise NoSteadyState(f"no steady state found: the belt does not settle under {load:g} N m")
+        if faster > 1.0:
+            name = f"belt slowed down at {load:g} N m"
+            x = self._follow(lambda share: self._faster(faster, share, self._wide), x, 1.0, name)
+            n = self._whole.cell.size
+            x[3 * n : -1] /= faster
+            self._faster(1.0, 1.0, self._wide)
+        return self._narrowed(x, load)
+
+    def _widened(self, load: float) -> np.ndarray:
+        """Unknowns without a march: without load and with rounded corners first, then under the load."""
+        self._own()
+        self._friction(0.0, self._wide)
         self._bridge(0.0)
         self._load(0.0)
         x = self._equations.initial()
@@ -164,17 +222,38 @@ class SteadyBelt:
             if found is None and rounding > 0.0:
                 found = newton(self._equations, x, ON_THE_WAY, damped=True)
             if found is None:
+                self._equations.rounding = 0.0
                 raise NoSteadyState("no steady state found without load and with widened friction")
             x = found
         if load != 0.0:
             x = self._follow(lambda share: self._load(share * load), x, LOADING, f"load of {load:g} N m")
-        x = self._follow(self._friction, x, NARROWING, f"friction narrowed at {load:g} N m")
+        return self._narrowed(x, load)
+
+    def _narrowed(self, x: np.ndarray, load: float) -> np.ndarray:
+        """Unknowns with the belt's own friction and dampers, from those with widened ones."""
+        name = f"friction narrowed at {load:g} N m"
+        x = self._follow(lambda share: self._friction(share, self._wide), x, NARROWING, name)
         return self._follow(self._bridge, x, NARROWING, f"dampers drawn back at {load:g} N m", AT_HOME)
+
+    def _rise(self, x: np.ndarray, start: float, load: float) -> np.ndarray:
+        """Unknowns under more load; near what friction carries along the curve of states."""
+        try:
+            return self._walk(x, start, load)
+        except _PathEnds as ended:
+            x, reached = ended.x, start + ended.share * (load - start)
+        self._load(reached)
+        found = largest_load(self._equations, self._load, x, reached, AT_HOME, NEAR_FOLD, abs(load))
+        if found is not None:
+            x, reached = found
+            if abs(reached) >= abs(load):
+                return self._walk(x, reached, load)
+        raise NoSteadyState(
+            f"no steady state found at {load:g} N m: from below they reach to {reached:.4g} N m"
+        )
 
     def _walk(self, x: np.ndarray, start: float, end: float) -> np.ndarray:
         """Unknowns under another load."""
-        self._friction(1.0)
-        self._bridge(1.0)
+        self._own()
 
         def loaded(share: float) -> None:
             self._load(start + share * (end - start))
@@ -216,21 +295,49 @@ class SteadyBelt:
             else:
                 step *= 0.25
                 if step < SHORTEST:
-                    raise NoSteadyState(f"no steady state found: {name}, the walk ends at {share:.3g} of it")
+                    raise _PathEnds(name, x, share)
         return x
 
     def _load(self, load: float) -> None:
         self._equations.under(load=load, load_start=load)
+
+    def _own(self) -> None:
+        """Back to the belt's own constants, but for the load."""
+        self._faster(1.0, 1.0, (1.0, 1.0))
+        self._friction(1.0)
+        self._bridge(1.0)
+
+    def _faster(self, factor: float, slowed: float, wide: tuple[float, float]) -> None:
+        """A belt with all speeds times a factor, those too over which its widened friction is regularised.
+
+        With its inertia over the factor's square and its dampers over the factor (slowed: 1) it has the same
+        forces as the belt itself; with those of the belt (0) nearly so.
+        """
+        belt, heavy = self._whole, factor ** (-2.0 * slowed)
+        self._equations.under(
+            belt_speed=factor * belt.belt_speed,
+            driving_speed=factor * belt.driving_speed,
+            speed_start=factor * belt.speed_start,
+            friction_speed=factor * wide[0] * belt.friction_speed,
+            ring_friction_speed=factor * wide[1] * belt.ring_friction_speed,
+            friction_memory=belt.friction_memory / factor,
+            ring_relief=factor**2 * heavy * belt.ring_relief,
+            mass=heavy * belt.mass,
+            element_mass=heavy * belt.element_mass,
+            ring_mass=heavy * belt.ring_mass,
+            **{key: factor**-slowed * getattr(belt, key) for key in DAMPERS},
+        )
 
     def _bridge(self, share: float) -> None:
         """Dampers that reach across all gaps (0), or as far as the elements' own stiffness lets them (1)."""
         whole = self._equations.belt.element_stiffness
         self._equations.under(bridging_stiffness=BRIDGING * (whole / BRIDGING) ** share)
 
-    def _friction(self, share: float) -> None:
-        """Flanks' and rings' friction between widened (0) and true (1); it falls with the square."""
-        flanks, rings = (
-            wide * (true / wide) ** share for wide, true in zip((WIDE, RING_WIDE), self._widths, strict=True)
+    def _friction(self, share: float, wide: tuple[float, float] = (1.0, 1.0)) -> None:
+        """Friction between widened and constant (0) and its own (1); it falls with the square."""
+        belt = self._whole
+        self._equations.under(
+            friction_speed=wide[0] ** (1.0 - share) * belt.friction_speed,
+            ring_friction_speed=wide[1] ** (1.0 - share) * belt.ring_friction_speed,
+            law=softened(belt.law, share * share),
         )
-        law = self._law._replace(gradient=share * share * self._law.gradient)
-        self._equations.under(friction_speed=flanks, ring_friction_speed=rings, law=law)
