@@ -96,7 +96,7 @@ def waterfall_figure(
     if "eigenfrequency" in shown:
         lines.append("dashed: eigenfrequencies, with their half waves along the strand")
     if np.isnan(amplitude).any():
-        lines.append("grey: the belt slips through, or the run failed")
+        lines.append("grey: no spectrum (not run, failed, slipped through or lifted off)")
     figure.suptitle("\n".join(fill(line, 72) for line in lines))
     return figure
 
