@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cvt_hpc.kernels import kernel
+from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.models.belt_drive.friction import Friction, Memory, begin_iterate, empty_memory, laws_hold, rub
 from cvt_hpc.models.belt_drive.pulleys import CONTACT_LOSS, FRICTION_LOSS, WORK_IN, Pulleys, Wheels
 from cvt_hpc.multibody.ancf_beam import PER_NODE, shapes
@@ -192,7 +192,7 @@ def add_contacts(
     return laws_hold(contact.friction, touch.memory, is_known)
 
 
-@kernel
+@merged_kernel
 def _may_touch(q: np.ndarray, i: int, j: int, l0: float, pulleys: Pulleys, wheels: Wheels) -> bool:
     """Whether an element between nodes i and j may reach into a pulley.
 
@@ -212,7 +212,7 @@ def _may_touch(q: np.ndarray, i: int, j: int, l0: float, pulleys: Pulleys, wheel
     return False
 
 
-@kernel
+@merged_kernel
 def _add_to_belt(
     chain: Chain,
     i: int,
@@ -247,7 +247,7 @@ def _add_to_belt(
                 blocks[at, row + 1, 3] += b * yy
 
 
-@kernel
+@merged_kernel
 def _add_to_border(
     chain: Chain,
     wheels: Wheels,
