@@ -18,6 +18,7 @@ def test_there_are_charts():
     assert [path.stem for path in CHARTS] == [
         "chart_beam_pushbelt",
         "chart_belt",
+        "chart_belt_drive",
         "chart_oscillator",
         "chart_pushbelt",
         "chart_ratios",
