@@ -155,7 +155,7 @@ def _write_png(figure: Figure, path: Path) -> None:
     canvas.draw()
     picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
     reduced = picture.quantize(256, Image.Quantize.MEDIANCUT, kmeans=SETTLED, dither=Image.Dither.NONE)
-    reduced.save(path, "png", optimize=True, dpi=(RESOLUTION, RESOLUTION))
+    reduced.save(path, "png", dpi=(RESOLUTION, RESOLUTION))
 
 
 def check_format(out: Path) -> None:

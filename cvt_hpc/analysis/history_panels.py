@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words
 from cvt_hpc.vibration.settings import SHORTEST_SEGMENT
@@ -209,6 +208,8 @@ def draw_spectra(axes: Axes, strands: list[Strand]) -> None:
 
 def _peaks(signal: Array, strand: Strand, bins: Array, spectrum: Array) -> list[tuple[float, float]]:
     """Frequency [Hz] and height of the highest peaks in the band that stand out by a fifth of the highest."""
+    from scipy.signal import find_peaks  # scipy.signal takes long to load
+
     inside = np.where(bins >= strand.band[0], spectrum, 0.0)
     indices, _ = find_peaks(inside, prominence=max(0.2 * inside.max(), np.finfo(float).tiny))
     highest = indices[np.argsort(inside[indices])[::-1][:MOST_PEAKS]]

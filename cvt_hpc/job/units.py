@@ -1,4 +1,7 @@
-"""Texts with units ("50 kN", "3000 rpm", "20 %") to numbers in SI; pint is loaded where a text needs it."""
+"""Texts with units ("50 kN", "3000 rpm", "20 %") to numbers in SI; pint is loaded where a text needs it.
+
+It takes half a second to load, which most jobs are spared: their texts have a prefix before the wanted unit.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,8 @@ _TYPOGRAPHY = str.maketrans(
     {"·": "*", "²": "2", "³": "3", "⁻": "-", "¹": "1", "%": " percent ", "°": " degree "}
 )
 _LONGEST_UNIT = 40
+_PREFIXES = {"M": 6, "k": 3, "m": -3, "u": -6, "µ": -6, "μ": -6}  # powers of ten
+_PREFIXED = ("m", "s", "N", "Hz")
 
 
 class UnitError(ValueError):
@@ -80,6 +85,10 @@ def unit_in(raw: Any) -> str:
 
 
 def _convert(number: Decimal, given: str, unit: str) -> Decimal:
+    if unit in _PREFIXED and given[1:] == unit and given[0] in _PREFIXES:
+        return number.scaleb(_PREFIXES[given[0]])
+    if given in _PREFIXED and unit[1:] == given and unit[0] in _PREFIXES:
+        return number.scaleb(-_PREFIXES[unit[0]])
     registry = _registry()
     source, target = _parse_unit(given), _parse_unit(unit)
     if source.dimensionality != target.dimensionality:

@@ -25,6 +25,8 @@ class Way(NamedTuple):
         Path coordinates where arcs and spans begin [m].
     length : float
         Of the whole path [m].
+    aside : float
+        What it counts to run across the path [m^2].
     """
 
     centre: np.ndarray
@@ -38,6 +40,7 @@ class Way(NamedTuple):
     off: np.ndarray
     begins: np.ndarray
     length: float
+    aside: float
 
 
 def way(path: BeltPath) -> Way:
@@ -45,7 +48,8 @@ def way(path: BeltPath) -> Way:
     begins = np.concatenate([[0.0], path.ends[:-1]]).reshape(-1, 2)
     onto, off = directions(path.angle), directions(path.leaving)
     circles = path.radius, path.turn, path.angle, path.wrap, path.spans
-    return Way(path.centre, span_starts(path), *circles, onto, off, begins, path.path_length)
+    aside = float(path.radius.min()) ** 2
+    return Way(path.centre, span_starts(path), *circles, onto, off, begins, path.path_length, aside)
 
 
 @kernel
@@ -53,14 +57,13 @@ def nearest(way: Way, x: float, y: float, along_x: float, along_y: float) -> tup
     """Path coordinate and offset [m] of one point, as `along` gives them."""
     per = 1.0 / np.sqrt(along_x * along_x + along_y * along_y)
     along_x, along_y = per * along_x, per * along_y
-    aside = way.radius.min() ** 2  # what it counts to run across the path
     least, position, offset = np.inf, 0.0, 0.0
     for i in range(way.radius.size):
         tx, ty = way.off[i, 0], way.off[i, 1]
         dx, dy = x - way.start[i, 0], y - way.start[i, 1]
         local = min(max(dx * tx + dy * ty, 0.0), way.spans[i])
         dx, dy = dx - local * tx, dy - local * ty
-        badness = dx * dx + dy * dy + aside * (1.0 - tx * along_x - ty * along_y)
+        badness = dx * dx + dy * dy + way.aside * (1.0 - tx * along_x - ty * along_y)
         if badness < least:
             least, position, offset = badness, way.begins[i, 1] + local, dx * ty - dy * tx
     for i in range(way.radius.size):
@@ -79,7 +82,7 @@ def nearest(way: Way, x: float, y: float, along_x: float, along_y: float) -> tup
         else:
             turned, tx, ty = 0.0, way.onto[i, 0], way.onto[i, 1]
         dx, dy = dx - turn * radius * ty, dy + turn * radius * tx
-        badness = dx * dx + dy * dy + aside * (1.0 - tx * along_x - ty * along_y)
+        badness = dx * dx + dy * dy + way.aside * (1.0 - tx * along_x - ty * along_y)
         if badness < least:
             least, position, offset = badness, way.begins[i, 0] + radius * turned, dx * ty - dy * tx
     return (position if position < way.length else position - way.length), offset

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binomtest
+from scipy.special import betaincinv
 
 from cvt_hpc.errors import mismatch, show
 from cvt_hpc.files import refuse_link
@@ -138,7 +138,7 @@ def built(job: Job, document: dict[str, Any]) -> Job:
 
 def interval(count: int, runs: int) -> tuple[float, float]:
     """Return the ends of the interval that holds a rate with CONFIDENCE (Clopper and Pearson 1934)."""
-    if runs == 0:
-        return 0.0, 1.0
-    ends = binomtest(count, runs).proportion_ci(CONFIDENCE, method="exact")
-    return ends.low, ends.high
+    outside = 0.5 * (1.0 - CONFIDENCE)
+    low = betaincinv(count, runs - count + 1, outside) if count > 0 else 0.0
+    high = betaincinv(count + 1, runs - count, 1.0 - outside) if count < runs else 1.0
+    return float(low), float(high)

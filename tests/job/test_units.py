@@ -1,11 +1,13 @@
 import math
 import subprocess
 import sys
+from decimal import Decimal
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cvt_hpc.job import units
 from cvt_hpc.job.units import UnitError, to_si
 
 
@@ -107,12 +109,20 @@ def run_program(program):
     return done.stdout, done.stderr
 
 
-def test_bare_numbers_and_texts_in_the_si_unit_do_without_pint():
+def test_bare_numbers_and_texts_in_the_si_unit_or_with_a_prefix_do_without_pint():
     program = (
-        "import sys; from cvt_hpc.job.units import to_si; "
-        "print(to_si('20', 'N m'), to_si('20 N m', 'N m'), 'pint' in sys.modules)"
+        "import sys; from cvt_hpc.job.units import from_si, to_si; "
+        "print(to_si('20', 'N m'), to_si('20 N m', 'N m'), to_si('75 mm', 'm'), from_si(0.075, 'm', 'mm'), "
+        "'pint' in sys.modules)"
     )
-    assert run_program(program) == ("20.0 20.0 False\n", "")
+    assert run_program(program) == ("20.0 20.0 0.075 75.0 False\n", "")
+
+
+def test_prefixes_are_those_of_pint():
+    for prefix, power in units._PREFIXES.items():
+        for unit in units._PREFIXED:
+            known = units._registry().Quantity(Decimal(1), prefix + unit).to(unit).magnitude
+            assert known == Decimal(10) ** power
 
 
 def test_conversion_is_silent():

@@ -174,4 +174,5 @@ def _add_profiles(way, beam, q, contact, slopes, touch, line, sums):
                 place = min(int(nearest(way, x, y, sx, sy)[0] * per), places - 1)
                 sums[3, place] += per * normal
                 sums[4, place] += per * forwards
-    sums[5] += 1.0
+    for place in range(places):
+        sums[5, place] += 1.0

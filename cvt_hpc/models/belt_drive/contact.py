@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cvt_hpc.kernels import kernel
+from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.models.belt_drive.friction import Friction, Memory, begin_iterate, empty_memory, laws_hold, rub
 from cvt_hpc.models.belt_drive.pulleys import CONTACT_LOSS, FRICTION_LOSS, WORK_IN, Pulleys, Wheels
 from cvt_hpc.multibody.ancf_beam import PER_NODE, shapes
@@ -106,6 +106,7 @@ def add_contacts(
         Whether the laws of friction held in that iterate.
     """
     q, u, n = chain.stage_q, chain.stage_v, chain.q.shape[0]
+    blocks, columns, rows, corner = chain.blocks.data, chain.columns.data, wheels.rows, wheels.corner.data[0]
     last, points = wheels.speed.shape[1] - 1, contact.shape.shape[0]
     begin_iterate(touch.memory)
     touch.normal[:] = 0.0
@@ -113,25 +114,28 @@ def add_contacts(
     for i in range(n):
         j = (i + 1) % n
         l0 = lengths[i]
-        if not _may_touch(q, i, j, l0, pulleys, wheels):
-            continue
+        reach = _reach(q, i, j, l0)
         weight = l0 / points
-        for c in range(points):
-            s0, s1, s2, s3 = (
-                contact.shape[c, 0],
-                l0 * contact.shape[c, 1],
-                contact.shape[c, 2],
-                l0 * contact.shape[c, 3],
-            )
-            x = s0 * q[i, 0] + s1 * q[i, 2] + s2 * q[j, 0] + s3 * q[j, 2]
-            y = s0 * q[i, 1] + s1 * q[i, 3] + s2 * q[j, 1] + s3 * q[j, 3]
-            for p in range(pulleys.radius.size):
-                away_x, away_y, radius = x - wheels.centre[p, 0], y - wheels.centre[p, 1], pulleys.radius[p]
+        for p in range(pulleys.radius.size):
+            radius, centre_x, centre_y = pulleys.radius[p], wheels.centre[p, 0], wheels.centre[p, 1]
+            if (q[i, 0] - centre_x) ** 2 + (q[i, 1] - centre_y) ** 2 >= (radius + reach) ** 2:
+                continue
+            centre_vx, centre_vy = wheels.centre_speed[p, 0], wheels.centre_speed[p, 1]
+            turning = wheels.stage_speed[0, p]
+            for c in range(points):
+                s0, s1, s2, s3 = (
+                    contact.shape[c, 0],
+                    l0 * contact.shape[c, 1],
+                    contact.shape[c, 2],
+                    l0 * contact.shape[c, 3],
+                )
+                x = s0 * q[i, 0] + s1 * q[i, 2] + s2 * q[j, 0] + s3 * q[j, 2]
+                y = s0 * q[i, 1] + s1 * q[i, 3] + s2 * q[j, 1] + s3 * q[j, 3]
+                away_x, away_y = x - centre_x, y - centre_y
                 if away_x * away_x + away_y * away_y >= (NEAR * radius) ** 2:
                     continue
-                vx = s0 * u[i, 0] + s1 * u[i, 2] + s2 * u[j, 0] + s3 * u[j, 2]
-                vy = s0 * u[i, 1] + s1 * u[i, 3] + s2 * u[j, 1] + s3 * u[j, 3]
-                vx, vy = vx - wheels.centre_speed[p, 0], vy - wheels.centre_speed[p, 1]
+                vx = s0 * u[i, 0] + s1 * u[i, 2] + s2 * u[j, 0] + s3 * u[j, 2] - centre_vx
+                vy = s0 * u[i, 1] + s1 * u[i, 3] + s2 * u[j, 1] + s3 * u[j, 3] - centre_vy
                 distance = np.sqrt(away_x * away_x + away_y * away_y)
                 nx, ny = away_x / distance, away_y / distance
                 outward, around = nx * vx + ny * vy, nx * vy - ny * vx
@@ -139,19 +143,19 @@ def add_contacts(
                 pressure = contact.stiffness * depth - contact.damping * outward
                 if pressure <= 0.0:
                     continue
-                slip = around - wheels.stage_speed[0, p] * distance
+                slip = around - turning * distance
                 found = rub(contact.friction, touch.memory, p, i, c, slip, pressure, tau, is_known)
                 force, traction, settled = weight * pressure, -weight * found.force, -weight * found.settled
                 touch.normal[p, i, c], touch.tangential[p, i, c] = force, settled
                 wheels.power[FRICTION_LOSS + p] -= settled * slip
                 wheels.power[CONTACT_LOSS] += weight * contact.damping * outward * outward
                 if p == 0:
-                    wheels.power[WORK_IN] += settled * distance * wheels.stage_speed[0, 0]
+                    wheels.power[WORK_IN] += settled * distance * turning
                 # slopes by speeds of the belt: of the force, of the slip, of traction and its moment
                 steep = -weight * found.by_slip
                 of_normal = -weight * (contact.stiffness * tau + contact.damping)
                 of_around = -weight * contact.damping * tau * around / distance
-                by_normal = steep * -tau * wheels.stage_speed[0, p] - found.by_pressure * of_normal
+                by_normal = steep * -tau * turning - found.by_pressure * of_normal
                 by_around = steep * (1.0 - tau * outward / distance) - found.by_pressure * of_around
                 turn = tau / distance  # of the normal
                 nn, nt = of_normal, of_around - settled * turn
@@ -166,12 +170,12 @@ def add_contacts(
                 moment_t = distance * by_around
                 mx, my = moment_n * nx - moment_t * ny, moment_n * ny + moment_t * nx
                 at_point = (s0, s1, s2, s3)
-                _add_to_belt(chain, i, j, at_point, last, (fx, fy), (xx, xy, yx, yy))
-                corner, lever = wheels.corner.data[0], steep * distance
+                _add_to_belt(blocks, columns, i, j, at_point, last, (fx, fy), (xx, xy, yx, yy))
+                lever = steep * distance
                 if p > 0:
                     corner[p - 1, p - 1] -= steep * distance * distance
                     corner[p - 1, last] -= traction * distance
-                    _add_to_border(chain, wheels, i, j, at_point, p - 1, (-lever * ny, lever * nx), (mx, my))
+                    _add_to_border(columns, rows, i, j, at_point, p - 1, (-lever * ny, lever * nx), (mx, my))
                 if pulleys.arm[p] < 0:
                     continue
                 # by the arm's rate the axis moves along (ex, ey), and its speed turns with the arm as well
@@ -183,7 +187,7 @@ def add_contacts(
                 by_x = xx * ex + xy * ey + by_n * nx - by_t * ny
                 by_y = yx * ex + yy * ey + by_n * ny + by_t * nx
                 ax, ay = -(ex * xx + ey * yx), -(ex * xy + ey * yy)
-                _add_to_border(chain, wheels, i, j, at_point, arm, (-by_x, -by_y), (ax, ay))
+                _add_to_border(columns, rows, i, j, at_point, arm, (-by_x, -by_y), (ax, ay))
                 corner[arm, arm] += ex * by_x + ey * by_y - tau * (fx * ey - fy * ex)
                 corner[arm, last] -= fx * ex + fy * ey
                 if p > 0:
@@ -192,29 +196,23 @@ def add_contacts(
     return laws_hold(contact.friction, touch.memory, is_known)
 
 
-@kernel
-def _may_touch(q: np.ndarray, i: int, j: int, l0: float, pulleys: Pulleys, wheels: Wheels) -> bool:
-    """Whether an element between nodes i and j may reach into a pulley.
+@merged_kernel
+def _reach(q, i, j, l0):
+    """How far an element between nodes i and j gets away from the first of them [m], at most.
 
-    A cubic lies within the hull of its ends and of the points a third of the end's derivative inwards, and
-    so within a circle around its first node.
+    A cubic lies within the hull of its ends and of the points a third of the end's derivative inwards.
     """
-    dx, dy = q[j, 0] - q[i, 0], q[j, 1] - q[i, 1]
     share = l0 / 3.0
+    dx, dy = q[j, 0] - q[i, 0], q[j, 1] - q[i, 1]
     bx, by = dx - share * q[j, 2], dy - share * q[j, 3]
     first = share * share * (q[i, 2] * q[i, 2] + q[i, 3] * q[i, 3])
-    reach = np.sqrt(max(dx * dx + dy * dy, max(bx * bx + by * by, first)))
-    for p in range(pulleys.radius.size):
-        ax, ay = q[i, 0] - wheels.centre[p, 0], q[i, 1] - wheels.centre[p, 1]
-        near = pulleys.radius[p] + reach
-        if ax * ax + ay * ay < near * near:
-            return True
-    return False
+    return np.sqrt(max(dx * dx + dy * dy, max(bx * bx + by * by, first)))
 
 
-@kernel
+@merged_kernel
 def _add_to_belt(
-    chain: Chain,
+    blocks: np.ndarray,
+    columns: np.ndarray,
     i: int,
     j: int,
     shape: tuple[float, float, float, float],
@@ -223,7 +221,6 @@ def _add_to_belt(
     matrix: tuple[float, float, float, float],
 ) -> None:
     """Add a force at a point between nodes i and j, and the matrix (xx, xy, yx, yy) of its slopes."""
-    blocks, columns = chain.blocks.data, chain.columns.data
     xx, xy, yx, yy = matrix
     for node in range(2):
         at = i if node == 0 else j
@@ -247,10 +244,10 @@ def _add_to_belt(
                 blocks[at, row + 1, 3] += b * yy
 
 
-@kernel
+@merged_kernel
 def _add_to_border(
-    chain: Chain,
-    wheels: Wheels,
+    columns: np.ndarray,
+    rows: np.ndarray,
     i: int,
     j: int,
     shape: tuple[float, float, float, float],
@@ -259,12 +256,11 @@ def _add_to_border(
     row: tuple[float, float],
 ) -> None:
     """Add to column and row k of the border what an unknown there and a point between i and j share."""
-    columns = chain.columns.data
     for node in range(2):
         at = i if node == 0 else j
         for kind in range(2):
             s, x = shape[2 * node + kind], 2 * kind
             columns[at, x, k] += s * column[0]
             columns[at, x + 1, k] += s * column[1]
-            wheels.rows[at, k, x] += s * row[0]
-            wheels.rows[at, k, x + 1] += s * row[1]
+            rows[at, k, x] += s * row[0]
+            rows[at, k, x + 1] += s * row[1]

@@ -36,7 +36,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cvt_hpc.kernels import kernel
+from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.physics.friction import FrictionLaw, friction_coefficient
 from cvt_hpc.physics.primal_dual import dual_of
 from cvt_hpc.physics.primal_dual import friction as smooth_friction
@@ -152,7 +152,7 @@ def begin_iterate(memory: Memory) -> None:
     memory.pivots[WRONG] = memory.pivots[LOOSE] = 0
 
 
-@kernel
+@merged_kernel
 def rub(
     friction: Friction,
     memory: Memory,
@@ -189,7 +189,7 @@ def rub(
     return found
 
 
-@kernel
+@merged_kernel
 def _rub_smoothly(friction, memory, p, i, c, slip, pressure, is_known):
     mu, mu_slope = friction_coefficient(friction.law, abs(slip), pressure)
     dual, width = memory.dual[p, i, c], friction.friction_speed
@@ -201,7 +201,7 @@ def _rub_smoothly(friction, memory, p, i, c, slip, pressure, is_known):
     return Rub(force, force, pressure * found[2], found[0])
 
 
-@kernel
+@merged_kernel
 def _rub_or_stick(friction, memory, p, i, c, slip, pressure, tau, is_known):
     side, k = memory.side[p, i, c], i * memory.slip.shape[2] + c
     mu, mu_slope = friction_coefficient(friction.law, abs(slip) if side != 0 else 0.0, pressure)
