@@ -100,8 +100,8 @@ def unsheared_tension(
     Returns
     -------
     float
-        N_c [N]; nan where friction cannot carry the difference, its coefficient is not constant, or a strand does
-        not press the belt on.
+        N_c [N]; nan where friction cannot carry the difference, its coefficient is not constant, or a strand
+        does not press the belt on.
     """
     p, mu = parameters, parameters["kinetic_friction"]
     compliance = 1.0 / p["axial_stiffness"] + 1.0 / (radius**2 * p["contact_stiffness"])
