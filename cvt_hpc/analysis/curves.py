@@ -151,7 +151,7 @@ def _scale(dataset: xr.Dataset, quantities: Sequence[str]) -> tuple[float, str]:
 def _draw_curves(
     axes: Axes, x: np.ndarray, shown: xr.Dataset, curves: Sequence[tuple[str, str, np.ndarray]]
 ) -> None:
-    """Marks of the first quantity and lines of the others; marks along the top where the belt did not hold."""
+    """Marks of the first quantity and lines of the others; marks along the top where it did not hold."""
     is_done = shown["status"].values == Status.DONE
     first, marks = curves[0][0], 0
     for k, (name, label, values) in enumerate(curves):
