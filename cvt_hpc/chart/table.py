@@ -58,10 +58,7 @@ def table_lines(comparison: Comparison) -> Iterator[str]:
         shown = comparison.shown
         words = [name.replace("_", " ") for name in shown]
         rows = [[f"error budget, against {comparison.base}", "core-s/s", *words, ""]]
-        rows += [
-            [r.point.label, _cost(r), *_errors(r, shown), _note(r)]
-            for r in comparison.choices
-        ]
+        rows += [[r.point.label, _cost(r), *_errors(r, shown), _note(r)] for r in comparison.choices]
         yield from columns(rows)
 
 
