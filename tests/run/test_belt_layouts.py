@@ -277,6 +277,8 @@ def test_a_tensioner_that_turns_away_lets_the_belt_go():
             {"profile_time": (0.0,), "driving_speed_profile": (0.5,)},
             "[profiles] driving_speed_profile: expected 1 at last",
         ),
+        ({"pulley_y": ((0.0, 0.1, 0.0),)}, "[layout] pulley_y: expected a list of numbers"),
+        ({"profile_time": ((0.0,),)}, "[profiles] profile_time: expected a list of numbers"),
         ({"load_profile": (1.0,)}, "[profiles] load_profile: expected as many values as profile_time has, 0"),
     ],
 )

@@ -16,6 +16,7 @@ from cvt_hpc.parameters import Column, FromFile, Parameter
 from cvt_hpc.physics.belt_path import BeltPath, belt_path
 from cvt_hpc.physics.geometry import variator_problems
 from cvt_hpc.variator import PULLEYS, STRANDS
+from cvt_hpc.variator.profiles import nested_problems
 
 Problem = tuple[str, str, str]  # key, expected, found
 
@@ -191,9 +192,8 @@ def layout_problems(parameters: Mapping[str, Any]) -> list[Problem]:
 
 def _list_problems(p: Mapping[str, Any], keys: Sequence[str]) -> list[Problem]:
     """Lists that are none of numbers, or not as long as the first of them."""
-    for key in keys:
-        if any(isinstance(value, Sequence) for value in p[key]):
-            return [(key, "a list of numbers", f"{list(p[key])}")]
+    if found := nested_problems(p, keys):
+        return found
     count = len(p[keys[0]])
     return [
         (key, f"as many values as {keys[0]} has, {count}", f"{len(p[key])}")

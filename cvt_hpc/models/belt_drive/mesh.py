@@ -9,8 +9,8 @@ import numpy as np
 
 from cvt_hpc.physics.belt_path import BeltPath
 
-# Of h^4 N / (EI R). 18 random drives (90 to 700 N, 0.005 to 0.15 N m^2, 20 to 150 rad/s) shake by 0.001 to 0.01
-# of it, at worst, where elements pass at a resonance, by 0.016
+# Of h^4 N / (EI R). 18 random drives (90 to 700 N, 0.005 to 0.15 N m^2, 20 to 150 rad/s) shake by 0.001 to
+# 0.01 of it, at worst, where elements pass at a resonance, by 0.016
 SHAKEN = 0.02
 
 
