@@ -6,6 +6,7 @@ and after the last one. From there on the speed has a ripple (Cepon and Boltezar
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -57,6 +58,15 @@ def load(parameters: Mapping[str, Any], time: float) -> float:
     return risen * _multiple(p, "load", time)
 
 
+def length_problems(parameters: Mapping[str, Any], keys: Sequence[str]) -> list[tuple[str, str, str]]:
+    """Lists that are missing beside others, or not as long as most of them: (key, expected, found)."""
+    lengths = {key: len(parameters[key]) for key in keys}
+    usual = Counter(filter(None, lengths.values())).most_common(1)[0][0]
+    first = next(key for key, length in lengths.items() if length == usual)
+    expected = f"as many values as {first} has, {usual}"
+    return [(key, expected, f"{length or 'none'}") for key, length in lengths.items() if length != usual]
+
+
 def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Problems of courses, in the form of a model's check: (key, expected, found).
 
@@ -74,10 +84,7 @@ def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]
     if (np.diff(times) <= 0.0).any() or (times and times[-1] > judged):
         expected = f"ascending times until the run is judged, up to {judged:g} s"
         return [("profile_time", expected, f"{list(times)}")]
-    found = []
-    for key in profiles:
-        if len(p[key]) != len(times):
-            found.append((key, f"as many values as profile_time has, {len(times)}", f"{len(p[key])}"))
+    found = length_problems(p, ("profile_time", *profiles)) if profiles else []
     last = p["driving_speed_profile"][-1:]
     if not found and last not in ((), (1.0,)):
         expected = "1 at last, since driving_speed is that of the judged part"

@@ -21,7 +21,7 @@ from cvt_hpc.models.belt_drive.theory import (
 )
 from cvt_hpc.physics.belt_path import regions
 from cvt_hpc.variables import Coordinate, Variable
-from cvt_hpc.variator import judging
+from cvt_hpc.variator import PULLEYS, STRANDS, judging
 from cvt_hpc.variator.history import dataset
 from cvt_hpc.variator.judging import each
 from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared
@@ -110,9 +110,13 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
         Flat parameters of the job.
     """
     drawn = layout(parameters)
+    driving, driven = drawn.pulleys[0], drawn.pulleys[drawn.driven]
+    roles = (
+        "" if drawn.pulleys == PULLEYS else f"; {driving} drives, {driven} is driven, of which is speed_loss"
+    )
     names = {
         "strand": _named("strand", drawn.spans),
-        "pulley": _named("pulley", drawn.pulleys),
+        "pulley": _named("pulley", drawn.pulleys, roles),
     }
     half_waves = Coordinate(np.arange(1, MODES + 1), "1", "half waves", "along the strand")
     modes = Coordinate(np.arange(1, DRIVE_MODES + 1), "1", "mode of the drive")
@@ -120,8 +124,9 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     return {**names, "frequency_bin": bins, "half_waves": half_waves, "drive_mode": modes}
 
 
-def _named(dimension: str, names: tuple[str, ...]) -> Coordinate:
-    comment = COORDINATES[dimension].comment if len(names) == 2 else "in the order in which the belt runs"
+def _named(dimension: str, names: tuple[str, ...], roles: str = "") -> Coordinate:
+    in_order = "in the order in which the belt runs" + roles
+    comment = COORDINATES[dimension].comment if names in (PULLEYS, STRANDS) else in_order
     return COORDINATES[dimension]._replace(values=np.array(names), comment=comment)
 
 
