@@ -12,9 +12,12 @@ runs onto the first circle, and offsets count to its right: outwards of a belt t
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
+
+MOST_WRAP = 1.5 * np.pi  # of a belt crossed around more than two: it crosses itself 0.41 radii off the rim
 
 
 class BeltPath(NamedTuple):
@@ -78,7 +81,8 @@ def belt_path(centre: np.ndarray, radius: np.ndarray, turn: np.ndarray) -> BeltP
     Raises
     ------
     ValueError
-        If circles overlap, or the belt does not close around them; the text says where.
+        If circles overlap, or the belt does not close around them or passes through itself; the text says
+        where.
     """
     centre, radius, turn = (np.array(values, float) for values in (centre, radius, turn))
     pulleys = range(len(radius))
@@ -105,7 +109,36 @@ def belt_path(centre: np.ndarray, radius: np.ndarray, turn: np.ndarray) -> BeltP
                 along = np.clip((centre[j] - start) @ direction, 0.0, path.spans[i])
                 if np.hypot(*(centre[j] - start - along * direction)) <= radius[j]:
                     raise ValueError(f"a span behind pulley {i + 1} that runs into pulley {j + 1}")
+    crossed = _crossed_spans(path)
+    if len(crossed) > (around == 0):
+        i, j = crossed[0]
+        raise ValueError(f"a belt whose spans behind pulleys {i + 1} and {j + 1} cross")
+    i = int(np.argmax(wrap))
+    if around == 0 and len(radius) > 2 and wrap[i] > MOST_WRAP:
+        told = f"pulley {i + 1} by {np.rad2deg(wrap[i]):.0f} deg"
+        raise ValueError(
+            f"a belt that crosses itself as it wraps {told}, more than {np.rad2deg(MOST_WRAP):.0f}"
+        )
     return path
+
+
+def _crossed_spans(path: BeltPath) -> list[tuple[int, int]]:
+    """Pairs of spans that cross. They alone can, as no span runs into a pulley."""
+    start, direction = span_starts(path), directions(path.leaving)
+    found = []
+    for i, j in combinations(range(len(path.spans)), 2):
+        between, sine = start[j] - start[i], _across(direction[i], direction[j])
+        if sine == 0.0:
+            continue
+        on_first = _across(between, direction[j]) / sine
+        on_second = _across(between, direction[i]) / sine
+        if 0.0 < on_first < path.spans[i] and 0.0 < on_second < path.spans[j]:
+            found.append((i, j))
+    return found
+
+
+def _across(a: np.ndarray, b: np.ndarray) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
 
 
 def directions(angle: np.ndarray) -> np.ndarray:

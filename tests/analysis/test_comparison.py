@@ -259,7 +259,7 @@ def has_colour(picture, colour, least=1e-3):
 
 @pytest.mark.parametrize("is_sampled", [False, True])
 def test_contradictions_show_in_the_picture(tmp_path, is_sampled):
-    a, b = of_job(study()), of_job(study())
+    a, b = (of_job(study(stiffnesses=(1.0,))) for _ in "ab")
     vibrating = np.argwhere(b["vibrates"].values == VIBRATING)
     if is_sampled:
         a, b = (dataset.stack(run=dataset["status"].dims).reset_index("run") for dataset in (a, b))

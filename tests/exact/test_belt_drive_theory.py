@@ -52,16 +52,71 @@ def test_a_strand_pinned_at_the_tangents_is_one_clamped_where_bending_lifts_it(s
             assert shorter / exact - 1.0 == pytest.approx(2.0 * lift / length, rel=0.15)
 
 
-def test_creep_by_torque_is_that_by_tensions():
+TWO_LISTED = {
+    "pulley_x": (0.0, 0.45),
+    "pulley_y": (0.0, 0.0),
+    "pulley_radius": (0.04, 0.08),
+    "pulley_turn": (1.0, 1.0),
+    "pulley_inertia": (0.0, 0.013),
+    "pulley_load": (0.0, 1.0),
+    "elements": 64,
+}
+
+
+@pytest.mark.parametrize(
+    ("values", "torque"),
+    [
+        ({"load": 8.0}, 8.0),
+        ({"load": 8.0, "profile_time": (0.05, 0.1), "load_profile": (1.0, 0.5)}, 4.0),
+        (TWO_LISTED | {"load": 8.0}, 4.0),  # the load is the driven pulley's, of twice the radius
+        (TWO_LISTED | {"load": 8.0, "pulley_load": (0.0, -1.0)}, -4.0),
+    ],
+)
+def test_creep_by_torque_is_that_by_tensions(values, torque):
+    """Speeds are as the lengths 1 + T / EA under tensions that the torque at the end sets apart."""
+    p, drawn = scene(**values)
+    pull = torque / drawn.path.radius[0]
+    slack, tight = 1.0 + (p["tension"] + np.array([-0.5, 0.5]) * pull) / p["axial_stiffness"]
+    assert theory.creep_loss(p, drawn) == pytest.approx(1.0 - slack / tight, rel=1e-9)
+
+
+def test_the_loss_of_a_hard_drive_is_creep():
     """(T2 - T1) / EA to the first order, without sinking in."""
     p, drawn = scene(load=8.0, contact_stiffness=1e13, driving_speed=1.0)
     pull = 8.0 / drawn.path.radius[0]
-    creep = pull / p["axial_stiffness"]
-    assert theory.creep_loss(p, drawn) == pytest.approx(creep, rel=p["tension"] / p["axial_stiffness"] + 1e-3)
     tension = p["tension"] + np.array([-0.5, 0.5]) * pull
     # less by 4 T / EA: 3 by the square in the strain, 1 by the stretch that speeds are taken over
     second = 1.0 - 4.0 * p["tension"] / p["axial_stiffness"]
-    assert theory.expected_loss(p, drawn, tension) == pytest.approx(creep * second, rel=1e-3)
+    wanted = pull / p["axial_stiffness"] * second
+    assert theory.expected_loss(p, drawn, tension) == pytest.approx(wanted, rel=1e-3)
+
+
+def test_the_loss_is_that_of_the_loaded_pulley():
+    """Of three pulleys the third one, by the tensions that run onto it and onto the first one."""
+    listed = {
+        "pulley_x": (0.0, 0.45, 0.2),
+        "pulley_y": (0.0, 0.0, 0.3),
+        "pulley_radius": (0.04, 0.05, 0.08),
+        "pulley_turn": (1.0, 1.0, 1.0),
+        "pulley_inertia": (0.0, 0.01, 0.01),
+        "pulley_load": (0.0, 0.1, 1.0),
+    }
+    p, drawn = scene(**listed, elements=96, contact_stiffness=1e13, driving_speed=1.0)
+    assert drawn.driven == 2
+    even = theory.expected_loss(p, drawn, np.full(3, p["tension"]))
+    assert even == pytest.approx(0.0, abs=2e-8)  # 300 N / (R^2 k)
+    loss = theory.expected_loss(p, drawn, p["tension"] + np.array([0.0, -30.0, 60.0]))
+    assert loss == pytest.approx(90.0 / p["axial_stiffness"], rel=0.01)  # 4 T / EA of it
+
+
+def test_a_belt_sinks_in_by_the_tension_above_that_of_its_running():
+    """Of (T - m v^2) / (R^2 k) of a radius: without it the belt of other radii has no loss."""
+    p, drawn = scene(ratio=1.25, driving_speed=300.0, contact_stiffness=1e8)
+    running = p["line_mass"] * (300.0 * drawn.path.radius[0]) ** 2
+    assert theory.expected_loss(p, drawn, np.full(2, running)) == pytest.approx(0.0, abs=1e-15)
+    sunk = 100.0 / (drawn.path.radius**2 * 1e8)
+    loss = theory.expected_loss(p, drawn, np.full(2, running + 100.0))
+    assert loss == pytest.approx(sunk[0] - sunk[1], rel=2.0 * sunk.max())
 
 
 def test_the_rubber_gives_way_by_more_where_the_tight_strand_runs_on():
@@ -134,12 +189,12 @@ def test_rubber_that_shears_takes_the_tension_from_inlet_to_outlet(inlet, outlet
     p, drawn = scene(shear_stiffness=stiffness)
     radius, wrap = drawn.path.radius[0], drawn.path.wrap[0]
     apparent = theory.unsheared_tension(p, inlet, outlet, radius, wrap)
-    give = 1.0 / p["axial_stiffness"] + 1.0 / (radius**2 * p["contact_stiffness"])
+    compliance = 1.0 / p["axial_stiffness"] + 1.0 / (radius**2 * p["contact_stiffness"])
     count = 20000
     ds, tension, shear = radius * wrap / count, inlet, 0.0
     for _ in range(count):
         bound = p["kinetic_friction"] * tension / (radius * stiffness)
-        shear = np.clip(shear + ds * give * (tension - apparent), -bound, bound)
+        shear = np.clip(shear + ds * compliance * (tension - apparent), -bound, bound)
         tension += ds * stiffness * shear
     assert tension == pytest.approx(outlet, rel=1e-3)
 
@@ -147,3 +202,15 @@ def test_rubber_that_shears_takes_the_tension_from_inlet_to_outlet(inlet, outlet
 def test_more_than_friction_carries_has_no_tension_without_shear():
     p, drawn = scene()
     assert np.isnan(theory.unsheared_tension(p, 500.0, 500.0 * np.exp(-1.6), drawn.path.radius[0], np.pi))
+
+
+@pytest.mark.parametrize("tension", [(300.0, -5.0), (-5.0, 300.0), (0.5, 300.0), (0.0, 300.0), (-5.0, -5.0)])
+def test_a_strand_without_tension_presses_no_belt_on(tension):
+    """0.5 N is less than m v^2."""
+    p, drawn = scene(friction_treatment="bristle")
+    assert np.isnan(theory.unsheared_tension(p, -5.0, 300.0, 0.05, np.pi))
+    assert np.isnan(theory.expected_loss(p, drawn, np.array(tension)))
+    position = np.linspace(0.0, drawn.path.path_length, 40, endpoint=False)
+    with np.errstate(all="raise"):
+        found = theory.sliding_tension(p, drawn.path, np.array(tension), position)
+    assert np.isnan(found).all()

@@ -65,6 +65,13 @@ def test_a_pulley_from_outside_bends_the_belt_back():
     assert path.path_length > without.path_length and 0.0 < path.wrap[3] < np.pi
 
 
+def test_a_crossed_belt_may_run_around_several():
+    """Spans cross once, so that it winds around all together not at all."""
+    corners = np.array([[0.0, 0.0], [0.4, 0.1], [0.4, -0.1]])
+    path = belt_path(corners, np.full(3, 0.05), np.array([1.0, -1.0, -1.0]))
+    assert np.array([1.0, -1.0, -1.0]) @ path.wrap == pytest.approx(0.0, abs=1e-14)
+
+
 @pytest.mark.parametrize(
     ("centres", "radii", "turns", "message"),
     [
@@ -75,6 +82,18 @@ def test_a_pulley_from_outside_bends_the_belt_back():
             [0.05, 0.05, 0.03],
             [1, 1, -1],
             "span behind pulley 1 that runs into pulley 3",
+        ),
+        (  # an idler outside of the belt, which reaches it by a loop around the idler, or backwards
+            np.array([[0.0, 0.0], [0.2, -0.1], [0.4, 0.0]]),
+            [0.05, 0.03, 0.05],
+            [1, -1, 1],
+            "crosses itself as it wraps pulley 2 by 349 deg, more than 270",
+        ),
+        (
+            np.array([[0.0, 0.0], [0.4, 0.0], [0.2, -0.1]]),
+            [0.05, 0.05, 0.03],
+            [1, 1, -1],
+            "spans behind pulleys 1 and 2 cross",
         ),
     ],
 )

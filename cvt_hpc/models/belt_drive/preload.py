@@ -26,14 +26,14 @@ def stretch(tension: float, stiffness: float) -> float:
     return x
 
 
-def give(path: BeltPath, contact_stiffness: float) -> float:
+def contact_compliance(path: BeltPath, contact_stiffness: float) -> float:
     """By how much the contacts shorten a path for each newton of tension [m/N]."""
     return float((path.wrap / path.radius).sum()) / contact_stiffness
 
 
 def length_at(path: BeltPath, tension: float, parameters: Mapping[str, Any]) -> float:
     """Length without load of the belt that has a tension [N] on a path, nearly [m]."""
-    shortened = path.path_length - give(path, parameters["contact_stiffness"]) * tension
+    shortened = path.path_length - contact_compliance(path, parameters["contact_stiffness"]) * tension
     return shortened / stretch(tension, parameters["axial_stiffness"])
 
 

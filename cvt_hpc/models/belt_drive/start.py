@@ -16,7 +16,7 @@ from cvt_hpc.models.belt_drive.courses import driving_speed
 from cvt_hpc.models.belt_drive.drive import UNSOLVED, Drive, State, advance, state
 from cvt_hpc.models.belt_drive.friction import Friction, Treatment
 from cvt_hpc.models.belt_drive.layout import Layout, pulleys_of
-from cvt_hpc.models.belt_drive.preload import give, length_at
+from cvt_hpc.models.belt_drive.preload import contact_compliance, length_at
 from cvt_hpc.multibody.ancf_beam import at_places, beam, random_lengths
 from cvt_hpc.physics.belt_path import points_at
 from cvt_hpc.physics.friction import friction_law, given_law
@@ -58,7 +58,8 @@ def start(
         Belt and pulleys, which move as if nothing slid, and whether equilibria were found.
     """
     p, path = parameters, drawn.path
-    compliance = 1.0 / p["axial_stiffness"] + give(path, p["contact_stiffness"]) / path.path_length
+    of_contacts = contact_compliance(path, p["contact_stiffness"]) / path.path_length
+    compliance = 1.0 / p["axial_stiffness"] + of_contacts
     length = length_at(path, p["tension"], p)
     for correction in range(CORRECTIONS + 1):
         drive = _drive(p, drawn, length)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
+from cvt_hpc.models.belt_drive.courses import load
 from cvt_hpc.models.belt_drive.layout import Layout
 from cvt_hpc.models.belt_drive.preload import stretch
 from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies
@@ -18,7 +19,7 @@ FUNCTIONS = 24  # sines of the Ritz model: more change no recorded frequency by 
 
 
 def creep_loss(parameters: Mapping[str, Any], drawn: Layout) -> float:
-    """Speed loss by creep alone, by the tension at rest and the torque (Cepon and Boltezar 2011, eq. 4).
+    """Speed loss by creep alone, by tension at rest and torque at the end (Cepon and Boltezar 2011, eq. 4).
 
     Parameters
     ----------
@@ -30,14 +31,15 @@ def creep_loss(parameters: Mapping[str, Any], drawn: Layout) -> float:
     Returns
     -------
     float
-        1 - (2 T0 R + 2 R EA - M) / (2 T0 R + 2 R EA + M), with radius and torque of the driving pulley; nan
-        of more than two pulleys.
+        1 - (2 T0 R + 2 R EA - M) / (2 T0 R + 2 R EA + M), with the radius of the driving pulley and its
+        torque without losses; nan of more than two pulleys.
     """
     p = parameters
     if len(drawn.pulleys) > 2:
         return np.nan
+    torque = load(p, p["duration"]) * float(drawn.load[1]) / drawn.ratio
     held = 2.0 * float(drawn.path.radius[0]) * (p["tension"] + p["axial_stiffness"])
-    return 1.0 - (held - p["load"]) / (held + p["load"])
+    return 1.0 - (held - torque) / (held + torque)
 
 
 def expected_loss(parameters: Mapping[str, Any], drawn: Layout, tension: np.ndarray) -> float:
@@ -98,12 +100,15 @@ def unsheared_tension(
     Returns
     -------
     float
-        N_c [N]; nan where friction cannot carry the difference, or its coefficient is not constant.
+        N_c [N]; nan where friction cannot carry the difference, its coefficient is not constant, or a strand
+        does not press the belt on.
     """
     p, mu = parameters, parameters["kinetic_friction"]
-    give = 1.0 / p["axial_stiffness"] + 1.0 / (radius**2 * p["contact_stiffness"])
-    rate, length = np.sqrt(p["shear_stiffness"] * give), radius * wrap
-    if not _has_one_coefficient(p) or abs(np.log(outlet / inlet)) >= mu * wrap:
+    compliance = 1.0 / p["axial_stiffness"] + 1.0 / (radius**2 * p["contact_stiffness"])
+    rate, length = np.sqrt(p["shear_stiffness"] * compliance), radius * wrap
+    if not _has_one_coefficient(p) or not min(inlet, outlet) > 0.0:
+        return np.nan
+    if abs(np.log(outlet / inlet)) >= mu * wrap:
         return np.nan
     if outlet == inlet:
         return inlet
@@ -160,13 +165,15 @@ def sliding_tension(
     Returns
     -------
     (place,) array
-        [N]; nan on strands, and everywhere unless the coefficient of friction is constant.
+        [N]; nan on strands, on pulleys that a strand does not press the belt on, and everywhere unless the
+        coefficient of friction is constant.
     """
     p = parameters
     if not _has_one_coefficient(p):
         return np.full(len(position), np.nan)
     centrifugal, pulley = _centrifugal(p, path), regions(path, position) // 2
     inlet, outlet = np.roll(tension, 1)[pulley] - centrifugal, np.asarray(tension)[pulley] - centrifugal
+    outlet = np.where(np.minimum(inlet, outlet) > 0.0, outlet, np.nan)
     lifted = np.sqrt(p["bending_stiffness"] / outlet) / path.radius[pulley]
     left = path.wrap[pulley] - lifted - wrap_angles(path, position)
     grown = np.exp(p["kinetic_friction"] * np.maximum(left, 0.0))
