@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.optimize import brentq
 
 from cvt_hpc.analysis.histories import history_figure
@@ -13,6 +14,7 @@ from cvt_hpc.models.belt_drive.pulleys import arms_energy
 from cvt_hpc.models.belt_drive.readings import Readings
 from cvt_hpc.models.belt_drive.start import start
 from cvt_hpc.physics.belt_path import belt_path
+from cvt_hpc.printing import outcome_lines
 from cvt_hpc.simulation import simulate
 from cvt_hpc.variables import Status, Vibrates
 
@@ -194,7 +196,10 @@ def test_a_fault_in_a_file_is_told_by_its_line(tmp_path, row, message):
     lines = ["x [mm],y [mm],radius [mm],turn,inertia [kg m^2],load", "0,0,100,1,0,0", row]
     (tmp_path / "pulleys.csv").write_text("\n".join([*lines, "240,0,100,1,5e-3,1"]))
     with pytest.raises(InputError) as caught:
-        build_job({"name": "x", "model": "belt_drive", "layout": {"pulley_file": "pulleys.csv"}}, str(tmp_path / "x"))
+        build_job(
+            {"name": "x", "model": "belt_drive", "layout": {"pulley_file": "pulleys.csv"}},
+            str(tmp_path / "x"),
+        )
     assert message in str(caught.value)
 
 
@@ -277,8 +282,8 @@ def test_a_tensioner_that_turns_away_lets_the_belt_go():
         ({"free_length": 1.5}, "[belt] free_length: expected more than"),
         ({"profile_time": (0.1, 0.0)}, "[profiles] profile_time: expected ascending times"),
         (
-            {"pulley_x": (0.0, 120.0, 240.0), "tensioner_x": (200.0,)},
-            "; but at most 2048 are permitted: on the belt of 480",
+            {"pulley_x": (0.0, 5.0, 10.0), "pulley_radius": (0.1, 0.005, 0.1)},
+            "; but at most 2048 are permitted: on the belt of 20.63 m none may be longer than 0.0025 m, found 64",
         ),
         ({"elements": 24}, "[belt] elements: expected at least 63, which turn by half a radian"),
         (
@@ -295,6 +300,12 @@ def test_layouts_that_cannot_be_are_refused(values, message):
     with pytest.raises(InputError) as caught:
         job(**SERPENTINE | values)
     assert message in str(caught.value)
+
+
+def test_lists_in_other_units_are_refused_alike():
+    values = {key: [f"{1e3 * value:g} mm" for value in SERPENTINE[key]] for key in ("pulley_x", "pulley_y")}
+    with pytest.raises(InputError, match="pulley_y: expected as many values as pulley_x has, 3, found 2"):
+        job(**SERPENTINE | values | {"pulley_y": ["0 mm", "5 mm"]})
 
 
 def test_a_picture_shows_forces_speeds_and_arms(started):
