@@ -114,6 +114,9 @@ def along(path: BeltPath, points: np.ndarray, running: np.ndarray) -> tuple[np.n
 
 
 @kernel
-def _along(way, points, running, position, offset):
+def _along(
+    way: Way, points: np.ndarray, running: np.ndarray, position: np.ndarray, offset: np.ndarray
+) -> None:
+    """Fill positions and offsets (n,) of points (n, 2), as of `along`."""
     for i in range(points.shape[0]):
         position[i], offset[i] = nearest(way, points[i, 0], points[i, 1], running[i, 0], running[i, 1])

@@ -294,6 +294,8 @@ def test_a_tensioner_that_turns_away_lets_the_belt_go():
             {"load_profile": (1.0,)},
             "[profiles] profile_time: expected as many values as load_profile has, 1, found none",
         ),
+        ({"pulley_y": ((0.0, 0.1, 0.0),)}, "[layout] pulley_y: expected a list of numbers"),
+        ({"profile_time": ((0.0,),)}, "[profiles] profile_time: expected a list of numbers"),
     ],
 )
 def test_layouts_that_cannot_be_are_refused(values, message):

@@ -117,7 +117,8 @@ def read(
 
 
 @kernel
-def _locate(way, beam, q, line):
+def _locate(way: Way, beam: AncfBeam, q: np.ndarray, line: Line) -> None:
+    """Fill a line, from the coordinates of the nodes (n, 4) [m], [1]."""
     n = q.shape[0]
     for i in range(beam.lengths.size):
         j, l0 = (i + 1) % n, beam.lengths[i]
@@ -130,15 +131,16 @@ def _locate(way, beam, q, line):
 
 
 @kernel
-def _at(shape, q, i, j, l0):
+def _at(shape: np.ndarray, q: np.ndarray, i: int, j: int, l0: float) -> tuple[float, float]:
+    """Vector (x, y) by shapes (4,) of the element of length l0 [m] between nodes i and j of q (n, 4)."""
     x = shape[0] * q[i, 0] + shape[2] * q[j, 0] + l0 * (shape[1] * q[i, 2] + shape[3] * q[j, 2])
     y = shape[0] * q[i, 1] + shape[2] * q[j, 1] + l0 * (shape[1] * q[i, 3] + shape[3] * q[j, 3])
     return x, y
 
 
 @kernel
-def _displace(line, probes, length, found):
-    """Offsets at probes, linear between the points before and behind."""
+def _displace(line: Line, probes: np.ndarray, length: float, found: np.ndarray) -> None:
+    """Offsets (p,) at probes (p,) of a path of a length [m], linear between the points before and behind."""
     for p in range(probes.size):
         before, behind, of_before, of_behind = length, length, 0.0, 0.0
         for i in range(line.position.shape[0]):
@@ -153,7 +155,17 @@ def _displace(line, probes, length, found):
 
 
 @kernel
-def _add_profiles(way, beam, q, contact, slopes, touch, line, sums):
+def _add_profiles(
+    way: Way,
+    beam: AncfBeam,
+    q: np.ndarray,
+    contact: Contact,
+    slopes: np.ndarray,
+    touch: Touch,
+    line: Line,
+    sums: np.ndarray,
+) -> None:
+    """Add a sample to the profiles; q (n, 4) are the nodes' coordinates, the rest is as in `read`."""
     places = sums.shape[1]
     per = places / way.length
     for i in range(beam.lengths.size):

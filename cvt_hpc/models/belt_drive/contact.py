@@ -64,7 +64,17 @@ class Touch(NamedTuple):
 
 def contact_shapes(points: int) -> np.ndarray:
     """Shapes (C, 4) at C points, each in the middle of its share of an element."""
-    return shapes((np.arange(points) + 0.5) / points)[0]
+    return shapes(_places(points))[0]
+
+
+def contact_slopes(points: int) -> np.ndarray:
+    """Derivatives (C, 4) of these shapes by the share of an element."""
+    return shapes(_places(points))[1]
+
+
+def _places(points: int) -> np.ndarray:
+    found: np.ndarray = (np.arange(points) + 0.5) / points
+    return found
 
 
 def first_touch(pulleys: int, elements: int, points: int) -> Touch:

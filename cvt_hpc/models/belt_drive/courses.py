@@ -14,6 +14,7 @@ import numpy as np
 
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.variator.course import load_course
+from cvt_hpc.variator.profiles import multiple, nested_problems
 
 PROFILED = ("driving_speed", "load")
 
@@ -38,24 +39,19 @@ PARAMETERS: dict[str, Parameter] = {
 }
 
 
-def _multiple(parameters: Mapping[str, Any], name: str, time: float) -> float:
-    values = parameters[f"{name}_profile"]
-    return float(np.interp(time, parameters["profile_time"], values)) if values else 1.0
-
-
 def driving_speed(parameters: Mapping[str, Any], time: float) -> float:
     """Speed of the driving pulley at a time [rad/s], in the direction in which it drives."""
     p = parameters
     since = time - (p["profile_time"][-1] if p["profile_time"] else 0.0)
     ripple = p["speed_ripple"] * np.sin(2.0 * np.pi * p["ripple_frequency"] * since) if since > 0.0 else 0.0
-    return p["driving_speed"] * _multiple(p, "driving_speed", time) + ripple
+    return p["driving_speed"] * multiple(p, "driving_speed", time) + ripple
 
 
 def load(parameters: Mapping[str, Any], time: float) -> float:
     """Load at a time [N m]: it rises smoothly within `rise_time`."""
     p = parameters
     risen = load_course.py_func(time, p["rise_time"], p["rise_time"], p["load"], p["load"])
-    return risen * _multiple(p, "load", time)
+    return risen * multiple(p, "load", time)
 
 
 def length_problems(parameters: Mapping[str, Any], keys: Sequence[str]) -> list[tuple[str, str, str]]:
@@ -77,9 +73,8 @@ def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]
     """
     p = parameters
     times, profiles = p["profile_time"], [f"{name}_profile" for name in PROFILED if p[f"{name}_profile"]]
-    for key in ("profile_time", *profiles):
-        if any(isinstance(value, Sequence) for value in p[key]):
-            return [(key, "a list of numbers", f"{list(p[key])}")]
+    if found := nested_problems(p, ("profile_time", *profiles)):
+        return found
     judged = (1.0 - p["judged_fraction"]) * p["duration"] * (1.0 + 1e-9)
     if (np.diff(times) <= 0.0).any() or (times and times[-1] > judged):
         expected = f"ascending times until the run is judged, up to {judged:g} s"

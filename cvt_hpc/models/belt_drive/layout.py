@@ -17,6 +17,7 @@ from cvt_hpc.parameters import Column, FromFile, Parameter, RowError
 from cvt_hpc.physics.belt_path import BeltPath, belt_path
 from cvt_hpc.physics.geometry import variator_problems
 from cvt_hpc.variator import PULLEYS, STRANDS
+from cvt_hpc.variator.profiles import nested_problems
 
 Problem = tuple[str, str, str]  # key, expected, found
 
@@ -201,10 +202,7 @@ def layout_problems(parameters: Mapping[str, Any]) -> list[Problem]:
 
 def _list_problems(p: Mapping[str, Any], keys: Sequence[str]) -> list[Problem]:
     """Lists that are none of numbers, missing beside others, or not as long as most of them."""
-    for key in keys:
-        if any(isinstance(value, Sequence) for value in p[key]):
-            return [(key, "a list of numbers", f"{list(p[key])}")]
-    return length_problems(p, keys)
+    return nested_problems(p, keys) or length_problems(p, keys)
 
 
 def _pulley_problems(p: Mapping[str, Any]) -> list[Problem]:

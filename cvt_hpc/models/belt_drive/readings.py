@@ -9,10 +9,11 @@ import numpy as np
 
 from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.belt_drive.along_belt import empty_line, empty_sample, read
+from cvt_hpc.models.belt_drive.contact import contact_slopes
 from cvt_hpc.models.belt_drive.drive import Drive, State
 from cvt_hpc.models.belt_drive.layout import Layout
 from cvt_hpc.models.belt_drive.pulleys import arms_energy
-from cvt_hpc.multibody.ancf_beam import energies, shapes
+from cvt_hpc.multibody.ancf_beam import energies
 from cvt_hpc.physics.nearest_on_path import way
 
 PROFILES = {
@@ -64,7 +65,7 @@ class Readings:
         self._way, self._line = way(path), empty_line(p["elements"])
         self._sample = empty_sample(self.probes.size, len(path.radius))
         self._read = called_alike(read)
-        self._slopes = shapes((np.arange(p["contact_points"]) + 0.5) / p["contact_points"])[1]
+        self._slopes = contact_slopes(p["contact_points"])
         self.places = (np.arange(PLACES) + 0.5) * (path.path_length / PLACES)
 
     def mean_tension(self, drive: Drive, state: State) -> float:

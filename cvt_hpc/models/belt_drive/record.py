@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from cvt_hpc.models.belt_drive.transient import Transient
 
 # Measured on one core of an EPYC beside other work: core-seconds per element and step, and per sample
-STEP_COST, SAMPLE_COST = 2.5e-6, 4e-5
+STEP_COST, SAMPLE_COST = 1.8e-6, 5e-5
 
 DRIVE_MODES = 8
 

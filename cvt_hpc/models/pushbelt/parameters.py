@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.models.pushbelt.profiles import PARAMETERS as PROFILES
-from cvt_hpc.models.pushbelt.profiles import extremes, nested, profile_inert, profile_problems, ratios_along
+from cvt_hpc.models.pushbelt.profiles import extremes, profile_inert, profile_problems, ratios_along
 from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
 from cvt_hpc.physics.geometry import driven_radius, variator, variator_problems
 from cvt_hpc.variator import PULLEYS
+from cvt_hpc.variator.profiles import nested
 from cvt_hpc.variator.scene import (
     FRICTION,
     HALF_WEDGE_ANGLE,

@@ -5,12 +5,13 @@ Between the times of a profile multiples are linear, before the first and after 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from cvt_hpc.parameters import Parameter
+from cvt_hpc.variator.profiles import nested_problems
 from cvt_hpc.variator.scene import course_problems
 
 PROFILED = ("load", "driving_speed", "thrust", "driving_thrust", "ratio")
@@ -33,12 +34,6 @@ PARAMETERS: dict[str, Parameter] = {
 }
 
 
-def multiple(parameters: Mapping[str, Any], name: str, time: float) -> float:
-    """Multiple of one of PROFILED at a time [1]; 1 without a profile."""
-    values = parameters[f"{name}_profile"]
-    return float(np.interp(time, parameters["profile_time"], values)) if values else 1.0
-
-
 def extremes(parameters: Mapping[str, Any], name: str) -> tuple[float, float]:
     """Least and greatest value of one of PROFILED along the run."""
     multiples = parameters[f"{name}_profile"] or (1.0,)
@@ -50,11 +45,6 @@ def ratios_along(parameters: Mapping[str, Any]) -> list[float]:
     """The ratio first, then the least and greatest along its profile if that has an effect."""
     ratio, others = parameters["ratio"], extremes(parameters, "ratio")
     return [ratio, *(other for other in others if other != ratio and parameters["driving_thrust"] == 0.0)]
-
-
-def nested(values: Sequence[Any]) -> bool:
-    """Whether values are lists in their turn."""
-    return any(isinstance(value, Sequence) for value in values)
 
 
 def profile_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
@@ -70,10 +60,8 @@ def profile_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]
     times = p["profile_time"]
     if not (profiles or times):
         return found
-    lists = {"profile_time": times} | {f"{name}_profile": values for name, values in profiles.items()}
-    for key, values in lists.items():
-        if nested(values):
-            return [(key, "a list of numbers", f"{list(values)}")]
+    if wrong := nested_problems(p, ("profile_time", *(f"{name}_profile" for name in profiles))):
+        return wrong
     judged = (1.0 - p["judged_fraction"]) * p["duration"] * (1.0 + 1e-9)
     inside = [p["rise_time"], *times, judged]
     if not times or any(np.diff(times) <= 0.0) or any(np.diff(inside) < 0.0):

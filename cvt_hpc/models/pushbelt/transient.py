@@ -12,7 +12,6 @@ from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import belt as fields
 from cvt_hpc.models.pushbelt.belt import CONTACTS, NOT_CONVERGED, Belt, Newton
 from cvt_hpc.models.pushbelt.parameters import MODES, path_length
-from cvt_hpc.models.pushbelt.profiles import multiple
 from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Reading, Readings
 from cvt_hpc.models.pushbelt.start import of_lanes, start, workspace
 from cvt_hpc.models.pushbelt.start_up import StartUps, fingerprint
@@ -22,6 +21,7 @@ from cvt_hpc.physics.geometry import driven_radius
 from cvt_hpc.variables import Status
 from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, STRANDS
 from cvt_hpc.variator.course import load_course
+from cvt_hpc.variator.profiles import multiple
 from cvt_hpc.variator.slip import GAINED, LOST
 from cvt_hpc.vibration.ramped import ramped
 

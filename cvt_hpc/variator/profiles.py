@@ -1,0 +1,30 @@
+"""Profiles over time: lists of a job that give multiples of one of its values, linear between their times."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+
+def multiple(parameters: Mapping[str, Any], name: str, time: float) -> float:
+    """Multiple of a value at a time [s], by `profile_time` and the list of its name; 1 without a list.
+
+    Before the first and after the last time it is constant.
+    """
+    values = parameters[f"{name}_profile"]
+    return float(np.interp(time, parameters["profile_time"], values)) if values else 1.0
+
+
+def nested(values: Sequence[Any]) -> bool:
+    """Whether values are lists in their turn."""
+    return any(isinstance(value, Sequence) for value in values)
+
+
+def nested_problems(parameters: Mapping[str, Any], keys: Iterable[str]) -> list[tuple[str, str, str]]:
+    """The first list whose values are no numbers, in the form of a model's check: (key, expected, found)."""
+    for key in keys:
+        if nested(parameters[key]):
+            return [(key, "a list of numbers", f"{list(parameters[key])}")]
+    return []
