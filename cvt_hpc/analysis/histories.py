@@ -10,14 +10,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from cvt_hpc.analysis import history_panels as panels
 from cvt_hpc.analysis.figures import WIDTH, balanced, draw, styled
 from cvt_hpc.errors import InputError, one_line
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.shown import JOB_UNITS, POINT_UNITS, shown
-from cvt_hpc.variables import Status, Vibrates, flag_in_words
+from cvt_hpc.variables import Status, Vibrates, flag_in_words, shortened
 from cvt_hpc.vibration.settings import PARAMETERS
+
+LONGEST_REASON = 120  # letters, in the title: one or two strands
 
 LEFT, RIGHT, WHOLE = slice(0, 2), 2, slice(0, 3)  # columns of a panel
 
@@ -83,7 +86,10 @@ def history_figure(dataset: xr.Dataset) -> Figure:
     grid = figure.add_gridspec(len(rows), 3, height_ratios=heights)
     for i, (_, row) in enumerate(rows):
         for columns, draw_panel, what in row:
-            draw_panel(figure.add_subplot(grid[i, columns]), what)
+            axes = figure.add_subplot(grid[i, columns])
+            draw_panel(axes, what)
+            if columns == RIGHT:
+                axes.xaxis.set_major_locator(MaxNLocator(2))
     return figure
 
 
@@ -116,13 +122,13 @@ def _title(dataset: xr.Dataset) -> str:
     name = one_line(dataset.attrs.get("job_name", ""))
     lines = [f"One run: {name}" if name else "One run"]
     if place := place_of(dataset.attrs):
-        lines.append(place)
+        lines.append(", ".join(place))
     if "rung" in dataset:
         rung = flag_in_words(dataset["rung"])
         lines.append(f"answered by the {rung} run, of {float(dataset['simulated_seconds']):.3g} s")
     status = Status(int(dataset["status"])) if "status" in dataset else None
     reason = dataset["reason"].item() if "reason" in dataset else ""
-    reason = reason.decode() if isinstance(reason, bytes) else reason
+    reason = shortened(reason.decode() if isinstance(reason, bytes) else reason, LONGEST_REASON)
     if status is Status.DONE and "vibrates" in dataset:
         verdict = Vibrates(int(dataset["vibrates"]))
         lines.append(f"vibrates: {verdict.name.lower()}" + (f" ({reason})" if reason else ""))
@@ -131,10 +137,10 @@ def _title(dataset: xr.Dataset) -> str:
     return "\n".join(balanced(line, 76) for line in lines)
 
 
-def place_of(attributes: Mapping[str, Any]) -> str:
+def place_of(attributes: Mapping[str, Any]) -> list[str]:
     """Where a run stands: its values on the axes of the job, and where else it departs from the job."""
     if not {"job", "point"} <= attributes.keys():
-        return ""
+        return []
     job, point = json.loads(attributes["job"]), json.loads(attributes["point"])
     schema = load_schema(job["model"], job["stepper"], "history")
     tables = {key: value for section in schema.sections for key, value in job.get(section, {}).items()}
@@ -143,7 +149,7 @@ def place_of(attributes: Mapping[str, Any]) -> str:
     keys = [key for key in (*job["axes"], *others) if key in point]
     units = _job_units(attributes)
     told = {key: {"units": schema.parameters[key].unit, JOB_UNITS: units.get(key, "")} for key in keys}
-    return ", ".join(f"{key} {shown(point[key], told[key])}" for key in keys)
+    return [f"{key} {shown(point[key], told[key])}" for key in keys]
 
 
 def _job_units(attributes: Mapping[str, Any]) -> dict[str, str]:

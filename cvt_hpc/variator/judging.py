@@ -1,7 +1,7 @@
 """Verdict and record of a run of a variator, as far as they are the same whichever model marched it.
 
 A run is as `slip` takes it, and has `displacement`, `probes` with labels, `failure` and `time` as well, and
-`kick`, the samples before its load has risen. Of its channels, those of both strands count here, too.
+`risen`, the samples before its load has risen. Of its channels, those of both strands count here, too.
 """
 
 from __future__ import annotations
@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.variables import Vibrates
+from cvt_hpc.variables import Vibrates, shortened
 from cvt_hpc.variator import PULLEYS, STRANDS
 from cvt_hpc.variator.slip import slid, speed_loss, with_slip
 from cvt_hpc.variator.variables import frequency_bins
 from cvt_hpc.vibration import assessment, ramp
-from cvt_hpc.vibration.occurrence import LONGEST_REASON
 from cvt_hpc.vibration.ramped import ramped
 from cvt_hpc.vibration.signals import amplitude_spectrum
 
@@ -46,7 +45,7 @@ def assess(
 
 def _assess_ramp(run: Any) -> ramp.RampOccurrence | None:
     """Whether and how a run vibrates along a ramp; None if it ended too soon to tell."""
-    p, first, quantity = run.parameters, run.kick, ramped(run.parameters)
+    p, first, quantity = run.parameters, run.risen, ramped(run.parameters)
     columns, strands = _on_strands(run)
     rate, moved = p["sampling_rate"], run.displacement[first:, columns]
     values = run.channel(RAMPED_CHANNELS[quantity])[first:]
@@ -72,7 +71,7 @@ def slipped(run: Any) -> dict[str, Any]:
     found = slipped_through(run)
     before = _assess_ramp(run) if ramped(run.parameters) else None
     if before is not None:
-        reason = f"{found['reason']}; before: {before.reason}"[:LONGEST_REASON]
+        reason = shortened(f"{found['reason']}; before: {before.reason}")
         found = before.record() | found | {"reason": reason}
     return found | slid(run)
 

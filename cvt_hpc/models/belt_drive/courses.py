@@ -6,15 +6,14 @@ and after the last one. From there on the speed has a ripple (Cepon and Boltezar
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.variator.course import load_course
-from cvt_hpc.variator.profiles import multiple, nested_problems
+from cvt_hpc.variator.profiles import length_problems, multiple, nested_problems
 
 PROFILED = ("driving_speed", "load")
 
@@ -52,15 +51,6 @@ def load(parameters: Mapping[str, Any], time: float) -> float:
     p = parameters
     risen = load_course.py_func(time, p["rise_time"], p["rise_time"], p["load"], p["load"])
     return risen * multiple(p, "load", time)
-
-
-def length_problems(parameters: Mapping[str, Any], keys: Sequence[str]) -> list[tuple[str, str, str]]:
-    """Lists that are missing beside others, or not as long as most of them: (key, expected, found)."""
-    lengths = {key: len(parameters[key]) for key in keys}
-    usual = Counter(filter(None, lengths.values())).most_common(1)[0][0]
-    first = next(key for key, length in lengths.items() if length == usual)
-    expected = f"as many values as {first} has, {usual}"
-    return [(key, expected, f"{length or 'none'}") for key, length in lengths.items() if length != usual]
 
 
 def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:

@@ -11,13 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.models.belt_drive.courses import length_problems
 from cvt_hpc.models.belt_drive.pulleys import Arms, Pulleys, no_struts, struts
 from cvt_hpc.parameters import Column, FromFile, Parameter, RowError
 from cvt_hpc.physics.belt_path import BeltPath, belt_path
 from cvt_hpc.physics.geometry import variator_problems
 from cvt_hpc.variator import PULLEYS, STRANDS
-from cvt_hpc.variator.profiles import nested_problems
+from cvt_hpc.variator.profiles import length_problems, nested_problems
 
 Problem = tuple[str, str, str]  # key, expected, found
 
