@@ -13,17 +13,25 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.arrangement import Arrangement, arrange, ruler, value_text
+from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, value_text
 from cvt_hpc.analysis.cells import STYLES
-from cvt_hpc.analysis.classes import OccurrenceClass, check_results
+from cvt_hpc.analysis.classes import OccurrenceClass, check_results, occurrence_classes
 from cvt_hpc.analysis.error_axes import COLOURS, MARKERS
 from cvt_hpc.analysis.figures import WIDTH, draw, in_words, styled
 from cvt_hpc.errors import mismatch, one_line, unknown
-from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.variables import Status
 
 HEIGHT = 3.8  # [inch]
 MOST_PANELS = 3  # side by side
 BESIDE = ("-", "--", ":", "-.")
+# of runs without a value: marks along the upper edge, which no curve has
+ABOVE = {
+    OccurrenceClass.SLIPPING: "slips or lifts off",
+    OccurrenceClass.FAILED: "failed",
+    OccurrenceClass.NOT_RUN: "not run",
+}
+MARKS = tuple(mark for mark in MARKERS if mark not in {STYLES[kind].mark for kind in ABOVE})
+LEGEND_LETTERS, HANDLE_LETTERS = 84, 8  # across the page, and what a handle with its space takes of them
 
 
 def draw_curve(
@@ -79,10 +87,17 @@ def curve_figure(
     x = ruler(arrangement.dataset[arrangement.x])
     factor, unit = _scale(arrangement.dataset, quantities)
     for axes, (title, shown) in zip(all_axes, panels, strict=True):
-        curves = [curve for name in quantities for curve in _curves(shown[name], factor, arrangement.x)]
-        _draw_curves(axes, x.centres, shown, curves)
-        axes.set_title(title, loc="left", pad=3)
-        axes.set_xlabel(x.label)
+        curves = [
+            curve
+            for name in quantities
+            for curve in _curves(shown[name], factor, arrangement.x, len(quantities) > 1)
+        ]
+        _draw_curves(axes, x.centres, curves, shown["status"].values == Status.DONE)
+        _mark_above(axes, x.centres, occurrence_classes(shown).values)
+        axes.set_title(title, loc="left", pad=6)
+        axes.set(xlabel=x.label, xlim=_with_margins(x))
+        if x.ticks is not None:
+            axes.set_xticks(x.ticks, x.tick_labels)
         axes.grid(linewidth=0.4, alpha=0.5)
     label = _common_words(dataset, quantities)
     all_axes[0].set_ylabel(f"{label} [{unit}]" if unit else label)
@@ -90,8 +105,14 @@ def curve_figure(
     for axes in all_axes:
         handles, labels = axes.get_legend_handles_labels()
         legend |= dict(zip(labels, handles, strict=True))
+    most = max(LEGEND_LETTERS // (max(map(len, legend)) + HANDLE_LETTERS), 1)
+    figure.set_figheight(HEIGHT + 0.2 * (len(legend) // most))
     figure.legend(
-        legend.values(), legend.keys(), loc="outside lower center", frameon=False, ncols=min(len(legend), 4)
+        legend.values(),
+        legend.keys(),
+        loc="outside lower center",
+        frameon=False,
+        ncols=min(len(legend), most),
     )
     job = one_line(dataset.attrs.get("job_name", ""))
     title = f"{label[0].upper()}{label[1:]}: {job}".rstrip(": ")
@@ -128,13 +149,22 @@ def _panels(arrangement: Arrangement, source: str) -> tuple[list[tuple[str, xr.D
     return [(title, dataset.isel({arrangement.y: k})) for k, title in enumerate(titles)], notes
 
 
-def _curves(array: xr.DataArray, factor: float, x: str) -> Iterator[tuple[str, str, np.ndarray]]:
-    """Name of the quantity, label of the curve, and values over x by a factor."""
+def _curves(
+    array: xr.DataArray, factor: float, x: str, is_named: bool
+) -> Iterator[tuple[str, str, np.ndarray]]:
+    """Name of the quantity, label of the curve, with it or without, and values over x by a factor."""
     extra = [str(dim) for dim in array.dims if dim != x]
+    words = [in_words(array)] if is_named or not extra else []
     for place in product(*(range(array.sizes[dim]) for dim in extra)):
         at = dict(zip(extra, place, strict=True))
-        labels = [str(array[dim].values[k]) for dim, k in at.items()]
-        yield str(array.name), " ".join([in_words(array), *labels]), factor * array.isel(at).values
+        labels = [_label(array[dim], k) for dim, k in at.items()]
+        yield str(array.name), " ".join([*words, *labels]), factor * array.isel(at).values
+
+
+def _label(coordinate: xr.DataArray, index: int) -> str:
+    """A place along a further dimension: a name speaks for itself, a number has the dimension's."""
+    value = coordinate.values[index]
+    return str(value) if coordinate.dtype.kind not in "iuf" else f"{in_words(coordinate)} {value:g}"
 
 
 def _scale(dataset: xr.Dataset, quantities: Sequence[str]) -> tuple[float, str]:
@@ -148,35 +178,37 @@ def _scale(dataset: xr.Dataset, quantities: Sequence[str]) -> tuple[float, str]:
     return 10.0**-power, f"$10^{{{power}}}$ {unit}".strip()
 
 
+def _with_margins(x: Ruler) -> tuple[float, float]:
+    """Limits around all values of the axis, also those where nothing is known."""
+    margin = 0.05 * np.ptp(x.centres) or 0.5 * np.ptp(x.edges)
+    return x.centres.min() - margin, x.centres.max() + margin
+
+
 def _draw_curves(
-    axes: Axes, x: np.ndarray, shown: xr.Dataset, curves: Sequence[tuple[str, str, np.ndarray]]
+    axes: Axes, x: np.ndarray, curves: Sequence[tuple[str, str, np.ndarray]], is_done: np.ndarray
 ) -> None:
-    """Marks of the first quantity and lines of the others; marks along the top for runs that slip through."""
-    is_done = shown["status"].values == Status.DONE
+    """Marks of the first quantity, hollow where they come again, and lines of the others."""
     first, marks = curves[0][0], 0
     for k, (name, label, values) in enumerate(curves):
         colour = COLOURS[k % len(COLOURS)]
         if name == first:
             known = np.where(is_done, values, np.nan)
-            axes.plot(x, known, ls="", marker=MARKERS[marks % len(MARKERS)], ms=5, color=colour, label=label)
+            mark, fill = MARKS[marks % len(MARKS)], ("full", "none")[marks // len(MARKS) % 2]
+            axes.plot(x, known, ls="", marker=mark, fillstyle=fill, ms=5, color=colour, label=label)
             marks += 1
         else:
             axes.plot(
                 x, values, ls=BESIDE[(k - marks) % len(BESIDE)], lw=1.4, color=colour, label=label, zorder=1.5
             )
-    slips = is_done & (shown["vibrates"].values == Vibrates.SLIPS)
-    if slips.any():
-        style = STYLES[OccurrenceClass.SLIPPING]
-        top = np.full(slips.sum(), 0.96)
-        axes.plot(
-            x[slips],
-            top,
-            ls="",
-            marker=style.mark,
-            color=style.ink,
-            transform=axes.get_xaxis_transform(),
-            label="slips",
-        )
+
+
+def _mark_above(axes: Axes, x: np.ndarray, classes: np.ndarray) -> None:
+    """Marks on the upper edge for runs without a value, by what became of them."""
+    for kind, label in ABOVE.items():
+        if (inside := classes == kind).any():
+            style, place = STYLES[kind], axes.get_xaxis_transform()
+            marks = {"marker": style.mark, "color": style.ink, "ms": 7, "clip_on": False, "zorder": 5}
+            axes.plot(x[inside], np.ones(inside.sum()), ls="", transform=place, label=label, **marks)
 
 
 def _common_words(dataset: xr.Dataset, quantities: Sequence[str]) -> str:

@@ -104,12 +104,17 @@ def styled(compose: Callable[P, Figure]) -> Callable[P, Figure]:
     return within
 
 
+def with_units(line: str) -> str:
+    """A line whose numbers are not parted from their units where it is broken."""
+    return re.sub(r"\b(\d[\d.]*) ", "\\1\u00a0", line)
+
+
 def balanced(line: str, width: int) -> str:
     """Break a line into no more lines than it takes, of like length, `width` letters at most.
 
     Numbers stay with their units.
     """
-    line = re.sub(r"\b(\d[\d.]*) ", "\\1\u00a0", line)
+    line = with_units(line)
     lines = wrap(line, width)
     while width > 1 and len(narrower := wrap(line, width - 1)) == len(lines):
         lines, width = narrower, width - 1

@@ -116,7 +116,7 @@ def _title(dataset: xr.Dataset) -> str:
     name = one_line(dataset.attrs.get("job_name", ""))
     lines = [f"One run: {name}" if name else "One run"]
     if place := place_of(dataset.attrs):
-        lines.append(place)
+        lines.append(", ".join(place))
     if "rung" in dataset:
         rung = flag_in_words(dataset["rung"])
         lines.append(f"answered by the {rung} run, of {float(dataset['simulated_seconds']):.3g} s")
@@ -131,10 +131,10 @@ def _title(dataset: xr.Dataset) -> str:
     return "\n".join(balanced(line, 76) for line in lines)
 
 
-def place_of(attributes: Mapping[str, Any]) -> str:
+def place_of(attributes: Mapping[str, Any]) -> list[str]:
     """Where a run stands: its values on the axes of the job, and where else it departs from the job."""
     if not {"job", "point"} <= attributes.keys():
-        return ""
+        return []
     job, point = json.loads(attributes["job"]), json.loads(attributes["point"])
     schema = load_schema(job["model"], job["stepper"], "history")
     tables = {key: value for section in schema.sections for key, value in job.get(section, {}).items()}
@@ -143,7 +143,7 @@ def place_of(attributes: Mapping[str, Any]) -> str:
     keys = [key for key in (*job["axes"], *others) if key in point]
     units = _job_units(attributes)
     told = {key: {"units": schema.parameters[key].unit, JOB_UNITS: units.get(key, "")} for key in keys}
-    return ", ".join(f"{key} {shown(point[key], told[key])}" for key in keys)
+    return [f"{key} {shown(point[key], told[key])}" for key in keys]
 
 
 def _job_units(attributes: Mapping[str, Any]) -> dict[str, str]:

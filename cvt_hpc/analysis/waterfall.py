@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis.arrangement import Ruler, along_x, arrange, ruler
 from cvt_hpc.analysis.cells import colours_of
-from cvt_hpc.analysis.classes import check_results
+from cvt_hpc.analysis.classes import check_results, count_classes, occurrence_classes
 from cvt_hpc.analysis.figures import WIDTH, draw, styled
 from cvt_hpc.errors import few_of, mismatch, one_line
 
@@ -96,7 +96,8 @@ def waterfall_figure(
     if "eigenfrequency" in shown:
         lines.append("dashed: eigenfrequencies, with their half waves along the strand")
     if np.isnan(amplitude).any():
-        lines.append("grey: the belt slips through, or the run failed")
+        unknown = occurrence_classes(shown).values[np.isnan(amplitude).any(axis=(0, 1))]
+        lines.append(f"grey: no spectrum, {count_classes(unknown)}")
     figure.suptitle("\n".join(fill(line, 72) for line in lines))
     return figure
 

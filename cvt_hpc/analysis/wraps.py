@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from cvt_hpc.analysis.error_axes import COLOURS
-from cvt_hpc.analysis.figures import WIDTH, balanced, draw, styled
+from cvt_hpc.analysis.figures import STYLE, WIDTH, balanced, draw, styled
 from cvt_hpc.analysis.histories import place_of
 from cvt_hpc.errors import InputError, mismatch, one_line
 
@@ -21,8 +23,12 @@ ROWS = (
     ("friction_force", "friction [N/mm]", 1e-3, None),
     ("tension", "tension [N]", 1.0, "sliding_tension"),
 )
-LINES = ("-", "--", "-.", ":")
-THEORY = "#333333"
+LINES = ("-", "--", "-.")  # dotted is theory
+THEORY = "Euler and Eytelwein"
+INK = "#333333"
+MOST_PANELS = 3  # side by side; of more pulleys only those that carry torque have one
+LEAST_PULL = 0.05  # of the largest sum of friction forces, from which on a pulley carries torque
+FEW = 10  # places on an arc, each of which has a mark
 
 
 def draw_wrap(histories: Sequence[xr.Dataset], out: Path, sources: Sequence[str] = ()) -> Path:
@@ -39,9 +45,9 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
     histories : sequence of Dataset
         As `simulate` returns them: `normal_force` and `friction_force` [N/m] and `tension` [N] over
         `position`, with `wrap_angle` [rad], nan on strands, and `region`; `sliding_tension` [N] is drawn
-        beside the tension.
+        beside the tension. Of more than MOST_PANELS pulleys those without torque are left out.
     sources : sequence of str, optional
-        Where they are from, for the errors and, of several, for the legend.
+        Where they are from, for the errors, and for the legend where the runs' points are alike.
 
     Returns
     -------
@@ -60,48 +66,77 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
         missing = [key for key in ("normal_force", "friction_force", "wrap_angle") if key not in dataset]
         if missing:
             raise mismatch(name, "the history of a run with normal_force and wrap_angle", f"no {missing[0]}")
-    pulleys = list(dict.fromkeys(_regions(histories[0])[np.isfinite(histories[0]["wrap_angle"].values)]))
+    pulleys, without_torque = _pulleys(histories)
+    common, labels = _told_apart(histories, names)
     rows = [row for row in ROWS if row[0] in histories[0]]
     figure = Figure((WIDTH, 1.6 * len(rows) + 1.1), layout="constrained")
-    grid = figure.subplots(len(rows), len(pulleys), sharex="col", sharey="row", squeeze=False)
+    panels = figure.subfigures()  # the label common to them keeps clear of the figure's legend
+    grid = panels.subplots(len(rows), len(pulleys), sharex="col", sharey="row", squeeze=False)
     for (name, label, factor, beside), line_of_axes in zip(rows, grid, strict=True):
         for axes, pulley in zip(line_of_axes, pulleys, strict=True):
-            for k, (dataset, source) in enumerate(zip(histories, names, strict=True)):
-                _draw(axes, dataset, pulley, name, factor, k, source)
-            if beside is not None and beside in histories[0]:
-                _draw(axes, histories[0], pulley, beside, factor, None, "Euler and Eytelwein")
+            for k, (dataset, of_run) in enumerate(zip(histories, labels, strict=True)):
+                style = {"ls": LINES[k % len(LINES)], "lw": 1.3, "color": COLOURS[k % len(COLOURS)]}
+                _draw(axes, dataset, pulley, name, factor, label=of_run, **style)
+            for k, dataset in enumerate(histories):
+                if beside is not None and beside in dataset:
+                    colour = COLOURS[k % len(COLOURS)] if len(histories) > 1 else INK
+                    _draw(axes, dataset, pulley, beside, factor, ls=":", lw=1.6, color=colour, zorder=3)
             axes.grid(linewidth=0.4, alpha=0.5)
         line_of_axes[0].set_ylabel(label)
     for axes, pulley in zip(grid[0], pulleys, strict=True):
         axes.set_title(f"{pulley} pulley", loc="left", pad=3)
-    for axes in grid[-1]:
-        axes.set_xlabel("wrap angle from inlet [°]")
-    handles, labels = grid[-1, 0].get_legend_handles_labels()
-    if len(labels) > 1:
-        figure.legend(handles, labels, loc="outside lower center", frameon=False, ncols=min(len(labels), 3))
-    figure.suptitle(_title(histories))
+    panels.supxlabel("wrap angle from inlet [°]", fontsize=STYLE["axes.labelsize"])
+    _add_legend(figure, grid[-1, 0], [THEORY] if "sliding_tension" in histories[0] else [])
+    figure.suptitle(_title(histories, common, without_torque))
     return figure
+
+
+def _pulleys(histories: Sequence[xr.Dataset]) -> tuple[list[str], list[str]]:
+    """Pulleys that have panels, and those that have none because no run has torque there."""
+    region = _regions(histories[0])
+    pulleys = list(dict.fromkeys(region[np.isfinite(histories[0]["wrap_angle"].values)]))
+    if len(pulleys) <= MOST_PANELS:
+        return pulleys, []
+    pulls = [[np.nansum(h["friction_force"].values[_regions(h) == p]) for p in pulleys] for h in histories]
+    largest = np.abs(pulls).max(axis=0)
+    carries = dict(zip(pulleys, largest >= LEAST_PULL * largest.max(), strict=True))
+    return [p for p in pulleys if carries[p]], [p for p in pulleys if not carries[p]]
+
+
+def _told_apart(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[str, list[str]]:
+    """What the runs' points have in common, and by what each differs, with its name where need be."""
+    if len(histories) == 1:
+        return ", ".join(place_of(histories[0].attrs)), ["simulated"]
+    places = [place_of(dataset.attrs) for dataset in histories]
+    common = [part for part in places[0] if all(part in place for place in places)]
+    labels = [", ".join(part for part in place if part not in common) for place in places]
+    if len(set(labels)) < len(labels) or not all(labels):
+        labels = [f"{name}: {label}".removesuffix(": ") for name, label in zip(names, labels, strict=True)]
+    return ", ".join(common), labels
 
 
 def _regions(dataset: xr.Dataset) -> np.ndarray:
     return dataset["region"].values.astype(str)
 
 
-def _draw(
-    axes: Axes, dataset: xr.Dataset, pulley: str, name: str, factor: float, number: int | None, label: str
-) -> None:
-    """A quantity over the wrap of a pulley; without a number it is theory."""
+def _draw(axes: Axes, dataset: xr.Dataset, pulley: str, name: str, factor: float, **style: Any) -> None:
+    """A quantity over the wrap of a pulley."""
     inside = (_regions(dataset) == pulley) & np.isfinite(dataset["wrap_angle"].values)
     angle = np.degrees(dataset["wrap_angle"].values[inside])
-    style = {"color": THEORY, "ls": ":", "lw": 1.6, "zorder": 3}
-    if number is not None:
-        style = {"color": COLOURS[number % len(COLOURS)], "ls": LINES[number % len(LINES)], "lw": 1.3}
-    axes.plot(angle, factor * dataset[name].values[inside], label=label, **style)
+    marker = "." if angle.size < FEW else ""
+    axes.plot(angle, factor * dataset[name].values[inside], marker=marker, ms=5, **style)
 
 
-def _title(histories: Sequence[xr.Dataset]) -> str:
-    attributes = histories[0].attrs
-    lines = [f"Forces over the wrap: {one_line(attributes.get('job_name', ''))}".rstrip(": ")]
-    if len(histories) == 1 and (place := place_of(attributes)):
-        lines.append(place)
-    return "\n".join(balanced(line, 76) for line in lines)
+def _add_legend(figure: Figure, axes: Axes, theory: Sequence[str]) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    handles += [Line2D([], [], ls=":", lw=1.6, color=INK) for _ in theory]
+    if len(labels := [*labels, *theory]) > 1:
+        figure.legend(handles, labels, loc="outside lower center", frameon=False, ncols=min(len(labels), 3))
+
+
+def _title(histories: Sequence[xr.Dataset], common: str, without_torque: Sequence[str]) -> str:
+    jobs = dict.fromkeys(one_line(dataset.attrs.get("job_name", "")) for dataset in histories)
+    lines = [f"Forces over the wrap: {', '.join(filter(None, jobs))}".rstrip(": "), common]
+    if without_torque:
+        lines.append(f"without torque, not drawn: {', '.join(without_torque)}")
+    return "\n".join(balanced(line, 76) for line in lines if line)

@@ -6,6 +6,7 @@ import math
 import re
 from textwrap import wrap
 
+from cvt_hpc.analysis.figures import with_units
 from cvt_hpc.chart.comparing import Comparison, Result
 
 _LINE_LENGTH = 104  # [letters]
@@ -17,12 +18,12 @@ def notes(comparison: Comparison) -> list[str]:
     """What stands under the panels: what was chosen, and what is not drawn and why."""
     point = comparison.reference.point
     known = f"{point.label} at {point.setting_in_words}; its own error from a coarser one"
-    lines = wrap(f"reference: {'exact solution' if comparison.scene.exact else known}", _LINE_LENGTH)
-    lines += wrap(f"cheapest within all tolerances: {comparison.verdict}", _LINE_LENGTH)
+    lines = [f"reference: {'exact solution' if comparison.scene.exact else known}"]
+    lines.append(f"cheapest within all tolerances: {comparison.verdict}")
     for why, methods in _omitted(comparison).items():
         each = "; ".join(f"{label} ({', '.join(settings)})" for label, settings in methods.items())
-        lines += wrap(f"omitted: {why}: {each}", _LINE_LENGTH, subsequent_indent="    ")
-    return lines
+        lines.append(f"omitted: {why}: {each}")
+    return [part for line in lines for part in wrap(with_units(line), _LINE_LENGTH, subsequent_indent="    ")]
 
 
 def _omitted(comparison: Comparison) -> dict[str, dict[str, list[str]]]:

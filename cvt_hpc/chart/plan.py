@@ -157,7 +157,7 @@ class Point:
         if schema.parameters[self.key].unit != "s":
             return schema.in_words(self.key, self.setting)
         factor, prefix = next((pair for pair in _PREFIXES if abs(self.setting) >= pair[0]), _PREFIXES[-1])
-        return f"{self.setting / factor:.4g}\u00a0{prefix}s"  # no line break between the two
+        return f"{self.setting / factor:.4g} {prefix}s"
 
     def parameters(self, start: int) -> dict[str, Any]:
         """Return the flat parameters [SI] of one of the runs."""

@@ -47,7 +47,7 @@ def table_lines(comparison: Comparison) -> Iterator[str]:
     heads = ["method", "", "core-s/s", *(f"{name.replace('_', ' ')} error" for name in names), ""]
     own = [short(comparison.reference.errors[name]) for name in names]
     label, setting = comparison.reference.point.label, comparison.reference.point.setting_in_words
-    rows = [heads, [f"reference: {label}", setting, "", *own, comparison.reference.measurement.reason]]
+    rows = [heads, [f"reference: {label}", setting, "-", *own, comparison.reference.measurement.reason]]
     rows += [_line(result, names) for result in comparison.methods]
     yield comparison.scene.title
     yield from columns(rows)
@@ -58,10 +58,7 @@ def table_lines(comparison: Comparison) -> Iterator[str]:
         shown = comparison.shown
         words = [name.replace("_", " ") for name in shown]
         rows = [[f"error budget, against {comparison.base}", "core-s/s", *words, ""]]
-        rows += [
-            [r.point.label, short(r.measurement.cost), *_errors(r, shown), _note(r)]
-            for r in comparison.choices
-        ]
+        rows += [[r.point.label, _cost(r), *_errors(r, shown), _note(r)] for r in comparison.choices]
         yield from columns(rows)
 
 
@@ -106,8 +103,11 @@ def _tail(result: Result, counters: Sequence[str]) -> list[str]:
 
 def _line(result: Result, names: Sequence[str]) -> list[str]:
     point = result.point
-    cost = short(result.measurement.cost)
-    return [point.label, point.setting_in_words, cost, *_errors(result, names), _note(result)]
+    return [point.label, point.setting_in_words, _cost(result), *_errors(result, names), _note(result)]
+
+
+def _cost(result: Result) -> str:
+    return short(result.measurement.cost) or "-"
 
 
 def _errors(result: Result, names: Sequence[str]) -> list[str]:

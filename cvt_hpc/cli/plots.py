@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import re
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from cvt_hpc.cli.parts import DONE, PICTURES, add_assignments, add_command, check_output, folder_of, say
 from cvt_hpc.errors import mismatch
+
+LONGEST_NAME = 100  # letters of a picture's name
 
 
 def add(commands: Any) -> None:
@@ -23,10 +26,10 @@ def add(commands: Any) -> None:
     text = "forces between belt and pulleys over the wrap, of one run or of several"
     wrap = add_command(kinds, "wrap", _wrap, text, "HISTORY")
     wrap.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
-    for command, name in ((waterfall, "waterfall"), (curve, "curve"), (wrap, "wrap")):
-        command.add_argument(
-            "--out", type=Path, metavar="PNG", help=f"default: {name}.png beside the dataset"
-        )
+    names = {waterfall: "waterfall", curve: "curve_QUANTITY", wrap: "HISTORY_wrap"}
+    for command, name in names.items():
+        text = f"default: {name}.png beside the dataset"
+        command.add_argument("--out", type=Path, metavar="PNG", help=text)
     for command in (waterfall, curve):
         add_assignments(command, "--at", "fix an axis at a value")
 
@@ -35,7 +38,7 @@ def _waterfall(arguments: argparse.Namespace) -> int:
     from cvt_hpc.analysis.waterfall import draw_waterfall
     from cvt_hpc.study import open_results
 
-    out = _picture(arguments, "waterfall.png")
+    out = _picture(arguments, "waterfall", *arguments.at)
     with open_results(arguments.path) as dataset:
         at = _at(arguments, dataset)
         say(f"picture: {draw_waterfall(dataset, out, at, str(arguments.path))}")
@@ -46,7 +49,7 @@ def _curve(arguments: argparse.Namespace) -> int:
     from cvt_hpc.analysis.curves import draw_curve
     from cvt_hpc.study import open_results
 
-    out = _picture(arguments, "curve.png")
+    out = _picture(arguments, "curve", *arguments.quantities, *arguments.at)
     with open_results(arguments.path) as dataset:
         at = _at(arguments, dataset)
         say(f"picture: {draw_curve(dataset, arguments.quantities, out, at, str(arguments.path))}")
@@ -56,8 +59,8 @@ def _curve(arguments: argparse.Namespace) -> int:
 def _wrap(arguments: argparse.Namespace) -> int:
     from cvt_hpc.netcdf import is_history
 
-    out = _picture(arguments, "wrap.png")
     files = [arguments.path, *arguments.others]
+    out = _picture(arguments, *(file.stem for file in files), "wrap")
     for file in files:
         if not is_history(file):
             raise mismatch(
@@ -75,9 +78,11 @@ def _wrap(arguments: argparse.Namespace) -> int:
     return DONE
 
 
-def _picture(arguments: argparse.Namespace, name: str) -> Path:
+def _picture(arguments: argparse.Namespace, *words: str) -> Path:
+    """The picture asked for, or one beside the dataset whose name tells what it shows."""
     check_output(arguments.out, PICTURES)
-    return arguments.out or folder_of(arguments.path) / name
+    name = "_".join(re.sub(r"[^\w.=+-]+", "_", word) for word in words)
+    return arguments.out or folder_of(arguments.path) / f"{name[:LONGEST_NAME]}.png"
 
 
 def _at(arguments: argparse.Namespace, dataset: Any) -> dict[str, Any]:

@@ -11,6 +11,9 @@ from cvt_hpc.models.marched import Probe
 from cvt_hpc.recording import sample_count, start_up_samples
 from cvt_hpc.variables import Status
 
+MOST_UNSOLVED = 0.02  # of the steps
+LATEST = 0.01  # [s] before a run ends early in which its steps have to be solved, too
+
 
 class SampledRun:
     """One run, advanced sample by sample.
@@ -33,7 +36,7 @@ class SampledRun:
         On the strands, equally spaced between their ends.
     interval : float
         Sampling interval [s].
-    samples, done, kick : int
+    samples, done, risen : int
         Samples of the whole run, those recorded so far, and those before the load has risen.
     first_judged : int
         The sample at which the judged part begins.
@@ -67,6 +70,7 @@ class SampledRun:
         )
         self._rows = np.empty((0, len(self.probes) + len(channels)))
         self._totals = np.empty((0, totals))
+        self._unsolved = np.empty(0, int)
         self._sums = np.zeros(sums)
         self.prolong(self.parameters)
 
@@ -79,12 +83,33 @@ class SampledRun:
             Those of the run but for `duration` and `judged_fraction`.
         """
         self.parameters = parameters
-        self.samples, self.kick = sample_count(parameters), start_up_samples(parameters)
+        self.samples, self.risen = sample_count(parameters), start_up_samples(parameters)
         self.first_judged = self.samples - round(parameters["judged_fraction"] * self.samples)
         more = self.samples - len(self._rows)
         self._rows = np.concatenate([self._rows, np.full((more, self._rows.shape[1]), np.nan)])
         self._totals = np.concatenate([self._totals, np.full((more, self._totals.shape[1]), np.nan)])
+        self._unsolved = np.concatenate([self._unsolved, np.zeros(more, int)])
         self._sums = np.zeros_like(self._sums)
+
+    def _keep(self, row: Sequence[float], totals: Sequence[float]) -> None:
+        """Record a sample."""
+        self._rows[self.done], self._totals[self.done] = row, totals
+        self._unsolved[self.done] = self.counters()["unsolved"]
+        self.done += 1
+
+    def _recorded(self) -> tuple[np.ndarray, ...]:
+        """Views of the samples so far."""
+        return self._rows[: self.done], self._totals[: self.done], self._unsolved[: self.done]
+
+    def _early_end(self, why: str) -> tuple[Status, str]:
+        """How a run ends early: done, for a reason of physics, unless its steps were not solved."""
+        late = round(LATEST / self.interval)
+        before = self._unsolved[self.done - 1 - late] if self.done > late else 0
+        steps = min(late, self.done) * self._steps_per_sample
+        share = max(self.unsolved_share, (self.counters()["unsolved"] - before) / steps)
+        if share > MOST_UNSOLVED:
+            return Status.FAILED_NUMERICS, f"{share:.1%} of the steps were not solved, and then {why}"
+        return Status.DONE, why
 
     @property
     def step(self) -> float:
@@ -105,6 +130,12 @@ class SampledRun:
         """Work done so far: steps, iterations, and steps that were not solved to the tolerance."""
         names = ("steps", "iterations", "unsolved")
         return dict(zip(names, self._state.counters[: len(names)].tolist(), strict=True))
+
+    @property
+    def unsolved_share(self) -> float:
+        """Share of the steps so far that were not solved to the tolerance [1]."""
+        work = self.counters()
+        return work["unsolved"] / max(work["steps"], 1)
 
     @property
     def displacement(self) -> np.ndarray:

@@ -156,6 +156,14 @@ def span_starts(path: BeltPath) -> np.ndarray:
     return path.centre + (path.turn * path.radius)[:, None] * _normals(path.leaving)
 
 
+def tangents(centre: np.ndarray, radius: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the spans between circles begin and end, (P, 2) [m]; arguments of `belt_path`, unchecked."""
+    after, aside = np.roll(centre, -1, 0) - centre, turn * radius
+    steep = np.arcsin((aside - np.roll(aside, -1)) / np.hypot(*after.T))
+    right = _normals(np.arctan2(after[:, 1], after[:, 0]) + steep)
+    return centre + aside[:, None] * right, np.roll(centre, -1, 0) + np.roll(aside, -1)[:, None] * right
+
+
 def points_at(path: BeltPath, position: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points of a path, angles of the running direction, and curvatures to the left.
 

@@ -1,7 +1,7 @@
 """Verdict and record of a run of a variator, as far as they are the same whichever model marched it.
 
 A run is as `slip` takes it, and has `displacement`, `probes` with labels, `failure` and `time` as well, and
-`kick`, the samples before its load has risen. Of its channels, those of both strands count here, too.
+`risen`, the samples before its load has risen. Of its channels, those of both strands count here, too.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def assess(
 
 def _assess_ramp(run: Any) -> ramp.RampOccurrence | None:
     """Whether and how a run vibrates along a ramp; None if it ended too soon to tell."""
-    p, first, quantity = run.parameters, run.kick, ramped(run.parameters)
+    p, first, quantity = run.parameters, run.risen, ramped(run.parameters)
     columns, strands = _on_strands(run)
     rate, moved = p["sampling_rate"], run.displacement[first:, columns]
     values = run.channel(RAMPED_CHANNELS[quantity])[first:]

@@ -4,6 +4,7 @@ import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.text import Text
 
 from cvt_hpc.analysis.curves import curve_figure
 from cvt_hpc.analysis.figures import STYLE
@@ -50,6 +51,7 @@ def results():
 
 
 def test_a_waterfall_shows_each_spectrum_at_its_place(results):
+    results["vibrates"][-1, -1] = Vibrates.SLIPS
     figure = waterfall_figure(results, {"driving_speed": 60.0})
     first, second, bar = figure.axes
     assert [axes.get_title(loc="left") for axes in (first, second)] == ["strand t1", "strand t2"]
@@ -62,7 +64,7 @@ def test_a_waterfall_shows_each_spectrum_at_its_place(results):
         assert (shown[:, :-1].argmax(axis=0) == 3).all() and shown.max() == pytest.approx(10.0)
         top, left = mesh.get_coordinates()[-1, 0], mesh.get_coordinates()[0, 0]
         assert (left[0], top[1]) == (-1.0, 105.0)  # cells reach halfway to their neighbours
-    assert "grey: the belt slips through" in figure.get_suptitle()
+    assert "grey: no spectrum, 1 slipping" in figure.get_suptitle()
 
 
 def test_eigenfrequencies_lie_over_the_spectra(results):
@@ -84,14 +86,18 @@ def test_a_curve_has_marks_of_runs_and_lines_of_theory(results):
         "driving speed 572.958 rpm",
     ]
     for k, axes in enumerate(figure.axes):
-        marks, line, *slips = axes.lines
-        assert [mark.get_xdata().tolist() for mark in slips] == [[4.0]] * k
+        marks, line, *above = axes.lines
+        assert [(mark.get_label(), mark.get_xdata().tolist()) for mark in above] == [
+            ("slips or lifts off", [4.0]) if k else ("failed", [0.0])
+        ]
+        assert above[0].get_ydata() == 1.0 and above[0].get_transform() == axes.get_xaxis_transform()
+        assert axes.get_xlim()[0] < 0.0 and axes.get_xlim()[1] > 4.0
         assert (marks.get_linestyle(), line.get_linestyle()) == ("None", "-")
         np.testing.assert_array_equal(line.get_ydata(), results["expected_speed_loss"][k])
         known = results["speed_loss"][k].where(results["status"][k] == 1)
         np.testing.assert_array_equal(marks.get_ydata(), known)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert labels == ["speed loss", "creep and compliance", "slips"]
+    assert labels == ["speed loss", "creep and compliance", "failed", "slips or lifts off"]
     assert figure.get_suptitle() == "Speed loss: test"
 
 
@@ -105,8 +111,20 @@ def test_small_numbers_have_their_power_of_ten_on_the_axis(results):
 def test_a_quantity_of_each_strand_gives_a_curve_of_each(results):
     figure = curve_figure(results, ["strand_tension"], {"driving_speed": 20.0})
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert labels == ["strand tension t1", "strand tension t2"]
+    assert labels == ["t1", "t2"]
     assert figure.axes[0].get_ylabel() == "strand tension [N]"
+
+
+def test_many_curves_differ_in_their_marks_and_have_a_legend_on_the_page(results):
+    many = xr.concat([results["strand_tension"]] * 7, "strand", join="override", combine_attrs="override")
+    names = [f"P{k}-P{k + 1}" for k in range(14)]
+    results = results.drop_dims("strand").assign(strand_tension=many.assign_coords(strand=names))
+    figure = curve_figure(results, ["strand_tension"], {"driving_speed": 20.0})
+    looks = {(line.get_marker(), line.get_fillstyle()) for line in figure.axes[0].lines}
+    assert len(looks) == 14 and not any(mark == ">" for mark, _ in looks)
+    figure.draw_without_rendering()
+    legend = figure.legends[0].get_window_extent()
+    assert figure.bbox.x0 <= legend.x0 and legend.x1 <= figure.bbox.x1
 
 
 @pytest.fixture
@@ -131,10 +149,25 @@ def test_forces_are_drawn_over_the_wrap_of_each_pulley(history):
     angle, force = normal.lines[0].get_data()
     np.testing.assert_allclose(angle, np.degrees(np.linspace(0.1, 3.0, 9)))
     np.testing.assert_allclose(force, np.arange(12, 21))
-    assert len(normal.lines) == 2 and len(tension.lines) == 3
-    np.testing.assert_allclose(tension.lines[2].get_ydata(), 3.0 * np.arange(12, 21))
+    assert len(normal.lines) == 2 and len(tension.lines) == 4
+    for line in tension.lines[2:]:
+        np.testing.assert_allclose(line.get_ydata(), 3.0 * np.arange(12, 21))
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == ["one", "two", "Euler and Eytelwein"]
+    figure.draw_without_rendering()
+    common = next(part for part in figure.findobj(Text) if part.get_text() == "wrap angle from inlet [°]")
+    assert not common.get_window_extent().overlaps(figure.legends[0].get_window_extent())
+
+
+def test_of_many_pulleys_those_with_torque_are_drawn(history):
+    regions = [f"{name} 2" for name in history["region"].values]
+    second = history.assign_coords(region=("position", regions))
+    second = second.assign(friction_force=1e-3 * second["friction_force"])
+    both = xr.concat([history, second.assign_coords(position=second["position"] + 1.0)], "position")
+    figure = wrap_figure([both])
+    assert [axes.get_title(loc="left") for axes in figure.axes[:2]] == ["driving pulley", "driven pulley"]
+    assert "without torque, not drawn: driving 2, driven 2" in figure.get_suptitle()
+    assert figure.axes[0].lines[0].get_marker() == "."  # of few places
 
 
 @pytest.mark.parametrize(

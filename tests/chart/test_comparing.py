@@ -164,9 +164,7 @@ def test_a_blunt_or_failed_reference_chooses_nothing(write_chart):
     )
     assert not any(result.chosen for result in blunt.methods)
     (failed,) = compared(load_chart(write_chart(computed("0.6 ms"))))
-    assert failed.verdict.startswith(
-        "none can be chosen: the reference failed at 1.2\u00a0ms: failed_numerics"
-    )
+    assert failed.verdict.startswith("none can be chosen: the reference failed at 1.2 ms: failed_numerics")
     assert not any(result.chosen for result in failed.methods)
 
 

@@ -131,7 +131,7 @@ def texts(figure):
 def test_what_failed_is_listed_under_the_panels(figure):
     assert "omitted: failed, the bell has cracked: soft hammer (2\u00a0ms)" in texts(figure)
     assert "reference: soft at 2\u00a0µs; its own error from a coarser one" in texts(figure)
-    assert "cheapest within all tolerances: clever at 0.1, 0.00022 core-s/s" in texts(figure)
+    assert "cheapest within all tolerances: clever at 0.1, 0.00022\u00a0core-s/s" in texts(figure)
 
 
 def test_the_legend_explains_all_signs(figure, comparison):

@@ -33,7 +33,7 @@ def test_a_chart_holds_every_run_that_it_needs(write_chart):
     soft = by_name["ringing-soft-2"]
     assert soft.role is Role.METHOD and soft.timed
     assert (soft.label, soft.key, soft.setting) == ("soft hammer", "step", 1e-6)
-    assert soft.setting_in_words == "1\u00a0µs"
+    assert soft.setting_in_words == "1 µs"
     assert soft.job.parameters["loudness"] == 20e-6 and soft.job.stepper == "soft"
     assert by_name["ringing-clever-1"].setting_in_words == "0.01"
     assert math.isinf(soft.until)

@@ -38,8 +38,8 @@ def test_run_status_gather_and_map_of_one_study(write_job, call, tmp_path):
     assert call("map", "out/x", "--at", "sheave_stiffness=3") == (0, ["map: out/x/map.png"], [])
     assert call("map", "out/x/results.nc", "--out", "y.png") == (0, ["map: y.png"], [])
     curve = "plot", "curve", "out/x", "vibrates", "--at", "sheave_stiffness=3"
-    assert call(*curve) == (0, ["picture: out/x/curve.png"], [])
-    for picture in ("out/x/map.png", "y.png", "out/x/curve.png"):
+    assert call(*curve) == (0, ["picture: out/x/curve_vibrates_sheave_stiffness=3.png"], [])
+    for picture in ("out/x/map.png", "y.png", "out/x/curve_vibrates_sheave_stiffness=3.png"):
         assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
 
 

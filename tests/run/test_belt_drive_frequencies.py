@@ -10,6 +10,8 @@ from cvt_hpc.models.belt_drive.transient import Transient
 # A belt that bends easily, for what bending curves a strand couples it to the pulleys; a heavy driven pulley, whose
 # own frequency on the belt, 6 Hz, is far below; v^2 / c^2 of 0.03
 SCENE = {
+    "elements": 48,
+    "amplitude_threshold": 0.01,
     "driving_speed": 200.0,
     "driven_inertia": 1.0,
     "bending_stiffness": 2.6e-3,

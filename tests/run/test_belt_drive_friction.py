@@ -22,6 +22,7 @@ SCENE = {
     "kinetic_friction": MU,
     "duration": 0.3,
     "longest_duration": 0.3,
+    "amplitude_threshold": 0.01,  # coarse elements shake the strands
 }
 
 

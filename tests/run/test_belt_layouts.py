@@ -9,14 +9,15 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.belt_drive.layout import layout
 from cvt_hpc.models.belt_drive.preload import length_at
-from cvt_hpc.models.belt_drive.pulleys import arms_energy
-from cvt_hpc.models.belt_drive.readings import Readings
+from cvt_hpc.models.belt_drive.pulleys import arms_energy, axes
+from cvt_hpc.models.belt_drive.readings import Reading, Readings, stored_energy
 from cvt_hpc.models.belt_drive.start import start
-from cvt_hpc.physics.belt_path import belt_path
+from cvt_hpc.physics.belt_path import belt_path, span_starts, tangents
 from cvt_hpc.simulation import simulate
 from cvt_hpc.variables import Status, Vibrates
 
-SHORT = {"duration": 0.25, "longest_duration": 0.25, "most_refinements": 0}
+# coarse elements shake the strands
+SHORT = {"duration": 0.25, "longest_duration": 0.25, "most_refinements": 0, "amplitude_threshold": 0.01}
 # a belt that bends easily around two large pulleys, and a tensioner that presses it inwards on its slack side
 PULLEYS = {
     "pulley_x": (0.0, 0.12, 0.24),
@@ -116,6 +117,29 @@ def test_a_given_spring_turns_the_arm_into_equilibrium(held, strut):
     assert abs(angle) > 5e-3
     assert state.wheels.angle[0, 0] == pytest.approx(angle, rel=0.02)
     assert found.mean_tension(released, state) == pytest.approx(tension(angle), rel=0.02)
+    # displacement counts from where the spans run: the arm's motion is none of theirs
+    moved = turned(where.drawn, pivot, float(state.wheels.angle[0, 0]))
+    starts, ends = tangents(moved.centre, moved.radius, moved.turn)
+    np.testing.assert_allclose(starts, span_starts(moved), atol=1e-12)
+    np.testing.assert_allclose(np.hypot(*(ends - starts).T), moved.spans, rtol=1e-12)
+    np.testing.assert_allclose(axes(released.pulleys, state.wheels.angle[0]), moved.centre, atol=1e-12)
+    chords = found.chords(released, state)
+    away = np.abs(Reading(found, released, state).displacement)
+    assert (away < 0.05 * np.abs(chords).max()).all() and np.abs(chords).max() > 2e-4
+
+
+def test_arms_store_energy(held):
+    """I w^2 / 2 of the speed; of the angle k angle^2 / 2, less what the spring's moment gives."""
+    _, _, drive, state = held
+    rest, count = stored_energy(drive, state), len(drive.pulleys.radius)
+    arms, (angle, rate) = drive.pulleys.arms, (0.01, 3.0)
+    state.wheels.speed[0, count] += rate
+    state.wheels.angle[0, 0] += angle
+    gained = stored_energy(drive, state) - rest
+    state.wheels.speed[0, count] -= rate
+    state.wheels.angle[0, 0] -= angle
+    expected = 0.5 * 2e-3 * rate**2 + 0.5 * 40.0 * angle**2 - float(arms.moment[0]) * angle
+    assert gained == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_belt_of_a_given_length_has_its_tension(held):
@@ -131,6 +155,7 @@ COURSES = {
     "profile_time": (0.0, 0.1),
     "speed_ripple": 5.0,
     "load": 8.0,
+    "load_profile": (0.5, 1.0),
 }
 
 
@@ -145,6 +170,8 @@ def test_a_drive_starts_from_rest_and_follows_its_courses(started):
     ramp = np.where(time < 0.1, 600.0 * time, 60.0 + 5.0 * np.sin(80.0 * np.pi * (time - 0.1)))
     np.testing.assert_allclose(started.driving_speed.values, ramp, rtol=1e-12)
     assert list(started.strand.values) == ["P1-P2", "P2-P3", "P3-P1"]
+    risen = time > 0.1  # rise_time; before, half of the load rises
+    np.testing.assert_allclose(started["load"].values[risen], 8.0, rtol=1e-12)
     first = started["speed_P3"].values[0]
     assert 0.0 <= first < 1.0 and started["speed_P3"].values[-1] == pytest.approx(ramp[-1], rel=0.1)
     # the tensioner's pulley turns the other way, by its radius
@@ -153,12 +180,17 @@ def test_a_drive_starts_from_rest_and_follows_its_courses(started):
 
 def test_powers_of_a_drive_with_a_tensioner_are_in_balance(started):
     assert started.status == Status.DONE and abs(float(started.power_residual)) < 4e-3
+    assert float(started.efficiency) == pytest.approx(1.0 - float(started.loss / started.driving_power))
     assert float(started.arm_loss) > 0.0 and float(started.arm_ripple[1]) > 1e-4
     assert np.isnan(started.arm_angle.values[[0, 2]]).all() and float(started.stop_share[1]) == 0.0
 
 
 def test_a_tensioner_evens_out_the_slack_spans(started):
     """Tension rises in the span that runs to the driving pulley; beside the tensioner it changes less."""
+    judged = started.isel(time=slice(started.sizes["time"] // 2, None))
+    for k, strand in enumerate(started.strand.values):
+        ripple = judged[f"tension_{strand}"].values.std()
+        assert float(started.tension_ripple[k]) == pytest.approx(ripple, rel=1e-3)
     slack, behind, tight = started.strand_tension.values
     assert tight - 0.5 * (slack + behind) == pytest.approx(8.0 / 0.1, rel=0.05)
     assert (started.tension_ripple.values[:2] < 0.8 * started.tension_ripple.values[2]).all()
@@ -204,6 +236,7 @@ def test_a_tensioner_that_turns_away_lets_the_belt_go():
     found = simulate(job(**SERPENTINE, **away), {})
     assert (found.status, found.vibrates) == (Status.DONE, Vibrates.SLIPS)
     assert "lifts off: it has not touched the P2 pulley" in str(found.reason.values)
+    assert list(found.lifted.values) == [0.0, 1.0, 0.0]
 
 
 @pytest.mark.parametrize(

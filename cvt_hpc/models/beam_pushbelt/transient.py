@@ -16,6 +16,7 @@ from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import belt as fields
 from cvt_hpc.models.pushbelt import transient as pushbelt
 from cvt_hpc.models.pushbelt.readings import Reading
+from cvt_hpc.models.sampled import MOST_UNSOLVED
 from cvt_hpc.multibody.rcm_beam import energies
 from cvt_hpc.variables import Status
 
@@ -35,8 +36,7 @@ class Transient(pushbelt.Transient):
 
     def _reached(self) -> tuple[np.ndarray, ...]:
         elements, ring = self._state.elements, self._state.ring
-        recorded = self._rows[: self.done], self._totals[: self.done]
-        return elements, ring.q, ring.u, *self._state[2:], *recorded
+        return elements, ring.q, ring.u, *self._state[2:], *self._recorded()
 
     def _elements(self) -> np.ndarray:
         return self._state.elements
@@ -57,7 +57,7 @@ class Transient(pushbelt.Transient):
         unsolved, flow = record["unsolved_share"], max(abs(record["driving_power"]), record["loss"])
         either = (self._most_damped() + pushbelt.OF_LOSS * record["loss"]) / flow
         most = either if self._method.theta <= 0.5 else np.inf
-        if not unsolved <= pushbelt.MOST_UNSOLVED:
+        if not unsolved <= MOST_UNSOLVED:
             why = f"{unsolved:.1%} of the steps were not solved, the last {self._fault()}"
         elif not -either <= record["power_residual"] <= most:
             why = f"the power balance is open by {record['power_residual']:.3g}, not by {either:.3g} or less"

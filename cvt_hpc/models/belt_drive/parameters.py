@@ -78,7 +78,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "bending_damping": not_negative(
             1.8e-3, "s", "damping of bending over its stiffness (Rayleigh's beta)", sensible=(1e-7, 1.0)
         ),
-        "elements": Parameter(48, "", "elements of the belt", minimum=8, maximum=2048),
+        "elements": Parameter(96, "", "elements of the belt", minimum=8, maximum=2048),
         "length_scatter": Parameter(
             0.12, "", "largest share by which the lengths of elements differ", minimum=0.0, maximum=0.5
         ),

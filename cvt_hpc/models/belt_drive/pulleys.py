@@ -290,6 +290,17 @@ def strut_lengths(arms: Arms, angle: np.ndarray) -> np.ndarray:
     return np.hypot(*(held - arms.struts.fixed).T)
 
 
+def axes(pulleys: Pulleys, angle: np.ndarray) -> np.ndarray:
+    """Axes with the arms at angles (A,) [rad] from where they are drawn, (P, 2) [m]."""
+    found = pulleys.centre.copy()
+    for p in np.flatnonzero(pulleys.arm >= 0):
+        a = pulleys.arm[p]
+        x, y = found[p] - pulleys.arms.pivot[a]
+        cosine, sine = np.cos(angle[a]), np.sin(angle[a])
+        found[p] = pulleys.arms.pivot[a] + [x * cosine - y * sine, x * sine + y * cosine]
+    return found
+
+
 def arms_energy(arms: Arms, angle: np.ndarray, rate: np.ndarray) -> float:
     """Kinetic and elastic energy of arms at angles and rates (A,) [J]; that of a spring is 0 as drawn."""
     beyond = angle - np.clip(angle, arms.lowest, arms.highest)

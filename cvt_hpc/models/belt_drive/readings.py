@@ -12,8 +12,9 @@ from cvt_hpc.models.belt_drive.along_belt import empty_line, empty_sample, read
 from cvt_hpc.models.belt_drive.contact import contact_slopes
 from cvt_hpc.models.belt_drive.drive import Drive, State
 from cvt_hpc.models.belt_drive.layout import Layout
-from cvt_hpc.models.belt_drive.pulleys import arms_energy
+from cvt_hpc.models.belt_drive.pulleys import arms_energy, axes
 from cvt_hpc.multibody.ancf_beam import energies
+from cvt_hpc.physics.belt_path import directions, span_starts, tangents
 from cvt_hpc.physics.nearest_on_path import way
 
 PROFILES = {
@@ -68,6 +69,18 @@ class Readings:
         self._slopes = contact_slopes(p["contact_points"])
         self.places = (np.arange(PLACES) + 0.5) * (path.path_length / PLACES)
 
+    def chords(self, drive: Drive, state: State) -> np.ndarray:
+        """Offset from the drawn spans to the present ones at the probes, (P p,) [m]."""
+        if not state.wheels.angle.size:
+            return np.zeros(self.probes.size)
+        path = self.drawn.path
+        starts, ends = tangents(axes(drive.pulleys, state.wheels.angle[0]), path.radius, path.turn)
+        forwards, right = directions(path.leaving), directions(path.leaving - 0.5 * np.pi)
+        away = np.stack([starts, ends]) - span_starts(path)
+        (first, last), (before, behind) = (away * forwards).sum(-1), (away * right).sum(-1)
+        share = (self.probes - path.ends[::2, None] - first[:, None]) / (last - first)[:, None]
+        return (before[:, None] + share * (behind - before)[:, None]).ravel()
+
     def mean_tension(self, drive: Drive, state: State) -> float:
         """Mean tension of all strands [N]."""
         return float(Reading(self, drive, state).strand_tensions.mean())
@@ -88,7 +101,7 @@ class Reading:
     Attributes
     ----------
     displacement : (P p,) array
-        At the probes, to the right of the belt's way [m].
+        At the probes, to the right of the belt's way, off the tangents of the pulleys on their arms [m].
     strand_tensions : (P,) array
         Means over the middle half of the strands [N].
     lifted : (P,) array
@@ -101,7 +114,8 @@ class Reading:
         belt, contacts = (drive.beam, state.chain), (drive.contact, state.touch)
         found, points = where._sample, (where._slopes, where.probes.ravel())
         where._read(where._way, *belt, *contacts, *points, where._line, found, sums)
-        self.displacement, self.strand_tensions, self._slip = found.displacement, found.tension, found.slip
+        self.strand_tensions, self._slip = found.tension, found.slip
+        self.displacement = found.displacement - where.chords(drive, state)
         self.lifted = found.largest <= 0.0
 
     def scalars(self) -> list[float]:
@@ -112,11 +126,12 @@ class Reading:
         found = [float(speeds[drawn.driven]), *self.strand_tensions, *slip]
         return [*found, *(speeds if len(speeds) > 2 else ()), *wheels.angle[0]]
 
-    def stored_energy(self) -> float:
-        """Kinetic and elastic energy of belt, driven pulleys and arms [J], without what contacts store."""
-        kinetic, elastic, _ = energies(self._drive.beam, self._state.chain.q, self._state.chain.v)
-        pulleys, wheels = self._drive.pulleys, self._state.wheels
-        count = len(pulleys.radius)
-        turning = 0.5 * (pulleys.inertia[1:] * wheels.speed[0, 1:count] ** 2).sum()
-        arms = arms_energy(pulleys.arms, wheels.angle[0], wheels.speed[0, count:])
-        return kinetic + elastic + float(turning) + arms
+
+def stored_energy(drive: Drive, state: State) -> float:
+    """Kinetic and elastic energy of belt, driven pulleys and arms [J], without what contacts store."""
+    kinetic, elastic, _ = energies(drive.beam, state.chain.q, state.chain.v)
+    pulleys, wheels = drive.pulleys, state.wheels
+    count = len(pulleys.radius)
+    turning = 0.5 * (pulleys.inertia[1:] * wheels.speed[0, 1:count] ** 2).sum()
+    arms = arms_energy(pulleys.arms, wheels.angle[0], wheels.speed[0, count:])
+    return kinetic + elastic + float(turning) + arms

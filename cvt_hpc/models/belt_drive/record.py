@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from cvt_hpc.models.belt_drive.transient import Transient
 
 # Measured on one core of an EPYC beside other work: core-seconds per element and step, and per sample
-STEP_COST, SAMPLE_COST = 2.5e-6, 4e-5
+STEP_COST, SAMPLE_COST = 1.8e-6, 5e-5
 
 DRIVE_MODES = 8
 
@@ -46,7 +46,8 @@ VARIABLES = (
     Variable("tension_ripple", ("strand",), "f8", "N", "standard deviation of that mean"),
     *shared("slip"),
     replace(
-        shared("speed_loss")[0], comment="1 - ratio x driven speed / driving speed, mean of whole belt turns"
+        shared("speed_loss")[0],
+        comment="1 - ratio x driven speed / driving speed, mean of whole belt turns or ripples of the speed",
     ),
     Variable(
         "expected_speed_loss",
@@ -69,14 +70,15 @@ VARIABLES = (
         ("strand", "half_waves"),
         "f8",
         "Hz",
-        "of a running beam under the strand's mean tension, pinned where tangents touch the pulleys",
+        "of a running beam under the strand's mean tension, pinned where tangents touch the pulleys; "
+        "arms at their mean angles",
     ),
     Variable(
         "drive_frequency",
         ("drive_mode",),
         "f8",
         "Hz",
-        "of strands, sticking arcs and driven pulleys together, linearised at the end",
+        "of strands, sticking arcs and driven pulleys together, linearised at the end; arms stand still",
     ),
     Variable(
         "answered_frequency",
@@ -88,14 +90,27 @@ VARIABLES = (
     Variable("arm_angle", ("pulley",), "f8", "rad", "mean rotation of the arm from where it is drawn"),
     Variable("arm_ripple", ("pulley",), "f8", "rad", "standard deviation of that rotation"),
     Variable("stop_share", ("pulley",), "f8", "1", "share of the judged part in which the arm is at a stop"),
+    Variable(
+        "lifted",
+        ("pulley",),
+        "f8",
+        "1",
+        "1 where the belt has left the pulley, which ends a run as slip does",
+    ),
     *shared("driven_speed_ripple"),
     Variable("friction_loss", ("pulley",), "f8", "W", "mean friction power of the belt on the pulley"),
     Variable("contact_loss", (), "f8", "W", "mean power of the contacts' normal damping"),
     replace(shared("belt_loss")[0], comment="mean power of the belt's damping along, across and in bending"),
     *shared("driving_power", "load_power", "storing_power", "loss", "power_residual"),
     Variable("arm_loss", (), "f8", "W", "mean power of the tensioners' dashpots"),
-    Variable("efficiency", (), "f8", "1", "what is left of driving_power for load and storing"),
-    Variable("turns", (), "i8", "1", "whole turns of the belt that speed_loss is the mean of"),
+    Variable("efficiency", (), "f8", "1", "what losses leave of the power put in"),
+    Variable(
+        "turns",
+        (),
+        "i8",
+        "1",
+        "whole turns of the belt that speed_loss is the mean of, about those with speed_ripple",
+    ),
     Variable("unsolved_share", (), "f8", "1", "share of steps that were not solved to the tolerance"),
     Variable("iterations", (), "f8", "1", "of Newton's method in a step, mean"),
 )
@@ -133,15 +148,22 @@ def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
 
 
 def judge(run: Transient) -> dict[str, Any]:
-    """The record of a run that has reached its end, or slipped through before, its cost apart.
+    """The record of a run that has reached its end, or lost its grip before, its cost apart.
 
     Parameters
     ----------
     run : Transient
-        With all samples recorded, or those until it slipped through.
+        With all samples recorded, or those until it slipped through or the belt left a pulley.
     """
     if run.failure is not None:
-        return judging.slipped_through(run)
+        return (
+            judging.slipped_through(run)
+            | _powers(run)
+            | {
+                "unsolved_share": run.unsolved_share,
+                "lifted": run.lifted.astype(float),
+            }
+        )
     found = judging.assess(run, run.drawn.spans, run.drawn.pulleys)
     return found.record() | evaluate(run, found.strongest_probe)
 
@@ -161,35 +183,39 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     dict
         Value by name.
     """
-    driving, load = run.mean_rate(fields.WORK_IN), run.mean_rate(fields.WORK_OUT)
-    contact, belt = run.mean_rate(fields.CONTACT_LOSS), run.mean_rate(fields.BELT_LOSS)
-    arm_loss, drawn = run.mean_rate(fields.ARM_LOSS), run.drawn
-    friction = np.array([run.mean_rate(fields.FRICTION_LOSS + k) for k in range(len(drawn.pulleys))])
-    storing = run.mean_rate(-1)
+    drawn, present, powers = run.drawn, run.present, _powers(run)
     work, tension = run.counters(), each(run, "tension", drawn.spans)
-    frequencies = strand_frequencies(run.parameters, run.path, tension)
+    frequencies = strand_frequencies(run.parameters, present.path, tension)
     return {
         **judging.motion(run, strongest_probe, drawn.pulleys),
         "spectrum": _spectrum(run),
         **_of_arms(run),
         "speed_loss": run.speed_loss(run.whole_turns),
-        "expected_speed_loss": expected_loss(run.parameters, drawn, tension),
+        "expected_speed_loss": expected_loss(run.parameters, present, tension),
         "creep_speed_loss": creep_loss(run.parameters, drawn),
         "strand_tension": tension,
         "eigenfrequency": frequencies,
         "drive_frequency": run.drive_frequencies(DRIVE_MODES),
         "answered_frequency": _answered(run, frequencies),
         "tension_ripple": np.array([run.channel(f"tension {k}")[run.judged].std() for k in drawn.spans]),
-        "friction_loss": friction,
-        "contact_loss": contact,
-        "belt_loss": belt,
-        "arm_loss": arm_loss,
-        **judging.power_balance(driving, load, contact + belt + arm_loss + friction.sum(), storing),
-        "efficiency": (load + storing) / driving if driving > 0.0 else np.nan,
+        **powers,
+        "efficiency": judging.efficiency(*(powers[key] for key in ("driving_power", "load_power", "loss"))),
+        "lifted": run.lifted.astype(float),
         "turns": run.turns,
-        "unsolved_share": work["unsolved"] / max(work["steps"], 1),
+        "unsolved_share": run.unsolved_share,
         "iterations": work["iterations"] / max(work["steps"], 1),
     }
+
+
+def _powers(run: Transient) -> dict[str, Any]:
+    """Mean powers of a run and their balance."""
+    driving, load = run.mean_rate(fields.WORK_IN), run.mean_rate(fields.WORK_OUT)
+    contact, belt = run.mean_rate(fields.CONTACT_LOSS), run.mean_rate(fields.BELT_LOSS)
+    arm = run.mean_rate(fields.ARM_LOSS)
+    friction = np.array([run.mean_rate(fields.FRICTION_LOSS + k) for k in range(len(run.drawn.pulleys))])
+    losses = {"friction_loss": friction, "contact_loss": contact, "belt_loss": belt, "arm_loss": arm}
+    loss = contact + belt + arm + friction.sum()
+    return losses | judging.power_balance(driving, load, loss, run.mean_rate(-1))
 
 
 def _of_arms(run: Transient) -> dict[str, np.ndarray]:
@@ -221,10 +247,10 @@ def _moved(run: Transient) -> np.ndarray:
 
 def _answered(run: Transient, expected: np.ndarray) -> np.ndarray:
     """Frequencies (strand, mode) [Hz] at which strands answer a kick; nan without one."""
-    moved = _moved(run)
-    before, after = moved[run.kick : run.first_judged], moved[run.judged]
-    if run.parameters["kick"] == 0.0 or len(before) < SHORTEST_SEGMENT:
+    if run.kicked is None or run.kicked.start - run.risen < SHORTEST_SEGMENT:
         return np.full(expected.shape, np.nan)
+    moved = _moved(run)
+    before, after = moved[run.risen : run.kicked.start], moved[run.kicked]
     rate = run.parameters["sampling_rate"]
     return np.array([answers(before[:, k], after[:, k], rate, modes) for k, modes in enumerate(expected)])
 
@@ -244,7 +270,7 @@ def histories(run: Transient) -> xr.Dataset:
     """
     from cvt_hpc.models.belt_drive.readings import PROFILES
 
-    comment = "mean over the middle half of the strand"
+    comment = "mean over the middle half of the strand, arms as drawn"
     over_time = {f"tension {k}": (f"tension {k}", "N", comment) for k in run.drawn.spans}
     names = [name for name in run.channels if name.startswith("speed ")]
     over_time |= {name: (name, "rad s-1", "in the belt's direction") for name in names}
@@ -253,9 +279,13 @@ def histories(run: Transient) -> xr.Dataset:
     profiles = {name: (values, *PROFILES[name]) for name, values in run.profiles.items()}
     tension = np.array([_late(run, f"tension {k}") for k in run.drawn.spans])
     sliding = sliding_tension(run.parameters, run.path, tension, run.places)
-    words = "tension where it slides", "N", "by Euler and Eytelwein, from the strands' tensions"
+    words = (
+        "tension where it slides",
+        "N",
+        "by Euler and Eytelwein, from the strands' tensions, arms as drawn",
+    )
     profiles["sliding_tension"] = sliding, *words
-    words = "wrap angle", "rad", "from the inlet of the arc"
+    words = "wrap angle", "rad", "from the inlet of the arc, arms as drawn"
     profiles["wrap_angle"] = wrap_angles(run.path, run.places), *words
     names = [name for pair in zip(run.drawn.pulleys, run.drawn.spans, strict=True) for name in pair]
     region = np.array(names)[regions(run.path, run.places)]

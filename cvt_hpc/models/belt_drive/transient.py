@@ -11,15 +11,24 @@ from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.belt_drive import courses
 from cvt_hpc.models.belt_drive.drive import advance
 from cvt_hpc.models.belt_drive.kick import kick
-from cvt_hpc.models.belt_drive.layout import layout
+from cvt_hpc.models.belt_drive.layout import Layout, layout
 from cvt_hpc.models.belt_drive.linearised import drive_frequencies
-from cvt_hpc.models.belt_drive.pulleys import Pulleys
-from cvt_hpc.models.belt_drive.readings import PLACES, PROFILES, Reading, Readings, scalars_of
+from cvt_hpc.models.belt_drive.mesh import mesh_amplitude
+from cvt_hpc.models.belt_drive.pulleys import Pulleys, axes
+from cvt_hpc.models.belt_drive.readings import (
+    PLACES,
+    PROFILES,
+    Reading,
+    Readings,
+    scalars_of,
+    stored_energy,
+)
 from cvt_hpc.models.belt_drive.start import start
 from cvt_hpc.models.marched import batches_of_one
-from cvt_hpc.models.sampled import SampledRun
+from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
+from cvt_hpc.physics.belt_path import belt_path
 from cvt_hpc.solvers.generalised_alpha import generalised_alpha
-from cvt_hpc.variables import Status
+from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, PULLEYS, STRANDS
 from cvt_hpc.variator.slip import GAINED, LOST
 
@@ -30,7 +39,6 @@ CHANNELS = (
     *(f"slip {pulley}" for pulley in PULLEYS),
 )
 MOST_LIFTED = 0.01  # [s] that a pulley may be without the belt
-MOST_UNSOLVED = 0.02  # of the steps
 MOST_OPEN = 0.02  # of the larger of drive and losses; sound runs leave up to 0.004, without load
 
 
@@ -48,7 +56,11 @@ class Transient(SampledRun):
     ----------
     drawn : Layout
         Pulleys and reference path.
+    kicked : slice or None
+        Samples from a kick to the end that the run then had.
     """
+
+    kicked: slice | None = None
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
         p = parameters
@@ -80,16 +92,18 @@ class Transient(SampledRun):
             Why the run ends here.
         """
         for _ in range(min(samples, self.samples - self.done)):
-            if self.done == self.first_judged and self.parameters["kick"] > 0.0:
+            if self.done == self.first_judged and self.parameters["kick"] > 0.0 and not self.kicked:
                 chain = self._state.chain
                 kick(self.path, self.parameters["line_mass"], self.parameters["kick"], chain.q, chain.v)
+                self.kicked = self.judged  # a run that is prolonged is not kicked again
             inputs = np.array([self._inputs(self.time), self._inputs(self.time + self.interval)])
             if not self._march(inputs):
                 self.failure = Status.FAILED_NUMERICS, "the equations of a step have no solution in numbers"
                 break
             self._take_sample()
             if (ended := self._slipped() or self._left()) is not None:
-                self.failure = Status.DONE, ended
+                self._totals[self.done - 1, -1] = stored_energy(self._drive, self._state)
+                self.failure = self._early_end(ended)
                 break
         return self.failure
 
@@ -118,13 +132,12 @@ class Transient(SampledRun):
         found = Reading(self._readings, self._drive, self._state, sums)
         time = self.time
         speed = self.driving_speed(time)
-        self._rows[self.done] = [*found.displacement, self.load(time), speed, *found.scalars()]
+        row = [*found.displacement, self.load(time), speed, *found.scalars()]
         self._lifted = np.where(found.lifted, self._lifted + 1, 0)
         stored = np.nan
-        if self.done in (self.whole_turns.start, self.samples - 1):
-            stored = found.stored_energy()
-        self._totals[self.done] = [*self._state.totals, stored]
-        self.done += 1
+        if self.done in (0, self.whole_turns.start - 1, self.samples - 1):
+            stored = stored_energy(self._drive, self._state)
+        self._keep(row, [*self._state.totals, stored])
 
     def _slipped(self) -> str | None:
         """Whether the driven pulley runs far from its speed without slip, where the drive is under way."""
@@ -137,12 +150,15 @@ class Transient(SampledRun):
             return LOST
         return GAINED if share > MOST_SPEED else None
 
+    @property
+    def lifted(self) -> np.ndarray:
+        """Whether the belt has left a pulley, (P,)."""
+        return self._lifted * self.interval > MOST_LIFTED
+
     def _left(self) -> str | None:
-        """Whether the belt has left a pulley."""
-        k = int(np.argmax(self._lifted))
-        if self._lifted[k] * self.interval <= MOST_LIFTED:
+        if not self.lifted.any():
             return None
-        name = self.drawn.pulleys[k]
+        name = self.drawn.pulleys[int(np.argmax(self._lifted))]
         return f"the belt lifts off: it has not touched the {name} pulley for {MOST_LIFTED:g} s"
 
     @property
@@ -171,9 +187,16 @@ class Transient(SampledRun):
 
     @property
     def whole_turns(self) -> slice:
-        """Samples of the last of these turns; of the judged part where there is none."""
-        first = self.samples - round(self.turns * self._turn)
-        return slice(first, self.samples) if self.turns else self.judged
+        """Samples of the last of these turns; of the judged part where there is none.
+
+        With a ripple of the speed they are whole periods of it, as near to whole turns as the judged part has
+        room for.
+        """
+        judged, count = self.samples - self.first_judged, self.turns * self._turn
+        if self.parameters["speed_ripple"] > 0.0:
+            period = 1.0 / (self.parameters["ripple_frequency"] * self.interval)
+            count = min(round((count or judged) / period), int(judged / period + 1e-9)) * period or count
+        return slice(self.samples - round(count), self.samples) if round(count) else self.judged
 
     @property
     def _turn(self) -> float:
@@ -181,9 +204,15 @@ class Transient(SampledRun):
         return self.path.path_length / (self._readings.belt_speed * self.interval)
 
     def mean_rate(self, total: int) -> float:
-        """Mean rate over whole turns of one of the totals, by its index; -1: of the stored energy."""
-        part = self._totals[self.whole_turns]
-        return float((part[-1, total] - part[0, total]) / ((len(part) - 1) * self.interval))
+        """Mean rate of one of the totals, by its index; -1: of the stored energy.
+
+        Over whole turns; of a run that ended before, over all that it has recorded.
+        """
+        first, last = max(self.whole_turns.start - 1, 0), self.samples - 1
+        if self.done < self.samples:
+            first, last = 0, self.done - 1
+        change = self._totals[last, total] - self._totals[first, total]
+        return float(change / ((last - first) * self.interval)) if last > first else np.nan
 
     @property
     def profiles(self) -> dict[str, np.ndarray]:
@@ -199,6 +228,19 @@ class Transient(SampledRun):
         return self.drawn.path
 
     @property
+    def present(self) -> Layout:
+        """Pulleys and path with the arms at their mean angles in the judged part."""
+        angles = [
+            self.channel(f"arm T{a + 1}")[self.judged].mean() for a in range(len(self.pulleys.arms.pivot))
+        ]
+        if not angles:
+            return self.drawn
+        path = self.path
+        return self.drawn._replace(
+            path=belt_path(axes(self.pulleys, np.array(angles)), path.radius, path.turn)
+        )
+
+    @property
     def places(self) -> np.ndarray:
         """Path coordinates of the profiles, (place,) [m]."""
         return self._readings.places
@@ -209,13 +251,23 @@ class Transient(SampledRun):
         Parameters
         ----------
         record : dict
-            With `unsolved_share` and `power_residual`.
+            With `unsolved_share`, `power_residual`, `vibrates`, `amplitude` and `strand_tension`.
         """
+        p = self.parameters
         unsolved, open_power = record["unsolved_share"], record["power_residual"]
         if not unsolved <= MOST_UNSOLVED:
             why = f"{unsolved:.1%} of the steps were not solved"
         elif not abs(open_power) <= MOST_OPEN:
             why = f"the power balance is open by {open_power:.3g}, not by at most {MOST_OPEN:g}"
+        elif record["vibrates"] in (Vibrates.YES, Vibrates.IRREGULAR) and (
+            record["amplitude"].max() < (shaken := mesh_amplitude(p, self.path, record["strand_tension"]))
+        ):
+            needed = p["elements"] * (shaken / p["amplitude_threshold"]) ** 0.25
+            why = (
+                f"the mesh alone may shake the belt by {shaken * 1e6:.3g} um: {np.ceil(needed):.0f} elements"
+            )
+            why += " or more tell whether it vibrates"
+            self.parameters = {**p, "most_refinements": 0}  # no shorter step would help
         else:
             return None
         return Status.FAILED_NUMERICS, why

@@ -122,7 +122,7 @@ class RecordedRun:
     def __init__(self, parameters: Mapping[str, Any], plan: Recording, sums: np.ndarray) -> None:
         self.parameters = parameters
         self.mesh, self.probes = plan.mesh, plan.probes
-        self.interval, self.samples, self.kick = plan.interval, plan.samples, plan.kick
+        self.interval, self.samples, self.risen = plan.interval, plan.samples, plan.kick
         self._plan, self._sums = plan, sums
         self._sensed = plan.sensing.matrix.shape[0]
 

@@ -141,7 +141,7 @@ def _evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
         "largest_push_force": largest,
         "idle_arc": np.array([idle[where == REGIONS.index(pulley)].mean() for pulley in PULLEYS]),
         "passing_frequency": mean(run, "passing_frequency"),
-        "unsolved_share": work["unsolved"] / max(work["steps"], 1),
+        "unsolved_share": run.unsolved_share,
         "iterations": work["iterations"] / max(work["steps"], 1),
     }
 

@@ -16,7 +16,7 @@ from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Reading, Reading
 from cvt_hpc.models.pushbelt.start import of_lanes, start, workspace
 from cvt_hpc.models.pushbelt.start_up import StartUps, fingerprint
 from cvt_hpc.models.pushbelt.step import advance
-from cvt_hpc.models.sampled import SampledRun
+from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
 from cvt_hpc.physics.geometry import driven_radius
 from cvt_hpc.variables import Status
 from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, STRANDS
@@ -35,7 +35,6 @@ OF_LOSS = 0.02  # [1]
 # that meet and leave an arc, and of thrust times belt speed, by step. Without vibration sound runs damp by up
 # to 85 % of these two.
 OF_ROTATION, OF_THRUST = 1.5, 10.0  # [1], [1/s]
-MOST_UNSOLVED = 0.02  # of the steps
 
 _start_ups = StartUps()
 forget = _start_ups.forget
@@ -106,7 +105,7 @@ class Transient(SampledRun):
                 break
             self._take_sample(inputs[1])
             if (slipped := self._slipped()) is not None:
-                self.failure = Status.DONE, slipped
+                self.failure = self._early_end(slipped)
                 break
             if self.done == self._start_up:
                 _start_ups.keep(self._start_up_key, self._reached())
@@ -128,8 +127,7 @@ class Transient(SampledRun):
 
     def _reached(self) -> tuple[np.ndarray, ...]:
         """Views of all that marching has changed so far, where nothing is judged yet."""
-        recorded = self._rows[: self.done], self._totals[: self.done]
-        return self._state.elements.data, *self._state[1:], *recorded
+        return self._state.elements.data, *self._state[1:], *self._recorded()
 
     def _march(self, inputs: np.ndarray, steps: int) -> int:
         return self._advance(self._belt, self._method, self._state, self._work, inputs, steps, self.step)
@@ -182,13 +180,12 @@ class Transient(SampledRun):
         found = Reading(self._readings, self._elements(), self._state.pulleys)
         speed, torque = inputs[fields.IN_SPEED], inputs[fields.IN_LOAD]
         load = torque / self.parameters["ratio"]
-        self._rows[self.done] = [*found.displacement(), load, speed, *found.scalars()]
         stored = np.nan
         if self.done >= self.first_judged:
             stored = self._stored_energy(found)
             self._sums += found.profiles()
-        self._totals[self.done] = [*self._state.totals, stored]
-        self.done += 1
+        row = [*found.displacement(), load, speed, *found.scalars()]
+        self._keep(row, [*self._state.totals, stored])
 
     def _elements(self) -> np.ndarray:
         """Fields of the elements in the order of the belt, (n, fields)."""
