@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from enum import IntEnum
+from textwrap import shorten
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -34,6 +36,26 @@ class Vibrates(IntEnum):
     UNDECIDED = 2
     SLIPS = 3
     IRREGULAR = 4
+
+
+LONGEST_REASON = 240  # bytes that a record keeps of the reason
+
+
+def shortened(reason: str, longest: int = LONGEST_REASON) -> str:
+    """Return a reason as `longest` bytes hold it: its first clauses, "...; and 2 more".
+
+    Of a single clause that is too long the first words stay.
+    """
+    clauses, left = reason.split("; "), 0
+    if told := re.fullmatch(r"and (\d+) more", clauses[-1]):
+        left = int(told[1])
+        clauses.pop()
+    for kept in range(len(clauses), 0, -1):
+        others = left + len(clauses) - kept
+        text = "; ".join([*clauses[:kept], *([f"and {others} more"] if others else [])])
+        if len(text.encode()) <= longest:
+            return text
+    return shorten(clauses[0], longest, placeholder=" ...")
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,11 @@ from cvt_hpc.errors import few_of, mismatch
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 from cvt_hpc.vibration.hysteresis import StartClass
 
+WITHOUT_RESULT = {  # in words, beside curves and spectra
+    OccurrenceClass.SLIPPING: "slips or lifts off",
+    OccurrenceClass.FAILED: "failed",
+    OccurrenceClass.NOT_RUN: "not run",
+}
 _MOST_NAMED = 6  # variables
 
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, value_text
 from cvt_hpc.analysis.cells import STYLES
-from cvt_hpc.analysis.classes import OccurrenceClass, check_results, occurrence_classes
+from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.error_axes import COLOURS, MARKERS
 from cvt_hpc.analysis.figures import WIDTH, draw, in_words, styled
 from cvt_hpc.errors import mismatch, one_line, unknown
@@ -24,13 +24,7 @@ from cvt_hpc.variables import Status
 HEIGHT = 3.8  # [inch]
 MOST_PANELS = 3  # side by side
 BESIDE = ("-", "--", ":", "-.")
-# of runs without a value: marks along the upper edge, which no curve has
-ABOVE = {
-    OccurrenceClass.SLIPPING: "slips or lifts off",
-    OccurrenceClass.FAILED: "failed",
-    OccurrenceClass.NOT_RUN: "not run",
-}
-MARKS = tuple(mark for mark in MARKERS if mark not in {STYLES[kind].mark for kind in ABOVE})
+MARKS = tuple(mark for mark in MARKERS if mark not in {STYLES[kind].mark for kind in WITHOUT_RESULT})
 LEGEND_LETTERS, HANDLE_LETTERS = 84, 8  # across the page, and what a handle with its space takes of them
 
 
@@ -203,8 +197,8 @@ def _draw_curves(
 
 
 def _mark_above(axes: Axes, x: np.ndarray, classes: np.ndarray) -> None:
-    """Marks on the upper edge for runs without a value, by what became of them."""
-    for kind, label in ABOVE.items():
+    """Marks on the upper edge, which no curve has, for runs without a value, by what became of them."""
+    for kind, label in WITHOUT_RESULT.items():
         if (inside := classes == kind).any():
             style, place = STYLES[kind], axes.get_xaxis_transform()
             marks = {"marker": style.mark, "color": style.ink, "ms": 7, "clip_on": False, "zorder": 5}

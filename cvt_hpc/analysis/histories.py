@@ -10,14 +10,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from cvt_hpc.analysis import history_panels as panels
 from cvt_hpc.analysis.figures import WIDTH, balanced, draw, styled
 from cvt_hpc.errors import InputError, one_line
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.shown import JOB_UNITS, POINT_UNITS, shown
-from cvt_hpc.variables import Status, Vibrates, flag_in_words
+from cvt_hpc.variables import Status, Vibrates, flag_in_words, shortened
 from cvt_hpc.vibration.settings import PARAMETERS
+
+LONGEST_REASON = 120  # letters, in the title: one or two strands
 
 LEFT, RIGHT, WHOLE = slice(0, 2), 2, slice(0, 3)  # columns of a panel
 
@@ -83,7 +86,10 @@ def history_figure(dataset: xr.Dataset) -> Figure:
     grid = figure.add_gridspec(len(rows), 3, height_ratios=heights)
     for i, (_, row) in enumerate(rows):
         for columns, draw_panel, what in row:
-            draw_panel(figure.add_subplot(grid[i, columns]), what)
+            axes = figure.add_subplot(grid[i, columns])
+            draw_panel(axes, what)
+            if columns == RIGHT:
+                axes.xaxis.set_major_locator(MaxNLocator(2))
     return figure
 
 
@@ -122,7 +128,7 @@ def _title(dataset: xr.Dataset) -> str:
         lines.append(f"answered by the {rung} run, of {float(dataset['simulated_seconds']):.3g} s")
     status = Status(int(dataset["status"])) if "status" in dataset else None
     reason = dataset["reason"].item() if "reason" in dataset else ""
-    reason = reason.decode() if isinstance(reason, bytes) else reason
+    reason = shortened(reason.decode() if isinstance(reason, bytes) else reason, LONGEST_REASON)
     if status is Status.DONE and "vibrates" in dataset:
         verdict = Vibrates(int(dataset["vibrates"]))
         lines.append(f"vibrates: {verdict.name.lower()}" + (f" ({reason})" if reason else ""))

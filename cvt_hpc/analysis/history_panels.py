@@ -21,19 +21,22 @@ Array = NDArray[np.float64]
 BIN_WIDTH = 5.0  # [Hz]
 CLOSE_UP = 0.01  # [s]: six periods at 600 Hz
 MOST_PEAKS = 3
-COLOURS = {"t1": "#b5460f", "t2": "#1f4e8c"}  # of like lightness, so line styles tell them apart in grey
+COLOURS = ("#d55e00", "#0072b2", "#cc79a7", "#009e73", "#333333")  # Okabe and Ito's, of strands and pulleys
 LINES = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))  # one for each probe of a strand, by default
 GROUPS = ("tension_", "speed_", "arm_")  # how the names of histories begin that share a panel
-_GROUP_COLOURS = ("#b5460f", "#1f4e8c", "#333333", "#2a7f62", "#8c5aa8")
 COURSES = ("driving_speed", "load")  # what a run may change
 FEEDS = {
-    "flank_feed": ("friction of the flanks", "#b5460f", "-"),
-    "stress_feed": ("push and tension", "#1f4e8c", "--"),
+    "flank_feed": ("friction of the flanks", "#d55e00", "-"),
+    "stress_feed": ("push and tension", "#0072b2", "--"),
     "damping_feed": ("damping, rings' friction", "#333333", ":"),
 }
 _OTHER_COLOUR = "#333333"
+_PAPER = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}
 _MARGINS = (0.1, 0.9)  # share of the frequencies from which on labels are on the left: first strand, others
 _LINEAR = 0.01  # of the largest feed: below it the axis is linear
+_FLAT = 0.1  # of the largest spectrum: where another one stays below it the axis is logarithmic
+_DEEPEST = 1e-3  # of the largest spectrum, on a logarithmic axis
+_APART = (0.15, 0.13)  # of the panel's width and height, between labels of peaks
 _HEADROOM = 1.45  # for a legend of one line
 
 
@@ -55,6 +58,8 @@ class Strand:
         Index of the first sample of the part that is judged; the number of samples where nothing is.
     band : (float, float)
         Where vibrations are looked for [Hz].
+    colour : str
+        Of the strand's lines.
     """
 
     name: str
@@ -63,6 +68,7 @@ class Strand:
     displacement: Array
     first_judged: int
     band: tuple[float, float]
+    colour: str
 
     @property
     def rate(self) -> float:
@@ -85,11 +91,6 @@ class Strand:
         if self.has_spectrum:
             return int(np.argmax(band_amplitude(self.judged, self.rate, self.band)))
         return int(np.argmax(np.ptp(self.displacement, axis=0)))
-
-    @property
-    def colour(self) -> str:
-        """Of the strand's lines."""
-        return COLOURS.get(self.name, _OTHER_COLOUR)
 
 
 def read_strands(dataset: xr.Dataset, judged_fraction: float, band: tuple[float, float]) -> list[Strand]:
@@ -120,7 +121,8 @@ def read_strands(dataset: xr.Dataset, judged_fraction: float, band: tuple[float,
     displacement = displacement[:length] - displacement[:length].mean(axis=0)
     labels = [str(label) for label in dataset["probe"].values]
     strands = []
-    for name in dict.fromkeys(label.split()[0] for label in labels if " arc " not in label):
+    names = dict.fromkeys(label.split()[0] for label in labels if " arc " not in label)
+    for k, name in enumerate(names):
         columns = [i for i, label in enumerate(labels) if label.split()[0] == name]
         strands.append(
             Strand(
@@ -130,6 +132,7 @@ def read_strands(dataset: xr.Dataset, judged_fraction: float, band: tuple[float,
                 displacement[:, columns],
                 length - round(judged_fraction * length),
                 band,
+                COLOURS[k % len(COLOURS)],
             )
         )
     return strands
@@ -144,9 +147,15 @@ def draw_displacement(axes: Axes, strand: Strand) -> None:
         title += ", judged part shaded"
     axes.plot(time, strand.displacement[:, strand.strongest], color=strand.colour, linewidth=0.6)
     # the belt seats itself by hundreds of um at the start, which would hide everything after it
-    seated = strand.displacement[time.size // 5 :, strand.strongest]
+    moved = strand.displacement[:, strand.strongest]
+    seated = moved[time.size // 5 :]
     margin = 0.1 * np.ptp(seated) or 1.0
-    axes.set(xlim=(time[0], time[-1]), ylim=(seated.min() - margin, seated.max() + margin))
+    lowest, highest = seated.min() - margin, seated.max() + margin
+    axes.set(xlim=(time[0], time[-1]), ylim=(lowest, highest))
+    if moved.min() < lowest or moved.max() > highest:
+        text = f"start cut off: {moved.min():.0f} to {moved.max():.0f} µm"
+        place = {"xycoords": "axes fraction", "va": "top", "fontsize": 7, "bbox": _PAPER}
+        axes.annotate(text.replace("-", "−"), (0.01, 0.97), **place)
     axes.set(xlabel="time [ms]", ylabel=f"{strand.name} [µm]")
     axes.set_title(title, loc="left", pad=3)
 
@@ -161,6 +170,9 @@ def draw_close_up(axes: Axes, strand: Strand) -> None:
         axes.plot(time, values, ls=LINES[i % len(LINES)], color=strand.colour, linewidth=1.2, label=place)
     axes.set(xlim=(time[0], time[-1]), xlabel="time [ms]")
     axes.legend(
+        title="probes from the inlet",
+        alignment="left",
+        title_fontsize=7,
         loc="lower left",
         bbox_to_anchor=(-0.05, 0.97),
         ncols=3,
@@ -174,36 +186,56 @@ def draw_close_up(axes: Axes, strand: Strand) -> None:
 
 def draw_spectra(axes: Axes, strands: list[Strand]) -> None:
     """Amplitude spectra of the strongest probes over the judged part, dominant peaks marked."""
-    top = 0.0
-    few = len(strands) <= 2  # of more, peaks at one frequency would cover each other's labels
-    for i, strand in enumerate(strands):
-        bins = np.arange(0.0, strand.band[1] + BIN_WIDTH / 2, BIN_WIDTH)
-        signal = strand.judged[:, strand.strongest]
-        spectrum = amplitude_spectrum(signal, strand.rate, bins)
-        label = strand.probes[strand.strongest]
-        axes.plot(bins, spectrum, ls=LINES[i % len(LINES)], color=strand.colour, linewidth=1.2, label=label)
+    bins = np.arange(0.0, strands[0].band[1] + BIN_WIDTH / 2, BIN_WIDTH)
+    signals = [strand.judged[:, strand.strongest] for strand in strands]
+    spectra = [amplitude_spectrum(x, s.rate, bins) for x, s in zip(signals, strands, strict=True)]
+    tops = [float(spectrum.max()) for spectrum in spectra]
+    top = max(tops)
+    if min(tops) < _FLAT * top:
+        axes.set(yscale="log", ylim=(_DEEPEST * top, 3.0 * top))
+    else:
+        axes.set_ylim(0, 1.1 * top or 1.0)
+    axes.set_xlim(0, strands[0].band[1])
+    marked = []
+    for i, (strand, signal, spectrum) in enumerate(zip(strands, signals, spectra, strict=True)):
+        label, line = strand.probes[strand.strongest], LINES[i % len(LINES)]
+        axes.plot(bins, spectrum, ls=line, color=strand.colour, linewidth=1.2, label=label)
         for frequency, amplitude in _peaks(signal, strand, bins, spectrum):
             axes.plot(frequency, amplitude, "v", color=strand.colour, markersize=5)
-            if not few:
-                continue
-            # strands often vibrate at one frequency: the first is labelled on the left, others right
-            is_left = frequency > _MARGINS[i > 0] * strand.band[1]
-            axes.annotate(
-                f"{frequency:.0f} Hz",
-                (frequency, amplitude),
-                xytext=(-5 if is_left else 5, 0),
-                textcoords="offset points",
-                ha="right" if is_left else "left",
-                va="center",
-                fontsize=8,
-                color=strand.colour,
-            )
-        top = max(top, spectrum.max())
-    axes.set(xlim=(0, strands[0].band[1]), ylim=(0, 1.1 * top or 1.0))
+            marked.append((amplitude, frequency, i))
+    _label_peaks(axes, strands, marked)
     axes.set(xlabel="frequency [Hz]", ylabel="amplitude [µm]")
-    axes.set_title("spectrum of the judged part", loc="left", pad=3)
+    axes.set_title("spectrum of the judged part", loc="left", pad=3 if len(strands) <= 2 else 18)
     place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.97), "ncols": len(strands)}
-    axes.legend(**(place if few else {"loc": "upper right"}), frameon=False)
+    axes.legend(**place, frameon=False, fontsize=9 if len(strands) <= 2 else 8)
+
+
+def _label_peaks(axes: Axes, strands: list[Strand], marked: list[tuple[float, float, int]]) -> None:
+    """Frequencies beside peaks (height, frequency, strand), the highest first, where none stands yet.
+
+    Of more than two strands each frequency is told once.
+    """
+    within = axes.transData - axes.transAxes
+    taken: list[tuple[float, float, float]] = []
+    for amplitude, frequency, i in sorted(marked, reverse=True):
+        # strands often vibrate at one frequency: the first is labelled on the left, others right
+        is_left = frequency > _MARGINS[i > 0] * strands[i].band[1]
+        x, y = within.transform((frequency, amplitude))
+        side = x + (-0.5 if is_left else 0.5) * _APART[0]
+        told = len(strands) > 2 and any(abs(x - other) < 0.01 for _, _, other in taken)
+        if told or any(abs(side - a) < _APART[0] and abs(y - b) < _APART[1] for a, b, _ in taken):
+            continue
+        taken.append((side, y, x))
+        axes.annotate(
+            f"{frequency:.0f} Hz",
+            (frequency, amplitude),
+            xytext=(-5 if is_left else 5, 0),
+            textcoords="offset points",
+            ha="right" if is_left else "left",
+            va="center",
+            fontsize=8,
+            color=strands[i].colour,
+        )
 
 
 def _peaks(signal: Array, strand: Strand, bins: Array, spectrum: Array) -> list[tuple[float, float]]:
@@ -241,8 +273,9 @@ def draw_group(axes: Axes, group: list[xr.DataArray]) -> None:
     for k, course in enumerate(group):
         factor, unit = coordinate_unit(course.attrs)
         kind, _, label = str(course.name).partition("_")
-        style = {"ls": LINES[k % len(LINES)], "color": _GROUP_COLOURS[k % len(_GROUP_COLOURS)]}
-        axes.plot(1e3 * course["time"].values, factor * course.values, label=label, linewidth=1.0, **style)
+        style = {"ls": LINES[k % len(LINES)], "color": COLOURS[k % len(COLOURS)]}
+        width = 0.8 + 0.5 * (len(group) - 1 - k)  # of two alike the upper one lets the lower one be seen
+        axes.plot(1e3 * course["time"].values, factor * course.values, label=label, linewidth=width, **style)
     axes.set(xlabel="time [ms]", ylabel=f"{kind} [{unit}]", xlim=1e3 * course["time"].values[[0, -1]])
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=len(group), frameon=False, fontsize=8)
 
@@ -250,7 +283,7 @@ def draw_group(axes: Axes, group: list[xr.DataArray]) -> None:
 def draw_forces(axes: Axes, dataset: xr.Dataset) -> None:
     """Ring tension and push force around the belt."""
     position = 1e3 * dataset["position"].values
-    styles = {"ring_tension": ("-", "#1f4e8c"), "push_force": ("--", "#b5460f")}
+    styles = {"ring_tension": ("-", "#0072b2"), "push_force": ("--", "#d55e00")}
     for name, (line, colour) in styles.items():
         if name in dataset:
             label = in_words(dataset[name])

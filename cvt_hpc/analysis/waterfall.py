@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis.arrangement import Ruler, along_x, arrange, ruler
 from cvt_hpc.analysis.cells import colours_of
-from cvt_hpc.analysis.classes import check_results, count_classes, occurrence_classes
+from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.figures import WIDTH, draw, styled
 from cvt_hpc.errors import few_of, mismatch, one_line
 
@@ -97,7 +97,8 @@ def waterfall_figure(
         lines.append("dashed: eigenfrequencies, with their half waves along the strand")
     if np.isnan(amplitude).any():
         unknown = occurrence_classes(shown).values[np.isnan(amplitude).any(axis=(0, 1))]
-        lines.append(f"grey: no spectrum, {count_classes(unknown)}")
+        words = [text for kind, text in WITHOUT_RESULT.items() if (unknown == kind).any()]
+        lines.append("grey: no spectrum" + (f" ({', '.join(words)})" if words else ""))
     figure.suptitle("\n".join(fill(line, 72) for line in lines))
     return figure
 

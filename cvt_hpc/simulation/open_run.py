@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.recording import longest_duration, sample_count
 from cvt_hpc.simulation.record import record_of, record_without_run
-from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.variables import LONGEST_REASON, Status, Vibrates, shortened
 from cvt_hpc.vibration.ramped import ramped
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ class OpenRun:
         if self._refinements and record["status"] == Status.FAILED_NUMERICS:
             remedy = f"; failed at {1 + self._refinements} steps down to {record['time_step']:.3g} s"
             remedy += _remedy(self._job, self._point)
-            self.record["reason"] = record["reason"][: 240 - len(remedy)] + remedy
+            self.record["reason"] = shortened(record["reason"], LONGEST_REASON - len(remedy)) + remedy
 
     def _finer(self, run: Any) -> dict[str, Any] | None:
         """The point at half the step of a run; None where it has no step, or has been refined enough."""

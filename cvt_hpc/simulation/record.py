@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.models.contract import Model, Run, load_model
-from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+from cvt_hpc.variables import LONGEST_REASON, Coordinate, Status, Variable, Vibrates, shortened
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
@@ -19,7 +19,7 @@ _VERDICT = (
     Variable(
         "vibrates", (), "i1", "", "whether the belt vibrates; has a meaning where status is done", Vibrates
     ),
-    Variable("reason", (), "S240", "", "why the run failed, or was found to vibrate or not"),
+    Variable("reason", (), f"S{LONGEST_REASON}", "", "why the run failed, or was found to vibrate or not"),
 )
 _COST = (
     Variable(
@@ -104,7 +104,7 @@ def record_of(
             failure = run.numerical_doubt(record)
     if failure is not None and failure[0] is not Status.DONE:
         status, why = failure
-        record = _blank(job) | {"status": status, "reason": f"at {run.time * 1e3:.4g} ms: {why}"[:240]}
+        record = _blank(job) | {"status": status, "reason": shortened(f"at {run.time * 1e3:.4g} ms: {why}")}
     return record | {
         "core_seconds": marched + time.process_time() - started,
         "simulated_seconds": run.time,

@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.variables import Vibrates
+from cvt_hpc.variables import Vibrates, shortened
 from cvt_hpc.variator import PULLEYS, STRANDS
 from cvt_hpc.variator.slip import slid, speed_loss, with_slip
 from cvt_hpc.variator.variables import frequency_bins
 from cvt_hpc.vibration import assessment, ramp
-from cvt_hpc.vibration.occurrence import LONGEST_REASON
 from cvt_hpc.vibration.ramped import ramped
 from cvt_hpc.vibration.signals import amplitude_spectrum
 
@@ -72,7 +71,7 @@ def slipped(run: Any) -> dict[str, Any]:
     found = slipped_through(run)
     before = _assess_ramp(run) if ramped(run.parameters) else None
     if before is not None:
-        reason = f"{found['reason']}; before: {before.reason}"[:LONGEST_REASON]
+        reason = shortened(f"{found['reason']}; before: {before.reason}")
         found = before.record() | found | {"reason": reason}
     return found | slid(run)
 

@@ -32,10 +32,9 @@ from cvt_hpc.physics.capacity import torque_limit
 from cvt_hpc.physics.friction import FrictionLaw, friction_coefficients, given_law
 from cvt_hpc.physics.friction_laws import TABLE_PARAMETERS
 from cvt_hpc.physics.geometry import Variator
-from cvt_hpc.variables import Variable, Vibrates
+from cvt_hpc.variables import Variable, Vibrates, shortened
 from cvt_hpc.variator import GROSS_SLIP, LEAST_SPEED, MOST_SPEED, PULLEYS
 from cvt_hpc.vibration.assessment import Occurrence
-from cvt_hpc.vibration.occurrence import LONGEST_REASON
 
 LOST = f"the belt slips through: the driven pulley has lost {1 - LEAST_SPEED:.0%} of its speed"
 GAINED = f"the belt slips through: the driven pulley has gained {MOST_SPEED - 1:.0%} of its speed"
@@ -122,7 +121,7 @@ def with_slip(run: Any, found: Occurrence, pulleys: Sequence[str] = PULLEYS) -> 
     if beyond <= 0.0:
         return replace(found, margin=min(found.margin, -beyond))
     reason = f"the {pulleys[k]} pulley slips by {abs(slips[k]):.3g} of the belt's speed; {found.reason}"
-    return replace(found, vibrates=Vibrates.SLIPS, reason=reason[:LONGEST_REASON], margin=beyond)
+    return replace(found, vibrates=Vibrates.SLIPS, reason=shortened(reason), margin=beyond)
 
 
 def slide(run: Any) -> slice:

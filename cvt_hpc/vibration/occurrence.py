@@ -20,13 +20,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtrit
 
-from cvt_hpc.variables import Vibrates
+from cvt_hpc.variables import Vibrates, shortened
 from cvt_hpc.vibration.irregularity import is_irregular, is_stationary
 
 CONFIDENCE = 0.975  # one-sided, by Student's t: few windows know their own scatter badly
 STEADY_LOSS = 0.05  # e-folds over the judged part that a settled vibration may lose, scatter apart
 LEAST_RISES = 3  # windows in a row, none below the one before: irregular motion does that once in 24 times
-LONGEST_REASON = 240  # bytes that a record keeps of the reason
 
 
 def classify(
@@ -60,7 +59,7 @@ def classify(
         YES if a strand vibrates, UNDECIDED where a longer run may tell, IRREGULAR where it would not, NO if
         all strands are quiet.
     str
-        The reason, in one line.
+        The reason, in one line, the strongest strand first.
 
     Raises
     ------
@@ -70,13 +69,15 @@ def classify(
     windows = np.asarray(amplitudes, dtype=float)
     if windows.ndim != 2 or len(windows) == 0 or not np.all(np.isfinite(windows)):
         raise ValueError("expected finite amplitudes of one window or more, shape (window, strand)")
+    each = list(zip(strands, windows.T, growth_rate, growth_error, strict=True))
+    each.sort(key=lambda strand: -strand[1][-1])  # of a long reason the first ones stay
     judged = {
         name: _judge_strand(strand, rate, error, judged_time, record_time, parameters)
-        for name, strand, rate, error in zip(strands, windows.T, growth_rate, growth_error, strict=True)
+        for name, strand, rate, error in each
     }
     left_open = [
         strand
-        for strand, (vibrates, _) in zip(windows.T, judged.values(), strict=True)
+        for (_, strand, *_), (vibrates, _) in zip(each, judged.values(), strict=True)
         if vibrates is Vibrates.UNDECIDED
     ]
     order = [Vibrates.YES, Vibrates.UNDECIDED, Vibrates.IRREGULAR, Vibrates.NO]
@@ -85,7 +86,7 @@ def classify(
     for outcome in order:
         told = [f"{name} {text}" for name, (vibrates, text) in judged.items() if vibrates is outcome]
         if told:
-            return outcome, "; ".join(told)[:LONGEST_REASON]
+            return outcome, shortened("; ".join(told))
     raise ValueError("expected one strand or more")
 
 

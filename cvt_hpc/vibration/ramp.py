@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cvt_hpc.variables import Coordinate, Variable, Vibrates
+from cvt_hpc.variables import Coordinate, Variable, Vibrates, shortened
 from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.assessment import Occurrence
-from cvt_hpc.vibration.occurrence import LEAST_RISES, LONGEST_REASON
+from cvt_hpc.vibration.occurrence import LEAST_RISES
 from cvt_hpc.vibration.ramped import QUANTITIES, Quantity
 from cvt_hpc.vibration.settings import SHORTEST_SEGMENT, fitting_window
 
@@ -199,7 +199,7 @@ class Passages:
             onset, end = self.ends()
             since = "the ramp's start" if np.isnan(onset) else self._in_words(onset)
             until = "its end" if np.isnan(end) else self._in_words(end)
-            return Vibrates.YES, f"{who} from {since} to {until}, {top}"[:LONGEST_REASON]
+            return Vibrates.YES, shortened(f"{who} from {since} to {until}, {top}")
         place = f"between {self.quantity.factor * self.at[0]:.4g} and {self._in_words(self.at[-1])}"
         above = int((self.levels >= self.threshold).any(axis=1).sum())
         if above:

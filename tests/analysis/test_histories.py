@@ -16,7 +16,7 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import load_job
 from cvt_hpc.netcdf import is_history, write_history
 from cvt_hpc.printing import point_lines
-from cvt_hpc.variables import Status
+from cvt_hpc.variables import Status, shortened
 from support.runs import PROBES, RATE, run
 
 BAND = (100.0, 1500.0)
@@ -277,7 +277,7 @@ def test_labels_stay_within_the_spectrum(frequency):
     figure = history_figure(at_the_edge)
     figure.draw_without_rendering()
     spectrum = panel(figure, "amplitude [µm]")
-    assert len(spectrum.texts) == 2
+    assert len(spectrum.texts) == 1  # both strands at one place
     for box in boxes(spectrum.texts):
         assert box.x0 > spectrum.bbox.x0 and box.x1 < spectrum.bbox.x1
 
@@ -326,6 +326,36 @@ def test_pictures_are_small_in_every_format(suffix, tmp_path):
     assert out.stat().st_size < 300_000
     with pytest.raises(InputError, match="found no suffix"):
         draw_history(run(), tmp_path / "run")
+
+
+def test_spans_of_many_pulleys_are_told_apart():
+    time, names = run()["time"].values, [f"P{k}-P{k + 1} 1" for k in range(1, 6)]
+    sizes = 10e-6 * 10.0 ** -np.arange(5.0)
+    moved = sizes * np.sin(2 * np.pi * 560 * time)[:, np.newaxis]
+    moved[0] = 1e-3
+    dataset = xr.Dataset({"displacement": (("time", "probe"), moved)}, {"time": time, "probe": names})
+    for k in range(5):
+        dataset[f"speed_P{k + 1}"] = ("time", np.ones(time.size), {"units": "rad s-1"})
+    figure = history_figure(dataset)
+    spectrum, speed = panel(figure, "amplitude [µm]"), panel(figure, "speed [rpm]")
+    lines = [line for line in spectrum.lines if line.get_label() in names]
+    assert len({line.get_color() for line in lines}) == 5 and spectrum.get_yscale() == "log"
+    assert [text.get_text() for text in spectrum.texts] == ["560 Hz"]
+    widths = [line.get_linewidth() for line in speed.lines]
+    assert (np.diff(widths) < 0.0).all()  # each lies narrower upon those before
+    assert panel(figure, "P1-P2 [µm]").texts[0].get_text().startswith("start cut off: ")
+
+
+def test_a_long_reason_is_shortened_by_whole_clauses():
+    clauses = [
+        f"P{k}-P{k + 1} vibrates for the last 0.35 s, 889 um at the end, growth -0.064 1/s" for k in range(5)
+    ]
+    stored = shortened("; ".join(clauses))
+    assert stored == "; ".join([*clauses[:3], "and 2 more"])
+    assert shortened(stored, 100) == f"{clauses[0]}; and 4 more"
+    assert shortened(clauses[0], 30) == "P0-P1 vibrates for the ..."
+    title = history_figure(run().assign(reason=stored.encode())).get_suptitle()
+    assert " ".join(title.replace("\u00a0", " ").split()).endswith(f"({clauses[0]}; and 4 more)")
 
 
 def test_probes_are_grouped_by_strand():

@@ -9,7 +9,7 @@ from cvt_hpc.models.auto.rules import COARSENESS, SHARE, Rung, coarse, is_clear,
 from cvt_hpc.models.elastic_belt import grouping
 from cvt_hpc.models.elastic_belt import record as belt_record
 from cvt_hpc.models.elastic_belt.record import coordinates, lane_key
-from cvt_hpc.variables import Status, Variable, Vibrates
+from cvt_hpc.variables import Status, Variable, Vibrates, shortened
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,7 +88,7 @@ def settle(run: RecordedRun) -> dict[str, Any] | None:
         return None
     values = _values(run, found, Rung.COARSE)
     if not is_clear(run.parameters, found):
-        reason = f"too close for a coarse run: {found.reason}"[:240]
+        reason = shortened(f"too close for a coarse run: {found.reason}")
         values |= {"vibrates": Vibrates.UNDECIDED, "reason": reason}
     return values
 
