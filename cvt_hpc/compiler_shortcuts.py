@@ -1,8 +1,10 @@
 """Work that the compiler repeats while it compiles kernels, done once: same machine code, in less time.
 
 Each shortcut takes the place of a function of numba for as long as a kernel is compiled, and calls it where
-that has something to do. Kernels are long, as others are merged into them: what the compiler does for each
-statement and each variable takes longer than the rest.
+that has something to do. They are in force for the whole process: threads must not compile at the same time.
+
+Kernels are long, as others are merged into them: what the compiler does for each statement and each variable
+takes longer than the rest.
 """
 
 from __future__ import annotations

@@ -38,7 +38,8 @@ _KNOWN_OF_FAILURES = (
     "contact_solves",
 )
 _FLAGS_FIRST = ("status", "vibrates", "reason")
-_LARGEST_LINE = 4  # values: one per strand or pulley, but no spectrum and no history
+_ALWAYS_SHOWN = {"strand", "pulley"}
+_LARGEST_LINE = 4  # values along other dimensions: no spectrum and no history
 
 
 def report_lines(report: RunReport) -> Iterator[str]:
@@ -60,7 +61,7 @@ def _special_in_words(counted: RunReport | StudyStatus) -> str:
 
 def repeat_line(repeat: Repeat) -> str:
     """Return what doing a sample of the runs again is expected to cost."""
-    runs = round(repeat.fraction * repeat.first.size)
+    runs = max(round(repeat.fraction * repeat.first.size), 1)
     at_most = "at most" if repeat.first.design else "about"
     cost = cost_in_words(repeat.core_seconds(), runs)
     return f"{repeat.label}: {at_most} {runs} runs again {repeat.way}, estimated cost: {cost}"
@@ -152,6 +153,14 @@ def _deviation_lines(found: Comparison) -> Iterator[str]:
             yield (
                 f"{name} where both vibrate ({both} cells): B deviates by {deviation.median:.2%} (median), "
                 f"{deviation.high:.2%} (95 %), {deviation.largest:.2%} (largest)"
+            )
+    for name, unit in found.quantities.items():
+        deviation = found.deviation(name)
+        if not math.isnan(deviation.median):
+            largest = f"{found.largest_difference(name):.3g} {'' if unit == '1' else unit}".rstrip()
+            yield (
+                f"{name} where both have ended: B deviates by {deviation.median:.2%} (median), "
+                f"{deviation.high:.2%} (95 %), {deviation.largest:.2%} (largest); at most {largest}"
             )
 
 
@@ -254,7 +263,9 @@ def outcome_lines(dataset: xr.Dataset) -> Iterator[str]:
     names = [
         str(name)
         for name, array in dataset.data_vars.items()
-        if array.ndim <= 1 and 0 < array.size <= _LARGEST_LINE and array.notnull().any()
+        if array.ndim <= 1
+        and (set(array.dims) <= _ALWAYS_SHOWN or array.size <= _LARGEST_LINE)
+        and array.notnull().any()
     ]
     if int(dataset["status"]) != Status.DONE:
         names = [name for name in names if name in _KNOWN_OF_FAILURES]
@@ -273,5 +284,6 @@ def _array_in_words(array: xr.DataArray) -> str:
         value = array.item()
         return f"{value:.6g} {unit}".rstrip() if isinstance(value, float) else f"{value} {unit}".rstrip()
     (dimension,) = array.dims
-    places = zip(array[dimension].values, array.values, strict=True)
+    known = array[array.notnull()]
+    places = zip(known[dimension].values, known.values, strict=True)
     return f"{', '.join(f'{place} {value:.6g}' for place, value in places)} {unit}".rstrip()

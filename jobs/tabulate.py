@@ -6,6 +6,7 @@ from itertools import product
 import numpy as np
 
 from cvt_hpc import open_results
+from cvt_hpc.errors import InputError, unknown
 
 OF_A_BELT = ("amplitude", "frequency", "mode", "power_residual")
 # unit, factor and digits of quantities that are not written in SI units, to six digits
@@ -23,6 +24,9 @@ def rows(results, quantities=OF_A_BELT):
     """Yield the lines, one per run: axes, status, verdict, and the quantities, per strand and the like."""
     dims = results["status"].dims
     axes = [str(name) for name, values in results.coords.items() if set(values.dims) <= set(dims)]
+    for name in quantities:
+        if name not in results.data_vars:
+            raise unknown(name, "variable", name, map(str, results.data_vars))
     columns = [column for name in quantities for column in _columns(results[name], dims)]
     yield ",".join([*axes, "status", "vibrates", *(head for head, *_ in columns), "core_seconds"])
     words = {name: results[name].attrs["flag_meanings"].split() for name in ("status", "vibrates")}
@@ -60,5 +64,10 @@ def _number(value):
 
 if __name__ == "__main__":
     folder, table, *asked = sys.argv[1:]
-    with open_results(folder) as results, open(table, "w", encoding="utf-8") as out:
-        out.writelines(f"{row}\n" for row in rows(results.load(), asked or OF_A_BELT))
+    try:
+        with open_results(folder) as results:
+            lines = [f"{row}\n" for row in rows(results.load(), asked or OF_A_BELT)]
+    except InputError as error:
+        sys.exit(f"tabulate.py: {error}")
+    with open(table, "w", encoding="utf-8") as out:
+        out.writelines(lines)

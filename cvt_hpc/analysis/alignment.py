@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Hashable, Iterable
+from collections.abc import Collection, Hashable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from cvt_hpc.errors import InputError, did_you_mean, mismatch
 from cvt_hpc.job.shown import shown
 from cvt_hpc.study.job_difference import flatten
 
-COMPARED = ("status", "vibrates", "amplitude", "frequency")
+COMPARED = ("status", "vibrates", "amplitude", "frequency")  # beside what a model adds
 
 
 class Aligned(NamedTuple):
@@ -25,7 +25,8 @@ class Aligned(NamedTuple):
     Attributes
     ----------
     a, b : Dataset
-        Those of COMPARED that each study has, in memory, over the same runs in the same order.
+        Those of COMPARED and of the names asked for that each study has, in memory, over the same runs in
+        the same order.
     left_out : (int, int)
         Number of runs of A and of B that the other study does not have.
     notes : tuple of str
@@ -38,7 +39,7 @@ class Aligned(NamedTuple):
     notes: tuple[str, ...]
 
 
-def align(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str]) -> Aligned:
+def align(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str], names: Collection[str] = ()) -> Aligned:
     """Return the common runs of two studies.
 
     Parameters
@@ -47,6 +48,8 @@ def align(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str]) -> Aligned:
         Results of either study, both over a grid or both of samples.
     sources : (str, str)
         Where they are from, for the errors.
+    names : collection of str
+        Variables to be kept beside COMPARED.
 
     Raises
     ------
@@ -63,7 +66,7 @@ def align(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str]) -> Aligned:
     reduced = []
     notes: list[str] = []
     for one, other, labels, places in ((a, b, "AB", sources), (b, a, "BA", sources[::-1])):
-        one = one[[name for name in COMPARED if name in one]]
+        one = one[[name for name in (*COMPARED, *names) if name in one]]
         reduced.append(_reduced(one, other, labels, places, notes))
     one, other = (_at_common_samples if is_sampled(a) else _on_common_grid)(reduced[0], reduced[1], sources)
     common = one["status"].size

@@ -1,4 +1,4 @@
-"""Two studies against each other, cell by cell: which classes contradict, how far amplitudes deviate."""
+"""Two studies against each other, cell by cell: which classes contradict, how far numbers deviate."""
 
 from __future__ import annotations
 
@@ -15,10 +15,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.alignment import align, axes_of, job_of
+from cvt_hpc.analysis.alignment import COMPARED, align, axes_of, job_of
 from cvt_hpc.analysis.classes import at_strongest_strand, occurrence_classes
 from cvt_hpc.files import written_aside
 from cvt_hpc.job.shown import heading, shown, shown_number
+from cvt_hpc.models import MODELS
+from cvt_hpc.models.contract import load_model
 from cvt_hpc.study.job_difference import differences, short
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.agreement import (
@@ -43,7 +45,7 @@ _HEAD = (
 
 
 class Deviation(NamedTuple):
-    """How far B deviates from A where both vibrate, relative to A; not a number where nothing is known.
+    """How far B deviates from A, relative to A; not a number where nothing is known.
 
     Attributes
     ----------
@@ -71,6 +73,8 @@ class Cell(NamedTuple):
         The class that both have, or a `PairClass`.
     amplitude, frequency : (float, float)
         In A and in B [m, Hz].
+    quantities : dict
+        Further values in A and in B by name [SI].
     """
 
     at: dict[str, Any]
@@ -79,6 +83,7 @@ class Cell(NamedTuple):
     pair: int
     amplitude: tuple[float, float]
     frequency: tuple[float, float]
+    quantities: dict[str, tuple[float, float]]
 
     @property
     def pair_label(self) -> str:
@@ -95,7 +100,8 @@ class Comparison:
     cells : Dataset
         Over the axes of A: `class_a`, `class_b`, values of `OccurrenceClass`; `occurrence_class`, as
         `classify_pairs` has it; `amplitude_a`, `amplitude_b` [m] and `frequency_a`,
-        `frequency_b` [Hz] at the strand with the largest amplitude, not a number where unknown.
+        `frequency_b` [Hz] at the strand with the largest amplitude, not a number where unknown; and
+        `QUANTITY_a`, `QUANTITY_b` of `quantities`.
     thresholds : (float, float)
         Amplitude from which a strand of A and of B vibrates [m]; not a number where a job has none.
     left_out : (int, int)
@@ -104,6 +110,9 @@ class Comparison:
         Which axes were reduced, in words.
     differences : tuple of str
         In what the jobs and the versions of the program differ, in words.
+    quantities : dict
+        Units of what the model has compared beside amplitude and frequency, by name: of a variable along
+        strands or pulleys that with the label of the place, such as "strand_tension_t1".
     """
 
     cells: xr.Dataset
@@ -111,6 +120,7 @@ class Comparison:
     left_out: tuple[int, int]
     notes: tuple[str, ...]
     differences: tuple[str, ...]
+    quantities: dict[str, str]
 
     @property
     def pairs(self) -> NDArray[np.int8]:
@@ -140,14 +150,20 @@ class Comparison:
         return {(of_a, of_b): int(((a == of_a) & (b == of_b)).sum()) for of_a, of_b in kinds}
 
     def deviation(self, name: str) -> Deviation:
-        """Return how far `name`, "amplitude" or "frequency", of B deviates where both vibrate."""
-        both = self.pairs == OccurrenceClass.VIBRATING
+        """Return how far B deviates: "amplitude", "frequency" where both vibrate, others where both end."""
+        both = self.answered if name in self.quantities else self.pairs == OccurrenceClass.VIBRATING
         a, b = (self.cells[f"{name}_{study}"].values[both] for study in "ab")
-        deviations = np.abs(b / a - 1.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            deviations = np.abs(b / a - 1.0)
         known = deviations[np.isfinite(deviations)]
         if not known.size:
             return Deviation(math.nan, math.nan, math.nan)
         return Deviation(float(np.median(known)), float(np.quantile(known, 0.95)), float(known.max()))
+
+    def largest_difference(self, name: str) -> float:
+        """Return the largest magnitude of B - A of one of `quantities` [SI] where both end; 0 of none."""
+        a, b = (self.cells[f"{name}_{study}"].values[self.answered] for study in "ab")
+        return float(np.nan_to_num(np.abs(b - a), posinf=0.0).max(initial=0.0))
 
     def rows(self, chosen: NDArray[np.bool_]) -> Iterator[Cell]:
         """Yield the cells that an array of bool marks, shape of the grid."""
@@ -165,6 +181,7 @@ class Comparison:
                 found["occurrence_class"],
                 (found["amplitude_a"], found["amplitude_b"]),
                 (found["frequency_a"], found["frequency_b"]),
+                {name: (found[f"{name}_a"], found[f"{name}_b"]) for name in self.quantities},
             )
 
 
@@ -181,7 +198,7 @@ def compare(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str] = ("A", "B"))
     InputError
         As of `align`.
     """
-    aligned = align(a, b, sources)
+    aligned = align(a, b, sources, _compared(a, b))
     thresholds = _threshold(a), _threshold(b)
     known = [_known(dataset) for dataset in (aligned.a, aligned.b)]
     near = is_near(*(found["amplitude"] / least for found, least in zip(known, thresholds, strict=True)))
@@ -190,8 +207,32 @@ def compare(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str] = ("A", "B"))
               for name, array in found.items()}  # fmt: skip
     values |= {"status": frame.values}
     values |= {"occurrence_class": classify_pairs(values["class_a"], values["class_b"], near)}
+    quantities = [_quantities(dataset) for dataset in (aligned.a, aligned.b)]
+    common = {name: unit for name, (_, unit) in quantities[0].items() if name in quantities[1]}
+    for study, found in zip("ab", quantities, strict=True):
+        values |= {f"{name}_{study}": found[name][0] for name in common}
     cells = xr.Dataset({name: frame.copy(data=array) for name, array in values.items()})
-    return Comparison(cells, thresholds, aligned.left_out, aligned.notes, tuple(_differences(a, b)))
+    return Comparison(cells, thresholds, aligned.left_out, aligned.notes, tuple(_differences(a, b)), common)
+
+
+def _compared(*studies: xr.Dataset) -> list[str]:
+    """Variables that the models of the studies have compared."""
+    models = [name for study in studies if (name := job_of(study).get("model")) in MODELS]
+    return list(dict.fromkeys(name for model in models for name in load_model(model).compared))
+
+
+def _quantities(dataset: xr.Dataset) -> dict[str, tuple[NDArray, str]]:
+    """Values and unit of each number that is compared beside COMPARED, by its name with its place."""
+    dims = dataset["status"].dims
+    found = {}
+    for name, array in dataset.drop_vars(COMPARED, errors="ignore").data_vars.items():
+        unit = array.attrs.get("units", "1")
+        extra = [dim for dim in array.dims if dim not in dims]
+        for place in product(*(range(array.sizes[dim]) for dim in extra)):
+            at = dict(zip(extra, place, strict=True))
+            labels = [str(array[dim].values[k]) for dim, k in at.items()]
+            found["_".join([str(name), *labels])] = array.isel(at).transpose(*dims).values, unit
+    return found
 
 
 def only(dataset: xr.Dataset, chosen: NDArray[np.bool_]) -> xr.Dataset:
@@ -211,10 +252,13 @@ def write_comparison(found: Comparison, table: Path) -> Path:
     with written_aside(table, parents=True) as path, path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         told = {name: found.cells[name].attrs for name in axes_of(found.cells)}
-        writer.writerow([*(heading(name, attributes) for name, attributes in told.items()), *_HEAD])
+        units = {name: "" if unit == "1" else f" [{unit}]" for name, unit in found.quantities.items()}
+        further = [f"{name}_{study}{unit}" for name, unit in units.items() for study in "ab"]
+        writer.writerow([*(heading(name, attributes) for name, attributes in told.items()), *_HEAD, *further])
         for cell in found.rows(np.ones(found.pairs.shape, bool)):
             numbers = [_number(size * 1e6, ".4g") for size in cell.amplitude]
             numbers += [_number(frequency, ".5g") for frequency in cell.frequency]
+            numbers += [_number(value, ".6g") for pair in cell.quantities.values() for value in pair]
             labels = [kind.label for kind in cell.classes]
             place = [shown_number(value, told[name]) for name, value in cell.at.items()]
             writer.writerow([*place, *labels, cell.pair_label, *numbers])

@@ -126,7 +126,8 @@ class _Parser(argparse.ArgumentParser):
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="cvt-hpc",
-        description="Vibration-occurrence maps of metal pushbelt CVTs.",
+        description="Vibration-occurrence maps of metal pushbelt CVTs; speed loss and vibration of rubber "
+        "belt drives.",
         epilog="Exit status: 0 done, 1 some runs failed, 2 bad input, 99 stopped early (run again to go on), "
         "98 stopped before any run had ended.",
     )

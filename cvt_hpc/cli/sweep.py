@@ -158,6 +158,9 @@ def _show_step_check(check: Repeat) -> None:
     from cvt_hpc.printing import step_check_lines
     from cvt_hpc.study import open_results
 
+    if not check.sample.any():
+        say("step check: none of the runs has taken steps, none is done again")
+        return
     sources = str(check.out), str(check.place)
     with open_results(check.out) as a, open_results(check.place) as b:
         found = compare(a, only(b, check.sample), sources)

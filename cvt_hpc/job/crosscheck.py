@@ -85,9 +85,10 @@ def check_point(
         With the first problem found.
     """
     for key, expected, found in schema.problems(parameters):
-        unit = schema.parameters[key].unit
-        if schema.unit_in_words(key) != unit and found == f"{parameters[key]:g} {unit}".rstrip():
-            found = f"{found} ({schema.in_words(key, parameters[key])})"  # models tell SI values
+        unit, value = schema.parameters[key].unit, parameters[key]
+        told_in_si = isinstance(value, float) and found == f"{value:g} {unit}".rstrip()
+        if told_in_si and schema.unit_in_words(key) != unit:
+            found = f"{found} ({schema.in_words(key, value)})"
         where = f"{source}: [{schema.section_of[key]}] {key}"
         raise mismatch(where, expected, found + _place(schema, varied or {}))
 

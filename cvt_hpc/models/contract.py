@@ -145,8 +145,9 @@ class Declaration(Protocol):
     It may also have `check(parameters)`, which yields (key, expected, found) of what does not fit together;
     `inert(parameters)`, the keys without effect with the reason of each; `GIVES`, by stepper and key what a
     key of the stepper is for this model (`cvt_hpc.parameters.Substitute`); `REFUSED`, steppers that it does
-    not take, each with the reason; and `ANSWERED_BY`, questions that another model answers, each with that
-    model's name and the reason.
+    not take, each with the reason; `ANSWERED_BY`, questions that another model answers, each with that
+    model's name and the reason; and `COMPARED`, variables of the record, numbers per run or per strand or
+    pulley, in which two studies are compared beside class, amplitude and frequency.
     """
 
     @property
@@ -233,6 +234,11 @@ class Model:
     def answered_by(self) -> Mapping[str, tuple[str, str]]:
         """Questions that another model answers: its name, and the reason."""
         return _member(self._declared, "ANSWERED_BY", {})
+
+    @property
+    def compared(self) -> tuple[str, ...]:
+        """Variables in which two studies are compared beside class, amplitude and frequency."""
+        return _member(self._declared, "COMPARED", ())
 
     @property
     def check(self) -> Callable[[Parameters], Any]:

@@ -57,7 +57,7 @@ class Repeat:
     job : Job
         The same runs as they are done again.
     fraction : float
-        Share of the eligible runs that is done again.
+        Share of the eligible runs that is done again; one run at least, if any is eligible.
     eligible : callable
         Tells of the records of the first study which runs may be drawn, shape (runs,).
     core_seconds : callable
@@ -102,7 +102,9 @@ class Repeat:
     def sample(self) -> NDArray[np.bool_]:
         """Which runs are done again, shape (runs,): each by a lot that is drawn for its index."""
         lots = np.random.default_rng(int(self.study.fingerprint[:16], 16)).random(self.study.size)
-        return self.may_be_drawn & (lots < self.fraction)
+        lots = np.where(self.may_be_drawn, lots, np.inf)
+        # the lowest lot is in every larger sample as well
+        return np.isfinite(lots) & (lots <= max(self.fraction, lots.min()))
 
     def check(self, fresh: bool) -> None:
         """Raise the InputError that `run` would raise before it computes anything; touches nothing."""

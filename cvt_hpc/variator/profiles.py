@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -28,3 +29,12 @@ def nested_problems(parameters: Mapping[str, Any], keys: Iterable[str]) -> list[
         if nested(parameters[key]):
             return [(key, "a list of numbers", f"{list(parameters[key])}")]
     return []
+
+
+def length_problems(parameters: Mapping[str, Any], keys: Sequence[str]) -> list[tuple[str, str, str]]:
+    """Lists that are missing beside others, or not as long as most of them: (key, expected, found)."""
+    lengths = {key: len(parameters[key]) for key in keys}
+    usual = Counter(filter(None, lengths.values())).most_common(1)[0][0]
+    first = next(key for key, length in lengths.items() if length == usual)
+    expected = f"as many values as {first} has, {usual}"
+    return [(key, expected, f"{length or 'none'}") for key, length in lengths.items() if length != usual]

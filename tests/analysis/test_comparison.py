@@ -223,6 +223,30 @@ def test_the_table_has_a_row_for_each_cell(tmp_path):
     ]
 
 
+def of_drive(losses, tensions):
+    """A study of the belt drive along the load, quiet, by speed loss [1] and tensions [N] of two strands."""
+    dataset = row([QUIET] * len(losses), [math.nan] * len(losses), model="belt_drive")
+    dataset["speed_loss"] = ("load", losses, {"units": "1"})
+    dataset["strand_tension"] = (("load", "span"), tensions, {"units": "N"})
+    return dataset.assign_coords(span=["t1", "t2"])
+
+
+def test_what_the_model_names_is_compared(tmp_path):
+    a = of_drive([0.0, 1.0e-3, math.nan], [[300.0, 320.0], [280.0, 340.0], [250.0, 370.0]])
+    b = of_drive([1e-5, 1.02e-3, 2e-3], [[300.0, 320.0], [280.0, 323.0], [250.0, 370.0]])
+    found = compare(a, b)
+    # speed loss: of 0 no share is known, the third run of A has none
+    assert list(comparison_lines(found, ("a", "b")))[-3:] == [
+        "speed_loss where both have ended: B deviates by 2.00% (median), 2.00% (95 %), 2.00% (largest); at most 2e-05",
+        "strand_tension_t1 where both have ended: B deviates by 0.00% (median), 0.00% (95 %), 0.00% (largest); at most 0 N",
+        "strand_tension_t2 where both have ended: B deviates by 0.00% (median), 4.50% (95 %), 5.00% (largest); at most 17 N",
+    ]
+    rows = list(csv.DictReader(write_comparison(found, tmp_path / "compare.csv").open()))
+    further = [rows[1][f"{name}_{study}"] for name in ("speed_loss",) for study in "ab"]
+    further += [rows[1][f"strand_tension_t2_{study} [N]"] for study in "ab"]
+    assert further == ["0.001", "0.00102", "340", "323"] and rows[2]["speed_loss_a"] == ""
+
+
 def drawn(found, path):
     """The picture of a comparison, as numbers."""
     return image.imread(draw_comparison(found, path, ("out/a", "out/b")))[..., :3]

@@ -5,7 +5,9 @@ import runpy
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from cvt_hpc.errors import InputError
 from support.studies import study
 
 ROWS = runpy.run_path(str(Path(__file__).parents[2] / "jobs" / "tabulate.py"))["rows"]
@@ -48,6 +50,11 @@ def test_a_run_that_failed_has_no_numbers():
         assert not any(
             row[key] for key in row if key.startswith(("vibrates", "amplitude", "frequency", "mode"))
         )
+
+
+def test_an_unknown_variable_is_told_with_the_nearest():
+    with pytest.raises(InputError, match="frequncy: unknown variable; did you mean frequency"):
+        list(ROWS(table()[0], ["frequncy"]))
 
 
 def test_samples_have_their_place_in_the_table():

@@ -135,6 +135,20 @@ def test_a_check_by_the_explicit_step_is_priced_by_it(tmp_path):
     assert check.core_seconds() > 20.0 * estimate_cost(job)
 
 
+def test_at_least_one_run_is_done_again(checked, undrawn, tmp_path):
+    _, out, _ = checked("1e-9")
+    assert out[2] == "step check: 1 of 39 runs that took steps done again at half the step"
+    (one,), _ = loads(tmp_path / "out/x/check_step/results.nc")
+    checked("0.1")
+    assert one in loads(tmp_path / "out/x/check_step/results.nc")[0]
+
+
+def test_without_steps_nothing_is_drawn(checked, tmp_path):
+    status, out, _ = checked("1", "--set", "load=8")
+    assert status == 0
+    assert out[2:] == ["step check: none of the runs has taken steps, none is done again"]
+
+
 def test_a_study_that_is_right_has_no_contradiction(checked, undrawn):
     status, out, _ = checked("1", "--set", "load=30")
     assert status == 0

@@ -178,6 +178,23 @@ def test_bristles_follow_the_exact_law_of_an_elastic_rim_that_slides():
     assert errors[1] < 0.6 * errors[0]
 
 
+def test_bristles_that_slid_come_back_alike_whether_for_long_or_not():
+    """While the rim slides they stand still: what they do when it turns back is not set by how they came there."""
+    dt, speed, after = 1e-2, 0.05, []
+    for slid in (1, 2, 5):  # steps; the bound is reached in six
+        back = (6 + slid) * dt
+
+        def slip(time, back=back):
+            return speed * np.sign(back - time)
+
+        forces = rubbed(slip, dt)[1]
+        assert forces[5] < forces[6] == MU * 1e3
+        after.append(forces[6 + slid : 14 + slid])
+    np.testing.assert_allclose(after[1:], [after[0], after[0]], rtol=0, atol=1e-9 * MU * 1e3)
+    # as fast as the rim shears them, but for 0.03 of a step where the scheme rings down
+    np.testing.assert_allclose(np.diff(after[0]), -1e5 * speed * dt, rtol=0.05)
+
+
 def test_contacts_that_leave_the_pulley_forget_their_bristles():
     made = Friction(Treatment.BRISTLE, friction_law("coulomb", MU, 0.0, 1.0), 1.0, 1.0, 1.0, 1e5)
     memory, scheme = friction.empty_memory(1, 2, 1), generalised_alpha(0.6)

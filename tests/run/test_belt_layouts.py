@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.optimize import brentq
 
 from cvt_hpc.analysis.histories import history_figure
@@ -13,6 +14,7 @@ from cvt_hpc.models.belt_drive.pulleys import arms_energy, axes
 from cvt_hpc.models.belt_drive.readings import Reading, Readings, stored_energy
 from cvt_hpc.models.belt_drive.start import start
 from cvt_hpc.physics.belt_path import belt_path, span_starts, tangents
+from cvt_hpc.printing import outcome_lines
 from cvt_hpc.simulation import simulate
 from cvt_hpc.variables import Status, Vibrates
 
@@ -214,12 +216,43 @@ def test_a_file_gives_the_pulleys(tmp_path):
     assert {key: found[key] for key in PULLEYS} == PULLEYS
 
 
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ("120,-100,0,-1,1e-4,0", "pulleys.csv: line 3: expected radius: a radius above 0, found 0 m"),
+        ("120,-100,40,-1,0,0", "pulleys.csv: line 3: expected inertia: moments of inertia above 0"),
+        ("120,-100,400,-1,1e-4,0", "pulleys.csv: pulley_x: expected pulleys that do not overlap"),
+    ],
+)
+def test_a_fault_in_a_file_is_told_by_its_line(tmp_path, row, message):
+    lines = ["x [mm],y [mm],radius [mm],turn,inertia [kg m^2],load", "0,0,100,1,0,0", row]
+    (tmp_path / "pulleys.csv").write_text("\n".join([*lines, "240,0,100,1,5e-3,1"]))
+    with pytest.raises(InputError) as caught:
+        build_job(
+            {"name": "x", "model": "belt_drive", "layout": {"pulley_file": "pulleys.csv"}},
+            str(tmp_path / "x"),
+        )
+    assert message in str(caught.value)
+
+
+def test_what_is_per_pulley_is_printed(started):
+    """However many pulleys there are; of arms those that are there."""
+    lines = {line.split()[0]: line.split(maxsplit=1)[1] for line in outcome_lines(started)}
+    assert lines["arm_angle"].startswith("P2 ") and "P1" not in lines["arm_angle"]
+    assert lines["slip"].count("P") == 3 and "spectrum" not in lines
+    wider = xr.Dataset({"status": started.status, "slip": ("pulley", np.arange(9.0), {"units": "1"})})
+    (slip,) = (line for line in outcome_lines(wider.assign_coords(pulley=np.arange(9))) if "slip" in line)
+    assert slip.endswith("7 7, 8 8")
+
+
 def test_a_crossed_belt_turns_the_driven_pulley_the_other_way():
     values = {"driven_radius": 0.1, "centre_distance": 0.3, "elements": 40, "bending_stiffness": 2.6e-3}
     found = simulate(job(**values, crossed=True, load=10.0, contact_stiffness=1.2e8), {})
     t1, t2 = found.strand_tension.values
     assert (t2 - t1) * 0.1 == pytest.approx(10.0, rel=0.03)
-    assert 0.0 < float(found.speed_loss) < 2e-3 and abs(float(found.power_residual)) < 4e-3
+    late = 1.0 - found.driven_speed.values[-250:].mean() / 62.8
+    assert found.turns == 0 and np.isnan(found.speed_loss)  # 0.125 s are judged, a turn takes longer
+    assert 0.0 < late < 2e-3 and abs(float(found.power_residual)) < 4e-3
     assert float(found.load_power) == pytest.approx(10.0 * 62.8, rel=5e-3)
     assert found.driven_speed.values[-1] > 0.0  # forwards along the belt
 
@@ -253,6 +286,17 @@ def test_a_tensioner_that_turns_away_lets_the_belt_go():
         ),
         ({"pulley_x": (0.0, 0.12, 0.19)}, "[layout] pulley_x: expected pulleys that do not overlap"),
         ({"pulley_load": (1.0, 0.0, 1.0)}, "[layout] pulley_load: expected 0 of the first pulley"),
+        ({"pulley_load": (0.0, 0.0, 0.0)}, "[layout] pulley_load: expected a value other than 0"),
+        ({"pulley_x": (0.0, 0.1)}, "[layout] pulley_x: expected as many values as pulley_y has, 3, found 2"),
+        (
+            {"crossed": True},
+            "[scene] crossed: expected none beside pulley_x, which gives all pulleys, found true",
+        ),
+        ({"centre_distance": 0.5}, "[scene] centre_distance: expected none beside pulley_x"),
+        (
+            {"tensioner_pulley": ()},
+            "[tensioner] tensioner_pulley: expected as many values as tensioner_x has, 1, found none",
+        ),
         ({"tensioner_highest": (0.0,)}, "[tensioner] tensioner_lowest: expected travel on both sides"),
         (
             {"tensioner_pulley": (1.0,)},
@@ -272,20 +316,33 @@ def test_a_tensioner_that_turns_away_lets_the_belt_go():
         ),
         ({"free_length": 1.5}, "[belt] free_length: expected more than"),
         ({"profile_time": (0.1, 0.0)}, "[profiles] profile_time: expected ascending times"),
+        (
+            {"pulley_x": (0.0, 5.0, 10.0), "pulley_radius": (0.1, 0.005, 0.1)},
+            "; but at most 2048 are permitted: on the belt of 20.63 m none may be longer than 0.0025 m, found 64",
+        ),
         ({"elements": 24}, "[belt] elements: expected at least 63, which turn by half a radian"),
         (
             {"profile_time": (0.0,), "driving_speed_profile": (0.5,)},
             "[profiles] driving_speed_profile: expected 1 at last",
         ),
+        (
+            {"load_profile": (1.0,)},
+            "[profiles] profile_time: expected as many values as load_profile has, 1, found none",
+        ),
         ({"pulley_y": ((0.0, 0.1, 0.0),)}, "[layout] pulley_y: expected a list of numbers"),
         ({"profile_time": ((0.0,),)}, "[profiles] profile_time: expected a list of numbers"),
-        ({"load_profile": (1.0,)}, "[profiles] load_profile: expected as many values as profile_time has, 0"),
     ],
 )
 def test_layouts_that_cannot_be_are_refused(values, message):
     with pytest.raises(InputError) as caught:
         job(**SERPENTINE | values)
     assert message in str(caught.value)
+
+
+def test_lists_in_other_units_are_refused_alike():
+    values = {key: [f"{1e3 * value:g} mm" for value in SERPENTINE[key]] for key in ("pulley_x", "pulley_y")}
+    with pytest.raises(InputError, match="pulley_y: expected as many values as pulley_x has, 3, found 2"):
+        job(**SERPENTINE | values | {"pulley_y": ["0 mm", "5 mm"]})
 
 
 def test_a_picture_shows_forces_speeds_and_arms(started):

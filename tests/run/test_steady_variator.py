@@ -15,6 +15,8 @@ from cvt_hpc.models.elastic_belt.belt import (
 )
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
+from cvt_hpc.models.elastic_belt.sampling import Outcome
+from cvt_hpc.models.steady_variator import walking
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.forces import distributions, quantities
 from cvt_hpc.models.steady_variator.newton import newton
@@ -138,6 +140,36 @@ def test_a_load_beyond_what_friction_carries():
         SteadyBelt(DEFAULTS | {"stations": 48}).at(400.0)
     record = rung_record("steady_variator", load=400.0, stations=48)
     assert record["status"] == Status.FAILED_NUMERICS and b"400 N m" in record["reason"].encode()
+
+
+def test_a_load_that_does_not_settle_is_reached_from_each_of_the_loads_beside_it(monkeypatch):
+    """And a march that runs away from a load that brakes has not slipped through: it diverges."""
+    monkeypatch.setattr(walking, "settled", lambda *_: Outcome.RAN_AWAY)
+    belt = SteadyBelt(DEFAULTS | {"stations": 48})
+    with pytest.raises(NoSteadyState, match="does not settle under 60 N m"):
+        belt._settle(60.0)
+    with pytest.raises(NoSteadyState, match="slips through under -60 N m"):
+        belt._settle(-60.0)
+
+    begun = []
+
+    def rise(x, start, load):
+        begun.append(start)
+        if len(begun) < 3:
+            raise NoSteadyState(f"not from {start:g}")
+        return x
+
+    def settle(load):
+        if load == 60.0:
+            raise NoSteadyState("not at 60")
+        return np.zeros(1)
+
+    def widened(load):
+        raise NoSteadyState("nor by rounded corners")
+
+    for name, double in (("_rise", rise), ("_settle", settle), ("_widened", widened)):
+        monkeypatch.setattr(belt, name, double)
+    assert belt._first(60.0) == 0.0 and len(set(begun)) == 3
 
 
 def test_record_is_that_of_the_state():

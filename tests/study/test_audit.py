@@ -85,10 +85,10 @@ def test_forces_are_compared(job, capsys):
     assert f"mean forces within {np.quantile(off, 0.95):.2%} in 95 % of the runs" in printed
 
 
-def test_a_sample_without_runs_is_no_error(job, capsys):
+def test_the_smallest_sample_has_a_run(job, capsys):
     status, printed, _ = audited(job, capsys, "1e-9")
     assert status == 0
-    assert "audit: 0 of 4 runs that lower rungs answered done again in full" in printed
+    assert "audit: 1 of 4 runs that lower rungs answered done again in full" in printed
 
 
 def test_a_fresh_study_has_a_fresh_audit(job, capsys):

@@ -12,5 +12,6 @@ REFUSED = dict.fromkeys(
     "the belt's contacts are stiff and open and close: it is marched by its own step, cyclic_alpha",
 )
 STEPPERS = {"cyclic_alpha": "cvt_hpc.models.belt_drive.step_settings"}
+COMPARED = ("speed_loss", "efficiency", "strand_tension", "tension_ripple")
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]
+__all__ = ["COMPARED", "DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]

@@ -13,7 +13,7 @@ import numpy as np
 
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.variator.course import load_course
-from cvt_hpc.variator.profiles import multiple, nested_problems
+from cvt_hpc.variator.profiles import length_problems, multiple, nested_problems
 
 PROFILED = ("driving_speed", "load")
 
@@ -69,9 +69,7 @@ def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]
     if (np.diff(times) <= 0.0).any() or (times and times[-1] > judged):
         expected = f"ascending times until the run is judged, up to {judged:g} s"
         return [("profile_time", expected, f"{list(times)}")]
-    for key in profiles:
-        if len(p[key]) != len(times):
-            found.append((key, f"as many values as profile_time has, {len(times)}", f"{len(p[key])}"))
+    found = length_problems(p, ("profile_time", *profiles)) if profiles else []
     last = p["driving_speed_profile"][-1:]
     if not found and last not in ((), (1.0,)):
         expected = "1 at last, since driving_speed is that of the judged part"

@@ -6,17 +6,17 @@ it stands in the lists as at rest.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.models.belt_drive.pulleys import Arms, Pulleys, no_struts, struts
-from cvt_hpc.parameters import Column, FromFile, Parameter
+from cvt_hpc.parameters import Column, FromFile, Parameter, RowError
 from cvt_hpc.physics.belt_path import BeltPath, belt_path
 from cvt_hpc.physics.geometry import variator_problems
 from cvt_hpc.variator import PULLEYS, STRANDS
-from cvt_hpc.variator.profiles import nested_problems
+from cvt_hpc.variator.profiles import length_problems, nested_problems
 
 Problem = tuple[str, str, str]  # key, expected, found
 
@@ -32,7 +32,13 @@ TWO = (
 
 
 def _arranged(columns: Mapping[str, Column]) -> dict[str, Any]:
-    return {f"pulley_{name}": list(column.values) for name, column in columns.items()}
+    """Lists of the columns of a file; what is wrong with them is told by its row, or of all of them."""
+    lists = {f"pulley_{name}": list(column.values) for name, column in columns.items()}
+    for row, key, expected, found in _pulley_faults(lists):
+        raise RowError(row, f"{key.removeprefix('pulley_')}: {expected}", found)
+    for key, expected, found in _pulley_problems(lists):
+        raise ValueError(f"{key}: expected {expected}, found {found}")
+    return lists
 
 
 def _list(
@@ -48,8 +54,10 @@ LAYOUT: dict[str, Parameter] = {
         f"CSV file of pulleys in the place of lists; a row for each, columns {', '.join(COLUMNS)}",
         file=FromFile(COLUMNS, tuple(COLUMNS), PULLEY_LISTS, _arranged),
     ),
-    "pulley_x": _list("m", "axes of the pulleys, the driving one first, as the belt runs", (1e-3, 10.0)),
-    "pulley_y": _list("m", "the same along y", (1e-3, 10.0)),
+    "pulley_x": _list(
+        "m", "axes of the pulleys along x, the driving one first, as the belt runs", (1e-3, 10.0)
+    ),
+    "pulley_y": _list("m", "axes of the pulleys along y", (1e-3, 10.0)),
     "pulley_radius": _list("m", "radii at the belt's cord", (5e-3, 1.0), minimum=0.0, exclusive=True),
     "pulley_turn": _list("", "1 where the belt turns a pulley counter-clockwise, -1 where clockwise"),
     "pulley_inertia": _list(
@@ -59,8 +67,8 @@ LAYOUT: dict[str, Parameter] = {
 }
 TENSIONER: dict[str, Parameter] = {
     "tensioner_pulley": _list("", "numbers of the pulleys that arms carry, from 2 on"),
-    "tensioner_x": _list("m", "pivots of the arms", (1e-3, 10.0)),
-    "tensioner_y": _list("m", "the same along y", (1e-3, 10.0)),
+    "tensioner_x": _list("m", "pivots of the arms along x", (1e-3, 10.0)),
+    "tensioner_y": _list("m", "pivots of the arms along y", (1e-3, 10.0)),
     "tensioner_inertia": _list(
         "kg m^2", "of arm and pulley's mass, about the pivot", (1e-7, 100.0), minimum=0.0, exclusive=True
     ),
@@ -70,11 +78,11 @@ TENSIONER: dict[str, Parameter] = {
         "N m", "moments of the springs as drawn, which turn the arms; else those that hold them", (1e-3, 1e4)
     ),
     "strut_fixed_x": _list(
-        "m", "fixed ends of springs that pull at the arms, if they have such", (1e-3, 10.0)
+        "m", "fixed ends along x of springs that pull at the arms, if they have such", (1e-3, 10.0)
     ),
-    "strut_fixed_y": _list("m", "the same along y", (1e-3, 10.0)),
-    "strut_held_x": _list("m", "ends of these on the arms, as drawn", (1e-3, 10.0)),
-    "strut_held_y": _list("m", "the same along y", (1e-3, 10.0)),
+    "strut_fixed_y": _list("m", "fixed ends of these springs along y", (1e-3, 10.0)),
+    "strut_held_x": _list("m", "ends of these springs on the arms along x, as drawn", (1e-3, 10.0)),
+    "strut_held_y": _list("m", "ends of these springs on the arms along y, as drawn", (1e-3, 10.0)),
     "strut_stiffness": _list("N/m", "force of such a spring by its length", (1.0, 1e9), minimum=0.0),
     "strut_damping": _list("N s/m", "force of a dashpot beside it by the speed", (1e-3, 1e6), minimum=0.0),
     "tensioner_lowest": _list("rad", "clockwise end of the travel", (1e-3, 7.0)),
@@ -186,34 +194,24 @@ def layout_problems(parameters: Mapping[str, Any]) -> list[Problem]:
         found = _pulley_problems(p)
     if not found and any(p[key] for key in (*_ARM_LISTS, *_STRUT_LISTS, "tensioner_moment")):
         given = (*_ARM_LISTS, *_STRUT_LISTS) if any(p[key] for key in _STRUT_LISTS) else _ARM_LISTS
+        given = (*given, "tensioner_moment") if p["tensioner_moment"] else given
         found = _list_problems(p, given) or _arm_problems(p)
     return found
 
 
 def _list_problems(p: Mapping[str, Any], keys: Sequence[str]) -> list[Problem]:
-    """Lists that are none of numbers, or not as long as the first of them."""
-    if found := nested_problems(p, keys):
-        return found
-    count = len(p[keys[0]])
-    return [
-        (key, f"as many values as {keys[0]} has, {count}", f"{len(p[key])}")
-        for key in keys
-        if len(p[key]) != count
-    ]
+    """Lists that are none of numbers, missing beside others, or not as long as most of them."""
+    return nested_problems(p, keys) or length_problems(p, keys)
 
 
 def _pulley_problems(p: Mapping[str, Any]) -> list[Problem]:
     count = len(p["pulley_x"])
     if count < 2:
         return [("pulley_x", "two pulleys or more", f"{count}")]
-    for turn in p["pulley_turn"]:
-        if turn not in (1.0, -1.0):
-            return [("pulley_turn", "1 or -1 for each pulley", f"{turn:g}")]
-    if min(p["pulley_inertia"][1:]) <= 0.0:
-        expected = "moments of inertia above 0 of all but the first"
-        return [("pulley_inertia", expected, f"{min(p['pulley_inertia'][1:]):g}")]
-    if p["pulley_load"][0] != 0.0:
-        return [("pulley_load", "0 of the first pulley, which drives", f"{p['pulley_load'][0]:g}")]
+    for _, key, expected, value in _pulley_faults(p):
+        return [(key, expected, value)]
+    if not any(p["pulley_load"]):
+        return [("pulley_load", "a value other than 0, of the pulley that is driven", "0 of all")]
     try:
         layout(p)
     except ValueError as error:
@@ -221,6 +219,27 @@ def _pulley_problems(p: Mapping[str, Any]) -> list[Problem]:
         expected = "pulleys that do not overlap" if key == "pulley_x" else "a belt that closes on its pulleys"
         return [(key, expected, str(error).removeprefix("overlap: "))]
     return []
+
+
+def _pulley_faults(p: Mapping[str, Any]) -> Iterator[tuple[int, str, str, str]]:
+    """Yield what is wrong with single pulleys: number of the pulley from 0 on, key, expected, found."""
+    for k in range(len(p["pulley_x"])):
+        radius, turn, inertia, load = (
+            p[f"pulley_{name}"][k] for name in ("radius", "turn", "inertia", "load")
+        )
+        if radius <= 0.0:
+            yield k, "pulley_radius", "a radius above 0", f"{radius:g} m"
+        if turn not in (1.0, -1.0):
+            yield k, "pulley_turn", "1 or -1 for each pulley", f"{turn:g}"
+        if inertia < 0.0 or (k > 0 and inertia == 0.0):
+            yield (
+                k,
+                "pulley_inertia",
+                "moments of inertia above 0 of all but the first",
+                f"{inertia:g} kg m^2",
+            )
+        if k == 0 and load != 0.0:
+            yield k, "pulley_load", "0 of the first pulley, which drives", f"{load:g}"
 
 
 def _arm_problems(p: Mapping[str, Any]) -> list[Problem]:
@@ -232,9 +251,6 @@ def _arm_problems(p: Mapping[str, Any]) -> list[Problem]:
         if not low < 0.0 < high:
             expected = "travel on both sides: tensioner_lowest < 0 < tensioner_highest"
             return [("tensioner_lowest", expected, f"{low:g} to {high:g} rad")]
-    if len(p["tensioner_moment"]) not in (0, len(numbers)):
-        expected = f"as many values as tensioner_pulley has, {len(numbers)}, or none"
-        return [("tensioner_moment", expected, f"{len(p['tensioner_moment'])}")]
     pulleys = pulleys_of(p, layout(p))
     for a, number in enumerate(numbers):
         if np.hypot(*(pulleys.centre[int(number) - 1] - pulleys.arms.pivot[a])) == 0.0:

@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc import recording
+from cvt_hpc.errors import show
 from cvt_hpc.models.belt_drive.courses import PARAMETERS as COURSES
 from cvt_hpc.models.belt_drive.courses import course_inert, course_problems
-from cvt_hpc.models.belt_drive.layout import LAYOUT, TENSIONER, layout, layout_inert, layout_problems
+from cvt_hpc.models.belt_drive.layout import LAYOUT, TENSIONER, TWO, layout, layout_inert, layout_problems
 from cvt_hpc.models.belt_drive.preload import free_length
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
@@ -139,7 +140,7 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         Empty where all is well.
     """
     p = parameters
-    problems = layout_problems(p)
+    problems = layout_problems(p) or _beside_lists(p)
     if problems:
         return problems
     path = layout(p).path
@@ -151,6 +152,9 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         expected = f"at least {least}, four on the shorter arc and two on a strand"
         if path.wrap.min() < 2.0:
             expected = f"at least {least}, which turn by half a radian and lie two on a strand"
+        if least > (most := PARAMETERS["belt"]["elements"].maximum):
+            expected += f"; but at most {most:g} are permitted: on the belt of {path.path_length:.4g} m "
+            expected += f"none may be longer than {longest:.3g} m"
         problems.append(("elements", expected, f"{p['elements']}"))
     strain = p["tension"] / p["axial_stiffness"]
     if strain > 0.5:
@@ -161,6 +165,15 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         expected = f"at least {stiffness:g} N/m^2, by which the belt sinks in by {DEEPEST:.0%} of the radius"
         problems.append(("contact_stiffness", expected, f"{p['contact_stiffness']:g} N/m^2"))
     return problems + rise_problems(p) + course_problems(p) + friction_problems(p)
+
+
+def _beside_lists(p: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Settings of two pulleys, other than by default, beside lists that give all pulleys."""
+    if not p["pulley_x"]:
+        return []
+    given = {key: entry for key in TWO if p[key] != (entry := PARAMETERS["scene"][key]).default}
+    expected = "none beside pulley_x, which gives all pulleys"
+    return [(key, expected, f"{show(p[key])} {entry.unit}".rstrip()) for key, entry in given.items()]
 
 
 def inert(parameters: Mapping[str, Any]) -> dict[str, str]:

@@ -21,7 +21,7 @@ from cvt_hpc.models.belt_drive.theory import (
 )
 from cvt_hpc.physics.belt_path import regions
 from cvt_hpc.variables import Coordinate, Variable
-from cvt_hpc.variator import judging
+from cvt_hpc.variator import PULLEYS, STRANDS, judging
 from cvt_hpc.variator.history import dataset
 from cvt_hpc.variator.judging import each
 from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared
@@ -47,7 +47,8 @@ VARIABLES = (
     *shared("slip"),
     replace(
         shared("speed_loss")[0],
-        comment="1 - ratio x driven speed / driving speed, mean of whole belt turns or ripples of the speed",
+        comment="1 - ratio x driven speed / driving speed, mean of whole belt turns or ripples of the speed; "
+        "none where the judged part is shorter than a turn",
     ),
     Variable(
         "expected_speed_loss",
@@ -125,9 +126,13 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
         Flat parameters of the job.
     """
     drawn = layout(parameters)
+    driving, driven = drawn.pulleys[0], drawn.pulleys[drawn.driven]
+    roles = (
+        "" if drawn.pulleys == PULLEYS else f"; {driving} drives, {driven} is driven, of which is speed_loss"
+    )
     names = {
         "strand": _named("strand", drawn.spans),
-        "pulley": _named("pulley", drawn.pulleys),
+        "pulley": _named("pulley", drawn.pulleys, roles),
     }
     half_waves = Coordinate(np.arange(1, MODES + 1), "1", "half waves", "along the strand")
     modes = Coordinate(np.arange(1, DRIVE_MODES + 1), "1", "mode of the drive")
@@ -135,8 +140,9 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     return {**names, "frequency_bin": bins, "half_waves": half_waves, "drive_mode": modes}
 
 
-def _named(dimension: str, names: tuple[str, ...]) -> Coordinate:
-    comment = COORDINATES[dimension].comment if len(names) == 2 else "in the order in which the belt runs"
+def _named(dimension: str, names: tuple[str, ...], roles: str = "") -> Coordinate:
+    in_order = "in the order in which the belt runs" + roles
+    comment = COORDINATES[dimension].comment if names in (PULLEYS, STRANDS) else in_order
     return COORDINATES[dimension]._replace(values=np.array(names), comment=comment)
 
 
@@ -190,7 +196,7 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
         **judging.motion(run, strongest_probe, drawn.pulleys),
         "spectrum": _spectrum(run),
         **_of_arms(run),
-        "speed_loss": run.speed_loss(run.whole_turns),
+        "speed_loss": run.speed_loss(run.whole_turns) if run.turns else np.nan,
         "expected_speed_loss": expected_loss(run.parameters, present, tension),
         "creep_speed_loss": creep_loss(run.parameters, drawn),
         "strand_tension": tension,

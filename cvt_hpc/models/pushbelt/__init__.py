@@ -12,5 +12,6 @@ REFUSED = dict.fromkeys(
     "the pushbelt's contacts open, close and stick by the hundred: it is marched by its own step, newton",
 )
 STEPPERS = {"newton": "cvt_hpc.models.pushbelt.newton_settings"}
+COMPARED = ("speed_loss", "efficiency", "loss")
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]
+__all__ = ["COMPARED", "DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]

@@ -186,7 +186,12 @@ class SteadyBelt:
                 x = self._settle(other)
             except NoSteadyState:
                 continue
-            return self._rise(x, other, load)
+            try:
+                return self._rise(x, other, load)
+            except NoSteadyState as error:
+                slips, missed = isinstance(missed, _SlipsThrough), error
+                if slips:  # loads below begin on the same curve
+                    break
         raise missed
 
     def _settle(self, load: float) -> np.ndarray:
@@ -198,7 +203,8 @@ class SteadyBelt:
         self._faster(faster, 0.0, self._wide)
         x = settled(self._parameters, self._equations, ON_THE_WAY)
         if isinstance(x, Outcome):
-            if x in (Outcome.SLIPPED_THROUGH, Outcome.RAN_AWAY):
+            # a load that the driven pulley takes can only slow it; a march that diverges may end at either
+            if x is (Outcome.SLIPPED_THROUGH if load > 0.0 else Outcome.RAN_AWAY):
                 raise _SlipsThrough(f"no steady state found: the belt slips through under {load:g} N m")
             raise NoSteadyState(f"no steady state found: the belt does not settle under {load:g} N m")
         if faster > 1.0:
