@@ -159,6 +159,15 @@ def test_forces_are_drawn_over_the_wrap_of_each_pulley(history):
     assert not common.get_window_extent().overlaps(figure.legends[0].get_window_extent())
 
 
+def test_several_runs_are_told_apart_by_their_points(history, monkeypatch):
+    monkeypatch.setattr("cvt_hpc.analysis.wraps.place_of", lambda attributes: attributes["place"])
+    runs = [history.assign_attrs(place=["driving_speed 60 rad/s", f"load {load} N m"]) for load in (8, 16)]
+    figure = wrap_figure(runs, ["one", "two"])
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["load 8 N m", "load 16 N m", "Euler and Eytelwein"]
+    assert figure.get_suptitle().replace("\u00a0", " ").splitlines()[1] == "driving_speed 60 rad/s"
+
+
 def test_of_many_pulleys_those_with_torque_are_drawn(history):
     regions = [f"{name} 2" for name in history["region"].values]
     second = history.assign_coords(region=("position", regions))
