@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.models.belt_drive.theory import centrifugal
 from cvt_hpc.physics.belt_path import BeltPath
 
 # Of h^4 N / (EI R). 18 random drives (90 to 700 N, 0.005 to 0.15 N m^2, 20 to 150 rad/s) shake by 0.001 to
@@ -32,7 +33,6 @@ def mesh_amplitude(parameters: Mapping[str, Any], path: BeltPath, tension: np.nd
         Of the strands [N].
     """
     p = parameters
-    speed = p["driving_speed"] * path.radius[0]
-    pull = max(float(np.max(tension) - p["line_mass"] * speed**2), 0.0)
+    pull = max(float(np.max(tension)) - centrifugal(p, path), 0.0)
     length = path.path_length / p["elements"]
     return float(SHAKEN * length**4 * pull / (p["bending_stiffness"] * path.radius.min()))

@@ -59,17 +59,17 @@ def expected_loss(parameters: Mapping[str, Any], drawn: Layout, tension: np.ndar
         Of the strands [N].
     """
     p, radius = parameters, drawn.path.radius
-    running_on, centrifugal = np.roll(tension, 1), _centrifugal(p, drawn.path)
+    running_on, inertial = np.roll(tension, 1), centrifugal(p, drawn.path)
     if p["friction_treatment"] == "bristle":
         running_on = np.array(
             [
-                unsheared_tension(p, *arc) + centrifugal
+                unsheared_tension(p, *arc) + inertial
                 for arc in zip(
-                    running_on - centrifugal, tension - centrifugal, radius, drawn.path.wrap, strict=True
+                    running_on - inertial, tension - inertial, radius, drawn.path.wrap, strict=True
                 )
             ]
         )
-    depth = (running_on - centrifugal) / (radius * p["contact_stiffness"])
+    depth = (running_on - inertial) / (radius * p["contact_stiffness"])
     stretched = np.array([stretch(float(force), p["axial_stiffness"]) for force in running_on])
     per_angle = (radius - depth) / stretched
     return float(1.0 - drawn.ratio * per_angle[0] / per_angle[drawn.driven])
@@ -129,9 +129,9 @@ def _has_one_coefficient(p: Mapping[str, Any]) -> bool:
     return bool(p["friction_law"] == "coulomb" and p["friction_gradient"] == 0.0)
 
 
-def _centrifugal(p: Mapping[str, Any], path: BeltPath) -> float:
-    """M v^2 [N]."""
-    return float(p["line_mass"] * (p["driving_speed"] * path.radius[0]) ** 2)
+def centrifugal(parameters: Mapping[str, Any], path: BeltPath) -> float:
+    """The part m v^2 of a tension, by which a running belt does not press [N]."""
+    return float(parameters["line_mass"] * (parameters["driving_speed"] * path.radius[0]) ** 2)
 
 
 def wrap_angles(path: BeltPath, position: np.ndarray) -> np.ndarray:
@@ -171,14 +171,14 @@ def sliding_tension(
     p = parameters
     if not _has_one_coefficient(p):
         return np.full(len(position), np.nan)
-    centrifugal, pulley = _centrifugal(p, path), regions(path, position) // 2
-    inlet, outlet = np.roll(tension, 1)[pulley] - centrifugal, np.asarray(tension)[pulley] - centrifugal
+    inertial, pulley = centrifugal(p, path), regions(path, position) // 2
+    inlet, outlet = np.roll(tension, 1)[pulley] - inertial, np.asarray(tension)[pulley] - inertial
     outlet = np.where(np.minimum(inlet, outlet) > 0.0, outlet, np.nan)
     lifted = np.sqrt(p["bending_stiffness"] / outlet) / path.radius[pulley]
     left = path.wrap[pulley] - lifted - wrap_angles(path, position)
     grown = np.exp(p["kinetic_friction"] * np.maximum(left, 0.0))
     slid = np.where(outlet < inlet, np.minimum(outlet * grown, inlet), np.maximum(outlet / grown, inlet))
-    found: np.ndarray = slid + centrifugal
+    found: np.ndarray = slid + inertial
     return found
 
 
