@@ -16,6 +16,7 @@ from functools import partial
 from operator import add, mul
 from pathlib import Path
 from types import CodeType, ModuleType
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -763,3 +764,43 @@ def test_no_kernel_may_be_rounded_otherwise_than_written(dispatchers):
     for dispatcher in dispatchers:
         assert not dispatcher.targetoptions.get("fastmath"), dispatcher
         assert not dispatcher.targetoptions.get("parallel"), dispatcher
+
+
+# The types of arguments
+
+
+class Pair(NamedTuple):
+    first: object
+    second: object
+
+
+FIELD = np.zeros((3, 4))
+FIELD.flags.writeable = False
+ONES = (
+    1,
+    True,
+    1.0,
+    np.float64(1.0),
+    np.float32(1.0),
+    np.int32(1),
+    1j,
+    2**63,
+    None,
+    "a",
+    kernels.kernel(plus_one),
+)
+ARRAYS = (
+    *(np.zeros((3, 4), kind) for kind in "fdi?"),
+    np.zeros(4),
+    np.zeros((4, 3)).T,
+    np.zeros(9)[::2],
+    FIELD,
+)
+
+
+def test_types_are_those_that_the_compiler_finds():
+    values = [*ONES, *ARRAYS, (), *((one,) for one in ONES), *(Pair(one, (FIELD, one)) for one in ARRAYS)]
+    for value in values * 2:  # then those found before
+        assert compiler_shortcuts.typeof(value) == numba.typeof(value)
+    with pytest.raises(ValueError, match="Cannot determine Numba type"):
+        compiler_shortcuts.typeof((1.0, object()))
