@@ -780,19 +780,7 @@ class Pair(NamedTuple):
 
 FIELD = np.zeros((3, 4))
 FIELD.flags.writeable = False
-ONES = (
-    1,
-    True,
-    1.0,
-    np.float64(1.0),
-    np.float32(1.0),
-    np.int32(1),
-    1j,
-    2**63,
-    None,
-    "a",
-    kernels.kernel(plus_one),
-)
+ONES = (1, True, 1.0, np.float64(1.0), np.float32(1.0), np.int32(1), 1j, 2**63, None, "a")
 ARRAYS = (
     *(np.zeros((3, 4), kind) for kind in "fdi?"),
     np.zeros(4),
@@ -803,7 +791,14 @@ ARRAYS = (
 
 
 def test_types_are_those_that_the_compiler_finds():
-    values = [*ONES, *ARRAYS, (), *((one,) for one in ONES), *(Pair(one, (FIELD, one)) for one in ARRAYS)]
+    values = [
+        kernels.kernel(plus_one),
+        *ONES,
+        *ARRAYS,
+        (),
+        *((one,) for one in ONES),
+        *(Pair(one, (FIELD, one)) for one in ARRAYS),
+    ]
     for value in values * 2:  # then those found before
         assert compiler_shortcuts.typeof(value) == numba.typeof(value)
     with pytest.raises(ValueError, match="Cannot determine Numba type"):
