@@ -38,7 +38,7 @@ CASES = {
     "free pulleys": FREE,
     "memory": {},
     "no memory": {"friction_memory": 0.0},
-    "rigid": {"sheave_stiffness": np.inf},
+    "rigid": {"sheave_stiffness": np.inf, "stiffness_of": "sheave"},
 }
 
 
