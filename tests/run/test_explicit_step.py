@@ -54,7 +54,7 @@ FREE = {
     "tilt_lag": 1e-3,
     "collar_clearance": 1e-3,
 }
-CONTROLLED = {"driving_axial": "ratio", "clamping": "torque_ratio", "torque_ratio": 0.5}
+CONTROLLED = {"driving_axial": "ratio", "clamping": "torque_ratio", "held_torque_ratio": 0.5}
 CASES = {
     "memory": {},
     "no memory": {"friction_memory": 0.0},

@@ -116,7 +116,7 @@ PULLEYS: dict[str, Parameter] = {
         "driven pulley: its thrust is constant, or a controller holds the torque ratio by it",
         choices=("constant", "torque_ratio"),
     ),
-    "torque_ratio": Parameter(
+    "held_torque_ratio": Parameter(
         0.6,
         "",
         "torque ratio to be held: load over what friction carries at the lesser axial force",
@@ -255,21 +255,14 @@ def _controller_problems(p: Mapping[str, Any]) -> list[Problem]:
         return found
     starts = (p["load_start"],) if p.get("load_history") == "ramp" else ()
     loads = [load for load in (*starts, p["load"]) if load]
-    if p["torque_ratio"] == 0.0 or any(load * p["torque_ratio"] < 0.0 for load in loads):
+    if p["held_torque_ratio"] == 0.0 or any(load * p["held_torque_ratio"] < 0.0 for load in loads):
         listed = ", ".join(f"{load:g} N m" for load in loads) or "any"
-        found.append(("torque_ratio", f"the sign of the load, {listed}", f"{p['torque_ratio']:g}"))
+        found.append(("held_torque_ratio", f"the sign of the load, {listed}", f"{p['held_torque_ratio']:g}"))
         return found
-    most = capacity.carried_torque(dict(p) | {"thrust": p["most_thrust"]}) * abs(p["torque_ratio"])
-    found += [
-        (
-            "load",
-            f"at most {most:.4g} N m, which most_thrust carries at torque_ratio {p['torque_ratio']:g}",
-            f"{load:g} N m",
-        )
-        for load in loads
-        if abs(load) > most
-    ][:1]
-    return found
+    share = abs(p["held_torque_ratio"])
+    most = capacity.carried_torque(dict(p) | {"thrust": p["most_thrust"]}) * share
+    expected = f"at most {most:.4g} N m, which most_thrust carries at held_torque_ratio {share:g}"
+    return found + [("load", expected, f"{load:g} N m") for load in loads if abs(load) > most][:1]
 
 
 def pulley_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
@@ -281,7 +274,7 @@ def pulley_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
         (p["driving_axial"] != "thrust", ("driving_thrust",), f"driving_axial {p['driving_axial']}"),
         (p["driving_axial"] == "position", ("driving_spring_rate",), "driving_axial position"),
         (not controlled[0], ("ratio_gain", "ratio_rate"), f"driving_axial {p['driving_axial']}"),
-        (not controlled[1], ("torque_ratio", "clamping_gain", "clamping_rate"), "clamping constant"),
+        (not controlled[1], ("held_torque_ratio", "clamping_gain", "clamping_rate"), "clamping constant"),
         (not any(controlled), ("least_thrust", "most_thrust"), "no controller"),
         (not p["driving_piston"] and not p["driven_piston"], ("oil_density",), "no piston"),
         (

@@ -160,7 +160,7 @@ def with_pulleys(
     limits = (p["least_thrust"], p["most_thrust"]) if sets_ratio or sets_clamping else (-np.inf, np.inf)
     need = 0.0
     if sets_clamping:
-        need = 1.0 / (capacity.carried_torque(p | {"thrust": 1.0}) * abs(p["torque_ratio"]))
+        need = 1.0 / (capacity.carried_torque(p | {"thrust": 1.0}) * abs(p["held_torque_ratio"]))
     named = {
         "driving_mobility": 1.0 / p["driving_inertia"],
         "driven_mobility": 1.0 / p["driven_inertia"],
