@@ -70,6 +70,10 @@ def _document(job: Job) -> dict[str, Any]:
         if along[key] or job.parameters[key] != only:
             told = "several values" if along[key] else f"{job.parameters[key]:g}"
             raise mismatch(f"{where}: {key}", f"{only:g}, since the pushbelt knows no other", told)
+    scaled = along["sheave_stiffness"] or job.parameters["sheave_stiffness"] != 1.0
+    if scaled and (along["stiffness_of"] or job.parameters["stiffness_of"] != "sheave"):
+        expected = '"sheave", since sheave_stiffness scales all modes of opening of the pushbelt'
+        raise mismatch(f"{where}: stiffness_of", expected, job.parameters["stiffness_of"])
     whole = replace(job, given=frozenset(job.parameters))  # defaults are another belt's there
     document = handed_to(whole, PUSHBELT, "the reference of its ladder")
     document.get("numerics", {}).pop("step", None)

@@ -52,7 +52,7 @@ CASES = {
     "ramp": {"load_history": "ramp", "load_start": 60.0, "load": 140.0},
     "ramp of speed": {"speed_history": "ramp", "speed_start": 100.0},
     "rising": {"rise_time": 0.03},  # the start-up's damping and load, half way
-    "rigid": {"sheave_stiffness": np.inf, "load": -80.0},
+    "rigid": {"sheave_stiffness": np.inf, "stiffness_of": "sheave", "load": -80.0},
 }
 STEP = 1e-7
 

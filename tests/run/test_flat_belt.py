@@ -25,7 +25,11 @@ from support.fast_runs import FastRuns, march
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
 DEFAULTS |= {"duration": 0.1, "load": 100.0, "load_history": "ramp", "stations": 96}
-CASES = {"memory": {}, "no memory": {"friction_memory": 0.0}, "rigid": {"sheave_stiffness": np.inf}}
+CASES = {
+    "memory": {},
+    "no memory": {"friction_memory": 0.0},
+    "rigid": {"sheave_stiffness": np.inf, "stiffness_of": "sheave"},
+}
 
 
 @cache

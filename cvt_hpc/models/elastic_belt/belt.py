@@ -15,7 +15,13 @@ import numpy as np
 
 from cvt_hpc.physics.friction import FrictionLaw, given_law
 from cvt_hpc.physics.geometry import Variator, cell_counts, variator
-from cvt_hpc.physics.sheaves import Sheaves, flexibility, sheaves
+from cvt_hpc.physics.sheaves import (
+    Sheaves,
+    axial_element_stiffness,
+    flexibility,
+    sheaves,
+    stiffness_factors,
+)
 from cvt_hpc.vibration.ramped import ramped
 
 FIELDS = ("w", "u", "v_element", "v_ring", "v_filtered", "n_element", "n_ring")
@@ -159,16 +165,18 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     arc_share = 0.5 * (cell * (kappa > 0) + np.roll(cell * (kappa > 0), 1)) / dual
     ring_mass = p["ring_mass"] * 0.5 * _pair(cell * (1.0 + kappa * p["ring_offset"])) / dual
     belt_speed = p["driving_speed"] * path.driving_radius
+    whole, disc = stiffness_factors(p)
     wraps = [
         sheaves(
             cell[grid.starts[region]],
             grid.counts[region] + 1,
             radius,
-            p["sheave_stiffness"],
-            p["tilt_stiffness"],
+            whole,
+            p["tilt_stiffness"] * p["tilt_factor"],
             p["local_stiffness"],
             p["local_length"],
-            p["flank_stiffness"],
+            axial_element_stiffness(p),
+            disc,
         )
         for region, radius in ((0, path.driving_radius), (2, path.driven_radius))
     ]

@@ -14,6 +14,7 @@ import numpy as np
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
+from cvt_hpc.physics.sheaves import STIFFNESS_OF, stiffness_factors
 from cvt_hpc.variator.scene import (
     FRICTION,
     HALF_WEDGE_ANGLE,
@@ -70,13 +71,25 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     },
     "sheaves": {
         "sheave_stiffness": _stiffness(
-            1.0, "", "stiffness of the sheaves, multiple of the reference; inf: rigid"
+            1.0,
+            "",
+            "stiffness of the sheaves' discs, multiple of the reference; inf: rigid; see stiffness_of",
+        ),
+        "stiffness_of": Parameter(
+            "disc",
+            "",
+            "what sheave_stiffness scales: the discs alone, as in Lebrecht et al. 2004, or the whole sheave, "
+            "disc and tilt of its collar",
+            choices=STIFFNESS_OF,
         ),
         "tilt_stiffness": _stiffness(
             3e5,
             "N m/rad",
             "reference stiffness against tilting, shaft bending included",
             sensible=(100.0, 1000000000.0),
+        ),
+        "tilt_factor": _stiffness(
+            1.0, "", "factor on tilt_stiffness, whatever sheave_stiffness scales; inf: no tilt"
         ),
         "local_stiffness": positive(
             4e9,
@@ -91,6 +104,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "axial stiffness of the elements, per length",
             sensible=(1000000.0, 100000000000000.0),
         ),
+        "element_factor": positive(1.0, "", "factor on flank_stiffness"),
         "half_wedge_angle": HALF_WEDGE_ANGLE,
         "driving_position": Parameter(
             0.0, "m", "axial opening of the driving pulley, prescribed (LOW stop)", sensible=(1e-07, 0.1)
@@ -154,11 +168,16 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         By the name of the parameter, the setting that makes it so, e.g. "friction_law table".
     """
     p = parameters
-    of_elastic_sheaves = ("tilt_stiffness", "local_stiffness", "local_length")
+    whole, disc = stiffness_factors(p)
+    of_disc, of_tilt = ("local_stiffness", "local_length"), ("tilt_stiffness", "tilt_factor")
     cases = (
         (p["disturbance"] == 0.0, ("seed",), "disturbance 0"),
         (p["ring_friction"] == 0.0, ("ring_friction_speed",), "ring_friction 0"),
-        (np.isinf(p["sheave_stiffness"]), of_elastic_sheaves, "sheave_stiffness inf"),
+        (p["sheave_stiffness"] == 1.0, ("stiffness_of",), "sheave_stiffness 1"),
+        (np.isinf(p["tilt_factor"]), of_tilt[:1], "tilt_factor inf"),
+        (np.isinf(p["tilt_stiffness"]), of_tilt[1:], "tilt_stiffness inf"),
+        (np.isinf(disc), of_disc, "sheave_stiffness inf"),
+        (np.isinf(whole), of_disc + of_tilt, "sheave_stiffness inf"),
     )
     found = {key: setting for holds, keys, setting in cases if holds for key in keys}
     return friction_inert(p) | course_inert(p) | found
