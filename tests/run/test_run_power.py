@@ -20,7 +20,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     belt_constants,
 )
 from cvt_hpc.models.elastic_belt.lane_belt import take_lane
-from cvt_hpc.models.elastic_belt.power import LAYER_LOSS, POWERS, STORED_ENERGY
+from cvt_hpc.models.elastic_belt.power_terms import LAYER_LOSS, POWERS, STORED_ENERGY
 from cvt_hpc.models.elastic_belt.record import LOSSES
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.sampling import Outcome

@@ -11,6 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.pulley_settings import (
+    DRIVEN_INERTIA,
+    PULLEYS,
+    SHAFT,
+    pulley_inert,
+    pulley_problems,
+    shaft_problems,
+)
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
@@ -115,10 +123,10 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "lag_stiffness": positive(
             2e8, "N/m", "stiffness that scales that lag", sensible=(10000.0, 1000000000000.0)
         ),
-        "driven_inertia": positive(
-            0.02, "kg m^2", "moment of inertia of the driven pulley", sensible=(1e-05, 100.0)
-        ),
+        "driven_inertia": DRIVEN_INERTIA,
     },
+    "pulleys": PULLEYS,
+    "shaft": SHAFT,
     "friction": FRICTION,
     "mesh": {
         "stations": Parameter(160, "", "cells around the belt", minimum=24, maximum=4096),
@@ -140,7 +148,8 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         Empty where all is well.
     """
     p = parameters
-    return shape_problems(p) + course_problems(p) + friction_problems(p)
+    found = shape_problems(p) + course_problems(p) + friction_problems(p)
+    return found or pulley_problems(p)
 
 
 def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
@@ -151,7 +160,7 @@ def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         path = variator(p["ratio"], p["driven_radius"], p["centre_distance"]).path_length
         if abs(p["play"]) > 0.02 * path:
             problems.append(("play", f"within 2 % of the belt's length {path:.4g} m", f"{p['play']:g} m"))
-    return problems
+    return problems + shaft_problems(p)
 
 
 def inert(parameters: dict[str, Any]) -> dict[str, str]:
@@ -180,4 +189,4 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         (np.isinf(whole), of_disc + of_tilt, "sheave_stiffness inf"),
     )
     found = {key: setting for holds, keys, setting in cases if holds for key in keys}
-    return friction_inert(p) | course_inert(p) | found
+    return friction_inert(p) | course_inert(p) | pulley_inert(p) | found

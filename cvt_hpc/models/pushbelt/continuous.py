@@ -28,12 +28,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
 from cvt_hpc.physics.sheaves import axial_element_stiffness
 
 RIGID = 1e12  # [N/m]: of a mode that does not open; it gives way by 0.1 um under 100 kN
 
 # By key of the continuum the only value that the pushbelt has a counterpart of
-ONLY = {"driving_position": 0.0, "longitudinal_mass": 1.0}
+ONLY = {"driving_position": 0.0, "longitudinal_mass": 1.0, **PULLEY_DEFAULTS}
 # Of the continuum alone
 ABSENT = (
     "reference_tension",

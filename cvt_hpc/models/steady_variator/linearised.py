@@ -84,6 +84,7 @@ def _evaluate(flat: FlatBelt, out: np.ndarray) -> None:
     set_inlets(flat)
     rates_under_forces(flat)
     out[:MOMENT], out[MOMENT] = flat.rate, flat.moments
+    out[MOMENT, : flat.belt.driven_start] = 0.0
 
 
 class Linearisation:
