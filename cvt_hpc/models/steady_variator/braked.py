@@ -1,12 +1,12 @@
 """States at a held speed of the driven pulley: which load, or which thrust, such a belt asks for.
 
-Under a given load there may be one steady state, several or none. At the torque that friction carries the states
-turn back. Where neither strand pushes, the play passes from one strand to the driving wrap and on to the
-other strand while the load hardly changes, so that the load does not tell them apart. A brake that holds the driven
-pulley's speed omega does: as omega falls slip grows, past the largest torque, and play moves. That is how slip is
-measured on a test bench. The driven pulley's balance of moments, sum of the flanks' moments = i M, then gives M and
-leaves the equations, as omega leaves the unknowns. Where the load is given instead and the thrust is asked for, it is
-the balance of axial forces, sum f = Q, that leaves them and gives Q.
+Under a given load there may be one steady state, several or none. At the torque that friction carries the
+states turn back. Where neither strand pushes, the play passes from one strand to the driving wrap and on to
+the other strand while the load hardly changes, so that the load does not tell them apart. A brake that holds
+the driven pulley's speed omega does: as omega falls slip grows, past the largest torque, and play moves; slip
+is measured like that. The driven pulley's balance of moments, sum of the flanks' moments = i M, then gives M,
+and leaves the equations as omega leaves the unknowns. Where the load is given instead and the thrust is asked
+for, it is the balance of axial forces, sum f = Q, that leaves them and gives Q.
 
 M(omega) has small folds where single cells open. Steps that do not come through are shortened, and where that
 does not help the walk leaps ahead, onto the curve behind such a fold.
@@ -81,13 +81,13 @@ class Braked:
         return np.insert(x, x.size + 1 + SPEED, self.speed)
 
     def at(self, speed: float, x: np.ndarray, tolerance: float) -> tuple[np.ndarray, float] | None:
-        """Unknowns of `Equations` at a driven speed from ones nearby, and what follows; None where none is found."""
+        """Unknowns of `Equations` at a driven speed from ones nearby, and what follows; None: not found."""
         self.speed = speed
         found = newton(self, np.delete(x, SPEED), tolerance, most=TRIES)
         return None if found is None else (self.whole(found), self.following)
 
     def along(self, x: np.ndarray, sign: float, tolerance: float) -> Iterator[tuple[np.ndarray, float]]:
-        """Solutions as the driven speed falls (sign -1) or rises (1), with what follows, as far as any are found."""
+        """Solutions as the driven speed falls (sign -1) or rises (1), with what follows, as far as found."""
         before: np.ndarray | None = None
         step, leaps, leaping = FIRST, iter(LEAPS), False
         while step > 0.0:

@@ -171,7 +171,9 @@ class SteadyBelt:
                 most = state
             elif direction * state.load < FALLEN * direction * most.load:
                 return most
-        raise NoSteadyState(f"no largest load found: from {near.load:.4g} N m states reach to {last.load:.4g} N m")
+        raise NoSteadyState(
+            f"no largest load found: from {near.load:.4g} N m states reach to {last.load:.4g} N m"
+        )
 
     def _at_slip(self, below: Steady, beyond: Steady) -> Steady:
         """State at which a pulley just does not slip grossly, between two states."""
@@ -281,7 +283,7 @@ class SteadyBelt:
         )
 
     def _between(self, low: Steady, high: Steady, load: float) -> np.ndarray:
-        """Unknowns under a load between those of two states, by regula falsi (Illinois) over the driven speed."""
+        """Unknowns under a load between two states, by regula falsi (Illinois) over the driven speed."""
         braked, ends = Braked(self._equations), [low.unknowns, high.unknowns]
         left = [low.load - load, high.load - load]
         self._load(0.0)
