@@ -1,12 +1,11 @@
-"""States at a held speed of the driven pulley: which load, or which thrust, such a belt asks for.
+"""States at a held speed of the driven pulley: the load follows, as the moment of a brake that holds it.
 
 Under a given load there may be one steady state, several or none. At the torque that friction carries the
 states turn back. Where neither strand pushes, the play passes from one strand to the driving wrap and on to
 the other strand while the load hardly changes, so that the load does not tell them apart. A brake that holds
 the driven pulley's speed omega does: as omega falls slip grows, past the largest torque, and play moves; slip
 is measured like that. The driven pulley's balance of moments, sum of the flanks' moments = i M, then gives M,
-and leaves the equations as omega leaves the unknowns. Where the load is given instead and the thrust is asked
-for, it is the balance of axial forces, sum f = Q, that leaves them and gives Q.
+and leaves the equations as omega leaves the unknowns.
 
 M(omega) has small folds where single cells open. Steps that do not come through are shortened, and where that
 does not help the walk leaps ahead, onto the curve behind such a fold.
@@ -27,7 +26,7 @@ FIRST, LONGEST, SHORTEST = 1e-4, 2.5e-3, 3e-6
 LEAPS = (3e-4, 1e-3, 3e-3)  # beyond a place where shorter steps do not help
 TRIES = 25  # Newton's steps: ten to fifteen where several cells open at once
 SPEED = -2  # place of the driven speed among the unknowns
-MOMENT, AXIAL = -4, -3  # places of the driven pulley's two balances in the residual
+MOMENT = -4  # place of the driven pulley's balance of moments in the residual
 
 
 class Braked:
@@ -36,9 +35,7 @@ class Braked:
     Parameters
     ----------
     equations : Equations
-        Of the belt, with its load and thrust.
-    thrust_follows : bool
-        The load stays and the thrust on the driven pulley follows; else the load follows.
+        Of the belt; its load has no influence.
 
     Attributes
     ----------
@@ -48,46 +45,43 @@ class Braked:
         Of the driven pulley [rad/s].
     """
 
-    def __init__(self, equations: Equations, thrust_follows: bool = False) -> None:
-        self._equations, self._thrust_follows = equations, thrust_follows
-        self._left_out = AXIAL if thrust_follows else MOMENT
+    def __init__(self, equations: Equations) -> None:
+        self._equations = equations
         self.sizes = np.delete(equations.sizes, SPEED)
         self.speed, self._open = 0.0, 0.0
 
     @property
-    def following(self) -> float:
-        """The load [N m], or the thrust [N], that belongs to the last residual."""
+    def load(self) -> float:
+        """Torque at the driving pulley that belongs to the last residual [N m]."""
         belt = self._equations.belt
-        if self._thrust_follows:
-            return belt.thrust + self._open * belt.axial_damping
         return belt.load + self._open * belt.driven_inertia / belt.ratio
 
     def residual(self, x: np.ndarray) -> np.ndarray | None:
-        """As of `Equations`, without the balance that gives what follows."""
+        """As of `Equations`, without the balance that gives the load."""
         left = self._equations.residual(self.whole(x))
         if left is None:
             return None
-        self._open = float(left[self._left_out])
-        return np.delete(left, self._left_out)
+        self._open = float(left[MOMENT])
+        return np.delete(left, MOMENT)
 
     def jacobian(self, x: np.ndarray) -> csc_array:
         """Slopes of the residual, (n - 1, n - 1)."""
         slopes = self._equations.jacobian(self.whole(x)).tocsr()
         rows, columns = (np.arange(slopes.shape[0]) for _ in range(2))
-        return slopes[np.delete(rows, self._left_out)].tocsc()[:, np.delete(columns, SPEED)]
+        return slopes[np.delete(rows, MOMENT)].tocsc()[:, np.delete(columns, SPEED)]
 
     def whole(self, x: np.ndarray) -> np.ndarray:
         """Unknowns of `Equations`."""
         return np.insert(x, x.size + 1 + SPEED, self.speed)
 
     def at(self, speed: float, x: np.ndarray, tolerance: float) -> tuple[np.ndarray, float] | None:
-        """Unknowns of `Equations` at a driven speed from ones nearby, and what follows; None: not found."""
+        """Unknowns of `Equations` at a driven speed from ones nearby, and their load; None: not found."""
         self.speed = speed
         found = newton(self, np.delete(x, SPEED), tolerance, most=TRIES)
-        return None if found is None else (self.whole(found), self.following)
+        return None if found is None else (self.whole(found), self.load)
 
     def along(self, x: np.ndarray, sign: float, tolerance: float) -> Iterator[tuple[np.ndarray, float]]:
-        """Solutions as the driven speed falls (sign -1) or rises (1), with what follows, as far as found."""
+        """Solutions as the driven speed falls (sign -1) or rises (1), with their loads, as far as found."""
         before: np.ndarray | None = None
         step, leaps, leaping = FIRST, iter(LEAPS), False
         while step > 0.0:
