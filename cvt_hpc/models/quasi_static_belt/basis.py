@@ -11,7 +11,6 @@ from cvt_hpc.models.elastic_belt.belt import Belt, Mesh
 from cvt_hpc.physics.sheaves import flexibility
 from cvt_hpc.physics.splines import Splines, hierarchical_splines
 
-COARSE_SPACING = 0.02  # [m]: seven splines along a strand, three for the shortest half wave that is looked at
 SPLITS = ("free_splines", "held_splines", "modes")
 
 
@@ -36,7 +35,7 @@ class Basis(NamedTuple):
     fastest: float
 
 
-def split_basis(belt: Belt, grid: Mesh, split: str, limit: float) -> Basis:
+def split_basis(belt: Belt, grid: Mesh, split: str, limit: float, spacing: float) -> Basis:
     """Shapes of a belt, split at a limit frequency [Hz].
 
     Parameters
@@ -50,9 +49,11 @@ def split_basis(belt: Belt, grid: Mesh, split: str, limit: float) -> Basis:
         splines in closed grooves, of which none of the dynamic ones is faster than the limit.
     limit : float
         Limit frequency [Hz].
+    spacing : float
+        Of the coarse splines [m].
     """
     mass, held = belt.mass * belt.dual, transverse_stiffness(belt)
-    shapes = splines_of_belt(grid).values
+    shapes = splines_of_belt(grid, spacing).values
     if split == "modes":
         squares, mix = eigh(shapes.T @ held @ shapes, (shapes.T * mass) @ shapes)
         shapes = shapes @ mix
@@ -68,13 +69,13 @@ def split_basis(belt: Belt, grid: Mesh, split: str, limit: float) -> Basis:
     return Basis(np.ascontiguousarray(moving), np.ascontiguousarray(shapes[:, ~slow]), held, fastest)
 
 
-def splines_of_belt(grid: Mesh) -> Splines:
+def splines_of_belt(grid: Mesh, spacing: float) -> Splines:
     """Splines of a belt: the coarse ones all around, finer ones on the arcs and finest at the arcs' ends.
 
-    None finer than the mesh: with 160 stations 10 mm on the arcs and 5 mm at their ends.
+    None finer than the mesh: of 20 mm with 160 stations 10 mm on the arcs and 5 mm at their ends.
     """
     length = grid.path.path_length
-    coarse = round(length / COARSE_SPACING)
+    coarse = max(round(length / spacing), 4)
     spacing = length / coarse
     levels = int(np.floor(np.log2(spacing / grid.cell.max()))) if spacing > grid.cell.max() else 0
     ends = [grid.position[start] for start in grid.starts]

@@ -61,7 +61,7 @@ def settle_contents(
         for j in range(n):
             speed += share[layer, j] * v[j] / (1.0 + eps[layer, j - 1 if j > 0 else n - 1])
             whole += along[layer, j]
-        for iteration in range(MOST_ITERATIONS):
+        for _ in range(MOST_ITERATIONS):
             for c in range(n):
                 mean = 0.5 * (fields[W, c] + fields[W, c + 1 if c < n - 1 else 0])
                 length = 1.0 + belt.curvature[c] * (mean + offset)

@@ -3,9 +3,9 @@
     E x + R^T c v_0 = f,    c R x + A v = y
 
 x are the increments of the R coordinates' rates, v = (v_0, v_1) those of both layers' speeds at the N
-stations, c the cross slope of friction, R the shapes. A is cyclic block-tridiagonal, symmetric positive
-definite: the layers are chains of masses. It is eliminated for all columns of c R at once, and what is left is
-dense and small.
+stations, c the cross slope of friction, R the shapes; hoop stresses couple both likewise. A is cyclic
+block-tridiagonal, symmetric positive definite: the layers are chains of masses. It is eliminated for all
+columns of c R at once, and what is left is dense and small.
 """
 
 from __future__ import annotations
@@ -42,7 +42,10 @@ def chain(stations: int, coordinates: int) -> Chain:
     """Work space; a whole number of registers wide."""
     width = 8 * ((coordinates + 3 + 7) // 8)
     return Chain(
-        np.zeros((stations, 3)), np.zeros((2, stations)), np.zeros((stations, 3)), np.zeros((2 * stations, width))
+        np.zeros((stations, 3)),
+        np.zeros((2, stations)),
+        np.zeros((stations, 3)),
+        np.zeros((2 * stations, width)),
     )
 
 

@@ -1,16 +1,17 @@
 """The model's own step: leapfrog of the dynamic coordinates, lag exactly, friction and layers implicit.
 
 Staggered in time as `elastic_belt/imex.py`: displacements and contents at t_k, rates and speeds at t_k-1/2.
-Forces are those of `rhs.accelerations`; their slopes with the speeds, that is of flank and saddle friction and
-of the layers' stresses, make the step linearly implicit. Elastic forces across the belt are explicit:
+Forces are those of `rhs.accelerations`; their slopes with the speeds, that is of flank and saddle friction
+and of the layers' stresses, hoop forces included, make the step linearly implicit. Other elastic forces
+across the belt are explicit:
 
 - dynamic coordinates, of inertia M: M (p' - p) / dt = force, a leapfrog;
 - lagging ones: (1 - exp(-dt / T)) of the way to where they would rest, so dt q' = (1 - exp(-dt / T)) K^-1
   force, which is exact for the forces of a spring K, at any dt / T.
 
-Both have one dense system with the slopes of friction, into which the layers' cyclic block-tridiagonal one is
-eliminated (`coupled.py`). With the steady flow of eqs 29 and 30 each layer has one speed in the place of N, and
-its contents follow by an implicit step of their own (`contents.py`).
+Both have one dense system with the slopes of friction, into which the layers' cyclic block-tridiagonal one
+is eliminated (`coupled.py`). With the steady flow of eqs 29 and 30 each layer has one speed in the place of
+N, and its contents follow by an implicit step of their own (`contents.py`).
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ from cvt_hpc.models.quasi_static_belt.basis import Basis
 from cvt_hpc.models.quasi_static_belt.contents import settle_contents
 from cvt_hpc.models.quasi_static_belt.coupled import Chain, chain, solve_chain, solve_dense
 from cvt_hpc.physics.compliance import Contact
-from cvt_hpc.physics.flank import flank_forces, flank_shares, flank_sliding
+from cvt_hpc.physics.flank import flank_shares, flank_sliding
 from cvt_hpc.physics.friction import friction_coefficient, saturation
 
 MOST_PASSES = 9
@@ -77,13 +78,12 @@ MOST_PASSES = 9
     REVERSING,
     RING_REVERSING,
     ELEMENT_STRAIN_AHEAD,
-    RUBBING,
     ELEMENT_STRESS,
     RING_STRESS,
     HOOP_STRESS,
     ELEMENT_HOOP,
     RING_HOOP,
-) = range(21)
+) = range(20)
 
 
 class SplitBelt(NamedTuple):
@@ -97,16 +97,12 @@ class SplitBelt(NamedTuple):
         Dynamic shapes first.
     dynamic : int
         Their number D.
-    coupled : int
-        Of coordinates whose rates slide: all, or D.
     step : float
         [s]
     inertia : (D + L, D + L) array
         M / dt of the dynamic ones, dt / (1 - exp(-dt / T)) K of the lagging ones [N s/m].
     gyration : (D + L, D + L) array
         Half of the gyroscopic matrix per belt speed, antisymmetric [N s^2/m^2].
-    follow : (L, L) array
-        Inverse of the lagging part of `inertia`.
     steady_flow : bool
         Each layer has one speed.
     drag : (2,) array
@@ -118,11 +114,9 @@ class SplitBelt(NamedTuple):
     belt: Belt
     shapes: np.ndarray
     dynamic: int
-    coupled: int
     step: float
     inertia: np.ndarray
     gyration: np.ndarray
-    follow: np.ndarray
     steady_flow: bool
     drag: np.ndarray
     share: np.ndarray
@@ -157,7 +151,7 @@ class Motion(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Work space: at the stations (21, N), rates (7, N), moments (N,); the layers; the dense system."""
+    """Work space: at the stations (20, N), rates (7, N), moments (N,); the layers; the dense system."""
 
     stations: np.ndarray
     rate: np.ndarray
@@ -183,7 +177,7 @@ def layer_shares(belt: Belt) -> np.ndarray:
 
 
 def split_belt(
-    belt: Belt, grid: Mesh, basis: Basis, limit: float, longitudinal: str, sliding: str, step: float
+    belt: Belt, grid: Mesh, basis: Basis, limit: float, longitudinal: str, step: float
 ) -> SplitBelt:
     """Constants of a run.
 
@@ -193,8 +187,8 @@ def split_belt(
         The belt, its mesh and its shapes.
     limit : float
         Limit frequency [Hz].
-    longitudinal, sliding : str
-        As the parameters of the job.
+    longitudinal : str
+        As the parameter of the job.
     step : float
         [s]
     """
@@ -208,16 +202,13 @@ def split_belt(
     difference = np.roll(np.eye(belt.cell.size), 1, axis=1) - np.roll(np.eye(belt.cell.size), -1, axis=1)
     # 2 m v u_s, a difference of the neighbours over both cells, times the length of the station: half of it
     gyration = 0.5 * belt.mass * shapes.T @ difference @ shapes
-    follow = np.linalg.inv(inertia[slow:, slow:]) if count > slow else np.zeros((0, 0))
     return SplitBelt(
         belt,
         shapes,
         slow,
-        count if sliding == "all" else slow,
         step,
         inertia,
         np.ascontiguousarray(0.5 * (gyration - gyration.T)),
-        np.ascontiguousarray(follow),
         longitudinal == "steady_flow",
         lag_drag(belt, grid, lag),
         layer_shares(belt),
@@ -226,18 +217,18 @@ def split_belt(
 
 def work_space(model: SplitBelt) -> Work:
     """Work space of a step."""
-    n, size = model.belt.cell.size, model.coupled + 2
+    n, size = model.belt.cell.size, model.shapes.shape[1] + 2
     width = 8 * ((size + 1 + 7) // 8)
     return Work(
-        np.zeros((21, n)),
+        np.zeros((20, n)),
         np.zeros((7, n)),
         np.zeros(n),
-        chain(n, model.coupled),
+        chain(n, model.shapes.shape[1]),
         np.zeros((size, width)),
         np.zeros(model.shapes.shape[1]),
         np.zeros(size),
         np.zeros(model.shapes.shape[1]),
-        np.zeros(8 * ((model.coupled + 3 + 7) // 8)),
+        np.zeros(8 * ((model.shapes.shape[1] + 3 + 7) // 8)),
     )
 
 
@@ -248,7 +239,9 @@ def motion(model: SplitBelt, state: State) -> Motion:
     q = np.linalg.lstsq(model.shapes * weight[:, None], weight * fields[W], rcond=None)[0]
     p, slow = np.zeros_like(q), model.dynamic
     if slow:
-        p[:slow] = np.linalg.lstsq(model.shapes[:, :slow] * weight[:, None], weight * fields[U], rcond=None)[0]
+        p[:slow] = np.linalg.lstsq(model.shapes[:, :slow] * weight[:, None], weight * fields[U], rcond=None)[
+            0
+        ]
     fields[W], fields[U] = model.shapes @ q, model.shapes @ p
     found = State(fields, state.scalars.copy())
     n = belt.cell.size
@@ -311,10 +304,9 @@ def _step(model: SplitBelt, moved: Motion, work: Work) -> bool:
 def _forces(model: SplitBelt, moved: Motion, work: Work) -> None:
     """Forces at the stations [N] without those of the layers' stresses."""
     belt, stations, fields = model.belt, work.stations, moved.state.fields
-    n = belt.cell.size
+    n, v0, v1 = belt.cell.size, fields[V_ELEMENT], fields[V_RING]
     for j in range(n):
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
-        v0, v1 = fields[V_ELEMENT], fields[V_RING]
         push_left = damped_push(belt, moved.eps[0, a], (v0[j] - v0[a]) / belt.cell[a])
         push_right = damped_push(belt, moved.eps[0, j], (v0[b] - v0[j]) / belt.cell[j])
         pull = belt.ring_stiffness * (moved.eps[1, j] - moved.eps[1, a])
@@ -327,13 +319,12 @@ def _forces(model: SplitBelt, moved: Motion, work: Work) -> None:
 
 @kernel
 def _slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
-    """Slopes of friction with the speeds at the stations [N s/m], and the layers' blocks, links and stresses."""
+    """Slopes of friction with the speeds [N s/m], and the layers' blocks, links and stresses."""
     belt, state, stations, step = model.belt, moved.state, work.stations, model.step
     n, fields, eps = belt.cell.size, state.fields, moved.eps
     w, u, v0, v1 = fields[W], fields[U], fields[V_ELEMENT], fields[V_RING]
     sine, cosine = np.sin(belt.half_wedge_angle), np.cos(belt.half_wedge_angle)
     per_cosine, per_width = 1.0 / cosine, 1.0 / belt.friction_speed
-    wedge = 2.0 * np.tan(belt.half_wedge_angle)
     damping = damping_at(belt, state.scalars[TIME])
     speed_share = speed_share_at(belt, state.scalars[TIME])
     driving_speed = speed_share * belt.driving_speed
@@ -345,7 +336,6 @@ def _slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
         slope = (w[b] - w[a]) / (belt.cell[a] + belt.cell[j])
         v_radial = u[j] + v0[j] * slope
         radial_slope, cross, along_slope, stiff, lever = 0.5 * damping, 0.0, 0.0, 0.0, 1.0
-        stations[RUBBING, j] = -damping * v_radial
         if share > 0.0:
             lever = 1.0 + belt.ring_offset * belt.arc_curvature[j]
             driven = j >= belt.driven_start
@@ -368,10 +358,6 @@ def _slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
             radial_slope += (across + excess * climb * climb) * per_cosine * per_cosine
             cross = excess * climb * run * per_cosine
             along_slope = across + excess * run * run
-            radial, _ = flank_forces(
-                coefficient, belt.friction_speed, sine, cosine, moved.force[j], v_radial, v_tangential
-            )
-            stations[RUBBING, j] += share * (radial - wedge * moved.force[j])
             drag, saddle = ring_drag(belt, j, a, eps, v0[j], v1[j], speed_share)
             grip, _ = saturation(saddle, 1.0 / belt.ring_friction_speed)
             if stations[RING_REVERSING, j] > 0.5:
@@ -419,7 +405,7 @@ def _slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
 @kernel
 def _couple(model: SplitBelt, moved: Motion, work: Work) -> None:
     """Increments of the coordinates' rates into `found`, of the layers' speeds into the chain's column 0."""
-    belt, stations, shapes, size = model.belt, work.stations, model.shapes, model.coupled
+    belt, stations, shapes, size = model.belt, work.stations, model.shapes, model.shapes.shape[1]
     n, slow, matrix = belt.cell.size, model.dynamic, work.matrix
     speed = speed_share_at(belt, moved.state.scalars[TIME]) * belt.belt_speed
     whole = size + 2 if model.steady_flow else size
@@ -467,7 +453,13 @@ def _couple(model: SplitBelt, moved: Motion, work: Work) -> None:
 @kernel
 def _fill_chain(model: SplitBelt, work: Work) -> None:
     """Right side of the layers' system, and its coupling with the coordinates."""
-    belt, stations, shapes, columns, size = model.belt, work.stations, model.shapes, work.layers.columns, model.coupled
+    belt, stations, shapes, columns, size = (
+        model.belt,
+        work.stations,
+        model.shapes,
+        work.layers.columns,
+        model.shapes.shape[1],
+    )
     n = belt.cell.size
     columns[:] = 0.0
     for j in range(n):
@@ -496,7 +488,13 @@ def _fill_chain(model: SplitBelt, work: Work) -> None:
 @kernel
 def _reduce(model: SplitBelt, work: Work) -> None:
     """Add the forces at the stations and their slopes to the dense system, with what the layers leave."""
-    belt, stations, shapes, columns, size = model.belt, work.stations, model.shapes, work.layers.columns, model.coupled
+    belt, stations, shapes, columns, size = (
+        model.belt,
+        work.stations,
+        model.shapes,
+        work.layers.columns,
+        model.shapes.shape[1],
+    )
     n, matrix = belt.cell.size, work.matrix
     whole = size + 2 if model.steady_flow else size
     row = work.row
@@ -566,33 +564,26 @@ def _again(model: SplitBelt, moved: Motion, work: Work) -> bool:
 def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
     """Apply the increments."""
     belt, state, stations, step = model.belt, moved.state, work.stations, model.step
-    n, fields, columns, size, slow = belt.cell.size, state.fields, work.layers.columns, model.coupled, model.dynamic
+    n, fields, columns, size, slow = (
+        belt.cell.size,
+        state.fields,
+        work.layers.columns,
+        model.shapes.shape[1],
+        model.dynamic,
+    )
     scalars, count, shapes = state.scalars, model.shapes.shape[1], model.shapes
     moment = 0.0
     for j in range(n):
         du, dv0 = work.rate[U, j], columns[2 * j, 0]
-        # what friction takes of the motion across, at the end of the step
-        stations[RUBBING, j] *= belt.dual[j]
-        stations[RUBBING, j] -= stations[RADIAL_SLOPE, j] * du + stations[CROSS_SLOPE, j] * dv0
-        stations[ACROSS, j] -= stations[RADIAL_SLOPE, j] * du + stations[CROSS_SLOPE, j] * dv0
-        if belt.arc_share[j] > 0.0:
-            moment += work.moments[j]
-            if j >= belt.driven_start:
-                slopes = stations[TANGENTIAL_SLOPE, j] * dv0 + stations[CROSS_SLOPE, j] * du
-                moment += slopes * (belt.driven_radius + fields[W, j])
+        if belt.arc_share[j] > 0.0 and j >= belt.driven_start:
+            slopes = stations[TANGENTIAL_SLOPE, j] * dv0 + stations[CROSS_SLOPE, j] * du
+            moment += work.moments[j] + slopes * (belt.driven_radius + fields[W, j])
     for k in range(size):
         moved.p[k] += work.found[k]
-    if size == slow and count > slow:
-        _follow(model, moved, work)
     work_done = 0.0
     np.dot(model.inertia, moved.p, work.row)
     for i in range(slow, count):
         work_done += moved.p[i] * work.row[i]
-    if size == slow:
-        # of the power that the lagging coordinates take, friction gives a part that is in no other loss
-        work.vector[:] = moved.p
-        work.vector[:slow] = 0.0
-        work_done -= np.dot(np.dot(shapes, work.vector), stations[RUBBING])
     if not model.steady_flow:
         for j in range(n):
             b = j + 1 if j < n - 1 else 0
@@ -625,9 +616,7 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
     for k in range(count):
         moved.q[k] += step * moved.p[k]
     belt_speed = speed_share_at(belt, scalars[TIME]) * belt.belt_speed
-    work.vector[:] = moved.p
-    work.vector[size:] = 0.0
-    np.dot(shapes, work.vector, fields[U])
+    np.dot(shapes, moved.p, fields[U])
     np.dot(shapes, moved.q, work.rate[W])
     last = fields[V_FILTERED, n - 1]
     for j in range(n):
@@ -638,7 +627,10 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
             if j == 0 or j == belt.driven_start:
                 fields[V_FILTERED, j] = speed
             else:
-                carried, forget = memory_transport(belt, belt.cell[j - 1], belt_speed), 1.0 / belt.friction_memory
+                carried, forget = (
+                    memory_transport(belt, belt.cell[j - 1], belt_speed),
+                    1.0 / belt.friction_memory,
+                )
                 target = (carried * before + forget * speed) / (carried + forget)
                 fields[V_FILTERED, j] = target + (last - target) * np.exp(-(carried + forget) * step)
     for j in range(n):
@@ -664,11 +656,3 @@ def _settle(model: SplitBelt, moved: Motion, work: Work) -> float:
         along[0, j] -= rubbed + stations[CROSS_SLOPE, j] * work.rate[U, j]
         along[1, j] -= (blocks[j, 2] - dual * belt.ring_mass[j] / model.step) * dv1 + blocks[j, 1] * dv0
     return settle_contents(belt, model.drag, model.share, moved.state.fields, moved.eps, along, model.step)
-
-
-@kernel
-def _follow(model: SplitBelt, moved: Motion, work: Work) -> None:
-    """Rates of the lagging coordinates from the forces at the end of the step, which do not slide by them."""
-    slow = model.dynamic
-    pull = np.dot(work.stations[ACROSS], model.shapes)
-    moved.p[slow:] = np.dot(model.follow, pull[slow:])
