@@ -22,6 +22,7 @@ OF_THE_COURSE = {
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     section: {key: parameter for key, parameter in table.items() if key not in OF_THE_COURSE}
     for section, table in elastic_belt.PARAMETERS.items()
+    if section != "record"
 }
 
 
