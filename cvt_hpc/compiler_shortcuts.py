@@ -5,6 +5,8 @@ that has something to do. They are in force for the whole process: threads must 
 
 Kernels are long, as others are merged into them: what the compiler does for each statement and each variable
 takes longer than the rest.
+
+`typeof` is no such replacement: it finds the types of a call's arguments.
 """
 
 from __future__ import annotations
@@ -14,6 +16,8 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, nullco
 from typing import Any
 from weakref import WeakKeyDictionary
 
+import numba
+import numpy as np
 from numba import types
 from numba.core import event, ir, ssa
 from numba.core.base import BaseContext
@@ -41,6 +45,35 @@ def shortcuts() -> Iterator[None]:
         for owner, name, value in _SHORTCUTS:
             taken.enter_context(replaced(owner, name, value))
         yield
+
+
+_types_of_likes: dict[Any, types.Type] = {}
+
+
+def typeof(value: Any) -> types.Type:
+    """Return what `numba.typeof` does, for tuples of arrays in a tenth of the time.
+
+    Raises
+    ------
+    ValueError or NumbaValueError
+        If a value has no type.
+    """
+    like = _like(value)
+    if (found := _types_of_likes.get(like)) is None:
+        found = _types_of_likes[like] = numba.typeof(value)
+    return found
+
+
+def _like(value: Any) -> Any:
+    """What values of one type have in common, and those of no other type."""
+    kind = type(value)
+    if kind is np.ndarray:
+        return value.dtype, value.ndim, value.flags.num
+    if kind is float or kind is bool:
+        return kind
+    if isinstance(value, tuple):
+        return kind, *map(_like, value)
+    return numba.typeof(value)
 
 
 _signatures: dict[tuple, Any] = {}

@@ -50,7 +50,7 @@ from typing import Any, NamedTuple
 
 import numba
 from numba import types
-from numba.core import compiler_lock
+from numba.core import compiler_lock, errors
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.environment import lookup_environment
@@ -59,7 +59,7 @@ from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 from numba.core.targetconfig import ConfigStack
 
-from cvt_hpc.compiler_shortcuts import replaced, shortcuts
+from cvt_hpc.compiler_shortcuts import replaced, shortcuts, typeof
 from cvt_hpc.lanes.kinds import LaneArrayKind
 
 _PACKAGE = Path(__file__).parent
@@ -166,6 +166,15 @@ class _Kernel(CPUDispatcher):
         self._without_entry: set[tuple] = set()  # types of arguments
         self._claims = ExitStack()
         self._compiler._customize_flags = self._customized
+
+    def typeof_pyval(self, val: Any) -> Any:
+        """Return the type of an argument that the compiler's own code does not tell, as of a named tuple."""
+        try:
+            found = typeof(val)
+        except (errors.NumbaValueError, ValueError):
+            found = types.pyobject
+        self._types_active_call.add(found)
+        return found
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Compile for a call from another kernel."""

@@ -10,6 +10,7 @@ import sys
 import time
 import uuid
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -54,11 +55,16 @@ def history_line(what: str, seconds: float | None = None) -> str:
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that numbers may depend on."""
     found = {"cvt_hpc": cvt_hpc.__version__, "python": platform.python_version()}
+    return found | _installed()
+
+
+@cache
+def _installed() -> dict[str, str]:
+    """Versions of packages; to read them takes some 10 ms."""
+    found = {}
     for package in _PACKAGES:
-        try:
+        with suppress(metadata.PackageNotFoundError):
             found[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            continue
     return found
 
 

@@ -12,9 +12,11 @@ prepare_environment() {
     stamp=.venv/installed-$extras
     state=$(cat pyproject.toml tests/constraints.txt | cksum)
     if [ "$(cat "$stamp" 2>/dev/null)" != "$state" ]; then
-        echo "Installing cvt_hpc[$extras] in .venv (a minute or two, once)."
-        .venv/bin/python -m pip install --quiet --disable-pip-version-check \
+        echo "Installing cvt_hpc[$extras] in .venv (half a minute or more, once)."
+        # pip compiles on one core, and also the tests that come with packages: half of its time
+        .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile \
             --constraint tests/constraints.txt --editable ".[$extras]" || return 1
+        .venv/bin/python -m compileall -qq -j 0 -x '/tests?/' .venv/lib || true # what fails is compiled when imported
         echo "$state" > "$stamp"
     fi
 }

@@ -23,8 +23,9 @@ install_slurm() {
     fi
 }
 
-prepare_environment mpich,test
-install_slurm
+install_slurm & # beside the other, as both wait for the network
+prepare_environment mpich,test || { wait; exit 1; }
+wait
 # Where nothing may be written beside the sources, each process rewrites all assertions anew, for 8 s of a core.
 unset PYTHONDONTWRITEBYTECODE
 # One worker more than cores: some tests wait, for Slurm or for ranks, while others compute.

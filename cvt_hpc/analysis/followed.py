@@ -1,12 +1,12 @@
 """One element on its way through the path: what it meets over time, in Lagrange's coordinates.
 
 A history has speeds and forces at places s of the reference path, in Euler's coordinates (Bullinger et al.
-2005, eq. 11). An element at s moves along the belt at its speed v_0. The path is 1 + kappa w times as long where the
-belt runs off it by w, so that its path coordinate goes by
+2005, eq. 11). An element at s moves along the belt at its speed v_0. Where the belt runs off the path by w it
+is 1 + kappa w times as long, so that the element's path coordinate goes by
 
     ds/dt = v_0(s, t) / (1 + kappa w(s, t)),
 
-the `momentary_element_speed` of a history. Heun's method takes it from sample to sample, with the speed linear
+the `momentary_element_speed` of a history. Heun's method takes it from sample to sample, the speed linear
 between samples and stations.
 """
 

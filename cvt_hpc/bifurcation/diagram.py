@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from cvt_hpc.bifurcation.attractors import Attractor, Start, attractors
 from cvt_hpc.bifurcation.costs import predicted_cost
@@ -20,6 +19,7 @@ from cvt_hpc.bifurcation.followed import Followed
 from cvt_hpc.bifurcation.job import Asked, Diagram
 from cvt_hpc.bifurcation.kinds import kinds_of, lowest_judged
 from cvt_hpc.files import written_aside
+from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.models.elastic_belt.belt import State, mesh
 from cvt_hpc.models.linear_stability.branch import Branch, branch, onsets
 from cvt_hpc.models.linear_stability.modes import LOW
@@ -90,7 +90,7 @@ def make_diagram(
         with closing(Steps(costs, len(followed), "branch", tell)) as steps:
             for number in missing:
                 # matrices are small: threads of the linear algebra would wait for each other in loops
-                with threadpool_limits(1):
+                with one_thread():
                     one = followed[number] = _follow(diagram, branches[number])
                 folder.save_branch(number, one)
                 if len(followed) >= stored:

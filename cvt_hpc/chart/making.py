@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from multiprocessing.synchronize import Lock
 from pathlib import Path
 
-from threadpoolctl import threadpool_limits
-
 from cvt_hpc.chart.budget_drawing import draw_budget
 from cvt_hpc.chart.checks import check_prospects
 from cvt_hpc.chart.comparing import Comparison, compare
@@ -26,6 +24,7 @@ from cvt_hpc.chart.scene_drawing import draw_scene
 from cvt_hpc.chart.store import ChartFolder
 from cvt_hpc.chart.table import write_table
 from cvt_hpc.files import written_aside
+from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.netcdf import write_netcdf
 from cvt_hpc.study.ranks.progress import Steps
 
@@ -153,5 +152,5 @@ def _measure(chart: Chart, point: Point) -> Measurement:
     scene = chart.scene(point.scene)
     limit = min(chart.time_limit, scene.time_limit) if point.timed else math.inf
     # threads of the linear algebra wait for each other in loops, which would count as a method's own time
-    with threadpool_limits(1):
+    with one_thread():
         return measure(point, scene, chart.repeats, limit)

@@ -7,8 +7,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from threadpoolctl import threadpool_limits
-
 from cvt_hpc.files import refuse_link, written_aside
 from cvt_hpc.job import Job
 from cvt_hpc.ladder.comparing import Finding, compare
@@ -16,6 +14,7 @@ from cvt_hpc.ladder.costs import cost_left
 from cvt_hpc.ladder.drawing import draw_ladder
 from cvt_hpc.ladder.rungs import Rung
 from cvt_hpc.ladder.table import ladder_dataset, write_ladder
+from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.netcdf import write_netcdf
 from cvt_hpc.simulation import simulate
 from cvt_hpc.study import RunReport, check_start, open_results, run
@@ -91,7 +90,7 @@ def run_ladder(
             announce(f"rung {number}/{len(rungs)} {rung.name}: {expected}")
         started = time.monotonic()
         # threads of the linear algebra wait for each other in loops, which would count as a rung's own time
-        with threadpool_limits(1):
+        with one_thread():
             if rung.job.stepper is None and begins[rung.name]:
                 simulate(rung.job)  # libraries loaded and kernels compiled would count as time of a first run
             report = run(rung.job, out / rung.name, fresh=fresh)

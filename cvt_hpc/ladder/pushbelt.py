@@ -12,6 +12,7 @@ from cvt_hpc.job.assignments import warn_of_bare_assignments
 from cvt_hpc.job.for_model import handed_to
 from cvt_hpc.job.rules import varied_by
 from cvt_hpc.job.schema import known_keys, load_schema
+from cvt_hpc.job.values import in_words
 from cvt_hpc.models.pushbelt.continuous import FOLLOWS, ONLY
 from cvt_hpc.models.pushbelt.profiles import PARAMETERS as PROFILES
 
@@ -68,8 +69,14 @@ def _document(job: Job) -> dict[str, Any]:
     along = {key: varied.get(key, (key,) if key in axes else ()) for key in job.parameters}
     for key, only in ONLY.items():
         if along[key] or job.parameters[key] != only:
-            told = "several values" if along[key] else f"{job.parameters[key]:g}"
-            raise mismatch(f"{where}: {key}", f"{only:g}, since the pushbelt knows no other", told)
+            told = "several values" if along[key] else in_words(job.parameters[key], "")
+            raise mismatch(
+                f"{where}: {key}", f"{in_words(only, '')}, since the pushbelt knows no other", told
+            )
+    scaled = along["sheave_stiffness"] or job.parameters["sheave_stiffness"] != 1.0
+    if scaled and (along["stiffness_of"] or job.parameters["stiffness_of"] != "sheave"):
+        expected = '"sheave", since sheave_stiffness scales all modes of opening of the pushbelt'
+        raise mismatch(f"{where}: stiffness_of", expected, job.parameters["stiffness_of"])
     whole = replace(job, given=frozenset(job.parameters))  # defaults are another belt's there
     document = handed_to(whole, PUSHBELT, "the reference of its ladder")
     document.get("numerics", {}).pop("step", None)

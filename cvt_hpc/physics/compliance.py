@@ -3,10 +3,11 @@
 Stations j of a wrap carry axial line forces f_j [N/m] and leave gaps g_j [m] (Bullinger et al. 2005, eqs
 33-35):
 
-    g_j = G_j + f_j / c_e + a (y_j + U_j . t),   f_j >= 0,  g_j >= 0,  f_j g_j = 0,
+    g_j = G_j + f_j / c_e + a (b y_j + U_j . t),   f_j >= 0,  g_j >= 0,  f_j g_j = 0,
 
 G_j the gap of the rigid bodies (negative: overlap), c_e the axial stiffness of the elements per length, a the
-compliance of the sheaves (1 reference, 0 rigid), y the local bending and t the tilt about two axes,
+compliance of the sheaves as a whole and b that of their discs (1 reference, 0 rigid), y the local bending and
+t the tilt about two axes,
 
     y_j = sum_k exp(-|x_j - x_k| / l) / (2 l k) h_k f_k,
     t = r^2 / c_tilt sum_k U_k h_k f_k,   U = (cos phi, sin phi),
@@ -37,8 +38,8 @@ ROUNDS_OF_BLOCK_FLIPS = 10
 # fields of Contact.stations
 GAP, PUSH, DIAGONAL, PIVOT, MULTIPLIER, RESPONSE_1, RESPONSE_2, Y, CLOSED, FORCED = range(10)
 # fields of Contact.scalars
-ELEMENT_STIFFNESS, COMPLIANCE, OFF_DIAGONAL, TILT_COMPLIANCE, INVERSE_11, INVERSE_12, INVERSE_22 = range(7)
-ROUND_OFF, SOLVES, UNSOLVED = range(7, 10)
+ELEMENT_STIFFNESS, COMPLIANCE, DISC_COMPLIANCE, OFF_DIAGONAL, TILT_COMPLIANCE = range(5)
+INVERSE_11, INVERSE_12, INVERSE_22, ROUND_OFF, SOLVES, UNSOLVED = range(5, 11)
 
 # Forces are 1e5 N/m and come from openings that are 1 % of their parts: what each precision leaves of them.
 _ROUND_OFF = {np.dtype(np.float64): 1e-6, np.dtype(np.float32): 2.0}
@@ -55,7 +56,7 @@ class Contact(NamedTuple):
         Gap of the rigid bodies [m] (set by the caller), -c_e times the opening without f / c_e [N/m]; the
         local kernel's diagonal, factors, the tilt's response, work space, closed set (1 or 0), and the force
         that the caller takes from it [N/m].
-    scalars : (1, 10) LaneArray or array
+    scalars : (1, 11) LaneArray or array
         Constants of the wrap, the inverse of the tilt's 2x2 system, the round-off of forces [N/m]; linear
         solves so far, and whether (1) a search for the closed set did not end.
     fresh : (1,) bool array
@@ -87,7 +88,7 @@ def lane_contact(wraps: list[Sheaves], dtype: DTypeLike, sweeps: int = 0) -> Con
     """
     weight = wraps[0].weight
     stations = LaneArray(weight.size, 10, len(wraps), dtype)
-    scalars = LaneArray(1, 10, len(wraps), dtype)
+    scalars = LaneArray(1, 11, len(wraps), dtype)
     stations.data[:, CLOSED] = 1.0
     scalars.data[:, ROUND_OFF] = _ROUND_OFF[np.dtype(dtype)]
     for lane, wrap in enumerate(wraps):
@@ -95,6 +96,7 @@ def lane_contact(wraps: list[Sheaves], dtype: DTypeLike, sweeps: int = 0) -> Con
         scalars.data[0, :INVERSE_11, lane] = (
             wrap.element_stiffness,
             wrap.compliance,
+            wrap.disc_compliance,
             wrap.off_diagonal,
             wrap.tilt_compliance,
         )
@@ -128,8 +130,9 @@ def _factorise(contact: Contact) -> None:
     """Factors and tilt responses for the present closed set."""
     stations, scalars, weight = contact.stations, contact.scalars, contact.weight
     m = weight.size
-    ce, a, off = scalars[0, ELEMENT_STIFFNESS], scalars[0, COMPLIANCE], scalars[0, OFF_DIAGONAL]
-    grip = ce * a
+    ce, off = scalars[0, ELEMENT_STIFFNESS], scalars[0, OFF_DIAGONAL]
+    whole = ce * scalars[0, COMPLIANCE]
+    grip = whole * scalars[0, DISC_COMPLIANCE]
     pivot = like(0.0, ce)
     for j in range(m):
         multiplier = off * pivot
@@ -143,7 +146,7 @@ def _factorise(contact: Contact) -> None:
         _bend(m, stations)
         for j in range(m):
             stations[j, RESPONSE_1 + b] = tilt[j] - stations[j, Y]
-    gain = scalars[0, TILT_COMPLIANCE] * grip
+    gain = scalars[0, TILT_COMPLIANCE] * whole
     s11, s12, s22 = like(1.0, ce), like(0.0, ce), like(1.0, ce)
     for j in range(m):
         h = gain * stations[j, CLOSED] * weight[j]
@@ -162,6 +165,7 @@ def _pushes(contact: Contact) -> bool:
     stations, scalars, weight = contact.stations, contact.scalars, contact.weight
     m = weight.size
     ce, a, round_off = scalars[0, ELEMENT_STIFFNESS], scalars[0, COMPLIANCE], scalars[0, ROUND_OFF]
+    disc = scalars[0, DISC_COMPLIANCE]
     y = like(0.0, ce)
     for j in range(m):
         y = fma(-stations[j, MULTIPLIER], y, -weight[j] * stations[j, CLOSED] * ce * stations[j, GAP])
@@ -170,8 +174,9 @@ def _pushes(contact: Contact) -> bool:
     for j in range(m - 1, -1, -1):
         y = fma(-multiplier, y, stations[j, Y] * stations[j, PIVOT])
         multiplier = stations[j, MULTIPLIER]
-        stations[j, Y] = y
-        overlap = weight[j] * stations[j, CLOSED] * fma(a, y, stations[j, GAP])
+        bent = disc * y
+        stations[j, Y] = bent
+        overlap = weight[j] * stations[j, CLOSED] * fma(a, bent, stations[j, GAP])
         p1 = fma(-contact.cosine[j], overlap, p1)
         p2 = fma(-contact.sine[j], overlap, p2)
     gain = scalars[0, TILT_COMPLIANCE] * ce

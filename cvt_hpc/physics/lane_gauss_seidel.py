@@ -14,6 +14,7 @@ from cvt_hpc.lanes import fma, like, maximum
 from cvt_hpc.physics.compliance import (
     COMPLIANCE,
     DIAGONAL,
+    DISC_COMPLIANCE,
     ELEMENT_STIFFNESS,
     GAP,
     OFF_DIAGONAL,
@@ -48,7 +49,7 @@ def _sweep(contact: Contact) -> None:
     give = 1.0 / scalars[0, ELEMENT_STIFFNESS]
     # the kernel exp(-|x| / l) / (2 l k) from its inverse, whose first row is 2 l k (1, -e) / (1 - e^2)
     decay = -scalars[0, OFF_DIAGONAL] / stations[0, DIAGONAL]
-    local = 1.0 / (stations[0, DIAGONAL] * (1.0 - decay * decay))
+    local = scalars[0, DISC_COMPLIANCE] / (stations[0, DIAGONAL] * (1.0 - decay * decay))
     ahead = p1 = p2 = behind = like(0.0, a)
     for j in range(m - 1, -1, -1):
         pressed = weight[j] * stations[j, PUSH]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
+
+STIFFNESS_OF = ("disc", "sheave")  # what `sheave_stiffness` scales
 
 
 class Sheaves(NamedTuple):
@@ -17,7 +20,9 @@ class Sheaves(NamedTuple):
     element_stiffness : float
         c_e [N/m^2].
     compliance : float
-        a [1]: 1 / sheave_stiffness, 0 for rigid sheaves.
+        a [1] of disc and collar together, 0 where both are rigid.
+    disc_compliance : float
+        b [1] of the disc alone, 0 where it is rigid.
     diagonal : (m,) array
         Diagonal of the inverse of the local kernel [N/m].
     off_diagonal : float
@@ -31,6 +36,7 @@ class Sheaves(NamedTuple):
     weight: np.ndarray
     element_stiffness: float
     compliance: float
+    disc_compliance: float
     diagonal: np.ndarray
     off_diagonal: float
     tilt: np.ndarray
@@ -46,6 +52,7 @@ def sheaves(
     local_stiffness: float,
     local_length: float,
     element_stiffness: float,
+    disc_stiffness: float = 1.0,
 ) -> Sheaves:
     """Constants of the contact over one wrap with equidistant stations, the first and last at its ends.
 
@@ -58,13 +65,15 @@ def sheaves(
     radius : float
         Pitch radius [m].
     sheave_stiffness : float
-        Multiple of the reference stiffness; inf is rigid [1].
+        Multiple of the reference stiffness of disc and collar together; inf is rigid [1].
     tilt_stiffness : float
-        c_tilt of the reference [N m/rad].
+        c_tilt of the reference [N m/rad]; inf is a collar without tilt.
     local_stiffness, local_length : float
         k [N/m^2] and l [m] of the local bending kernel of the reference.
     element_stiffness : float
         c_e [N/m^2].
+    disc_stiffness : float
+        Multiple of the reference stiffness of the disc alone; inf is rigid [1].
 
     Returns
     -------
@@ -82,11 +91,32 @@ def sheaves(
         weight,
         element_stiffness,
         1.0 / sheave_stiffness,
+        1.0 / disc_stiffness,
         diagonal,
         -scale * decay,
         np.array([np.cos(phi), np.sin(phi)]),
         radius * radius / tilt_stiffness,
     )
+
+
+def stiffness_factors(parameters: Mapping[str, Any]) -> tuple[float, float]:
+    """Multiples of the reference stiffness of disc and collar together, and of the disc alone [1].
+
+    Lebrecht et al. 2004 vary "the stiffness parameters of the FE-model" (sec. 3.6), which is that of the
+    discs; the tilt of the shaft-to-collar connection belongs to their rigid bodies (sec. 2.1.1) and stays.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Values by name [SI], of which `sheave_stiffness` and `stiffness_of` count.
+    """
+    factor = parameters["sheave_stiffness"]
+    return (1.0, factor) if parameters["stiffness_of"] == "disc" else (factor, 1.0)
+
+
+def axial_element_stiffness(parameters: Mapping[str, Any]) -> float:
+    """Return c_e [N/m^2] by `flank_stiffness` and `element_factor`."""
+    return float(parameters["flank_stiffness"] * parameters["element_factor"])
 
 
 def flexibility(sheave: Sheaves) -> np.ndarray:
@@ -105,5 +135,6 @@ def flexibility(sheave: Sheaves) -> np.ndarray:
     m = sheave.weight.size
     inverse = np.diag(sheave.diagonal)
     inverse += sheave.off_diagonal * (np.eye(m, k=1) + np.eye(m, k=-1))
-    elastic = np.linalg.inv(inverse) + sheave.tilt_compliance * sheave.tilt.T @ sheave.tilt
+    elastic = sheave.disc_compliance * np.linalg.inv(inverse)
+    elastic += sheave.tilt_compliance * sheave.tilt.T @ sheave.tilt
     return np.eye(m) / sheave.element_stiffness + sheave.compliance * elastic * sheave.weight

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import StorageError
+from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.locks import BusyError
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
@@ -201,7 +201,7 @@ def _compute(
     try:
         # Every core has a rank of its own: threads of linear algebra would only wait for each other.
         log = RecordLog(folder.records, layout, plan.session, rank, plan.attempts)
-        with threadpool_limits(1), log:
+        with one_thread(), log:
             for runs, alone in claimed_batches(
                 plan.assignments, counter, stop.may_claim, lambda batch: stop.fits(model.upper(batch))
             ):

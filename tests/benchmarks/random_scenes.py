@@ -65,7 +65,8 @@ def _scene(ratio: float, law: str, x: np.ndarray) -> dict:
         0.3 * 0.7 * 2.0 ** x[7],
         0.5 * 0.7 * 2.0 ** x[8],
     )
-    return {"ratio": ratio, "friction_law": law} | dict(zip(GIVEN[2:], map(float, values), strict=True))
+    common = {"ratio": ratio, "friction_law": law, "stiffness_of": "sheave"}
+    return common | dict(zip(GIVEN[2:], map(float, values), strict=True))
 
 
 def run_group(scenes_: list[dict], stepper: str, step: float | None) -> list[dict]:

@@ -25,6 +25,7 @@ def scenes() -> list[dict]:
             "driving_speed": 500.0 ** x[1] if x[1] > 0.15 else 0.01,
             "thrust": 5e3 * 16.0 ** x[2],
             "load_share": -0.95 + 1.9 * x[3] if x[7] > 0.15 else 0.0,
+            "stiffness_of": "sheave",
             "sheave_stiffness": np.inf if x[4] > 0.9 else 0.5 * 10.0 ** (x[4] / 0.9),
             "friction_gradient": -1.2 * x[5],
             "kinetic_friction": 0.06 + 0.06 * x[6],

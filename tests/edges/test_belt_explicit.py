@@ -21,7 +21,13 @@ CASES = {
     "layer damper": SMOOTH | {"element_damping": 200.0, "ring_damping": 0.0},
     # a slow sheave and next to no friction: else these come first where contact is stiff
     "contact": SMOOTH
-    | {"flank_stiffness": 1e13, "sheave_stiffness": np.inf, "friction_speed": 50.0, "load": 0.0}
+    | {
+        "flank_stiffness": 1e13,
+        "sheave_stiffness": np.inf,
+        "stiffness_of": "sheave",
+        "friction_speed": 50.0,
+        "load": 0.0,
+    }
     | {"lag_stiffness": 1e12},
 }
 

@@ -13,7 +13,12 @@ CASES = {
     "bending, half the mesh": {"bending_stiffness": 20.0, "stations": 128},
     "contact": {"flank_stiffness": 1e12},
 }
-RIGID = {"sheave_stiffness": np.inf, "friction_gradient": 0.0, "lag_stiffness": 1e11}
+RIGID = {
+    "sheave_stiffness": np.inf,
+    "stiffness_of": "sheave",
+    "friction_gradient": 0.0,
+    "lag_stiffness": 1e11,
+}
 
 
 def limit(values):

@@ -13,8 +13,10 @@ from support.complementarity import solve_lcp
 RADIUS, ELEMENTS, LOCAL, LENGTH, TILT = 0.075, 3e10, 4e9, 0.012, 4e5
 
 
-def wrap(stations=20, arc=0.27, stiffness=1.0, tilt=TILT, local=LOCAL, length=LENGTH, elements=ELEMENTS):
-    return sheaves(arc / (stations - 1), stations, RADIUS, stiffness, tilt, local, length, elements)
+def wrap(
+    stations=20, arc=0.27, stiffness=1.0, tilt=TILT, local=LOCAL, length=LENGTH, elements=ELEMENTS, disc=1.0
+):
+    return sheaves(arc / (stations - 1), stations, RADIUS, stiffness, tilt, local, length, elements, disc)
 
 
 def contact(sheave, gap, closed=None):
@@ -32,6 +34,7 @@ wraps = st.builds(
     stiffness=st.sampled_from([0.3, 1.0, 3.0, np.inf]),
     tilt=st.sampled_from([4e4, TILT, np.inf]),
     length=st.floats(0.002, 0.05),
+    disc=st.sampled_from([0.5, 1.0, np.inf]),
 )
 
 
@@ -55,9 +58,8 @@ def test_flexibility_is_the_kernels_of_the_text(sheave):
     x = h * np.arange(m)
     length = -h / np.log(-sheave.off_diagonal / sheave.diagonal[0])
     apart = np.abs(x[:, None] - x)
-    elastic = np.exp(-apart / length) / (2.0 * length * LOCAL) + sheave.tilt_compliance * np.cos(
-        apart / RADIUS
-    )
+    bending = np.exp(-apart / length) / (2.0 * length * LOCAL)
+    elastic = sheave.disc_compliance * bending + sheave.tilt_compliance * np.cos(apart / RADIUS)
     weight = np.r_[0.5 * h, np.full(m - 2, h), 0.5 * h]
     expected = np.eye(m) / ELEMENTS + sheave.compliance * elastic * weight
     dense = flexibility(sheave)
@@ -149,6 +151,27 @@ def test_overlapping_station_opens_behind_a_deep_one():
     force, _, state = contact(wrap(15, arc=0.03), gap)
     assert np.flatnonzero(force).tolist() == [7]
     assert state.stations[8, CLOSED] == 0.0
+
+
+@given(contacts())
+@settings(max_examples=30)
+def test_a_stiff_disc_is_stiff_in_local_bending_alone(case):
+    """Factors on disc and tilt are factors on their stiffnesses: two ways to one matrix, and to one solution."""
+    _, gap, closed = case
+    factored, _, _ = contact(wrap(gap.size, stiffness=2.0, tilt=3.0 * TILT, disc=1.5), gap, closed)
+    expected, _, _ = contact(wrap(gap.size, tilt=6.0 * TILT, local=3.0 * LOCAL), gap, closed)
+    assert factored == pytest.approx(expected, abs=1e-9 * expected.max())
+
+
+def test_a_rigid_disc_tilts_as_a_body():
+    # deep enough for all stations to be closed; with f = -c_e (G + U . t) the tilt solves a 2 x 2 system
+    sheave, gap = wrap(60, tilt=100.0 * TILT, disc=np.inf), np.linspace(-3e-4, -2e-4, 60)
+    force, _, _ = contact(sheave, gap)
+    lever = ELEMENTS * sheave.tilt_compliance * sheave.weight * sheave.tilt
+    tilt = np.linalg.solve(np.eye(2) + lever @ sheave.tilt.T, -lever @ gap)
+    expected = -ELEMENTS * (gap + tilt @ sheave.tilt)
+    assert expected.min() > 0.0
+    assert force == pytest.approx(expected, rel=1e-11)
 
 
 @pytest.mark.parametrize("value", [np.nan, -np.inf])

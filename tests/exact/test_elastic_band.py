@@ -65,6 +65,7 @@ def band_parameters(stations):
         "element_damping": 0.0,
         "ring_damping": 0.0,
         "sheave_stiffness": np.inf,
+        "stiffness_of": "sheave",
         "flank_stiffness": 1e16,
         "friction_law": "coulomb",
         "friction_gradient": 0.0,

@@ -56,7 +56,12 @@ def test_overlap_in_rigid_grooves():
     parameters = {
         key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()
     }
-    parameters |= {"duration": 1.0, "sheave_stiffness": np.inf, "driving_position": 3e-5}
+    parameters |= {
+        "duration": 1.0,
+        "sheave_stiffness": np.inf,
+        "stiffness_of": "sheave",
+        "driving_position": 3e-5,
+    }
     belt = belt_constants(parameters)
     n, first, count = belt.cell.size, belt.driven_start, belt.driven.weight.size
     fields, scalars, force = np.zeros((7, n)), np.zeros(len(SCALARS)), np.empty(n)

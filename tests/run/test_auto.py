@@ -26,7 +26,7 @@ from support.rungs import rung_job
 # cells of the reference map by what is known of them: the middle of a window, outside of all, push changing strands
 VIBRATING = {"load": 120.0, "friction_gradient": -1.0}
 QUIET = {"load": 60.0, "friction_gradient": -0.4}
-JUDDER = {"load": 40.0, "friction_gradient": -1.2, "sheave_stiffness": 1.2}
+JUDDER = {"load": 40.0, "friction_gradient": -1.2, "sheave_stiffness": 1.2, "stiffness_of": "sheave"}
 CELLS = (VIBRATING, QUIET, JUDDER)
 SHARED = [variable.name for variable in record_variables(rung_job("elastic_belt"))]
 OF_COST = {"core_seconds", "steps", "contact_solves"}

@@ -9,6 +9,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
     FIELDS,
+    FIRST_STATE,
     LAYER_WORK,
     N_ELEMENT,
     N_RING,
@@ -22,7 +23,8 @@ from cvt_hpc.models.elastic_belt.belt import (
     belt_constants,
     initial_state,
 )
-from cvt_hpc.models.elastic_belt.one_system import driven_thrust
+from cvt_hpc.models.elastic_belt.one_system import driven_moment, driven_thrust, free_rates
+from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS
 from cvt_hpc.models.elastic_belt.rhs import (
     accelerations,
     contact_forces,
@@ -42,6 +44,17 @@ TABLE = {
     "table_speed": (0.0, 0.05, 0.3),
     "table_mu": ((0.12, 0.09, 0.08), (0.11, 0.08, 0.07)),
 }
+FREE = {
+    "driving_inertia": 0.05,
+    "drive_slope": 5.0,
+    "driving_spring_rate": 2e6,
+    "driven_spring_rate": 1e6,
+    "driving_piston": (0.02, 0.09),
+    "driven_piston": (0.02, 0.08),
+    "tilt_lag": 1e-3,
+    "collar_clearance": 1e-3,
+}
+CONTROLLED = {"driving_axial": "ratio", "clamping": "torque_ratio", "held_torque_ratio": 0.5}
 CASES = {
     "memory": {},
     "no memory": {"friction_memory": 0.0},
@@ -52,7 +65,11 @@ CASES = {
     "ramp": {"load_history": "ramp", "load_start": 60.0, "load": 140.0},
     "ramp of speed": {"speed_history": "ramp", "speed_start": 100.0},
     "rising": {"rise_time": 0.03},  # the start-up's damping and load, half way
-    "rigid": {"sheave_stiffness": np.inf, "load": -80.0},
+    "rigid": {"sheave_stiffness": np.inf, "stiffness_of": "sheave", "load": -80.0},
+    "free pulleys": FREE | {"driving_axial": "thrust"},
+    "controlled pulleys": FREE | CONTROLLED,
+    "driven by its driven pulley": CONTROLLED
+    | {"driven_inertia": np.inf, "driving_inertia": 0.05, "rise_time": 0.03},
 }
 STEP = 1e-7
 
@@ -70,6 +87,9 @@ def rough_belt(case):
     state.fields[N_ELEMENT, ::6] *= (1.0 + forces(belt, state)[1][0, ::6]) / (1.0 - 1e-6)
     state.fields[V_FILTERED] = np.abs(state.fields[V_FILTERED])
     state.scalars[LAYER_WORK] = 0.0
+    if belt.pulleys.are_free:
+        # not yet beyond the collar's clearance
+        state.scalars[FIRST_STATE + DRIVEN_COS : FIRST_STATE + DRIVEN_COS + 2] *= 0.02
     return belt, state
 
 
@@ -90,14 +110,19 @@ def plain_step(belt, before, step):
     for row in (U, V_ELEMENT, V_RING):
         fields[row] += step * rate[row]
     load = belt.ratio * load_at(belt, scalars[TIME])
-    scalars[DRIVEN_SPEED] += step * (moments.sum() - load) / belt.driven_inertia
+    closing = (driven_thrust(belt, force) - belt.thrust) / belt.axial_damping
+    turning = (driven_moment(belt, moments) - load) / belt.driven_inertia
+    if belt.pulleys.are_free:
+        turning, closing, *others = free_rates(belt, before, force, moments)
+        scalars[FIRST_STATE:] += step * np.array(others)
+    scalars[DRIVEN_SPEED] += step * turning
     scalars[TIME] += step
     memory_rates(belt, state, rate)
     content_rates(belt, state, eps, rate)
     fields[W] += step * fields[U]
     for row in (V_FILTERED, N_ELEMENT, N_RING):
         fields[row] += step * rate[row]
-    scalars[DRIVEN_POSITION] += step * (driven_thrust(belt, force) - belt.thrust) / belt.axial_damping
+    scalars[DRIVEN_POSITION] += step * closing
     return state
 
 
@@ -130,6 +155,7 @@ def test_a_step_is_that_of_the_readable_right_hand_side(case):
     assert found.scalars[TIME] == expected.scalars[TIME]
     assert found.scalars[DRIVEN_SPEED] == pytest.approx(expected.scalars[DRIVEN_SPEED], rel=4e-16)
     assert found.scalars[DRIVEN_POSITION] == pytest.approx(expected.scalars[DRIVEN_POSITION], rel=1e-12)
+    assert found.scalars[FIRST_STATE:] == pytest.approx(expected.scalars[FIRST_STATE:], rel=1e-11, abs=1e-18)
 
 
 def test_steps_follow_one_another():

@@ -8,6 +8,7 @@ import pytest
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
+    FIRST_STATE,
     N_RING,
     TIME,
     V_ELEMENT,
@@ -21,11 +22,24 @@ from cvt_hpc.models.elastic_belt.belt import (
 )
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates, system, unpack
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
+from cvt_hpc.models.elastic_belt.pulleys import EXCESS
 from support.fast_runs import FastRuns, march
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
 DEFAULTS |= {"duration": 0.1, "load": 100.0, "load_history": "ramp", "stations": 96}
-CASES = {"memory": {}, "no memory": {"friction_memory": 0.0}, "rigid": {"sheave_stiffness": np.inf}}
+FREE = {
+    "driving_inertia": 0.05,
+    "driving_axial": "thrust",
+    "driven_spring_rate": 1e6,
+    "tilt_lag": 1e-3,
+    "collar_clearance": 1e-4,
+}
+CASES = {
+    "free pulleys": FREE,
+    "memory": {},
+    "no memory": {"friction_memory": 0.0},
+    "rigid": {"sheave_stiffness": np.inf, "stiffness_of": "sheave"},
+}
 
 
 @cache
@@ -81,6 +95,8 @@ def test_rates_are_those_of_the_explicit_step(case):
     assert out[-2] == pytest.approx(speed, abs=1e-4)  # round-off of 125 rad/s
     position = (after.scalars[DRIVEN_POSITION] - state.scalars[DRIVEN_POSITION]) / step
     assert out[-1] == pytest.approx(position, rel=1e-6)
+    changes = (after.scalars[flat.loose] - state.scalars[flat.loose]) / step
+    assert out[-2 - flat.loose.size : -2] == pytest.approx(changes, rel=1e-6, abs=1e-4)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -92,7 +108,8 @@ def test_what_velocities_advance_is_by_their_new_values_in_the_explicit_step(cas
     mixed = State(state.fields.copy(), state.scalars.copy())
     for row in (U, V_ELEMENT, V_RING):
         mixed.fields[row] = after.fields[row]
-    mixed.scalars[DRIVEN_SPEED] = after.scalars[DRIVEN_SPEED]
+    for place in (DRIVEN_SPEED, FIRST_STATE + EXCESS):
+        mixed.scalars[place] = after.scalars[place]
     flat, y, out = flat_rates(belt, mixed)
     advanced = y + step * out
     advanced[system(flat).velocities] = y[system(flat).velocities]

@@ -4,6 +4,7 @@ import ast
 import gc
 import importlib
 import importlib.util
+import json
 import logging
 import os
 import pkgutil
@@ -16,6 +17,7 @@ from functools import partial
 from operator import add, mul
 from pathlib import Path
 from types import CodeType, ModuleType
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -231,53 +233,60 @@ def test_a_module_that_is_edited_and_imported_again_has_its_new_content(package)
     assert module._content(str(source)) != before
 
 
-def output(program, tmp_path, path):
-    """What a program prints, in a process of its own with a cache of its own, which finds modules in a folder."""
-    (found,) = outputs(program, tmp_path, path, [lambda: None])
-    return found
-
-
-# Each program a process of its own, begun where the compiler, which takes long to import, is all that is there.
+# Each program a process of its own, begun where the compiler, which takes long to import and to compile its first
+# function, has done so.
 FORKING = """
-import os, sys
+import json, os, sys
 import numba
+numba.njit(lambda x: x + 1.0)(1.0)
 for line in sys.stdin:
+    program, path, cache = json.loads(line)
     if not (child := os.fork()):
-        exec(PROGRAM)
+        os.chdir(path)
+        os.environ["NUMBA_CACHE_DIR"] = numba.config.CACHE_DIR = cache
+        exec(program)
         sys.stdout.flush()
         os._exit(0)
-    assert os.waitpid(child, 0)[1] == 0
-    print("done", flush=True)
+    print("failed" if os.waitpid(child, 0)[1] else "done", flush=True)
 """
 
 
-def outputs(program, tmp_path, path, changes):
-    """What a program prints after each of some changes; else as `output`."""
+@pytest.fixture(scope="module")
+def forking():
+    """A process that runs programs in processes of their own."""
     environment = {
         **os.environ,
-        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
         "PYTHONPATH": str(PACKAGE.parent),
         # Python takes its bytecode for that of a file which was changed within the second, to the same length
         "PYTHONDONTWRITEBYTECODE": "1",
     }
-    found = []
     with subprocess.Popen(
-        [sys.executable, "-c", FORKING.replace("PROGRAM", repr(program))],
-        cwd=path,
+        [sys.executable, "-c", FORKING],
         env=environment,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
     ) as process:
+        yield process
+
+
+@pytest.fixture
+def outputs(forking, tmp_path):
+    """What a program prints after each of some changes, with a cache of its own, where modules are in a folder."""
+
+    def printed(program, path, changes):
+        found = []
         for change in changes:
             change()
-            process.stdin.write("next\n")
-            process.stdin.flush()
+            forking.stdin.write(json.dumps([program, str(path), str(tmp_path / "cache")]) + "\n")
+            forking.stdin.flush()
             found.append([])
-            while (line := process.stdout.readline()) != "done\n":
-                assert line, "the program has failed"
+            while (line := forking.stdout.readline()) != "done\n":
+                assert line not in ("", "failed\n"), "the program has failed"
                 found[-1] += line.split()
-    return found
+        return found
+
+    return printed
 
 
 EULER = (
@@ -296,7 +305,7 @@ RUN = (
 )
 
 
-def test_a_changed_kernel_that_was_handed_over_is_another(package, tmp_path):
+def test_a_changed_kernel_that_was_handed_over_is_another(package, outputs):
     # the marching kernel stays; the one that it was handed stays, too, but what this calls has changed
     (package / "steppers" / "marching_on.py").write_text(EULER)
     (package / "physics" / "falling.py").write_text(
@@ -313,36 +322,32 @@ def test_a_changed_kernel_that_was_handed_over_is_another(package, tmp_path):
         (package / "physics" / "slope.py").write_text(text)
 
     changes = [partial(written, slope) for slope in ("1.0", "0.5", "1.0")]
-    found = outputs(program, tmp_path, package.parent, changes)
+    found = outputs(program, package.parent, changes)
     assert found == [["0.5", "0"], ["0.75", "0"], ["0.5", "1"]]
 
 
-def test_a_changed_kernel_from_outside_the_package_is_another(tmp_path):
+def test_a_changed_kernel_from_outside_the_package_is_another(outputs, tmp_path):
     (tmp_path / "marching.py").write_text(EULER)
     texts = [FALL.replace("SLOPE", slope).replace("NAME", "Rate") for slope in ("1.0", "0.5", "1.0")]
-    found = outputs(
-        RUN, tmp_path, tmp_path, [partial((tmp_path / "falling.py").write_text, text) for text in texts]
-    )
+    found = outputs(RUN, tmp_path, [partial((tmp_path / "falling.py").write_text, text) for text in texts])
     assert found == [["0.5", "0"], ["0.75", "0"], ["0.5", "1"]]
 
 
-def test_an_entry_with_a_type_that_is_not_at_hand_is_skipped_and_kept(tmp_path):
+def test_an_entry_with_a_type_that_is_not_at_hand_is_skipped_and_kept(outputs, tmp_path):
     (tmp_path / "marching.py").write_text(EULER)
     texts = [
         FALL.replace("SLOPE", "1.0").replace("NAME", name) for name in ("Rate", "Speed", "Speed", "Rate")
     ]
-    found = outputs(
-        RUN, tmp_path, tmp_path, [partial((tmp_path / "falling.py").write_text, text) for text in texts]
-    )
+    found = outputs(RUN, tmp_path, [partial((tmp_path / "falling.py").write_text, text) for text in texts])
     assert found == [["0.5", "0"], ["0.5", "0"], ["0.5", "1"], ["0.5", "1"]]
 
 
-def test_a_kernel_typed_into_a_shell_is_compiled_without_a_file(tmp_path):
+def test_a_kernel_typed_into_a_shell_is_compiled_without_a_file(outputs):
     program = (
         "from cvt_hpc.kernels import kernel\n@kernel\ndef half(x):\n    return 0.5 * x\n"
         "print(half(1.0), half.stats.cache_path)"
     )
-    assert output(program, tmp_path, PACKAGE.parent) == ["0.5", "None"]
+    assert outputs(program, PACKAGE.parent, [lambda: None]) == [["0.5", "None"]]
 
 
 # Calls from Python and from kernels
@@ -387,13 +392,11 @@ except ValueError as error:
 """
 
 
-def test_other_processes_take_in_a_kernel_that_they_find(tmp_path):
+def test_other_processes_take_in_a_kernel_that_they_find(outputs, tmp_path):
     # an error with a value needs the environment of the function that raises it, wherever its code is
     (tmp_path / "called.py").write_text(CALLED)
     texts = [CALLED.split("@")[0] + CALLER.replace("FACTOR", factor) for factor in ("2.0", "3.0", "3.0")]
-    found = outputs(
-        CALL, tmp_path, tmp_path, [partial((tmp_path / "calling.py").write_text, text) for text in texts]
-    )
+    found = outputs(CALL, tmp_path, [partial((tmp_path / "calling.py").write_text, text) for text in texts])
     assert found == [["above", "1.5", "1.0", "0"], ["above", "1.5", "1.5", "1"], ["above", "1.5", "1.5", "0"]]
 
 
@@ -572,7 +575,9 @@ def test_code_lies_in_the_folder_that_the_user_has_chosen(tmp_path):
         "import numba; from cvt_hpc.physics.friction import saturation; "
         "saturation(0.1, 1.0); print(saturation.stats.cache_path); print(numba.config.CACHE_DIR)"
     )
-    used, left = output(program, tmp_path, PACKAGE.parent)
+    chosen = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(PACKAGE.parent)}
+    command = [sys.executable, "-c", program]
+    used, left = subprocess.check_output(command, env=os.environ | chosen, text=True).split()
     assert Path(used).parent == tmp_path / "cache" / "cvt_hpc-kernels"
     assert Path(used).name == f"cvt_hpc.physics.friction-{kernels._content(str(PACKAGE / FRICTION))}"
     assert list(Path(used).glob("saturation*.nbi"))
@@ -763,3 +768,38 @@ def test_no_kernel_may_be_rounded_otherwise_than_written(dispatchers):
     for dispatcher in dispatchers:
         assert not dispatcher.targetoptions.get("fastmath"), dispatcher
         assert not dispatcher.targetoptions.get("parallel"), dispatcher
+
+
+# The types of arguments
+
+
+class Pair(NamedTuple):
+    first: object
+    second: object
+
+
+FIELD = np.zeros((3, 4))
+FIELD.flags.writeable = False
+ONES = (1, True, 1.0, np.float64(1.0), np.float32(1.0), np.int32(1), 1j, 2**63, None, "a")
+ARRAYS = (
+    *(np.zeros((3, 4), kind) for kind in "fdi?"),
+    np.zeros(4),
+    np.zeros((4, 3)).T,
+    np.zeros(9)[::2],
+    FIELD,
+)
+
+
+def test_types_are_those_that_the_compiler_finds():
+    values = [
+        kernels.kernel(plus_one),
+        *ONES,
+        *ARRAYS,
+        (),
+        *((one,) for one in ONES),
+        *(Pair(one, (FIELD, one)) for one in ARRAYS),
+    ]
+    for value in values * 2:  # then those found before
+        assert compiler_shortcuts.typeof(value) == numba.typeof(value)
+    with pytest.raises(ValueError, match="Cannot determine Numba type"):
+        compiler_shortcuts.typeof((1.0, object()))

@@ -36,7 +36,9 @@ def coarse_branch():
     return branch(SteadyBelt(COARSE), mesh(COARSE), (90.0, 120.0))
 
 
-@pytest.mark.parametrize("values", [{}, {"sheave_stiffness": np.inf, "stations": 98}])
+@pytest.mark.parametrize(
+    "values", [{}, {"sheave_stiffness": np.inf, "stiffness_of": "sheave", "stations": 98}]
+)
 def test_jacobian_is_that_of_central_differences_one_by_one(values):
     parameters = COARSE | values
     flat, y, matrix = at_rest(SteadyBelt(parameters).at(80.0))
@@ -98,7 +100,7 @@ def test_constant_friction_and_rigid_sheaves_are_stable():
     parameters = COARSE | {"friction_gradient": 0.0}
     for point in branch(SteadyBelt(parameters), mesh(parameters), (80.0, 125.0)).points:
         assert point.growth < -50.0
-    parameters = COARSE | {"sheave_stiffness": np.inf}
+    parameters = COARSE | {"sheave_stiffness": np.inf, "stiffness_of": "sheave"}
     for point in branch(SteadyBelt(parameters), mesh(parameters), (80.0, 125.0)).points:
         assert point.growth < -50.0
 

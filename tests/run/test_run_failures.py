@@ -122,7 +122,13 @@ def test_a_load_that_drives_beyond_what_friction_carries_slips_through():
 
 def test_gross_slip_to_the_end_of_a_run_is_found_by_its_size():
     # a window of some 2 N m below the largest torque, in which the belt slides on steadily on rigid sheaves
-    values = {"sheave_stiffness": np.inf, "stations": 96, "step": 7.6e-6, "precision": "single"}
+    values = {
+        "sheave_stiffness": np.inf,
+        "stiffness_of": "sheave",
+        "stations": 96,
+        "step": 7.6e-6,
+        "precision": "single",
+    }
     found = record(load=210.0, duration=0.3, **values)
     assert (found["status"], found["vibrates"]) == (Status.DONE, Vibrates.SLIPS)
     assert found["reason"].startswith("the driving pulley slips by 0.0")

@@ -5,6 +5,7 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt import inert
+from cvt_hpc.models.elastic_belt.pulley_settings import pulley_inert
 from cvt_hpc.simulation import record_variables
 from support.marched import fresh_record, job
 
@@ -23,10 +24,13 @@ OTHER = {
     "speed_start": 200.0,
     "seed": 2,
     "ring_friction_speed": 0.02,
+    "stiffness_of": "sheave",
     "tilt_stiffness": 4e5,
+    "tilt_factor": 2.0,
     "local_stiffness": 5e9,
     "local_length": 0.02,
 }
+AT_REST = pulley_inert({})  # of pulleys as they are in every scene here
 CASES = [
     (TABLE, ["friction_gradient", "kinetic_friction", "stribeck_velocity"], "friction_law table"),
     ({"friction_law": "coulomb", "friction_gradient": 0.0}, ["stribeck_velocity"], "friction_gradient 0"),
@@ -38,11 +42,15 @@ CASES = [
     ({}, ["speed_start"], "speed_history constant"),
     ({"disturbance": 0.0}, ["seed"], "disturbance 0"),
     ({"ring_friction": 0.0}, ["ring_friction_speed"], "ring_friction 0"),
+    ({}, ["stiffness_of"], "sheave_stiffness 1"),
+    ({"sheave_stiffness": np.inf}, ["local_stiffness", "local_length"], "sheave_stiffness inf"),
     (
-        {"sheave_stiffness": np.inf},
-        ["tilt_stiffness", "local_stiffness", "local_length"],
+        {"sheave_stiffness": np.inf, "stiffness_of": "sheave"},
+        ["tilt_stiffness", "tilt_factor", "local_stiffness", "local_length"],
         "sheave_stiffness inf",
     ),
+    ({"tilt_factor": np.inf}, ["tilt_stiffness"], "tilt_factor inf"),
+    ({"tilt_stiffness": np.inf}, ["tilt_factor"], "tilt_stiffness inf"),
 ]
 
 
@@ -68,7 +76,9 @@ def test_what_is_inert_changes_nothing_and_is_no_axis(scene, keys, setting):
     scene = {"load_history": "ramp"} | scene
     asked = job(**COARSE, **scene)
     steady = {} if "speed_history" in scene else {"speed_start": "speed_history constant"}
-    assert inert(asked.parameters) == dict.fromkeys(keys, setting) | steady | without_table(scene)
+    whole = {} if "sheave_stiffness" in scene else {"stiffness_of": "sheave_stiffness 1"}
+    found = {key: why for key, why in inert(asked.parameters).items() if key not in AT_REST}
+    assert found == dict.fromkeys(keys, setting) | steady | whole | without_table(scene)
     alone = bits(**scene)
     for key in keys:
         assert bits(**scene, **{key: OTHER[key]}) == alone, key
@@ -79,12 +89,13 @@ def test_what_is_inert_changes_nothing_and_is_no_axis(scene, keys, setting):
 
 
 def test_each_parameter_has_its_effect_once_load_or_speed_ramps():
-    scenes = {"load": {"load_history": "ramp"}, "speed": {"speed_history": "ramp"}}
+    stiff = {"sheave_stiffness": 1.2}  # of 1 it does not matter what it is a factor on
+    scenes = {"load": stiff | {"load_history": "ramp"}, "speed": stiff | {"speed_history": "ramp"}}
     starts = {name: f"{name}_start" for name in scenes}
     alone = {name: bits(**scene) for name, scene in scenes.items()}
     for ramped, constant in (("load", "speed"), ("speed", "load")):
         expected = {starts[constant]: f"{constant}_history constant"} | without_table({})
-        assert inert(job(**COARSE, **scenes[ramped]).parameters) == expected
+        assert inert(job(**COARSE, **scenes[ramped]).parameters) == expected | AT_REST
     for key, value in OTHER.items():
         name = "speed" if key == starts["speed"] else "load"
         assert bits(**scenes[name], **{key: value}) != alone[name], key

@@ -30,7 +30,7 @@ DIFFERENT = [
     {"load": 120.0},
     {"load": 60.0, "seed": 3},
     {"load": 500.0},  # slips through
-    {"load": 100.0, "sheave_stiffness": np.inf},
+    {"load": 100.0, "sheave_stiffness": np.inf, "stiffness_of": "sheave"},
     {"load": 100.0, "friction_gradient": -1.2, "friction_speed": 0.02},
     {"load": 80.0, "half_wedge_angle": 0.21, "thrust": 40e3, "element_damping": 30.0},
     {"load": -60.0, "driving_speed": 250.0, "ring_friction": 0.05},

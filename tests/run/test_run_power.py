@@ -20,7 +20,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     belt_constants,
 )
 from cvt_hpc.models.elastic_belt.lane_belt import take_lane
-from cvt_hpc.models.elastic_belt.power import LAYER_LOSS, POWERS, STORED_ENERGY
+from cvt_hpc.models.elastic_belt.power_terms import LAYER_LOSS, POWERS, STORED_ENERGY
 from cvt_hpc.models.elastic_belt.record import LOSSES
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.sampling import Outcome
@@ -37,9 +37,9 @@ SCENES = {
     "quiet": ({"load": 60.0}, 5e-4),
     "constant friction": ({"load": 120.0} | CONSTANT, 5e-4),
     "braking": ({"load": -60.0}, 5e-4),
-    "rigid": ({"load": 120.0, "sheave_stiffness": np.inf}, 1e-3),  # 20 W of 38 kW
+    "rigid": ({"load": 120.0, "sheave_stiffness": np.inf, "stiffness_of": "sheave"}, 1e-3),  # 20 W of 38 kW
     "no load": ({"load": 0.0}, 5e-3),
-    "no load, rigid": ({"load": 0.0, "sheave_stiffness": np.inf}, 5e-3),
+    "no load, rigid": ({"load": 0.0, "sheave_stiffness": np.inf, "stiffness_of": "sheave"}, 5e-3),
     "no load, damped": ({"load": 0.0, "transverse_damping": 2e4}, 5e-3),
 }
 # The default mesh carries waves that are so short that they last a few steps only, and fronts of pressed elements into which
@@ -48,8 +48,11 @@ SCENES = {
 NO_LOAD = {"load": 0.0, "duration": 0.06}
 DEFAULT_MESH = {
     "vibrating": ({"load": 120.0}, 5e-4),
-    "rigid": ({"load": 120.0, "sheave_stiffness": np.inf} | CONSTANT, 5e-4),
-    "rigid, small load": ({"load": 40.0, "sheave_stiffness": np.inf} | CONSTANT, 5e-4),
+    "rigid": ({"load": 120.0, "sheave_stiffness": np.inf, "stiffness_of": "sheave"} | CONSTANT, 5e-4),
+    "rigid, small load": (
+        {"load": 40.0, "sheave_stiffness": np.inf, "stiffness_of": "sheave"} | CONSTANT,
+        5e-4,
+    ),
     "no load": (NO_LOAD, 2e-3),
     # of a step that begins at every sample in the same phase: dampers that were sampled too were 80 W off here, 4 %
     "no load, in phase": (NO_LOAD | {"step": 2.5e-6}, 2e-3),

@@ -28,6 +28,7 @@ def random_scenes(count):
             "driving_speed": float(5.0 * 100.0 ** x[1]),
             "thrust": float(5e3 * 16.0 ** x[2]),
             "load_share": float(max(share, -0.3) if ratio > 1.0 else share),
+            "stiffness_of": "sheave",
             "sheave_stiffness": np.inf if x[4] > 0.9 else float(0.5 * 10.0 ** (x[4] / 0.9)),
             "friction_gradient": float(-1.2 * x[5]),
         }

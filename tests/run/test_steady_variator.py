@@ -43,7 +43,9 @@ def rates_of(found, belt):
     return out
 
 
-@pytest.mark.parametrize("values", [{}, {"sheave_stiffness": np.inf}, {"friction_memory": 0.0}])
+@pytest.mark.parametrize(
+    "values", [{}, {"sheave_stiffness": np.inf, "stiffness_of": "sheave"}, {"friction_memory": 0.0}]
+)
 def test_nothing_changes_in_it(values):
     first = initial_state(DEFAULTS | values, belt_constants(DEFAULTS | values))
     for found in steady(**values):
@@ -127,7 +129,7 @@ def test_newton_gives_up_where_it_is_lost():
 def test_friction_carries_what_bullinger_says():
     # transmittable torque 2 mu / cos(d0) Q r of the driving pulley (Bullinger et al. 2005, eq. 2), if all sliding is along
     # the belt and far beyond the regularisation speed
-    parameters = DEFAULTS | {"friction_gradient": 0.0, "sheave_stiffness": np.inf}
+    parameters = DEFAULTS | {"friction_gradient": 0.0, "sheave_stiffness": np.inf, "stiffness_of": "sheave"}
     belt = SteadyBelt(parameters)
     last = belt.carried(belt.at(200.0))
     axial = quantities(last, mesh(parameters))["axial_force"][0]

@@ -64,7 +64,13 @@ def test_saddles_stick_however_stiff_their_friction_is(ratio):
 @cache
 def least_force(step):
     """Smallest T - P - m v^2 in a strand [N] between rigid sheaves, near the largest load."""
-    values = {"sheave_stiffness": np.inf, "load": 200.0, "friction_gradient": -1.0, "stations": 96}
+    values = {
+        "sheave_stiffness": np.inf,
+        "stiffness_of": "sheave",
+        "load": 200.0,
+        "friction_gradient": -1.0,
+        "stations": 96,
+    }
     asked = job(**values, step=step, duration=0.12, rise_time=0.02)
     run = Transient(asked.point(0), "imex")
     assert run.advance(run.samples) is None

@@ -21,6 +21,7 @@ def random_wrap(random, stiffness=None):
         random.uniform(2e9, 8e9),
         random.uniform(0.004, 0.04),
         ELEMENTS * random.uniform(0.5, 2.0),
+        random.choice([0.5, 1.0, np.inf]),
     )
 
 

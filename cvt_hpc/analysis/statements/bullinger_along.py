@@ -114,14 +114,14 @@ FIGURE_20 = (
     Statement(
         "and grows rapidly up to the exit of the pulley",
         _grows_to_exit,
-        "at low torque the belt outruns the pulley where it is innermost, and friction turns round for a while",
+        "at low torque the belt outruns the pulley where it is innermost, and friction turns round",
     ),
     Statement("This increases the tangential force f_Pt", _raises_flank_friction),
     Statement("and influences the ring friction f_Rt by a jump", _ring_friction_jumps),
     Statement("In t1 the compression force stays constant", _constant_in_t1),
     Statement("In the driven pulley the compression area continues up to the exit", _pressed_to_driven_exit),
     Statement(
-        "At rather low r, P increases after entering the driven pulley before it decreases to zero at the exit",
+        "At low r, P increases after entering the driven pulley before it decreases to zero at the exit",
         _rises_after_driven_entry,
     ),
 )
@@ -193,6 +193,6 @@ FIGURE_21 = (
               _angle_passes_right_angle),
     Statement("The elements are pressed most around where the tangential velocity changes sign",
               _turns_where_push_is_largest),
-    Statement("The rise of P is a matter of low r: sliding turns earlier as r grows", _turns_earlier_with_load),
+    Statement("The rise of P needs low r: sliding turns earlier as r grows", _turns_earlier_with_load),
     Statement("At i = 1 and no load the compression force disappears in both spans", _no_push_without_load),
 )  # fmt: skip

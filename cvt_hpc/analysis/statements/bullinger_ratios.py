@@ -34,7 +34,7 @@ def _rise_disappears(kept: Kept) -> Measured:
     low, high = ([rises[ratio, share] for ratio in (0.5, 2.0)] for share in (0.3, 0.85))
     return Measured(
         [a > 1 and b < 0.2 * a for a, b in zip(low, high, strict=True)],
-        f"rise after the driven entry at i 0.5 and 2: {listed(low)} % at r 0.3, {listed(high, '.2g')} % at r 0.85",
+        f"rise behind the entry, i 0.5 and 2: {listed(low)} % (r 0.3), {listed(high, '.2g')} % (r 0.85)",
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from enum import Enum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from cvt_hpc.analysis.statements.kept import Kept
 from cvt_hpc.errors import InputError
@@ -22,7 +22,7 @@ class Verdict(Enum):
 class Measured(NamedTuple):
     """Whether each part of a statement holds, and the numbers by which that is told."""
 
-    holds: Sequence[bool]
+    holds: Sequence[Any]
     numbers: str
 
 

@@ -13,15 +13,30 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.pulleys import (
+    DRIVEN_COS,
+    DRIVING_COS,
+    STATES,
+    Pulleys,
+    settled_tilt,
+    with_pulleys,
+)
 from cvt_hpc.physics.friction import FrictionLaw, given_law
 from cvt_hpc.physics.geometry import Variator, cell_counts, variator
-from cvt_hpc.physics.sheaves import Sheaves, flexibility, sheaves
+from cvt_hpc.physics.sheaves import (
+    Sheaves,
+    axial_element_stiffness,
+    flexibility,
+    sheaves,
+    stiffness_factors,
+)
 from cvt_hpc.vibration.ramped import ramped
 
 FIELDS = ("w", "u", "v_element", "v_ring", "v_filtered", "n_element", "n_ring")
 W, U, V_ELEMENT, V_RING, V_FILTERED, N_ELEMENT, N_RING = range(len(FIELDS))
-SCALARS = ("time", "driven_speed", "driven_position", "layer_work")
-TIME, DRIVEN_SPEED, DRIVEN_POSITION, LAYER_WORK = range(len(SCALARS))
+SCALARS = ("time", "driven_speed", "driven_position", "layer_work", *STATES)
+TIME, DRIVEN_SPEED, DRIVEN_POSITION, LAYER_WORK = range(4)
+FIRST_STATE = 4  # of the pulleys' states, which are 0 where a pulley does not have them
 
 REGIONS = ("driving arc", "t1", "driven arc", "t2")
 MODES = 5  # half waves along a strand that are told apart
@@ -75,6 +90,7 @@ class Belt(NamedTuple):
     driving_speed: float
     driving_position: float
     driven_inertia: float
+    pulleys: Pulleys
     axial_damping: float
     thrust: float
     ratio: float
@@ -86,9 +102,9 @@ class Belt(NamedTuple):
 
 
 class State(NamedTuple):
-    """The state: `fields` (7, N) in the order of FIELDS, `scalars` (4,) in the order of SCALARS.
+    """The state: `fields` (7, N) in the order of FIELDS, `scalars` (12,) in the order of SCALARS.
 
-    The last scalar is no state of the belt: the work of the layers' dampers [J] until it is asked for.
+    The work of the layers' dampers [J] until it is asked for is no state of the belt.
     """
 
     fields: np.ndarray
@@ -159,19 +175,22 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     arc_share = 0.5 * (cell * (kappa > 0) + np.roll(cell * (kappa > 0), 1)) / dual
     ring_mass = p["ring_mass"] * 0.5 * _pair(cell * (1.0 + kappa * p["ring_offset"])) / dual
     belt_speed = p["driving_speed"] * path.driving_radius
+    whole, disc = stiffness_factors(p)
     wraps = [
         sheaves(
             cell[grid.starts[region]],
             grid.counts[region] + 1,
             radius,
-            p["sheave_stiffness"],
-            p["tilt_stiffness"],
+            whole,
+            p["tilt_stiffness"] * p["tilt_factor"],
             p["local_stiffness"],
             p["local_length"],
-            p["flank_stiffness"],
+            axial_element_stiffness(p),
+            disc,
         )
         for region, radius in ((0, path.driving_radius), (2, path.driven_radius))
     ]
+    wraps, freedom = with_pulleys(p, wraps, (path.driving_radius, path.driven_radius))
     law = given_law(p)
     quantity = ramped(p)
     computed = dict(
@@ -193,6 +212,7 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
         law=law,
         driving=wraps[0],
         driven=wraps[1],
+        pulleys=freedom,
         driven_start=grid.starts[2],
         driving_radius=path.driving_radius,
         driven_radius=path.driven_radius,
@@ -244,13 +264,16 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     pull = 2.0 * tangent * p["thrust"] / grid.path.driven_wrap
     w = np.zeros(grid.cell.size)
     arcs = []
-    for region, sheave, radius in (
-        (0, belt.driving, belt.driving_radius),
-        (2, belt.driven, belt.driven_radius),
+    states = np.zeros(len(STATES))
+    for region, sheave, radius, tilted in (
+        (0, belt.driving, belt.driving_radius, DRIVING_COS),
+        (2, belt.driven, belt.driven_radius, DRIVEN_COS),
     ):
         stations = slice(grid.starts[region], grid.starts[region] + sheave.weight.size)
         force = np.full(sheave.weight.size, pull / (2.0 * tangent * radius))
-        w[stations] = -(flexibility(sheave) @ force) / (2.0 * tangent)
+        tilt = settled_tilt(belt.pulleys, tilted, sheave.tilt @ (sheave.weight * force))
+        states[tilted : tilted + 2] = tilt
+        w[stations] = -(flexibility(sheave) @ force + tilt @ sheave.tilt) / (2.0 * tangent)
         arcs.append((stations, sheave.weight, radius))
     w[arcs[0][0]] -= p["driving_position"] / (2.0 * tangent)
     # the belt keeps its length: what sinks at the driver comes out at the driven pulley
@@ -270,8 +293,8 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     rings /= 1.0 + p["reference_tension"] / p["ring_stiffness"]
     fields[N_ELEMENT] = length * (grid.path.path_length - p["play"]) / (grid.cell @ length)
     fields[N_RING] = ring_length * rings / (grid.cell @ ring_length)
-    scalars = np.array([0.0, speed / (belt.driven_radius + mean[1]), -2.0 * tangent * lift, 0.0])
-    return State(fields, scalars)
+    scalars = [0.0, speed / (belt.driven_radius + mean[1]), -2.0 * tangent * lift, 0.0]
+    return State(fields, np.concatenate([scalars, states]))
 
 
 def _fill_strands(w: np.ndarray, grid: Mesh) -> None:

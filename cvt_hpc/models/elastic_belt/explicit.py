@@ -34,6 +34,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     DRIVEN_RADIUS,
     DRIVING_CARRY,
     DRIVING_CELL,
+    DRIVING_RADIUS,
     ELEMENT_DAMPING,
     ELEMENT_MASS,
     ELEMENT_STIFFNESS,
@@ -47,7 +48,6 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     RING_RELIEF,
     RING_STIFFNESS,
     SINE,
-    SPEED,
     LaneBelt,
     LaneState,
 )
@@ -63,7 +63,6 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     SHORT_0,
     SLIDING_R,
     SLIDING_T,
-    advance_pulley,
     arc_sliding,
     derive,
     lane_acceleration,
@@ -76,6 +75,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     lane_transverse,
     ring_grip,
 )
+from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 from cvt_hpc.physics.flank import flank_shares
 
 # fields of ExplicitWork.stations, after those of `lane_forces`
@@ -115,8 +115,8 @@ def step_explicit(belt: LaneBelt, state: LaneState, work: ExplicitWork, step: fl
     """
     stations = work.stations
     lane_sliding(belt, state, stations)
-    moment = _accelerate(belt, state, stations, step)
-    advance_pulley(belt, state, moment, step)
+    taken, moment = _accelerate(belt, state, stations, step)
+    advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
     _advance_layers(belt, state, stations, step)
     _advance_across(belt, state, stations, step)
@@ -125,10 +125,13 @@ def step_explicit(belt: LaneBelt, state: LaneState, work: ExplicitWork, step: fl
 
 @kernel
 def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float):
-    """Increments of the velocities into DU and DV; the moment of the flanks on the driven pulley [N m]."""
+    """Increments of the velocities into DU and DV; the flanks' torques.
+
+    What they take from the driving pulley, where that is free, and their moment on the driven one [N m].
+    """
     n, fields, c = state.fields.rows, state.fields, belt.constants
     sine, cosine, offset = c[0, SINE], c[0, COSINE], c[0, RING_OFFSET]
-    per_cosine, radius = 1.0 / cosine, c[0, DRIVEN_RADIUS]
+    per_cosine, radius, driving_radius = 1.0 / cosine, c[0, DRIVEN_RADIUS], c[0, DRIVING_RADIUS]
     element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
     element_damping, ring_damping = c[0, ELEMENT_DAMPING], c[0, RING_DAMPING]
     speed_share = lane_speed_share(belt, state.time[0], sine)
@@ -140,7 +143,7 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
     damping = lane_damping(belt, state.time[0])
     mobility, element_mobility, ring_mobility = step / mass, step / c[0, ELEMENT_MASS], step / ring_mass
     rise, zero = acceleration * step, like(0.0, sine)
-    moment = net_left = ring_left = stress_left_0 = stress_left_1 = zero
+    taken = moment = net_left = ring_left = stress_left_0 = stress_left_1 = zero
     gap_left_0 = gap_left_1 = zero
     for k in range(-1, n):
         # the last cell first, which is behind row 0
@@ -184,6 +187,9 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
                 if anywhere(is_driven):
                     lever_arm = select(is_driven, (radius + fields[j, W]) * belt.dual[j], zero)
                     moment = fma(-tangential, lever_arm, moment)
+                if belt.is_free:
+                    lever_arm = select(is_driven, zero, (driving_radius + fields[j, W]) * belt.dual[j])
+                    taken = fma(tangential, lever_arm, taken)
                 along_element += fma(-lever, drag, tangential)
                 along_ring = (along_ring + drag) * (per_ring * step)
             else:
@@ -200,7 +206,7 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
             net_left, ring_left = from_behind(net_left), from_behind(ring_left)
             stress_left_0, stress_left_1 = from_behind(stress_left_0), from_behind(stress_left_1)
             gap_left_0, gap_left_1 = from_behind(gap_left_0), from_behind(gap_left_1)
-    return around(moment)
+    return around(taken), around(moment)
 
 
 @kernel
@@ -235,7 +241,7 @@ def _advance_across(belt: LaneBelt, state: LaneState, stations: LaneArray, step:
     n, fields, c = state.fields.rows, state.fields, belt.constants
     speed_share = lane_speed_share(belt, state.time[0], c[0, BELT_SPEED])
     per_cosine, belt_speed = 1.0 / c[0, COSINE], speed_share * c[0, BELT_SPEED]
-    forget, pulleys = step * c[0, FORGET], lane_pulleys(belt, speed_share, state.scalars[0, SPEED])
+    forget, pulleys = step * c[0, FORGET], lane_pulleys(belt, speed_share, state.scalars)
     carries = (
         step * lane_carry(belt, DRIVING_CELL, DRIVING_CARRY, belt_speed),
         step * lane_carry(belt, DRIVEN_CELL, DRIVEN_CARRY, belt_speed),

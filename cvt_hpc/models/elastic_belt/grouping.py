@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.models.elastic_belt import OWN_STEPPERS
+from cvt_hpc.models.elastic_belt.pulley_settings import are_free
 
 # Core-seconds per station and time step of a batch, measured on one core of an EPYC (Zen 5) at 160 stations.
 STEP_COST = {"imex": 1.3e-7, "explicit": 6.2e-8}
@@ -81,4 +82,5 @@ def lane_key(parameters: Mapping[str, Any]) -> tuple:
     parameters : dict
         Resolved parameters of a run.
     """
-    return (*(parameters[key] for key in SHARED if key in parameters), parameters["friction_memory"] > 0.0)
+    alike = (parameters[key] for key in SHARED if key in parameters)
+    return (*alike, parameters["friction_memory"] > 0.0, are_free(parameters))

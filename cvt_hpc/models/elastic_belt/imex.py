@@ -46,6 +46,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     DRIVEN_RADIUS,
     DRIVING_CARRY,
     DRIVING_CELL,
+    DRIVING_RADIUS,
     ELEMENT_DAMPING,
     ELEMENT_STIFFNESS,
     FORGET,
@@ -61,7 +62,6 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     EPS_1,
     SHORT_0,
     SHORT_1,
-    advance_pulley,
     arc_sliding,
     cell_strains,
     lane_carry,
@@ -70,6 +70,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     lane_sliding,
     lane_speed_share,
 )
+from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 
 # One, unless friction turns sliding about or elements meet; then each closes the cells beside the last ones,
 # and a push goes through c dt / h of them in a step.
@@ -100,8 +101,8 @@ def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
             break
         if found & TURNS_BACK:
             assemble(belt, state, work, step, True)
-    moment = _advance(belt, state, work, step)
-    advance_pulley(belt, state, moment, step)
+    taken, moment = _advance(belt, state, work, step)
+    advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
     lane_contact_forces(belt, state, stations)
 
@@ -116,15 +117,18 @@ def _forget(work: ImexWork) -> None:
 
 @kernel
 def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
-    """Apply the increments, and find the new strains; the moment of the flanks on the driven pulley [N m]."""
+    """Apply the increments, and find the new strains; the flanks' torques.
+
+    What they take from the driving pulley, where that is free, and their moment on the driven one [N m].
+    """
     n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
     per_cosine = 1.0 / c[0, COSINE]
     speed_share = lane_speed_share(belt, state.time[0], c[0, BELT_SPEED])
     belt_speed, forget, offset = speed_share * c[0, BELT_SPEED], c[0, FORGET], c[0, RING_OFFSET]
     stiffness, damper_0, damper_1 = c[0, ELEMENT_STIFFNESS], c[0, ELEMENT_DAMPING], c[0, RING_DAMPING]
-    driven_speed, radius = state.scalars[0, SPEED], c[0, DRIVEN_RADIUS]
-    pulleys = lane_pulleys(belt, speed_share, driven_speed)
-    zero, moment = like(0.0, forget), like(0.0, driven_speed)
+    driven_speed, radius, driving_radius = state.scalars[0, SPEED], c[0, DRIVEN_RADIUS], c[0, DRIVING_RADIUS]
+    pulleys = lane_pulleys(belt, speed_share, state.scalars)
+    zero, moment, taken = like(0.0, forget), like(0.0, driven_speed), like(0.0, driven_speed)
     carries = (
         lane_carry(belt, DRIVING_CELL, DRIVING_CARRY, belt_speed),
         lane_carry(belt, DRIVEN_CELL, DRIVEN_CARRY, belt_speed),
@@ -174,10 +178,15 @@ def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
         u = fields[j, U] + du
         if anywhere(share > 0.0):
             is_driven = belt.on_driven[j] > 0.5
-            if anywhere(is_driven):
+            if belt.is_free or anywhere(is_driven):
                 slopes = fma(stations[j, FLANK_SLOPE], dv0, stations[j, FLANK_CROSS] * du)
-                tangential = (stations[j, FLANK] - slopes) * (belt.dual[j] * (radius + w))
+                here = select(is_driven, radius, driving_radius)
+                tangential = (stations[j, FLANK] - slopes) * (belt.dual[j] * (here + w))
                 moment = moment - like(select(is_driven, tangential, zero), moment)
+                if belt.is_free:
+                    # beside an arc what stands there is of an earlier step
+                    tangential = select(share > 0.0, tangential, zero)
+                    taken = taken + like(select(is_driven, zero, tangential), taken)
             if belt.memory:
                 v_radial = fma(belt_speed + new_0, stations[j, SLOPE], u)
                 speed, along = arc_sliding(belt, j, pulleys, per_cosine, v_radial, new_0, w)
@@ -193,4 +202,4 @@ def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
         cell_strains(belt, stations, j, w, w_b, more_0, more_1, offset)
         w_b = w
     state.scalars[0, LAYER_WORK] = state.scalars[0, LAYER_WORK] + around(like(work_done, moment)) * step
-    return around(moment)
+    return around(taken), around(moment)

@@ -74,7 +74,8 @@ class ImexWork(NamedTuple):
     ----------
     stations : (N, 43) LaneArray
         The fields of `lane_forces`. Of the step: pending increment of u, its sensitivity to v_element's,
-        slope w_s, of the driven pulley's stations the flanks' tangential force and its slopes, whether (1)
+        slope w_s, of the driven pulley's stations, of free pulleys of both, the flanks' tangential force and
+        its slopes, whether (1)
         linearised friction would turn the sliding of the flanks, or of the saddle, about, whether (1) the
         elements of the cell ahead of a station meet within the step, and, where they are apart, their strain
         at its end with the speeds that it begins with; the blocks of the system and its right side;
@@ -193,7 +194,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
             element += fma(lever * lever, stiff, flank_slope)
             ring += stiff
             coupling = -lever * stiff
-            if anywhere(belt.on_driven[j] > 0.5):
+            if belt.is_free or anywhere(belt.on_driven[j] > 0.5):
                 stations[j, FLANK], stations[j, FLANK_SLOPE] = tangential, flank_slope
                 stations[j, FLANK_CROSS] = cross
         along_element = fma(outward, slope, along_element)

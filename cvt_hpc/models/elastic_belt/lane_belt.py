@@ -17,6 +17,7 @@ from cvt_hpc.lanes import LaneArray, split
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
+    FIRST_STATE,
     N_ELEMENT,
     N_RING,
     TIME,
@@ -26,6 +27,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     State,
     bending_bands,
 )
+from cvt_hpc.models.elastic_belt.pulleys import LAWS, STATES
 from cvt_hpc.models.elastic_belt.rhs import speed_share_at
 from cvt_hpc.physics.compliance import Contact, lane_contact
 from cvt_hpc.physics.friction import FrictionLaw
@@ -69,7 +71,9 @@ CONSTANTS = (
     "start_share",
     "driving_cell",
     "driven_cell",
+    *LAWS,
 )
+FIRST_LAW = len(CONSTANTS) - len(LAWS)
 (
     ELEMENT_STIFFNESS,
     RING_STIFFNESS,
@@ -108,12 +112,13 @@ CONSTANTS = (
     START_SHARE,
     DRIVING_CELL,
     DRIVEN_CELL,
-) = range(len(CONSTANTS))
+) = range(FIRST_LAW)
 
 # Scalars of the state, of each lane, double in any precision: the driven pulley's two, the work of the
-# layers' dampers until it is asked for [J], how often friction was found to turn sliding about in a step.
-LANE_SCALARS = ("driven_speed", "driven_position", "layer_work", "repeats")
-SPEED, POSITION, LAYER_WORK, REPEATS = range(len(LANE_SCALARS))
+# layers' dampers until it is asked for [J], how often friction was found to turn sliding about in a step, and
+# from FIRST_STATE on what free pulleys have beside.
+LANE_SCALARS = ("driven_speed", "driven_position", "layer_work", "repeats", *STATES)
+SPEED, POSITION, LAYER_WORK, REPEATS = range(FIRST_STATE)
 
 LEAST_ROWS = 3  # of a part of a run: bending reaches two stations
 
@@ -134,7 +139,7 @@ class LaneBelt(NamedTuple):
         As in `Belt`, for a bending stiffness of 1 N m^2.
     on_driven, enters : (N,) arrays
         Whether (1) a station lies on the driven half, from `driven_start` on, and is the first of an arc.
-    constants : (1, 37) LaneArray
+    constants : (1, 59) LaneArray
         CONSTANTS.
     driven_start : int
         First station of the driven arc.
@@ -146,6 +151,8 @@ class LaneBelt(NamedTuple):
         Course of the load and of the speed [s].
     speed_ramps : bool
         Whether some run's driving speed changes.
+    is_free : bool
+        Whether the pulleys have the states and laws of `pulleys.py`.
     """
 
     cell: np.ndarray
@@ -167,6 +174,7 @@ class LaneBelt(NamedTuple):
     rise_time: float
     ramp_end: float
     speed_ramps: bool
+    is_free: bool
 
 
 class LaneState(NamedTuple):
@@ -176,7 +184,7 @@ class LaneState(NamedTuple):
     ----------
     fields : (N, 7) LaneArray
         FIELDS at each station: layers' speeds less the belt speed of `time`; contents less 1 + kappa d_i.
-    scalars : (1, 4) LaneArray of doubles
+    scalars : (1, 12) LaneArray of doubles
         LANE_SCALARS.
     time : (1,) array
         [s]
@@ -231,6 +239,7 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
         rise_time=first.rise_time,
         ramp_end=first.ramp_end,
         speed_ramps=any(belt.speed_start != belt.driving_speed for belt in belts),
+        is_free=first.pulleys.are_free,
     )
 
 
@@ -257,6 +266,9 @@ def _constants_of(belt: Belt) -> list[float]:
         "start_share": belt.speed_start / belt.driving_speed,
         "driving_cell": belt.cell[0],
         "driven_cell": belt.cell[belt.driven_start],
+        # what is stored in a pulley whose speed is given is none of its business
+        "driven_inertia": belt.driven_inertia if np.isfinite(belt.driven_inertia) else 0.0,
+        **dict(zip(LAWS, belt.pulleys.laws[0], strict=True)),
     }
     return [named[key] if key in named else getattr(belt, key) for key in CONSTANTS]
 
@@ -348,6 +360,7 @@ def put_lane(fields: np.ndarray, scalars: np.ndarray, lane: int, belt: Belt, sta
     fields[:, :, lane] = values.T
     scalars[0, SPEED, lane] = state.scalars[DRIVEN_SPEED]
     scalars[0, POSITION, lane] = state.scalars[DRIVEN_POSITION]
+    scalars[0, FIRST_STATE:, lane] = state.scalars[FIRST_STATE:]
 
 
 def take_lane(state: LaneState, lane: int, belt: Belt) -> State:
@@ -359,4 +372,4 @@ def take_lane(state: LaneState, lane: int, belt: Belt) -> State:
     values[N_ELEMENT] += 1.0
     values[N_RING] += 1.0 + belt.curvature * belt.ring_offset
     scalars = state.scalars.data[0, :, lane]
-    return State(values, np.array([state.time[0], *scalars[: LAYER_WORK + 1]]))
+    return State(values, np.array([state.time[0], *scalars[: LAYER_WORK + 1], *scalars[FIRST_STATE:]]))

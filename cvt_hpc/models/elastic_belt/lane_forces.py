@@ -25,6 +25,7 @@ from cvt_hpc.lanes import (
     sqrt,
 )
 from cvt_hpc.models.elastic_belt.belt import (
+    FIRST_STATE,
     N_ELEMENT,
     N_RING,
     V_ELEMENT,
@@ -34,10 +35,8 @@ from cvt_hpc.models.elastic_belt.belt import (
     W,
 )
 from cvt_hpc.models.elastic_belt.lane_belt import (
-    AXIAL_DAMPING,
     BELT_SPEED,
     COSINE,
-    DRIVEN_INERTIA,
     DRIVEN_RADIUS,
     DRIVING_POSITION,
     DRIVING_RADIUS,
@@ -52,18 +51,17 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LOAD_START,
     MASS,
     POSITION,
-    RATIO,
     RING_FRICTION_SPEED,
     RING_MASS,
     RING_OFFSET,
     SPEED,
     START_SHARE,
-    THRUST,
     TRANSVERSE_DAMPING,
     WEDGE,
     LaneBelt,
     LaneState,
 )
+from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVING_COS, EXCESS, SHIFT
 from cvt_hpc.physics.compliance import FORCED, GAP, contact_force, solve_contact
 from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
@@ -165,16 +163,19 @@ def lane_acceleration(belt: LaneBelt, time: float, step: float):
 
 
 @merged_kernel
-def lane_pulleys(belt: LaneBelt, share, driven_speed):
+def lane_pulleys(belt: LaneBelt, share, scalars: LaneArray):
     """Speeds of both pulleys [rad/s], and of their surfaces less the belt speed [m/s], driving and driven.
 
-    `share` is what `lane_speed_share` gives, whose precision they take; `driven_speed` is [rad/s].
+    `share` is what `lane_speed_share` gives, whose precision they take; `scalars` are those of the state.
     """
     c = belt.constants
+    driven_speed, excess = scalars[0, SPEED], like(scalars[0, FIRST_STATE + EXCESS], share)
     belt_speed = like(share * c[0, BELT_SPEED], driven_speed)
     driving = share * (c[0, DRIVING_SPEED] * c[0, DRIVING_RADIUS] - c[0, BELT_SPEED])
+    driving = driving + excess * c[0, DRIVING_RADIUS]
     driven = driven_speed * like(c[0, DRIVEN_RADIUS], driven_speed) - belt_speed
-    return (share * c[0, DRIVING_SPEED], like(driven_speed, share)), (driving, like(driven, share))
+    turning = share * c[0, DRIVING_SPEED] + excess
+    return (turning, like(driven_speed, share)), (driving, like(driven, share))
 
 
 @merged_kernel
@@ -211,29 +212,6 @@ def lane_damping(belt: LaneBelt, time: float):
     """Transverse damping [N s/m^2], as `rhs.damping_at`."""
     damping = belt.constants[0, TRANSVERSE_DAMPING] + start_damping(time, belt.rise_time)
     return damping
-
-
-@kernel
-def lane_thrust(state: LaneState):
-    """Axial force of the belt on the driven sheave [N]."""
-    weight, pushed = state.contacts[1].weight, state.contacts[1].stations
-    total = like(0.0, pushed[0, FORCED])
-    for k in range(weight.size):
-        total = fma(weight[k], pushed[k, FORCED], total)
-    return total
-
-
-@kernel
-def advance_pulley(belt: LaneBelt, state: LaneState, moment, step: float) -> None:
-    """Driven pulley's speed and opening at the end of a step, by the belt's moment [N m] and axial forces."""
-    c, scalars = belt.constants, state.scalars
-    speed = scalars[0, SPEED]
-    load = like(c[0, RATIO], speed) * lane_load(belt, state.time[0], speed)
-    scalars[0, SPEED] = speed + step * (moment - load) / like(c[0, DRIVEN_INERTIA], speed)
-    axial = like(lane_thrust(state), speed)
-    scalars[0, POSITION] = scalars[0, POSITION] + step * (axial - like(c[0, THRUST], speed)) / like(
-        c[0, AXIAL_DAMPING], speed
-    )
 
 
 @merged_kernel
@@ -284,17 +262,24 @@ def ring_grip(belt: LaneBelt, j: int, ring_left, ring_right, relief, friction):
 def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Axial line forces of both wraps into FORCE [N/m]; on the strands it stays 0."""
     n, fields, c = state.fields.rows, state.fields, belt.constants
-    wedge, speed = c[0, WEDGE], state.scalars[0, SPEED]
+    wedge, scalars = c[0, WEDGE], state.scalars
     for wrap in range(2):
         contact = state.contacts[1] if wrap else state.contacts[0]
         pushed = contact.stations
         slope = like(wedge, pushed[0, GAP])
-        opening = like(state.scalars[0, POSITION] if wrap else like(c[0, DRIVING_POSITION], speed), slope)
+        shift = scalars[0, FIRST_STATE + SHIFT]
+        opening = like(scalars[0, POSITION] if wrap else like(c[0, DRIVING_POSITION], shift) + shift, slope)
+        tilted = FIRST_STATE + (DRIVEN_COS if wrap else DRIVING_COS)
         first = belt.driven_start if wrap else 0
         row, part = first % n, first // n
         for k in range(contact.weight.size):
             pushed[k, GAP] = fma(slope, at_station(fields, row, part, W), opening)
             row, part = _next_station(n, row, part)
+        if belt.is_free:
+            one, other = like(scalars[0, tilted], slope), like(scalars[0, tilted + 1], slope)
+            for k in range(contact.weight.size):
+                tilt = fma(contact.sine[k], other, contact.cosine[k] * one)
+                pushed[k, GAP] = pushed[k, GAP] + tilt
         if contact.sweeps > 0:
             sweep_lane_contact(contact)
         else:
@@ -361,7 +346,7 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     per_cosine, belt_speed, offset = 1.0 / c[0, COSINE], share * c[0, BELT_SPEED], c[0, RING_OFFSET]
     least = LEAST_SHARE_OF_WIDTH * c[0, FRICTION_SPEED]
     per_width, per_ring_width = 1.0 / c[0, FRICTION_SPEED], 1.0 / c[0, RING_FRICTION_SPEED]
-    pulleys = lane_pulleys(belt, share, state.scalars[0, SPEED])
+    pulleys = lane_pulleys(belt, share, state.scalars)
     for j in range(n):
         if not anywhere(belt.arc_share[j] > 0.0):
             continue

@@ -1,7 +1,8 @@
 """The elastic belt as one system of differential equations, y' = rates(t, y), for general integrators.
 
 Unknowns, in this order, for N stations: w, u, v_element, v_ring, n_element, n_ring (N each), the filtered
-speed of those stations that have a memory, the driven pulley's speed and position. Layers' speeds are counted
+speed of those stations that have a memory, the states of free pulleys where they are, the driven pulley's
+speed and position. Layers' speeds are counted
 from the nominal belt speed, contents from 1 and the pulley's speed from its nominal one, so that tolerances
 relative to an unknown mean its variation. Strands have no memory, and where the belt enters an arc the
 filtered speed is the sliding speed itself: neither is an unknown; without friction memory none is. Forces,
@@ -19,6 +20,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
     FIELDS,
+    FIRST_STATE,
     N_ELEMENT,
     N_RING,
     SCALARS,
@@ -31,10 +33,12 @@ from cvt_hpc.models.elastic_belt.belt import (
     U,
     W,
 )
+from cvt_hpc.models.elastic_belt.pulleys import EXCESS, RATIO_SUM, STATES, pulley_rates
 from cvt_hpc.models.elastic_belt.rhs import (
     accelerations,
     contact_forces,
     content_rates,
+    driving_speed_at,
     fresh_contacts,
     load_at,
     memory_rates,
@@ -49,7 +53,9 @@ VELOCITIES = (U, V_ELEMENT, V_RING)
 
 # What counts alike in each unknown: 0.1 mm off the path, 0.1 m/s of sliding, the strain of the rings.
 SIZES = {W: 1e-4, U: 0.1, V_ELEMENT: 0.1, V_RING: 0.1, V_FILTERED: 0.1, N_ELEMENT: 1e-3, N_RING: 1e-3}
-SIZE_OF_SPEED, SIZE_OF_POSITION = 1.0, 1e-4  # of the driven pulley [rad/s], [m]
+SIZE_OF_SPEED, SIZE_OF_POSITION = 1.0, 1e-4  # of a pulley [rad/s], [m]
+SIZE_OF_THRUST = 1e3  # [N]
+SIZES_OF_STATES = (SIZE_OF_SPEED, *[SIZE_OF_POSITION] * (RATIO_SUM - 1), SIZE_OF_THRUST, SIZE_OF_THRUST)
 
 
 class FlatBelt(NamedTuple):
@@ -65,6 +71,8 @@ class FlatBelt(NamedTuple):
         Closed sets of the last call, where the next search starts. They change results by round-off alone.
     remembering : (M,) int array
         Stations whose filtered speed is an unknown.
+    loose : (K,) int array
+        Those of the state's scalars that are unknowns beside the driven pulley's speed and position.
     origin : (n,) array
         What the unknowns are counted from.
     start : float
@@ -79,6 +87,7 @@ class FlatBelt(NamedTuple):
     state: State
     contacts: tuple[Contact, Contact]
     remembering: np.ndarray
+    loose: np.ndarray
     origin: np.ndarray
     start: float
     rounding: float
@@ -104,16 +113,18 @@ def flat_belt(belt: Belt, start: float = 0.0) -> FlatBelt:
     remembering = np.flatnonzero(arc & (belt.friction_memory > 0.0))
     origins = {V_ELEMENT: belt.belt_speed, V_RING: belt.belt_speed, N_ELEMENT: 1.0, N_RING: 1.0}
     rows = np.repeat([origins.get(row, 0.0) for row in ROWS], n)
-    origin = np.concatenate([rows, np.zeros(remembering.size), [belt.driving_speed / belt.ratio, 0.0]])
+    loose = FIRST_STATE + np.arange(len(STATES) if belt.pulleys.are_free else 0)
+    driven = [belt.driving_speed / belt.ratio, 0.0]
+    origin = np.concatenate([rows, np.zeros(remembering.size + loose.size), driven])
     state = State(np.zeros((len(FIELDS), n)), np.zeros(len(SCALARS)))
     work = np.zeros(n), np.zeros((2, n)), np.zeros((len(FIELDS), n)), np.zeros(n)
-    return FlatBelt(belt, state, fresh_contacts(belt), remembering, origin, start, 0.0, *work)
+    return FlatBelt(belt, state, fresh_contacts(belt), remembering, loose, origin, start, 0.0, *work)
 
 
 def pack(flat: FlatBelt, state: State) -> np.ndarray:
     """Vector y of a state; its time is not part of it."""
     rows, filtered = state.fields[list(ROWS)].ravel(), state.fields[V_FILTERED, flat.remembering]
-    scalars = state.scalars[[DRIVEN_SPEED, DRIVEN_POSITION]]
+    scalars = state.scalars[[*flat.loose, DRIVEN_SPEED, DRIVEN_POSITION]]
     return np.concatenate([rows, filtered, scalars]) - flat.origin
 
 
@@ -127,6 +138,9 @@ def unpack(flat: FlatBelt, t: float, y: np.ndarray) -> None:
     first = len(ROWS) * n
     for k in range(flat.remembering.size):
         fields[V_FILTERED, flat.remembering[k]] = y[first + k]
+    first += flat.remembering.size
+    for k in range(flat.loose.size):
+        scalars[flat.loose[k]] = y[first + k]
     scalars[TIME], scalars[DRIVEN_SPEED], scalars[DRIVEN_POSITION] = flat.start + t, origin[-2] + y[-2], y[-1]
     set_inlets(flat)
 
@@ -147,6 +161,43 @@ def driven_thrust(belt: Belt, force: np.ndarray) -> float:
     for k in range(belt.driven.weight.size):
         total += belt.driven.weight[k] * force[first + k]
     return total
+
+
+@kernel
+def driven_moment(belt: Belt, moments: np.ndarray) -> float:
+    """Moment of the belt on the driven pulley [N m]."""
+    return moments[belt.driven_start :].sum()
+
+
+@kernel
+def free_rates(belt: Belt, state: State, force: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """Rates of free pulleys, (10,): the driven one's speed and position, and STATES."""
+    scalars, pull = state.scalars, np.zeros((2, 3))
+    for wrap in range(2):
+        sheave, first = (belt.driven, belt.driven_start) if wrap else (belt.driving, 0)
+        for k in range(sheave.weight.size):
+            pressed = sheave.weight[k] * force[first + k]
+            pull[wrap, 0] += pressed
+            pull[wrap, 1] += pressed * sheave.tilt[0, k]
+            pull[wrap, 2] += pressed * sheave.tilt[1, k]
+    time = scalars[TIME]
+    pulled = (
+        moments[: belt.driven_start].sum(),
+        driven_moment(belt, moments),
+        (pull[0, 0], pull[1, 0]),
+        (pull[0, 1], pull[0, 2], pull[1, 1], pull[1, 2]),
+    )
+    found = pulley_rates(
+        belt.pulleys.laws,
+        0,
+        scalars[FIRST_STATE:],
+        1.0 if time >= belt.rise_time else 0.0,
+        (driving_speed_at(belt, state), scalars[DRIVEN_SPEED]),
+        scalars[DRIVEN_POSITION],
+        pulled,
+        (load_at(belt, time), belt.ratio, belt.thrust, belt.axial_damping),
+    )
+    return np.array(found)
 
 
 @kernel
@@ -197,7 +248,15 @@ def rates(flat: FlatBelt, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     first = len(ROWS) * n
     for k in range(flat.remembering.size):
         out[first + k] = rate[V_FILTERED, flat.remembering[k]]
-    out[-2] = (flat.moments.sum() - belt.ratio * load_at(belt, state.scalars[TIME])) / belt.driven_inertia
+    if flat.loose.size > 0:
+        found = free_rates(belt, state, flat.force, flat.moments)
+        first += flat.remembering.size
+        for k in range(flat.loose.size):
+            out[first + k] = found[2 + k]
+        out[-2], out[-1] = found[0], found[1]
+        return True
+    moment = driven_moment(belt, flat.moments)
+    out[-2] = (moment - belt.ratio * load_at(belt, state.scalars[TIME])) / belt.driven_inertia
     out[-1] = (driven_thrust(belt, flat.force) - belt.thrust) / belt.axial_damping
     return True
 
@@ -208,15 +267,17 @@ def system(flat: FlatBelt) -> System:
     Velocities are those unknowns whose rates are forces over masses: u, the layers' speeds and the pulley's.
     Of these u alone is the rate of an unknown.
     """
-    moving = _by_row(flat, {row: row in VELOCITIES for row in (*ROWS, V_FILTERED)}, True, False)
+    is_velocity = np.arange(len(STATES)) == EXCESS
+    moving = _by_row(flat, {row: row in VELOCITIES for row in (*ROWS, V_FILTERED)}, is_velocity, True, False)
     n = flat.belt.cell.size
     position_of = np.full(moving.size, -1)
     position_of[n : 2 * n] = np.arange(n)
-    scale = _by_row(flat, SIZES, SIZE_OF_SPEED, SIZE_OF_POSITION)
+    scale = _by_row(flat, SIZES, np.array(SIZES_OF_STATES), SIZE_OF_SPEED, SIZE_OF_POSITION)
     return System(rates, flat, moving, position_of, scale)
 
 
-def _by_row(flat: FlatBelt, values: dict[int, float], *scalars: float) -> np.ndarray:
-    """One value for each unknown, by its row of the state."""
+def _by_row(flat: FlatBelt, values: dict[int, float], states: np.ndarray, *scalars: float) -> np.ndarray:
+    """One value for each unknown, by its row of the state, or its place in STATES."""
     rows = np.repeat([values[row] for row in ROWS], flat.belt.cell.size)
-    return np.concatenate([rows, np.full(flat.remembering.size, values[V_FILTERED]), scalars])
+    loose = states[flat.loose - FIRST_STATE]
+    return np.concatenate([rows, np.full(flat.remembering.size, values[V_FILTERED]), loose, scalars])

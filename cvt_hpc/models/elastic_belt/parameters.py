@@ -11,9 +11,18 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.pulley_settings import (
+    DRIVEN_INERTIA,
+    PULLEYS,
+    SHAFT,
+    pulley_inert,
+    pulley_problems,
+    shaft_problems,
+)
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
+from cvt_hpc.physics.sheaves import STIFFNESS_OF, stiffness_factors
 from cvt_hpc.variator.scene import (
     FRICTION,
     HALF_WEDGE_ANGLE,
@@ -70,13 +79,25 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     },
     "sheaves": {
         "sheave_stiffness": _stiffness(
-            1.0, "", "stiffness of the sheaves, multiple of the reference; inf: rigid"
+            1.0,
+            "",
+            "stiffness of the sheaves' discs, multiple of the reference; inf: rigid; see stiffness_of",
+        ),
+        "stiffness_of": Parameter(
+            "disc",
+            "",
+            "what sheave_stiffness scales: the discs alone, as in Lebrecht et al. 2004, or the whole sheave, "
+            "disc and tilt of its collar",
+            choices=STIFFNESS_OF,
         ),
         "tilt_stiffness": _stiffness(
             3e5,
             "N m/rad",
             "reference stiffness against tilting, shaft bending included",
             sensible=(100.0, 1000000000.0),
+        ),
+        "tilt_factor": _stiffness(
+            1.0, "", "factor on tilt_stiffness, whatever sheave_stiffness scales; inf: no tilt"
         ),
         "local_stiffness": positive(
             4e9,
@@ -91,6 +112,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "axial stiffness of the elements, per length",
             sensible=(1000000.0, 100000000000000.0),
         ),
+        "element_factor": positive(1.0, "", "factor on flank_stiffness"),
         "half_wedge_angle": HALF_WEDGE_ANGLE,
         "driving_position": Parameter(
             0.0, "m", "axial opening of the driving pulley, prescribed (LOW stop)", sensible=(1e-07, 0.1)
@@ -101,10 +123,10 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "lag_stiffness": positive(
             2e8, "N/m", "stiffness that scales that lag", sensible=(10000.0, 1000000000000.0)
         ),
-        "driven_inertia": positive(
-            0.02, "kg m^2", "moment of inertia of the driven pulley", sensible=(1e-05, 100.0)
-        ),
+        "driven_inertia": DRIVEN_INERTIA,
     },
+    "pulleys": PULLEYS,
+    "shaft": SHAFT,
     "friction": FRICTION,
     "mesh": {
         "stations": Parameter(160, "", "cells around the belt", minimum=24, maximum=4096),
@@ -140,7 +162,8 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         Empty where all is well.
     """
     p = parameters
-    return shape_problems(p) + course_problems(p) + friction_problems(p)
+    found = shape_problems(p) + course_problems(p) + friction_problems(p)
+    return found or pulley_problems(p)
 
 
 def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
@@ -151,7 +174,7 @@ def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         path = variator(p["ratio"], p["driven_radius"], p["centre_distance"]).path_length
         if abs(p["play"]) > 0.02 * path:
             problems.append(("play", f"within 2 % of the belt's length {path:.4g} m", f"{p['play']:g} m"))
-    return problems
+    return problems + shaft_problems(p)
 
 
 def inert(parameters: dict[str, Any]) -> dict[str, str]:
@@ -168,11 +191,16 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         By the name of the parameter, the setting that makes it so, e.g. "friction_law table".
     """
     p = parameters
-    of_elastic_sheaves = ("tilt_stiffness", "local_stiffness", "local_length")
+    whole, disc = stiffness_factors(p)
+    of_disc, of_tilt = ("local_stiffness", "local_length"), ("tilt_stiffness", "tilt_factor")
     cases = (
         (p["disturbance"] == 0.0, ("seed",), "disturbance 0"),
         (p["ring_friction"] == 0.0, ("ring_friction_speed",), "ring_friction 0"),
-        (np.isinf(p["sheave_stiffness"]), of_elastic_sheaves, "sheave_stiffness inf"),
+        (p["sheave_stiffness"] == 1.0, ("stiffness_of",), "sheave_stiffness 1"),
+        (np.isinf(p["tilt_factor"]), of_tilt[:1], "tilt_factor inf"),
+        (np.isinf(p["tilt_stiffness"]), of_tilt[1:], "tilt_stiffness inf"),
+        (np.isinf(disc), of_disc, "sheave_stiffness inf"),
+        (np.isinf(whole), of_disc + of_tilt, "sheave_stiffness inf"),
     )
     found = {key: setting for holds, keys, setting in cases if holds for key in keys}
-    return friction_inert(p) | course_inert(p) | found
+    return friction_inert(p) | course_inert(p) | pulley_inert(p) | found

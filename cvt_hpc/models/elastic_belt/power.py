@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, fma, like, maximum, minimum
-from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_FILTERED, V_RING, U, W
+from cvt_hpc.models.elastic_belt.belt import FIRST_STATE, N_ELEMENT, V_ELEMENT, V_FILTERED, V_RING, U, W
 from cvt_hpc.models.elastic_belt.lane_belt import (
     AXIAL_DAMPING,
     BELT_SPEED,
@@ -74,36 +74,24 @@ from cvt_hpc.models.elastic_belt.moments import (
     add_speeds,
     add_stresses,
 )
+from cvt_hpc.models.elastic_belt.power_terms import (
+    BELT_LOSS,
+    DRIVEN_FLANK_LOSS,
+    DRIVING_FLANK_LOSS,
+    DRIVING_POWER,
+    LAG_LOSS,
+    LAYER_LOSS,
+    LOAD_POWER,
+    RING_LOSS,
+    SEATING_LOSS,
+    STORED_ENERGY,
+    THRUST_POWER,
+)
+from cvt_hpc.models.elastic_belt.pulley_step import audit_pulleys
+from cvt_hpc.models.elastic_belt.pulleys import SHIFT
 from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
 from cvt_hpc.physics.friction_laws import Law
-
-POWERS = (
-    "driving_power",
-    "load_power",
-    "thrust_power",
-    "driving_flank_loss",
-    "driven_flank_loss",
-    "ring_loss",
-    "belt_loss",
-    "layer_loss",
-    "lag_loss",
-    "seating_loss",
-    "stored_energy",
-)
-(
-    DRIVING_POWER,
-    LOAD_POWER,
-    THRUST_POWER,
-    DRIVING_FLANK_LOSS,
-    DRIVEN_FLANK_LOSS,
-    RING_LOSS,
-    BELT_LOSS,
-    LAYER_LOSS,
-    LAG_LOSS,
-    SEATING_LOSS,
-    STORED_ENERGY,
-) = range(len(POWERS))
 
 
 @kernel
@@ -150,18 +138,20 @@ def audit(
     element_mass, ring_mass, mass, offset = c[0, ELEMENT_MASS], c[0, RING_MASS], c[0, MASS], c[0, RING_OFFSET]
     ring_stiffness, element_stiffness = c[0, RING_STIFFNESS], c[0, ELEMENT_STIFFNESS]
     element_damping, centrifugal = c[0, ELEMENT_DAMPING], mass * belt_speed * belt_speed
-    turnings, surfaces = lane_pulleys(belt, speed_share, speed)
+    turnings, surfaces = lane_pulleys(belt, speed_share, scalars)
     omega, surface = turnings[0], surfaces[0]
-    radius, opening_0 = c[0, DRIVING_RADIUS], c[0, DRIVING_POSITION]
+    radius = c[0, DRIVING_RADIUS]
+    opening_0 = c[0, DRIVING_POSITION] + like(scalars[0, FIRST_STATE + SHIFT], zero)
     ring_relief = c[0, RING_RELIEF] * speed_share * speed_share
     summed = profiles.rows > 0
-    driving = driving_rub = rub = ring_loss = belt_loss = seating = zero
+    driving = turned = driving_rub = rub = ring_loss = belt_loss = seating = zero
     stored = 0.5 * c[0, DRIVEN_INERTIA] * turnings[1] * turnings[1]
     for j in range(n):
         if j == belt.driven_start:
             omega, surface, radius = turnings[1], surfaces[1], c[0, DRIVEN_RADIUS]
             opening_0 = like(scalars[0, POSITION], zero)
             driving_rub, rub = rub, zero
+            driving, turned = turned, zero
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
         aa, bb = a - 1 if a > 0 else n - 1, b + 1 if b < n - 1 else 0
         right, dual = belt.cell[j], belt.dual[j]
@@ -217,8 +207,7 @@ def audit(
         tangential = -share * twice_normal * mu * v_tangential / sliding
         seating -= dual * elastic_radial * (v_radial - u)
         rub -= dual * fma(radial, v_radial, tangential * v_tangential)
-        if j < belt.driven_start:
-            driving += dual * tangential * (radius + w) * omega
+        turned += dual * tangential * (radius + w) * omega
         across += radial
         along = fma(across + elastic_radial, slope, tangential)
         if summed:
@@ -248,4 +237,6 @@ def audit(
     rows[k, first + LAG_LOSS] = c[0, AXIAL_DAMPING] * axial_speed * axial_speed
     rows[k, first + SEATING_LOSS] = seating
     rows[k, first + STORED_ENERGY] = stored
+    if belt.is_free:
+        audit_pulleys(belt, state, like(driving, speed), like(turned, speed), rows, k, first)
     scalars[0, LAYER_WORK] = 0.0

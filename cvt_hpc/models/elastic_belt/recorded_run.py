@@ -9,6 +9,7 @@ import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import REGIONS, Mesh, mesh
 from cvt_hpc.models.elastic_belt.fluctuation import Fluctuation, fluctuation
+from cvt_hpc.models.elastic_belt.pulley_settings import are_free
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, PROFILES, Probe, Sensors, probes, sensors
 from cvt_hpc.models.elastic_belt.validity import doubt
 from cvt_hpc.physics.geometry import Variator
@@ -148,7 +149,7 @@ class RecordedRun:
 
     def mean_driving_speed(self, samples: slice) -> float:
         """Mean speed of the driving pulley in some samples [rad/s]."""
-        if ramped(self.parameters) != "speed":
+        if ramped(self.parameters) != "speed" and not are_free(self.parameters):
             return self.parameters["driving_speed"]
         return float(self.channel("driving_speed")[samples].mean())
 

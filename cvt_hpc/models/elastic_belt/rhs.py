@@ -10,7 +10,7 @@ outward):
     rings          m_1 (v_1,t + v_1 v_1,s) =  T,s + q
     transverse     m (w_tt + 2 v w_ts + v' w_s) = (F w_s),s - EI w_ssss - F kappa - d_b (w_t + v_0 w_s) + p_r
     memory         v_f,t + v v_f,s = (|v| - v_f) / tau_f on the arcs, v_f = |v| where the belt enters
-    pulleys        J omega_dn' = -sum f_t (r + w) - i M,   T_1 k z_dn' = sum f_ax - F_dn
+    pulleys        J omega_dn' = -sum f_t (r + w) - i M,   T_1 k z_dn' = sum f_ax - F_dn   (and `pulleys.py`)
 
 with q the friction of the rings on the elements' saddle, p_r, f_t the flanks' forces, |v| their sliding
 speed and M the load; v = r_dr omega_dr is the speed of the pitch line at the driving pulley's present speed,
@@ -28,6 +28,7 @@ from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
+    FIRST_STATE,
     N_ELEMENT,
     N_RING,
     TIME,
@@ -39,6 +40,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     U,
     W,
 )
+from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVING_COS, EXCESS, SHIFT
 from cvt_hpc.physics.compliance import Contact, plain_contact, solve_wrap
 from cvt_hpc.physics.flank import flank_forces, flank_sliding
 from cvt_hpc.physics.friction import friction_coefficient, saturation
@@ -57,6 +59,13 @@ def speed_share_at(belt: Belt, time: float) -> float:
     """Speed of the driving pulley over driving_speed [1]: that of speed_start, from rise_time linear to 1."""
     share = speed_course(time, belt.rise_time, belt.ramp_end, belt.speed_start / belt.driving_speed)
     return share
+
+
+@merged_kernel
+def driving_speed_at(belt: Belt, state: State) -> float:
+    """Speed of the driving pulley [rad/s]: that of its course, and by how much it deviates from that."""
+    course = speed_share_at(belt, state.scalars[TIME]) * belt.driving_speed
+    return course + state.scalars[FIRST_STATE + EXCESS]
 
 
 @merged_kernel
@@ -92,9 +101,15 @@ def fresh_contacts(belt: Belt) -> tuple[Contact, Contact]:
 
 
 @merged_kernel
-def wrap_contact(belt: Belt, contact: Contact, w: np.ndarray, opening: float, force: np.ndarray) -> int:
-    """Axial line forces of one wrap from its displacements; returns the solver's count, 0 where it failed."""
+def wrap_contact(
+    belt: Belt, contact: Contact, w: np.ndarray, opening: float, tilt: np.ndarray, force: np.ndarray
+) -> int:
+    """Axial line forces of one wrap from its displacements; returns the solver's count, 0 where it failed.
+
+    `opening` and `tilt` (2,) are those of the rigid sheaves [m].
+    """
     gap = opening + 2.0 * np.tan(belt.half_wedge_angle) * w
+    gap = gap + (contact.cosine * tilt[0] + contact.sine * tilt[1])
     solves = solve_wrap(contact, gap, force)
     return solves
 
@@ -105,9 +120,12 @@ def contact_forces(belt: Belt, state: State, contacts: tuple[Contact, Contact], 
     force[:] = 0.0
     w = state.fields[W]
     last = belt.driving.weight.size
-    solves = wrap_contact(belt, contacts[0], w[:last], belt.driving_position, force[:last])
+    scalars, states = state.scalars, state.scalars[FIRST_STATE:]
+    opening, tilt = belt.driving_position + states[SHIFT], states[DRIVING_COS : DRIVING_COS + 2]
+    solves = wrap_contact(belt, contacts[0], w[:last], opening, tilt, force[:last])
     first, last = belt.driven_start, belt.driven_start + belt.driven.weight.size
-    more = wrap_contact(belt, contacts[1], w[first:last], state.scalars[DRIVEN_POSITION], force[first:last])
+    opening, tilt = scalars[DRIVEN_POSITION], states[DRIVEN_COS : DRIVEN_COS + 2]
+    more = wrap_contact(belt, contacts[1], w[first:last], opening, tilt, force[first:last])
     return solves + more if solves > 0 and more > 0 else 0
 
 
@@ -164,14 +182,15 @@ def accelerations(
     rate : (7, N) array
         Rows U, V_ELEMENT and V_RING are set [m/s^2].
     moments : (N,) array
-        Result: moments of the stations' flanks on the driven pulley [N m].
+        Result: moments of the stations' flanks on the driven pulley, and, of those before `driven_start`,
+        what they take from the driving one [N m].
     """
     n = belt.cell.size
     w, u = state.fields[W], state.fields[U]
     v0, v1, vf = state.fields[V_ELEMENT], state.fields[V_RING], state.fields[V_FILTERED]
     sine, cosine = np.sin(belt.half_wedge_angle), np.cos(belt.half_wedge_angle)
     speed_share = speed_share_at(belt, state.scalars[TIME])
-    belt_speed, driving_speed = speed_share * belt.belt_speed, speed_share * belt.driving_speed
+    belt_speed, driving_speed = speed_share * belt.belt_speed, driving_speed_at(belt, state)
     acceleration = belt_acceleration_at(belt, state.scalars[TIME])
     centrifugal = belt.mass * belt_speed * belt_speed
     damping = damping_at(belt, state.scalars[TIME])
@@ -217,7 +236,7 @@ def accelerations(
             )
             outward += share * radial
             along_element += share * tangential
-            moments[j] = -driven * share * dual * tangential * radius
+            moments[j] = (-1.0 if driven else 1.0) * share * dual * tangential * radius
             drag, _ = ring_drag(belt, j, a, eps, v0[j], v1[j], speed_share)
             along_ring += drag
             along_element -= (1.0 + belt.ring_offset * belt.arc_curvature[j]) * drag
@@ -275,7 +294,6 @@ def sliding_speed(belt: Belt, state: State, j: int) -> float:
     if j >= belt.driven_start:
         v_tangential = v - state.scalars[DRIVEN_SPEED] * (belt.driven_radius + w[j])
     else:
-        driving_speed = speed_share_at(belt, state.scalars[TIME]) * belt.driving_speed
-        v_tangential = v - driving_speed * (belt.driving_radius + w[j])
+        v_tangential = v - driving_speed_at(belt, state) * (belt.driving_radius + w[j])
     speed, _ = flank_sliding(v_radial, v_tangential, 1.0 / np.cos(belt.half_wedge_angle))
     return speed

@@ -10,9 +10,10 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, select
-from cvt_hpc.models.elastic_belt.belt import FIELDS, MODES, REGIONS, V_ELEMENT, Mesh, W
+from cvt_hpc.models.elastic_belt.belt import FIELDS, FIRST_STATE, MODES, REGIONS, V_ELEMENT, Mesh, W
 from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
+    DRIVING_POSITION,
     DRIVING_SPEED,
     ELEMENT_STIFFNESS,
     MASS,
@@ -34,7 +35,10 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     step_ripple,
 )
 from cvt_hpc.models.elastic_belt.moments import MOMENTS, add
-from cvt_hpc.models.elastic_belt.power import POWERS, audit
+from cvt_hpc.models.elastic_belt.power import audit
+from cvt_hpc.models.elastic_belt.power_terms import POWERS
+from cvt_hpc.models.elastic_belt.pulley_step import opening_by_tilt
+from cvt_hpc.models.elastic_belt.pulleys import EXCESS, SHIFT
 from cvt_hpc.physics.compliance import SOLVES, UNSOLVED
 from cvt_hpc.physics.flank import tangential_sliding
 from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED
@@ -55,6 +59,9 @@ SCALARS = (
     "open_share driven",
     "least_strand_force",
     "driving_speed",
+    "driving_position",
+    "tilt driving",
+    "tilt driven",
 )
 
 
@@ -235,8 +242,10 @@ def sample(
             least = minimum(net, least)
     rows[k, sensed + Scalar.LEAST_STRAND_FORCE] = least - centrifugal
     driving_speed = like(c[0, DRIVING_SPEED], speed) * lane_speed_share(belt, state.time[0], speed)
-    rows[k, sensed + Scalar.DRIVING_SPEED] = driving_speed
-    turnings, surfaces = lane_pulleys(belt, share, speed)
+    rows[k, sensed + Scalar.DRIVING_SPEED] = driving_speed + state.scalars[0, FIRST_STATE + EXCESS]
+    shift = state.scalars[0, FIRST_STATE + SHIFT]
+    rows[k, sensed + Scalar.DRIVING_POSITION] = like(c[0, DRIVING_POSITION], speed) + shift
+    turnings, surfaces = lane_pulleys(belt, share, state.scalars)
     axial = zero
     for wrap in range(2):
         weight = state.contacts[1].weight if wrap else state.contacts[0].weight
@@ -254,6 +263,7 @@ def sample(
         rows[k, sensed + Scalar.AXIAL_FORCE_DRIVING + wrap] = axial
         rows[k, sensed + Scalar.SLIP_DRIVING + wrap] = sliding / (maximum(axial, 1e-9) * belt_speed)
         rows[k, sensed + Scalar.OPEN_SHARE_DRIVING + wrap] = open_length / length
+        rows[k, sensed + Scalar.TILT_DRIVING + wrap] = opening_by_tilt(state, wrap)
     audit(belt, state, stations, axial, sensing.interval, rows, k, sensed + len(SCALARS), profiles)
     rows[k, sensed + STEP_RIPPLE] = step_ripple(belt, state, stations)
     for j in range(profiles.rows):
@@ -277,6 +287,7 @@ def _watch(belt: LaneBelt, state: LaneState, stations: LaneArray, ended: LaneArr
     total = fma(speed, 0.0, fma(state.scalars[0, POSITION], 0.0, like(content, speed)))
     nominal = like(c[0, DRIVING_SPEED] / c[0, RATIO], speed)
     nominal = nominal * lane_speed_share(belt, state.time[0], speed)
+    nominal = nominal + state.scalars[0, FIRST_STATE + EXCESS] / like(c[0, RATIO], speed)
     code = like(Outcome.OK.value, speed)
     beyond = maximum(like(element_strain, speed) - LARGEST_ELEMENT_STRAIN, 0.0)
     beyond = maximum(like(strain, speed) - LARGEST_STRAIN, beyond)

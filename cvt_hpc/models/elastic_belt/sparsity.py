@@ -74,6 +74,10 @@ def pattern(flat: FlatBelt) -> csc_array:
             found[np.ix_(place[SPEED], np.concatenate([row[near] for row in rim]))] = True
             found[np.ix_(place[SPEED], remembered[remembered >= 0])] = True
         found[np.ix_(np.concatenate(pushed), np.concatenate(moved))] = True
+    # states of free pulleys know both wraps, and all of those know them
+    if flat.loose.size > 0:
+        loose = count - 2 - flat.loose.size
+        found[:, loose:] = found[loose:] = True
     return csc_array(found)
 
 

@@ -12,7 +12,7 @@ from cvt_hpc.models.elastic_belt.belt import LAYER_WORK, Belt, State
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state, take_lane
 from cvt_hpc.models.elastic_belt.lane_forces import derive
 from cvt_hpc.models.elastic_belt.march import Sampled
-from cvt_hpc.models.elastic_belt.power import LAYER_LOSS, POWERS
+from cvt_hpc.models.elastic_belt.power_terms import LAYER_LOSS, POWERS
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFILES, Outcome, Sensors
 
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from cvt_hpc.parameters import Substitute
 from cvt_hpc.physics.geometry import cell_counts, variator, variator_problems
+from cvt_hpc.physics.sheaves import axial_element_stiffness
 
 REFERENCE_STEP, REFERENCE_ERROR = 4.6e-6, 0.02  # [s], share of the amplitude
 SAFE_SHARE = 0.75
@@ -34,6 +35,7 @@ NEEDS = (
     "ring_mass",
     "bending_stiffness",
     "flank_stiffness",
+    "element_factor",
     "half_wedge_angle",
 )
 
@@ -56,7 +58,7 @@ def transverse_limit(parameters: Mapping[str, Any]) -> float:
     slope = np.tan(p["half_wedge_angle"])
     force = 2.0 * slope * p["thrust"] / path.driven_wrap
     stiffness = 16.0 * p["bending_stiffness"] / cell**4 + 4.0 * force / cell**2
-    stiffness += 4.0 * slope**2 * p["flank_stiffness"]
+    stiffness += 4.0 * slope**2 * axial_element_stiffness(p)
     return float(2.0 / np.sqrt(stiffness / (p["element_mass"] + p["ring_mass"])))
 
 

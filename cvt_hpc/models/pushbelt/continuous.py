@@ -7,7 +7,8 @@ friction of the belt, the transverse damping, wedge angle and inertia, the law o
 - force between neighbours: `edge_stiffness` times strain is `element_stiffness` times strain;
 - a flank alone has half the axial compliance of a station, 1 / c_e + a / k of both flanks, elements and
   local bending in series, a being 1 / sheave_stiffness. Its own stiffness c is normal force over normal
-  overlap, of which the axial one is c cos^2 d0: 1 / (c cos^2 d0) = (1 / c_e + a / k) / 2;
+  overlap, of which the axial one is c cos^2 d0: 1 / (c cos^2 d0) = (1 / c_e + a / k) / 2. The pushbelt's own
+  `sheave_stiffness` scales its modes of opening, so a value other than 1 asks for `stiffness_of` "sheave";
 - tilt opens a pulley by r^2 / c_tilt cos(phi) times the sum of F cos(phi), and likewise with sin, while modes
   open each flank by 1 / S: S = 2 c_tilt / r^2 of cos and sin. Nothing opens all around alike;
 - the thrust moves the driven sheave by 1 / (T_1 k) in opening, which is 2 tan d0 of radius: `sheave_rate`.
@@ -27,10 +28,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
+from cvt_hpc.physics.sheaves import axial_element_stiffness
+
 RIGID = 1e12  # [N/m]: of a mode that does not open; it gives way by 0.1 um under 100 kN
 
 # By key of the continuum the only value that the pushbelt has a counterpart of
-ONLY = {"driving_position": 0.0, "longitudinal_mass": 1.0}
+ONLY = {"driving_position": 0.0, "longitudinal_mass": 1.0, **PULLEY_DEFAULTS}
 # Of the continuum alone
 ABSENT = (
     "reference_tension",
@@ -59,25 +63,27 @@ class Follows(NamedTuple):
 
 
 def _flank_stiffness(p: Mapping[str, Any]) -> float:
-    compliance = 1.0 / p["flank_stiffness"] + 1.0 / (p["sheave_stiffness"] * p["local_stiffness"])
+    compliance = 1.0 / axial_element_stiffness(p) + 1.0 / (p["sheave_stiffness"] * p["local_stiffness"])
     return float(2.0 / np.cos(p["half_wedge_angle"]) ** 2 / compliance)
 
 
 def _modes(p: Mapping[str, Any], radius: float) -> tuple[float, float, float]:
-    tilt = min(2.0 * p["tilt_stiffness"] / radius**2, RIGID)
+    tilt = min(2.0 * p["tilt_stiffness"] * p["tilt_factor"] / radius**2, RIGID)
     return RIGID, tilt, tilt
 
 
 FOLLOWS = {
     "edge_stiffness": Follows(("element_stiffness",), lambda p: p["element_stiffness"]),
     "flank_stiffness": Follows(
-        ("flank_stiffness", "sheave_stiffness", "local_stiffness", "half_wedge_angle"), _flank_stiffness
+        ("flank_stiffness", "element_factor", "sheave_stiffness", "local_stiffness", "half_wedge_angle"),
+        _flank_stiffness,
     ),
     "driving_modal_stiffness": Follows(
-        ("tilt_stiffness", "ratio", "driven_radius"), lambda p: _modes(p, p["driven_radius"] / p["ratio"])
+        ("tilt_stiffness", "tilt_factor", "ratio", "driven_radius"),
+        lambda p: _modes(p, p["driven_radius"] / p["ratio"]),
     ),
     "driven_modal_stiffness": Follows(
-        ("tilt_stiffness", "driven_radius"), lambda p: _modes(p, p["driven_radius"])
+        ("tilt_stiffness", "tilt_factor", "driven_radius"), lambda p: _modes(p, p["driven_radius"])
     ),
     "sheave_rate": Follows(
         ("sheave_lag", "lag_stiffness", "half_wedge_angle"),

@@ -153,7 +153,11 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     },
     "sheaves": {
         "sheave_stiffness": replace(
-            positive(1.0, "", "stiffness of the sheaves, multiple of the reference; inf: rigid"),
+            positive(
+                1.0,
+                "",
+                "stiffness of the sheaves, disc and collar: factor on all modes of opening; inf: rigid",
+            ),
             allow_infinite=True,
         ),
         **{

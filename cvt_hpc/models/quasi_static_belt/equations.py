@@ -43,6 +43,7 @@ from cvt_hpc.models.elastic_belt.one_system import (
     SIZE_OF_SPEED,
     SIZES,
     FlatBelt,
+    driven_moment,
     driven_thrust,
     flat_belt,
     set_inlets,
@@ -237,7 +238,7 @@ def rates(model: QuasiStatic, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     first += 2 + 2 * n
     for k in range(flat.remembering.size):
         out[first + k] = rate[V_FILTERED, flat.remembering[k]]
-    out[-2] = (flat.moments.sum() - belt.ratio * load_at(belt, t)) / belt.driven_inertia
+    out[-2] = (driven_moment(belt, flat.moments) - belt.ratio * load_at(belt, t)) / belt.driven_inertia
     out[-1] = (driven_thrust(belt, flat.force) - belt.thrust) / belt.axial_damping
     return True
 

@@ -53,21 +53,20 @@ def local_slopes(flat: FlatBelt, increments: np.ndarray, near: np.ndarray, turni
     n, fields, scalars = flat.belt.cell.size, flat.state.fields, flat.state.scalars
     origin, force, speed = fields.copy(), flat.force.copy(), scalars[DRIVEN_SPEED]
     ahead, behind = np.zeros((8, n)), np.zeros((8, n))
-    whole = n - n % STRIDE
+    # around the ring in strides of five stations, but the first n % 5 of six
+    longer = n % STRIDE * (STRIDE + 1)
+    groups = np.array([j % (STRIDE + 1) if j < longer else (j - longer) % STRIDE for j in range(n)])
     for i in range(8):
         moved, unmoved = (flat.force, force) if i == FORCE else (fields[i], origin[i])
-        for group in range(STRIDE + n % STRIDE):
-            first, last, stride = group, whole, STRIDE
-            if group >= STRIDE:
-                # those left over at the end go one by one
-                first, last, stride = whole + group - STRIDE, whole + group - STRIDE + 1, 1
+        for group in range(STRIDE + (longer > 0)):
+            chosen = np.flatnonzero(groups == group)
             for sign, out in ((1.0, ahead), (-1.0, behind)):
                 fields[:] = origin
-                for j in range(first, last, stride):
+                for j in chosen:
                     moved[j] = unmoved[j] + sign * increments[i]
                 _evaluate(flat, out)
                 moved[:] = unmoved
-            for j in range(first, last, stride):
+            for j in chosen:
                 for d in range(STRIDE):
                     k = (j + d - REACH) % n
                     for o in range(8):
@@ -85,6 +84,7 @@ def _evaluate(flat: FlatBelt, out: np.ndarray) -> None:
     set_inlets(flat)
     rates_under_forces(flat)
     out[:MOMENT], out[MOMENT] = flat.rate, flat.moments
+    out[MOMENT, : flat.belt.driven_start] = 0.0
 
 
 class Linearisation:

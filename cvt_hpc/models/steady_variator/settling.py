@@ -20,6 +20,7 @@ from cvt_hpc.models.elastic_belt.state_march import StateMarch
 from cvt_hpc.models.elastic_belt.step_choice import SAFE_SHARE, transverse_limit
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.newton import newton
+from cvt_hpc.physics.sheaves import axial_element_stiffness
 
 LONGEST_STEP = 9e-6  # [s]: the state is Newton's, the march need only come near
 STIFFEST_FLANKS = 5e11  # [N/m^2]: contact stiffer than that would shorten the step; the march is without
@@ -45,22 +46,24 @@ def settled(parameters: Mapping[str, Any], equations: Equations, tolerance: floa
     (n,) array or Outcome
         The unknowns; or how the march ended, OK if it has not settled in time.
     """
-    p = {**parameters, "flank_stiffness": min(parameters["flank_stiffness"], STIFFEST_FLANKS)}
+    own = axial_element_stiffness(parameters)
+    softened = min(own, STIFFEST_FLANKS)
+    p = {**parameters, "flank_stiffness": softened, "element_factor": 1.0}
     whole = equations.belt
     belt = whole._replace(
         bridging_stiffness=np.inf,
         rise_time=RISE,
         ramp_end=RISE,
         load_start=whole.load,
-        driving=whole.driving._replace(element_stiffness=p["flank_stiffness"]),
-        driven=whole.driven._replace(element_stiffness=p["flank_stiffness"]),
+        driving=whole.driving._replace(element_stiffness=softened),
+        driven=whole.driven._replace(element_stiffness=softened),
         **{key: max(least, getattr(whole, key)) for key, least in LEAST_DAMPERS.items()},
     )
     step = min(LONGEST_STEP, SAFE_SHARE * transverse_limit(p))
     around = belt.cell.sum() / belt.belt_speed
     look = max(round(ROUNDS_A_LOOK * around / step), 1)
     force = np.empty(belt.cell.size)
-    softer = 1.0 / p["flank_stiffness"] - 1.0 / parameters["flank_stiffness"]
+    softer = 1.0 / softened - 1.0 / own
     pressed_in = softer / (2.0 * np.tan(belt.half_wedge_angle))
     run = StateMarch([belt], [initial_state(p, belt)])
     run.advance(round(RISE / step), step)

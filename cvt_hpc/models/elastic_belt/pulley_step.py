@@ -1,0 +1,209 @@
+"""The pulleys' part of a step in lanes, and of the audit of power; their laws stand in `pulleys.py`."""
+
+from __future__ import annotations
+
+from cvt_hpc.kernels import kernel, merged_kernel
+from cvt_hpc.lanes import LaneArray, fma, like, select, sqrt
+from cvt_hpc.models.elastic_belt.belt import FIRST_STATE
+from cvt_hpc.models.elastic_belt.lane_belt import (
+    AXIAL_DAMPING,
+    DRIVEN_INERTIA,
+    DRIVING_SPEED,
+    FIRST_LAW,
+    POSITION,
+    RATIO,
+    SPEED,
+    THRUST,
+    LaneBelt,
+    LaneState,
+)
+from cvt_hpc.models.elastic_belt.lane_forces import lane_load, lane_speed_share
+from cvt_hpc.models.elastic_belt.power_terms import (
+    DRIVING_POWER,
+    LAG_LOSS,
+    LOAD_POWER,
+    STORED_ENERGY,
+    THRUST_POWER,
+)
+from cvt_hpc.models.elastic_belt.pulleys import (
+    DRIVEN_COS,
+    DRIVEN_FREE,
+    DRIVEN_MOBILITY,
+    DRIVEN_SPRING_RATE,
+    DRIVEN_TILT,
+    DRIVING_COS,
+    DRIVING_FREE,
+    DRIVING_MOBILITY,
+    DRIVING_SPRING_RATE,
+    DRIVING_TILT,
+    EXCESS,
+    SHIFT,
+    beyond_clearance,
+    drive_torque,
+    pulley_rates,
+)
+from cvt_hpc.physics.compliance import COMPLIANCE, FORCED, TILT_COMPLIANCE, Contact
+
+
+@kernel
+def lane_thrust(state: LaneState):
+    """Axial force of the belt on the driven sheave [N]."""
+    weight, pushed = state.contacts[1].weight, state.contacts[1].stations
+    total = like(0.0, pushed[0, FORCED])
+    for k in range(weight.size):
+        total = fma(weight[k], pushed[k, FORCED], total)
+    return total
+
+
+@merged_kernel
+def _pull(contact: Contact, pattern):
+    """Axial force of the belt on a sheave [N], and what tilts it, times the cosine and times the sine."""
+    pushed = contact.stations
+    total, one, other = like(0.0, pattern), like(0.0, pattern), like(0.0, pattern)
+    for k in range(contact.weight.size):
+        pressed = contact.weight[k] * like(pushed[k, FORCED], pattern)
+        total = total + pressed
+        one, other = fma(contact.cosine[k], pressed, one), fma(contact.sine[k], pressed, other)
+    return total, one, other
+
+
+@kernel
+def lane_pulley_rates(belt: LaneBelt, state: LaneState, taken, moment):
+    """Rates of free pulleys, ten, by the torques of the belt [N m], as `pulleys.pulley_rates` has them.
+
+    Then what tilts the sheaves, four [N], and the axial forces, two [N].
+    """
+    c, scalars, time = belt.constants, state.scalars, state.time[0]
+    speed = scalars[0, SPEED]
+    first = FIRST_STATE
+    states = (
+        scalars[0, first],
+        scalars[0, first + 1],
+        scalars[0, first + 2],
+        scalars[0, first + 3],
+        scalars[0, first + 4],
+        scalars[0, first + 5],
+        scalars[0, first + 6],
+        scalars[0, first + 7],
+    )
+    course = lane_speed_share(belt, time, speed) * like(c[0, DRIVING_SPEED], speed)
+    axial_driving, driving_cos, driving_sin = _pull(state.contacts[0], speed)
+    axial_driven, driven_cos, driven_sin = _pull(state.contacts[1], speed)
+    tilting = (driving_cos, driving_sin, driven_cos, driven_sin)
+    load = lane_load(belt, time, speed)
+    found = pulley_rates(
+        c,
+        FIRST_LAW,
+        states,
+        1.0 if time >= belt.rise_time else 0.0,
+        (course + states[EXCESS], speed),
+        scalars[0, POSITION],
+        (taken, moment, (axial_driving, axial_driven), tilting),
+        (load, like(c[0, RATIO], speed), like(c[0, THRUST], speed), like(c[0, AXIAL_DAMPING], speed)),
+    )
+    return found, tilting, (axial_driving, axial_driven)
+
+
+@kernel
+def advance_pulleys(belt: LaneBelt, state: LaneState, taken, moment, step: float) -> None:
+    """Pulleys' speeds, openings and tilts at the end of a step, by torques of the belt [N m] and its forces.
+
+    `taken` is what the belt takes from the driving pulley, which counts where that is free; `moment` is its
+    torque on the driven one.
+    """
+    c, scalars = belt.constants, state.scalars
+    speed = scalars[0, SPEED]
+    if belt.is_free:
+        rates, tilting, axial = lane_pulley_rates(belt, state, taken, moment)
+        scalars[0, SPEED] = fma(step, rates[0], speed)
+        scalars[0, POSITION] = fma(step, rates[1], scalars[0, POSITION])
+        first = FIRST_STATE
+        scalars[0, first] = fma(step, rates[2], scalars[0, first])
+        scalars[0, first + 1] = fma(step, rates[3], scalars[0, first + 1])
+        scalars[0, first + 2] = fma(step, rates[4], scalars[0, first + 2])
+        scalars[0, first + 3] = fma(step, rates[5], scalars[0, first + 3])
+        scalars[0, first + 4] = fma(step, rates[6], scalars[0, first + 4])
+        scalars[0, first + 5] = fma(step, rates[7], scalars[0, first + 5])
+        scalars[0, first + 6] = fma(step, rates[8], scalars[0, first + 6])
+        scalars[0, first + 7] = fma(step, rates[9], scalars[0, first + 7])
+    else:
+        load = like(c[0, RATIO], speed) * lane_load(belt, state.time[0], speed)
+        scalars[0, SPEED] = speed + step * (moment - load) / like(c[0, DRIVEN_INERTIA], speed)
+        axial = like(lane_thrust(state), speed)
+        scalars[0, POSITION] = scalars[0, POSITION] + step * (axial - like(c[0, THRUST], speed)) / like(
+            c[0, AXIAL_DAMPING], speed
+        )
+
+
+@kernel
+def opening_by_tilt(state: LaneState, wrap: int):
+    """Largest opening of a groove by the tilt of its sheaves and the bending of its shaft [m]."""
+    scalars = state.scalars
+    contact = state.contacts[1] if wrap else state.contacts[0]
+    total, one, other = _pull(contact, scalars[0, SPEED])
+    give = like(contact.scalars[0, COMPLIANCE] * contact.scalars[0, TILT_COMPLIANCE], total)
+    tilted = FIRST_STATE + (DRIVEN_COS if wrap else DRIVING_COS)
+    one, other = fma(give, one, scalars[0, tilted]), fma(give, other, scalars[0, tilted + 1])
+    return sqrt(fma(one, one, other * other))
+
+
+@kernel
+def audit_pulleys(
+    belt: LaneBelt, state: LaneState, driving, driven, rows: LaneArray, k: int, first: int
+) -> None:
+    """Powers and stored energy of free pulleys, in the place of those of pulleys that are not.
+
+    A lag's oil takes what the axial forces, or moments, put in beyond what springs store. Thrusts work with
+    all that presses but the springs.
+
+    Parameters
+    ----------
+    belt, state, rows, k, first
+        As of `power.audit`, whose results stand in the row.
+    driving, driven
+        Power that the belt takes from the driving pulley, and torque that it takes from the driven one times
+        that pulley's speed [W].
+    """
+    c, scalars = belt.constants, state.scalars
+    speed = scalars[0, SPEED]
+    excess, shift, position = (
+        scalars[0, FIRST_STATE + EXCESS],
+        scalars[0, FIRST_STATE + SHIFT],
+        scalars[0, POSITION],
+    )
+    turning = lane_speed_share(belt, state.time[0], speed) * like(c[0, DRIVING_SPEED], speed) + excess
+    rates, tilting, axial = lane_pulley_rates(belt, state, driving / turning, -driven / speed)
+    mobility = like(c[0, FIRST_LAW + DRIVING_MOBILITY], speed)
+    torque = drive_torque(c, FIRST_LAW, excess, lane_load(belt, state.time[0], speed))
+    rows[k, first + DRIVING_POWER] = select(mobility > 0.0, torque * turning, driving)
+    is_free = like(c[0, FIRST_LAW + DRIVEN_MOBILITY], speed) > 0.0
+    rows[k, first + LOAD_POWER] = select(is_free, rows[k, first + LOAD_POWER], -driven)
+    stored = rows[k, first + STORED_ENERGY]
+    stored += select(mobility > 0.0, 0.5 * turning * turning / mobility, 0.0)
+    # both sheaves along the shaft: axial force in, thrust and spring out, the rest is the lag's
+    damping = like(c[0, AXIAL_DAMPING], speed)
+    lag = damping * fma(rates[1], rates[1], rates[3] * rates[3])
+    springs = (
+        like(c[0, FIRST_LAW + DRIVING_SPRING_RATE], speed) * shift,
+        like(c[0, FIRST_LAW + DRIVEN_SPRING_RATE], speed) * position,
+    )
+    thrust_power = fma(-damping, rates[1], axial[1] - springs[1]) * rates[1]
+    thrust_power += fma(-damping, rates[3], axial[0] - springs[0]) * rates[3]
+    rows[k, first + THRUST_POWER] = thrust_power
+    stored += 0.5 * fma(springs[0], shift, springs[1] * position)
+    for wrap in range(2):
+        tilted = FIRST_STATE + (DRIVEN_COS if wrap else DRIVING_COS)
+        give = like(c[0, FIRST_LAW + (DRIVEN_TILT if wrap else DRIVING_TILT)], speed)
+        free = like(c[0, FIRST_LAW + (DRIVEN_FREE if wrap else DRIVING_FREE)], speed)
+        one, other = scalars[0, tilted], scalars[0, tilted + 1]
+        elastic, beside = beyond_clearance(one, other, free)
+        stiffness = select(give > 0.0, 1.0 / give, 0.0)
+        put_in, across = tilting[2 * wrap], tilting[2 * wrap + 1]
+        opening, moving = rates[4 + 2 * wrap], rates[5 + 2 * wrap]
+        lag += fma(fma(-stiffness, elastic, put_in), opening, fma(-stiffness, beside, across) * moving)
+        # of what closed stations store: their gap is less by the opening
+        stored += 0.5 * (
+            stiffness * fma(elastic, elastic, beside * beside) - fma(put_in, one, across * other)
+        )
+    rows[k, first + LAG_LOSS] = lag
+    rows[k, first + STORED_ENERGY] = stored

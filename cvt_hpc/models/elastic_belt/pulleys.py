@@ -1,0 +1,339 @@
+"""Pulleys with four degrees of freedom each: rotation, axial position, and two tilts of the movable sheave.
+
+    rotation   J omega' = M - sum (r_i x f_i)_z                 (Bullinger et al. 2005, eq. 7)
+    position   T_1 k z' = sum f - A p - F_c - F_omega           (eq. 8)
+    tilt       T_1 q' = kappa s - q (1 - c / |q|)+              (eq. 9), s = sum (cos phi, sin phi) h f
+
+M is the drive's torque, the load's course less `drive_slope` times what the driving pulley is faster than its
+course, or the load; a speed that is given has an infinite inertia. `thrust` is A p and the spring's force at
+its reference together, the spring's change c z and F_omega = C omega^2 come to it. q is the opening of the
+groove, the same for both axes of the collar and the shaft (`physics/shaft.py`), c its part that is free: a
+collar within its clearance moves against the oil alone. A sheave without a lag is no state: its q is part of
+the contact (`physics/compliance.py`), to which T_1 -> 0 leads.
+
+Two controllers, both PI with limits, whose gains are assumptions:
+
+    ratio          Q_dr = Q_0 + k_P (i - i_0) + k_I integral (i - i_0),   i = omega_dr / omega_dn
+    torque ratio   Q_dn = Q_1 + k_P lack + k_I integral lack,   lack = |M| Q / (M*(Q) r) - min(F_dr, F_dn)
+
+M* by eq. 2. Until `rise_time` the driving sheave keeps its position; Q_0 follows, within T_1, the thrust that
+it needs there.
+
+All of this stands for plain numbers as for lanes. Layers' speeds are counted from the course of the driving
+speed, also where the pulley deviates from it, and so is m v^2: it is off by twice that deviation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cvt_hpc.kernels import merged_kernel
+from cvt_hpc.lanes import fma, like, maximum, minimum, select, sqrt
+from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, are_free, oil_factor
+from cvt_hpc.physics import capacity
+from cvt_hpc.physics.shaft import Bearing, Seats, beam_flexibility, free_opening, shaft_compliance
+from cvt_hpc.physics.sheaves import Sheaves
+
+# Constants of the laws, in SI units: mobilities are 1 / J, or 1 / (T_1 k) of the driving sheave, 0 where the
+# speed or the position is given; `tilt_rate` is 1 / T_1, 0 without a lag; `..._tilt` is kappa [m/N], and
+# `..._free` is c [m]; `tracking` is how fast Q_0 follows, `need` [1/m] the force per torque at r.
+LAWS = (
+    "driving_mobility",
+    "driven_mobility",
+    "drive_slope",
+    "driving_axial_mobility",
+    "driving_thrust",
+    "driving_spring_rate",
+    "driven_spring_rate",
+    "driving_oil",
+    "driven_oil",
+    "tracking",
+    "ratio_gain",
+    "ratio_rate",
+    "need",
+    "clamping_gain",
+    "clamping_rate",
+    "least_thrust",
+    "most_thrust",
+    "tilt_rate",
+    "driving_tilt",
+    "driven_tilt",
+    "driving_free",
+    "driven_free",
+)
+(
+    DRIVING_MOBILITY,
+    DRIVEN_MOBILITY,
+    DRIVE_SLOPE,
+    DRIVING_AXIAL_MOBILITY,
+    DRIVING_THRUST,
+    DRIVING_SPRING_RATE,
+    DRIVEN_SPRING_RATE,
+    DRIVING_OIL,
+    DRIVEN_OIL,
+    TRACKING,
+    RATIO_GAIN,
+    RATIO_RATE,
+    NEED,
+    CLAMPING_GAIN,
+    CLAMPING_RATE,
+    LEAST_THRUST,
+    MOST_THRUST,
+    TILT_RATE,
+    DRIVING_TILT,
+    DRIVEN_TILT,
+    DRIVING_FREE,
+    DRIVEN_FREE,
+) = range(len(LAWS))
+
+# States of the pulleys beside the driven one's speed and position: what the driving pulley's speed is above
+# its course, and its opening above the one given; openings q of both grooves; the controllers' integrals.
+STATES = (
+    "driving_excess",
+    "driving_shift",
+    "driving_tilt_cos",
+    "driving_tilt_sin",
+    "driven_tilt_cos",
+    "driven_tilt_sin",
+    "ratio_integral",
+    "clamping_integral",
+)
+EXCESS, SHIFT, DRIVING_COS, DRIVING_SIN, DRIVEN_COS, DRIVEN_SIN, RATIO_SUM, CLAMPING_SUM = range(len(STATES))
+
+
+class Pulleys(NamedTuple):
+    """Constants of both pulleys.
+
+    Attributes
+    ----------
+    laws : (1, 22) array
+        LAWS.
+    are_free : bool
+        Whether any pulley does more than turn by a given speed, or be pressed by a constant thrust.
+    """
+
+    laws: np.ndarray
+    are_free: bool
+
+
+def shaft_deflection(parameters: Mapping[str, Any], radius: float) -> tuple[float, float]:
+    """What a shaft adds to the groove at a radius [m]: compliance [m/N], free opening by its bearings [m]."""
+    p = PULLEY_DEFAULTS | dict(parameters)
+    if not p["shaft_lengths"]:
+        return 0.0, 0.0
+    seats, angle = Seats(*p["seat_positions"]), p["half_wedge_angle"]
+    bearings = [Bearing(position, p["bearing_stiffness"]) for position in p["bearing_positions"]]
+    flexibility = beam_flexibility(
+        p["shaft_lengths"], p["shaft_diameters"], p["shaft_modulus"], bearings, seats
+    )
+    opening = free_opening(p["bearing_clearance"], p["bearing_positions"], seats, angle)
+    return shaft_compliance(flexibility, seats, radius, angle) / p["shaft_factor"], opening
+
+
+def with_pulleys(
+    parameters: Mapping[str, Any], wraps: Sequence[Sheaves], radii: tuple[float, float]
+) -> tuple[list[Sheaves], Pulleys]:
+    """Sheaves as the contact takes them, on their shafts, and the constants of both pulleys.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat values of the run [SI].
+    wraps : sequence of Sheaves
+        Of the driving and of the driven pulley, on rigid shafts.
+    radii : (float, float)
+        Their pitch radii [m].
+    """
+    p = PULLEY_DEFAULTS | dict(parameters)
+    shafts = [shaft_deflection(p, radius) for radius in radii]
+    bent = [
+        wrap._replace(tilt_compliance=wrap.tilt_compliance + compliance)
+        for wrap, (compliance, _) in zip(wraps, shafts, strict=True)
+    ]
+    tilts = [wrap.compliance * wrap.tilt_compliance for wrap in bent]
+    free = [radius * p["collar_clearance"] + shaft[1] for radius, shaft in zip(radii, shafts, strict=True)]
+    lag = p["tilt_lag"]
+    sets_ratio, sets_clamping = p["driving_axial"] == "ratio", p["clamping"] == "torque_ratio"
+    limits = (p["least_thrust"], p["most_thrust"]) if sets_ratio or sets_clamping else (-np.inf, np.inf)
+    need = 0.0
+    if sets_clamping:
+        need = 1.0 / (capacity.carried_torque(p | {"thrust": 1.0}) * abs(p["held_torque_ratio"]))
+    named = {
+        "driving_mobility": 1.0 / p["driving_inertia"],
+        "driven_mobility": 1.0 / p["driven_inertia"],
+        "driving_axial_mobility": (
+            0.0 if p["driving_axial"] == "position" else 1.0 / (p["sheave_lag"] * p["lag_stiffness"])
+        ),
+        "driving_thrust": 0.0 if sets_ratio else p["driving_thrust"],
+        "driving_oil": oil_factor(p["driving_piston"], p["oil_density"]),
+        "driven_oil": oil_factor(p["driven_piston"], p["oil_density"]),
+        "tracking": 1.0 / p["sheave_lag"] if sets_ratio else 0.0,
+        "ratio_gain": p["ratio_gain"] if sets_ratio else 0.0,
+        "ratio_rate": p["ratio_rate"] if sets_ratio else 0.0,
+        "need": need,
+        "clamping_gain": p["clamping_gain"] if sets_clamping else 0.0,
+        "clamping_rate": p["clamping_rate"] if sets_clamping else 0.0,
+        "least_thrust": limits[0],
+        "most_thrust": limits[1],
+        "tilt_rate": 1.0 / lag if lag else 0.0,
+        "driving_tilt": tilts[0] if lag else 0.0,
+        "driven_tilt": tilts[1] if lag else 0.0,
+        "driving_free": free[0],
+        "driven_free": free[1],
+    }
+    laws = np.array([[named[key] if key in named else p[key] for key in LAWS]])
+    if lag:
+        bent = [wrap._replace(tilt_compliance=0.0) for wrap in bent]
+    return bent, Pulleys(laws, are_free(p))
+
+
+def settled_tilt(pulleys: Pulleys, first: int, tilting: np.ndarray) -> np.ndarray:
+    """Opening q of a groove at rest [m], (2,), where it is a state; else 0.
+
+    Parameters
+    ----------
+    pulleys : Pulleys
+        The constants.
+    first : int
+        DRIVING_COS or DRIVEN_COS.
+    tilting : (2,) array
+        s [N].
+    """
+    laws, which = pulleys.laws[0], int(first == DRIVEN_COS)
+    if laws[TILT_RATE] == 0.0:
+        return np.zeros(2)
+    return laws[DRIVING_TILT + which] * tilting + laws[DRIVING_FREE + which] * tilting / np.linalg.norm(
+        tilting
+    )
+
+
+@merged_kernel
+def beyond_clearance(one, other, free):
+    """What of a groove's opening is elastic [m]: (one, other) less the free part, in its direction."""
+    size = sqrt(fma(one, one, other * other))
+    share = maximum(size - free, 0.0) / maximum(size, 1e-30)
+    return share * one, share * other
+
+
+@merged_kernel
+def thrusts(laws, first: int, states, going: float, turning, position, axial, given):
+    """Axial forces on the movable sheaves [N], and how fast the controllers' integrals change [N/s].
+
+    Parameters
+    ----------
+    laws, first
+        Constants, LAWS from field `first` on.
+    states
+        STATES.
+    going : float
+        1 once the controllers go, 0 before.
+    turning, axial
+        Speeds of both pulleys [rad/s], axial forces of the belt on them [N].
+    position
+        Opening of the driven pulley [m].
+    given
+        Load at the driving pulley [N m], speed ratio [1], thrust on the driven pulley [N].
+
+    Returns
+    -------
+    driving, driven, ratio_rate, clamping_rate
+        Forces with springs and oil, and rates.
+    """
+    torque, ratio, thrust = given
+    least, most = like(laws[0, first + LEAST_THRUST], thrust), like(laws[0, first + MOST_THRUST], thrust)
+    deviation = going * (turning[0] / turning[1] - ratio)
+    asked = like(laws[0, first + DRIVING_THRUST], thrust) + states[RATIO_SUM]
+    asked = fma(like(laws[0, first + RATIO_GAIN], thrust), deviation, asked)
+    driving = minimum(maximum(asked, least), most)
+    ratio_rate = like(laws[0, first + RATIO_RATE], thrust) * deviation
+    # at a limit an integral does not go on towards it
+    ratio_rate = select(asked > most, minimum(ratio_rate, 0.0), ratio_rate)
+    ratio_rate = select(asked < least, maximum(ratio_rate, 0.0), ratio_rate)
+    needed = like(laws[0, first + NEED], thrust) * maximum(torque, -torque)
+    lack = going * (needed - minimum(axial[0], axial[1]))
+    asked = fma(like(laws[0, first + CLAMPING_GAIN], thrust), lack, thrust + states[CLAMPING_SUM])
+    driven = minimum(maximum(asked, least), most)
+    clamping_rate = like(laws[0, first + CLAMPING_RATE], thrust) * lack
+    clamping_rate = select(asked > most, minimum(clamping_rate, 0.0), clamping_rate)
+    clamping_rate = select(asked < least, maximum(clamping_rate, 0.0), clamping_rate)
+    driving = fma(like(laws[0, first + DRIVING_SPRING_RATE], thrust), states[SHIFT], driving)
+    driving = fma(like(laws[0, first + DRIVING_OIL], thrust), turning[0] * turning[0], driving)
+    driven = fma(like(laws[0, first + DRIVEN_SPRING_RATE], thrust), position, driven)
+    driven = fma(like(laws[0, first + DRIVEN_OIL], thrust), turning[1] * turning[1], driven)
+    ratio_rate += (1.0 - going) * like(laws[0, first + TRACKING], thrust) * (axial[0] - driving)
+    return driving, driven, ratio_rate, clamping_rate
+
+
+@merged_kernel
+def tilt_rates(laws, first: int, states, tilting):
+    """Rates of the grooves' openings [m/s], four, by what tilts them: s of both pulleys [N], four."""
+    pattern = tilting[0]
+    rate = like(laws[0, first + TILT_RATE], pattern)
+    one, other = beyond_clearance(
+        states[DRIVING_COS], states[DRIVING_SIN], like(laws[0, first + DRIVING_FREE], pattern)
+    )
+    three, four = beyond_clearance(
+        states[DRIVEN_COS], states[DRIVEN_SIN], like(laws[0, first + DRIVEN_FREE], pattern)
+    )
+    driving, driven = (
+        like(laws[0, first + DRIVING_TILT], pattern),
+        like(laws[0, first + DRIVEN_TILT], pattern),
+    )
+    return (
+        rate * fma(driving, tilting[0], -one),
+        rate * fma(driving, tilting[1], -other),
+        rate * fma(driven, tilting[2], -three),
+        rate * fma(driven, tilting[3], -four),
+    )
+
+
+@merged_kernel
+def drive_torque(laws, first: int, excess, load):
+    """Torque of the drive [N m] at a speed above its course [rad/s]."""
+    return load - like(laws[0, first + DRIVE_SLOPE], excess) * excess
+
+
+@merged_kernel
+def pulley_rates(laws, first: int, states, going: float, turning, position, pulled, given):
+    """Rates of all that moves of both pulleys.
+
+    Parameters
+    ----------
+    laws, first, states, going, turning, position
+        As of `thrusts`.
+    pulled
+        What the belt does to both pulleys: the torque that it takes from the driving one, that on the driven
+        one [N m], its axial forces (2) and what tilts the sheaves (4) [N].
+    given
+        Load [N m], speed ratio [1], thrust [N], and T_1 k of the driven sheave [N s/m].
+
+    Returns
+    -------
+    driven speed, driven position, and STATES
+        [rad/s^2], [m/s] and so on.
+    """
+    taken, moment, axial, tilting = pulled
+    load, ratio, thrust, damping = given
+    driving, driven, ratio_rate, clamping_rate = thrusts(
+        laws, first, states, going, turning, position, axial, (load, ratio, thrust)
+    )
+    torque = drive_torque(laws, first, states[EXCESS], load)
+    tilts = tilt_rates(laws, first, states, tilting)
+    excess_rate = like(laws[0, first + DRIVING_MOBILITY], load) * (torque - taken)
+    shift_rate = going * like(laws[0, first + DRIVING_AXIAL_MOBILITY], load) * (axial[0] - driving)
+    speed_rate = like(laws[0, first + DRIVEN_MOBILITY], load) * (moment - ratio * load)
+    return (
+        speed_rate,
+        (axial[1] - driven) / damping,
+        excess_rate,
+        shift_rate,
+        tilts[0],
+        tilts[1],
+        tilts[2],
+        tilts[3],
+        ratio_rate,
+        clamping_rate,
+    )
