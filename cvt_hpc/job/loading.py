@@ -34,7 +34,7 @@ from cvt_hpc.job.units import unit_in
 from cvt_hpc.job.values import expectation, kind_of, read_value
 from cvt_hpc.models.contract import load_model
 
-OF_COMMANDS = ("branch", "chart", "ladder")  # tables that a command of the same name reads
+OF_COMMANDS = ("branch", "chart", "fit", "ladder")  # tables that a command of the same name reads
 _OF_DESIGN = "design."
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
