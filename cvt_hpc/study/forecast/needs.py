@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from cvt_hpc.errors import mismatch
-from cvt_hpc.models.contract import load_model
 from cvt_hpc.study.description import record_layout, record_type, runs_along
 from cvt_hpc.study.record.frames import HEAD, PLACE
 from cvt_hpc.study.simulator import Simulator
@@ -58,9 +57,8 @@ def needs(job: Job, simulator: Simulator) -> Needs:
     size = runs_along(job, [axis.name for axis in job.axes])
     named = len(variables) + len(coordinates) + len(job.axes) + len(job.rules)
     disk = Disk((HEAD.size + PLACE.size + record) * size, most_of_results(size * record, named), math.nan)
-    model, kept = load_model(job.model), job.histories
-    profiles = max((model.profile_bytes(job.point(index)) for index in kept), default=0)
-    return Needs(MEMORY_PER_RUN * size, disk if kept else disk._replace(histories=0.0), profiles)
+    disk = disk if job.histories else disk._replace(histories=0.0)
+    return Needs(MEMORY_PER_RUN * size, disk, simulator.profile_bytes(job))
 
 
 def most_of_results(values: int, named: int) -> int:
@@ -92,10 +90,9 @@ def refuse_too_large(job: Job, simulator: Simulator, out: Path) -> Needs:
     if needed.memory > memory:
         found = f"{size_in_words(memory)} in this machine"
         raise mismatch(where, f"{size_in_words(needed.memory)} of memory for their plan", found)
-    lanes = load_model(job.model).lanes(job.parameters, job.stepper)
-    if (held := needed.profiles * min(lanes, len(job.histories))) > memory:
+    if needed.profiles > memory:
         found = f"{size_in_words(memory)} in this machine"
-        raise mismatch(where, f"{size_in_words(held)} of memory for the profiles of a batch", found)
+        raise mismatch(where, f"{size_in_words(needed.profiles)} of memory for profiles over time", found)
     if "first_spacing" not in job.design:
         free = _free(out) + _held(out)
         profiles = needed.profiles * len(job.histories)
