@@ -27,7 +27,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     W,
 )
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
-from cvt_hpc.models.elastic_belt.state_march import StateMarch
+from cvt_hpc.models.steady_variator.sampled import sampled
 from cvt_hpc.models.steady_variator.walking import Steady
 from cvt_hpc.variator import PULLEYS
 from cvt_hpc.variator.history import along_path
@@ -116,9 +116,7 @@ def quantities(steady: Steady, grid: Mesh) -> dict[str, Any]:
     """Numbers of strands (t1, t2) and pulleys (driving, driven), named as in the elastic belt's record."""
     belt, around = steady.belt, distributions(steady)
     middles = [grid.starts[region] + grid.counts[region] // 2 for region in (1, 3)]
-    sampled = StateMarch([belt], [steady.state])
-    sampled.advance(0, 1.0)
-    seen = sampled.channels()
+    seen = sampled(belt, steady.state)
     axial, slip, opened, flanks = (
         np.array([seen[name.format(pulley)] for pulley in PULLEYS])
         for name in ("axial_force {}", "slip {}", "open_share {}", "{}_flank_loss")
