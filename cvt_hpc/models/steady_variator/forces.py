@@ -27,7 +27,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     W,
 )
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
-from cvt_hpc.models.steady_variator.sampled import sampled
+from cvt_hpc.models.steady_variator.sampled import sampled, sampled_profiles
 from cvt_hpc.models.steady_variator.walking import Steady
 from cvt_hpc.variator import PULLEYS
 from cvt_hpc.variator.history import along_path
@@ -90,9 +90,7 @@ def distributions(steady: Steady) -> Distributions:
 
 def profiles(steady: Steady, grid: Mesh) -> xr.Dataset:
     """Speeds and forces by `position`, named as in a history of the elastic belt."""
-    sampled = StateMarch([steady.belt], [steady.state])
-    sampled.advance(0, 1.0)
-    sample = {name: values[:, 0] for name, values in sampled.profiles().items()}
+    sample = sampled_profiles(steady.belt, steady.state)
     sliding = along_belt(sample, grid, {"half_wedge_angle": steady.belt.half_wedge_angle})
     values, words = elsewhere(sample) | sliding, ELSEWHERE | SLIDING
     named = {name: (values[name], *words[name]) for name in words}
