@@ -168,10 +168,10 @@ def test_the_published_map_is_traced_with_half_of_its_runs():
         rows = list(csv.DictReader(table))
     verdicts = {"no": QUIET, "yes": VIBRATING, "undecided": UNDECIDED, "irregular": IRREGULAR, "": FAILED}
     truth = np.array([verdicts[row["vibrates"]] for row in rows], np.int8).reshape(5, 4, 19)
-    for spacing in (4, 6, 8):
+    for spacing in (4, 6, 9):
         done, inferred = traced(truth, [None, None, spacing])
-        # but for the one vibrating cell between rigid sheaves, an island
-        assert ((inferred == VIBRATING) != (truth == VIBRATING)).sum() <= 1
+        # but for an island at 40 N m and a quiet cell within a window, between rigid discs
+        assert ((inferred == VIBRATING) != (truth == VIBRATING)).sum() <= 2
         assert done.mean() < 0.5
         # what is missed are islands of one cell
         assert (inferred != truth).mean() < 0.05
