@@ -9,7 +9,8 @@ HEAD = """# The papers' figures, statement by statement
 
 Made by `python jobs/coverage.py cvt_hpc/models/elastic_belt/FIGURES.md` from the tables in
 `jobs/results/figures`. Each is that of a job: `cvt-hpc run jobs/figures/NAME.toml && cvt-hpc figure out/NAME`
-leaves `figure.png` and `statements.csv`. A statement is reproduced where all parts of its measure hold, partly where some do.
+leaves `figure.png` and `statements.csv`. A statement is reproduced where all parts of its measure hold,
+partly where some do.
 """
 
 
