@@ -33,7 +33,7 @@ def add(commands: Any) -> None:
     pilots = "forecast by K batches that are done for it, shortened (default: by records, else by prediction)"
     check.add_argument("--pilots", type=int, default=0, metavar="K", help=pilots)
     check.add_argument("--plot", type=Path, metavar="PNG", help="picture of the forecast, 1 to 10 000 ranks")
-    command = "command that is to take the job (default: chart, branch or ladder by its table, else run)"
+    command = "command that is to take the job (default: chart, branch, fit or ladder by its table, else run)"
     check.add_argument("--for", dest="command_for", choices=(RUN, *_PLANS), help=command)
     add_assignments(check, "--set", REPLACE)
 
@@ -104,8 +104,15 @@ def _branch_lines(arguments: argparse.Namespace) -> Iterator[str]:
     return plan_lines(load_diagram(arguments.path, arguments.set))
 
 
+def _fit_lines(arguments: argparse.Namespace) -> Iterator[str]:
+    from cvt_hpc.fit.loading import load_fit
+    from cvt_hpc.fit.making import plan_lines
+
+    return plan_lines(load_fit(arguments.path, arguments.set))
+
+
 RUN = "run"
-_PLANS = {"chart": _chart_lines, "ladder": _ladder_lines, "branch": _branch_lines}
+_PLANS = {"chart": _chart_lines, "ladder": _ladder_lines, "branch": _branch_lines, "fit": _fit_lines}
 
 
 def show_job(job: Job, out: Path | None) -> None:

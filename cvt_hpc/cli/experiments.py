@@ -1,4 +1,4 @@
-"""`chart`, `ladder` and `branch`: many runs whose results are tables and pictures of their own."""
+"""`chart`, `ladder`, `branch` and `fit`: many runs whose results are tables and pictures of their own."""
 
 from __future__ import annotations
 
@@ -34,6 +34,10 @@ def add(commands: Any) -> None:
     branch = add_command(commands, "branch", _branch, text, "JOB")
     add_folder(branch, "an earlier diagram of the folder")
     add_assignments(branch, "--set", REPLACE)
+    text = "look for the parameters that meet the targets of a job best"
+    fit = add_command(commands, "fit", _fit, text, "JOB")
+    add_folder(fit, "earlier studies of the folder")
+    add_assignments(fit, "--set", f"{REPLACE}; fit.KEY replaces a number of [fit]")
 
 
 def _chart(arguments: argparse.Namespace) -> int:
@@ -91,3 +95,20 @@ def _branch(arguments: argparse.Namespace) -> int:
         say(*branch_lines(diagram, followed), "")
     say(f"dataset: {report.dataset}", *(f"picture: {picture}" for picture in report.pictures))
     return SOME_FAILED if failures else DONE
+
+
+def _fit(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.fit.evaluating import Stopped
+    from cvt_hpc.fit.loading import load_fit
+    from cvt_hpc.fit.making import make_fit
+    from cvt_hpc.study.ranks.launch import end_process
+
+    fit = load_fit(arguments.path, arguments.set)
+    folder = output_folder(arguments.out, fit.job)
+    try:
+        report = make_fit(fit, folder, fresh=arguments.fresh, tell=complain)
+    except Stopped as stopped:
+        return end_process(stopped.status)
+    if speaks():
+        say(*report.lines, *(f"table: {table}" for table in report.tables))
+    return end_process(DONE)

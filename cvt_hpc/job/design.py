@@ -10,8 +10,16 @@ from cvt_hpc.job.axes import LARGEST_AXIS, Axis
 from cvt_hpc.job.values import read_value
 from cvt_hpc.parameters import Parameter
 
-_KIND = Parameter("grid", "", "which points are run", choices=("grid", "trace", "sobol", "latin_hypercube"))
-_KEYS = {"trace": ("first_spacing",), "sobol": ("runs", "seed"), "latin_hypercube": ("runs", "seed")}
+_KIND = Parameter(
+    "grid", "", "which points are run", choices=("grid", "trace", "sobol", "latin_hypercube", "listed")
+)
+LISTED = "listed"  # samples that the job gives itself, drawn elsewhere
+_KEYS = {
+    "trace": ("first_spacing",),
+    "sobol": ("runs", "seed"),
+    "latin_hypercube": ("runs", "seed"),
+    LISTED: ("runs",),
+}
 _SPACING = Parameter(
     4, "", "cells between the runs that a trace begins with", minimum=1, maximum=LARGEST_AXIS
 )
@@ -27,7 +35,8 @@ def read_design(table: Mapping[str, Any], source: str) -> Design:
     Parameters
     ----------
     table : mapping
-        `kind`, and with "trace" `first_spacing`, with "sobol" and "latin_hypercube" `runs` and `seed`.
+        `kind`, and with "trace" `first_spacing`, with "sobol" and "latin_hypercube" `runs` and `seed`, with
+        "listed" `runs`.
     source : str
         The job file, for the error.
 
@@ -59,6 +68,8 @@ def read_design(table: Mapping[str, Any], source: str) -> Design:
         # Only whole powers of two fill the space evenly: that is the point of such a sequence.
         lower = 2 ** (runs.bit_length() - 1)
         raise mismatch(f"{where} runs", f"a power of 2 (the nearest: {lower} and {2 * lower})", str(runs))
+    if kind == LISTED:
+        return {"kind": kind, "runs": runs}
     seed = read_value(_SEED, table.get("seed", _SEED.default), f"{where} seed")
     return {"kind": kind, "runs": runs, "seed": seed}
 

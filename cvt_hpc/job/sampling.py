@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.errors import mismatch, show, unknown
-from cvt_hpc.job.axes import Axis, read_axis, read_bounds, read_spacing
-from cvt_hpc.job.design import Design
+from cvt_hpc.job.axes import Axis, read_axis, read_bounds, read_spacing, read_values
+from cvt_hpc.job.design import LISTED, Design
 from cvt_hpc.job.values import kind_of
 from cvt_hpc.parameters import Parameter
 
@@ -26,7 +26,7 @@ def sampled_axes(
     found : mapping
         By name what the parameter declares; what stands in the job file, a table with from, to and if wanted
         spacing; and file and key, for the error. In the place of all ranges may stand the lists of drawn
-        values, as the resolved job in a dataset gives them.
+        values, as the resolved job in a dataset gives them; with the kind "listed" they have to.
     design : dict
         Kind, `runs` and `seed`.
     source : str
@@ -47,17 +47,27 @@ def sampled_axes(
     for parameter, _, where in found.values():
         if kind_of(parameter) is not float:
             raise mismatch(where, "a parameter with continuous values, to draw samples from", "another one")
+    if design["kind"] == LISTED:
+        return tuple(_read_listed(name, design["runs"], *entry) for name, entry in found.items())
     if all(isinstance(raw, list) and len(raw) == design["runs"] for _, raw, _ in found.values()):
         return tuple(read_axis(name, *entry) for name, entry in found.items())
-    ranges = [_read_range(*entry) for entry in found.values()]
+    ranges = [read_range(*entry) for entry in found.values()]
     shares = _draw(design, len(ranges)).T
     return tuple(
-        Axis(name, tuple(_between(*ends, share).tolist()), parameter.unit, parameter.description, ends[2])
+        Axis(name, tuple(between(*ends, share).tolist()), parameter.unit, parameter.description, ends[2])
         for (name, (parameter, _, _)), ends, share in zip(found.items(), ranges, shares, strict=True)
     )
 
 
-def _read_range(parameter: Parameter, raw: Any, where: str) -> tuple[float, float, str]:
+def _read_listed(name: str, runs: int, parameter: Parameter, raw: Any, where: str) -> Axis:
+    """Return an axis with the value of each sample, as it stands in the job; values may come again."""
+    if not isinstance(raw, (list, tuple, np.ndarray)) or len(raw) != runs:
+        found = f"{len(raw)} values" if isinstance(raw, (list, tuple, np.ndarray)) else show(raw)
+        raise mismatch(where, f"a list of {runs} values, one for each of the runs of [design]", found)
+    return Axis(name, read_values(parameter, raw, where), parameter.unit, parameter.description)
+
+
+def read_range(parameter: Parameter, raw: Any, where: str) -> tuple[float, float, str]:
     """Return the ends of a range and the spacing of what is drawn from it."""
     if not isinstance(raw, dict):
         raise mismatch(where, "a range {from=, to=}, to draw samples from", show(raw))
@@ -76,5 +86,6 @@ def _draw(design: Design, dimensions: int) -> np.ndarray:
     return engine(dimensions, seed=np.random.default_rng(design["seed"])).random(design["runs"])
 
 
-def _between(start: float, stop: float, spacing: str, share: np.ndarray) -> np.ndarray:
+def between(start: float, stop: float, spacing: str, share: np.ndarray) -> np.ndarray:
+    """Return the values at shares of the way from `start` to `stop`, by their spacing."""
     return start * (stop / start) ** share if spacing == "log" else start + (stop - start) * share

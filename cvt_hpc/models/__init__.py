@@ -12,5 +12,6 @@ MODELS = {
     "strand": "cvt_hpc.models.strand",
     "pushbelt": "cvt_hpc.models.pushbelt",
     "quasi_static_belt": "cvt_hpc.models.quasi_static_belt",
+    "slip_limit": "cvt_hpc.models.slip_limit",
     "steady_variator": "cvt_hpc.models.steady_variator",
 }

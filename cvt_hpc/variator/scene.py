@@ -52,6 +52,9 @@ SCENE: dict[str, Parameter] = {
         None,
         "",
         "torque ratio, load over the torque that friction carries, in the place of load, which follows",
+        minimum=-1.0,
+        maximum=1.0,
+        exclusive=True,
         gives=Substitute("load", capacity.NEEDS, capacity.shared_load),
     ),
     "load_history": Parameter(

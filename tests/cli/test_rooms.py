@@ -68,7 +68,17 @@ def test_imports_run_downwards():
         ({"mpi4py"}, {"study"}),
         (
             {"cvt_hpc.files.written_aside"},
-            {"study", "analysis", "chart", "ladder", "bifurcation", "archives", "output_folder", "netcdf"},
+            {
+                "study",
+                "analysis",
+                "chart",
+                "ladder",
+                "bifurcation",
+                "fit",
+                "archives",
+                "output_folder",
+                "netcdf",
+            },
         ),
     ],
 )

@@ -101,6 +101,8 @@ def test_jobs_that_are_shipped_draw_none(path):
         from cvt_hpc.bifurcation import load_diagram as load
     elif path.stem == "ladder_pushbelt":
         from cvt_hpc.ladder.loading import load_ladder as load
+    elif path.stem == "fit_lebrecht":
+        from cvt_hpc.fit.loading import load_fit as load
     else:
         load = load_job
     assert warned(load, path) == []

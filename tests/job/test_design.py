@@ -73,6 +73,43 @@ def test_a_resolved_job_with_a_design_builds_the_same_job(write_job, text):
     assert (again.axes, again.design, again.fingerprint()) == (job.axes, job.design, job.fingerprint())
 
 
+LISTED = """
+[scene]
+thrust = "20 kN"
+[design]
+kind = "listed"
+runs = 3
+[axes]
+load = ["20 N m", "0.1 kN m", 20]
+sheave_stiffness = [1, inf, 1]
+"""
+
+
+def test_listed_samples_are_those_of_the_job(write_job):
+    job = load_job(write_job(LISTED))
+    assert (job.size, job.shape, job.is_sampled) == (3, (3,), True)
+    points = [(job.point(i)["load"], job.point(i)["sheave_stiffness"]) for i in range(3)]
+    assert points == [(20.0, 1.0), (100.0, np.inf), (20.0, 1.0)]  # values may come again, a whole run, too
+    again = build_job(json.loads(json.dumps(job.resolved())), "x.toml")
+    assert (again.axes, again.design, again.fingerprint()) == (job.axes, job.design, job.fingerprint())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("runs = 3", "runs = 4", "[axes] load: expected a list of 4 values, one for each of the runs of [design], found 3 values"),
+        ("[1, inf, 1]", "{ from = 1, to = 2 }", "[axes] sheave_stiffness: expected a list of 3 values, one for each of the runs of [design], found a table"),
+        ("[1, inf, 1]", "[1, -2, 1]", "[axes] sheave_stiffness, value 2: expected > 0, found -2"),
+        ("runs = 3", "", "[design] runs: expected the number of samples, found nothing"),
+        ("runs = 3", "runs = 3\nseed = 1", '[design] seed: unknown key of a design of kind "listed"; known: kind, runs'),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_listed_samples_is_said(write_job, old, new, message):
+    with pytest.raises(InputError) as caught:
+        load_job(write_job(LISTED.replace(old, new)))
+    assert message in str(caught.value)
+
+
 def test_an_axis_that_is_replaced_by_one_value_is_no_dimension_of_the_samples(write_job):
     job = load_job(write_job(SAMPLED.format(kind="sobol")), ["sheave_stiffness=2"])
     assert [axis.name for axis in job.axes] == ["load"]
@@ -118,7 +155,7 @@ def test_a_design_is_told(write_job):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('"sobol"', '"sobl"', '[design] kind: expected one of grid, trace, sobol, latin_hypercube, found "sobl"; did you mean sobol?'),
+        ('"sobol"', '"sobl"', '[design] kind: expected one of grid, trace, sobol, latin_hypercube, listed, found "sobl"; did you mean sobol?'),
         ("runs = 32", "runs = 100", "[design] runs: expected a power of 2 (the nearest: 64 and 128), found 100"),
         ("runs = 32", "", "[design] runs: expected the number of samples, found nothing"),
         ("runs = 32", "run = 32", '[design] run: unknown key of a design of kind "sobol"; did you mean runs?'),

@@ -8,10 +8,11 @@ the next one would be smaller (Deuflhard's natural monotonicity test), whatever 
 
 from __future__ import annotations
 
-import numpy as np
-from scipy.sparse.linalg import splu
+from typing import Protocol
 
-from cvt_hpc.models.steady_variator.equations import Equations
+import numpy as np
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
 
 FULL_STEPS = 15  # a good start needs 3 to 6, a far one 12
 DAMPED_STEPS = 25
@@ -19,12 +20,30 @@ FAR = 1e4  # of the unknowns' sizes: a step beyond, such as 1 m of w, does not c
 SHORTEST = 1e-2  # of a full step: a direction that asks for less does not lead home
 
 
-def newton(equations: Equations, x: np.ndarray, tolerance: float, damped: bool = False) -> np.ndarray | None:
+class Solvable(Protocol):
+    """Equations as Newton's iteration takes them: `Equations` under a load, `Braked` at a speed."""
+
+    sizes: np.ndarray
+
+    def residual(self, x: np.ndarray) -> np.ndarray | None:
+        """What the equations leave; None where they have no value."""
+
+    def jacobian(self, x: np.ndarray) -> csc_array:
+        """Slopes of the residual, about the unknowns of its last call."""
+
+
+def newton(
+    equations: Solvable,
+    x: np.ndarray,
+    tolerance: float,
+    damped: bool = False,
+    most: int = FULL_STEPS,
+) -> np.ndarray | None:
     """Solve the steady equations.
 
     Parameters
     ----------
-    equations : Equations
+    equations : Solvable
         With their constants and rounding.
     x : (n,) array
         Where to begin; left as it is.
@@ -32,6 +51,8 @@ def newton(equations: Equations, x: np.ndarray, tolerance: float, damped: bool =
         Root mean square of what a further step would be, over the unknowns' sizes.
     damped : bool
         Shorten steps that do not lead home.
+    most : int
+        Of full steps.
 
     Returns
     -------
@@ -39,7 +60,7 @@ def newton(equations: Equations, x: np.ndarray, tolerance: float, damped: bool =
         The solution; None where the iteration does not end.
     """
     residual, share = equations.residual(x), 1.0
-    for _ in range(DAMPED_STEPS if damped else FULL_STEPS):
+    for _ in range(DAMPED_STEPS if damped else most):
         if residual is None or not np.all(np.isfinite(residual)):
             return None
         matrix = equations.jacobian(x)
@@ -70,6 +91,6 @@ def newton(equations: Equations, x: np.ndarray, tolerance: float, damped: bool =
     return None
 
 
-def _size(equations: Equations, step: np.ndarray) -> float:
+def _size(equations: Solvable, step: np.ndarray) -> float:
     """Root mean square of a step over the unknowns' sizes."""
     return float(np.sqrt(np.mean((step / equations.sizes) ** 2)))

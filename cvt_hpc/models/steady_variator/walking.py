@@ -16,13 +16,15 @@ import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants
 from cvt_hpc.models.elastic_belt.sampling import Outcome
-from cvt_hpc.models.steady_variator.arclength import largest_load
+from cvt_hpc.models.steady_variator.braked import SPEED, Braked
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.newton import newton
 from cvt_hpc.models.steady_variator.parameters import OF_THE_COURSE
+from cvt_hpc.models.steady_variator.sampled import largest_slip
 from cvt_hpc.models.steady_variator.settling import settled
 from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.physics.friction import softened
+from cvt_hpc.variator import GROSS_SLIP
 
 BRIDGING = 10.0  # [N]: dampers push by 100 N or so, which a gap's strain times this does not reach
 ON_THE_WAY, AT_HOME = 1e-4, 1e-7  # of the unknowns' sizes: 10 nm and 10 pm of w
@@ -32,11 +34,13 @@ ROUNDINGS = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 0.0)  # strains; rings' are 1e-3
 # [m/s]: regularisation speeds of flanks and rings to begin with. In a march by the belt's own, gaps and
 # pushes of a fine mesh can go round for ever
 WIDE, RING_WIDE = 0.3, 10.0
-NEAR_FOLD = 1.0  # [N m]: where so short a step along the load fails, a fold is near
+NEAR_LOAD, HALVINGS = 1e-6, 40  # [N m]: how closely a load is met along the driven speed; tries
+FALLEN = 0.9  # of the largest load: a load that has fallen so far rises no more
+SLIDING = 0.5  # slip of a pulley beyond which no state under a load is looked for
 DAMPERS = ("element_damping", "ring_damping", "transverse_damping")
 # What is marched under where a march under a load does not lead to a state: shares of a load under which the
 # belt slips through; loads beside one under which it does not settle, in shares of what friction carries.
-LESS, BESIDE = 0.8 ** np.arange(1, 8), (0.02, -0.02, 0.04, -0.04)
+LESS, BESIDE = 0.8 ** np.arange(1, 8), (0.1, -0.1, 0.2, -0.2)
 SLOWEST_MARCH = 100.0  # [rad/s]: a slower belt takes too long to settle, and a faster one like it is marched
 
 
@@ -111,7 +115,7 @@ class SteadyBelt:
         """
         if near is not None:
             try:
-                return self._found(self._walk(near.unknowns, near.load, load), load)
+                return self._found(self._rise(near.unknowns, near.load, load), load)
             except NoSteadyState:
                 pass
         return self._found(self._first(load), load)
@@ -131,41 +135,57 @@ class SteadyBelt:
             near = self.at(load, near)
             yield near
 
-    def carried(self, near: Steady, within: float = 0.1) -> Steady:
-        """State at the largest load that friction carries, as far as a walk upwards finds it.
+    def braked(self, near: Steady, sign: float) -> Iterator[Steady]:
+        """States from one on as the driven pulley is held at lower (sign -1) or higher (1) speeds.
 
-        A walk along the load goes past most of the small folds at which single cells open; from where it ends
-        the curve of states is followed round its fold.
+        As far as they are found; in the direction in which the load's size grows they go on past the largest
+        torque that friction carries.
+        """
+        self._own()
+        self._load(0.0)
+        for x, load in Braked(self._equations).along(near.unknowns, sign, AT_HOME):
+            yield self._found(x, load)
+            self._load(0.0)
+
+    def carried(self, near: Steady) -> Steady:
+        """State at the largest load that friction carries while neither pulley slips grossly.
 
         Parameters
         ----------
         near : Steady
-            Where the walk begins.
-        within : float
-            How closely the load is found [N m].
+            Where to begin; its load says in which direction power flows.
 
         Raises
         ------
         NoSteadyState
-            Where the curve of states cannot be followed to a fold.
+            Where states end before the load falls or a pulley slips grossly.
         """
-        step = max(0.1 * abs(near.load), NEAR_FOLD)
-        while step >= NEAR_FOLD:
-            try:
-                load = near.load + step
-                x = self._walk(near.unknowns, near.load, load)
-            except NoSteadyState:
-                step *= 0.5
-            else:
-                near = self._found(x, load)
-        self._load(near.load)
-        found = largest_load(self._equations, self._load, near.unknowns, near.load, AT_HOME, within)
-        if found is None:
-            raise NoSteadyState(f"no largest load found above {near.load:g} N m")
-        self._load(found[1])
-        return self._found(*found)
+        direction = -1.0 if near.load < 0.0 else 1.0
+        most = last = near
+        for state in self.braked(near, -direction):
+            if largest_slip(state.belt, state.state) > GROSS_SLIP:
+                state = self._at_slip(last, state)
+                return state if direction * state.load > direction * most.load else most
+            last = state
+            if direction * state.load > direction * most.load:
+                most = state
+            elif direction * state.load < FALLEN * direction * most.load:
+                return most
+        raise NoSteadyState(
+            f"no largest load found: from {near.load:.4g} N m states reach to {last.load:.4g} N m"
+        )
+
+    def _at_slip(self, below: Steady, beyond: Steady) -> Steady:
+        """State at which a pulley just does not slip grossly, between two states."""
+        self._load(0.0)
+        slips = [largest_slip(state.belt, state.state) for state in (below, beyond)]
+        share = (GROSS_SLIP - slips[0]) / (slips[1] - slips[0])
+        x = below.unknowns + share * (beyond.unknowns - below.unknowns)
+        found = Braked(self._equations).at(x[SPEED], x, AT_HOME)
+        return below if found is None else self._found(*found)
 
     def _found(self, x: np.ndarray, load: float) -> Steady:
+        self._load(load)
         belt = self._equations.belt._replace(bridging_stiffness=np.inf)
         return Steady(load, belt, self._equations.state(x), x)
 
@@ -177,10 +197,7 @@ class SteadyBelt:
         except _SlipsThrough as error:
             missed, others = error, [share * load for share in LESS]
         except NoSteadyState as error:
-            try:
-                return self._widened(load)
-            except NoSteadyState:
-                missed, others = error, [load + part * carried_torque(self._parameters) for part in BESIDE]
+            missed, others = error, [load + part * carried_torque(self._parameters) for part in BESIDE]
         for other in others:
             try:
                 x = self._settle(other)
@@ -192,7 +209,12 @@ class SteadyBelt:
                 slips, missed = isinstance(missed, _SlipsThrough), error
                 if slips:  # loads below begin on the same curve
                     break
-        raise missed
+        if isinstance(missed, _SlipsThrough):
+            raise missed
+        try:
+            return self._widened(load)
+        except NoSteadyState:
+            raise missed from None
 
     def _settle(self, load: float) -> np.ndarray:
         """Unknowns by the transient with constant friction over wide ranges of sliding, and by what it is."""
@@ -247,14 +269,38 @@ class SteadyBelt:
             return self._walk(x, start, load)
         except _PathEnds as ended:
             x, reached = ended.x, start + ended.share * (load - start)
-        self._load(reached)
-        found = largest_load(self._equations, self._load, x, reached, AT_HOME, NEAR_FOLD, abs(load))
-        if found is not None:
-            x, reached = found
-            if abs(reached) >= abs(load):
-                return self._walk(x, reached, load)
+        before = self._found(x, reached)
+        farthest, sign = reached, 1.0 if load < reached else -1.0  # a larger load slows the driven pulley
+        for state in self.braked(before, sign):
+            if (before.load - load) * (state.load - load) <= 0.0:
+                return self._between(before, state, load)
+            before = state
+            farthest = min(farthest, state.load) if load < reached else max(farthest, state.load)
+            if largest_slip(state.belt, state.state) > SLIDING:
+                break
         raise NoSteadyState(
-            f"no steady state found at {load:g} N m: from below they reach to {reached:.4g} N m"
+            f"no steady state found at {load:g} N m: from {start:.4g} N m they reach to {farthest:.4g} N m"
+        )
+
+    def _between(self, low: Steady, high: Steady, load: float) -> np.ndarray:
+        """Unknowns under a load between two states, by regula falsi (Illinois) over the driven speed."""
+        braked, ends = Braked(self._equations), [low.unknowns, high.unknowns]
+        left = [low.load - load, high.load - load]
+        self._load(0.0)
+        for _ in range(HALVINGS):
+            x = ends[0] + left[0] / (left[0] - left[1]) * (ends[1] - ends[0])
+            found = braked.at(x[SPEED], x, AT_HOME)
+            if found is None:
+                break
+            x, off = found[0], found[1] - load
+            if abs(off) < NEAR_LOAD:
+                self._load(load)
+                return found[0] if (own := newton(self._equations, x, AT_HOME)) is None else own
+            side = 0 if off * left[0] > 0.0 else 1
+            ends[side], left[side] = x, off
+            left[1 - side] *= 0.5
+        raise NoSteadyState(
+            f"no steady state found at {load:g} N m: they jump from {low.load:.4g} to {high.load:.4g} N m"
         )
 
     def _walk(self, x: np.ndarray, start: float, end: float) -> np.ndarray:

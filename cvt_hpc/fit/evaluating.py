@@ -1,0 +1,206 @@
+"""Candidates put to the test: a study of all their runs, and the score of each target."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cvt_hpc.files import refuse_link
+from cvt_hpc.fit.job import Case, Fit
+from cvt_hpc.fit.scoring import Course, score, total
+from cvt_hpc.job import Job, rebuild_job
+from cvt_hpc.study import open_results, run
+from cvt_hpc.variables import Status
+from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class Stopped(Exception):
+    """A study of a fit was stopped early; the same command goes on from there.
+
+    Attributes
+    ----------
+    status : int
+        Exit status.
+    """
+
+    def __init__(self, status: int) -> None:
+        super().__init__("stopped early")
+        self.status = status
+
+
+class Findings(NamedTuple):
+    """What was found of candidates.
+
+    Attributes
+    ----------
+    scenes : (candidates, free) array
+        Values of the free parameters [SI].
+    scores : (candidates, target) array
+        0 to 1.
+    totals : (candidates,) array
+        Their weighted means.
+    courses : list of dict
+        Of each candidate its runs by case.
+    """
+
+    scenes: NDArray[np.float64]
+    scores: NDArray[np.float64]
+    totals: NDArray[np.float64]
+    courses: list[dict[str, Course]]
+
+
+class Evaluation:
+    """The studies of a fit, each in a folder of its own below one folder; the same on all ranks.
+
+    Parameters
+    ----------
+    fit : Fit
+        What is fitted.
+    out : Path
+        Their folder.
+    fresh : bool
+        Throw away what earlier studies have left in a folder, instead of going on from there.
+
+    Attributes
+    ----------
+    runs, core_seconds : int, float
+        Of all studies so far, those of earlier starts included.
+    """
+
+    def __init__(self, fit: Fit, out: Path, *, fresh: bool = False) -> None:
+        self._fit, self._out, self._fresh = fit, out, fresh
+        self.runs, self.core_seconds = 0, 0.0
+
+    def evaluate(
+        self,
+        name: str,
+        scenes: NDArray[np.float64],
+        settings: Mapping[str, Any],
+        values: NDArray[np.float64],
+        cases: Sequence[str] = (),
+    ) -> Findings:
+        """Do the runs of candidates, and score them.
+
+        Parameters
+        ----------
+        name : str
+            Of the study, and of its folder.
+        scenes : (candidates, free) array
+            Values of the free parameters [SI].
+        settings : mapping
+            What else these runs have.
+        values : (runs,) array
+            Of the swept parameter.
+        cases : sequence of str
+            Those that are run; all by default. Of fewer there are courses and no scores.
+
+        Raises
+        ------
+        Stopped
+            If runs are left.
+        InputError
+            If the folder holds another job, or a candidate is not legal.
+        """
+        asked = {case: self._fit.cases[case] for case in cases or self._fit.cases}
+        job = study_of(self._fit, name, scenes, settings, values, asked)
+        folder = self._out / name
+        refuse_link(folder)
+        report = run(job, folder, fresh=self._fresh)
+        if report.remaining:
+            raise Stopped(report.exit_status)
+        with open_results(folder) as dataset:
+            courses = self._courses(dataset, len(scenes), list(asked), values)
+            self.runs += job.size
+            self.core_seconds += float(np.nansum(dataset["core_seconds"]))
+        targets = self._fit.targets if not cases else ()
+        scores = np.array([[score(target, of_one) for target in targets] for of_one in courses])
+        totals = total(targets, scores) if targets else np.full(len(scenes), np.nan)
+        return Findings(scenes, scores, totals, courses)
+
+    def _courses(
+        self, dataset: xr.Dataset, candidates: int, cases: Sequence[str], values: NDArray[np.float64]
+    ) -> list[dict[str, Course]]:
+        shape = candidates, len(cases), len(values)
+        fields = {name: array.reshape(shape) for name, array in _fields(self._fit, dataset).items()}
+        classes, counted = fields.pop("class"), fields.pop("counted")
+        return [
+            {
+                case: Course(
+                    values, classes[k, j], counted[k, j], {name: of[k, j] for name, of in fields.items()}
+                )
+                for j, case in enumerate(cases)
+            }
+            for k in range(candidates)
+        ]
+
+
+def study_of(
+    fit: Fit,
+    name: str,
+    scenes: NDArray[np.float64],
+    settings: Mapping[str, Any],
+    values: NDArray[np.float64],
+    cases: Mapping[str, Case],
+) -> Job:
+    """Return the study of candidates: for each of them, each case and each value a run, the last one fastest.
+
+    Parameters
+    ----------
+    fit, name, scenes, settings, values
+        As `Evaluation.evaluate` takes them.
+    cases : mapping
+        Those that are run.
+    """
+    own = {key: fit.job.parameters[key] for case in cases.values() for key in (*case.set, *case.factor)}
+    base = {**own, **dict(zip((one.name for one in fit.free), scenes.T, strict=True))}
+    shape = len(scenes), len(cases), len(values)
+    axes = {}
+    for key, of_candidates in base.items():
+        column = np.empty(shape)
+        for j, case in enumerate(cases.values()):
+            of_case = case.set.get(key, of_candidates)
+            column[:, j, :] = np.reshape(of_case * np.float64(case.factor.get(key, 1.0)), (-1, 1))
+        axes[key] = column.ravel().tolist()
+    axes[fit.along] = np.broadcast_to(values, shape).ravel().tolist()
+    document = fit.job.resolved()
+    document |= {
+        "name": f"{fit.job.name}_{name}",
+        "axes": axes,
+        "design": {"kind": "listed", "runs": int(np.prod(shape))},
+    }
+    return rebuild_job(document, fit.job.source, fit.job.units, dict(settings), "[fit]")
+
+
+def _fields(fit: Fit, dataset: xr.Dataset) -> dict[str, NDArray]:
+    """Arrays over the runs: class, whether they count, and what targets ask for."""
+    status, vibrates = dataset["status"].values, dataset["vibrates"].values
+    classes = classify_runs(status, vibrates)
+    names = {"amplitude", *(target.quantity for target in fit.targets), *fit.counted} - {""}
+    found = {name: _quantity(dataset, name) for name in names if name.split()[0] in dataset}
+    counted = classes != OccurrenceClass.SLIPPING
+    for name, (low, high) in fit.counted.items():
+        # a failed run has no number, and is not to be left out as one that need not be quiet
+        counted &= (status != Status.DONE) | ((found[name] >= low) & (found[name] <= high))
+    return {"class": classes, "counted": counted, **found}
+
+
+def _quantity(dataset: xr.Dataset, name: str) -> NDArray[np.float64]:
+    """A recorded number of each run, of the strand or pulley that is named, or else that moves most."""
+    variable, _, label = name.partition(" ")
+    array = dataset[variable].transpose("run", ...)
+    values = array.values.astype(float)
+    if array.ndim == 1:
+        return values
+    dim = array.dims[1]
+    if label:
+        return values[:, list(dataset[dim].values.astype(str)).index(label)]
+    size = dataset["amplitude"] if "amplitude" in dataset and dim in dataset["amplitude"].dims else array
+    size = np.nan_to_num(np.abs(size.transpose("run", dim).values.astype(float)), nan=-1.0)
+    return values[np.arange(len(values)), size.argmax(axis=1)]

@@ -1,0 +1,213 @@
+"""A job for `cvt-hpc fit`: an ordinary job whose axes are the ranges of what is free, with a table [fit]."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cvt_hpc.errors import mismatch, show, unknown
+from cvt_hpc.fit.job import NUMBERS, TABLE, Case, Fit, Free, share_of
+from cvt_hpc.fit.targets import read_targets, unit_of
+from cvt_hpc.job import Job, build_job
+from cvt_hpc.job.assignments import Assignments, split_assignments
+from cvt_hpc.job.axes import read_values
+from cvt_hpc.job.document import read_document
+from cvt_hpc.job.plausibility import warn_of_bare_numbers
+from cvt_hpc.job.sampling import read_range
+from cvt_hpc.job.tables import read_set, read_table, read_tables
+from cvt_hpc.job.units import unit_in
+from cvt_hpc.job.values import kind_of, read_value
+from cvt_hpc.parameters import Parameter, positive
+
+_TABLES = ("along", "starts", "coarse", "repeat", "counted", "cases", "targets")
+
+
+def load_fit(path: str | Path, overrides: Assignments = ()) -> Fit:
+    """Read and validate a job of a fit.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file: a job whose [axes] are the ranges of the free parameters, with a table [fit].
+    overrides : mapping, or sequence of "KEY=VALUE"
+        As `load_job` takes them; fit.KEY replaces a number of the table [fit].
+
+    Raises
+    ------
+    InputError
+        If anything is wrong with the file or an override.
+    """
+    source, document = str(path), read_document(Path(path))
+    where = f"{source}: [{TABLE}]"
+    replaced = split_assignments(overrides, source, "--set")
+    prefix = f"{TABLE}."
+    put = {key.removeprefix(prefix): replaced.pop(key) for key in [*replaced] if key.startswith(prefix)}
+    if TABLE not in document:
+        raise mismatch(where, "a table of cases and targets", "nothing")
+    table = document.pop(TABLE)
+    for key in put:
+        if key not in NUMBERS or kind_of(NUMBERS[key]) is tuple:
+            numbers = [name for name, one in NUMBERS.items() if kind_of(one) is not tuple]
+            raise unknown(f"{source}: --set {prefix}{key}", "number of [fit]", key, numbers)
+    if isinstance(table, Mapping):
+        table = {**table, **put}
+    own = read_table(NUMBERS, table, where, _TABLES)
+    _check_own(own, where)
+    axes = document.pop("axes", {})
+    if "design" in document or "linked" in document:
+        key = "design" if "design" in document else "linked"
+        raise mismatch(f"{source}: [{key}]", "none: a fit draws its candidates itself", "one")
+    job = build_job(document, source, replaced, "--set")
+    if job.axes:
+        raise mismatch(f"{source}: --set {job.axes[0].name}", "one value", "an axis")
+    free, units = _read_free(axes, job, source)
+    job = replace(job, units={**job.units, **units})
+    along, values = _read_along(table.get("along"), job, where)
+    cases = _read_cases(table.get("cases"), job, where)
+    _check_apart(free, along, cases, where)
+    every = own["every"]
+    fit = Fit(
+        job=job,
+        free=free,
+        along=along,
+        values=values,
+        cases=cases,
+        targets=read_targets(table.get("targets"), job, along, values[::every], cases, where),
+        starts=_read_starts(table.get("starts", []), free, job, where),
+        coarse=read_set({"set": table.get("coarse", {})}, f"{where} coarse"),
+        repeat=_read_repeat(table.get("repeat", {}), job, where),
+        counted=_read_counted(table.get("counted", {}), job, where),
+        **own,
+    )
+    if axes := fit.coarse_job().axes:
+        raise mismatch(f"{where} coarse {axes[0].name}", "one value", "an axis")
+    return fit
+
+
+def _check_own(own: Mapping[str, Any], where: str) -> None:
+    for key in ("screened", "samples"):
+        if own[key] & (own[key] - 1):
+            raise mismatch(f"{where} {key}", "a power of 2", str(own[key]))
+    if any(factor <= 0.0 for factor in own["distances"]):
+        raise mismatch(f"{where} distances", "factors above 0", str(list(own["distances"])))
+    if own["nearby"] >= 1.0:
+        raise mismatch(f"{where} nearby", "a part below 1", f"{own['nearby']:g}")
+
+
+def _read_free(axes: Any, job: Job, source: str) -> tuple[tuple[Free, ...], dict[str, str]]:
+    """Return the free parameters, and the units in which the job gives them."""
+    where = f"{source}: [axes]"
+    found, units = [], {}
+    for name, raw in read_tables(axes, where, "ranges of the free parameters").items():
+        key, place = job.schema.find(name, f"{where} {name}"), f"{where} {name}"
+        parameter = job.schema.parameters[key]
+        if kind_of(parameter) is not float:
+            raise mismatch(place, "a parameter with continuous values, to fit it", "another one")
+        low, high, spacing = read_range(parameter, raw, place)
+        warn_of_bare_numbers(parameter, raw, place)
+        found.append(Free(key, low, high, spacing))
+        units[key] = unit_in(raw)
+    return tuple(found), {key: unit for key, unit in units.items() if unit}
+
+
+def _read_along(raw: Any, job: Job, where: str) -> tuple[str, NDArray[np.float64]]:
+    where = f"{where} along"
+    table = read_tables(raw if raw is not None else {}, where, "one parameter with its values")
+    if len(table) != 1:
+        raise mismatch(where, "one parameter", f"{len(table)}")
+    ((name, values),) = table.items()
+    key = job.schema.find(name, f"{where} {name}")
+    if kind_of(job.schema.parameters[key]) is not float:
+        raise mismatch(f"{where} {name}", "a parameter with continuous values", "another one")
+    read = read_values(job.schema.parameters[key], values, f"{where} {name}")
+    if list(read) != sorted(set(read)):
+        raise mismatch(f"{where} {name}", "values that rise all the way", "others")
+    return key, np.array(read)
+
+
+def _read_cases(raw: Any, job: Job, where: str) -> dict[str, Case]:
+    found = {}
+    for name, table in read_tables(raw if raw is not None else {}, f"{where} cases", "cases").items():
+        place = f"{where} cases.{name}"
+        read_table({}, table, place, ("set", "factor"))
+        parts: dict[str, dict[str, float]] = {"set": {}, "factor": {}}
+        for part, of_part in parts.items():
+            entries = table.get(part, {})
+            if not isinstance(entries, Mapping):
+                raise mismatch(f"{place} {part}", "a table", show(entries))
+            for key, value in entries.items():
+                spot = f"{place} {part} {key}"
+                key = job.schema.find(key, spot)
+                parameter = job.schema.parameters[key]
+                if kind_of(parameter) is not float:
+                    raise mismatch(spot, "a parameter with continuous values", "another one")
+                declared = parameter if part == "set" else positive(1.0, "", "factor")
+                of_part[key] = read_value(declared, value, spot)
+        found[name] = Case(**parts)
+    return found
+
+
+def _check_apart(free: tuple[Free, ...], along: str, cases: Mapping[str, Case], where: str) -> None:
+    if along in {one.name for one in free}:
+        raise mismatch(f"{where} along {along}", "a parameter that is not free", "one of [axes]")
+    for name, case in cases.items():
+        if along in {*case.set, *case.factor}:
+            raise mismatch(f"{where} cases.{name} {along}", "other parameters than the swept one", along)
+
+
+def _read_starts(raw: Any, free: tuple[Free, ...], job: Job, where: str) -> NDArray[np.float64]:
+    """Return the shares at which the search begins; what a start leaves open is as the job has it."""
+    if not isinstance(raw, list):
+        raise mismatch(f"{where} starts", "a list of tables", show(raw))
+    shares = np.empty((len(raw), len(free)))
+    names = [one.name for one in free]
+    for row, table in enumerate(raw):
+        place = f"{where} starts, item {row + 1}"
+        if not isinstance(table, Mapping):
+            raise mismatch(place, "a table", show(table))
+        for key in table:
+            if key not in names:
+                raise unknown(f"{place} {key}", "free parameter", key, names)
+        for column, one in enumerate(free):
+            value = job.parameters[one.name]
+            if one.name in table:
+                value = read_value(job.schema.parameters[one.name], table[one.name], f"{place} {one.name}")
+            shares[row, column] = share = share_of(one, value)
+            if not -1e-9 <= share <= 1.0 + 1e-9:
+                words = [job.schema.in_words(one.name, end) for end in (one.low, one.high, value)]
+                raise mismatch(f"{place} {one.name}", f"a value from {words[0]} to {words[1]}", words[2])
+    return np.clip(shares, 0.0, 1.0)
+
+
+def _read_repeat(raw: Any, job: Job, where: str) -> dict[str, tuple]:
+    where = f"{where} repeat"
+    if not isinstance(raw, Mapping) or len(raw) > 1:
+        raise mismatch(where, "a table of one parameter with its values", show(raw))
+    found = {}
+    for name, values in raw.items():
+        key = job.schema.find(name, f"{where} {name}")
+        found[key] = read_values(job.schema.parameters[key], values, f"{where} {name}")
+    return found
+
+
+def _read_counted(raw: Any, job: Job, where: str) -> dict[str, tuple[float, float]]:
+    where = f"{where} counted"
+    if not isinstance(raw, Mapping):
+        raise mismatch(where, "a table of quantities", show(raw))
+    found = {}
+    for name, table in raw.items():
+        place = f"{where} {name}"
+        unit = unit_of(name, job, place)
+        ends = {
+            "from": Parameter(-math.inf, unit, "", allow_infinite=True),
+            "to": Parameter(math.inf, unit, "", allow_infinite=True),
+        }
+        read = read_table(ends, table, place)
+        found[name] = (read["from"], read["to"])
+    return found

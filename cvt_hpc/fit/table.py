@@ -1,0 +1,209 @@
+"""The results of a fit as tables: comma-separated values below lines that tell where they are from."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cvt_hpc import __version__
+from cvt_hpc.files import written_aside
+from cvt_hpc.fit.around import Index, Moved, reach
+from cvt_hpc.fit.confirming import Confirmed
+from cvt_hpc.fit.job import Fit
+from cvt_hpc.fit.scoring import REPRODUCED, Course, areas, verdict
+from cvt_hpc.fit.search import Found
+from cvt_hpc.job.units import from_si
+from cvt_hpc.provenance import command, git_revision
+from cvt_hpc.tables import columns
+from cvt_hpc.vibration.classes import OccurrenceClass
+
+_OPEN = (
+    OccurrenceClass.UNDECIDED,
+    OccurrenceClass.IRREGULAR,
+    OccurrenceClass.FAILED,
+    OccurrenceClass.SLIPPING,
+)
+_SPREAD = ("lowest", "highest")
+_ORDERS = ("first", "first_low", "first_high", "total", "total_low", "total_high")
+Row = Sequence[str | float]
+
+
+class Table(NamedTuple):
+    """A table: the name of its file, what it holds, the names of its columns, and its rows."""
+
+    name: str
+    what: str
+    head: Sequence[str]
+    rows: Sequence[Row]
+
+
+def write_table(fit: Fit, table: Table, folder: Path) -> Path:
+    """Write a table with its provenance: program, revision, command, and the job's fingerprint."""
+    numbers = json.dumps(fit.resolved(), sort_keys=True)
+    fingerprint = hashlib.sha256(numbers.encode()).hexdigest()[:16]
+    by = f"cvt_hpc {__version__}, revision {git_revision() or 'unknown'}"
+    path = folder / f"{table.name}.csv"
+    with written_aside(path) as aside, aside.open("w", encoding="utf-8", newline="") as file:
+        file.write(f"# {table.what}\n# {by}, job {fit.job.name} {fingerprint}: {command()}\n")
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(table.head)
+        writer.writerows([_cell(cell) for cell in row] for row in table.rows)
+    return path
+
+
+def set_table(fit: Fit, found: Found, best: Confirmed, moved: list[Moved], indices: Sequence[Index]) -> Table:
+    """The set: what is as good, how far each parameter is from silence, and what it decides."""
+    good = found.scenes[found.totals >= fit.accepted * found.totals.max()]
+    of_total = {index.parameter: index for index in indices if index.score == "total"}
+    rows: list[Row] = []
+    for k, one in enumerate(fit.free):
+        likewise = np.quantile(good[:, k], [0.0, 0.5, 1.0])
+        values = [_shown(fit, one.name, float(value)) for value in (best.scene[k], *likewise)]
+        index = of_total.get(one.name)
+        orders = (index.first, index.total) if index else (np.nan, np.nan)
+        rows.append(
+            [one.name, fit.job.schema.unit_in_words(one.name), *values, *reach(moved, one.name), *orders]
+        )
+    what = (
+        f"The best set, found in {best.name}; lowest, median and highest of the {len(good)} candidates "
+        f"from {fit.accepted:g} of the best score of the search; nearest of the factors tried at which "
+        f"vibration of the first case goes out; Sobol indices of the score within {fit.nearby:g} of the set"
+    )
+    head = ("parameter", "unit", "value", "lowest", "median", "highest", "out_below", "out_above")
+    return Table("set", what, (*head, "first_order", "total_order"), rows)
+
+
+def verdict_table(fit: Fit, best: Confirmed) -> Table:
+    """What the best set does with each statement."""
+    rows = []
+    for k, target in enumerate(fit.targets):
+        told = "; ".join(dict.fromkeys(in_words(fit, courses[target.case]) for courses in best.courses))
+        mean, scores = best.mean[k], best.scores[:, k]
+        bounds = scores.min(), scores.max()
+        rows.append([target.name, target.case, mean, *bounds, verdict(mean), told, target.statement])
+    what = "What the best set does with each statement: mean score of the repeats, lowest and highest"
+    head = ("target", "case", "score", *_SPREAD, "verdict", "found", "statement")
+    return Table("verdicts", what, head, rows)
+
+
+def confirmed_table(fit: Fit, confirmed: Sequence[Confirmed]) -> Table:
+    """The sets that were run in full, the best one first."""
+    rows = [
+        [one.name, *_in_units(fit, one.scene), one.coarse, one.total, *one.spread, *one.mean]
+        for one in confirmed
+    ]
+    what = "Sets run in full: score in the search, then mean, lowest and highest of the repeats"
+    return Table(
+        "confirmed", what, ("found_in", *_free(fit), "coarse", "score", *_SPREAD, *_names(fit)), rows
+    )
+
+
+def candidate_table(fit: Fit, found: Found) -> Table:
+    """All candidates of the search, in their order."""
+    rows = [
+        [stage, *_in_units(fit, scene), *scores, total]
+        for stage, scene, scores, total in zip(*found, strict=True)
+    ]
+    return Table(
+        "candidates", "The candidates of the search", ("stage", *_free(fit), *_names(fit), "score"), rows
+    )
+
+
+def conflict_table(fit: Fit, found: Found) -> Table:
+    """Pairs of targets that no candidate of the search meets together, the worst first.
+
+    What is told of a pair is the best that a candidate does with the one of the two that it meets less.
+    """
+    alone = found.scores.max(axis=0)
+    rows: list[Row] = []
+    for j, k in combinations(range(len(fit.targets)), 2):
+        together = float(found.scores[:, [j, k]].min(axis=1).max())
+        if together < REPRODUCED:
+            rows.append([fit.targets[j].name, fit.targets[k].name, alone[j], alone[k], together])
+    what = "Targets that no candidate of the search meets together: best score of each, and of the lesser one"
+    head = ("target", "other", "target_alone", "other_alone", "together")
+    return Table("conflicts", what, head, sorted(rows, key=lambda row: row[-1]))
+
+
+def distance_table(fit: Fit, moved: Sequence[Moved]) -> Table:
+    """What becomes of the first case where one parameter is moved alone."""
+    rows = [
+        [
+            one.parameter,
+            one.factor,
+            _shown(fit, one.parameter, one.value),
+            float(one.course.vibrates.sum()),
+            "yes" if one.is_out else "no",
+            in_words(fit, one.course),
+        ]
+        for one in moved
+    ]
+    what = "The first case of the best set with one parameter moved alone, in full"
+    return Table("distances", what, ("parameter", "factor", "value", "vibrating", "out", "found"), rows)
+
+
+def sensitivity_table(fit: Fit, indices: Sequence[Index]) -> Table:
+    """Sobol indices of each score."""
+    what = f"Sobol indices with their 95 % bounds, all parameters within {fit.nearby:g} of the best set"
+    return Table("sensitivities", what, ("score", "parameter", *_ORDERS), indices)
+
+
+def set_lines(best: Confirmed, of_set: Table, verdicts: Table) -> Iterator[str]:
+    """Yield what people are told of the best set."""
+    low, high = best.spread
+    scores = f"{best.total:.3f} ({low:.3f} to {high:.3f}), {best.coarse:.3f} in the search"
+    yield f"best set: {best.name}, score {scores}"
+    yield from columns([[str(name), f"{value:.4g} {unit}"] for name, unit, value, *_ in of_set.rows])
+    yield from columns(
+        [[str(row[0]), f"{row[2]:.2f}", str(row[5]), f"{row[1]}: {row[6]}"] for row in verdicts.rows]
+    )
+
+
+def in_words(fit: Fit, course: Course) -> str:
+    """Where a course vibrates, and where nothing can be said."""
+
+    def span(low: float, high: float) -> str:
+        low, high = (_shown(fit, fit.along, end) for end in (low, high))
+        return f"{low:g}" if low == high else f"{low:g}-{high:g}"
+
+    told = [f"vibrates {', '.join(span(*area) for area in areas(course))}"] if course.vibrates.any() else []
+    of_others = {kind.label: course.classes == kind for kind in _OPEN}
+    of_others["not counted"] = (course.classes == OccurrenceClass.VIBRATING) & ~course.counted
+    for words, chosen in of_others.items():
+        if chosen.any():
+            told.append(f"{words} {', '.join(span(value, value) for value in course.values[chosen])}")
+    return ", ".join(told) or "quiet"
+
+
+def _free(fit: Fit) -> list[str]:
+    """Names of the free parameters with the units in which people read them."""
+    units = {one.name: fit.job.schema.unit_in_words(one.name) for one in fit.free}
+    return [f"{name} [{unit}]" if unit else name for name, unit in units.items()]
+
+
+def _names(fit: Fit) -> list[str]:
+    return [target.name for target in fit.targets]
+
+
+def _in_units(fit: Fit, scene: NDArray[np.float64]) -> list[float]:
+    return [_shown(fit, one.name, float(value)) for one, value in zip(fit.free, scene, strict=True)]
+
+
+def _shown(fit: Fit, name: str, value: float) -> float:
+    """A value [SI] in the unit in which people read it."""
+    schema = fit.job.schema
+    return from_si(value, schema.parameters[name].unit, schema.unit_in_words(name))
+
+
+def _cell(cell: str | float) -> str:
+    if isinstance(cell, str):
+        return cell
+    return "" if np.isnan(cell) else f"{cell:.6g}"

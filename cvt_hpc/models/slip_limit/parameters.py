@@ -1,0 +1,44 @@
+"""What a job may set of the limit of slip: the steady belt's parameters, and the question."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cvt_hpc.models import steady_variator
+from cvt_hpc.parameters import Parameter
+
+PARAMETERS: dict[str, dict[str, Parameter]] = {
+    "question": {
+        "sought": Parameter(
+            "torque",
+            "",
+            "the largest torque under the thrust, or the least thrust for the load",
+            choices=("torque", "thrust"),
+        ),
+        "method": Parameter(
+            "steady_state",
+            "",
+            "steady states of the elastic belt, or the formula of Bullinger et al. 2005, eq. 2",
+            choices=("steady_state", "formula"),
+        ),
+        # 1.3 is a common choice for clamping forces, and an assumption
+        "safety": Parameter(1.3, "", "limit over working point, of torque or thrust", minimum=1.0),
+    },
+    **steady_variator.PARAMETERS,
+}
+
+
+def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems that lie between parameters: as of `steady_variator`, or a thrust sought for no load."""
+    problems = list(steady_variator.check(parameters))
+    if parameters["sought"] == "thrust" and parameters["load"] == 0.0:
+        problems.append(("load", 'other than 0 where sought = "thrust"', "0 N m"))
+    return problems
+
+
+def inert(parameters: dict[str, Any]) -> dict[str, str]:
+    """Parameters without effect; of a load whose limit is sought the sign counts, the direction of power."""
+    found = dict(steady_variator.inert(parameters))
+    if parameters["sought"] == "thrust":
+        found["thrust"] = "sought thrust"
+    return found

@@ -1,0 +1,133 @@
+"""What the record of a limit of slip holds, and how it is found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cvt_hpc.physics.capacity import carried_torque
+from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+from cvt_hpc.variator.variables import COORDINATES, shared
+
+if TYPE_CHECKING:
+    from cvt_hpc.models.steady_variator.walking import Steady, SteadyBelt
+
+VARIABLES = (
+    Variable("limit_torque", (), "f8", "N m", "at the driving pulley, where the belt begins to slip grossly"),
+    Variable("limit_thrust", (), "f8", "N", "on the driven pulley, where the belt begins to slip grossly"),
+    Variable("formula_ratio", (), "f8", "1", "limit torque over that of Bullinger et al. 2005, eq. 2"),
+    Variable("limit_slip", ("pulley",), "f8", "1", "at the limit, tangential sliding over belt speed"),
+    Variable("working_torque", (), "f8", "N m", "at the driving pulley, safe by the factor"),
+    Variable("axial_force", ("pulley",), "f8", "N", "necessary thrust at the working point"),
+    Variable("thrust_ratio", (), "f8", "1", "axial force of the driving over that of the driven pulley"),
+    Variable("slip", ("pulley",), "f8", "1", "at the working point, tangential sliding over belt speed"),
+    *shared("flank_loss", "driving_power", "load_power", "ring_loss", "belt_loss"),
+    *shared("layer_loss", "seating_loss", "loss", "efficiency", "power_residual"),
+)
+AT_WORK = tuple(variable.name for variable in VARIABLES[5:])
+FIRST_SHARE = 0.4  # of eq. 2's torque: where walks to the limit begin
+WITHIN, TRIES = 2e-3, 8  # of the load: how closely a thrust's limit meets it; thrusts tried at most
+
+
+def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+    """Coordinates of the record's dimensions, whatever the parameters."""
+    return dict(COORDINATES)
+
+
+def cost(parameters: Mapping[str, Any], stepper: None) -> Any:
+    """Core-seconds of a run: of a first state and of the walk to the limit."""
+    return np.where(parameters["method"] == "formula", 1e-4, 6e-2 * parameters["stations"])
+
+
+def solve(parameters: Mapping[str, Any]) -> Any:
+    """Limit and working point of the parameters of a run [SI]; or why none was found."""
+    from cvt_hpc.models.steady_variator.walking import NoSteadyState
+
+    try:
+        return _by_formula(parameters) if parameters["method"] == "formula" else _by_states(parameters)
+    except NoSteadyState as error:
+        return error
+
+
+def judge(solution: dict[str, Any] | ValueError) -> dict[str, Any]:
+    """The record of a run, its cost apart."""
+    if isinstance(solution, ValueError):
+        return {"status": Status.FAILED_NUMERICS, "reason": str(solution)}
+    reason = "a limit of slip, and whether the belt vibrates is not asked here"
+    return {"status": Status.DONE, "vibrates": Vibrates.UNDECIDED, "reason": reason, **solution}
+
+
+def _formula_thrust(p: Mapping[str, Any]) -> float:
+    """Thrust that carries the load by eq. 2, which is linear in it [N]."""
+    return abs(p["load"]) / carried_torque({**p, "thrust": 1.0})
+
+
+def _by_formula(p: Mapping[str, Any]) -> dict[str, Any]:
+    sign, safety = -1.0 if p["load"] < 0.0 else 1.0, p["safety"]
+    if p["sought"] == "thrust":
+        thrust, working_thrust = _formula_thrust(p), safety * _formula_thrust(p)
+        torque = working_torque = p["load"]
+    else:
+        thrust = working_thrust = p["thrust"]
+        torque = sign * carried_torque(p)
+        working_torque = torque / safety
+    return {
+        "limit_torque": torque,
+        "limit_thrust": thrust,
+        "formula_ratio": 1.0,
+        "working_torque": working_torque,
+        "axial_force": np.array([np.nan, working_thrust]),
+    }
+
+
+def _by_states(p: Mapping[str, Any]) -> dict[str, Any]:
+    from cvt_hpc.models.elastic_belt.belt import mesh
+    from cvt_hpc.models.steady_variator.forces import quantities
+    from cvt_hpc.models.steady_variator.walking import SteadyBelt
+
+    if p["sought"] == "thrust":
+        limit = _at_least_thrust(p)
+        at_work = {**p, "thrust": p["safety"] * limit.belt.thrust}
+        working = SteadyBelt(at_work).at(p["load"])
+    else:
+        limit, first, belt = _largest(p)
+        working = belt.at(limit.load / p["safety"], first)
+    found, there = quantities(working, mesh(p)), quantities(limit, mesh(p))
+    by_formula = carried_torque({**p, "thrust": limit.belt.thrust})
+    return {
+        "limit_torque": limit.load,
+        "limit_thrust": limit.belt.thrust,
+        "formula_ratio": abs(limit.load) / by_formula,
+        "limit_slip": there["slip"],
+        "working_torque": working.load,
+        **{name: found[name] for name in AT_WORK},
+    }
+
+
+def _largest(p: Mapping[str, Any]) -> tuple[Steady, Steady, SteadyBelt]:
+    """State at the largest load that the thrust carries, the one where the walk began, and their belt."""
+    from cvt_hpc.models.steady_variator.walking import SteadyBelt
+
+    belt = SteadyBelt(p)
+    first = belt.at(np.copysign(FIRST_SHARE, p["load"]) * carried_torque(p))
+    return belt.carried(first), first, belt
+
+
+def _at_least_thrust(p: Mapping[str, Any]) -> Steady:
+    """State at the least thrust that carries the load.
+
+    The largest load is nearly proportional to the thrust. The driven speed does not lead there: under less
+    thrust the belt sinks into the driven pulley, which turns the faster for it while slip slows it down.
+    """
+    from cvt_hpc.models.steady_variator.walking import NoSteadyState
+
+    thrust = _formula_thrust(p)
+    for _ in range(TRIES):
+        limit, _, _ = _largest({**p, "thrust": thrust})
+        share = p["load"] / limit.load
+        if abs(share - 1.0) < WITHIN:
+            return limit
+        thrust *= share
+    raise NoSteadyState(f"no least thrust found at {p['load']:g} N m: {thrust:.4g} N after {TRIES} tries")
