@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.fluctuation import at_stations
+from cvt_hpc.variator import PULLEYS
 from cvt_hpc.variator.history import dataset
 
 if TYPE_CHECKING:
@@ -31,7 +32,10 @@ def histories(run: RecordedRun) -> xr.Dataset:
         `displacement` (time, probe) [m], scalars over time, and the profiles of the judged part by
         `position`.
     """
-    over_time = {"driven_position": ("driven position", "m", "axial opening of the driven pulley")}
+    over_time = {
+        f"{pulley}_position": (f"{pulley} position", "m", f"axial opening of the {pulley} pulley")
+        for pulley in PULLEYS
+    }
     return dataset(run, over_time, _profiles(run), run.mesh.position, run.regions)
 
 
