@@ -222,8 +222,13 @@ def needs_line(needed: Needs, histories: int) -> str:
     """Return the line that says what memory and disk a sweep needs."""
     from cvt_hpc.study.forecast.needs import size_in_words
 
-    return (
+    line = (
         f"needed: {size_in_words(needed.memory)} of memory for the plan; {disk_line(needed.disk, histories)}"
+    )
+    if not needed.profiles:
+        return line
+    return (
+        f"{line}; each history at most {size_in_words(needed.profiles)} of profiles over time, as much memory"
     )
 
 

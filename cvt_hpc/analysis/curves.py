@@ -75,7 +75,7 @@ def curve_figure(
     check_results(dataset, source)
     _check_quantities(dataset, quantities, source)
     arrangement = arrange(dataset, at or {}, source)
-    panels, notes = _panels(arrangement, source)
+    panels, notes = panels_of(arrangement, source)
     figure = Figure((WIDTH, HEIGHT), layout="constrained")
     all_axes = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
     x = ruler(arrangement.dataset[arrangement.x])
@@ -124,7 +124,7 @@ def _check_quantities(dataset: xr.Dataset, quantities: Sequence[str], source: st
             raise mismatch(f"{source}: {name}", f"the unit of {quantities[0]}, {units[0]}", str(units[1]))
 
 
-def _panels(arrangement: Arrangement, source: str) -> tuple[list[tuple[str, xr.Dataset]], list[str]]:
+def panels_of(arrangement: Arrangement, source: str) -> tuple[list[tuple[str, xr.Dataset]], list[str]]:
     """Title and results over x of each panel, and what is fixed, in words."""
     dataset, notes = arrangement.dataset, list(arrangement.notes)
     if arrangement.panel:

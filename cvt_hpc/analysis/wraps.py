@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 
 from cvt_hpc.analysis.error_axes import COLOURS
 from cvt_hpc.analysis.figures import STYLE, WIDTH, balanced, draw, styled
-from cvt_hpc.analysis.histories import place_of
+from cvt_hpc.analysis.telling_apart import told_apart
 from cvt_hpc.errors import InputError, mismatch, one_line
 
 # rows: variable, label with unit, factor, and what stands beside it
@@ -67,7 +67,7 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
         if missing:
             raise mismatch(name, "the history of a run with normal_force and wrap_angle", f"no {missing[0]}")
     pulleys, without_torque = _pulleys(histories)
-    common, labels = _told_apart(histories, names)
+    common, labels = told_apart(histories, names)
     rows = [row for row in ROWS if row[0] in histories[0]]
     figure = Figure((WIDTH, 1.6 * len(rows) + 1.1), layout="constrained")
     panels = figure.subfigures()  # the label common to them keeps clear of the figure's legend
@@ -101,18 +101,6 @@ def _pulleys(histories: Sequence[xr.Dataset]) -> tuple[list[str], list[str]]:
     largest = np.abs(pulls).max(axis=0)
     carries = dict(zip(pulleys, largest >= LEAST_PULL * largest.max(), strict=True))
     return [p for p in pulleys if carries[p]], [p for p in pulleys if not carries[p]]
-
-
-def _told_apart(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[str, list[str]]:
-    """What the runs' points have in common, and by what each differs, with its name where need be."""
-    if len(histories) == 1:
-        return ", ".join(place_of(histories[0].attrs)), ["simulated"]
-    places = [place_of(dataset.attrs) for dataset in histories]
-    common = [part for part in places[0] if all(part in place for place in places)]
-    labels = [", ".join(part for part in place if part not in common) for place in places]
-    if len(set(labels)) < len(labels) or not all(labels):
-        labels = [f"{name}: {label}".removesuffix(": ") for name, label in zip(names, labels, strict=True)]
-    return ", ".join(common), labels
 
 
 def _regions(dataset: xr.Dataset) -> np.ndarray:

@@ -24,6 +24,7 @@ _SUBJECTS = {
     "JOB": "job file (TOML)",
     "DIR": "output folder of a run",
     "RESULTS": "output folder of a run, or a dataset (.nc)",
+    "HISTORIES": "dataset of one run (.nc), or the folder of a study: all runs whose histories it keeps",
     "HISTORY": "dataset of one run (.nc), as simulate --out writes it",
 }
 

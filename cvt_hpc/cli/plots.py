@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import re
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 from cvt_hpc.cli.parts import DONE, PICTURES, add_assignments, add_command, check_output, folder_of, say
-from cvt_hpc.errors import mismatch
 
 LONGEST_NAME = 100  # letters of a picture's name
 
@@ -26,11 +26,37 @@ def add(commands: Any) -> None:
     text = "forces between belt and pulleys over the wrap, of one run or of several"
     wrap = add_command(kinds, "wrap", _wrap, text, "HISTORY")
     wrap.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
-    names = {waterfall: "waterfall", curve: "curve_QUANTITY", wrap: "HISTORY_wrap"}
+    text = "quantities along the belt of one run or of several, such as forces and sliding"
+    profile = add_command(kinds, "profile", _profile, text, "HISTORIES")
+    profile.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
+    text = "variable over position; may be repeated (default: push_force, friction_force, ring_friction)"
+    profile.add_argument("--of", action="append", default=[], metavar="QUANTITY", help=text)
+    profile.add_argument("--region", choices=("driving", "driven"), help="over the wrap of that pulley alone")
+    profile.add_argument("--columns", metavar="AXIS", help="a column of panels for each value of an axis")
+    text = "motion of a strand along a ramp of load or speed, with its spectrogram"
+    ramp = add_command(kinds, "ramp", _ramp, text, "HISTORIES")
+    ramp.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
+    ramp.add_argument(
+        "--of", default="t1", metavar="WHAT", help="t1, t2 or a variable over time (default: t1)"
+    )
+    text = "sliding of one element on the sheaves over time, along its path"
+    element = add_command(kinds, "element", _element, text, "HISTORY")
+    element.add_argument("--region", choices=("driving", "driven"), help="one passage of that arc alone")
+    text = "what the element meets over time, as a dataset"
+    element.add_argument("--data", type=Path, metavar="FILE.nc", help=text)
+    text = "tension and push force of the strands over an axis, as bars"
+    strands = add_command(kinds, "strands", _strands, text, "RESULTS")
+    names = {
+        strands: "strands",
+        waterfall: "waterfall",
+        curve: "curve_QUANTITY",
+        wrap: "HISTORY_wrap",
+        profile: "profile",
+    }
     for command, name in names.items():
         text = f"default: {name}.png beside the dataset"
         command.add_argument("--out", type=Path, metavar="PNG", help=text)
-    for command in (waterfall, curve):
+    for command in (waterfall, curve, strands):
         add_assignments(command, "--at", "fix an axis at a value")
 
 
@@ -56,26 +82,77 @@ def _curve(arguments: argparse.Namespace) -> int:
     return DONE
 
 
+def _strands(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.strand_bars import draw_strand_bars
+    from cvt_hpc.study import open_results
+
+    out = _picture(arguments, "strands", *arguments.at)
+    with open_results(arguments.path) as dataset:
+        at = _at(arguments, dataset)
+        say(f"picture: {draw_strand_bars(dataset, out, at, str(arguments.path))}")
+    return DONE
+
+
 def _wrap(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.netcdf import is_history
+    from cvt_hpc.analysis.telling_apart import history_files
 
-    files = [arguments.path, *arguments.others]
+    files = history_files([arguments.path, *arguments.others])
     out = _picture(arguments, *(file.stem for file in files), "wrap")
-    for file in files:
-        if not is_history(file):
-            raise mismatch(
-                str(file), "a history written by `cvt-hpc simulate --out`", "another file, or none"
-            )
-    import xarray as xr
-
     from cvt_hpc.analysis.wraps import draw_wrap
 
-    with ExitStack() as stack:
-        histories = [
-            stack.enter_context(xr.open_dataset(file, engine="netcdf4", decode_times=False)) for file in files
-        ]
+    with _opened(files) as histories:
         say(f"picture: {draw_wrap(histories, out, [file.stem for file in files])}")
     return DONE
+
+
+def _profile(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.profiles import DEFAULT, draw_profile
+    from cvt_hpc.analysis.telling_apart import history_files
+
+    out = _picture(arguments, "profile", *filter(None, (*arguments.of, arguments.region)))
+    files = history_files([arguments.path, *arguments.others])
+    with _opened(files) as histories:
+        chosen = arguments.of or DEFAULT, arguments.region, arguments.columns
+        say(f"picture: {draw_profile(histories, out, *chosen, [file.stem for file in files])}")
+    return DONE
+
+
+def _ramp(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.ramps import draw_ramp
+    from cvt_hpc.analysis.telling_apart import history_files
+
+    out = _picture(arguments, "ramp", arguments.of)
+    files = history_files([arguments.path, *arguments.others])
+    with _opened(files) as histories:
+        say(f"picture: {draw_ramp(histories, out, arguments.of, [file.stem for file in files])}")
+    return DONE
+
+
+def _element(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.followed_drawing import draw_element, followed_of
+    from cvt_hpc.analysis.telling_apart import history_files
+    from cvt_hpc.netcdf import write_history
+
+    out = _picture(arguments, "element", *filter(None, [arguments.region]))
+    check_output(arguments.data, (".nc",))
+    files, written = history_files([arguments.path]), []
+    with _opened(files[:1]) as (history,):
+        if arguments.data is not None:
+            followed = followed_of(history, arguments.region, str(files[0]))
+            written.append(f"data: {write_history(followed, arguments.data)}")
+        say(f"picture: {draw_element(history, out, arguments.region, str(files[0]))}", *written)
+    return DONE
+
+
+@contextmanager
+def _opened(files: Sequence[Path]) -> Iterator[list[Any]]:
+    """Histories of runs, open within."""
+    import xarray as xr
+
+    with ExitStack() as stack:
+        yield [
+            stack.enter_context(xr.open_dataset(file, engine="netcdf4", decode_times=False)) for file in files
+        ]
 
 
 def _picture(arguments: argparse.Namespace, *words: str) -> Path:

@@ -1,4 +1,4 @@
-"""`status`, `gather`, `map` and `compare`: what a run has left in its folder."""
+"""`status`, `gather`, `map`, `figure` and `compare`: what a run has left in its folder."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ def add(commands: Any) -> None:
     picture = add_command(commands, "map", _map, "draw where vibration occurs", "RESULTS")
     picture.add_argument("--out", type=Path, metavar="PNG", help="default: map.png beside the dataset")
     add_assignments(picture, "--at", "fix an axis at a value")
+    text = "draw the figure of a paper that a study repeats, and measure what the paper says of it"
+    add_command(commands, "figure", _figure, text, "DIR")
     text = "compare two studies, cell by cell; exit status 1: some contradict"
     compare = add_command(commands, "compare", _compare, text, "RESULTS")
     compare.add_argument("other", type=Path, metavar="RESULTS", help="the one to compare with it")
@@ -61,6 +63,14 @@ def _map(arguments: argparse.Namespace) -> int:
         if has_starts(dataset, at):
             say(start_line(dataset, at, str(arguments.path)))
         say(f"map: {picture}")
+    return DONE
+
+
+def _figure(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.statements.figures import figure_of, finding_lines
+
+    picture, table, findings = figure_of(arguments.path)
+    say(*finding_lines(findings), f"picture: {picture}", f"table: {table}")
     return DONE
 
 

@@ -32,6 +32,7 @@ from cvt_hpc.job.sampling import sampled_axes
 from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.units import unit_in
 from cvt_hpc.job.values import expectation, kind_of, read_value
+from cvt_hpc.models.contract import load_model
 
 OF_COMMANDS = ("branch", "chart", "fit", "ladder")  # tables that a command of the same name reads
 _OF_DESIGN = "design."
@@ -289,7 +290,7 @@ def _read_description(head: Mapping[str, Any], source: str) -> str:
 
 
 def _check_top_level(document: Mapping[str, Any], schema: Schema, source: str) -> None:
-    tables = [*schema.sections, "axes", "design", "derived", "linked"]
+    tables = [*_sections(document, schema), "axes", "design", "derived", "linked"]
     for key, value in document.items():
         if key in HEADER:
             continue
@@ -310,9 +311,17 @@ def _check_top_level(document: Mapping[str, Any], schema: Schema, source: str) -
             raise InputError(f"{source}: {key}: unknown key{hint}")
 
 
+def _sections(document: Mapping[str, Any], schema: Schema) -> list[str]:
+    """Return the tables of parameters; without a transient that of kept histories may join them."""
+    sections = list(schema.sections)
+    if KEY[0] in document and KEY[0] not in sections and load_model(schema.model).has_histories:
+        sections.append(KEY[0])
+    return sections
+
+
 def _read_tables(document: Mapping[str, Any], schema: Schema, source: str) -> dict[str, Any]:
     values = {}
-    for section in schema.sections:
+    for section in _sections(document, schema):
         for name, raw in document.get(section, {}).items():
             if (section, name) == KEY:
                 continue

@@ -308,6 +308,15 @@ class Model:
         """What `judge` and `histories` read, of a model without a transient."""
         return self._record.solve(parameters)
 
+    def profile_bytes(self, parameters: Parameters) -> int:
+        """Size of what a kept history has along the belt at each sample [byte]."""
+        return _member(self._record, "profile_bytes", lambda parameters: 0)(parameters)
+
+    @property
+    def has_histories(self) -> bool:
+        """Whether `simulate` has anything beyond the record."""
+        return self.default_stepper is not None or self.is_recorded and hasattr(self._record, "histories")
+
     def histories(self, run: Any) -> xr.Dataset:
         """What `simulate` has beyond the record, of a run or of what `solve` found."""
         import xarray as xr

@@ -1,6 +1,14 @@
 """One run: a model marched by a stepper, or solved at once, judged, and turned into a record or a history."""
 
-from cvt_hpc.simulation.batches import estimate_cost, forget, lane_groups, pilot_share, run_costs, turns
+from cvt_hpc.simulation.batches import (
+    estimate_cost,
+    forget,
+    lane_groups,
+    pilot_share,
+    profile_bytes,
+    run_costs,
+    turns,
+)
 from cvt_hpc.simulation.history import run_points_keeping, simulate
 from cvt_hpc.simulation.record import record_coordinates, record_variables
 from cvt_hpc.simulation.running import Interrupted, run_point, run_points
@@ -11,6 +19,7 @@ __all__ = [
     "forget",
     "lane_groups",
     "pilot_share",
+    "profile_bytes",
     "record_coordinates",
     "record_variables",
     "run_costs",

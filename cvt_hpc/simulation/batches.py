@@ -203,6 +203,12 @@ def forget(job: Job) -> None:
     load_model(job.model).forget()
 
 
+def profile_bytes(job: Job) -> int:
+    """Size of what a kept history of a job has along the belt at each sample, at most [byte]."""
+    model = load_model(job.model)
+    return max((model.profile_bytes(job.point(index)) for index in job.histories), default=0)
+
+
 def pilot_share(job: Job) -> float:
     """Share of a run's simulated time that tells what the whole run costs."""
     return load_model(job.model).pilot_share

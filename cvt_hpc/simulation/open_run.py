@@ -48,6 +48,8 @@ class OpenRun:
     """
 
     def __init__(self, job: Job, point: dict[str, Any], is_kept: bool = False) -> None:
+        if not is_kept and point.get("profile_duration"):
+            point = point | {"profile_duration": 0.0}  # only histories have profiles over time
         self._job, self._point, self._model = job, point, load_model(job.model)
         self._is_kept = is_kept
         self.next, self.paused = point, None

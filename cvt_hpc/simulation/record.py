@@ -58,13 +58,17 @@ def recorded_model(job: Job) -> Model:
 def record_variables(job: Job) -> tuple[Variable, ...]:
     """Quantities of a run's record, `status` first.
 
+    Those along a dimension that the job's record does not have are left out.
+
     Parameters
     ----------
     job : Job
-        Of which only the model counts.
+        A validated job.
     """
     march = () if job.stepper is None else _MARCH
-    return (*_VERDICT, *recorded_model(job).variables, *_COST, *march)
+    model, dims = recorded_model(job), record_coordinates(job).keys()
+    own = (variable for variable in model.variables if dims >= {*variable.dims})
+    return (*_VERDICT, *own, *_COST, *march)
 
 
 def record_coordinates(job: Job) -> dict[str, Coordinate]:

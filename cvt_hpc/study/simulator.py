@@ -39,6 +39,9 @@ class Simulator(Protocol):
     def pilot_share(self, job: Job) -> float:
         """Return the share of a run's simulated time that tells what the whole run costs."""
 
+    def profile_bytes(self, job: Job) -> int:
+        """Return the size of what a kept history has along the belt at each sample, at most [byte]."""
+
     def forget(self, job: Job) -> None:
         """Have the next batch take its full time, whatever runs before it have left."""
 

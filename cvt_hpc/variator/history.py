@@ -52,8 +52,6 @@ def dataset(
     variables: dict[str, Any] = {"displacement": (("time", "probe"), run.displacement, moved)}
     for name, words in {**OVER_TIME, **over_time}.items():
         variables[name.replace(" ", "_")] = ("time", run.channel(name), attributes(*words))
-    for name, (values, *named) in profiles.items():
-        variables[name] = ("position", values, attributes(*named))
     coordinates = {
         "time": ("time", (1 + np.arange(run.done)) * run.interval, attributes("time", "s")),
         "probe": ("probe", np.array([probe.label for probe in run.probes], object), attributes("probe")),
@@ -62,11 +60,22 @@ def dataset(
             np.array([probe.position for probe in run.probes]),
             attributes("position of the probe", "m", "path coordinate"),
         ),
-        "position": (
-            "position",
-            position,
-            attributes("position", "m", "path coordinate, from the inlet of the driving arc"),
-        ),
+    }
+    return xr.Dataset(variables, coordinates).merge(along_path(profiles, position, regions))
+
+
+def along_path(
+    profiles: Mapping[str, tuple[np.ndarray, str, str, str]], position: np.ndarray, regions: np.ndarray
+) -> xr.Dataset:
+    """Quantities by `position` along the path, with the region of each place; arguments as of `dataset`."""
+    import xarray as xr
+
+    variables = {
+        name: ("position", values, attributes(*named)) for name, (values, *named) in profiles.items()
+    }
+    words = "position", "m", "path coordinate, from the inlet of the driving arc"
+    coordinates = {
+        "position": ("position", position, attributes(*words)),
         "region": ("position", np.array(regions, object), attributes("region", comment="of the path")),
     }
     return xr.Dataset(variables, coordinates)

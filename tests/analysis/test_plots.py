@@ -160,7 +160,7 @@ def test_forces_are_drawn_over_the_wrap_of_each_pulley(history):
 
 
 def test_several_runs_are_told_apart_by_their_points(history, monkeypatch):
-    monkeypatch.setattr("cvt_hpc.analysis.wraps.place_of", lambda attributes: attributes["place"])
+    monkeypatch.setattr("cvt_hpc.analysis.telling_apart.place_of", lambda attributes: attributes["place"])
     runs = [history.assign_attrs(place=["driving_speed 60 rad/s", f"load {load} N m"]) for load in (8, 16)]
     figure = wrap_figure(runs, ["one", "two"])
     labels = [text.get_text() for text in figure.legends[0].get_texts()]

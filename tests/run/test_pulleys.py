@@ -5,9 +5,10 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
-from cvt_hpc.models.elastic_belt.belt import FIRST_STATE, belt_constants, initial_state
+from cvt_hpc.models.elastic_belt.belt import DRIVEN_POSITION, FIRST_STATE, belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.pulley_settings import oil_factor, piston_area
-from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVING_COS
+from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVING_COS, SHIFT
+from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
 from support.fast_runs import FastRuns
 from support.marched import Together, balance, job, mean
 
@@ -103,6 +104,40 @@ def tilted(duration, step, **values):
     run = FastRuns([belt], [initial_state(parameters, belt)])
     run.advance(round(duration / step), step)
     return belt, run.state()
+
+
+def stored(belt, state):
+    """Stored energy of a belt in a state [J]."""
+    run = FastRuns([belt], [state])
+    run.advance(0, 1e-10)
+    return run.channels()["stored_energy"]
+
+
+def test_springs_store_half_their_force_times_their_way():
+    free = {"driving_axial": "thrust"}
+    plain, state = tilted(1e-3, 4e-6, **free)
+    state.scalars[DRIVEN_POSITION], state.scalars[FIRST_STATE + SHIFT] = -3e-4, 2e-4
+    sprung, _ = tilted(0.0, 4e-6, **free, driven_spring_rate=1e7, driving_spring_rate=4e7)
+    gained = stored(sprung, state) - stored(plain, state)
+    assert gained == pytest.approx(0.5 * (1e7 * 9e-8 + 4e7 * 4e-8), rel=1e-9)
+
+
+def test_a_tilt_stores_what_the_contact_does_of_one_without_a_lag():
+    plain, state = tilted(1e-3, 4e-6)
+    lagging, _ = tilted(0.0, 4e-6, tilt_lag=1e-3)
+    force = np.zeros(plain.cell.size)
+    assert contact_forces(plain, state, fresh_contacts(plain), force) > 0
+    resting = state.copy()
+    for first, tilted_by, sheave in (
+        (0, DRIVING_COS, plain.driving),
+        (plain.driven_start, DRIVEN_COS, plain.driven),
+    ):
+        pull = sheave.tilt @ (sheave.weight * force[first : first + sheave.weight.size])
+        place = FIRST_STATE + tilted_by
+        resting.scalars[place : place + 2] = sheave.tilt_compliance * pull
+    assert stored(lagging, resting) == pytest.approx(stored(plain, state), rel=1e-12)
+    resting.scalars[FIRST_STATE + DRIVEN_COS] *= 1.01
+    assert stored(lagging, resting) != pytest.approx(stored(plain, state), rel=1e-12)
 
 
 def test_a_short_lag_is_none():

@@ -20,7 +20,7 @@ from cvt_hpc.models.steady_variator import walking
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.forces import distributions, quantities
 from cvt_hpc.models.steady_variator.newton import newton
-from cvt_hpc.models.steady_variator.record import judge
+from cvt_hpc.models.steady_variator.record import Found, judge
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 from cvt_hpc.variables import Status, Vibrates
 from support.fast_runs import FastRuns
@@ -184,7 +184,8 @@ def test_record_is_that_of_the_state():
 
 @pytest.mark.parametrize(("slip", "verdict"), [(0.049, Vibrates.UNDECIDED), (-0.051, Vibrates.SLIPS)])
 def test_a_state_in_which_a_pulley_slips_grossly_is_called_so(slip, verdict):
-    found = judge({"slip": np.array([slip, 0.02])})
+    values = {"slip": np.array([slip, 0.02])}
+    found = judge(Found(None, None, values))
     assert (found["status"], found["vibrates"]) == (Status.DONE, verdict)
 
 

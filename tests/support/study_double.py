@@ -129,6 +129,9 @@ class Simulator:
     def pilot_share(self, job: Job) -> float:
         return 0.25
 
+    def profile_bytes(self, job: Job) -> int:
+        return 0
+
     def forget(self, job: Job) -> None:
         pass
 

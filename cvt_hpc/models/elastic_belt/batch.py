@@ -23,6 +23,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
 )
 from cvt_hpc.models.elastic_belt.lane_forces import derive
 from cvt_hpc.models.elastic_belt.march import Sampled, march_explicit, march_imex
+from cvt_hpc.models.elastic_belt.momentary import Momentary
 from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, recording
 from cvt_hpc.models.elastic_belt.sampling import (
     CHANNELS,
@@ -127,6 +128,7 @@ class Batch:
         n = self.plan.mesh.cell.size
         # of the part that is not judged nothing is summed up
         self.profiles = [LaneArray(rows, len(PROFILES), width) for rows in (0, n)]
+        self.momentary = Momentary(points, n)
         self.ended = LaneArray(1, len(ENDED), width)
         columns = self.plan.sensing.matrix.shape[0] + len(CHANNELS)
         self._go_on_after([run.rows for run in paused] or [np.zeros((0, columns))] * len(points))
@@ -174,8 +176,8 @@ class Batch:
                 self.state.fields.data[:, W, lane] += shape
             derive(self._belt, self.state, self.work.stations)
             self._disturbed = True
-        borders = [border for border in (plan.kick, plan.first_judged, self.samples) if border > first]
-        last = min(first + samples, *borders)
+        borders = plan.kick, plan.first_judged, self.momentary.first, self.samples
+        last = min(first + samples, *(border for border in borders if border > first))
         whole = Sampled(self._belt, self.state, self.work.stations)
         marched = self._belt, self.state, self.work
         if self._parts > 1:
@@ -184,19 +186,29 @@ class Batch:
                 parted_state(self.state, self._parts),
                 type(self.work)(split(self.work.stations, self._parts)),
             )
-        self._march(
-            *marched,
-            self.step,
-            self.steps_per_sample,
-            whole,
-            plan.sensing,
-            self.rows,
-            first - self._recorded,
-            last - self._recorded,
-            self.profiles[int(first >= plan.first_judged)],
-            self.ended,
-        )
-        self.done = last
+        by_sample = first >= self.momentary.first and last > first
+        ends = range(first + 1, last + 1) if by_sample else [last]
+        for end in ends:
+            profiles = self.profiles[int(first >= plan.first_judged)]
+            if by_sample:
+                profiles = LaneArray(*self.profiles[1].data.shape)
+            self._march(
+                *marched,
+                self.step,
+                self.steps_per_sample,
+                whole,
+                plan.sensing,
+                self.rows,
+                self.done - self._recorded,
+                end - self._recorded,
+                profiles,
+                self.ended,
+            )
+            if by_sample:
+                self.momentary.note(self.done, profiles)
+                if first >= plan.first_judged:
+                    self.profiles[1].data[:] += profiles.data
+            self.done = end
 
     def take_over(self, runs: Sequence[Any]) -> None:
         """Go on from where runs by another stepper stand, their history included, but for means begun before.
@@ -269,6 +281,11 @@ class LaneRun(RecordedRun):
         if found is None and self.batch.stepper == "imex":
             found = step_doubt(self.step, transverse_limit(self.parameters))
         return found
+
+    @property
+    def momentary(self) -> np.ndarray | None:
+        """What `Momentary` has kept of the run."""
+        return self.batch.momentary.of(self._lane)
 
     @property
     def time(self) -> float:

@@ -159,8 +159,8 @@ def _lifting(m: dict[str, np.ndarray], grid: Mesh, p: Mapping[str, Any]) -> np.n
 
 
 def at_stations(values: np.ndarray) -> np.ndarray:
-    """Mean of a quantity of the cells, (N,), in the two beside each station."""
-    return 0.5 * (values + np.roll(values, 1))
+    """Mean of a quantity of the cells, (..., N), in the two beside each station."""
+    return 0.5 * (values + np.roll(values, 1, axis=-1))
 
 
 def _step(values: np.ndarray) -> np.ndarray:

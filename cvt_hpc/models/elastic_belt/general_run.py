@@ -23,6 +23,7 @@ from cvt_hpc.models.elastic_belt.belt import (
 from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK, lane_belt, lane_state, put_lane
 from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES
 from cvt_hpc.models.elastic_belt.march import sample_state
+from cvt_hpc.models.elastic_belt.momentary import Momentary
 from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, recording
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFILES, Outcome
@@ -125,6 +126,12 @@ class GeneralTransient(Marched, RecordedRun):
         if self.done:
             rows.data[: self.done, :, 0] = self.rows
         self._rows = rows
+        self._momentary = Momentary([parameters], plan.mesh.cell.size)
+
+    @property
+    def momentary(self) -> np.ndarray | None:
+        """What `Momentary` has kept of the run."""
+        return self._momentary.of(0)
 
     @property
     def state(self) -> State:
@@ -219,10 +226,16 @@ class GeneralTransient(Marched, RecordedRun):
         lane.time[0] = (self.done + 1) * self.interval
         # a general stepper knows nothing of dampers: their work is taken from the state, as over the interval
         lane.scalars.data[0, LAYER_WORK] = damper_power(self.belt, state) * self.interval
-        profiles = self._profiles[int(self.done >= self._plan.first_judged)]
+        is_judged, is_kept = self.done >= self._plan.first_judged, self.done >= self._momentary.first
+        sums = self._profiles[int(is_judged)]
+        profiles = LaneArray(*self._profiles[1].data.shape) if is_kept else sums
         place = self._plan.sensing, self._rows, self.done, profiles, self._ended
         sample_state(self._lane_belt, lane, self._stations, *place)
         self._rows.data[self.done, -1, 0] = np.nan  # its steps are not seen here: no step_ripple
+        if is_kept:
+            self._momentary.note(self.done, profiles)
+            if is_judged:
+                sums.data[:] += profiles.data
         outcome = int(self._ended.data[0, OUTCOME, 0])
         self.done += int(outcome == Outcome.OK)
         return outcome

@@ -6,7 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.along_belt import SLIDING, WRAP_ANGLE, along_belt, wrap_angles
 from cvt_hpc.models.elastic_belt.fluctuation import at_stations
+from cvt_hpc.models.elastic_belt.momentary import PREFIX, last_profiles
+from cvt_hpc.netcdf import attributes
 from cvt_hpc.variator import PULLEYS
 from cvt_hpc.variator.history import dataset
 
@@ -30,13 +33,27 @@ def histories(run: RecordedRun) -> xr.Dataset:
     -------
     Dataset
         `displacement` (time, probe) [m], scalars over time, and the profiles of the judged part by
-        `position`.
+        `position`; with a profile_duration also those of the last samples over `profile_time`.
     """
     over_time = {
         f"{pulley}_position": (f"{pulley} position", "m", f"axial opening of the {pulley} pulley")
         for pulley in PULLEYS
     }
-    return dataset(run, over_time, _profiles(run), run.mesh.position, run.regions)
+    found = dataset(run, over_time, _profiles(run), run.mesh.position, run.regions)
+    moment = run.channel("driving_power") / run.channel("driving_speed")
+    words = "driving moment", "N m", "of the belt on the driving pulley, which the drive has to overcome"
+    found = found.assign(driving_moment=("time", moment, attributes(*words)))
+    momentary = last_profiles(run)
+    if not momentary:
+        return found
+    count = len(next(iter(momentary.values()))[0])
+    times = attributes("time of the profiles", "s")
+    return found.assign_coords(profile_time=("profile_time", found["time"].values[-count:], times)).assign(
+        {
+            PREFIX + name: (("profile_time", "position"), values, attributes(*named))
+            for name, (values, *named) in momentary.items()
+        }
+    )
 
 
 def _profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str]]:
@@ -44,6 +61,7 @@ def _profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str]]:
     means, fed = run.means, run.fluctuation
     dual = at_stations(run.mesh.cell)
     damping = (fed.belt + fed.rings) / dual
+    sliding = along_belt(means, run.mesh, run.parameters)
     return {
         "ring_tension": (at_stations(means["ring_tension"]), "ring tension", "N", "mean"),
         "push_force": (at_stations(means["push_force"]), "push force", "N", "mean, between elements"),
@@ -67,4 +85,9 @@ def _profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str]]:
             FED,
         ),
         "damping_feed": (damping, "feed by damping and rings", "W m-1", f"{FED}; negative: taken"),
+        "wrap_angle": (wrap_angles(run.mesh), *WRAP_ANGLE),
+        **{
+            name: (sliding[name], words, unit, f"{comment}; of means")
+            for name, (words, unit, comment) in SLIDING.items()
+        },
     }

@@ -125,6 +125,20 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     "mesh": {
         "stations": Parameter(160, "", "cells around the belt", minimum=24, maximum=4096),
     },
+    "record": {
+        "profile_duration": not_negative(
+            0.0,
+            "s",
+            "end of a run over which kept histories have sliding and forces along the belt at each sample",
+            sensible=(1e-4, 10.0),
+        ),
+        "modal_peaks": Parameter(
+            "off",
+            "",
+            "on: the record has the largest spectral peaks of each strand, each with its mode",
+            choices=("off", "on"),
+        ),
+    },
 }
 
 

@@ -11,6 +11,7 @@ from cvt_hpc.models.elastic_belt import fluctuation
 from cvt_hpc.models.elastic_belt.belt import MODES
 from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.models.elastic_belt.history import histories
+from cvt_hpc.models.elastic_belt.momentary import profile_bytes
 from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, are_free, oil_factor
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, judging
@@ -18,7 +19,7 @@ from cvt_hpc.variator.judging import assess, each, efficiency, mean, power_balan
 from cvt_hpc.variator.slip import VARIABLES as AGAINST_SLIP
 from cvt_hpc.variator.slip import capacity, slide
 from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared
-from cvt_hpc.vibration import assessment, ramp
+from cvt_hpc.vibration import assessment, peaks, ramp
 from cvt_hpc.vibration.signals import band_amplitude
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ __all__ = [
     "judge",
     "lane_key",
     "lanes",
+    "profile_bytes",
 ]
 
 LOSSES = (
@@ -60,6 +62,7 @@ VARIABLES = (
     Variable(
         "modal_amplitude", ("strand", "half_waves"), "f8", "m", "amplitude of each sine mode in the band"
     ),
+    *peaks.VARIABLES,
     *shared("spectrum", "mean_ring_tension", "mean_push_force", "axial_force", "slip"),
     *AGAINST_SLIP,
     Variable(
@@ -114,8 +117,10 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     parameters : dict
         Flat parameters of the job.
     """
+    of_peaks = {"peak": peaks.coordinate()} if parameters["modal_peaks"] == "on" else {}
     return {
         **COORDINATES,
+        **of_peaks,
         "arc_part": Coordinate(
             np.arange(1, fluctuation.ARC_PARTS + 1), "1", "part of the wrap", "from its inlet to its outlet"
         ),
@@ -157,7 +162,9 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
         Value by name.
     """
     p, judged = run.parameters, run.judged
-    modal = band_amplitude(run.modes[judged], p["sampling_rate"], (p["band_low"], p["band_high"]))
+    rate, band = p["sampling_rate"], (p["band_low"], p["band_high"])
+    modal = band_amplitude(run.modes[judged], rate, band)
+    of_peaks = p["modal_peaks"] == "on"
     losses = {name: mean(run, name) for name in LOSSES}
     stored = run.channel("stored_energy")[judged]
     storing = (stored[-1] - stored[0]) / ((stored.size - 1) * run.interval)
@@ -166,6 +173,7 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
     return {
         "mode": np.where(modal.max(axis=1) > 0.0, 1 + modal.argmax(axis=1), 0),
         "modal_amplitude": modal,
+        **(peaks.modal_peaks(run.modes[judged], rate, band).record() if of_peaks else {}),
         **judging.evaluate(run, strongest_probe),
         **capacity(run, judged),
         "open_share": each(run, "open_share"),

@@ -100,6 +100,8 @@ class RecordedRun:
         Why the run does not go on: what has gone wrong, or a result, with the status done; of who marches it.
     time : float
         Simulated time [s]; of who marches it.
+    momentary : (sample, quantity, N) array or None
+        What `Momentary` has kept of the last samples; of who marches it.
     """
 
     if TYPE_CHECKING:  # of who marches the run
@@ -119,6 +121,10 @@ class RecordedRun:
         @property
         def time(self) -> float:
             """Simulated time [s]."""
+
+        @property
+        def momentary(self) -> np.ndarray | None:
+            """What `Momentary` has kept of the run."""
 
     def __init__(self, parameters: Mapping[str, Any], plan: Recording, sums: np.ndarray) -> None:
         self.parameters = parameters

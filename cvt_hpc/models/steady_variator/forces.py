@@ -5,17 +5,37 @@ Powers and the contact's means are those that a transient of the belt records in
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.belt import DRIVEN_POSITION, DRIVEN_SPEED, V_ELEMENT, V_RING, Mesh, W
+from cvt_hpc.models.elastic_belt.along_belt import (
+    ELSEWHERE,
+    SLIDING,
+    WRAP_ANGLE,
+    along_belt,
+    elsewhere,
+    wrap_angles,
+)
+from cvt_hpc.models.elastic_belt.belt import (
+    DRIVEN_POSITION,
+    DRIVEN_SPEED,
+    REGIONS,
+    V_ELEMENT,
+    V_RING,
+    Mesh,
+    W,
+)
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
-from cvt_hpc.models.steady_variator.sampled import sampled
+from cvt_hpc.models.steady_variator.sampled import sampled, sampled_profiles
 from cvt_hpc.models.steady_variator.walking import Steady
 from cvt_hpc.variator import PULLEYS
+from cvt_hpc.variator.history import along_path
 from cvt_hpc.variator.judging import efficiency, power_balance
 from cvt_hpc.variator.slip import against_slip, largest_torque
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 LOSSES = ("driving_flank_loss", "driven_flank_loss", "ring_loss", "belt_loss", "seating_loss")
 
@@ -66,6 +86,16 @@ def distributions(steady: Steady) -> Distributions:
         sliding,
         fields[W].copy(),
     )
+
+
+def profiles(steady: Steady, grid: Mesh) -> xr.Dataset:
+    """Speeds and forces by `position`, named as in a history of the elastic belt."""
+    sample = sampled_profiles(steady.belt, steady.state)
+    sliding = along_belt(sample, grid, {"half_wedge_angle": steady.belt.half_wedge_angle})
+    values, words = elsewhere(sample) | sliding, ELSEWHERE | SLIDING
+    named = {name: (values[name], *words[name]) for name in words}
+    named["wrap_angle"] = wrap_angles(grid), *WRAP_ANGLE
+    return along_path(named, grid.position, np.array(REGIONS)[grid.region])
 
 
 def layer_loss(steady: Steady) -> float:

@@ -22,8 +22,8 @@ OF_THE_COURSE = {
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     section: {key: parameter for key, parameter in table.items() if key not in OF_THE_COURSE}
     for section, table in elastic_belt.PARAMETERS.items()
-    if section
-    != "pulleys"  # of a transient: a steady pulley is turned by a given speed, pressed by a given thrust
+    # of a transient: a steady pulley is turned by a given speed, pressed by a given thrust
+    if section not in ("pulleys", "record")
 }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,12 @@ from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 from cvt_hpc.variator import GROSS_SLIP
 from cvt_hpc.variator.slip import VARIABLES as AGAINST_SLIP
 from cvt_hpc.variator.variables import COORDINATES, shared
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from cvt_hpc.models.elastic_belt.belt import Mesh
+    from cvt_hpc.models.steady_variator.walking import Steady
 
 VARIABLES = (
     Variable("mean_ring_tension", ("strand",), "f8", "N", "ring tension in the middle of the strand"),
@@ -37,25 +43,43 @@ def cost(parameters: Mapping[str, Any], stepper: None) -> Any:
     return 6e-3 * parameters["stations"]
 
 
-def solve(parameters: Mapping[str, Any]) -> Any:
+class Found(NamedTuple):
+    """A steady state on its mesh, and its values of VARIABLES."""
+
+    steady: Steady
+    grid: Mesh
+    values: dict[str, Any]
+
+
+def solve(parameters: Mapping[str, Any]) -> Found | ValueError:
     """Steady state of the parameters of a run [SI] with what it means; or why none was found."""
     from cvt_hpc.models.elastic_belt.belt import mesh
     from cvt_hpc.models.steady_variator.forces import quantities
     from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 
     try:
-        return quantities(SteadyBelt(parameters).at(parameters["load"]), mesh(parameters))
+        steady, grid = SteadyBelt(parameters).at(parameters["load"]), mesh(parameters)
+        return Found(steady, grid, quantities(steady, grid))
     except NoSteadyState as error:
         return error
 
 
-def judge(solution: dict[str, Any] | ValueError) -> dict[str, Any]:
+def judge(solution: Found | ValueError) -> dict[str, Any]:
     """The record of a run, its cost apart."""
     if isinstance(solution, ValueError):
         return {"status": Status.FAILED_NUMERICS, "reason": str(solution)}
-    largest = np.abs(solution["slip"]).max()
+    largest = np.abs(solution.values["slip"]).max()
     if largest > GROSS_SLIP:
         reason = f"a steady state in which a pulley slips by {largest:.3g} of the belt's speed"
-        return {"status": Status.DONE, "vibrates": Vibrates.SLIPS, "reason": reason, **solution}
+        return {"status": Status.DONE, "vibrates": Vibrates.SLIPS, "reason": reason, **solution.values}
     reason = "a steady state, and whether it is stable is not asked here"
-    return {"status": Status.DONE, "vibrates": Vibrates.UNDECIDED, "reason": reason, **solution}
+    return {"status": Status.DONE, "vibrates": Vibrates.UNDECIDED, "reason": reason, **solution.values}
+
+
+def histories(solution: Found | ValueError) -> xr.Dataset:
+    """Speeds and forces by `position`; nothing where no state was found."""
+    import xarray as xr
+
+    from cvt_hpc.models.steady_variator.forces import profiles
+
+    return xr.Dataset() if isinstance(solution, ValueError) else profiles(solution.steady, solution.grid)

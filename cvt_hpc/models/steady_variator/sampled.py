@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.state_march import StateMarch
 from cvt_hpc.variator import PULLEYS
@@ -12,6 +14,13 @@ def sampled(belt: Belt, state: State) -> dict[str, float]:
     march = StateMarch([belt], [state])
     march.advance(0, 1.0)
     return march.channels()
+
+
+def sampled_profiles(belt: Belt, state: State) -> dict[str, np.ndarray]:
+    """The elastic belt's PROFILES in a state, (N,) each."""
+    march = StateMarch([belt], [state])
+    march.advance(0, 1.0)
+    return {name: values[:, 0] for name, values in march.profiles().items()}
 
 
 def largest_slip(belt: Belt, state: State) -> float:

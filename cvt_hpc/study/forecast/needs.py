@@ -33,10 +33,21 @@ class Disk(NamedTuple):
 
 
 class Needs(NamedTuple):
-    """What a sweep needs: memory of rank 0 [byte], and space on the disk."""
+    """What a sweep needs.
+
+    Attributes
+    ----------
+    memory : int
+        Of rank 0, for the plan [byte].
+    disk : Disk
+        Space on the disk.
+    profiles : int
+        Memory of a rank, and disk at most, for what a kept history has along the belt at each sample [byte].
+    """
 
     memory: int
     disk: Disk
+    profiles: int = 0
 
 
 def needs(job: Job, simulator: Simulator) -> Needs:
@@ -46,7 +57,8 @@ def needs(job: Job, simulator: Simulator) -> Needs:
     size = runs_along(job, [axis.name for axis in job.axes])
     named = len(variables) + len(coordinates) + len(job.axes) + len(job.rules)
     disk = Disk((HEAD.size + PLACE.size + record) * size, most_of_results(size * record, named), math.nan)
-    return Needs(MEMORY_PER_RUN * size, disk if job.histories else disk._replace(histories=0.0))
+    disk = disk if job.histories else disk._replace(histories=0.0)
+    return Needs(MEMORY_PER_RUN * size, disk, simulator.profile_bytes(job))
 
 
 def most_of_results(values: int, named: int) -> int:
@@ -78,10 +90,15 @@ def refuse_too_large(job: Job, simulator: Simulator, out: Path) -> Needs:
     if needed.memory > memory:
         found = f"{size_in_words(memory)} in this machine"
         raise mismatch(where, f"{size_in_words(needed.memory)} of memory for their plan", found)
+    if needed.profiles > memory:
+        found = f"{size_in_words(memory)} in this machine"
+        raise mismatch(where, f"{size_in_words(needed.profiles)} of memory for profiles over time", found)
     if "first_spacing" not in job.design:
         free = _free(out) + _held(out)
-        if (disk := needed.disk.records + needed.disk.results) > free:
+        profiles = needed.profiles * len(job.histories)
+        if (disk := needed.disk.records + needed.disk.results + profiles) > free:
             expected = f"{size_in_words(disk)} on the disk for their records and results.nc"
+            expected += ", and for profiles over time" if profiles else ""
             raise mismatch(where, expected, f"{size_in_words(free)} at {out}")
     return needed
 

@@ -1,0 +1,189 @@
+"""Quantities along the belt, as figs 20 to 23 of Bullinger et al. 2005 and 4.1 of Lebrecht et al. 2004."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cvt_hpc.analysis.error_axes import COLOURS
+from cvt_hpc.analysis.figures import STYLE, WIDTH, balanced, display_unit, draw, in_words, styled
+from cvt_hpc.analysis.telling_apart import on_axes, titles
+from cvt_hpc.errors import InputError, mismatch, unknown
+
+DEFAULT = ("push_force", "friction_force", "ring_friction")
+LINES = ("-", "--", "-.", ":")
+ARC = "#ececec"
+MOST_COLUMNS = 3
+HEIGHT = 1.75  # [inch] of a panel
+_UNITS = {"N m-1": (1e-3, "kN/m"), "m s-1": (1e3, "mm/s")}
+_REFERENCES = {"rad": 90.0}  # where sliding turns from one hand to the other
+
+
+def draw_profile(
+    histories: Sequence[xr.Dataset],
+    out: Path,
+    quantities: Sequence[str] = DEFAULT,
+    region: str | None = None,
+    columns: str | None = None,
+    sources: Sequence[str] = (),
+) -> Path:
+    """Write the figure of `profile_figure`, with its arguments and errors, as `save_figure` does."""
+    return draw(lambda: profile_figure(histories, quantities, region, columns, sources), out)
+
+
+@styled
+def profile_figure(
+    histories: Sequence[xr.Dataset],
+    quantities: Sequence[str] = DEFAULT,
+    region: str | None = None,
+    columns: str | None = None,
+    sources: Sequence[str] = (),
+) -> Figure:
+    """Draw quantities along the belt of one or several runs, a panel for each, below each other.
+
+    Parameters
+    ----------
+    histories : sequence of Dataset
+        As `simulate` returns them: quantities over `position`, with `region`.
+    quantities : sequence of str
+        Variables over `position`.
+    region : str, optional
+        "driving" or "driven": that arc alone, over the wrap angle; else the whole belt.
+    columns : str, optional
+        An axis of the runs' job that has a column of panels for each value; else all are drawn together.
+    sources : sequence of str, optional
+        Where the runs are from, for errors, and for the legend where their axes do not tell them apart.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Unknown to pyplot; `figure.savefig(path)` writes it.
+
+    Raises
+    ------
+    InputError
+        A history has no such quantity, no such region; or no axis, or too many values of it, for columns.
+    """
+    if not histories:
+        raise InputError("profile: expected one history or more, found none")
+    names = list(sources) or [f"history {k + 1}" for k in range(len(histories))]
+    _check(histories, names, quantities, region)
+    common, labels = on_axes(histories, names)
+    groups = _groups(labels, columns)
+    width = WIDTH * (1.0 + 0.25 * (len(groups) - 1))
+    figure = Figure((width, HEIGHT * len(quantities) + 1.2), layout="constrained")
+    panels = figure.subplots(len(quantities), len(groups), sharex="col", sharey="row", squeeze=False)
+    for column, (title, members) in zip(panels.T, groups.items(), strict=True):
+        for axes, name in zip(column, quantities, strict=True):
+            for k, run in enumerate(members):
+                told = ", ".join(text for key, text in labels[run].items() if key != columns)
+                style = {"color": COLOURS[k % len(COLOURS)], "ls": LINES[k % len(LINES)], "lw": 1.3}
+                _draw(axes, histories[run], name, region, label=told or None, **style)
+            _finish(axes, histories[members[0]], name, region)
+        if region is None:
+            _name_regions(column[0], histories[members[0]])
+        column[0].set_title(title, loc="left", pad=16 if region is None else 4)
+        column[-1].set_xlabel("position along the path [mm]" if region is None else "wrap angle [°]")
+    for row, name in zip(panels, quantities, strict=True):
+        _, unit = _scale(histories[0][name])
+        row[0].set_ylabel(f"{in_words(histories[0][name])}\n[{unit}]")
+    handles, told = max(
+        (axes.get_legend_handles_labels() for axes in panels[0]), key=lambda pair: len(pair[1])
+    )
+    if told:
+        figure.legend(handles, told, loc="outside lower center", frameon=False, ncols=min(len(told), 3))
+    where = f" of the {region} pulley" if region else ""
+    lines = titles(histories, f"Along the belt{where}", common)
+    figure.suptitle("\n".join(balanced(line, 76) for line in lines), fontsize=STYLE["figure.titlesize"])
+    return figure
+
+
+def _check(
+    histories: Sequence[xr.Dataset], names: Sequence[str], quantities: Sequence[str], region: str | None
+) -> None:
+    for dataset, name in zip(histories, names, strict=True):
+        known = [str(key) for key, array in dataset.data_vars.items() if array.dims == ("position",)]
+        for quantity in quantities:
+            if quantity not in known:
+                raise unknown(f"{name}: {quantity}", "quantity along the belt", quantity, known)
+        if region is not None and not inside(dataset, region).any():
+            found = ", ".join(dict.fromkeys(dataset["region"].values.astype(str)))
+            raise mismatch(f"{name}: --region", "a pulley of the belt's path", f"{region}; it has {found}")
+
+
+def _groups(labels: Sequence[dict[str, str]], columns: str | None) -> dict[str, list[int]]:
+    """Places of the runs by the title of their column."""
+    if columns is None:
+        return {"": list(range(len(labels)))}
+    groups: dict[str, list[int]] = {}
+    for run, label in enumerate(labels):
+        if columns not in label:
+            raise mismatch("--columns", f"an axis in which the runs differ ({', '.join(labels[0])})", columns)
+        groups.setdefault(label[columns], []).append(run)
+    if len(groups) > MOST_COLUMNS:
+        raise mismatch(
+            "--columns", f"an axis with at most {MOST_COLUMNS} values", f"{len(groups)} of {columns}"
+        )
+    return groups
+
+
+def inside(dataset: xr.Dataset, region: str) -> np.ndarray:
+    """Stations (position,) in contact with a pulley, its arc's end included."""
+    angle, at = dataset["wrap_angle"].values, dataset["region"].values.astype(str)
+    here = (at == f"{region} arc") | (at == region)
+    # the station at an arc's end is the first of the strand behind it
+    return (here | np.roll(here, 1)) & np.isfinite(angle)
+
+
+def _scale(array: xr.DataArray) -> tuple[float, str]:
+    unit = str(array.attrs.get("units", ""))
+    return _UNITS.get(unit) or display_unit(unit)
+
+
+def _draw(axes: Axes, dataset: xr.Dataset, name: str, region: str | None, **style: object) -> None:
+    factor, _ = _scale(dataset[name])
+    values = factor * dataset[name].values
+    if region is None:
+        axes.plot(1e3 * dataset["position"].values, values, **style)  # type: ignore[arg-type]  # of a line
+    else:
+        here = inside(dataset, region)
+        axes.plot(np.degrees(dataset["wrap_angle"].values[here]), values[here], **style)  # type: ignore[arg-type]
+
+
+def _finish(axes: Axes, dataset: xr.Dataset, name: str, region: str | None) -> None:
+    """Grid, zero line, and arcs shaded where the whole path is drawn."""
+    axes.grid(linewidth=0.4, alpha=0.5)
+    unit = str(dataset[name].attrs.get("units", ""))
+    axes.axhline(_REFERENCES.get(unit, 0.0), color="#333333", linewidth=0.7, zorder=1)
+    if region is None:
+        for start, stop, label in regions(dataset):
+            if label.endswith("arc"):
+                axes.axvspan(1e3 * start, 1e3 * stop, color=ARC, linewidth=0, zorder=0)
+        axes.set_xlim(0.0, 1e3 * dataset["position"].values[-1])
+
+
+def regions(dataset: xr.Dataset) -> list[tuple[float, float, str]]:
+    """First and last path coordinate of each region [m], with its name."""
+    position, region = dataset["position"].values, dataset["region"].values.astype(str)
+    first = [0, *(1 + np.flatnonzero(region[1:] != region[:-1]))]
+    borders = [*position[first], position[-1]]
+    return [(a, b, str(region[k])) for (a, b), k in zip(pairwise(borders), first, strict=True)]
+
+
+def _name_regions(axes: Axes, dataset: xr.Dataset) -> None:
+    for start, stop, name in regions(dataset):
+        place = (500.0 * (start + stop), 1.02)
+        axes.text(
+            *place,
+            name.removesuffix(" arc"),
+            transform=axes.get_xaxis_transform(),
+            ha="center",
+            va="bottom",
+            fontsize=9,
+        )

@@ -1,0 +1,174 @@
+"""Motion along a ramp of load or speed, as figs 3.1, 3.2, 3.9, 3.13 and 3.14 of Lebrecht et al. 2004."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+from cvt_hpc.analysis.cells import colours_of
+from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, draw, in_words, styled
+from cvt_hpc.analysis.telling_apart import on_axes, titles
+from cvt_hpc.errors import mismatch
+from cvt_hpc.vibration.signals import window_amplitudes
+
+COLOURS = colours_of("inferno_r", 0.0, 0.95)
+DEEPEST = 1e-2  # of the largest amplitude
+WINDOW = 0.04  # [s]: lines of the spectrogram 50 Hz wide
+HIGHEST = 1500.0  # [Hz]
+ROW = 1.5  # [inch]
+
+
+class Ramp(NamedTuple):
+    """What a run does along its ramp.
+
+    Attributes
+    ----------
+    values : (time,) array
+        Of what the ramp changes, in display units.
+    label : str
+        Its name with the unit.
+    motion : (time,) array
+        [um, N m], mean removed.
+    rate : float
+        Of samples [Hz].
+    """
+
+    values: np.ndarray
+    label: str
+    motion: np.ndarray
+    rate: float
+
+
+def draw_ramp(
+    histories: Sequence[xr.Dataset], out: Path, of: str = "t1", sources: Sequence[str] = ()
+) -> Path:
+    """Write the figure of `ramp_figure`, with its arguments and errors, as `save_figure` does."""
+    return draw(lambda: ramp_figure(histories, of, sources), out)
+
+
+@styled
+def ramp_figure(histories: Sequence[xr.Dataset], of: str = "t1", sources: Sequence[str] = ()) -> Figure:
+    """Draw motion and spectrogram of runs along their ramps, below each other.
+
+    Parameters
+    ----------
+    histories : sequence of Dataset
+        As `simulate` returns them, of runs along a ramp of load or speed.
+    of : str
+        "t1" or "t2": the probe of that strand that moves most; or a variable over `time`.
+    sources : sequence of str, optional
+        Where the runs are from, for errors, and for titles where their axes do not tell them apart.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Unknown to pyplot; `figure.savefig(path)` writes it.
+
+    Raises
+    ------
+    InputError
+        A history has no ramp, no such strand or variable.
+    """
+    names = list(sources) or [f"history {k + 1}" for k in range(len(histories))]
+    ramps = [read_ramp(history, of, name) for history, name in zip(histories, names, strict=True)]
+    common, labels = on_axes(histories, names)
+    figure = Figure((WIDTH * 1.25, ROW * len(ramps) + 1.1), layout="constrained")
+    panels = figure.subplots(len(ramps), 2, sharex=True, sharey="col", squeeze=False)
+    spectra = [spectrogram(ramp) for ramp in ramps]
+    largest = max(float(amplitude.max()) for _, _, amplitude in spectra)
+    norm = LogNorm(DEEPEST * largest, largest)
+    for (left, right), ramp, (values, frequency, amplitude), label in zip(
+        panels, ramps, spectra, labels, strict=True
+    ):
+        left.plot(ramp.values, ramp.motion, color="#0072b2", linewidth=0.3, rasterized=True)
+        left.grid(linewidth=0.4, alpha=0.5)
+        right.pcolormesh(
+            values, frequency, np.maximum(amplitude, norm.vmin).T, norm=norm, cmap=COLOURS, rasterized=True
+        )
+        for edge in (500.0, 700.0):
+            right.axhline(edge, color="#123a6b", linewidth=0.8, linestyle=(0, (4, 4)))
+        left.set_title(", ".join(label.values()), loc="left", pad=3)
+        right.set_ylabel("frequency [Hz]")
+        left.set_xlim(np.sort(ramp.values[[0, -1]]))
+    unit = "µm" if of in ("t1", "t2") else str(histories[0][of].attrs.get("units", ""))
+    name = f"strand {of}" if of in ("t1", "t2") else in_words(histories[0][of])
+    for left, _ in panels:
+        left.set_ylabel(f"{name} [{unit}]")
+    for axes in panels[-1]:
+        axes.set_xlabel(ramps[0].label)
+    bar = figure.colorbar(ScalarMappable(norm, COLOURS), ax=list(panels[:, 1]), pad=0.02, extend="min")
+    bar.set_label(f"amplitude [{unit}]")
+    lines = [*titles(histories, f"Along the ramp, {name}", common), "dashed: 500 and 700 Hz"]
+    figure.suptitle("\n".join(balanced(line, 80) for line in lines))
+    return figure
+
+
+def read_ramp(
+    history: xr.Dataset, of: str, source: str = "history", band: tuple[float, float] = (300.0, 1500.0)
+) -> Ramp:
+    """What a run does along its ramp, without the start-up before it; arguments as of `ramp_figure`."""
+    courses = [name for name in ("load", "driving_speed") if name in history]
+    changing = next((name for name in courses if _is_ramp(history[name].values)), None)
+    if changing is None:
+        raise mismatch(source, "a run along a ramp of load or speed", "constant ones")
+    course, time = history[changing], history["time"].values
+    first = int(np.searchsorted(time, _start_up(history)))
+    factor, unit = coordinate_unit(course.attrs)
+    rate = 1.0 / (time[1] - time[0])
+    if of in ("t1", "t2"):
+        probes = [str(name).split()[0] == of for name in history["probe"].values]
+        moved = 1e6 * history["displacement"].values[first:, probes]
+        _, amplitude = window_amplitudes(moved, rate, band, WINDOW)
+        motion = moved[:, int(np.argmax(amplitude.max(axis=0)))]
+    elif of in history and history[of].dims == ("time",):
+        motion = history[of].values[first:]
+    else:
+        raise mismatch(source, "t1, t2 or a variable over time", of)
+    return Ramp(
+        factor * course.values[first:], f"{in_words(course)} [{unit}]", _without_drift(motion, rate), rate
+    )
+
+
+def _is_ramp(values: np.ndarray) -> bool:
+    """Whether a quantity still changes in the last half of a run."""
+    half = values[values.size // 2 :]
+    return bool(np.ptp(half) > 1e-6 * np.abs(half).max())
+
+
+def _start_up(history: xr.Dataset) -> float:
+    """When the ramp begins [s]."""
+    import json
+
+    return float(json.loads(history.attrs.get("point", "{}")).get("rise_time", 0.0))
+
+
+def _without_drift(motion: np.ndarray, rate: float) -> np.ndarray:
+    """Motion less its mean over 10 ms around."""
+    width = max(int(round(0.01 * rate)), 1)
+    padded = np.pad(motion, (width // 2, width - 1 - width // 2), mode="edge")
+    return motion - np.convolve(padded, np.ones(width) / width, mode="valid")
+
+
+def spectrogram(ramp: Ramp) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Values of the ramp (window,), frequencies (line,) [Hz], amplitudes (window, line) by Hann windows."""
+    width = int(round(WINDOW * ramp.rate))
+    cut = np.lib.stride_tricks.sliding_window_view(ramp.motion, width)[:: width // 4]
+    window = np.hanning(width)
+    lines = np.fft.rfftfreq(2 * width, 1.0 / ramp.rate)
+    inside = lines <= HIGHEST
+    amplitude = 2.0 * np.abs(np.fft.rfft(cut * window, 2 * width)) / window.sum()
+    middles = ramp.values[width // 2 :: width // 4][: len(cut)]
+    return middles, lines[inside], amplitude[:, inside]
+
+
+def envelope(ramp: Ramp, band: tuple[float, float] = (300.0, 1500.0)) -> tuple[np.ndarray, np.ndarray]:
+    """Values of the ramp and amplitude of the motion in a band, in windows."""
+    centres, amplitude = window_amplitudes(ramp.motion, ramp.rate, band, WINDOW)
+    return ramp.values[np.minimum((centres * ramp.rate).astype(int), ramp.values.size - 1)], amplitude

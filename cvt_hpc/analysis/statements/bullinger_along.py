@@ -1,0 +1,198 @@
+"""Statements of Bullinger, Funk and Pfeiffer 2005 about figs 20 and 21: along the belt at speed ratio 1."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from cvt_hpc.analysis.statements.kept import Kept, on_strand, over_arc
+from cvt_hpc.analysis.statements.verdicts import Measured, Statement, listed
+
+LOW_RATIOS, ALL_RATIOS = (0.26, 0.51), (0.26, 0.51, 0.77)  # torque ratios
+ALIKE = 0.2  # of two forces that are said to be in equilibrium
+CONSTANT = 0.01  # of a force that is said to be constant
+APART = 1.0  # [N]: push force below which elements count as apart
+FORCES = ("friction_force", "ring_friction")
+HALF_TURN = 0.5 * np.pi
+
+
+def _each(kept: Kept, shares: tuple[float, ...] = ALL_RATIOS) -> list[xr.Dataset]:
+    return [kept.history(load_share=share) for share in shares]
+
+
+def _front(history: xr.Dataset) -> int:
+    """First station of the driving arc at which elements press."""
+    return int(np.argmax(over_arc(history, "push_force", "driving").values > APART))
+
+
+def _enters_apart(kept: Kept) -> Measured:
+    push = [over_arc(history, "push_force", "driving").values[0] for history in _each(kept)]
+    return Measured([force < APART for force in push], f"P at the inlet {listed(push)} N")
+
+
+def _balanced_before_front(kept: Kept) -> Measured:
+    ratios = []
+    for history in _each(kept):
+        before = slice(1, _front(history) - 1)
+        flank, ring = (over_arc(history, name, "driving").values[before].mean() for name in FORCES)
+        ratios.append(flank / ring)
+    return Measured(
+        [abs(ratio - 1.0) < ALIKE for ratio in ratios], f"f_Pt / f_Rt where P = 0: {listed(ratios)}"
+    )
+
+
+def _appears_later_with_load(kept: Kept) -> Measured:
+    shares = [over_arc(h, "push_force", "driving").share[_front(h)] for h in _each(kept)]
+    return Measured([a < b for a, b in zip(shares, shares[1:], strict=False)],
+                    f"P appears after {listed(np.multiply(100, shares))} % of the wrap")  # fmt: skip
+
+
+def _grows_to_exit(kept: Kept) -> Measured:
+    holds, exits, falls = [], [], []
+    for history in _each(kept):
+        push = over_arc(history, "push_force", "driving").values
+        fall = (np.maximum.accumulate(push) - push).max() / push.max()
+        holds.append(np.argmax(push) == push.size - 1 and fall < CONSTANT)
+        exits.append(push[-1])
+        falls.append(100 * fall)
+    return Measured(
+        holds, f"P at the exit {listed(exits)} N; it falls by {listed(falls, '.2g')} % on the way"
+    )
+
+
+def _raises_flank_friction(kept: Kept) -> Measured:
+    steps = []
+    for history in _each(kept):
+        force, k = over_arc(history, "friction_force", "driving").values, _front(history)
+        steps.append(force[k + 1 : k + 3].mean() / force[1 : k - 1].mean())
+    return Measured(
+        [step > 1.1 for step in steps], f"f_Pt behind the front over that before it: {listed(steps)}"
+    )
+
+
+def _ring_friction_jumps(kept: Kept) -> Measured:
+    steps, before = [], []
+    for history in _each(kept):
+        force, k = over_arc(history, "ring_friction", "driving").values, _front(history)
+        before.append(1e-3 * force[1 : k - 1].mean())
+        steps.append(1e-3 * force[k + 2])
+    holds = [abs(b - a) > 0.5 * abs(a) for a, b in zip(before, steps, strict=True)]
+    return Measured(holds, f"f_Rt from {listed(before)} to {listed(steps, '.2g')} kN/m within three cells")
+
+
+def _constant_in_t1(kept: Kept) -> Measured:
+    spreads = [
+        np.ptp(force) / force.mean() for force in (on_strand(h, "push_force", "t1") for h in _each(kept))
+    ]
+    return Measured(
+        [spread < CONSTANT for spread in spreads],
+        f"P varies by {listed(100 * np.array(spreads), '.2g')} % in t1",
+    )
+
+
+def _pressed_to_driven_exit(kept: Kept) -> Measured:
+    ends = []
+    for history in _each(kept):
+        arc = over_arc(history, "push_force", "driven")
+        ends.append(100 * arc.share[arc.values > APART].max())
+    return Measured([end > 95.0 for end in ends], f"pressed up to {listed(ends)} % of the driven wrap")
+
+
+def _rises_after_driven_entry(kept: Kept) -> Measured:
+    arcs = [over_arc(history, "push_force", "driven").values for history in _each(kept, LOW_RATIOS)]
+    rises, ends = [100 * (p.max() / p[0] - 1) for p in arcs], [100 * p[-1] / p.max() for p in arcs]
+    holds = [rise > 1 for rise in rises] + [end < 10 for end in ends]
+    return Measured(
+        holds, f"P rises by {listed(rises)} % and ends with {listed(ends, '.2g')} % of its largest value"
+    )
+
+
+FIGURE_20 = (
+    Statement("The elements enter the driving pulley separated and uncompressed, P = 0", _enters_apart),
+    Statement("So f_Pt and f_Rt have to be in equilibrium to each other", _balanced_before_front),
+    Statement("P appears at a load depending position in the driving pulley", _appears_later_with_load),
+    Statement(
+        "and grows rapidly up to the exit of the pulley",
+        _grows_to_exit,
+        "at low torque the belt outruns the pulley where it is innermost, and friction turns round",
+    ),
+    Statement("This increases the tangential force f_Pt", _raises_flank_friction),
+    Statement("and influences the ring friction f_Rt by a jump", _ring_friction_jumps),
+    Statement("In t1 the compression force stays constant", _constant_in_t1),
+    Statement("In the driven pulley the compression area continues up to the exit", _pressed_to_driven_exit),
+    Statement(
+        "At low r, P increases after entering the driven pulley before it decreases to zero at the exit",
+        _rises_after_driven_entry,
+    ),
+)
+
+
+def _no_push_without_load(kept: Kept) -> Measured:
+    without, loaded = (kept.run(load_share=share)["mean_push_force"].values for share in (0.0, 0.26))
+    return Measured(without < 0.01 * loaded.max(), f"P in t1 and t2 without load: {listed(without, '.2g')} N")
+
+
+def _radius_decreases(kept: Kept) -> Measured:
+    depths, places = [], []
+    for history in _each(kept, (0.0, *ALL_RATIOS)):
+        arc = over_arc(history, "mean_displacement", "driven")
+        depths.append(1e3 * (arc.values[0] - arc.values.min()))
+        places.append(100 * arc.share[np.argmin(arc.values)])
+    return Measured(
+        [depth > 0 and place > 50 for depth, place in zip(depths, places, strict=True)],
+        f"by {listed(depths)} mm, innermost at {listed(places)} % of the driven wrap",
+    )
+
+
+def _sliding_increases(kept: Kept) -> Measured:
+    places, gains = [], []
+    for history in _each(kept, (0.0, *ALL_RATIOS)):
+        arc = over_arc(history, "tangential_sliding", "driven")
+        places.append(100 * arc.largest)
+        gains.append(1e3 * (arc.values.max() - arc.values[0]))
+    return Measured(
+        [gain > 0 and place > 50 for gain, place in zip(gains, places, strict=True)],
+        f"by {listed(gains)} mm/s, up to {listed(places)} % of the driven wrap",
+    )
+
+
+def _angle_passes_right_angle(kept: Kept) -> Measured:
+    shares = (0.0, *ALL_RATIOS)
+    arcs = [over_arc(history, "sliding_angle", "driven") for history in _each(kept, shares)]
+    first = [np.degrees(arc.values[1]) for arc in arcs]
+    turns = [100 * arc.share[np.argmax(arc.values < HALF_TURN)] for arc in arcs]
+    falls = [np.all(np.diff(arc.values[arc.share < 0.75]) < 0) for arc in arcs]
+    holds = [a > 90 and 0 < b < 100 and c for a, b, c in zip(first, turns, falls, strict=True)]
+    return Measured(
+        holds, f"from {listed(first)} deg, below 90 deg from {listed(turns)} % of the driven wrap on"
+    )
+
+
+def _turns_where_push_is_largest(kept: Kept) -> Measured:
+    apart = []
+    for history in _each(kept, (0.0, *ALL_RATIOS)):
+        push, angle = (over_arc(history, name, "driven") for name in ("push_force", "sliding_angle"))
+        apart.append(100 * abs(push.largest - angle.share[np.argmax(angle.values < HALF_TURN)]))
+    return Measured(
+        [gap < 10 for gap in apart], f"largest P and turn of sliding are {listed(apart)} % of the wrap apart"
+    )
+
+
+def _turns_earlier_with_load(kept: Kept) -> Measured:
+    arcs = [over_arc(history, "sliding_angle", "driven") for history in _each(kept, (0.0, *ALL_RATIOS))]
+    turns = [100 * arc.share[np.argmax(arc.values < HALF_TURN)] for arc in arcs]
+    return Measured(
+        [a > b for a, b in zip(turns, turns[1:], strict=False)], f"at {listed(turns)} % of the driven wrap"
+    )
+
+
+FIGURE_21 = (
+    Statement("The local contact radius decreases passing through the driven pulley", _radius_decreases),
+    Statement("The tangential relative velocity increases on the way", _sliding_increases),
+    Statement("The sliding angle decreases from above pi/2 (the pulley drives) to below (the belt drives)",
+              _angle_passes_right_angle),
+    Statement("The elements are pressed most around where the tangential velocity changes sign",
+              _turns_where_push_is_largest),
+    Statement("The rise of P needs low r: sliding turns earlier as r grows", _turns_earlier_with_load),
+    Statement("At i = 1 and no load the compression force disappears in both spans", _no_push_without_load),
+)  # fmt: skip

@@ -1,0 +1,108 @@
+"""The figures that jobs reproduce: how each is drawn and what the paper says of it."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from matplotlib.figure import Figure
+
+from cvt_hpc.analysis.figures import draw
+from cvt_hpc.analysis.profiles import profile_figure
+from cvt_hpc.analysis.statements import bullinger_along, bullinger_ratios
+from cvt_hpc.analysis.statements.kept import Kept, opened
+from cvt_hpc.analysis.statements.verdicts import Finding, Statement, judged
+from cvt_hpc.analysis.strand_bars import strand_bars_figure
+from cvt_hpc.errors import unknown
+from cvt_hpc.files import written_aside
+
+COLUMNS = ("figure", "statement", "verdict", "measured", "why")
+
+
+class PaperFigure(NamedTuple):
+    """A figure of a paper.
+
+    Attributes
+    ----------
+    source : str
+        Paper and number.
+    compose : callable
+        Draws it of a study.
+    statements : sequence of Statement
+        What the paper says of it.
+    """
+
+    source: str
+    compose: Callable[[Kept], Figure]
+    statements: Sequence[Statement]
+
+
+def _along(
+    *quantities: str, region: str | None = None, columns: str | None = None
+) -> Callable[[Kept], Figure]:
+    """Quantities along the belt, of all histories."""
+    return lambda kept: profile_figure(kept.histories, quantities, region, columns)
+
+
+FIGURES = {
+    f"bullinger_{number}": PaperFigure(f"Bullinger et al. 2005, fig. {int(number)}", compose, statements)
+    for number, compose, statements in (
+        ("05", lambda kept: strand_bars_figure(kept.results), bullinger_ratios.FIGURE_5),
+        ("20", _along("push_force", "friction_force", "ring_friction"), bullinger_along.FIGURE_20),
+        ("21", _along("mean_displacement", "sliding_angle"), bullinger_along.FIGURE_21),
+        ("22", _along("push_force", "sliding_angle", columns="ratio"), bullinger_ratios.FIGURE_22),
+        ("23", _along("normal_force", region="driving"), bullinger_ratios.FIGURE_23),
+    )
+}
+
+
+def figure_of(folder: Path) -> tuple[Path, Path, list[Finding]]:
+    """Draw the figure of a study and measure what its paper says of it.
+
+    Parameters
+    ----------
+    folder : Path
+        Output folder of one of the jobs of FIGURES.
+
+    Returns
+    -------
+    picture, table : Path
+        figure.png and statements.csv in the folder.
+    findings : list of Finding
+        In the paper's order.
+
+    Raises
+    ------
+    InputError
+        The folder is not that of such a job, or holds no results.
+    """
+    with opened(folder) as kept:
+        name = str(kept.results.attrs.get("job_name", ""))
+        if name not in FIGURES:
+            raise unknown(f"{folder}: job {name}", "job of a paper's figure", name, list(FIGURES))
+        figure = FIGURES[name]
+        picture = draw(lambda: figure.compose(kept), folder / "figure.png")
+        findings = [judged(statement, kept) for statement in figure.statements]
+    table = folder / "statements.csv"
+    with written_aside(table, parents=True) as aside, aside.open("w", encoding="utf-8", newline="") as out:
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for finding in findings:
+            writer.writerow(
+                [figure.source, finding.text, finding.verdict.value, finding.numbers, finding.why]
+            )
+    return picture, table, findings
+
+
+def finding_lines(findings: Sequence[Finding]) -> Iterator[str]:
+    """Yield a line for each finding, and one that counts them."""
+    for finding in findings:
+        yield f"{finding.verdict.value}: {finding.text}"
+        yield f"    {finding.numbers}" + (f"; {finding.why}" if finding.why else "")
+    counts = {
+        verdict: sum(f.verdict is verdict for f in findings)
+        for verdict in dict.fromkeys(f.verdict for f in findings)
+    }
+    yield f"{len(findings)} statements: {', '.join(f'{n} {verdict.value}' for verdict, n in counts.items())}"

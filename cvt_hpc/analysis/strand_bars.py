@@ -1,0 +1,101 @@
+"""Tension and push force of the strands over an axis of a study, as fig. 5 of Bullinger et al. 2005."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cvt_hpc.analysis.arrangement import arrange, ruler
+from cvt_hpc.analysis.classes import check_results
+from cvt_hpc.analysis.curves import panels_of
+from cvt_hpc.analysis.figures import WIDTH, balanced, draw, styled
+from cvt_hpc.errors import mismatch, one_line
+from cvt_hpc.variables import Status
+
+HEIGHT = 3.8  # [inch]
+SHADES = {"t1": "#8a8a8a", "t2": "#c9c9c9"}
+PUSH = "#d55e00"
+BAR = 0.36  # of the distance of two runs
+NEEDED = ("mean_ring_tension", "mean_push_force")
+
+
+def draw_strand_bars(
+    dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None, source: str = "results"
+) -> Path:
+    """Write the figure of `strand_bars_figure`, with its arguments and errors, as `save_figure` does."""
+    return draw(lambda: strand_bars_figure(dataset, at, source), out)
+
+
+@styled
+def strand_bars_figure(
+    dataset: xr.Dataset, at: Mapping[str, Any] | None = None, source: str = "results"
+) -> Figure:
+    """Draw for each run what each strand carries: ring tension above zero, push force below.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        Results of a study, as `open_results` returns them, with `mean_ring_tension` and `mean_push_force`
+        [N] over the job's axes and `strand`. The axis along x of a map does so here; there is a panel for
+        each value of the one that runs along y.
+    at : mapping, optional
+        Axes to fix: name -> value, as a number [SI] or a text.
+    source : str, optional
+        Where the results are from, for the errors.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Unknown to pyplot; `figure.savefig(path)` writes it.
+
+    Raises
+    ------
+    InputError
+        The dataset holds no results, no such forces or a single run; `at` names no axis or no value on it;
+        or there would be too many panels.
+    """
+    check_results(dataset, source)
+    for name in NEEDED:
+        if name not in dataset:
+            raise mismatch(source, f"results with {', '.join(NEEDED)}", f"no {name}")
+    arrangement = arrange(dataset, at or {}, source)
+    panels, notes = panels_of(arrangement, source)
+    figure = Figure((WIDTH, HEIGHT), layout="constrained")
+    row = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    x = ruler(arrangement.dataset[arrangement.x])
+    ticks = x.tick_labels or [f"{value:g}" for value in x.centres]
+    for axes, (title, shown) in zip(row, panels, strict=True):
+        _draw_bars(axes, shown.transpose(arrangement.x, ...))
+        axes.set_title(title, loc="left", pad=4)
+        axes.set_xticks(np.arange(len(ticks)), ticks)
+        axes.set_xlabel(x.label)
+    row[0].set_ylabel("push force | ring tension [kN]")
+    handles, labels = row[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", frameon=False, ncols=4)
+    job = one_line(dataset.attrs.get("job_name", ""))
+    lines = [f"Forces in the strands: {job}".removesuffix(": "), *notes]
+    figure.suptitle("\n".join(balanced(line, 76) for line in lines))
+    return figure
+
+
+def _draw_bars(axes: Axes, shown: xr.Dataset) -> None:
+    """A pair of bars for each run, one for each strand."""
+    places = np.arange(shown["status"].size)
+    done = shown["status"].values == Status.DONE
+    for k, strand in enumerate(str(name) for name in shown["strand"].values):
+        left = places + (k - 0.5) * (BAR + 0.04)
+        tension, push = (
+            1e-3 * np.where(done, shown[name].sel(strand=strand).values, np.nan) for name in NEEDED
+        )
+        label = {"label": f"tension {strand}"}
+        axes.bar(left, tension, BAR, color=SHADES[strand], edgecolor="#333333", lw=0.6, **label)
+        hatch = {"hatch": "" if k else "///", "label": f"push {strand}"}
+        axes.bar(left, -push, BAR, color=PUSH, alpha=0.75, edgecolor="#333333", lw=0.6, **hatch)
+    axes.axhline(0.0, color="#333333", linewidth=0.8)
+    axes.grid(axis="y", linewidth=0.4, alpha=0.5)

@@ -1,0 +1,85 @@
+"""By what runs that are drawn together differ, and what they have in common, in words."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import xarray as xr
+
+from cvt_hpc.analysis.histories import place_of
+from cvt_hpc.errors import mismatch, one_line
+
+
+def told_apart(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[str, list[str]]:
+    """What the runs' points have in common, and by what each differs, with its name where need be."""
+    if len(histories) == 1:
+        return ", ".join(place_of(histories[0].attrs)), ["simulated"]
+    places = [place_of(dataset.attrs) for dataset in histories]
+    common = [part for part in places[0] if all(part in place for place in places)]
+    labels = [", ".join(part for part in place if part not in common) for place in places]
+    if len(set(labels)) < len(labels) or not all(labels):
+        labels = [f"{name}: {label}".removesuffix(": ") for name, label in zip(names, labels, strict=True)]
+    return ", ".join(common), labels
+
+
+def on_axes(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[list[str], list[dict[str, str]]]:
+    """As `told_apart`, by the axes of the runs' jobs alone: common parts, and for each run text by axis.
+
+    Runs that do not differ there are told apart by their names, under the axis "".
+    """
+    parts = [_axes_of(dataset) for dataset in histories]
+    common = {key for key in parts[0] if len({part.get(key) for part in parts}) == 1}
+    labels = [{key: text for key, text in part.items() if key not in common} for part in parts]
+    if len(histories) > 1 and len({tuple(label.items()) for label in labels}) < len(labels):
+        labels = [{"": name} for name in names]
+    return [parts[0][key] for key in parts[0] if key in common], labels
+
+
+def _axes_of(dataset: xr.Dataset) -> dict[str, str]:
+    """By axis of the run's job its value with its name, such as "load 120 N m"."""
+    axes = json.loads(dataset.attrs.get("job", "{}")).get("axes", {})
+    told = {text.split(" ")[0]: text for text in place_of(dataset.attrs)}
+    return {key: told[key].replace("_", " ") for key in axes if key in told}
+
+
+def titles(histories: Sequence[xr.Dataset], subject: str, common: Sequence[str]) -> list[str]:
+    """First lines above a picture of runs: its subject with the jobs. names, and what they have in common."""
+    jobs = dict.fromkeys(one_line(dataset.attrs.get("job_name", "")) for dataset in histories)
+    lines = [f"{subject}: {', '.join(filter(None, jobs))}".removesuffix(": "), ", ".join(common)]
+    return [line for line in lines if line]
+
+
+def check_holds(histories: Sequence[xr.Dataset], names: Sequence[str], wanted: dict[str, str]) -> None:
+    """Raise InputError if a history lacks a variable; `wanted` has for each what gives it."""
+    for dataset, name in zip(histories, names, strict=True):
+        for key, by in wanted.items():
+            if key not in dataset:
+                raise mismatch(name, f"a history with {key} ({by})", "none")
+
+
+def history_files(paths: Sequence[Path]) -> list[Path]:
+    """Files of histories; of a folder all that it keeps, those of a study in its folder `histories`.
+
+    Raises
+    ------
+    InputError
+        A file is no history, or a folder has none.
+    """
+    from cvt_hpc.netcdf import is_history
+
+    found: list[Path] = []
+    for path in paths:
+        inside = path / "histories" if (path / "histories").is_dir() else path
+        files = sorted(inside.glob("*.nc")) if path.is_dir() else [path]
+        if path.is_dir():
+            files = [file for file in files if is_history(file)]
+        if not files or not all(map(is_history, files)):
+            raise mismatch(
+                str(path),
+                "a history written by `cvt-hpc simulate --out`",
+                "no history" if path.is_dir() else "another file, or none",
+            )
+        found += files
+    return found

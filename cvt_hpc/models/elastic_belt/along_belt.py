@@ -1,0 +1,130 @@
+"""Speeds and forces along the belt, as Lebrecht et al. 2004 and Bullinger et al. 2005 draw them.
+
+They follow from what every sample holds of each station (`moments.py`), of a single instant or of means.
+
+The flank carries the normal force N = f_P,n and, along its meridian, the friction m N outward, with m =
+-mu v_m/|v|. The axial force is f_ax = N cos d - m N sin d, the radial force of both flanks p_r = 2 (N sin d +
+m N cos d) (`elastic_belt/README.md`). Times cos d and sin d / 2 they add up to
+
+    f_P,n = f_ax cos d + (p_r / 2) sin d,
+
+whatever friction is. That is linear, so that the mean normal force follows from mean forces. A sample has p_r
+less its frictionless part 2 f_ax tan d.
+
+The sliding angle is that of Bullinger et al. 2005, eq. 36, against the running direction, positive where the
+belt slides into the groove: from pi/2 to 3 pi/2 the pulley drives the belt, below pi/2 the belt the pulley.
+Of means, sliding speed and angle are those of the mean sliding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.models.elastic_belt.belt import Mesh
+from cvt_hpc.models.elastic_belt.fluctuation import at_stations
+
+# of a sample, what the quantities below follow from
+NEEDED = (
+    "radial_friction",
+    "tangential_friction",
+    "radial_speed",
+    "sliding_speed",
+    "saddle_friction",
+    "element_speed",
+    "ring_tension",
+    "push_force",
+    "contact_force",
+    "mean_displacement",
+)
+# long name, unit and comment by name; of all but the wrap angle nan where a station has no contact
+SLIDING = {
+    "radial_sliding": ("radial sliding", "m s-1", "of the belt on the sheaves, outward"),
+    "tangential_sliding": ("tangential sliding", "m s-1", "of the elements on the sheaves, forward"),
+    "sliding_speed": ("sliding speed", "m s-1", "in the plane of the flank"),
+    "sliding_angle": (
+        "sliding angle",
+        "rad",
+        "of sliding into the groove against the running direction; beyond pi/2 the pulley drives the belt",
+    ),
+    "normal_force": ("normal force", "N m-1", "of one flank, per length of the belt"),
+    "friction_force": ("friction force", "N m-1", "of both flanks on the belt, forward"),
+    "ring_friction": ("ring friction", "N m-1", "of the elements' saddles on the rings, forward"),
+}
+WRAP_ANGLE = ("wrap angle", "rad", "from the inlet of the arc")
+# everywhere, of an instant or of a state that does not change
+ELSEWHERE = {
+    "ring_tension": ("ring tension", "N", ""),
+    "push_force": ("push force", "N", "between elements"),
+    "contact_force": ("contact force", "N m-1", "axial line force of one flank"),
+    "mean_displacement": ("mean displacement", "m", "off the reference path, outward"),
+}
+
+
+def along_belt(
+    sample: Mapping[str, np.ndarray], grid: Mesh, parameters: Mapping[str, Any]
+) -> dict[str, np.ndarray]:
+    """Quantities of SLIDING at the stations.
+
+    Parameters
+    ----------
+    sample : mapping
+        Those of NEEDED, (..., N) each: of one instant, or means.
+    grid : Mesh
+        The belt's mesh.
+    parameters : mapping
+        Of the run [SI], of which the half wedge angle counts.
+
+    Returns
+    -------
+    dict
+        By name, (..., N).
+    """
+    angle = parameters["half_wedge_angle"]
+    dual = at_stations(grid.cell)
+    share = at_stations(grid.cell * (grid.region % 2 == 0)) / dual  # of a station's length that is on an arc
+    touching = share > 0.0
+    share = np.where(touching, share, np.nan)
+    radial, tangential = sample["radial_speed"] + 0.0 * share, sample["sliding_speed"] + 0.0 * share
+    axial = sample["contact_force"]
+    pressing = 2.0 * np.tan(angle) * axial + sample["radial_friction"] / share
+    meridian = radial / np.cos(angle)
+    return {
+        "radial_sliding": radial,
+        "tangential_sliding": tangential,
+        "sliding_speed": np.hypot(meridian, tangential),
+        "sliding_angle": sliding_angle(radial, tangential, angle),
+        "normal_force": axial * np.cos(angle) + 0.5 * np.sin(angle) * pressing,
+        "friction_force": sample["tangential_friction"] / share,
+        "ring_friction": sample["saddle_friction"] / (dual * share),
+    }
+
+
+def elsewhere(sample: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Quantities of ELSEWHERE at the stations, (..., N) each, of a sample as `along_belt` takes it."""
+    stresses = {name: at_stations(sample[name]) for name in ("ring_tension", "push_force")}
+    return stresses | {name: sample[name] for name in ("contact_force", "mean_displacement")}
+
+
+def sliding_angle(radial: np.ndarray, tangential: np.ndarray, half_wedge_angle: float) -> np.ndarray:
+    """Sliding angle [rad], from -pi/2 to 3 pi/2, of radial sliding outward and of sliding forward [m/s]."""
+    found = np.arctan2(-radial / np.cos(half_wedge_angle), tangential)
+    return np.where(found < -0.5 * np.pi, found + 2.0 * np.pi, found)
+
+
+def curvature_at_stations(grid: Mesh) -> np.ndarray:
+    """Curvature of the reference path at the stations [1/m], (N,): at an arc's end that of its own length."""
+    path = grid.path
+    curvature = np.array([1.0 / path.driving_radius, 0.0, 1.0 / path.driven_radius, 0.0])[grid.region]
+    return at_stations(grid.cell * curvature) / at_stations(grid.cell)
+
+
+def wrap_angles(grid: Mesh) -> np.ndarray:
+    """Angle of the stations from the inlet of their arc [rad], (N,); nan within strands."""
+    found = np.full(grid.cell.size, np.nan)
+    for region, radius in ((0, grid.path.driving_radius), (2, grid.path.driven_radius)):
+        first, count = grid.starts[region], grid.counts[region]
+        found[first : first + count + 1] = grid.cell[first] * np.arange(count + 1) / radius
+    return found

@@ -1,0 +1,113 @@
+"""Sliding and forces along the belt: their derivation, and those of an instant beside means of the judged part."""
+
+import numpy as np
+import pytest
+
+from cvt_hpc import simulate
+from cvt_hpc.models.elastic_belt.along_belt import NEEDED, along_belt, sliding_angle
+from cvt_hpc.models.elastic_belt.belt import mesh
+from cvt_hpc.physics.flank import flank_forces
+from support.marched import CHEAP, job
+from support.rungs import rung_job
+
+LOADED = CHEAP | {"load": 120.0}
+WEDGE = np.deg2rad(11.0)
+
+
+@pytest.fixture(scope="module")
+def history():
+    """With profiles over the whole judged part."""
+    return simulate(job(**LOADED, profile_duration=0.02), {"lanes": "runs"})
+
+
+def test_the_normal_force_is_the_flanks_own():
+    """f_P,n = f_ax / (cos d - mu sin d sin gamma), Bullinger et al. 2005, eq. 39, from radial and axial force."""
+    grid = mesh(job(**LOADED).parameters)
+    n = grid.cell.size
+    axial, v_radial, v_tangential, mu = 3e5, -0.2, 0.1, 0.09
+    radial, tangential = flank_forces(mu, 1e-6, np.sin(WEDGE), np.cos(WEDGE), axial, v_radial, v_tangential)
+    sample = dict.fromkeys(NEEDED, np.zeros(n))
+    on_arc = np.zeros(n) + (grid.region == 0)
+    on_arc[0] = grid.cell[0] / (
+        grid.cell[0] + grid.cell[-1]
+    )  # of that station only the half on the arc touches
+    sample |= {
+        "contact_force": axial * np.ones(n),
+        "radial_friction": on_arc * (radial - 2.0 * np.tan(WEDGE) * axial),
+        "tangential_friction": on_arc * tangential,
+        "radial_speed": v_radial * np.ones(n),
+        "sliding_speed": v_tangential * np.ones(n),
+    }
+    found = along_belt(sample, grid, {"half_wedge_angle": WEDGE})
+    angle = found["sliding_angle"][0]
+    assert angle == pytest.approx(np.arctan2(0.2 / np.cos(WEDGE), 0.1))
+    expected = axial / (np.cos(WEDGE) - mu * np.sin(WEDGE) * np.sin(angle))
+    inside = slice(0, grid.counts[0])
+    assert found["normal_force"][inside] == pytest.approx(expected, rel=1e-9)
+    assert found["friction_force"][inside] == pytest.approx(-2 * mu * expected * np.cos(angle), rel=1e-9)
+    strand = slice(grid.starts[1] + 1, grid.starts[2])
+    assert all(np.isnan(values[strand]).all() for values in found.values())
+
+
+@pytest.mark.parametrize(
+    ("radial", "tangential", "degrees"),
+    [
+        (-1, 0.0, 90),
+        (0.0, 1, 0),
+        (0.0, -1, 180),
+        (-1, -1, 134.5),
+        (1, 1e-9, -90),
+        (1, -1, 225.5),
+        (1, -1e-9, 270),
+    ],
+)
+def test_the_sliding_angle_is_that_of_eq_36(radial, tangential, degrees):
+    found = np.degrees(sliding_angle(np.array(radial), np.array(tangential), WEDGE))
+    assert found == pytest.approx(degrees, abs=0.2)
+
+
+def test_means_of_instants_are_the_profiles(history):
+    assert history.sizes["profile_time"] == 400
+    assert history["profile_time"].values[-1] == history["time"].values[-1]
+    for name in (
+        "normal_force",
+        "friction_force",
+        "ring_friction",
+        "radial_sliding",
+        "push_force",
+        "mean_displacement",
+    ):
+        mean = history["momentary_" + name].astype(float).mean("profile_time").values
+        scale = np.nanmax(np.abs(history[name].values))
+        assert mean == pytest.approx(history[name].values, abs=1e-6 * scale, nan_ok=True), name
+
+
+def test_forces_add_up_to_the_moments_of_the_drive(history):
+    grid = mesh(job(**LOADED).parameters)
+    dual = 0.5 * (grid.cell + np.roll(grid.cell, 1))
+    first, count = grid.starts[0], grid.counts[0]
+    here = slice(first, first + count + 1)
+    weight = dual[here].copy()
+    weight[[0, -1]] = 0.5 * grid.cell[first]
+    radius = grid.path.driving_radius + history["momentary_mean_displacement"].values[:, here]
+    moment = (history["momentary_friction_force"].values[:, here] * radius) @ weight
+    recorded = history["driving_moment"].values[-400:]
+    assert moment == pytest.approx(recorded, rel=1e-4, abs=1e-3 * np.abs(recorded).max())
+    speed = job(**LOADED).parameters["driving_speed"]
+    assert recorded.mean() * speed == pytest.approx(history["driving_power"].item(), rel=1e-9)
+
+
+def test_profiles_over_time_change_nothing_else(history):
+    plain = simulate(job(**LOADED), {"lanes": "runs"})
+    assert set(plain.variables) < set(history.variables)
+    for name, variable in plain.variables.items():
+        if variable.attrs.get("volatile") != "yes" and variable.dtype.kind == "f":
+            assert history[name].values.tobytes() == variable.values.tobytes(), name
+
+
+def test_a_steady_state_has_profiles_in_equilibrium():
+    found = simulate(rung_job("steady_variator", load=100.0, stations=96))
+    alone = (found["region"] == "driving arc").values & (found["push_force"].values < 1.0)
+    flank, ring = (found[name].values[alone][2:-2] for name in ("friction_force", "ring_friction"))
+    # where elements are apart nothing else holds them: what is left is the radial load on the spiral path
+    assert flank == pytest.approx(ring * (1.0 + 1e-3 / (0.075 / 2.52)), rel=0.15)
