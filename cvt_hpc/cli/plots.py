@@ -53,6 +53,7 @@ def add(commands: Any) -> None:
         wrap: "HISTORY_wrap",
         profile: "profile",
     }
+    names |= {ramp: "ramp_WHAT", element: "element"}
     for command, name in names.items():
         text = f"default: {name}.png beside the dataset"
         command.add_argument("--out", type=Path, metavar="PNG", help=text)

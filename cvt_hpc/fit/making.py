@@ -70,6 +70,7 @@ def make_fit(
         verdicts,
         table.confirmed_table(fit, confirmed),
         table.candidate_table(fit, found),
+        table.conflict_table(fit, found),
         table.distance_table(fit, moved),
         table.sensitivity_table(fit, indices),
     )

@@ -6,6 +6,7 @@ import csv
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
+from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,7 +18,7 @@ from cvt_hpc.files import written_aside
 from cvt_hpc.fit.around import Index, Moved, reach
 from cvt_hpc.fit.confirming import Confirmed
 from cvt_hpc.fit.job import Fit
-from cvt_hpc.fit.scoring import Course, areas, verdict
+from cvt_hpc.fit.scoring import REPRODUCED, Course, areas, verdict
 from cvt_hpc.fit.search import Found
 from cvt_hpc.job.units import from_si
 from cvt_hpc.provenance import command, git_revision
@@ -114,6 +115,22 @@ def candidate_table(fit: Fit, found: Found) -> Table:
     return Table(
         "candidates", "The candidates of the search", ("stage", *_free(fit), *_names(fit), "score"), rows
     )
+
+
+def conflict_table(fit: Fit, found: Found) -> Table:
+    """Pairs of targets that no candidate of the search meets together, the worst first.
+
+    What is told of a pair is the best that a candidate does with the one of the two that it meets less.
+    """
+    alone = found.scores.max(axis=0)
+    rows: list[Row] = []
+    for j, k in combinations(range(len(fit.targets)), 2):
+        together = float(found.scores[:, [j, k]].min(axis=1).max())
+        if together < REPRODUCED:
+            rows.append([fit.targets[j].name, fit.targets[k].name, alone[j], alone[k], together])
+    what = "Targets that no candidate of the search meets together: best score of each, and of the lesser one"
+    head = ("target", "other", "target_alone", "other_alone", "together")
+    return Table("conflicts", what, head, sorted(rows, key=lambda row: row[-1]))
 
 
 def distance_table(fit: Fit, moved: Sequence[Moved]) -> Table:

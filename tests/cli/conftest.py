@@ -70,6 +70,7 @@ def mechanics(monkeypatch):
         turns=lambda job, runs: 1,
         forget=lambda job: None,
         pilot_share=lambda job: 0.25,
+        profile_bytes=lambda job: 0,
         run_points=run_points,
         simulate=simulate,
         estimate_cost=lambda job: 30.0,

@@ -66,6 +66,7 @@ def window(toy, monkeypatch, tmp_path):
         turns=lambda job, runs: 1,
         forget=lambda job: None,
         pilot_share=lambda job: 0.25,
+        profile_bytes=lambda job: 0,
         run_points=run_points,
         estimate_cost=lambda job: 2.0,
     )

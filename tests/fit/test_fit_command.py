@@ -10,6 +10,8 @@ from cvt_hpc.cli import main
 from cvt_hpc.fit.around import sensitivities
 from cvt_hpc.fit.evaluating import Evaluation
 from cvt_hpc.fit.loading import load_fit
+from cvt_hpc.fit.search import Found
+from cvt_hpc.fit.table import conflict_table
 from cvt_hpc.study import run
 
 # The window begins at 25 N m / element_mass, so that these targets ask for a mass of 0.25 kg/m and a gradient of -1.44 s/m
@@ -123,11 +125,23 @@ def test_it_finds_the_set_that_is_known(job, window, capsys, tmp_path):
     runs, tables = len(window), {path: path.read_bytes() for path in (tmp_path / "out" / "x").glob("*.csv")}
     assert main(["fit", "x.toml"]) == 0
     assert capsys.readouterr().out == printed and len(window) == runs
-    assert len(tables) == 6 and {path: path.read_bytes() for path in tables} == tables
+    assert len(tables) == 7 and {path: path.read_bytes() for path in tables} == tables
     # another search would mix with the studies that are there
     assert main(["fit", "x.toml", "--set", "fit.seed=2"]) == 2
     assert "screening: expected" in capsys.readouterr().err
     assert len(window) == runs
+
+
+def test_conflicts_are_pairs_that_nobody_meets_together(job):
+    fit = load_fit(job)
+    scores = np.ones((3, len(fit.targets)))
+    scores[:, 0] = 1.0, 0.2, 0.7  # of the first target and the second each is met, but never both
+    scores[:, 1] = 0.1, 1.0, 0.6
+    scores[:, 2] = 0.5  # and the third by none
+    table = conflict_table(fit, Found(["a"] * 3, np.zeros((3, 2)), scores, np.zeros(3)))
+    assert table.rows[-1] == ["area", "below", 1.0, 1.0, 0.6]
+    assert all("band" in row[:2] and row[-1] == 0.5 for row in table.rows[:-1])
+    assert len(table.rows) == 7
 
 
 def test_sensitivities_are_those_of_the_law(job, tmp_path):

@@ -1,14 +1,16 @@
-"""The quasi-static belt: what it keeps of the belt's forces, what lags, and by how much."""
+"""The quasi-static belt: its shapes, its lag, its step against dense solutions and against the whole belt."""
 
 import numpy as np
 import pytest
 
+from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.belt import (
     N_ELEMENT,
     V_ELEMENT,
+    V_FILTERED,
+    V_RING,
     U,
-    W,
     belt_constants,
     initial_state,
     mesh,
@@ -16,160 +18,175 @@ from cvt_hpc.models.elastic_belt.belt import (
 from cvt_hpc.models.elastic_belt.one_system import flat_belt
 from cvt_hpc.models.elastic_belt.one_system import pack as flat_pack
 from cvt_hpc.models.elastic_belt.one_system import rates as flat_rates
-from cvt_hpc.models.elastic_belt.rhs import content_rates
-from cvt_hpc.models.quasi_static_belt import PARAMETERS
-from cvt_hpc.models.quasi_static_belt.equations import (
+from cvt_hpc.models.quasi_static_belt.basis import (
     own_frequencies,
-    pack,
-    quasi_static_belt,
-    rates,
     splines_of_belt,
-    system,
+    split_basis,
     transverse_stiffness,
-    unpack,
 )
+from cvt_hpc.models.quasi_static_belt.coupled import chain, solve_chain, solve_dense
+from cvt_hpc.models.quasi_static_belt.step import march, motion, refresh, split_belt, work_space
+from cvt_hpc.models.quasi_static_belt.transient import batch
 
-DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
-DEFAULTS |= {"duration": 0.1, "load": 100.0, "stations": 96}
-LIMIT = 1000.0
-
-
-def belt_and_model(limit=LIMIT, **values):
-    p = DEFAULTS | values
-    belt = belt_constants(p)
-    return belt, initial_state(p, belt), quasi_static_belt(belt, mesh(p), limit)
+LIMIT, STEP, SPACING = 1000.0, 1e-5, 0.02
 
 
-def moving(model, state):
-    """Unknowns of a state with some motion in all of them."""
-    random = np.random.default_rng(4)
-    return pack(model, state) + 0.02 * random.normal(size=model.origin.size) * system(model).scale
+def parameters(**values):
+    options = {"duration": 0.1, "load": 100.0, "stations": 96} | values
+    return dict(build_job({"name": "test", "model": "quasi_static_belt"}, "test.toml", options).parameters)
 
 
-def evaluate(model, y, time=1.0):
-    out = np.full_like(y, np.nan)
-    assert rates(model, time, y, out)
-    return out
+def split(limit=LIMIT, step=STEP, longitudinal="inertia", kind="free_splines", **values):
+    p = parameters(**values)
+    belt, grid = belt_constants(p), mesh(p)
+    basis = split_basis(belt, grid, kind, limit, SPACING)
+    model = split_belt(belt, grid, basis, limit, longitudinal, step)
+    return basis, model, motion(model, initial_state(p, belt))
 
 
-def parts(model):
-    """Where in y the dynamic and lagging splines, their rates, the layers' speeds and their contents are."""
-    count, slow, n = model.shapes.shape[1], model.moving.shape[1], model.flat.belt.cell.size
-    borders = np.cumsum([0, slow, count - slow, slow, 2, n, n])
-    return [slice(first, last) for first, last in zip(borders[:-1], borders[1:], strict=True)]
+def steps(model, moved, count):
+    assert march(model, moved, work_space(model), count, np.zeros((3, model.belt.cell.size)))
+    return moved.state.fields
 
 
-def test_splines_below_the_limit_are_those_of_the_strands():
-    belt, _, model = belt_and_model()
-    grid = mesh(DEFAULTS)
-    splines = splines_of_belt(grid)
+def test_the_split_is_by_the_frequency_that_is_asked_for():
+    p = parameters()
+    belt, grid = belt_constants(p), mesh(p)
+    splines, held = splines_of_belt(grid, SPACING), transverse_stiffness(belt)
     mass = belt.mass * belt.dual
-    own = own_frequencies(splines.values, transverse_stiffness(belt), mass)
+    own = own_frequencies(splines.values, held, mass)
     ends = [grid.position[start] for start in grid.starts] + [grid.path.path_length]
     strand = ((splines.centres > ends[1]) & (splines.centres < ends[2])) | (splines.centres > ends[3])
-    assert np.all(strand[own < LIMIT])
-    # one spline of spacing H: integrals of its slope, curvature and itself squared are 2/3, 8/3, 151/315; summed
-    # over cells of a third of H
-    pull = 2.0 * np.tan(belt.half_wedge_angle) * belt.thrust / (belt.driven.weight.sum() / belt.driven_radius)
-    spacing = splines.spacings[0]
-    stiff = (2.0 / 3.0 * pull + 8.0 / 3.0 * DEFAULTS["bending_stiffness"] / spacing**2) / spacing**2
-    expected = np.sqrt(stiff / (151.0 / 315.0 * belt.mass)) / (2.0 * np.pi)
-    assert own.min() == pytest.approx(expected, rel=0.05)
-    # in the grooves the sheaves hold splines at three times the limit and more
+    # in the grooves the sheaves hold splines at twice the limit and more; free of them the coarse ones are slow
     assert own[~strand & (splines.levels == 0)].min() > 2.0 * LIMIT
-    assert model.moving.shape[1] == np.count_nonzero(own < LIMIT)
-
-
-def test_without_a_limit_all_splines_move_as_the_stations_forces_say():
-    belt, state, model = belt_and_model(limit=1e9)
-    assert model.moving.shape[1] == model.shapes.shape[1]
-    y = moving(model, state)
-    out = evaluate(model, y)
-    flat = model.flat
-    moved = parts(model)
-    # The same state by the whole belt's rates: force minus inertia has no part in any spline
-    whole = flat_belt(flat.belt)
-    full = np.empty(whole.origin.size)
-    assert flat_rates(whole, 1.0, flat_pack(whole, flat.state), full)
-    n = belt.cell.size
-    acceleration = full[n : 2 * n]
-    left = model.shapes.T @ (belt.dual * (acceleration - model.shapes @ out[moved[2]]))
-    assert np.abs(left).max() < 1e-9 * np.abs(model.shapes.T @ (belt.dual * acceleration)).max()
-    assert np.array_equal(out[moved[0]], y[moved[2]])
-
-
-def test_content_is_kept_and_the_layers_move_as_their_whole_mass():
-    belt, state, model = belt_and_model()
-    y = moving(model, state)
-    out = evaluate(model, y)
-    where, flat = parts(model), model.flat
-    n = belt.cell.size
-    for contents in where[4:6]:
-        change = belt.cell @ out[contents]
-        assert abs(change) < 1e-12 * (belt.cell @ np.abs(out[contents]))
-    whole = flat_belt(flat.belt)
-    full = np.empty(whole.origin.size)
-    assert flat_rates(whole, 1.0, flat_pack(whole, flat.state), full)
-    pulls = full[2 * n : 3 * n], full[3 * n : 4 * n]
-    expected = [pulls[0] @ belt.dual / belt.dual.sum(), pulls[1] @ (model.inertia[1])]
-    assert out[where[3]] == pytest.approx(expected, rel=1e-9)
-
-
-def test_speeds_along_the_path_are_those_of_a_steady_flow():
-    belt, state, model = belt_and_model()
-    unpack(model, 1.0, moving(model, state))
-    flat = model.flat
-    flux, n = np.zeros((7, belt.cell.size)), belt.cell.size
-    content_rates(flat.belt, flat.state, flat.eps, flux)
-    # v / (1 + eps) is one number around: nothing is carried from cell to cell but by the drag
-    assert np.abs(flux[N_ELEMENT : N_ELEMENT + 2]).max() < 1e-10
-    assert np.ptp(flat.state.fields[V_ELEMENT]) > 1e-4 and n
-
-
-def test_the_lag_is_that_of_the_limit():
-    # Without friction: held splines return to balance as exp(-2 pi limit t), and so does the longest wave of a
-    # layer, shorter ones with the square of their number. Layers are soft here: else each shape in a groove
-    # stretches them as well, and is back sooner by what that adds to the sheaves' stiffness.
-    soft = {"ring_stiffness": 1e4, "element_stiffness": 1e3}
-    belt, state, model = belt_and_model(
-        kinetic_friction=1e-9, friction_gradient=0.0, ring_friction=0.0, transverse_damping=0.0, **soft
+    assert split_basis(belt, grid, "held_splines", LIMIT, SPACING).dynamic.shape[1] == (own < LIMIT).sum()
+    assert (
+        split_basis(belt, grid, "free_splines", LIMIT, SPACING).dynamic.shape[1]
+        == (splines.levels == 0).sum()
     )
-    y = pack(model, state)
-    base, where = evaluate(model, y), parts(model)
-    scale = system(model).scale
-
-    def block(part):
-        indices = np.arange(y.size)[part]
-        columns = []
-        for j in indices:
-            moved = y.copy()
-            moved[j] += 1e-4 * scale[j]
-            columns.append((evaluate(model, moved)[part] - base[part]) / (moved[j] - y[j]))
-        return np.linalg.eigvals(np.array(columns).T)
-
-    rate = 2.0 * np.pi * LIMIT
-    held = -block(where[1]).real
-    assert np.median(held) == pytest.approx(rate, rel=0.03)
-    # where a spline reaches into a strand the tension counts, which here is not quite that of the thrust
-    assert held == pytest.approx(np.full(held.size, rate), rel=0.25)
-    rings = np.sort(-block(where[5]).real)
-    assert rings[0] == pytest.approx(0.0, abs=1e-3 * rate)  # the whole content
-    # a change of content n = 1 / (1 + eps) is one of strain by its square: soft rings are stretched by a half
-    stretch = (1.0 + model.flat.eps[1].mean()) ** 2
-    assert rings[1:5] == pytest.approx(stretch * rate * np.array([1.0, 1.0, 4.0, 4.0]), rel=0.05)
+    modes = split_basis(belt, grid, "modes", LIMIT, SPACING)
+    assert 0.5 * LIMIT < modes.fastest / (2.0 * np.pi) < LIMIT
+    # splines that are slow by themselves make shapes together that are not
+    assert split_basis(belt, grid, "held_splines", LIMIT, SPACING).fastest > 2.0 * np.pi * 2.0 * LIMIT
+    across = modes.dynamic.T @ held @ modes.lagging
+    assert np.abs(across).max() < 1e-9 * np.abs(held).max()
 
 
-def test_a_state_is_packed_into_the_nearest_splines():
-    belt, state, model = belt_and_model()
-    unpack(model, 0.0, pack(model, state))
-    found = model.flat.state
-    # the initial path has corners at the arcs' ends, which splines of 10 mm round off
-    assert np.abs(found.fields[W] - state.fields[W]).max() < 5e-5
-    assert np.abs(found.fields[U]).max() == 0.0
-    assert found.scalars[1:] == pytest.approx(state.scalars[1:], rel=1e-15)
-    assert found.fields[V_ELEMENT].mean() == pytest.approx(state.fields[V_ELEMENT].mean(), rel=1e-4)
+def test_without_a_limit_it_is_the_whole_belt_in_the_space_of_its_splines():
+    step = 1e-10
+    _, model, moved = split(limit=1e9, step=step, element_damping=0.0, ring_damping=0.0)
+    assert model.dynamic == model.shapes.shape[1]
+    random = np.random.default_rng(4)
+    moved.p[:] = 0.02 * random.normal(size=moved.p.size)
+    moved.state.fields[U] = model.shapes @ moved.p
+    moved.state.scalars[0] = 1.0
+    refresh(model, moved)
+    flat = flat_belt(model.belt)
+    full = np.empty(flat.origin.size)
+    assert flat_rates(flat, 1.0, flat_pack(flat, moved.state), full)
+    moved.state.fields[V_FILTERED] = flat.state.fields[V_FILTERED]  # where the belt enters
+    before, rates = moved.state.fields.copy(), moved.p.copy()
+    after = steps(model, moved, 1)
+    n, weight = model.belt.cell.size, model.belt.dual
+    gram = (model.shapes.T * weight) @ model.shapes
+    expected = np.linalg.solve(gram, model.shapes.T @ (weight * full[n : 2 * n]))
+    assert (moved.p - rates) / step == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
+    for row, place in ((V_ELEMENT, 2), (V_RING, 3)):
+        found, wanted = (after - before)[row] / step, full[place * n : (place + 1) * n]
+        assert found == pytest.approx(wanted, abs=1e-3 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("share", [0.05, 1.0, 20.0])
+def test_a_lagging_coordinate_follows_exactly(share):
+    # of the way to rest a step goes 1 - exp(-dt / T), whatever dt / T
+    lag = 1.0 / (2.0 * np.pi * LIMIT)
+    basis, model, _ = split(step=share * lag)
+    held = basis.lagging.T @ basis.stiffness @ basis.lagging
+    slow = model.dynamic
+    gone = model.step * np.linalg.solve(model.inertia[slow:, slow:], held)
+    assert gone == pytest.approx(-np.expm1(-share) * np.eye(len(held)), abs=1e-8)
+
+
+def test_the_coupled_system_is_that_of_a_dense_solver():
+    random, n, size = np.random.default_rng(1), 12, 4
+    work = chain(n, size)
+    work.links[:] = random.uniform(0.5, 3.0, (2, n))
+    work.diagonal[:] = random.uniform(0.2, 1.0, (n, 3)) * [1.0, -0.1, 1.0]
+    work.columns[:, :5] = random.normal(size=(2 * n, 5))
+    matrix, right = np.zeros((2 * n, 2 * n)), work.columns[:, :5].copy()
+    for j in range(n):
+        b = (j + 1) % n
+        matrix[2 * j : 2 * j + 2, 2 * j : 2 * j + 2] += work.diagonal[j][[[0, 1], [1, 2]]]
+        for layer in range(2):
+            ends = [2 * j + layer, 2 * b + layer]
+            matrix[np.ix_(ends, ends)] += work.links[layer, j] * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    solve_chain(work)
+    assert work.columns[:, :5] == pytest.approx(np.linalg.solve(matrix, right), rel=1e-10)
+    dense = np.zeros((size, 8))
+    dense[:, :4] = random.normal(size=(4, 4)) * 0.2 + np.eye(4)
+    dense[:, 4] = random.normal(size=4)
+    expected, found = np.linalg.solve(dense[:, :4], dense[:, 4]), np.zeros(size)
+    solve_dense(dense, size, found)
+    assert found == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_steady_flow_keeps_content_and_has_one_flux():
+    _, model, moved = split(longitudinal="steady_flow")
+    cell = model.belt.cell
+    before = moved.state.fields[N_ELEMENT : N_ELEMENT + 2] @ cell
+    fields = steps(model, moved, 50)
+    assert fields[N_ELEMENT : N_ELEMENT + 2] @ cell == pytest.approx(before, rel=1e-13)
+    flux = fields[V_ELEMENT : V_RING + 1] / (1.0 + np.roll(moved.eps, 1, axis=1))
+    assert np.ptp(flux, axis=1) == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert np.ptp(fields[V_ELEMENT]) > 1e-4
+
+
+def test_with_inertia_content_is_kept_too():
+    _, model, moved = split()
+    before = moved.state.fields[N_ELEMENT : N_ELEMENT + 2] @ model.belt.cell
+    fields = steps(model, moved, 50)
+    assert fields[N_ELEMENT : N_ELEMENT + 2] @ model.belt.cell == pytest.approx(before, rel=1e-13)
+
+
+@pytest.mark.parametrize("longitudinal", ["inertia", "steady_flow"])
+def test_a_quiet_belt_has_the_forces_of_the_whole_one_and_its_powers_close(longitudinal):
+    from cvt_hpc.models.elastic_belt.transient import Transient
+
+    values = {"friction_gradient": 0.0, "friction_law": "coulomb", "stations": 64, "duration": 0.08}
+    common = values | {"judged_fraction": 0.25, "load": 100.0}
+    (run,) = batch([parameters(**common, longitudinal=longitudinal)], "split").runs
+    document = {"name": "test", "model": "elastic_belt"}
+    whole = Transient(dict(build_job(document, "test.toml", common).parameters), "imex")
+    for one in (run, whole):
+        while one.done < one.samples:
+            assert one.advance(one.samples - one.done) is None
+    for name, allowed in (("ring_tension t1", 0.03), ("ring_tension t2", 0.03), ("push_force t1", 0.05)):
+        expected = whole.channel(name)[whole.judged].mean()
+        assert run.channel(name)[run.judged].mean() == pytest.approx(expected, rel=allowed)
+    power = {name: run.channel(name)[run.judged].mean() for name in ("driving_power", "load_power")}
+    losses = [
+        name for name in ("driving_flank_loss", "driven_flank_loss", "ring_loss", "belt_loss", "layer_loss")
+    ]
+    left = power["driving_power"] - power["load_power"]
+    left -= sum(run.channel(name)[run.judged].mean() for name in (*losses, "lag_loss", "seating_loss"))
+    left += run.channel("thrust_power")[run.judged].mean()
+    stored = run.channel("stored_energy")[run.judged]
+    left -= (stored[-1] - stored[0]) / ((stored.size - 1) * run.interval)
+    assert abs(left) < 0.004 * power["driving_power"]
+
+
+def test_a_step_beyond_the_fastest_shape_is_told():
+    p = parameters(step=1e-4, sampling_rate=1e4)
+    (run,) = batch([p], "split").runs
+    record = {"power_residual": 0.0, "step_ripple": 0.0, "least_strand_force": 1e3}
+    _, why = run.numerical_doubt(record)
+    assert "beyond the longest that is stable" in why
 
 
 def test_jobs_know_it():
-    document = {"name": "test", "model": "quasi_static_belt", "stepper": "scipy_bdf"}
+    document = {"name": "test", "model": "quasi_static_belt"}
     assert build_job(document, "test.toml", {"limit_frequency": 500.0}).parameters["limit_frequency"] == 500.0
+    with pytest.raises(InputError, match="a step of its own"):
+        build_job(document | {"stepper": "scipy_bdf"}, "test.toml")
+    with pytest.raises(InputError, match="split"):
+        build_job(document, "test.toml", {"split": "mode"})

@@ -83,7 +83,7 @@ def test_the_disturbance_comes_once(stepper):
 
 def test_another_model_of_the_belt_takes_over_what_it_can_represent():
     led = marched(runs("explicit"), BEFORE)
-    taken = runs("scipy_bdf", "quasi_static_belt", quasi_static_batch)
+    taken = runs("split", "quasi_static_belt", quasi_static_batch)
     taken.take_over(led.runs)
     (before,), (run,) = led.runs, taken.runs
     assert run.state.fields[0] == pytest.approx(before.state.fields[0], abs=1e-4)  # its splines are coarse

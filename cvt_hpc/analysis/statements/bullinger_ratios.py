@@ -161,7 +161,8 @@ def _transmits(kept: Kept) -> Measured:
     radius = found["driven_radius"] / found["ratio"]
     off = 100 * np.abs(force - found["load"] / radius).max() / np.abs(force).max()
     return Measured(
-        [off < 2], f"(T - P)_t2 - (T - P)_t1 and M / r differ by {float(off):.2g} % of the largest force"
+        [off < APPROXIMATE],
+        f"(T - P)_t2 - (T - P)_t1 and M / r differ by {float(off):.2g} % of the largest force",
     )
 
 

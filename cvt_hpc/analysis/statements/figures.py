@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.figures import draw
 from cvt_hpc.analysis.profiles import profile_figure
-from cvt_hpc.analysis.statements import bullinger_along, bullinger_ratios
+from cvt_hpc.analysis.ramps import ramp_figure
+from cvt_hpc.analysis.statements import bullinger_along, bullinger_ratios, lebrecht_ramps
 from cvt_hpc.analysis.statements.kept import Kept, opened
 from cvt_hpc.analysis.statements.verdicts import Finding, Statement, judged
 from cvt_hpc.analysis.strand_bars import strand_bars_figure
@@ -56,6 +57,9 @@ FIGURES = {
         ("23", _along("normal_force", region="driving"), bullinger_ratios.FIGURE_23),
     )
 }
+FIGURES["lebrecht_3_14"] = PaperFigure(
+    "Lebrecht et al. 2004, fig. 3.14", lambda kept: ramp_figure(kept.histories), lebrecht_ramps.FIGURE_3_14
+)
 
 
 def figure_of(folder: Path) -> tuple[Path, Path, list[Finding]]:

@@ -80,7 +80,7 @@ FADED = 0.1  # [N s/m]: couplings of stations are 1e3 and more
 
 
 @merged_kernel
-def _element_stress(stiffness, grip, eps, closing, ahead, per_length, last, meet):
+def element_stress(stiffness, grip, eps, closing, ahead, per_length, last, meet):
     """-P in a cell [N] with the speeds that the step begins with, and its slope with their change.
 
     Parameters
@@ -137,7 +137,7 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
             outflow = fma(0.5 * kappa * belt.cell[j], lifts, outflow)
         per_length = (step * per_cell) * stations[j, PER_CONTENT_0]
         at_end = fma(per_length, outflow, eps)
-        stress_0, e0 = _element_stress(
+        stress_0, e0 = element_stress(
             element_stiffness,
             element_damping * per_cell,
             eps,

@@ -1,7 +1,7 @@
 """The elastic belt with all that is faster than a limit frequency lagging behind its forces.
 
-Another model than `elastic_belt`, made of its parts: `equations.py` says what it
-keeps and what it drops. Importing this package is cheap.
+Another model than `elastic_belt`, made of its parts: `README.md` says what it keeps, what it drops, and why
+the equations as printed do not vibrate. Importing this package is cheap.
 """
 
 from cvt_hpc.models import elastic_belt
@@ -14,17 +14,48 @@ PARAMETERS = {table: keys for table, keys in elastic_belt.PARAMETERS.items() if 
         "limit_frequency": Parameter(
             1000.0,
             "Hz",
-            "splines of a higher own frequency, and all longitudinal motion, follow their forces with a lag",
+            "shapes of a higher own frequency follow their forces with a lag",
             minimum=0.0,
             exclusive=True,
             sensible=(10.0, 1000000.0),
         ),
+        "split": Parameter(
+            "free_splines",
+            "",
+            "whose own frequency counts: each spline's without grooves, with them, or that of eigenmodes",
+            choices=("free_splines", "held_splines", "modes"),
+        ),
+        "spline_spacing": Parameter(
+            0.02,
+            "m",
+            "of the coarse splines all around; halved on the arcs and again at their ends",
+            minimum=0.0,
+            exclusive=True,
+            sensible=(0.002, 0.1),
+        ),
+        "longitudinal": Parameter(
+            "inertia",
+            "",
+            "along the path: inertia and the whole equation of continuity, or the steady flow of Bullinger "
+            "et al. 2005, eqs 28-30, as printed",
+            choices=("inertia", "steady_flow"),
+        ),
     },
 }
-DEFAULT_STEPPER = "scipy_bdf"
-STEPPERS = taken(elastic_belt.REFUSED)
+DEFAULT_STEPPER = "split"
+OWN_STEPPERS = {"split": "cvt_hpc.models.quasi_static_belt.split_settings"}
 REFUSED = elastic_belt.REFUSED | dict.fromkeys(
-    elastic_belt.OWN_STEPPERS, "it is a step for the belt with all its inertia"
+    (*elastic_belt.OWN_STEPPERS, *taken(elastic_belt.REFUSED)),
+    "the rates of what lags follow from forces that know them: the model has a step of its own",
 )
+STEPPERS = OWN_STEPPERS
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]
+__all__ = [
+    "DEFAULT_STEPPER",
+    "OWN_STEPPERS",
+    "PARAMETERS",
+    "REFUSED",
+    "STEPPERS",
+    "check",
+    "inert",
+]

@@ -13,7 +13,7 @@ from cvt_hpc.models.elastic_belt.record import (
     lanes,
 )
 
-# Core-seconds per station and time step of SciPy's BDF, whose steps are not known beforehand: of 15 us
-cost = partial(grouping.cost, step_cost={"scipy_bdf": 1e-4})
+# Core-seconds per station and time step, measured beside other work at 160 stations
+cost = partial(grouping.cost, step_cost={"split": 8.5e-7})
 
 __all__ = ["VARIABLES", "coordinates", "cost", "evaluate", "histories", "judge", "lane_key", "lanes"]

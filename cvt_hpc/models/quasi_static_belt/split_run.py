@@ -1,0 +1,202 @@
+"""A transient run of the quasi-static belt by the model's own step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.kernels import called_alike
+from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.elastic_belt.belt import (
+    LAYER_WORK,
+    State,
+    W,
+    belt_constants,
+    initial_state,
+    random_strands,
+)
+from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK as LANE_WORK
+from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state, put_lane
+from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES, NOTED
+from cvt_hpc.models.elastic_belt.march import sample_state
+from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, recording
+from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFILES, Outcome
+from cvt_hpc.models.elastic_belt.validity import FAILURES
+from cvt_hpc.models.quasi_static_belt.basis import split_basis
+from cvt_hpc.models.quasi_static_belt.step import march, motion, refresh, split_belt, work_space
+from cvt_hpc.variables import Status
+
+BEYOND_LIMIT = 1.25  # of 2 / w of the fastest dynamic shape: contact may be stiffer than at rest
+
+_march, _sample = called_alike(march), called_alike(sample_state)
+
+
+class SplitRun(RecordedRun):
+    """One run, advanced sample by sample; attributes as of `RecordedRun`.
+
+    Parameters
+    ----------
+    parameters : dict
+        Resolved parameters of the run [SI].
+    stepper : str
+        "split", which it is.
+    """
+
+    done: int
+    failure: tuple[Status, str] | None
+
+    def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
+        p = parameters
+        self.done, self.failure, self._begun = 0, None, 0.0
+        self.prolong(p)
+        self.belt = belt_constants(p)
+        n = self.mesh.cell.size
+        self._basis = split_basis(self.belt, self.mesh, p["split"], p["limit_frequency"], p["spline_spacing"])
+        self._steps = max(int(np.ceil(self.interval / p["step"] - 1e-9)), 1)
+        self.step = self.interval / self._steps
+        self._model = split_belt(
+            self.belt,
+            self.mesh,
+            self._basis,
+            p["limit_frequency"],
+            p["longitudinal"],
+            self.step,
+        )
+        first = initial_state(p, self.belt)
+        self._motion, self._work = motion(self._model, first), work_space(self._model)
+        # the same run as a single lane, which is what can be sampled
+        self._lane_belt = lane_belt([self.belt], np.float64)
+        self._lane = lane_state([self.belt], [first], np.float64)
+        self._stations = LaneArray(n, FIELDS_OF_FORCES, 1)
+        self._ended = LaneArray(1, len(ENDED), 1)
+        self._noted = np.zeros((3, n))
+        self._disturbed = False
+
+    def prolong(self, parameters: Mapping[str, Any]) -> None:
+        """Make room for the samples of a longer duration, whose judged part has yet to come.
+
+        Parameters
+        ----------
+        parameters : dict
+            Those of the run but for `duration` and `judged_fraction`.
+        """
+        plan = recording(parameters, np.float64)
+        self._profiles = [LaneArray(rows, len(PROFILES), 1) for rows in (0, plan.mesh.cell.size)]
+        RecordedRun.__init__(self, parameters, plan, self._profiles[1].data[:, :, 0])
+        rows = LaneArray(self.samples, self._sensed + len(CHANNELS), 1)
+        if self.done:
+            rows.data[: self.done, :, 0] = self.rows
+        self._rows = rows
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C)."""
+        return self._rows.data[: self.done, :, 0]
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self._motion.state.scalars[0])
+
+    @property
+    def steps(self) -> int:
+        """Steps taken so far."""
+        return int(self._motion.counts[0])
+
+    @property
+    def contact_solves(self) -> int:
+        """Linear solves of the contact problem so far."""
+        return int(self._motion.counts[2])
+
+    def counters(self) -> dict[str, int]:
+        """Work done so far, by its name."""
+        return dict(zip(("steps", "repeats", "contact_solves"), map(int, self._motion.counts), strict=True))
+
+    @property
+    def state(self) -> State:
+        """The present state; a copy."""
+        return self._motion.state.copy()
+
+    def paused(self) -> SplitRun:
+        """What a batch of the same point over a longer time goes on from: the run itself."""
+        return self
+
+    def take_over(self, runs: Sequence[Any]) -> None:
+        """Go on from where a run by another stepper stands, its history included, but for means begun before.
+
+        Parameters
+        ----------
+        runs : sequence of one run
+            Of the same mesh, sampling and duration.
+        """
+        (run,) = runs
+        self.done, self._disturbed = run.done, run.done > self._plan.kick
+        self._rows.data[: self.done, :, 0] = run.rows
+        if self.done > self._plan.first_judged:
+            self._profiles[1].data[:] = np.nan  # what the other has summed up is not known
+        self._motion = motion(self._model, run.state)
+
+    def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
+        """Whether a run that reached its end is not to be trusted, as `RecordedRun` has it; or its step."""
+        found = super().numerical_doubt(record)
+        limit = 2.0 / max(self._basis.fastest, 1e-9)
+        if found is None and self.step > BEYOND_LIMIT * limit:
+            why = f"the step {self.step:.3g} s is beyond the longest that is stable, {limit:.3g} s"
+            found = Status.FAILED_NUMERICS, f"{why}: the fastest dynamic shapes grow from step to step"
+        return found
+
+    def advance(self, samples: int) -> tuple[Status, str] | None:
+        """March on.
+
+        Parameters
+        ----------
+        samples : int
+            How many samples at most; 0 compiles only.
+
+        Returns
+        -------
+        (Status, str) or None
+            What has gone wrong, where the run cannot go on.
+        """
+        if samples == 0:
+            _march(self._model, self._motion, self._work, 0, self._noted)
+        for _ in range(min(samples, self.samples - self.done)):
+            if self.done == self._plan.kick and not self._disturbed:
+                self._disturb()
+            if not _march(self._model, self._motion, self._work, self._steps, self._noted):
+                self.failure = FAILURES[Outcome.NO_CONTACT_SOLUTION]
+                return self.failure
+            outcome = self._record()
+            if outcome != Outcome.OK:
+                self.failure = FAILURES[outcome]
+                return self.failure
+        return None
+
+    def _disturb(self) -> None:
+        """Give the strands their random displacement, once the start-up's damping has gone."""
+        p, moved, state = self.parameters, self._motion, self.state
+        state.fields[W] += random_strands(self.mesh, p["disturbance"], p["seed"])
+        nearest = motion(self._model, state)
+        moved.q[:], moved.state.fields[W] = nearest.q, nearest.state.fields[W]
+        refresh(self._model, moved)
+        self._disturbed = True
+
+    def _record(self) -> Outcome:
+        """Record the present state."""
+        lane, state = self._lane, self._motion.state
+        put_lane(lane.fields.data, lane.scalars.data, 0, self.belt, state)
+        lane.time[0] = state.scalars[0]
+        lane.scalars.data[0, LANE_WORK] = state.scalars[LAYER_WORK]
+        state.scalars[LAYER_WORK] = 0.0
+        # the layers' speeds are counted from the belt speed there: a second difference takes that out
+        noted = self._noted.copy()
+        noted[1:] += state.fields[2:4] - lane.fields.data[:, 2:4, 0].T
+        self._stations.data[:, NOTED : NOTED + 3, 0] = noted.T
+        profiles = self._profiles[int(self.done >= self._plan.first_judged)]
+        place = self._plan.sensing, self._rows, self.done, profiles, self._ended
+        _sample(self._lane_belt, lane, self._stations, *place)
+        outcome = Outcome(int(self._ended.data[0, OUTCOME, 0]))
+        self.done += int(outcome == Outcome.OK)
+        return outcome
