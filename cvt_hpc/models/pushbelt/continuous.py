@@ -44,6 +44,8 @@ ABSENT = (
     "local_length",
     "disturbance",
     "seed",
+    "modal_peaks",
+    "profile_duration",
 )
 
 
