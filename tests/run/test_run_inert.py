@@ -6,7 +6,7 @@ import pytest
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt import inert
 from cvt_hpc.models.elastic_belt.deflection_settings import CONE, TABLE_KEYS
-from cvt_hpc.models.elastic_belt.pulley_settings import pulley_inert
+from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert
 from cvt_hpc.simulation import record_variables
 from support.marched import fresh_record, job
 

@@ -10,6 +10,7 @@ from cvt_hpc.models.elastic_belt.along_belt import SLIDING, WRAP_ANGLE, along_be
 from cvt_hpc.models.elastic_belt.fluctuation import at_stations
 from cvt_hpc.models.elastic_belt.momentary import PREFIX, last_profiles
 from cvt_hpc.netcdf import attributes
+from cvt_hpc.variator import PULLEYS
 from cvt_hpc.variator.history import dataset
 
 if TYPE_CHECKING:
@@ -34,7 +35,10 @@ def histories(run: RecordedRun) -> xr.Dataset:
         `displacement` (time, probe) [m], scalars over time, and the profiles of the judged part by
         `position`; with a profile_duration also those of the last samples over `profile_time`.
     """
-    over_time = {"driven_position": ("driven position", "m", "axial opening of the driven pulley")}
+    over_time = {
+        f"{pulley}_position": (f"{pulley} position", "m", f"axial opening of the {pulley} pulley")
+        for pulley in PULLEYS
+    }
     found = dataset(run, over_time, _profiles(run), run.mesh.position, run.regions)
     moment = run.channel("driving_power") / run.channel("driving_speed")
     words = "driving moment", "N m", "of the belt on the driving pulley, which the drive has to overcome"

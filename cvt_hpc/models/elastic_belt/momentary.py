@@ -19,6 +19,7 @@ from cvt_hpc.models.elastic_belt.along_belt import (
     curvature_at_stations,
     elsewhere,
 )
+from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
 from cvt_hpc.models.elastic_belt.sampling import PROFILES
 from cvt_hpc.recording import sample_count
 
@@ -87,7 +88,10 @@ def last_profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str
         return {}
     sample = dict(zip(NEEDED, kept[:count].transpose(1, 0, 2), strict=True))
     samples = slice(run.done - count, run.done)
-    belt_speed = run.channel("driving_speed")[samples, None] * run.path.driving_radius
+    # speeds are counted from the course of the driving speed, which is constant where the drive has inertia
+    is_given = np.isinf((PULLEY_DEFAULTS | dict(run.parameters))["driving_inertia"])
+    course = run.channel("driving_speed")[samples, None] if is_given else run.parameters["driving_speed"]
+    belt_speed = course * run.path.driving_radius
     lengthened = 1.0 + curvature_at_stations(run.mesh) * sample["mean_displacement"]
     found = elsewhere(sample) | along_belt(sample, run.mesh, run.parameters)
     found["element_speed"] = (belt_speed + sample["element_speed"]) / lengthened

@@ -16,14 +16,8 @@ from cvt_hpc.models.elastic_belt.deflection_settings import (
     deflection_inert,
     deflection_problems,
 )
-from cvt_hpc.models.elastic_belt.pulley_settings import (
-    DRIVEN_INERTIA,
-    PULLEYS,
-    SHAFT,
-    pulley_inert,
-    pulley_problems,
-    shaft_problems,
-)
+from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert, pulley_problems, shaft_problems
+from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, PULLEYS, SHAFT
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems

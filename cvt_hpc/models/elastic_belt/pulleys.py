@@ -32,9 +32,13 @@ import numpy as np
 
 from cvt_hpc.kernels import merged_kernel
 from cvt_hpc.lanes import fma, like, maximum, minimum, select, sqrt
-from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, are_free, oil_factor
+from cvt_hpc.models.elastic_belt.pulley_settings import (
+    PULLEY_DEFAULTS,
+    are_free,
+    oil_factor,
+    shaft_deflection,
+)
 from cvt_hpc.physics import capacity
-from cvt_hpc.physics.shaft import Bearing, Seats, beam_flexibility, free_opening, shaft_compliance
 from cvt_hpc.physics.sheaves import Sheaves
 
 # Constants of the laws, in SI units: mobilities are 1 / J, or 1 / (T_1 k) of the driving sheave, 0 where the
@@ -117,20 +121,6 @@ class Pulleys(NamedTuple):
 
     laws: np.ndarray
     are_free: bool
-
-
-def shaft_deflection(parameters: Mapping[str, Any], radius: float) -> tuple[float, float]:
-    """What a shaft adds to the groove at a radius [m]: compliance [m/N], free opening by its bearings [m]."""
-    p = PULLEY_DEFAULTS | dict(parameters)
-    if not p["shaft_lengths"]:
-        return 0.0, 0.0
-    seats, angle = Seats(*p["seat_positions"]), p["half_wedge_angle"]
-    bearings = [Bearing(position, p["bearing_stiffness"]) for position in p["bearing_positions"]]
-    flexibility = beam_flexibility(
-        p["shaft_lengths"], p["shaft_diameters"], p["shaft_modulus"], bearings, seats
-    )
-    opening = free_opening(p["bearing_clearance"], p["bearing_positions"], seats, angle)
-    return shaft_compliance(flexibility, seats, radius, angle) / p["shaft_factor"], opening
 
 
 def with_pulleys(

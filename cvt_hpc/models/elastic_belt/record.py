@@ -12,6 +12,7 @@ from cvt_hpc.models.elastic_belt.belt import MODES
 from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.models.elastic_belt.history import histories
 from cvt_hpc.models.elastic_belt.momentary import profile_bytes
+from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, are_free, oil_factor
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, judging
 from cvt_hpc.variator.judging import assess, each, efficiency, mean, power_balance
@@ -64,6 +65,22 @@ VARIABLES = (
     *peaks.VARIABLES,
     *shared("spectrum", "mean_ring_tension", "mean_push_force", "axial_force", "slip"),
     *AGAINST_SLIP,
+    Variable(
+        "piston_force",
+        ("pulley",),
+        "f8",
+        "N",
+        "mean force of a piston's pressure, or what it takes: axial force less spring and centrifugal oil",
+        words="piston force",
+    ),
+    Variable(
+        "sheave_tilt",
+        ("pulley",),
+        "f8",
+        "rad",
+        "mean angle that the tilt of the collar and the bending of the shaft put between the sheaves",
+        words="angle between sheaves",
+    ),
     Variable("open_share", ("pulley",), "f8", "1", "mean, out of contact", words="open share of the wrap"),
     *shared(
         "flank_loss",
@@ -160,6 +177,8 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
         **judging.evaluate(run, strongest_probe),
         **capacity(run, judged),
         "open_share": each(run, "open_share"),
+        "piston_force": piston_forces(run),
+        "sheave_tilt": each(run, "tilt") / [run.path.driving_radius, run.path.driven_radius],
         **power_balance(driving, load, loss, storing, thrust),
         "efficiency": efficiency(driving, load, loss),
         "thrust_power": thrust,
@@ -168,6 +187,19 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
         **fluctuation_record(run),
         "least_strand_force": run.channel("least_strand_force")[judged].min(),
     }
+
+
+def piston_forces(run: RecordedRun) -> np.ndarray:
+    """Mean force of the pressure on the pistons [N], (2,); the axial position is at rest in the mean."""
+    p = PULLEY_DEFAULTS | dict(run.parameters)
+    turning = np.array([(run.channel(f"{pulley}_speed")[run.judged] ** 2).mean() for pulley in PULLEYS])
+    # the driving spring is counted from the opening that is given
+    shifts = np.array([mean(run, f"{pulley}_position") for pulley in PULLEYS]) - [p["driving_position"], 0.0]
+    rates, forces = (
+        np.array([p[f"{pulley}_spring_{name}"] for pulley in PULLEYS]) for name in ("rate", "force")
+    )
+    oil = np.array([oil_factor(p[f"{pulley}_piston"], p["oil_density"]) for pulley in PULLEYS])
+    return each(run, "axial_force") - forces - rates * shifts - oil * turning
 
 
 def fluctuation_record(run: RecordedRun) -> dict[str, Any]:
@@ -182,6 +214,9 @@ def fluctuation_record(run: RecordedRun) -> dict[str, Any]:
     shares, dual = fluctuation.part_shares(run.mesh), fluctuation.at_stations(run.mesh.cell)
     fed = {"flank_fed": shares @ found.flanks, "stress_fed": found.stresses.sum()}
     lag = run.channel("axial_force driven")[judged].var() / (p["sheave_lag"] * p["lag_stiffness"])
+    if are_free(p):
+        # tilts and the driving sheave have lags, too; the mean motion, at rest, takes nothing in them
+        lag = run.channel("lag_loss")[judged].mean()
     taken = {
         "belt_taken": -found.belt.sum(),
         "ring_taken": -found.rings.sum(),

@@ -45,6 +45,8 @@ ABSENT = (
     "local_length",
     "disturbance",
     "seed",
+    "modal_peaks",
+    "profile_duration",
     *(key for key in DEFLECTION if key != "sheave_deformation"),
 )
 

@@ -1,0 +1,128 @@
+"""What does not fit together of the pulleys' settings, and which of them are without effect."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, shaft_deflection
+from cvt_hpc.physics import capacity
+from cvt_hpc.physics.geometry import variator, variator_problems
+from cvt_hpc.physics.sheaves import axial_element_stiffness, stiffness_factors
+
+Problem = tuple[str, str, str]  # key, expected, found
+
+
+def shaft_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+    """Problems of a shaft, in the form of a model's check."""
+    p = PULLEY_DEFAULTS | dict(parameters)
+    lengths, diameters = p["shaft_lengths"], p["shaft_diameters"]
+    if len(lengths) != len(diameters):
+        return [("shaft_diameters", f"one for each of {len(lengths)} shaft_lengths", str(len(diameters)))]
+    if not lengths:
+        return []
+    total = sum(lengths)
+    for key, what in (("bearing_positions", "bearings"), ("seat_positions", "sheaves")):
+        places = p[key]
+        found = ", ".join(f"{place:g} m" for place in places) or "none"
+        if len(places) != 2 or places[0] == places[1] or max(places) > total * (1.0 + 1e-9):
+            expected = f"two {what} at different places of the shaft, 0 to {total:g} m"
+            return [(key, expected, found)]
+    return []
+
+
+def pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+    """Problems of the pulleys' freedom, in the form of a model's check."""
+    p = PULLEY_DEFAULTS | dict(parameters)
+    found = _piston_problems(p) + _drive_problems(p)
+    if p["tilt_lag"] == 0.0:
+        for key in ("collar_clearance", "bearing_clearance"):
+            if p[key] > 0.0:
+                expected = "0, or a tilt_lag: a sheave is within its clearance for a time only"
+                found.append((key, expected, f"{p[key]:g}"))
+    elif p["tilt_lag"] < (least := least_tilt_lag(p)):
+        expected = f"0, or {least:.2g} s and more at this step: tilting is explicit"
+        found.append(("tilt_lag", expected, f"{p['tilt_lag']:g} s"))
+    if p["bearing_clearance"] > 0.0 and not p["shaft_lengths"]:
+        found.append(("bearing_clearance", "0, or shaft_lengths", f"{p['bearing_clearance']:g} m"))
+    return found + _controller_problems(p)
+
+
+def least_tilt_lag(parameters: Mapping[str, Any]) -> float:
+    """Shortest lag of a tilt [s] that an explicit step follows.
+
+    A belt that stays where it is answers an opening q with forces K q against it, K = c r wrap at most, c the
+    stiffness of discs and elements in series: the tilt comes to rest at the rate (1 + kappa K) / T1.
+    """
+    p = parameters
+    if not p.get("step") or variator_problems(p):
+        return 0.0
+    path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
+    whole, disc = stiffness_factors(p)
+    stiffness = 1.0 / (1.0 / axial_element_stiffness(p) + 1.0 / (whole * disc * p["local_stiffness"]))
+    gains = []
+    for radius, wrap in ((path.driving_radius, path.driving_wrap), (path.driven_radius, path.driven_wrap)):
+        tilt = radius * radius / (p["tilt_stiffness"] * p["tilt_factor"] * whole)
+        gains.append(stiffness * radius * wrap * (tilt + shaft_deflection(p, radius)[0] / whole))
+    return float(p["step"] * (1.0 + max(gains)))
+
+
+def _piston_problems(p: Mapping[str, Any]) -> list[Problem]:
+    found = []
+    for pulley in ("driving", "driven"):
+        piston = p[f"{pulley}_piston"]
+        if piston and (len(piston) != 2 or piston[0] >= piston[1]):
+            listed = ", ".join(f"{radius:g} m" for radius in piston)
+            found.append((f"{pulley}_piston", "an inner and a larger outer radius", listed))
+    return found
+
+
+def _drive_problems(p: Mapping[str, Any]) -> list[Problem]:
+    has_given = [np.isinf(p[f"{pulley}_inertia"]) for pulley in ("driving", "driven")]
+    if all(has_given):
+        return [("driven_inertia", "finite, or a finite driving_inertia: one speed follows", "both inf")]
+    if p.get("speed_history") == "ramp" and has_given != [True, False]:
+        return [("speed_history", "constant where the driving pulley's speed is not given", "ramp")]
+    return []
+
+
+def _controller_problems(p: Mapping[str, Any]) -> list[Problem]:
+    found: list[Problem] = []
+    if p["least_thrust"] >= p["most_thrust"]:
+        expected = f"less than most_thrust = {p['most_thrust']:g} N"
+        found.append(("least_thrust", expected, f"{p['least_thrust']:g} N"))
+    if p["clamping"] != "torque_ratio":
+        return found
+    starts = (p["load_start"],) if p.get("load_history") == "ramp" else ()
+    loads = [load for load in (*starts, p["load"]) if load]
+    if p["held_torque_ratio"] == 0.0 or any(load * p["held_torque_ratio"] < 0.0 for load in loads):
+        listed = ", ".join(f"{load:g} N m" for load in loads) or "any"
+        found.append(("held_torque_ratio", f"the sign of the load, {listed}", f"{p['held_torque_ratio']:g}"))
+        return found
+    share = abs(p["held_torque_ratio"])
+    most = capacity.carried_torque(dict(p) | {"thrust": p["most_thrust"]}) * share
+    expected = f"at most {most:.4g} N m, which most_thrust carries at held_torque_ratio {share:g}"
+    return found + [("load", expected, f"{load:g} N m") for load in loads if abs(load) > most][:1]
+
+
+def pulley_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+    """Settings of pulleys without effect, each with the setting that makes it so."""
+    p = PULLEY_DEFAULTS | dict(parameters)
+    controlled = p["driving_axial"] == "ratio", p["clamping"] == "torque_ratio"
+    cases = (
+        (np.isinf(p["driving_inertia"]), ("drive_slope",), "driving_inertia inf"),
+        (p["driving_axial"] != "thrust", ("driving_thrust",), f"driving_axial {p['driving_axial']}"),
+        (p["driving_axial"] == "position", ("driving_spring_rate",), "driving_axial position"),
+        (not controlled[0], ("ratio_gain", "ratio_rate"), f"driving_axial {p['driving_axial']}"),
+        (not controlled[1], ("held_torque_ratio", "clamping_gain", "clamping_rate"), "clamping constant"),
+        (not any(controlled), ("least_thrust", "most_thrust"), "no controller"),
+        (not p["driving_piston"] and not p["driven_piston"], ("oil_density",), "no piston"),
+        (
+            not p["shaft_lengths"],
+            ("shaft_modulus", "shaft_factor", "bearing_stiffness", "seat_positions", "bearing_positions"),
+            "no shaft_lengths",
+        ),
+    )
+    return {key: setting for holds, keys, setting in cases if holds for key in keys}

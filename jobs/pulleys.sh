@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# Each part of the pulleys' freedom by itself, over the loads of jobs/pulleys.toml: jobs/results/pulleys.csv.
+# Needs the environment of jobs/quickstart.sh; out/pulleys_* keep what is done. Values are assumptions, see the job.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+PATH=$PWD/.venv/bin:$PATH
+table=jobs/results/pulleys.csv
+columns=(amplitude frequency axial_force sheave_tilt driving_power lag_loss speed_loss torque_ratio power_residual)
+
+# a shaft of 220 mm, 45 mm thick between the sheaves; its collar is as much stiffer as to leave the driven pulley as it was
+shaft=(--set 'shaft_lengths=["30 mm", "50 mm", "60 mm", "50 mm", "30 mm"]'
+  --set 'shaft_diameters=["30 mm", "40 mm", "45 mm", "40 mm", "30 mm"]'
+  --set 'bearing_positions=["15 mm", "205 mm"]' --set 'seat_positions=["85 mm", "135 mm"]')
+collar=(--set 'tilt_stiffness=3.94e5 N m/rad')
+short=(--set 'step=2 us') # short lags of the tilt need it, the shortest 1 us
+
+part() { # NAME SETTINGS...
+  local name=$1
+  shift
+  cvt-hpc run jobs/pulleys.toml --set name="pulleys_$name" "$@" > /dev/null
+  python jobs/tabulate.py "out/pulleys_$name" "out/pulleys_$name/table.csv" "${columns[@]}" > /dev/null
+  [ -s "$table.part" ] || sed -n '1s/^/part,/p' "out/pulleys_$name/table.csv" > "$table.part"
+  sed -n "2,\$s/^/$name,/p" "out/pulleys_$name/table.csv" >> "$table.part"
+}
+
+rm -f "$table.part"
+still=(--set 'driven_spring_rate=0 N/m')
+part none "${still[@]}"
+part none_2us "${still[@]}" "${short[@]}"
+part spring
+part oil "${still[@]}" --set 'driving_piston=["20 mm", "90 mm"]' --set 'driven_piston=["20 mm", "70 mm"]'
+part drive "${still[@]}" --set 'driving_inertia=0.05 kg m^2'
+part drive_and_given_driven_speed "${still[@]}" --set 'driving_inertia=0.05 kg m^2' --set driven_inertia=inf --set 'drive_slope=0 N m s/rad'
+part ratio_held "${still[@]}" --set driving_axial=ratio --set 'duration=1 s'
+part clamping_held "${still[@]}" --set clamping=torque_ratio
+part both_held "${still[@]}" --set driving_axial=ratio --set clamping=torque_ratio --set 'duration=1 s'
+part tilt_lag_0.02ms "${still[@]}" --set 'step=1 us' --set 'tilt_lag=0.02 ms'
+for lag in 0.05 0.1 0.2 2; do
+  part "tilt_lag_${lag}ms" "${still[@]}" "${short[@]}" --set "tilt_lag=$lag ms"
+done
+part collar_clearance "${still[@]}" "${short[@]}" --set 'tilt_lag=0.05 ms' --set 'collar_clearance=0.5 mrad'
+part shaft "${still[@]}" "${shaft[@]}"
+part shaft_and_collar "${still[@]}" "${shaft[@]}" "${collar[@]}"
+part shaft_rigid "${still[@]}" "${shaft[@]}" --set shaft_factor=inf
+part bearing_clearance "${still[@]}" "${shaft[@]}" "${collar[@]}" "${short[@]}" --set 'tilt_lag=0.05 ms' --set 'bearing_clearance=20 um'
+mv "$table.part" "$table"
