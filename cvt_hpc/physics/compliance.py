@@ -16,7 +16,7 @@ h_k the length that station k stands for. The kernel's inverse is tridiagonal (M
 two; so for a given set of closed stations the solution takes one tridiagonal solve and a 2x2 system. The set
 is found by flipping every station that violates its sign, warm from the last set, and, should that not
 settle, by flipping the first violator only, which ends for every P-matrix (Murty 1974); this matrix is
-symmetric positive definite.
+symmetric positive definite. A matrix of flexibilities in the place of the kernel takes `closed_set`.
 
 Of a single run by plain numbers, or of several at once, each lane with stiffnesses and gaps of its own: lanes
 that have found their set repeat their last solve, with the same numbers, until the slowest has found its own.
@@ -31,7 +31,8 @@ from numpy.typing import DTypeLike
 
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, anywhere, fma, like, maximum, select
-from cvt_hpc.physics.sheaves import Sheaves
+from cvt_hpc.physics.closed_set import factorise_closed, solve_closed
+from cvt_hpc.physics.sheaves import Sheaves, elastic_matrix
 
 ROUNDS_OF_BLOCK_FLIPS = 10
 
@@ -61,6 +62,10 @@ class Contact(NamedTuple):
         solves so far, and whether (1) a search for the closed set did not end.
     fresh : (1,) bool array
         False until the factors belong to the closed set.
+    root : (m,) or (0,) array
+        sqrt(h) [m^(1/2)] where the sheaves have a matrix of flexibilities, else empty.
+    matrix : (m, 2 m) or (0, 0) LaneArray or array
+        That matrix and its factor, as in `closed_set`; else empty.
     sweeps : int
         Sweeps of projected Gauss-Seidel instead (`lane_gauss_seidel`); 0: none, the exact solution.
     """
@@ -71,6 +76,8 @@ class Contact(NamedTuple):
     stations: Any
     scalars: Any
     fresh: np.ndarray
+    root: np.ndarray
+    matrix: Any
     sweeps: int
 
 
@@ -100,15 +107,22 @@ def lane_contact(wraps: list[Sheaves], dtype: DTypeLike, sweeps: int = 0) -> Con
             wrap.off_diagonal,
             wrap.tilt_compliance,
         )
+    has_matrix = wraps[0].flexibilities.size > 0
+    m = weight.size if has_matrix else 0
+    root, matrix = np.sqrt(weight[:m]), LaneArray(m, 2 * m, len(wraps), dtype)
+    for lane, wrap in enumerate(wraps if has_matrix else []):
+        scale = wrap.element_stiffness * root
+        matrix.data[:, :m, lane] = np.eye(m) + scale[:, None] * elastic_matrix(wrap) * root
+    fresh = np.zeros(1, dtype=np.bool_)
     shared = (weight.astype(dtype), wraps[0].tilt[0].astype(dtype), wraps[0].tilt[1].astype(dtype))
-    return Contact(*shared, stations, scalars, np.zeros(1, dtype=np.bool_), sweeps)
+    return Contact(*shared, stations, scalars, fresh, root.astype(dtype), matrix, sweeps)
 
 
 def plain_contact(wrap: Sheaves) -> Contact:
     """All stations closed, for a single wrap in plain numbers."""
     contact = lane_contact([wrap], np.float64)
-    stations, scalars = contact.stations.data[:, :, 0], contact.scalars.data[:, :, 0]
-    return contact._replace(stations=stations, scalars=scalars)
+    names = ("stations", "scalars", "matrix")
+    return contact._replace(**{name: getattr(contact, name).data[:, :, 0] for name in names})
 
 
 @kernel
@@ -130,6 +144,10 @@ def _factorise(contact: Contact) -> None:
     """Factors and tilt responses for the present closed set."""
     stations, scalars, weight = contact.stations, contact.scalars, contact.weight
     m = weight.size
+    if contact.root.size > 0:
+        factorise_closed(contact.matrix, stations, CLOSED, m)
+        contact.fresh[0] = True
+        return
     ce, off = scalars[0, ELEMENT_STIFFNESS], scalars[0, OFF_DIAGONAL]
     whole = ce * scalars[0, COMPLIANCE]
     grip = whole * scalars[0, DISC_COMPLIANCE]
@@ -162,10 +180,26 @@ def _factorise(contact: Contact) -> None:
 @kernel
 def _pushes(contact: Contact) -> bool:
     """PUSH for the present closed set; whether a station of any lane is on the wrong side."""
+    stations, scalars = contact.stations, contact.scalars
+    ce, round_off = scalars[0, ELEMENT_STIFFNESS], scalars[0, ROUND_OFF]
+    if contact.root.size > 0:
+        solve_closed(contact.matrix, contact.root, stations, (CLOSED, GAP, Y, PUSH), ce)
+    else:
+        _push_by_kernel(contact)
+    wrong = ce < 0.0
+    for j in range(contact.weight.size):
+        push = stations[j, PUSH]
+        # closed stations that pull, open ones that overlap
+        outward = select(stations[j, CLOSED] > 0.5, -push, push)
+        wrong |= outward > round_off
+    return anywhere(wrong)
+
+
+@kernel
+def _push_by_kernel(contact: Contact) -> None:
     stations, scalars, weight = contact.stations, contact.scalars, contact.weight
     m = weight.size
-    ce, a, round_off = scalars[0, ELEMENT_STIFFNESS], scalars[0, COMPLIANCE], scalars[0, ROUND_OFF]
-    disc = scalars[0, DISC_COMPLIANCE]
+    ce, a, disc = scalars[0, ELEMENT_STIFFNESS], scalars[0, COMPLIANCE], scalars[0, DISC_COMPLIANCE]
     y = like(0.0, ce)
     for j in range(m):
         y = fma(-stations[j, MULTIPLIER], y, -weight[j] * stations[j, CLOSED] * ce * stations[j, GAP])
@@ -182,15 +216,9 @@ def _pushes(contact: Contact) -> bool:
     gain = scalars[0, TILT_COMPLIANCE] * ce
     t1 = gain * (scalars[0, INVERSE_11] * p1 + scalars[0, INVERSE_12] * p2)
     t2 = gain * (scalars[0, INVERSE_12] * p1 + scalars[0, INVERSE_22] * p2)
-    wrong = ce < 0.0
     for j in range(m):
         elastic = fma(t2, stations[j, RESPONSE_2], fma(t1, stations[j, RESPONSE_1], stations[j, Y]))
-        push = -ce * fma(a, elastic, stations[j, GAP])
-        stations[j, PUSH] = push
-        # closed stations that pull, open ones that overlap
-        outward = select(stations[j, CLOSED] > 0.5, -push, push)
-        wrong |= outward > round_off
-    return anywhere(wrong)
+        stations[j, PUSH] = -ce * fma(a, elastic, stations[j, GAP])
 
 
 @kernel

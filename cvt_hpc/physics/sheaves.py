@@ -31,6 +31,9 @@ class Sheaves(NamedTuple):
         U [1].
     tilt_compliance : float
         r^2 / c_tilt [m/N].
+    flexibilities : (m, m) or (0, 0) array
+        W [m/N] in the place of the local kernel, of discs of the reference stiffness: opening at one station
+        under a force at another; empty: the kernel.
     """
 
     weight: np.ndarray
@@ -41,6 +44,7 @@ class Sheaves(NamedTuple):
     off_diagonal: float
     tilt: np.ndarray
     tilt_compliance: float
+    flexibilities: np.ndarray
 
 
 def sheaves(
@@ -96,6 +100,7 @@ def sheaves(
         -scale * decay,
         np.array([np.cos(phi), np.sin(phi)]),
         radius * radius / tilt_stiffness,
+        np.empty((0, 0)),
     )
 
 
@@ -133,8 +138,16 @@ def flexibility(sheave: Sheaves) -> np.ndarray:
         C [m^2/N], force per length in, gap out; C diag(1/h) is symmetric.
     """
     m = sheave.weight.size
-    inverse = np.diag(sheave.diagonal)
-    inverse += sheave.off_diagonal * (np.eye(m, k=1) + np.eye(m, k=-1))
-    elastic = sheave.disc_compliance * np.linalg.inv(inverse)
-    elastic += sheave.tilt_compliance * sheave.tilt.T @ sheave.tilt
-    return np.eye(m) / sheave.element_stiffness + sheave.compliance * elastic * sheave.weight
+    return np.eye(m) / sheave.element_stiffness + elastic_matrix(sheave) * sheave.weight
+
+
+def elastic_matrix(sheave: Sheaves) -> np.ndarray:
+    """Symmetric a (b W + r^2 / c_tilt U^T U), (m, m) [m/N]: force in, opening of disc and collar out."""
+    local = sheave.flexibilities
+    if not local.size:
+        m = sheave.weight.size
+        inverse = np.diag(sheave.diagonal)
+        inverse += sheave.off_diagonal * (np.eye(m, k=1) + np.eye(m, k=-1))
+        local = np.linalg.inv(inverse)
+    elastic = sheave.disc_compliance * local + sheave.tilt_compliance * sheave.tilt.T @ sheave.tilt
+    return sheave.compliance * elastic

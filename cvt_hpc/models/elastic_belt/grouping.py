@@ -38,6 +38,7 @@ SHARED = (
     "precision",
     "lanes",
     "contact_sweeps",
+    "sheave_deformation",
 )
 
 

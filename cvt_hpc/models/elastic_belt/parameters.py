@@ -11,6 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.deflection_settings import (
+    DEFLECTION,
+    deflection_inert,
+    deflection_problems,
+)
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert, pulley_problems, shaft_problems
 from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, PULLEYS, SHAFT
 from cvt_hpc.parameters import Parameter, not_negative, positive
@@ -119,6 +124,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "driven_inertia": DRIVEN_INERTIA,
     },
+    "deflection": DEFLECTION,
     "pulleys": PULLEYS,
     "shaft": SHAFT,
     "friction": FRICTION,
@@ -168,6 +174,7 @@ def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         path = variator(p["ratio"], p["driven_radius"], p["centre_distance"]).path_length
         if abs(p["play"]) > 0.02 * path:
             problems.append(("play", f"within 2 % of the belt's length {path:.4g} m", f"{p['play']:g} m"))
+        problems += deflection_problems(p)
     return problems + shaft_problems(p)
 
 
@@ -197,4 +204,4 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         (np.isinf(whole), of_disc + of_tilt, "sheave_stiffness inf"),
     )
     found = {key: setting for holds, keys, setting in cases if holds for key in keys}
-    return friction_inert(p) | course_inert(p) | pulley_inert(p) | found
+    return friction_inert(p) | course_inert(p) | pulley_inert(p) | deflection_inert(p) | found

@@ -1,0 +1,118 @@
+"""Deflection of the sheaves' discs: flexibilities w_ij of the stations of a wrap, by formula or by table.
+
+A force F_j [N] on both flanks at station j opens the groove at station i by w_ij F_j (Castigliano's theorem
+with Maxwell and Betti's reciprocity: Bullinger et al. 2005, eq. 10), so w is symmetric and positive definite,
+its entries of either sign: a disc that is pressed on one side comes nearer on the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+ROUND_OFF = 1e-6  # of the largest entry: what tables of six digits leave of symmetry
+
+
+def cone_flexibilities(
+    stations: int, spacing: float, radius: float, stiffness: float, shift: float = 0.0
+) -> np.ndarray:
+    """Flexibilities of a cone that tilts as a whole, the "sinus approach" (Bullinger et al. 2005, fig. 10).
+
+    The axis of tilting is shifted from the centre towards the contact, here the middle of the arc; the paper
+    does not say where along the arc it takes the contact. Tilting about the axis across that opens by
+    r cos(phi) - dr, about the other by r sin(phi), phi from the middle.
+
+    Parameters
+    ----------
+    stations : int
+        Their number m.
+    spacing : float
+        Their distance along the arc [m].
+    radius : float
+        Pitch radius r [m].
+    stiffness : float
+        Of the cone against tilting, in series with that of its collar [N m/rad]; inf: rigid.
+    shift : float
+        dr [m].
+
+    Returns
+    -------
+    (m, m) array
+        w [m/N], of rank two.
+    """
+    phi = (np.arange(stations) - 0.5 * (stations - 1)) * spacing / radius
+    levers = np.array([radius * np.cos(phi) - shift, radius * np.sin(phi)])
+    return levers.T @ levers / stiffness
+
+
+def table_matrix(angles: Sequence[float], table: Sequence[Sequence[float]]) -> np.ndarray:
+    """Square matrix of a table of flexibilities.
+
+    Parameters
+    ----------
+    angles : sequence of n floats
+        Ascending angles from the inlet [rad]; of a single row equidistant and from 0.
+    table : n rows of n floats, or one row of n
+        w [m/N] of each pair of angles, or of a body of revolution over the angle between both.
+    """
+    values = np.array(table, dtype=float)
+    if len(values) > 1:
+        return values
+    apart = np.arange(len(angles))
+    return values[0][np.abs(apart[:, None] - apart)]
+
+
+def interpolated(
+    angles: Sequence[float], table: Sequence[Sequence[float]], stations: int, spacing: float, radius: float
+) -> np.ndarray:
+    """Flexibilities of a wrap from a table: forces go to the knots beside them, openings come from there.
+
+    So w stays symmetric and positive semi-definite on any mesh. Where knots are stations it is the table's.
+
+    Returns
+    -------
+    (m, m) array
+        w [m/N].
+    """
+    places = np.arange(stations) * spacing / radius
+    shares = np.array([np.interp(places, angles, unit) for unit in np.eye(len(angles))])
+    found = shares.T @ table_matrix(angles, table) @ shares
+    return 0.5 * (found + found.T)
+
+
+def table_problem(
+    angles: Sequence[float], table: Sequence[Sequence[float]], wrap: float
+) -> tuple[str, str] | None:
+    """What is wrong with a table of flexibilities: expected and found; None where all is well.
+
+    Parameters
+    ----------
+    angles, table : sequences
+        As of `table_matrix`.
+    wrap : float
+        Angle of the wrap [rad], which the table has to cover.
+    """
+    n, steps = len(angles), np.diff(angles)
+    if n < 2 or {len(row) for row in table} != {n} or len(table) not in (1, n):
+        rows = " x ".join(str(size) for size in (len(table), len(table[0]) if table else 0))
+        return f"1 or n rows of n flexibilities, n >= 2 being the number of angles, {n}", rows
+    if angles[0] != 0.0 or steps.min() <= 0.0:
+        return "angles that ascend from 0", f"{angles[0]:g} to {angles[-1]:g} rad"
+    if len(table) == 1 and np.ptp(steps) > ROUND_OFF * steps.max():
+        return (
+            "equidistant angles of a disc of revolution",
+            f"steps of {steps.min():g} to {steps.max():g} rad",
+        )
+    if angles[-1] < wrap * (1.0 - ROUND_OFF):
+        return f"angles over the whole wrap, {wrap:.4g} rad", f"up to {angles[-1]:.4g} rad"
+    matrix = table_matrix(angles, table)
+    worst = np.abs(matrix - matrix.T).max()
+    if not worst <= ROUND_OFF * np.abs(matrix).max():
+        i, j = np.unravel_index(np.abs(matrix - matrix.T).argmax(), matrix.shape)
+        pair = f"{matrix[i, j]:g} and {matrix[j, i]:g} m/N"
+        return "a symmetric matrix, by Maxwell and Betti", f"{pair} between angles {i + 1} and {j + 1}"
+    least = np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[0]
+    if least <= 0.0:
+        return "a positive definite matrix, since no force gains work", f"the eigenvalue {least:g} m/N"
+    return None
