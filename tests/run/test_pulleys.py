@@ -7,7 +7,7 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.belt import DRIVEN_POSITION, FIRST_STATE, belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.pulley_settings import oil_factor, piston_area
-from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVING_COS, SHIFT
+from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVEN_TILT, DRIVING_COS, SHIFT
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
 from support.fast_runs import FastRuns
 from support.marched import Together, balance, job, mean
@@ -122,22 +122,26 @@ def test_springs_store_half_their_force_times_their_way():
     assert gained == pytest.approx(0.5 * (1e7 * 9e-8 + 4e7 * 4e-8), rel=1e-9)
 
 
-def test_a_tilt_stores_what_the_contact_does_of_one_without_a_lag():
-    plain, state = tilted(1e-3, 4e-6)
-    lagging, _ = tilted(0.0, 4e-6, tilt_lag=1e-3)
-    force = np.zeros(plain.cell.size)
-    assert contact_forces(plain, state, fresh_contacts(plain), force) > 0
-    resting = state.copy()
-    for first, tilted_by, sheave in (
-        (0, DRIVING_COS, plain.driving),
-        (plain.driven_start, DRIVEN_COS, plain.driven),
-    ):
-        pull = sheave.tilt @ (sheave.weight * force[first : first + sheave.weight.size])
-        place = FIRST_STATE + tilted_by
-        resting.scalars[place : place + 2] = sheave.tilt_compliance * pull
-    assert stored(lagging, resting) == pytest.approx(stored(plain, state), rel=1e-12)
-    resting.scalars[FIRST_STATE + DRIVEN_COS] *= 1.01
-    assert stored(lagging, resting) != pytest.approx(stored(plain, state), rel=1e-12)
+@pytest.mark.parametrize("clearance", [0.0, 5e-4])
+def test_a_tilt_stores_what_its_spring_takes_less_what_the_contact_gives(clearance):
+    """dE / dq = (|q| - c) / kappa along q less s."""
+    belt, state = tilted(1e-3, 4e-6, tilt_lag=1e-3, collar_clearance=clearance)
+    place = FIRST_STATE + DRIVEN_COS
+    state.scalars[place : place + 2] *= 1.3  # far from rest
+    force, sheave = np.zeros(belt.cell.size), belt.driven
+    assert contact_forces(belt, state, fresh_contacts(belt), force) > 0
+    pull = sheave.tilt @ (sheave.weight * force[belt.driven_start :][: sheave.weight.size])
+    opening = state.scalars[place : place + 2].copy()
+    elastic = opening * (1.0 - clearance * belt.driven_radius / np.linalg.norm(opening))
+    expected = elastic / belt.pulleys.laws[0, DRIVEN_TILT] - pull
+    for k in range(2):
+        energies = []
+        for way in (1e-7, -1e-7):
+            state.scalars[place : place + 2] = opening
+            state.scalars[place + k] += way
+            energies.append(stored(belt, state))
+        assert (energies[0] - energies[1]) / 2e-7 == pytest.approx(expected[k], rel=1e-4)
+        assert abs(expected[k]) > 1e3
 
 
 def test_a_short_lag_is_none():
