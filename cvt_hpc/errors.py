@@ -25,11 +25,12 @@ class InputError(ValueError):
         super().__init__(one_line(text))
 
 
-class UnitWarning(UserWarning):
-    """A number without a unit that is far from usual: it may be meant in another unit.
+class JobWarning(UserWarning):
+    """What a job says may not be what is meant. The command line prints it on stderr."""
 
-    The command line prints it on stderr.
-    """
+
+class UnitWarning(JobWarning):
+    """A number without a unit that is far from usual: it may be meant in another unit."""
 
 
 def mismatch(where: str, expected: str, found: str) -> InputError:

@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 from cvt_hpc import __version__
 from cvt_hpc.cli import checking, experiments, plots, results, single_run, sweep
 from cvt_hpc.cli.parts import BAD_INPUT, DONE, INTERRUPTED, complain, speaks
-from cvt_hpc.errors import CRASHED, InputError, UnitWarning, mismatch, one_line, show
+from cvt_hpc.errors import CRASHED, InputError, JobWarning, mismatch, one_line, show
 
 __all__ = ["main"]
 
@@ -43,7 +43,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         _check_readable(sys.argv[1:] if arguments is None else arguments)
         parsed = _parser().parse_args(arguments)
-        with _compiling_told(), _unit_warnings_told():
+        with _compiling_told(), _job_warnings_told():
             status = parsed.command(parsed)
         sys.stdout.flush()
         return status
@@ -76,13 +76,13 @@ def _compiling_told() -> Iterator[None]:
 
 
 @contextmanager
-def _unit_warnings_told() -> Iterator[None]:
-    """Print warnings of numbers without a unit on stderr, each once."""
+def _job_warnings_told() -> Iterator[None]:
+    """Print warnings about jobs on stderr, each once."""
     told: set[str] = set()
     shown = warnings.showwarning
 
     def show(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
-        if not issubclass(category, UnitWarning):
+        if not issubclass(category, JobWarning):
             shown(message, category, *rest, **more)
             return
         _, _, text = str(message).rpartition("] ")  # many points of a chart have one value of its job
@@ -91,7 +91,7 @@ def _unit_warnings_told() -> Iterator[None]:
             complain(f"warning: {message}")
 
     with warnings.catch_warnings():
-        warnings.simplefilter("always", UnitWarning)
+        warnings.simplefilter("always", JobWarning)
         warnings.showwarning = show
         yield
 

@@ -1,4 +1,4 @@
-"""Numbers without a unit that are far from usual draw a warning, in Python and in the commands."""
+"""Numbers far from usual without a unit, and scaled sheaves, draw a warning, in Python and in the commands."""
 
 import warnings
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 
 from cvt_hpc import models
 from cvt_hpc.cli import main
-from cvt_hpc.errors import UnitWarning
+from cvt_hpc.errors import JobWarning, UnitWarning
 from cvt_hpc.job import build_job, load_job, rebuild_job
 from cvt_hpc.job.plausibility import warn_of_bare_numbers
 from cvt_hpc.parameters import Parameter
@@ -22,7 +22,7 @@ def warned(call, *arguments, **more):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         call(*arguments, **more)
-    assert {one.category for one in caught} <= {UnitWarning}
+    assert {one.category for one in caught} <= {JobWarning, UnitWarning}
     return [str(one.message) for one in caught]
 
 
@@ -79,6 +79,22 @@ def test_every_place_of_a_job_is_looked_at_and_what_counts_most_is_told(write_jo
     ]
     # a number that is an SI value of another job is what it is
     assert warned(rebuild_job, document, "x", {}) == []
+
+
+@pytest.mark.parametrize("model", ["elastic_belt", "linear_stability"])
+def test_scaled_sheaves_are_told_unless_the_job_names_what_is_scaled(model, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("x.toml").write_text(f'name = "x"\nmodel = "{model}"\n[axes]\nload = ["40 N m"]\n')
+    told = 'x.toml: [sheaves] sheave_stiffness scales the discs alone; stiffness_of = "sheave" keeps the earlier '
+    told += 'meaning, disc and tilt; stiffness_of = "disc" silences this line'
+    for value in ("1.5", "inf", "[1, 1.5]"):
+        assert warned(load_job, "x.toml", [f"sheave_stiffness={value}"]) == [told]
+        for named in ("disc", "sheave"):
+            assert warned(load_job, "x.toml", [f"sheave_stiffness={value}", f"stiffness_of={named}"]) == []
+    assert warned(load_job, "x.toml") == warned(load_job, "x.toml", ["sheave_stiffness=[1]"]) == []
+    main(["check", "x.toml", "--set", "sheave_stiffness=1.5"])
+    shown = [one for one in capsys.readouterr().err.splitlines() if "warning" in one]
+    assert shown == [f"cvt-hpc: warning: {told}"]
 
 
 def test_commands_say_it_once_on_stderr(write_job, capsys):

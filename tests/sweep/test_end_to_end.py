@@ -36,6 +36,9 @@ load = ["0 N m", "60 N m", "120 N m", "500 N m"] # the last one is more than fri
 [scene]
 rise_time = "20 ms"
 
+[sheaves]
+stiffness_of = "disc"
+
 [mesh]
 stations = 48
 
