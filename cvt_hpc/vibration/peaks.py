@@ -3,7 +3,7 @@
 Strands that move at several frequencies have a mode for each; the amplitude of a mode over the whole band
 does not tell which goes with which. A peak is one of the spectrum of all modes together, the root of the sum
 of their squares. Peaks nearer to a higher one than the window's main lobe, or lower than its side lobes, are
-that one's own flanks.
+that one's own, in the band or beside it.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.vibration.tapering import Array, check_band, fine_spectrum, time_last
 
 COUNT = 3  # peaks of a strand that are recorded
-MAIN_LOBE = 4.0  # of Hann's window, over 1 / length: between its zeros
-LEAST = 0.05  # of a strand's highest peak; the side lobes of Hann's window reach 0.027
+MAIN_LOBE = 4.0  # of Hann's window, in lines: between its zeros
+MARGIN = 2.0  # above side lobes
+LEAST = 0.05  # of a strand's highest peak in the band
 
 VARIABLES = (
     Variable("peak_frequency", ("strand", "peak"), "f8", "Hz", "of the largest peaks of the strand's motion"),
@@ -86,7 +87,7 @@ def modal_peaks(modes: ArrayLike, rate: float, band: tuple[float, float]) -> Pea
         np.full((strands, COUNT), np.nan), np.full((strands, COUNT), np.nan), np.zeros((strands, COUNT), int)
     )
     for strand, height in enumerate(total):
-        for k, line in enumerate(_highest(lines, height, band, MAIN_LOBE * rate / len(samples))):
+        for k, line in enumerate(_highest(lines, height, band, rate / len(samples))):
             own = magnitudes[strand, :, line]
             found.frequency[strand, k] = _vertex(lines, height, line)
             found.mode[strand, k] = 1 + np.argmax(own)
@@ -94,16 +95,26 @@ def modal_peaks(modes: ArrayLike, rate: float, band: tuple[float, float]) -> Pea
     return found
 
 
-def _highest(lines: Array, height: Array, band: tuple[float, float], lobe: float) -> list[int]:
-    """Lines of the highest peaks in a band, each no nearer to a higher one than a lobe [Hz]."""
-    inside = (lines[1:-1] >= band[0]) & (lines[1:-1] <= band[1])
-    is_peak = inside & (height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:])
+def _highest(lines: Array, height: Array, band: tuple[float, float], width: float) -> list[int]:
+    """Lines of the highest peaks in a band, none of them a flank or a side lobe of a higher peak anywhere.
+
+    `width` is the distance of two lines of a transform without padding [Hz].
+    """
+    is_peak = (height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:])
     candidates = 1 + np.flatnonzero(is_peak)
+    peaks: list[int] = []
     chosen: list[int] = []
     for line in candidates[np.argsort(height[candidates])[::-1]]:
-        if len(chosen) == COUNT or (chosen and height[line] < LEAST * height[chosen[0]]):
+        if len(chosen) == COUNT:
             break
-        if all(abs(lines[line] - lines[other]) >= lobe for other in chosen):
+        apart = np.abs(lines[peaks] - lines[line]) / width
+        if (apart < MAIN_LOBE).any():
+            continue
+        # side lobes of Hann's window fall as 1 / (pi x (x^2 - 1)), x in lines
+        if (height[line] < MARGIN * height[peaks] / (np.pi * apart * (apart**2 - 1.0))).any():
+            continue
+        peaks.append(int(line))
+        if band[0] <= lines[line] <= band[1] and not (chosen and height[line] < LEAST * height[chosen[0]]):
             chosen.append(int(line))
     return chosen
 

@@ -11,7 +11,7 @@ from cvt_hpc.job import load_job
 from cvt_hpc.study.description import describe
 
 FOLDER = Path(__file__).parents[2] / "jobs"
-OF_COMMANDS = {"branch", "chart", "ladder"}  # tables of jobs that `run` and `check` do not take
+OF_COMMANDS = {"branch", "chart", "fit", "ladder"}  # tables of jobs that `run` and `check` do not take
 JOBS = [
     path for path in sorted(FOLDER.glob("*.toml")) if not OF_COMMANDS & tomllib.loads(path.read_text()).keys()
 ]

@@ -9,10 +9,12 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
+from cvt_hpc.analysis.curves import curve_figure
 from cvt_hpc.analysis.figures import draw
+from cvt_hpc.analysis.followed_drawing import element_figure
 from cvt_hpc.analysis.profiles import profile_figure
 from cvt_hpc.analysis.ramps import ramp_figure
-from cvt_hpc.analysis.statements import bullinger_along, bullinger_ratios, lebrecht_ramps
+from cvt_hpc.analysis.statements import bullinger_along, bullinger_ratios, lebrecht_belt, lebrecht_ramps
 from cvt_hpc.analysis.statements.kept import Kept, opened
 from cvt_hpc.analysis.statements.verdicts import Finding, Statement, judged
 from cvt_hpc.analysis.strand_bars import strand_bars_figure
@@ -57,9 +59,18 @@ FIGURES = {
         ("23", _along("normal_force", region="driving"), bullinger_ratios.FIGURE_23),
     )
 }
-FIGURES["lebrecht_3_14"] = PaperFigure(
-    "Lebrecht et al. 2004, fig. 3.14", lambda kept: ramp_figure(kept.histories), lebrecht_ramps.FIGURE_3_14
-)
+FIGURES |= {
+    f"lebrecht_{number.replace('.', '_')}": PaperFigure(
+        f"Lebrecht et al. 2004, fig. {number}", compose, statements
+    )
+    for number, compose, statements in (
+        ("3.7", lambda kept: curve_figure(kept.results, ["eigenfrequency"]), lebrecht_belt.FIGURE_3_7),
+        ("3.9", lambda kept: ramp_figure(kept.histories), lebrecht_ramps.FIGURE_3_9),
+        ("3.10", lambda kept: element_figure(kept.histories[0], "driven"), lebrecht_belt.FIGURE_3_10),
+        ("3.13", lambda kept: ramp_figure(kept.histories), lebrecht_ramps.FIGURE_3_13),
+        ("3.14", lambda kept: ramp_figure(kept.histories), lebrecht_ramps.FIGURE_3_14),
+    )
+}
 
 
 def figure_of(folder: Path) -> tuple[Path, Path, list[Finding]]:

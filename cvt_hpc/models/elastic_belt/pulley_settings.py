@@ -179,16 +179,22 @@ PULLEY_DEFAULTS = {
 
 
 def are_free(parameters: Mapping[str, Any]) -> bool:
-    """Whether pulleys do more than turn by a given speed, or be pressed by a constant thrust."""
-    p = PULLEY_DEFAULTS | dict(parameters)
+    """Whether pulleys do more than turn by a given speed, or be pressed by a constant thrust.
+
+    Reads no parameter that does not count: those that it reads tell which runs can share a batch.
+    """
+
+    def of(key: str) -> Any:
+        return parameters[key] if key in parameters else PULLEY_DEFAULTS[key]
+
     return bool(
-        np.isfinite(p["driving_inertia"])
-        or np.isinf(p["driven_inertia"])
-        or p["driving_axial"] != "position"
-        or p["clamping"] != "constant"
-        or p["driven_spring_rate"] > 0.0
-        or p["driven_piston"]
-        or p["tilt_lag"] > 0.0
+        np.isfinite(of("driving_inertia"))
+        or np.isinf(of("driven_inertia"))
+        or of("driving_axial") != "position"
+        or of("clamping") != "constant"
+        or of("driven_spring_rate") > 0.0
+        or of("driven_piston")
+        or of("tilt_lag") > 0.0
     )
 
 
