@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cvt_hpc import simulate
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.belt import (
@@ -27,6 +28,7 @@ from cvt_hpc.models.quasi_static_belt.basis import (
 from cvt_hpc.models.quasi_static_belt.coupled import chain, solve_chain, solve_dense
 from cvt_hpc.models.quasi_static_belt.step import march, motion, refresh, split_belt, work_space
 from cvt_hpc.models.quasi_static_belt.transient import batch
+from support.rungs import rung_job
 
 LIMIT, STEP, SPACING = 1000.0, 1e-5, 0.02
 
@@ -190,3 +192,13 @@ def test_jobs_know_it():
         build_job(document | {"stepper": "scipy_bdf"}, "test.toml")
     with pytest.raises(InputError, match="split"):
         build_job(document, "test.toml", {"split": "mode"})
+
+
+def test_a_history_has_profiles_over_time_and_their_means():
+    values = {"stations": 48, "duration": 0.04, "rise_time": 0.01, "judged_fraction": 0.5}
+    found = simulate(rung_job("quasi_static_belt", load=60.0, profile_duration=0.02, **values))
+    kept = found["momentary_contact_force"]
+    assert kept.sizes["profile_time"] == 400
+    # single precision
+    expected = found["contact_force"].values
+    assert kept.mean("profile_time").values == pytest.approx(expected, abs=1e-6 * expected.max())

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.elastic_belt import one_system
 from cvt_hpc.models.elastic_belt.belt import (
     V_ELEMENT,
@@ -20,13 +19,10 @@ from cvt_hpc.models.elastic_belt.belt import (
     initial_state,
     random_strands,
 )
-from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK, lane_belt, lane_state, put_lane
-from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES
-from cvt_hpc.models.elastic_belt.march import sample_state
-from cvt_hpc.models.elastic_belt.momentary import Momentary
-from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, recording
+from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK, put_lane
+from cvt_hpc.models.elastic_belt.one_lane_run import OneLaneRun
 from cvt_hpc.models.elastic_belt.rhs import strains
-from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFILES, Outcome
+from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.sparsity import SparseJacobian
 from cvt_hpc.models.elastic_belt.validity import FAILURES
 from cvt_hpc.models.marched import Marched
@@ -75,7 +71,7 @@ class Form:
         return {"jac": jacobian}
 
 
-class GeneralTransient(Marched, RecordedRun):
+class GeneralTransient(Marched, OneLaneRun):
     """One run, advanced sample by sample; attributes as of `RecordedRun`.
 
     Parameters
@@ -87,51 +83,23 @@ class GeneralTransient(Marched, RecordedRun):
     """
 
     form: type[Any] = Form  # what a model has instead has the same methods
-    done: int
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
         p = parameters
         self.done = 0
         self.prolong(p)
-        n = self.mesh.cell.size
         self.belt = belt_constants(p)
         self._disturbed = False
-        self._ended = LaneArray(1, len(ENDED), 1)
         self._form = self.form(self.belt, self.mesh, p)
         first = initial_state(p, self.belt)
         start = self._form.pack(first)
-        # the same run as a single lane, which is what can be sampled
-        self._lane_belt = lane_belt([self.belt], np.float64)
-        self._lane = lane_state([self.belt], [first], np.float64)
-        self._stations = LaneArray(n, FIELDS_OF_FORCES, 1)
+        self._make_lane(self.belt, first)
         self.marching = Marching(stepper, p, self._form.system, start, self.interval)
         self._stable = STABLE.get(stepper, np.inf)
         self._fastest = np.random.default_rng(0).normal(size=start.size)
         if stepper.startswith("scipy_"):
             self.marching.tell(**self._form.hints(stepper))
         self.failure: tuple[Status, str] | None = None
-
-    def prolong(self, parameters: Mapping[str, Any]) -> None:
-        """Make room for the samples of a longer duration, whose judged part has yet to come.
-
-        Parameters
-        ----------
-        parameters : dict
-            Those of the run but for `duration` and `judged_fraction`.
-        """
-        plan = recording(parameters, np.float64)
-        self._profiles = [LaneArray(rows, len(PROFILES), 1) for rows in (0, plan.mesh.cell.size)]
-        RecordedRun.__init__(self, parameters, plan, self._profiles[1].data[:, :, 0])
-        rows = LaneArray(self.samples, self._sensed + len(CHANNELS), 1)
-        if self.done:
-            rows.data[: self.done, :, 0] = self.rows
-        self._rows = rows
-        self._momentary = Momentary([parameters], plan.mesh.cell.size)
-
-    @property
-    def momentary(self) -> np.ndarray | None:
-        """What `Momentary` has kept of the run."""
-        return self._momentary.of(0)
 
     @property
     def state(self) -> State:
@@ -143,11 +111,6 @@ class GeneralTransient(Marched, RecordedRun):
         """Solves of the contact problem so far: two wraps in every evaluation of the rates."""
         return 2 * self.counters()["rates"]
 
-    @property
-    def rows(self) -> np.ndarray:
-        """The sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C)."""
-        return self._rows.data[: self.done, :, 0]
-
     def take_over(self, runs: Sequence[Any]) -> None:
         """Go on from where a run by another stepper stands, its history included, but for means begun before.
 
@@ -157,10 +120,7 @@ class GeneralTransient(Marched, RecordedRun):
             Of the same mesh, sampling and duration.
         """
         (run,) = runs
-        self.done, self._disturbed = run.done, run.done > self._plan.kick
-        self._rows.data[: self.done, :, 0] = run.rows
-        if self.done > self._plan.first_judged:
-            self._profiles[1].data[:] = np.nan  # what the other has summed up is not known
+        self._go_on_from(run)
         self.marching.begin(run.time, self._form.pack(run.state))
 
     def advance(self, samples: int) -> tuple[Status, str] | None:
@@ -226,17 +186,8 @@ class GeneralTransient(Marched, RecordedRun):
         lane.time[0] = (self.done + 1) * self.interval
         # a general stepper knows nothing of dampers: their work is taken from the state, as over the interval
         lane.scalars.data[0, LAYER_WORK] = damper_power(self.belt, state) * self.interval
-        is_judged, is_kept = self.done >= self._plan.first_judged, self.done >= self._momentary.first
-        sums = self._profiles[int(is_judged)]
-        profiles = LaneArray(*self._profiles[1].data.shape) if is_kept else sums
-        place = self._plan.sensing, self._rows, self.done, profiles, self._ended
-        sample_state(self._lane_belt, lane, self._stations, *place)
+        outcome = self._sample_lane()
         self._rows.data[self.done, -1, 0] = np.nan  # its steps are not seen here: no step_ripple
-        if is_kept:
-            self._momentary.note(self.done, profiles)
-            if is_judged:
-                sums.data[:] += profiles.data
-        outcome = int(self._ended.data[0, OUTCOME, 0])
         self.done += int(outcome == Outcome.OK)
         return outcome
 

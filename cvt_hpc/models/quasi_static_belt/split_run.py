@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.kernels import called_alike
-from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.elastic_belt.belt import (
     LAYER_WORK,
     State,
@@ -18,11 +17,10 @@ from cvt_hpc.models.elastic_belt.belt import (
     random_strands,
 )
 from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK as LANE_WORK
-from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state, put_lane
-from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES, NOTED
-from cvt_hpc.models.elastic_belt.march import sample_state
-from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, recording
-from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFILES, Outcome
+from cvt_hpc.models.elastic_belt.lane_belt import put_lane
+from cvt_hpc.models.elastic_belt.lane_forces import NOTED
+from cvt_hpc.models.elastic_belt.one_lane_run import OneLaneRun
+from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.validity import FAILURES
 from cvt_hpc.models.quasi_static_belt.basis import split_basis
 from cvt_hpc.models.quasi_static_belt.step import march, motion, refresh, split_belt, work_space
@@ -30,10 +28,10 @@ from cvt_hpc.variables import Status
 
 BEYOND_LIMIT = 1.25  # of 2 / w of the fastest dynamic shape: contact may be stiffer than at rest
 
-_march, _sample = called_alike(march), called_alike(sample_state)
+_march = called_alike(march)
 
 
-class SplitRun(RecordedRun):
+class SplitRun(OneLaneRun):
     """One run, advanced sample by sample; attributes as of `RecordedRun`.
 
     Parameters
@@ -44,7 +42,6 @@ class SplitRun(RecordedRun):
         "split", which it is.
     """
 
-    done: int
     failure: tuple[Status, str] | None
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
@@ -66,34 +63,9 @@ class SplitRun(RecordedRun):
         )
         first = initial_state(p, self.belt)
         self._motion, self._work = motion(self._model, first), work_space(self._model)
-        # the same run as a single lane, which is what can be sampled
-        self._lane_belt = lane_belt([self.belt], np.float64)
-        self._lane = lane_state([self.belt], [first], np.float64)
-        self._stations = LaneArray(n, FIELDS_OF_FORCES, 1)
-        self._ended = LaneArray(1, len(ENDED), 1)
+        self._make_lane(self.belt, first)
         self._noted = np.zeros((3, n))
         self._disturbed = False
-
-    def prolong(self, parameters: Mapping[str, Any]) -> None:
-        """Make room for the samples of a longer duration, whose judged part has yet to come.
-
-        Parameters
-        ----------
-        parameters : dict
-            Those of the run but for `duration` and `judged_fraction`.
-        """
-        plan = recording(parameters, np.float64)
-        self._profiles = [LaneArray(rows, len(PROFILES), 1) for rows in (0, plan.mesh.cell.size)]
-        RecordedRun.__init__(self, parameters, plan, self._profiles[1].data[:, :, 0])
-        rows = LaneArray(self.samples, self._sensed + len(CHANNELS), 1)
-        if self.done:
-            rows.data[: self.done, :, 0] = self.rows
-        self._rows = rows
-
-    @property
-    def rows(self) -> np.ndarray:
-        """The sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C)."""
-        return self._rows.data[: self.done, :, 0]
 
     @property
     def time(self) -> float:
@@ -132,10 +104,7 @@ class SplitRun(RecordedRun):
             Of the same mesh, sampling and duration.
         """
         (run,) = runs
-        self.done, self._disturbed = run.done, run.done > self._plan.kick
-        self._rows.data[: self.done, :, 0] = run.rows
-        if self.done > self._plan.first_judged:
-            self._profiles[1].data[:] = np.nan  # what the other has summed up is not known
+        self._go_on_from(run)
         self._motion = motion(self._model, run.state)
 
     def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
@@ -194,9 +163,6 @@ class SplitRun(RecordedRun):
         noted = self._noted.copy()
         noted[1:] += state.fields[2:4] - lane.fields.data[:, 2:4, 0].T
         self._stations.data[:, NOTED : NOTED + 3, 0] = noted.T
-        profiles = self._profiles[int(self.done >= self._plan.first_judged)]
-        place = self._plan.sensing, self._rows, self.done, profiles, self._ended
-        _sample(self._lane_belt, lane, self._stations, *place)
-        outcome = Outcome(int(self._ended.data[0, OUTCOME, 0]))
+        outcome = self._sample_lane()
         self.done += int(outcome == Outcome.OK)
         return outcome

@@ -1,0 +1,80 @@
+"""A run of the belt by a step that knows nothing of lanes: sampled as a single lane, as every other run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.kernels import called_alike
+from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.elastic_belt.belt import Belt, State
+from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
+from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES
+from cvt_hpc.models.elastic_belt.march import sample_state
+from cvt_hpc.models.elastic_belt.momentary import Momentary
+from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, recording
+from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFILES, Outcome
+
+_sample = called_alike(sample_state)
+
+
+class OneLaneRun(RecordedRun):
+    """What such runs have in common; attributes as of `RecordedRun`."""
+
+    done: int
+
+    def prolong(self, parameters: Mapping[str, Any]) -> None:
+        """Make room for the samples of a longer duration, whose judged part has yet to come.
+
+        Parameters
+        ----------
+        parameters : dict
+            Those of the run but for `duration` and `judged_fraction`.
+        """
+        plan = recording(parameters, np.float64)
+        self._profiles = [LaneArray(rows, len(PROFILES), 1) for rows in (0, plan.mesh.cell.size)]
+        RecordedRun.__init__(self, parameters, plan, self._profiles[1].data[:, :, 0])
+        rows = LaneArray(self.samples, self._sensed + len(CHANNELS), 1)
+        if self.done:
+            rows.data[: self.done, :, 0] = self.rows
+        self._rows = rows
+        self._momentary = Momentary([parameters], plan.mesh.cell.size)
+
+    def _make_lane(self, belt: Belt, first: State) -> None:
+        """The same run as a single lane, which is what can be sampled."""
+        self._lane_belt = lane_belt([belt], np.float64)
+        self._lane = lane_state([belt], [first], np.float64)
+        self._stations = LaneArray(self.mesh.cell.size, FIELDS_OF_FORCES, 1)
+        self._ended = LaneArray(1, len(ENDED), 1)
+
+    @property
+    def momentary(self) -> np.ndarray | None:
+        """What `Momentary` has kept of the run."""
+        return self._momentary.of(0)
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C)."""
+        return self._rows.data[: self.done, :, 0]
+
+    def _go_on_from(self, run: Any) -> None:
+        """Take over the history of a run by another stepper, but for means begun before."""
+        self.done, self._disturbed = run.done, run.done > self._plan.kick
+        self._rows.data[: self.done, :, 0] = run.rows
+        if self.done > self._plan.first_judged:
+            self._profiles[1].data[:] = np.nan  # what the other has summed up is not known
+
+    def _sample_lane(self) -> Outcome:
+        """Record what the lane holds; `done` is left to the caller."""
+        is_judged, is_kept = self.done >= self._plan.first_judged, self.done >= self._momentary.first
+        sums = self._profiles[int(is_judged)]
+        profiles = LaneArray(*self._profiles[1].data.shape) if is_kept else sums
+        place = self._plan.sensing, self._rows, self.done, profiles, self._ended
+        _sample(self._lane_belt, self._lane, self._stations, *place)
+        if is_kept:
+            self._momentary.note(self.done, profiles)
+            if is_judged:
+                sums.data[:] += profiles.data
+        return Outcome(int(self._ended.data[0, OUTCOME, 0]))
