@@ -188,16 +188,24 @@ def write_values(
     for row, column in np.argwhere((classes == kind) & np.isfinite(values)):
         (fill,) = fills_of(kind, fills[row : row + 1, column], scale)
         value = values[row, column]
-        axes.annotate(
-            f"{value:.0f}" if value >= 10.0 else f"{value:.2g}",
-            (x.centres[column], y.centres[row]),
-            xytext=(0, 2.5),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            fontsize=8.5,
-            color=_ink_on(fill, "#000000"),
-        )
+        text = f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
+        write_value(axes, (x.centres[column], y.centres[row]), text, fill, above=2.5)
+
+
+def write_value(
+    axes: Axes, place: tuple[float, float], text: str, fill: Array, *, above: float = 0.0, size: float = 8.5
+) -> None:
+    """Write a number at a place in data coordinates [or above it, point] on a cell of a colour (rgba)."""
+    axes.annotate(
+        text,
+        place,
+        xytext=(0, above),
+        textcoords="offset points",
+        ha="center",
+        va="bottom" if above else "center",
+        fontsize=size,
+        color=_ink_on(fill, "#000000"),
+    )
 
 
 def class_legend(
