@@ -141,7 +141,7 @@ def draw_cells(
     # the axes have the same place with and without it
     axes.add_image(PcolorImage(axes, x.edges, y.edges, shades, rasterized=True, in_layout=False))
     for inside, lines in hatched.values():
-        axes.add_patch(PathPatch(_area(x, y, inside), rasterized=True, **lines))
+        axes.add_patch(PathPatch(area_of(x, y, inside), rasterized=True, **lines))
     axes.add_collection(LineCollection(_borders(x, y, classes), colors="#202020", linewidths=1.0))
     axes.set(xlim=x.edges[[0, -1]], ylim=y.edges[[0, -1]])
 
@@ -237,7 +237,7 @@ def class_legend(
     )
 
 
-def _area(x: Ruler, y: Ruler, inside: Mask) -> Path:
+def area_of(x: Ruler, y: Ruler, inside: Mask) -> Path:
     """The outline of some cells: a rectangle around those that follow each other in a row."""
     turns = np.diff(np.pad(inside, ((0, 0), (1, 1))).astype(np.int8))
     (rows, first), (_, end) = np.nonzero(turns == 1), np.nonzero(turns == -1)

@@ -59,7 +59,7 @@ def element_figure(
     for name in parts:
         style = {"color": COLOURS[name], "ls": LINES[name], "lw": 1.1, "label": LABELS[name]}
         axes.plot(time, 1e3 * followed[name].values, **style)
-        if region:
+        if region and name in history:
             mean = 1e3 * mean_there(history, followed, name)
             told = "mean at the same place" if name == parts[-1] else None
             axes.plot(time, mean, color="#8a8a8a", lw=0.9, ls="-", zorder=1.5, label=told)

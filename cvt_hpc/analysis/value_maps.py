@@ -12,7 +12,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
@@ -28,6 +30,8 @@ COLOURS = cells.colours_of("viridis_r", 0.05, 0.85)
 MOST_PANELS = 8
 ROW, FRAME = 0.25, 0.9  # [inch], of a row of cells, and of title and labels
 HIGHEST = 3.6  # [inch], of a panel's cells
+HATCH = cells.STYLES[OccurrenceClass.SLIPPING].hatch
+EQUAL = 1e-6  # of a quantity: what differs less is the same
 NARROWEST, LOWEST = 24.0, 11.0  # [point]: cells into which numbers are written
 OTHERS = (
     OccurrenceClass.SLIPPING,
@@ -97,7 +101,7 @@ def value_map_figure(
     for axes in list(all_axes.flat)[: len(panels)][-columns:]:
         axes.set_xlabel(x.label)
     job = one_line(dataset.attrs.get("job_name", ""))
-    lines = [f"{job}: {kinds.size} runs: {count_classes(kinds)}".removeprefix(": "), *notes]
+    lines = [f"{job}: {_counted(kinds)}".removeprefix(": "), *notes]
     figure.suptitle("\n".join(fill(line, 72 * columns) for line in lines))
     marked: dict[cells.CellClass, cells.ClassStyle] = {
         kind: cells.STYLES[kind] for kind in OTHERS if (kinds == kind).any()
@@ -105,6 +109,12 @@ def value_map_figure(
     if marked:
         cells.class_legend(figure, marked, len(marked))
     return figure
+
+
+def _counted(kinds: NDArray[np.int8]) -> str:
+    """How many runs there are, and how many of the marked classes."""
+    others = kinds[np.isin(kinds, OTHERS)]
+    return f"{kinds.size} runs" + (f", of them {count_classes(others)}" if others.size else "")
 
 
 def _one_panel(arrangement: Arrangement) -> tuple[xr.Dataset, list[str]]:
@@ -146,7 +156,7 @@ def _draw_panel(
 ) -> None:
     """Cells coloured by a quantity, with its numbers where they have room, and marks of the other runs."""
     x, y = rulers
-    scale = cells.Scale(COLOURS, cells.norm_over(values), unit)
+    scale = cells.Scale(COLOURS, _norm(values), unit)
     is_known = np.isfinite(values) & ~np.isin(kinds, (OccurrenceClass.FAILED, OccurrenceClass.NOT_RUN))
     # what has a value is coloured by it, as vibrating cells of other maps by their amplitude
     drawn = np.where(is_known, OccurrenceClass.VIBRATING, kinds).astype(np.int8)
@@ -159,10 +169,28 @@ def _draw_panel(
         for row, column in np.argwhere(is_known):
             place, value = (x.centres[column], y.centres[row]), values[row, column]
             fill_colour = np.asarray(scale.colours(scale.norm(value)))
-            cells.write_value(axes, place, f"{value:.3g}", fill_colour, size=7.5)
-    cells.draw_marks(axes, x, y, kinds, np.isin(kinds, OTHERS), 3.5)
+            text = f"{value:.3g}" if abs(value) >= 0.1 else f"{value:.2g}"
+            cells.write_value(axes, place, text, fill_colour, size=7.5)
+    cells.draw_marks(axes, x, y, kinds, np.isin(kinds, OTHERS) & ~is_known, 3.5)
+    if (slips := is_known & (kinds == OccurrenceClass.SLIPPING)).any():
+        dots = {
+            "facecolor": "none",
+            "edgecolor": "#ffffff",
+            "linewidth": 0,
+            "hatch": HATCH,
+            "rasterized": True,
+        }
+        axes.add_patch(PathPatch(cells.area_of(x, y, slips), **dots))
     for ruled, set_ticks in ((x, axes.set_xticks), (y, axes.set_yticks)):
         if ruled.ticks is not None:
             set_ticks(ruled.ticks, ruled.tick_labels)
     if is_known.any():
         figure.colorbar(ScalarMappable(scale.norm, scale.colours), ax=axes, pad=0.02, label=unit)
+
+
+def _norm(values: NDArray[np.float64]) -> Normalize:
+    """Scale over the finite values; a quantity that does not vary has the middle of one."""
+    known = values[np.isfinite(values)]
+    if known.size and np.ptp(known) < EQUAL * np.abs(known).max():
+        return Normalize(*(known.mean() + 0.1 * np.abs(known).max() * np.array([-1.0, 1.0])))
+    return cells.norm_over(values)

@@ -79,6 +79,7 @@ FIGURES |= {
     for number, compose, statements in (
         ("3.1", lambda kept: course_figure(kept.histories[0], "driving_moment"), lebrecht_ramps.FIGURE_3_1),
         ("3.2", lambda kept: waterfall_figure(kept.results), lebrecht_belt.FIGURE_3_2),
+        ("3.6", lambda kept: strand_bars_figure(kept.results), lebrecht_belt.FIGURE_3_6),
         ("3.7", lambda kept: curve_figure(kept.results, ["eigenfrequency"]), lebrecht_belt.FIGURE_3_7),
         ("3.9", lambda kept: ramp_figure(kept.histories), lebrecht_ramps.FIGURE_3_9),
         ("3.10", lebrecht_belt.swings_figure, lebrecht_belt.FIGURE_3_10),

@@ -1,4 +1,4 @@
-"""Statements of Lebrecht, Pfeiffer and Ulbrich 2004 about figs 3.2 to 3.4, 3.7, 3.10 and 3.11."""
+"""Statements of Lebrecht, Pfeiffer and Ulbrich 2004 about figs 3.2 to 3.4, 3.6, 3.7, 3.10, 3.11."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from cvt_hpc.analysis.statements.verdicts import Measured, Statement
 from cvt_hpc.variables import Status, Vibrates
 
 BAND = (500.0, 700.0)  # [Hz] of the noise
+NORMAL_LOAD = 120.0  # [N m], about where the noise begins in the measurements
 
 
 def _peaks(kept: Kept, strand: str) -> list[tuple[float, int, float]]:
@@ -142,6 +143,30 @@ FIGURE_3_2 = (
               _modes_over_load,
               "both strands move at one frequency, and then the one with less tension has more half waves"),
 )  # fmt: skip
+
+
+def _tension_above(kept: Kept) -> Measured:
+    tension = kept.results["mean_ring_tension"]
+    over = (tension.sel(strand="t2") / tension.sel(strand="t1")).values
+    return Measured(list(over > 1.0), f"T_t2 / T_t1 {over.min():.3g} to {over.max():.3g} over the loads")
+
+
+def _push_above(kept: Kept) -> Measured:
+    found = kept.results
+    tension = found["mean_ring_tension"]
+    more = (
+        found["mean_push_force"].sel(strand="t1") - (tension.sel(strand="t2") - tension.sel(strand="t1"))
+    ).values
+    load = found["load"].values
+    normal = load >= NORMAL_LOAD
+    first = f"from {load[more > 0.0].min():.0f} N m on" if (more > 0.0).any() else "at no load"
+    return Measured(list(more[normal] > 0.0), f"P_t1 is above T_t2 - T_t1 {first}")
+
+
+FIGURE_3_6 = (
+    Statement("In underdrive the tension of t2 is always above that of t1", _tension_above),
+    Statement("At normal load P_t1 is higher than the difference of ring tension", _push_above),
+)
 
 
 def _eigenfrequencies(kept: Kept, strand: str, waves: int) -> np.ndarray:

@@ -15,6 +15,8 @@ from cvt_hpc.analysis.statements.kept import Kept, over_arc
 from cvt_hpc.analysis.statements.verdicts import Measured, Statement, listed
 from cvt_hpc.variables import Vibrates
 
+SWING = 0.02  # of the radial speed: how far it swings at least where it is jagged
+
 
 def _goes_in(kept: Kept) -> Measured:
     arc = over_arc(kept.histories[0], "mean_displacement", "driven")
@@ -60,8 +62,10 @@ def _jagged(kept: Kept) -> Measured:
     element = one_passage(history, "driven")
     off = 1e3 * (element["radial_sliding"].values - mean_there(history, element, "radial_sliding"))[5:-5]
     turns = int((np.diff(np.sign(off)) != 0).sum())
+    size = 1e3 * float(np.sqrt(np.mean(element["radial_sliding"].values ** 2)))
     return Measured(
-        [turns >= 6], f"it swings {off.std():.2g} mm/s (rms) about its mean, with {turns} changes of sign"
+        [turns >= 6 and off.std() > SWING * size],
+        f"it swings {off.std():.2g} mm/s (rms) about its mean, with {turns} changes of sign",
     )
 
 
