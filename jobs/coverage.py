@@ -13,13 +13,16 @@ PAPERS = {
 }
 HEAD = """# Two papers, statement by statement
 
-What W. Lebrecht, F. Pfeiffer and H. Ulbrich (04CVT-32, 2004) and M. Bullinger, K. Funk and F. Pfeiffer (2005) state, the
-command that shows it here, what it gives, and whether that is what they state. First all of both papers, then each figure.
+What W. Lebrecht, F. Pfeiffer and H. Ulbrich (04CVT-32, 2004) and M. Bullinger, K. Funk and F. Pfeiffer
+(2005) state, the command that shows it here, what it gives, and whether that is what they state. First all
+of both papers, then each figure.
 
-Made by `python jobs/coverage.py docs/coverage.md` from `jobs/coverage.toml` and from the tables in `jobs/results/figures`. Each of these is
-that of a job: `cvt-hpc run jobs/figures/NAME.toml && cvt-hpc figure out/NAME` leaves `figure.png` and `statements.csv`, below "figure `NAME`". A
-statement is reproduced where all parts of its measure hold, partly where some do. The papers' pictures have no data here:
-"reproduced" means every number and shape that the text states. What they do not give is assumed, as each job says.
+Made by `python jobs/coverage.py docs/coverage.md` from `jobs/coverage.toml` and from the tables in
+`jobs/results/figures`. Each of these is that of a job, below "figure `NAME`":
+`cvt-hpc run jobs/figures/NAME.toml && cvt-hpc figure out/NAME` leaves `figure.png` and `statements.csv`. A
+statement is reproduced where all parts of its measure hold, partly where some do. The papers' pictures have
+no data here: "reproduced" means every number and shape that the text states. What they do not give is
+assumed, as each job says.
 """
 REPRODUCED, PARTLY, NOT = "reproduced", "partly", "not"
 
@@ -68,7 +71,8 @@ def lines():
     measured = [entry["verdict"] for entries in figures.values() for entry in entries]
     told = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
     each = ", ".join(f"{measured.count(verdict)} {verdict}" for verdict in counts)
-    yield f"**{len(rows)} rows: {told}.** Of {len(measured)} measured statements about {len(figures)} figures: {each}.\n"
+    of_figures = f"Of {len(measured)} statements measured in {len(figures)} figures: {each}."
+    yield f"**{len(rows)} rows: {told}.** {of_figures}\n"
     for letter, paper in PAPERS.items():
         yield f"## {paper}\n"
         yield "| | where | states | shown by | gives | verdict |\n|---|---|---|---|---|---|"
