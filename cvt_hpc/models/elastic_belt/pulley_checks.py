@@ -7,12 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, shaft_deflection
+from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, oil_factor, shaft_deflection
 from cvt_hpc.physics import capacity
+from cvt_hpc.physics.friction_laws import largest_friction
 from cvt_hpc.physics.geometry import variator, variator_problems
 from cvt_hpc.physics.sheaves import axial_element_stiffness, stiffness_factors
+from cvt_hpc.variator import LARGEST_DISPLACEMENT, MOST_SPEED
 
 Problem = tuple[str, str, str]  # key, expected, found
+
+# Over a bound on the torque by nominal radii and tangential friction. Sliding at an angle adds 4e-4 (1 / sqrt(1
+# - mu^2 tan^2 d0) - 1); the rest is for a belt that rides out of its groove by a tenth of its radius.
+ABOVE = 1.1
 
 
 def shaft_problems(parameters: Mapping[str, Any]) -> list[Problem]:
@@ -47,7 +53,44 @@ def pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
         found.append(("tilt_lag", expected, f"{p['tilt_lag']:g} s"))
     if p["bearing_clearance"] > 0.0 and not p["shaft_lengths"]:
         found.append(("bearing_clearance", "0, or shaft_lengths", f"{p['bearing_clearance']:g} m"))
-    return found + _controller_problems(p)
+    return found + (_controller_problems(p) or overload_problems(p))
+
+
+def overload_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+    """Problem of a load that is more than any belt carries under the axial forces that are given.
+
+    By `capacity.torque_limit` with the largest coefficient of friction, and ABOVE: a bound on the moment of
+    each pulley's flanks, whatever the belt does. Near it a belt slips through long since, which is a result.
+    A ramp may end there, and tells where the belt slips; its start may not lie there.
+    """
+    p = PULLEY_DEFAULTS | dict(parameters)
+    key = "load_start" if p.get("load_history") == "ramp" else "load"
+    mu, radius = largest_friction(p), p["driven_radius"] / p["ratio"]
+    for pulley, force in _most_axial_force(p).items():
+        most = ABOVE * capacity.torque_limit(mu, force, radius, p["half_wedge_angle"])
+        if abs(p[key]) > most:
+            expected = (
+                f"at most {most:.4g} N m in size, {ABOVE:g} times what the {pulley} pulley carries under "
+                f"{force * 1e-3:.4g} kN by its largest coefficient of friction, {mu:.3g}"
+            )
+            return [(key, expected, f"{p[key]:g} N m")]
+    return []
+
+
+def _most_axial_force(p: Mapping[str, Any]) -> dict[str, float]:
+    """Largest axial force on those pulleys whose thrust is given, or bounded by a controller [N]."""
+    thrusts = {"driven": p["most_thrust"] if p["clamping"] == "torque_ratio" else p["thrust"]}
+    if p["driving_axial"] != "position":
+        is_held = p["driving_axial"] == "ratio"
+        thrusts["driving"] = p["most_thrust"] if is_held else p["driving_thrust"]
+    moved = 2.0 * np.tan(p["half_wedge_angle"]) * LARGEST_DISPLACEMENT
+    speeds = {"driving": p["driving_speed"], "driven": p["driving_speed"] / p["ratio"]}
+    return {
+        pulley: thrust
+        + p[f"{pulley}_spring_rate"] * moved
+        + oil_factor(p[f"{pulley}_piston"], p["oil_density"]) * (MOST_SPEED * speeds[pulley]) ** 2
+        for pulley, thrust in thrusts.items()
+    }
 
 
 def least_tilt_lag(parameters: Mapping[str, Any]) -> float:

@@ -6,6 +6,7 @@ from typing import Any
 
 from cvt_hpc.models import elastic_belt
 from cvt_hpc.models.elastic_belt.parameters import shape_problems
+from cvt_hpc.models.elastic_belt.pulley_checks import overload_problems
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.physics.friction_laws import friction_problems
 
@@ -29,6 +30,11 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 
 def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     """Problems that lie between parameters: as of `elastic_belt`."""
+    return belt_problems(parameters) or overload_problems(parameters)
+
+
+def belt_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems of the belt, whatever its load. Result as of `check`."""
     return shape_problems(parameters) + friction_problems(parameters)
 
 
