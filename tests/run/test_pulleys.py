@@ -204,9 +204,30 @@ def test_a_stiff_shaft_is_none():
     assert twice == pytest.approx(0.5 * (bent.driven.tilt_compliance - plain.driven.tilt_compliance))
 
 
+def test_each_pulley_may_have_a_shaft_of_its_own():
+    """Compliances are those of a belt in which both pulleys have one or the other."""
+    one = {key: tuple(value) for key, value in SHAFT.items()}
+    other = {"shaft_lengths": (0.2,), "shaft_diameters": (0.05,), "bearing_positions": (0.01, 0.19)}
+    other |= {"seat_positions": (0.12, 0.07), "shaft_modulus": 1.1e11, "bearing_stiffness": 1e8}
+    own = {f"driven_{key}": value for key, value in other.items()}
+
+    def compliances(**values):
+        belt = belt_constants(job(stations=48, **values).parameters)
+        return belt.driving.tilt_compliance, belt.driven.tilt_compliance
+
+    plain, first, second = compliances(), compliances(**one), compliances(**other)
+    assert compliances(**one, **own) == (first[0], second[1])
+    assert compliances(**own) == (plain[0], second[1])
+    assert compliances(**one, **own, driven_shaft_factor=np.inf) == (first[0], plain[1])
+    assert len({plain[1], first[1], second[1]}) == 3
+
+
 @pytest.mark.parametrize(
     ("tables", "message"),
     [
+        ({"driven_shaft": {"driven_shaft_lengths": [0.1]}}, "driven_shaft_diameters: expected one for each of 1 driven"),
+        ({"driven_shaft": {"driven_shaft_lengths": [0.1], "driven_shaft_diameters": [0.04]}},
+         "driven_bearing_positions: expected two bearings at different"),
         ({"pulleys": {"collar_clearance": -1e-4}}, "collar_clearance: expected >= 0 rad, found -0.0001"),
         ({"pulleys": {"bearing_clearance": "-1 um"}}, "bearing_clearance: expected >= 0 um, found"),
         ({"pulleys": {"collar_clearance": 1e-4}}, "collar_clearance: expected 0, or a tilt_lag"),

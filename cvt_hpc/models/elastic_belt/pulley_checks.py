@@ -7,30 +7,42 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, oil_factor, shaft_deflection
+from cvt_hpc.models.elastic_belt.pulley_settings import (
+    OWN,
+    PULLEY_DEFAULTS,
+    oil_factor,
+    shaft_deflection,
+    shaft_keys,
+)
 from cvt_hpc.physics import capacity
 from cvt_hpc.physics.friction_laws import largest_friction
 from cvt_hpc.physics.geometry import variator, variator_problems
 from cvt_hpc.physics.sheaves import axial_element_stiffness, stiffness_factors
-from cvt_hpc.variator import LARGEST_DISPLACEMENT, MOST_SPEED
+from cvt_hpc.variator import LARGEST_DISPLACEMENT, MOST_SPEED, PULLEYS
 
 Problem = tuple[str, str, str]  # key, expected, found
 
-# Over a bound on the torque by nominal radii and tangential friction. Sliding at an angle adds 4e-4 (1 / sqrt(1
-# - mu^2 tan^2 d0) - 1); the rest is for a belt that rides out of its groove by a tenth of its radius.
+# Over a bound on the torque by nominal radii and tangential friction. Sliding at an angle adds 4e-4, which is
+# 1 / sqrt(1 - mu^2 tan^2 d0) - 1; the rest is for a belt that rides out of its groove by a tenth of a radius.
 ABOVE = 1.1
 
 
 def shaft_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     """Problems of a shaft, in the form of a model's check."""
     p = PULLEY_DEFAULTS | dict(parameters)
-    lengths, diameters = p["shaft_lengths"], p["shaft_diameters"]
+    return _problems_of_shaft(p, "") or _problems_of_shaft(p, OWN)
+
+
+def _problems_of_shaft(p: Mapping[str, Any], prefix: str) -> list[Problem]:
+    lengths, diameters = p[f"{prefix}shaft_lengths"], p[f"{prefix}shaft_diameters"]
     if len(lengths) != len(diameters):
-        return [("shaft_diameters", f"one for each of {len(lengths)} shaft_lengths", str(len(diameters)))]
+        expected = f"one for each of {len(lengths)} {prefix}shaft_lengths"
+        return [(f"{prefix}shaft_diameters", expected, str(len(diameters)))]
     if not lengths:
         return []
     total = sum(lengths)
-    for key, what in (("bearing_positions", "bearings"), ("seat_positions", "sheaves")):
+    for name, what in (("bearing_positions", "bearings"), ("seat_positions", "sheaves")):
+        key = f"{prefix}{name}"
         places = p[key]
         found = ", ".join(f"{place:g} m" for place in places) or "none"
         if len(places) != 2 or places[0] == places[1] or max(places) > total * (1.0 + 1e-9):
@@ -51,7 +63,7 @@ def pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     elif p["tilt_lag"] < (least := least_tilt_lag(p)):
         expected = f"0, or {least:.2g} s and more at this step: tilting is explicit"
         found.append(("tilt_lag", expected, f"{p['tilt_lag']:g} s"))
-    if p["bearing_clearance"] > 0.0 and not p["shaft_lengths"]:
+    if p["bearing_clearance"] > 0.0 and not (p["shaft_lengths"] or p[f"{OWN}shaft_lengths"]):
         found.append(("bearing_clearance", "0, or shaft_lengths", f"{p['bearing_clearance']:g} m"))
     return found + (_controller_problems(p) or overload_problems(p))
 
@@ -106,9 +118,10 @@ def least_tilt_lag(parameters: Mapping[str, Any]) -> float:
     whole, disc = stiffness_factors(p)
     stiffness = 1.0 / (1.0 / axial_element_stiffness(p) + 1.0 / (whole * disc * p["local_stiffness"]))
     gains = []
-    for radius, wrap in ((path.driving_radius, path.driving_wrap), (path.driven_radius, path.driven_wrap)):
+    sizes = (path.driving_radius, path.driving_wrap), (path.driven_radius, path.driven_wrap)
+    for pulley, (radius, wrap) in zip(PULLEYS, sizes, strict=True):
         tilt = radius * radius / (p["tilt_stiffness"] * p["tilt_factor"] * whole)
-        gains.append(stiffness * radius * wrap * (tilt + shaft_deflection(p, radius)[0] / whole))
+        gains.append(stiffness * radius * wrap * (tilt + shaft_deflection(p, pulley, radius)[0] / whole))
     return float(p["step"] * (1.0 + max(gains)))
 
 
@@ -162,10 +175,9 @@ def pulley_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
         (not controlled[1], ("held_torque_ratio", "clamping_gain", "clamping_rate"), "clamping constant"),
         (not any(controlled), ("least_thrust", "most_thrust"), "no controller"),
         (not p["driving_piston"] and not p["driven_piston"], ("oil_density",), "no piston"),
-        (
-            not p["shaft_lengths"],
-            ("shaft_modulus", "shaft_factor", "bearing_stiffness", "seat_positions", "bearing_positions"),
-            "no shaft_lengths",
+        *(
+            (not p[f"{prefix}shaft_lengths"], shaft_keys(prefix)[1:], f"no {prefix}shaft_lengths")
+            for prefix in ("", OWN)
         ),
     )
     return {key: setting for holds, keys, setting in cases if holds for key in keys}
