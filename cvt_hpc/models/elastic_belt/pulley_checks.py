@@ -63,9 +63,22 @@ def pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     elif p["tilt_lag"] < (least := least_tilt_lag(p)):
         expected = f"0, or {least:.2g} s and more at this step: tilting is explicit"
         found.append(("tilt_lag", expected, f"{p['tilt_lag']:g} s"))
-    if p["bearing_clearance"] > 0.0 and not (p["shaft_lengths"] or p[f"{OWN}shaft_lengths"]):
-        found.append(("bearing_clearance", "0, or shaft_lengths", f"{p['bearing_clearance']:g} m"))
+    found += _bearing_problems(p)
     return found + (_controller_problems(p) or overload_problems(p))
+
+
+def steady_pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+    """Problems of pulleys in a steady state: lags count for nothing there, but something has to hold each."""
+    p = PULLEY_DEFAULTS | dict(parameters)
+    found = _piston_problems(p) + _drive_problems(p) + _bearing_problems(p) + _controller_problems(p)
+    is_driven, is_held = np.isfinite(p["driving_inertia"]), np.isinf(p["driven_inertia"])
+    if is_driven and p["drive_slope"] == 0.0 and not is_held:
+        expected = "above 0, or driven_inertia inf: else no speed of the drive is steady"
+        found.append(("drive_slope", expected, "0 N m s/rad"))
+    if p["driving_axial"] == "ratio" and p["ratio_rate"] == 0.0:
+        expected = "above 0: by its gain alone a controller rests where it began"
+        found.append(("ratio_rate", expected, "0 N/s"))
+    return found or overload_problems(p)
 
 
 def overload_problems(parameters: Mapping[str, Any]) -> list[Problem]:
@@ -123,6 +136,12 @@ def least_tilt_lag(parameters: Mapping[str, Any]) -> float:
         tilt = radius * radius / (p["tilt_stiffness"] * p["tilt_factor"] * whole)
         gains.append(stiffness * radius * wrap * (tilt + shaft_deflection(p, pulley, radius)[0] / whole))
     return float(p["step"] * (1.0 + max(gains)))
+
+
+def _bearing_problems(p: Mapping[str, Any]) -> list[Problem]:
+    if p["bearing_clearance"] == 0.0 or p["shaft_lengths"] or p[f"{OWN}shaft_lengths"]:
+        return []
+    return [("bearing_clearance", "0, or shaft_lengths", f"{p['bearing_clearance']:g} m")]
 
 
 def _piston_problems(p: Mapping[str, Any]) -> list[Problem]:

@@ -181,6 +181,19 @@ def with_pulleys(
     return bent, Pulleys(laws, are_free(p))
 
 
+def moving_states(pulleys: Pulleys) -> np.ndarray:
+    """Places in STATES of those that anything moves: of the others a law has no rate, and they stay at 0."""
+    laws = pulleys.laws[0]
+    by = {
+        EXCESS: laws[DRIVING_MOBILITY],
+        SHIFT: laws[DRIVING_AXIAL_MOBILITY],
+        RATIO_SUM: laws[RATIO_RATE],
+        CLAMPING_SUM: laws[CLAMPING_RATE],
+        **dict.fromkeys(range(DRIVING_COS, DRIVEN_SIN + 1), laws[TILT_RATE]),
+    }
+    return np.array([state for state in range(len(STATES)) if by[state] > 0.0], dtype=int)
+
+
 def settled_tilt(pulleys: Pulleys, first: int, tilting: np.ndarray) -> np.ndarray:
     """Opening q of a groove at rest [m], (2,), where it is a state; else 0.
 

@@ -25,7 +25,8 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         # 1.3 is a common choice for clamping forces, and an assumption
         "safety": Parameter(1.3, "", "limit over working point, of torque or thrust", minimum=1.0),
     },
-    **steady_variator.PARAMETERS,
+    # pulleys turn by a given speed under the thrust that is given, or sought
+    **{name: table for name, table in steady_variator.PARAMETERS.items() if name != "pulleys"},
 }
 
 
