@@ -108,16 +108,20 @@ def test_growth_and_frequency_are_those_of_the_transient(place):
 def test_a_lag_of_the_tilt_takes_the_growth_away():
     """As in transients of the default belt: tilts that follow within 0.1 ms let it vibrate, 0.2 ms hardly do."""
     grid = mesh(COARSE)
-    lags = (0.0, 1e-6, 5e-5, 1e-4, 2e-4, 5e-4)
+    lags = (0.0, 1e-6, 1e-4, 2e-4)
     points = [branch(SteadyBelt(COARSE | {"tilt_lag": lag}), grid, (120.0,)).points[0] for lag in lags]
     growth = np.array([point.growth for point in points])
     # in first order of the lag, by some 3.4/s in each us
-    assert growth[1] == pytest.approx(growth[0], abs=5.0) and growth[1] < growth[0]
+    assert growth[1] == pytest.approx(growth[0], abs=5.0)
     assert np.all(np.diff(growth) < 0.0)
-    assert growth[3] > 200.0 and growth[4] < 50.0 and growth[5] < -100.0
-    found, frequency = measured(points[3])
-    assert found == pytest.approx(growth[3], abs=0.02 * growth[3] + 1.0)
-    assert frequency == pytest.approx(points[3].modes[0].frequency, rel=2e-3)
+    assert growth[2] > 200.0 and growth[3] < 50.0
+
+
+def test_growth_with_lagging_tilts_is_that_of_the_transient():
+    (point,) = branch(SteadyBelt(DEFAULTS | {"tilt_lag": 1e-4}), mesh(DEFAULTS), (125.0,)).points
+    growth, frequency = measured(point)
+    assert growth == pytest.approx(point.growth, abs=0.02 * point.growth)
+    assert frequency == pytest.approx(point.modes[0].frequency, rel=2e-3)
 
 
 def test_constant_friction_and_rigid_sheaves_are_stable():

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.models.elastic_belt.belt import FIRST_STATE, mesh
+from cvt_hpc.models.elastic_belt.belt import DRIVEN_SPEED, FIRST_STATE, LAYER_WORK, mesh
 from cvt_hpc.models.elastic_belt.pulley_settings import oil_factor
 from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVING_COS, EXCESS, SHIFT
 from cvt_hpc.models.steady_variator.forces import quantities
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
+from support.fast_runs import FastRuns
 from support.marched import Together, mean
 from support.rungs import rung_job, rung_record
 
@@ -19,11 +20,12 @@ SCENES = {
     "spring and oil": {"driven_spring_rate": 5e6, "driven_piston": (0.02, 0.08)},
     "drive": {"driving_inertia": 0.05, "drive_slope": 5.0},
     "given driven speed": {"driving_inertia": 0.05, "driven_inertia": np.inf},
-    # by the default lag an opening takes 0.2 s to follow its thrust
-    "thrust": {"driving_axial": "thrust", "driving_thrust": 43.2e3, "sheave_lag": 2e-4},
     "clamping": {"clamping": "torque_ratio", "held_torque_ratio": 0.3},
 }
+# Not among them, as the belt's creep takes seconds to shift it
+THRUST = {"driving_axial": "thrust", "driving_thrust": 43.2e3}
 TRANSIENT = CALM | {"duration": 0.3, "rise_time": 0.02, "disturbance": 0.0, "judged_fraction": 0.1}
+LEFT = 2e-4
 RUNS = Together(*(TRANSIENT | values for values in SCENES.values()))
 
 
@@ -41,21 +43,33 @@ def test_it_is_the_end_of_a_calm_transient(name):
     def last(channel):
         return mean(run, channel)
 
-    # the step of first order, and what 0.3 s leave of the way: as much as the same belt of held pulleys leaves
+    # what 0.3 s leave of the way, most of it by the controller and by the speeds of a drive with inertia
     for k, pulley in enumerate(("driving", "driven")):
-        assert found["axial_force"][k] == pytest.approx(last(f"axial_force {pulley}"), rel=1e-3)
-    assert found["driven_position"] == pytest.approx(last("driven_position"), abs=1e-6)
+        assert found["axial_force"][k] == pytest.approx(last(f"axial_force {pulley}"), rel=LEFT)
+    assert found["driven_position"] == pytest.approx(last("driven_position"), abs=LEFT * 1e-3)
     course = run.parameters["driving_speed"]
-    assert steady.state.scalars[FIRST_STATE + EXCESS] == pytest.approx(
-        last("driving_speed") - course, abs=0.02
-    )
-    assert steady.state.scalars[1] == pytest.approx(last("driven_speed"), rel=2e-4)
+    excess = steady.state.scalars[FIRST_STATE + EXCESS]
+    assert excess == pytest.approx(last("driving_speed") - course, abs=LEFT * course)
+    assert steady.state.scalars[DRIVEN_SPEED] == pytest.approx(last("driven_speed"), rel=LEFT)
+
+
+@pytest.mark.parametrize("name", ["thrust", "all"])
+def test_a_transient_that_begins_there_stays(name):
+    every = {"driving_axial": "ratio", **SCENES["clearance"], **SCENES["spring and oil"], **SCENES["drive"]}
+    steady, _ = state(**(THRUST if name == "thrust" else every | SCENES["clamping"]))
+    run = FastRuns([steady.belt], [steady.state.copy()])
+    run.advance(200, 4e-6)
+    moved = run.state().scalars, steady.state.scalars
+    # what Newton's iteration leaves, 10 pm of w, and the sums of controllers that see it
+    assert np.abs(run.state().fields[0] - steady.state.fields[0]).max() < 1e-9
+    for places in (slice(DRIVEN_SPEED, LAYER_WORK), slice(FIRST_STATE, None)):
+        assert moved[0][places] == pytest.approx(moved[1][places], rel=1e-5, abs=1e-8)
 
 
 def test_thrusts_are_those_that_are_given():
-    steady, found = state(**SCENES["thrust"])
+    steady, found = state(**THRUST)
     assert found["axial_force"] == pytest.approx([43.2e3, 50e3], rel=1e-9)
-    assert steady.state.scalars[FIRST_STATE + SHIFT] < -1e-5
+    assert abs(steady.state.scalars[FIRST_STATE + SHIFT]) > 1e-5
     # the same opening, given: the same state
     plain, same = state(driving_position=steady.state.scalars[FIRST_STATE + SHIFT])
     assert same["axial_force"] == pytest.approx(found["axial_force"], rel=1e-7)
@@ -64,7 +78,7 @@ def test_thrusts_are_those_that_are_given():
 
 def test_springs_and_oil_press_beside_the_thrust():
     steady, found = state(**SCENES["spring and oil"])
-    oil = oil_factor((0.02, 0.08), 850.0) * steady.state.scalars[1] ** 2
+    oil = oil_factor((0.02, 0.08), 850.0) * steady.state.scalars[DRIVEN_SPEED] ** 2
     assert found["axial_force"][1] == pytest.approx(50e3 + 5e6 * found["driven_position"] + oil, rel=1e-9)
 
 
@@ -84,7 +98,7 @@ def test_a_lag_changes_no_steady_state_and_a_clearance_needs_none():
 
 def test_controllers_hold_what_they_are_to_hold():
     steady, _ = state(driving_axial="ratio")
-    speeds = steady.belt.driving_speed / steady.state.scalars[1]
+    speeds = steady.belt.driving_speed / steady.state.scalars[DRIVEN_SPEED]
     assert speeds == pytest.approx(2.52, rel=1e-9)
     _, found = state(**SCENES["clamping"])
     assert found["torque_ratio"] == pytest.approx(0.3, rel=1e-3)  # by the coefficient at gross slip, not mu_k
@@ -132,7 +146,9 @@ def test_record():
     record = rung_record("steady_variator", **CALM | SCENES["drive"])
     steady, found = state(**SCENES["drive"])
     speed = steady.belt.driving_speed + steady.state.scalars[FIRST_STATE + EXCESS]
-    assert record["speed_loss"] == pytest.approx(1.0 - 2.52 * steady.state.scalars[1] / speed, rel=1e-9)
+    assert record["speed_loss"] == pytest.approx(
+        1.0 - 2.52 * steady.state.scalars[DRIVEN_SPEED] / speed, rel=1e-9
+    )
     torque = 60.0 - 5.0 * steady.state.scalars[FIRST_STATE + EXCESS]
     assert record["driving_power"] == pytest.approx(torque * speed, rel=1e-6)
     assert abs(record["power_residual"]) < 1e-3
