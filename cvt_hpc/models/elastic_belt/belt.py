@@ -105,6 +105,8 @@ class Belt(NamedTuple):
 class State(NamedTuple):
     """The state: `fields` (7, N) in the order of FIELDS, `scalars` (12,) in the order of SCALARS.
 
+    Of rings in n layers `fields` is (7 + 2 n, N), see `rings.py`.
+
     The work of the layers' dampers [J] until it is asked for is no state of the belt.
     """
 

@@ -39,6 +39,7 @@ SHARED = (
     "lanes",
     "contact_sweeps",
     "sheave_deformation",
+    "ring_layers",
 )
 
 

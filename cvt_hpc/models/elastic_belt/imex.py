@@ -97,18 +97,18 @@ def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
         if found == 0 and attempt == 0:
             break
         if found == 0 or attempt == MOST_PASSES - 1:
-            _forget(work)
+            forget(work)
             break
         if found & TURNS_BACK:
             assemble(belt, state, work, step, True)
-    taken, moment = _advance(belt, state, work, step)
+    taken, moment = advance_belt(belt, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
     lane_contact_forces(belt, state, stations)
 
 
 @kernel
-def _forget(work: ImexWork) -> None:
+def forget(work: ImexWork) -> None:
     """Clear the marks of what a step had to do again."""
     stations = work.stations
     for j in range(stations.rows):
@@ -116,7 +116,7 @@ def _forget(work: ImexWork) -> None:
 
 
 @kernel
-def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
+def advance_belt(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
     """Apply the increments, and find the new strains; the flanks' torques.
 
     What they take from the driving pulley, where that is free, and their moment on the driven one [N m].

@@ -17,6 +17,7 @@ from cvt_hpc.lanes import LaneArray, split
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
+    FIELDS,
     FIRST_STATE,
     N_ELEMENT,
     N_RING,
@@ -183,7 +184,8 @@ class LaneState(NamedTuple):
     Attributes
     ----------
     fields : (N, 7) LaneArray
-        FIELDS at each station: layers' speeds less the belt speed of `time`; contents less 1 + kappa d_i.
+        FIELDS at each station: layers' speeds less the belt speed of `time`; contents less 1 + kappa d_i. Of
+        rings in n layers (N, 7 + 2 n), see `rings.py`.
     scalars : (1, 12) LaneArray of doubles
         LANE_SCALARS.
     time : (1,) array
@@ -355,6 +357,7 @@ def put_lane(fields: np.ndarray, scalars: np.ndarray, lane: int, belt: Belt, sta
     belt_speed = speed_share_at(belt, state.scalars[TIME]) * belt.belt_speed
     values[V_ELEMENT] -= belt_speed
     values[V_RING] -= belt_speed
+    values[len(FIELDS) : (len(values) + len(FIELDS)) // 2] -= belt_speed  # ring layers, where there are
     values[N_ELEMENT] -= 1.0
     values[N_RING] -= 1.0 + belt.curvature * belt.ring_offset
     fields[:, :, lane] = values.T
@@ -369,6 +372,7 @@ def take_lane(state: LaneState, lane: int, belt: Belt) -> State:
     belt_speed = speed_share_at(belt, state.time[0]) * belt.belt_speed
     values[V_ELEMENT] += belt_speed
     values[V_RING] += belt_speed
+    values[len(FIELDS) : (len(values) + len(FIELDS)) // 2] += belt_speed
     values[N_ELEMENT] += 1.0
     values[N_RING] += 1.0 + belt.curvature * belt.ring_offset
     scalars = state.scalars.data[0, :, lane]

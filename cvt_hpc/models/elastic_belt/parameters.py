@@ -18,6 +18,7 @@ from cvt_hpc.models.elastic_belt.deflection_settings import (
 )
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert, pulley_problems, shaft_problems
 from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, PULLEYS, SHAFT
+from cvt_hpc.models.elastic_belt.ring_settings import RINGS, ring_inert, ring_problems
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
@@ -127,6 +128,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     "deflection": DEFLECTION,
     "pulleys": PULLEYS,
     "shaft": SHAFT,
+    "rings": RINGS,
     "friction": FRICTION,
     "mesh": {
         "stations": Parameter(160, "", "cells around the belt", minimum=24, maximum=4096),
@@ -175,7 +177,7 @@ def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         if abs(p["play"]) > 0.02 * path:
             problems.append(("play", f"within 2 % of the belt's length {path:.4g} m", f"{p['play']:g} m"))
         problems += deflection_problems(p)
-    return problems + shaft_problems(p)
+    return problems + shaft_problems(p) + ring_problems(p)
 
 
 def inert(parameters: dict[str, Any]) -> dict[str, str]:
@@ -203,5 +205,5 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         (np.isinf(disc), of_disc, "sheave_stiffness inf"),
         (np.isinf(whole), of_disc + of_tilt, "sheave_stiffness inf"),
     )
-    found = {key: setting for holds, keys, setting in cases if holds for key in keys}
+    found = {key: setting for holds, keys, setting in cases if holds for key in keys} | ring_inert(p)
     return friction_inert(p) | course_inert(p) | pulley_inert(p) | deflection_inert(p) | found

@@ -9,7 +9,9 @@ from cvt_hpc.models.elastic_belt import check, inert
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers import taken
 
-PARAMETERS = {table: keys for table, keys in elastic_belt.PARAMETERS.items() if table != "pulleys"} | {
+PARAMETERS = {
+    table: keys for table, keys in elastic_belt.PARAMETERS.items() if table not in ("pulleys", "rings")
+} | {
     "limit": {
         "limit_frequency": Parameter(
             1000.0,

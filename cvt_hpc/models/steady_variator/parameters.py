@@ -23,7 +23,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     section: {key: parameter for key, parameter in table.items() if key not in OF_THE_COURSE}
     for section, table in elastic_belt.PARAMETERS.items()
     # of a transient: a steady pulley is turned by a given speed, pressed by a given thrust
-    if section not in ("pulleys", "record")
+    if section not in ("pulleys", "rings", "record")
 }
 
 
