@@ -18,7 +18,7 @@ from cvt_hpc.models.elastic_belt.deflection_settings import (
 )
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert, pulley_problems, shaft_problems
 from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, PULLEYS, SHAFT
-from cvt_hpc.models.elastic_belt.ring_settings import RINGS, ring_inert, ring_problems
+from cvt_hpc.models.elastic_belt.ring_settings import RINGS, ring_inert, ring_problems, rings_rub
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
@@ -198,7 +198,7 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
     of_disc, of_tilt = ("local_stiffness", "local_length"), ("tilt_stiffness", "tilt_factor")
     cases = (
         (p["disturbance"] == 0.0, ("seed",), "disturbance 0"),
-        (p["ring_friction"] == 0.0, ("ring_friction_speed",), "ring_friction 0"),
+        (not rings_rub(p), ("ring_friction_speed",), "ring_friction 0"),
         (p["sheave_stiffness"] == 1.0, ("stiffness_of",), "sheave_stiffness 1"),
         (np.isinf(p["tilt_factor"]), of_tilt[:1], "tilt_factor inf"),
         (np.isinf(p["tilt_stiffness"]), of_tilt[1:], "tilt_stiffness inf"),

@@ -65,15 +65,18 @@ def ring_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     return []
 
 
+def rings_rub(parameters: Mapping[str, Any]) -> bool:
+    """Whether rings have friction, at the saddle or among each other."""
+    p = RING_DEFAULTS | dict(parameters)
+    return bool(p["ring_friction"] > 0.0 or (p["ring_layers"] > 1 and p["layer_friction"] > 0.0))
+
+
 def ring_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
     """Settings of the layers without effect, each with the setting that makes it so."""
     p = RING_DEFAULTS | dict(parameters)
     if p["ring_layers"] == 1:
         return dict.fromkeys((key for key in RINGS if key != "ring_layers"), "ring_layers 1")
-    rubs = p["layer_friction"] > 0.0 or p.get("ring_friction", 0.0) > 0.0
-    if not rubs or p["ring_static_factor"] == 1.0:
-        return {"ring_stribeck_speed": "no static friction of the rings above the kinetic one"}
-    return {}
+    return {"ring_stribeck_speed": "ring_static_factor 1"} if p["ring_static_factor"] == 1.0 else {}
 
 
 def refuse_layers(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
