@@ -10,10 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from cvt_hpc.kernels import kernel, merged_kernel
-from cvt_hpc.lanes import absolute, decay, fma, maximum, select
-from cvt_hpc.physics.friction import saturation
-
-LEAST_SLIDING = 1e-9  # [m/s]: below it friction is linear, and its slope the law's
+from cvt_hpc.lanes import absolute, decay, fma, maximum, reciprocals
 
 
 @kernel
@@ -41,44 +38,36 @@ def stack_forces(inward: np.ndarray, normal: np.ndarray) -> None:
 
 
 @merged_kernel
-def ring_coefficient(speed, kinetic, static_excess, per_stribeck, per_width):
-    """Friction coefficient of the rings with the sign of sliding, and its slope where that is not negative.
+def ring_friction(speed, kinetic, falls, static_excess, per_stribeck, per_width, least):
+    """Friction coefficient of the rings by the size of their sliding: its secant and its slope.
 
-    mu = mu_k (1 + (mu_s / mu_k - 1) exp(-|v| / v_st)) tanh(v / v_reg)
+    mu = mu_k (1 + (mu_s / mu_k - 1) exp(-|v| / v_st)) tanh(|v| / v_reg)
 
     Parameters
     ----------
     speed
-        Sliding speed, any sign [m/s]; lanes or a plain number, as all that follow.
+        Sliding speed, any sign [m/s]; lanes or a plain number, as all that follow but `falls`.
     kinetic, static_excess
         mu_k, and mu_s / mu_k - 1.
+    falls : bool
+        Whether mu_s is larger than mu_k anywhere.
     per_stribeck, per_width
         1 / v_st, 1 / v_reg [s/m].
+    least
+        Sliding speed below which friction is linear, 1e-3 v_reg and less [m/s].
 
     Returns
     -------
-    coefficient, slope
-        [1], and its derivative by the tanh alone [s/m].
+    secant, slope
+        mu / |v|, and the derivative of mu by the tanh alone, which is not negative [s/m].
     """
-    level = kinetic * fma(static_excess, decay(absolute(speed) * per_stribeck), 1.0)
-    factor, slope = saturation(speed, per_width)
-    return level * factor, level * slope
-
-
-@merged_kernel
-def resisting_slope(slope, drag, speed, inertia_rate):
-    """Slope with which a linearised step of friction does not turn sliding about by itself [N s/m^2].
-
-    The slope of the law, or, where friction would stop the surfaces' inertia within a step, as much of the
-    secant drag / speed as that takes.
-
-    Parameters
-    ----------
-    slope, drag, speed
-        Of the law [N s/m^2], the line force [N/m] and the sliding speed [m/s].
-    inertia_rate
-        Reduced mass per length of what slides, over the step [N s/m^2].
-    """
-    secant = drag / select(absolute(speed) > LEAST_SLIDING, speed, LEAST_SLIDING)
-    stiff = maximum(slope, secant - inertia_rate)
-    return stiff
+    size = maximum(absolute(speed), least)
+    level = kinetic
+    if falls:
+        level = kinetic * fma(static_excess, decay(size * per_stribeck), 1.0)
+    # tanh(x) = (1 - e^-2x) / (1 + e^-2x) and 1 / |v| by one division
+    rest = decay(size * (2.0 * per_width))
+    per_sum, per_size = reciprocals(1.0 + rest, size)
+    factor = (1.0 - rest) * per_sum
+    secant, slope = level * factor * per_size, level * per_width * fma(-factor, factor, 1.0)
+    return secant, slope

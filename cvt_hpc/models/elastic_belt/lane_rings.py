@@ -23,11 +23,11 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneState,
     alike,
 )
-from cvt_hpc.models.elastic_belt.lane_forces import lane_speed_share
+from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH, lane_speed_share
 from cvt_hpc.models.elastic_belt.moments import SADDLE_FRICTION, SADDLE_POWER, SADDLE_SPEED, add
 from cvt_hpc.models.elastic_belt.power_terms import RING_LOSS, STORED_ENERGY
 from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER, Rings
-from cvt_hpc.physics.layers import ring_coefficient
+from cvt_hpc.physics.layers import ring_friction
 
 # Constants of each lane; from FIRST_OFFSET on the layers' offsets, then by arc and surface the factors of the
 # layer above it and of the one below.
@@ -61,12 +61,15 @@ class LaneRings(NamedTuple):
         See above.
     number : int
         n
+    falls : bool
+        Whether static friction is above the kinetic one in any run.
     middles : (2,) int array
         Cell in the middle of each strand.
     """
 
     constants: LaneArray
     number: int
+    falls: bool
     middles: np.ndarray
 
 
@@ -109,7 +112,8 @@ def lane_rings(belts: Sequence[Belt], rings: Sequence[Rings], dtype: DTypeLike) 
     stations = np.arange(first.cell.size)
     straight = first.curvature == 0.0
     strands = (stations[straight & (beyond == (stations > first.driven_start))] for beyond in (False, True))
-    return LaneRings(constants, n, np.array([strand[strand.size // 2] for strand in strands]))
+    falls = any(ring.static_excess > 0.0 for ring in rings)
+    return LaneRings(constants, n, falls, np.array([strand[strand.size // 2] for strand in strands]))
 
 
 def parted_rings(rings: LaneRings, parts: int) -> LaneRings:
@@ -184,6 +188,7 @@ def audit_layers(
     )
     offset = belt.constants[0, RING_OFFSET]
     summed = profiles.rows > 0
+    least = LEAST_SHARE_OF_WIDTH / c[0, PER_WIDTH]
     loss = stored = zero
     length = driving = driven = 0.0
     for j in range(fields.rows):
@@ -221,10 +226,10 @@ def audit_layers(
             over = fields[j, FIRST_LAYER + i] if i < n else fields[j, V_ELEMENT]
             sliding = fma(below_factor, belt_speed + under, -above_factor * (belt_speed + over))
             level = c[0, LAYER_FRICTION_LEVEL] if 0 < i < n else c[0, SADDLE_FRICTION_LEVEL]
-            coefficient, slope = ring_coefficient(
-                sliding, level, c[0, STATIC_EXCESS], c[0, PER_STRIBECK], c[0, PER_WIDTH]
+            secant, slope = ring_friction(
+                sliding, level, rings.falls, c[0, STATIC_EXCESS], c[0, PER_STRIBECK], c[0, PER_WIDTH], least
             )
-            drag = dual * (largest - below) * coefficient
+            drag = dual * (largest - below) * secant * sliding
             loss += drag * sliding
             if summed:
                 add(sums, i, LOSS, drag * sliding)

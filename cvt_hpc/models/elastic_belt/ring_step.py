@@ -26,7 +26,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from cvt_hpc.kernels import kernel
+from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, ahead, anywhere, around, behind, fma, like, maximum, split
 from cvt_hpc.models.elastic_belt.belt import N_RING, V_ELEMENT, V_RING, Belt, W
 from cvt_hpc.models.elastic_belt.imex import MOST_PASSES, advance_belt, forget
@@ -47,12 +47,14 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     BELT_SPEED,
     ELEMENT_MASS,
     LAYER_WORK,
+    RING_FRICTION_SPEED,
     RING_OFFSET,
     LaneBelt,
     LaneState,
 )
 from cvt_hpc.models.elastic_belt.lane_forces import (
     EPS_1,
+    LEAST_SHARE_OF_WIDTH,
     PER_CONTENT_1,
     SADDLE,
     SHORT_1,
@@ -83,14 +85,15 @@ from cvt_hpc.models.elastic_belt.lane_rings import (
 )
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER, Rings
-from cvt_hpc.physics.layers import resisting_slope, ring_coefficient
+from cvt_hpc.physics.layers import ring_friction
 
 # Fields of RingWork.layers, STRIDE of each layer: strain; of the eliminated chain the increment by its own
-# forces, those per common force, per increment of the elements and of the layer below. Before that the sum of
-# inward forces below the layer, after it the flux of content. Behind them, of the station, what gives f.
+# forces, those per common force, per increment of the elements by way of the ears, and of the layer, or the
+# elements, below. Before that the sum of inward forces below the layer, after it the flux of content. Behind
+# them, of the station, what gives f, and the force of the ears.
 EPS, PART, COMMON, ELEMENTS, LINK = range(5)
 STRIDE = 5
-OWN_SUM, ELEMENT_SUM, PER_COMMON_SUM = range(3)
+OWN_SUM, ELEMENT_SUM, PER_COMMON_SUM, ON_EARS = FIELDS_OF_STATION = range(4)
 
 
 class RingWork(NamedTuple):
@@ -100,7 +103,7 @@ class RingWork(NamedTuple):
     ----------
     stations : (N, 43) LaneArray
         As of `ImexWork`.
-    layers : (N, 5 n + 3) LaneArray
+    layers : (N, 5 n + 4) LaneArray
         See above.
     rings : LaneRings
         Constants of the layers.
@@ -127,7 +130,7 @@ def ring_work(state: LaneState, belts: Sequence[Belt], rings: Sequence[Rings]) -
     constants = lane_rings(belts, rings, dtype)
     return RingWork(
         imex_work(state).stations,
-        LaneArray(rows, STRIDE * count + 3, lanes, dtype),
+        LaneArray(rows, STRIDE * count + len(FIELDS_OF_STATION), lanes, dtype),
         constants,
         constants,
         LaneArray(rows, count, lanes, dtype),
@@ -178,6 +181,14 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
     lane_contact_forces(belt, state, work.stations)
 
 
+@merged_kernel
+def heavier_by(rings: LaneRings, step: float):
+    """Factor on the inertia of what layers move against their mean."""
+    c = rings.constants
+    needed = 1.1 * (step * step * c[0, STRESS_RATE] + step * c[0, DAMPING_RATE])
+    return maximum(needed, 1.0)
+
+
 @kernel
 def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: RingWork, step: float) -> None:
     """Eliminate the layers: their part of the blocks and right side of elements and rings as one."""
@@ -188,10 +199,12 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
     acceleration = lane_acceleration(belt, state.time[0], step)
     per_step = 1.0 / step
     mass, stiffness, damping = c[0, LAYER_MASS], c[0, LAYER_STIFFNESS], c[0, LAYER_DAMPING]
-    heavier = maximum(1.1 * (step * step * c[0, STRESS_RATE] + step * c[0, DAMPING_RATE]), 1.0)
+    heavier = heavier_by(rings, step)
     relief = c[0, LAYER_RELIEF] * share * share
     excess, per_stribeck, per_width = c[0, STATIC_EXCESS], c[0, PER_STRIBECK], c[0, PER_WIDTH]
+    least = LEAST_SHARE_OF_WIDTH * belt.constants[0, RING_FRICTION_SPEED]
     zero = like(0.0, sine)
+    free = 1.0 / (heavier * mass * per_step)
     # reduced masses over the step: of two layers, and of the inner one, with all it takes along, and elements
     between = 0.5 * heavier * mass * per_step
     inner = mass / (1.0 / n + (1.0 - 1.0 / n) / heavier)
@@ -226,15 +239,16 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
         # of the ears: friction on the elements and its slopes
         ear_drag = ear_stiff = ear_cross = zero
         pressed = largest - below
-        if anywhere(pressed > 0.0):
+        on_ears = on_arc and anywhere(pressed > 0.0)
+        if on_ears:
             above_factor, below_factor = surface_factors(rings, n, is_driven)
             outer = fields[j, FIRST_LAYER + n - 1]
             sliding = fma(below_factor, belt_speed + outer, -above_factor * (belt_speed + element))
-            coefficient, slope = ring_coefficient(
-                sliding, c[0, SADDLE_FRICTION_LEVEL], excess, per_stribeck, per_width
+            secant, slope = ring_friction(
+                sliding, c[0, SADDLE_FRICTION_LEVEL], rings.falls, excess, per_stribeck, per_width, least
             )
-            drag_up = pressed * coefficient
-            stiff_up = resisting_slope(pressed * slope, drag_up, sliding, at_saddle)
+            drag_up = pressed * secant * sliding
+            stiff_up = maximum(pressed * slope, fma(pressed, secant, -at_saddle))
             factor_up = below_factor
             ear_drag, ear_stiff = above_factor * drag_up, above_factor * above_factor * stiff_up
             ear_cross = above_factor * below_factor * stiff_up
@@ -251,42 +265,53 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
             inertia = heavier * mass * fma(c[0, FIRST_OFFSET + k], turn, 1.0)
             moved = fma((belt_speed + v) * per_left, v - v_a, acceleration)
             force = fma(stress_r - stress_l, per_dual, fma(-inertia, moved, carried))
-            diagonal = inertia * per_step
-            by_common, by_elements = fma(link, common, 1.0), link * elements
-            if on_arc:
+            if not on_arc:
+                part = free * force
+                own_sum += part
+                common_sum += free
+                layers[j, first + PART] = part
+            else:
+                diagonal = inertia * per_step
+                by_common, by_elements = fma(link, common, 1.0), link * elements
                 pressed = largest - layers[j, first + PART]
                 above_factor, below_factor = surface_factors(rings, k, is_driven)
                 under = fields[j, FIRST_LAYER + k - 1] if k > 0 else element
                 sliding = fma(below_factor, belt_speed + under, -above_factor * (belt_speed + v))
                 level = c[0, LAYER_FRICTION_LEVEL] if k > 0 else c[0, SADDLE_FRICTION_LEVEL]
-                coefficient, slope = ring_coefficient(sliding, level, excess, per_stribeck, per_width)
-                drag = pressed * coefficient
-                stiff = resisting_slope(pressed * slope, drag, sliding, between if k > 0 else at_saddle)
+                secant, slope = ring_friction(
+                    sliding, level, rings.falls, excess, per_stribeck, per_width, least
+                )
+                secant *= pressed
+                drag = secant * sliding
+                # not less than what keeps friction from turning sliding about within the step
+                stiff = maximum(pressed * slope, secant - (between if k > 0 else at_saddle))
                 cross = above_factor * below_factor * stiff
                 force += above_factor * drag - factor_up * drag_up
                 diagonal += above_factor * above_factor * stiff + factor_up * factor_up * stiff_up
                 diagonal = fma(-link * link, pivot, diagonal)
                 force = fma(link, part, force)
-                if k == n - 1:
-                    by_elements += ear_cross
-                if k == 0:
-                    by_elements += cross
-                drag_up, stiff_up, factor_up = drag, stiff, below_factor
-            pivot = 1.0 / diagonal
-            part, common, elements = pivot * force, pivot * by_common, pivot * by_elements
-            link = cross
-            own_sum = fma(part, by_common, own_sum)
-            common_sum = fma(common, by_common, common_sum)
-            element_sum = fma(elements, by_common, element_sum)
-            own_element = fma(part, by_elements, own_element)
-            element_element = fma(elements, by_elements, element_element)
-            layers[j, first + PART], layers[j, first + COMMON] = part, common
-            layers[j, first + ELEMENTS] = elements
-            layers[j, first + LINK] = pivot * cross if k > 0 else zero
+                drag_up, stiff_up, factor_up, link = drag, stiff, below_factor, cross
+                pivot = 1.0 / diagonal
+                part, common = pivot * force, pivot * by_common
+                own_sum, common_sum = fma(part, by_common, own_sum), fma(common, by_common, common_sum)
+                layers[j, first + PART], layers[j, first + COMMON] = part, common
+                layers[j, first + LINK] = pivot * cross
+                if on_ears or k == 0:
+                    if k == n - 1:
+                        by_elements += ear_cross
+                    elements = pivot * by_elements
+                    if on_ears:
+                        layers[j, first + ELEMENTS] = elements
+                    if k == 0:
+                        by_elements += cross
+                        elements = fma(pivot, cross, elements)
+                    element_sum = fma(elements, by_common, element_sum)
+                    own_element = fma(part, by_elements, own_element)
+                    element_element = fma(elements, by_elements, element_element)
         per_common = 1.0 / common_sum
         last = STRIDE * n
         layers[j, last + OWN_SUM], layers[j, last + ELEMENT_SUM] = own_sum, element_sum
-        layers[j, last + PER_COMMON_SUM] = per_common
+        layers[j, last + PER_COMMON_SUM], layers[j, last + ON_EARS] = per_common, pressed
         if on_arc:
             # the inner surface's friction on the elements
             taken = below_factor * drag
@@ -310,45 +335,53 @@ def advance_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Rin
     offset = belt.constants[0, RING_OFFSET]
     belt_speed = lane_speed_share(belt, state.time[0], offset) * belt.constants[0, BELT_SPEED]
     damping, last = c[0, LAYER_DAMPING], STRIDE * n
-    for j in range(fields.rows):
-        element, common = stations[j, DV_0], stations[j, DV_1] * n
-        common = fma(-layers[j, last + ELEMENT_SUM], element, common - layers[j, last + OWN_SUM])
-        common = common * layers[j, last + PER_COMMON_SUM]
-        change = total = element * 0.0
-        for k in range(n):
-            first = STRIDE * k
-            own = fma(layers[j, first + COMMON], common, layers[j, first + PART])
-            own = fma(layers[j, first + ELEMENTS], element, own)
-            change = fma(layers[j, first + LINK], change, own)
-            v = fields[j, FIRST_LAYER + k] + change
-            fields[j, FIRST_LAYER + k] = v
-            total += v
-            # content that goes through the station, less that by the belt speed; 1 / (1 + eps) by its series
-            eps = behind(layers, j, first)
-            short = fma(-eps, fma(-eps, 1.0 - eps, 1.0), 1.0)
-            layers[j, first + PART] = fma(-belt_speed, eps, v) * short
-        fields[j, V_RING] = total / n
-    lost = offset * 0.0
-    for j in range(fields.rows):
-        kappa, per_cell = belt.curvature[j], belt.per_cell[j]
-        bent = (fields[j, W] + ahead(fields, j, W)) * (0.5 * kappa)
-        united = ahead(fields, j, V_RING) - fields[j, V_RING]
-        mean = united * 0.0
-        for k in range(n):
-            first = STRIDE * k
-            outflow = ahead(layers, j, first + PART) - layers[j, first + PART]
-            row = FIRST_LAYER + n + k
-            fields[j, row] = fma(-step * per_cell, outflow, fields[j, row])
-            eps = layer_strain(rings, state, j, k, kappa, bent)
-            layers[j, first] = eps
-            mean += eps
-            closing = ahead(fields, j, FIRST_LAYER + k) - fields[j, FIRST_LAYER + k] - united
-            lost = fma(damping * per_cell * closing, closing, lost)
-        mean = mean / n
-        longer, more = fma(offset, kappa, 1.0), 1.0 / (mean + 1.0)
-        content = (bent + longer) * more
-        stations[j, EPS_1], stations[j, PER_CONTENT_1] = mean, 1.0 / content
-        stations[j, SHORT_1] = more
-        fields[j, N_RING] = fma(-longer, mean, bent) * more
+    free = step / (heavier_by(rings, step) * c[0, LAYER_MASS])
+    lost = zero = offset * 0.0
+    for j in range(fields.rows + 1):
+        if j < fields.rows:
+            element = stations[j, DV_0]
+            common = fma(stations[j, DV_1], n, -layers[j, last + OWN_SUM])
+            common = fma(-layers[j, last + ELEMENT_SUM], element, common) * layers[j, last + PER_COMMON_SUM]
+            on_arc = anywhere(belt.arc_share[j] > 0.0)
+            on_ears = on_arc and anywhere(layers[j, last + ON_EARS] > 0.0)
+            change, total = element, zero
+            for k in range(n):
+                first = STRIDE * k
+                own = layers[j, first + PART]
+                if on_arc:
+                    own = fma(layers[j, first + COMMON], common, own)
+                    if on_ears:
+                        own = fma(layers[j, first + ELEMENTS], element, own)
+                    change = fma(layers[j, first + LINK], change, own)
+                else:
+                    change = fma(free, common, own)
+                v = fields[j, FIRST_LAYER + k] + change
+                fields[j, FIRST_LAYER + k] = v
+                total += v
+                # content that goes through, less that by the belt speed; 1 / (1 + eps) by its series
+                eps = behind(layers, j, first)
+                short = fma(-eps, fma(-eps, 1.0 - eps, 1.0), 1.0)
+                layers[j, first + PART] = fma(-belt_speed, eps, v) * short
+            fields[j, V_RING] = total / n
+        if j > 0:
+            # the cell behind the station, whose old strain is no longer needed
+            i = j - 1
+            kappa, per_cell = belt.curvature[i], belt.per_cell[i]
+            bent = (fields[i, W] + ahead(fields, i, W)) * (0.5 * kappa)
+            united, mean = ahead(fields, i, V_RING) - fields[i, V_RING], zero
+            for k in range(n):
+                first, row = STRIDE * k, FIRST_LAYER + n + k
+                outflow = ahead(layers, i, first + PART) - layers[i, first + PART]
+                fields[i, row] = fma(-step * per_cell, outflow, fields[i, row])
+                eps = layer_strain(rings, state, i, k, kappa, bent)
+                layers[i, first] = eps
+                mean += eps
+                closing = ahead(fields, i, FIRST_LAYER + k) - fields[i, FIRST_LAYER + k] - united
+                lost = fma(damping * per_cell * closing, closing, lost)
+            mean = mean / n
+            longer, short = fma(offset, kappa, 1.0), 1.0 / (mean + 1.0)
+            stations[i, EPS_1], stations[i, SHORT_1] = mean, short
+            stations[i, PER_CONTENT_1] = (mean + 1.0) / (bent + longer)
+            fields[i, N_RING] = fma(-longer, mean, bent) * short
     work_done = state.scalars[0, LAYER_WORK]
     state.scalars[0, LAYER_WORK] = work_done + around(like(lost, work_done)) * step

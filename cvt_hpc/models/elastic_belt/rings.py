@@ -25,8 +25,9 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt.belt import FIELDS, N_RING, V_ELEMENT, V_RING, Belt, State, W
+from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH
 from cvt_hpc.models.elastic_belt.ring_settings import RING_DEFAULTS, layer_count
-from cvt_hpc.physics.layers import ring_coefficient, stack_forces
+from cvt_hpc.physics.layers import ring_friction, stack_forces
 
 FIRST_LAYER = len(FIELDS)  # row of a state with the first layer's speed
 
@@ -205,14 +206,16 @@ def layer_rates(
         if belt.arc_share[j] > 0.0:
             surface_friction(belt, rings, state, eps, share, j, normal, sliding)
             for k in range(n + 1):
-                coefficient, _ = ring_coefficient(
+                secant, _ = ring_friction(
                     sliding[k],
                     rings.kinetic[k],
+                    True,
                     rings.static_excess,
                     1.0 / rings.stribeck_speed,
                     1.0 / rings.friction_speed,
+                    LEAST_SHARE_OF_WIDTH * rings.friction_speed,
                 )
-                drag = (1.0 + rings.surface[k] * kappa) * normal[k] * coefficient
+                drag = (1.0 + rings.surface[k] * kappa) * normal[k] * secant * sliding[k]
                 if k < n:
                     rate[k, j] += drag / (1.0 + rings.offset[k] * kappa)
                 else:
