@@ -58,6 +58,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     PER_CONTENT_1,
     SADDLE,
     SHORT_1,
+    advance_discs,
     lane_acceleration,
     lane_contact_forces,
     lane_sliding,
@@ -178,6 +179,7 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
     advance_layers(belt, work.rings, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
+    advance_discs(belt, state, step)
     lane_contact_forces(belt, state, work.stations)
 
 
