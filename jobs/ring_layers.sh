@@ -20,9 +20,10 @@ part() { # NAME SETTINGS...
 rm -f "$table.part"
 nine=(--set 'ring_layers=[9]')
 part number
-part step_2us --set 'ring_layers=[1, 9]' --set 'step=2 us'
-part step_1us "${nine[@]}" --set 'step=1 us'
+# the stack as thick as nine layers, 1.665 mm
+part stack_of_3 --set 'ring_layers=[3]' --set 'layer_thickness=0.555 mm'
+part stack_of_6 --set 'ring_layers=[6]' --set 'layer_thickness=0.2775 mm'
+part step_2us "${nine[@]}" --set 'step=2 us'
 part oiled_layers "${nine[@]}" --set 'layer_friction=0.03'
-part static_friction "${nine[@]}" --set 'ring_static_factor=1.5'
-part one_ring_long "${nine[@]}" --set 'layer_tolerance=[1.0002, 1, 1, 1, 1, 1, 1, 1, 1]'
+part inner_ring_long "${nine[@]}" --set 'layer_tolerance=[1.0002, 1, 1, 1, 1, 1, 1, 1, 1]'
 mv "$table.part" "$table"
