@@ -34,7 +34,7 @@ PARTS = {
 HEAVY = {"ritz, mass x 4": 4.0, "ritz, mass x 16": 16.0}  # frequencies / 2 and / 4
 HEAD = (
     "part", "load [N m]", "vibrates", "amplitude_t1 [um]", "amplitude_t2 [um]", "frequency_t1 [Hz]",
-    "frequency_t2 [Hz]", "axial_force_driving [N]", "largest_force_driven [kN/m]", "at_share_of_arc",
+    "frequency_t2 [Hz]", "axial_force_driving [N]", "largest_force_driven [kN/m]",
     "share_of_first_fifth", "share_of_last_fifth", "efficiency", "power_residual", "core_s_per_s",
 )  # fmt: skip
 
@@ -64,7 +64,6 @@ def row(name, load, run):
     cell = np.gradient(place)
     share = (place - place[0]) / (place[-1] - place[0])
     parts = force * cell / (force * cell).sum()
-    peak = int(force.argmax())
     numbers = [
         float(run[key].sel(strand=strand)) for key in ("amplitude", "frequency") for strand in ("t1", "t2")
     ]
@@ -72,7 +71,7 @@ def row(name, load, run):
         name, f"{load:g}", run["vibrates"].attrs["flag_meanings"].split()[int(run["vibrates"])],
         *(f"{1e6 * value:.2f}" for value in numbers[:2]), *(f"{value:.1f}" for value in numbers[2:]),
         f"{float(run['axial_force'].sel(pulley='driving')):.6g}",
-        f"{1e-3 * force[peak]:.4g}", f"{share[peak]:.3f}",
+        f"{1e-3 * force.max():.4g}",
         f"{parts[share <= 0.2].sum():.4f}", f"{parts[share >= 0.8].sum():.4f}",
         f"{float(run['efficiency']):.5f}", f"{float(run['power_residual']):.5f}",
         f"{float(run['core_seconds']) / float(run['time'][-1]):.3f}",

@@ -9,7 +9,8 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import load_job
 from cvt_hpc.models.elastic_belt.belt import mesh
 from cvt_hpc.physics.ritz import modal_flexibilities
-from support.marched import fresh_record, job
+from cvt_hpc.simulation import run_points
+from support.marched import fresh_record, job, never
 
 SCENE = {"stations": 32, "duration": 0.04, "rise_time": 0.01, "load": 60.0, "friction_gradient": -0.4}
 JUDGED = ("axial_force", "mean_push_force", "mean_ring_tension", "flank_loss")
@@ -102,6 +103,16 @@ def test_discs_with_inertia_settle_where_those_without_are():
         assert found[name] == pytest.approx(expected[name], rel=3e-3), name
     assert not np.array_equal(found["axial_force"], expected["axial_force"])
     assert found["power_residual"] < 2e-3
+
+
+def test_discs_with_inertia_do_not_feel_the_runs_beside_them():
+    asked = job(**RECORD, **MODES)
+    points = [asked.point(0) | {"sheave_stiffness": factor} for factor in (1.0, 1.5, np.inf)]
+    together = run_points(asked, points, never)
+    for point, expected in zip(points, together, strict=True):
+        (found,) = run_points(asked, [point], never)
+        for name in JUDGED:
+            assert np.array_equal(found[name], expected[name]), name
 
 
 def test_modes_of_a_disc_need_the_step_that_knows_them():
