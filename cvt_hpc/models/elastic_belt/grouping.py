@@ -39,6 +39,8 @@ SHARED = (
     "lanes",
     "contact_sweeps",
     "sheave_deformation",
+    "curvature_terms",
+    "column_bending",
 )
 
 
