@@ -5,6 +5,7 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt import inert
+from cvt_hpc.models.elastic_belt.bending_settings import bending_inert
 from cvt_hpc.models.elastic_belt.deflection_settings import CONE, TABLE_KEYS
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert
 from cvt_hpc.simulation import record_variables
@@ -31,7 +32,7 @@ OTHER = {
     "local_stiffness": 5e9,
     "local_length": 0.02,
 }
-AT_REST = pulley_inert({}) | dict.fromkeys(
+AT_REST = pulley_inert({}) | bending_inert({}) | dict.fromkeys(
     [*CONE, *TABLE_KEYS], "sheave_deformation bending"
 )  # of pulleys as they are in every scene here
 CASES = [

@@ -46,14 +46,16 @@ BENDING_DEFAULTS = {key: parameter.default for key, parameter in BENDING.items()
 
 def has_column(parameters: Mapping[str, Any]) -> bool:
     """Whether pressed elements bear a bending moment."""
-    return bool((BENDING_DEFAULTS | dict(parameters))["column_bending"] == "rocking")
+    return bool(parameters.get("column_bending", "off") == "rocking")
 
 
 def whole_bending_stiffness(parameters: Mapping[str, Any]) -> float:
-    """Largest bending stiffness that the belt may have [N m^2], pressed elements included."""
-    p = BENDING_DEFAULTS | dict(parameters)
-    column = p["column_stiffness"] if has_column(p) else 0.0
-    return float(p["bending_stiffness"] + column)
+    """Largest bending stiffness that the belt may have [N m^2], pressed elements included.
+
+    Of the parameters it reads those alone that have an effect.
+    """
+    column = parameters["column_stiffness"] if has_column(parameters) else 0.0
+    return float(parameters["bending_stiffness"] + column)
 
 
 def bending_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
