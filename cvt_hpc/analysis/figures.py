@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
 from textwrap import wrap
@@ -26,6 +26,7 @@ WIDTH = 6.4  # [inch]: letters of 10 points stay readable across a page and on a
 RESOLUTION = 170  # dots per inch
 SETTLED = 1000  # pixels: the palette is refined until no more than these, one in a thousand, change colour
 FORMATS = (".png", ".svg", ".pdf")
+LEGEND_LETTERS, HANDLE_LETTERS = 84, 8  # across the page, and what a handle with its space takes of them
 LONGEST_NAME = 26  # letters of a name on an axis
 
 STYLE = {
@@ -119,6 +120,12 @@ def balanced(line: str, width: int) -> str:
     while width > 1 and len(narrower := wrap(line, width - 1)) == len(lines):
         lines, width = narrower, width - 1
     return "\n".join(lines)
+
+
+def legend_columns(labels: Sequence[str]) -> int:
+    """Entries side by side in a legend below a picture of WIDTH."""
+    longest = max((len(label) for label in labels), default=0)
+    return max(min(len(labels), LEGEND_LETTERS // (longest + HANDLE_LETTERS)), 1)
 
 
 def save_figure(figure: Figure, out: Path) -> Path:

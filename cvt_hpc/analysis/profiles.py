@@ -12,7 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.error_axes import COLOURS
-from cvt_hpc.analysis.figures import STYLE, WIDTH, balanced, display_unit, draw, in_words, styled
+from cvt_hpc.analysis.figures import (
+    STYLE,
+    WIDTH,
+    balanced,
+    display_unit,
+    draw,
+    in_words,
+    legend_columns,
+    styled,
+)
 from cvt_hpc.analysis.telling_apart import on_axes, titles
 from cvt_hpc.errors import InputError, mismatch, unknown
 
@@ -97,7 +106,7 @@ def profile_figure(
         (axes.get_legend_handles_labels() for axes in panels[0]), key=lambda pair: len(pair[1])
     )
     if told:
-        figure.legend(handles, told, loc="outside lower center", frameon=False, ncols=min(len(told), 3))
+        figure.legend(handles, told, loc="outside lower center", frameon=False, ncols=legend_columns(told))
     where = f" of the {region} pulley" if region else ""
     lines = titles(histories, f"Along the belt{where}", common)
     figure.suptitle("\n".join(balanced(line, 76) for line in lines), fontsize=STYLE["figure.titlesize"])
