@@ -34,7 +34,7 @@ def draw_curve(
     at: Mapping[str, Any] | None = None,
     source: str = "results",
 ) -> Path:
-    """Write the figure of `curve_figure`, with its arguments and errors, as `save_figure` does."""
+    """Write the figure of `curve_figure`."""
     return draw(lambda: curve_figure(dataset, quantities, at, source), out)
 
 
@@ -49,27 +49,18 @@ def curve_figure(
 
     Parameters
     ----------
-    dataset : Dataset
-        Results of a study, as `open_results` returns them. The axis that runs along x in a map does so here;
+    dataset, at, source
+        As of all pictures of results (`figures.py`). The axis that runs along x in a map does so here;
         there is a panel for each value of the one that runs along y.
     quantities : sequence of str
         Numeric variables of one unit. The first is drawn by marks, the others by lines beside it; one with
         further dimensions, such as `strand`, gives a curve for each of their labels.
-    at : mapping, optional
-        Axes to fix: name -> value, as a number [SI] or a text.
-    source : str, optional
-        Where the results are from, for the errors.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Unknown to pyplot; `figure.savefig(path)` writes it.
 
     Raises
     ------
     InputError
-        The dataset holds no results, a single run or no such quantity; quantities differ in unit; `at` names
-        no axis or no value on it; or there would be more than MOST_PANELS panels.
+        As of all pictures; there is no such quantity, quantities differ in unit, or there would be more than
+        MOST_PANELS panels.
     """
     check_results(dataset, source)
     check_quantities(dataset, quantities, source)

@@ -1,4 +1,17 @@
-"""What all pictures share: a style, units for people, and how they are written."""
+"""What all pictures share: their arguments, a style, units for people, and how they are written.
+
+Pictures of results take
+
+    dataset    Dataset: results of a study over the axes of its job, as `open_results` returns them
+    at         mapping, optional: axes to fix, name -> value, as a number [SI] or a text
+    source     str, optional: where the results are from, for the errors
+
+and pictures of runs a `history` or `histories`, as `simulate` returns them, with their `sources`. A function
+`..._figure` composes a matplotlib Figure, unknown to pyplot, and writes nothing; `figure.savefig(path)` does.
+`draw_...` takes the same arguments, and writes it as `save_figure` does. InputError is raised where a dataset
+holds no results, a single run or not what is to be drawn, or where `at` names no axis or no value on it; what
+else a picture refuses its docstring says.
+"""
 
 from __future__ import annotations
 

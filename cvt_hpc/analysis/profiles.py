@@ -42,7 +42,7 @@ def draw_profile(
     columns: str | None = None,
     sources: Sequence[str] = (),
 ) -> Path:
-    """Write the figure of `profile_figure`, with its arguments and errors, as `save_figure` does."""
+    """Write the figure of `profile_figure`."""
     return draw(lambda: profile_figure(histories, quantities, region, columns, sources), out)
 
 
@@ -68,11 +68,6 @@ def profile_figure(
         An axis of the runs' job that has a column of panels for each value; else all are drawn together.
     sources : sequence of str, optional
         Where the runs are from, for errors, and for the legend where their axes do not tell them apart.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Unknown to pyplot; `figure.savefig(path)` writes it.
 
     Raises
     ------

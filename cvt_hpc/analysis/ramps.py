@@ -50,7 +50,7 @@ class Ramp(NamedTuple):
 def draw_ramp(
     histories: Sequence[xr.Dataset], out: Path, of: str = "t1", sources: Sequence[str] = ()
 ) -> Path:
-    """Write the figure of `ramp_figure`, with its arguments and errors, as `save_figure` does."""
+    """Write the figure of `ramp_figure`."""
     return draw(lambda: ramp_figure(histories, of, sources), out)
 
 
@@ -66,11 +66,6 @@ def ramp_figure(histories: Sequence[xr.Dataset], of: str = "t1", sources: Sequen
         "t1" or "t2": the probe of that strand that moves most; or a variable over `time`.
     sources : sequence of str, optional
         Where the runs are from, for errors, and for titles where their axes do not tell them apart.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Unknown to pyplot; `figure.savefig(path)` writes it.
 
     Raises
     ------

@@ -63,7 +63,7 @@ def value_map_figure(
     Parameters
     ----------
     dataset, at, source
-        As all pictures of results take them (`figures.py`). x and y are those of `map_figure`; the axis of
+        As of all pictures of results (`figures.py`). x and y are those of `map_figure`; the axis of
         its panels is fixed at its first value.
     quantities : sequence of str
         Numeric variables of the results.
@@ -71,7 +71,7 @@ def value_map_figure(
     Raises
     ------
     InputError
-        As all pictures of results; there is no such quantity, or there would be more than MOST_PANELS panels.
+        As of all pictures; there is no such quantity, or there would be more than MOST_PANELS panels.
     """
     check_results(dataset, source)
     if is_sampled(dataset):
@@ -189,8 +189,8 @@ def _draw_panel(
 
 
 def _norm(values: NDArray[np.float64]) -> Normalize:
-    """Scale over the finite values; a quantity that does not vary has the middle of one."""
+    """Scale over the finite values; a quantity that does not vary has one colour."""
     known = values[np.isfinite(values)]
     if known.size and np.ptp(known) < EQUAL * np.abs(known).max():
-        return Normalize(*(known.mean() + 0.1 * np.abs(known).max() * np.array([-1.0, 1.0])))
+        return Normalize(*(known.mean() + 0.1 * np.abs(known).max() * np.array([-1.0, 1.1])))
     return cells.norm_over(values)

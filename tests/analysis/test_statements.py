@@ -40,7 +40,7 @@ def test_each_figure_has_a_job_and_a_table():
 
 
 def test_the_page_has_a_row_for_all_that_the_papers_state():
-    rows = tomllib.loads((ROOT / "jobs/coverage.toml").read_text())["row"]
+    rows = tomllib.loads((ROOT / "docs/coverage.toml").read_text())["row"]
     assert [row["id"] for row in rows] == [f"L{k}" for k in range(1, 41)] + [f"B{k}" for k in range(1, 37)]
     assert all("measured" in row or row["verdict"] == "reproduced" or row["why"] for row in rows)
 
