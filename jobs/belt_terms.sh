@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Curvature terms and rocking elements over the loads of jobs/belt_terms.toml, in three scenes: jobs/results/belt_terms.csv.
+# Curvature terms and rocking elements over the loads of jobs/belt_terms.toml, in two scenes: jobs/results/belt_terms.csv.
 # Needs the environment of jobs/quickstart.sh; out/belt_terms_* keep what is done. Values are assumptions, see the job.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -7,15 +7,11 @@ PATH=$PWD/.venv/bin:$PATH
 table=jobs/results/belt_terms.csv
 columns=(amplitude frequency mean_push_force mean_ring_tension axial_force power_residual time_step)
 
-# scenes of jobs/chart_ratios.toml, with loads around theirs
+# the scene at ratio 1 of jobs/chart_ratios.toml, with loads around its own
 ratio_1=(--set 'belt_length=661.2 mm' --set 'ratio=1.063' --set 'driving_speed=1475 rpm' --set 'thrust=67.72 kN'
   --set 'friction_gradient=-1.178 s/m' --set 'friction_memory=0.1447 ms' --set stiffness_of=sheave
   --set sheave_stiffness=1.772 --set 'element_mass=1.241 kg/m' --set 'ring_mass=0.2921 kg/m'
   --set 'load={ from = "530 N m", to = "650 N m", step = "20 N m" }')
-overdrive=(--set 'belt_length=661.2 mm' --set 'ratio=0.5249' --set friction_law=linear --set 'driving_speed=4900 rpm'
-  --set 'thrust=62.99 kN' --set 'friction_gradient=-0.3008 s/m' --set 'friction_memory=0.1394 ms' --set stiffness_of=sheave
-  --set sheave_stiffness=inf --set 'element_mass=1.257 kg/m' --set 'ring_mass=0.231 kg/m'
-  --set 'load={ from = "40 N m", to = "160 N m", step = "20 N m" }')
 
 part() { # SCENE SWITCH SETTINGS...
   local scene=$1 name=$2
@@ -48,5 +44,4 @@ switches() { # SCENE SETTINGS...
 rm -f "$table.part"
 switches low
 switches ratio_1 "${ratio_1[@]}"
-switches overdrive "${overdrive[@]}"
 mv "$table.part" "$table"
