@@ -38,10 +38,10 @@ switches() { # SCENE SETTINGS...
   part "$scene" rocking_30 "$@" "${rocking[@]}" --set 'column_stiffness=30 N m^2' --set 'outer_edge=3 mm'
   part "$scene" rocking_30_about_pitch_line "$@" "${rocking[@]}" --set 'column_stiffness=30 N m^2' \
     --set 'outer_edge=1.5 mm' --set 'inner_edge=1.5 mm'
-  part "$scene" path_and_rocking "$@" "${rocking[@]}" --set curvature_terms=path
 }
 
 rm -f "$table.part"
 switches low
+part low path_and_rocking --set column_bending=rocking --set curvature_terms=path
 switches ratio_1 "${ratio_1[@]}"
 mv "$table.part" "$table"

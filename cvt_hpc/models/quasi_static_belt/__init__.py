@@ -9,9 +9,8 @@ from cvt_hpc.models.elastic_belt import check, inert
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers import taken
 
-# pulleys of constant speed and thrust; elements without a moment, and no curvature terms
-LEFT_OUT = ("pulleys", "bending")
-PARAMETERS = {table: keys for table, keys in elastic_belt.PARAMETERS.items() if table not in LEFT_OUT} | {
+# elements without a moment, and no curvature terms
+PARAMETERS = {table: keys for table, keys in elastic_belt.PARAMETERS.items() if table != "bending"} | {
     "limit": {
         "limit_frequency": Parameter(
             1000.0,

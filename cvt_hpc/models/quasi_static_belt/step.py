@@ -24,6 +24,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
+    FIRST_STATE,
     LAYER_WORK,
     N_ELEMENT,
     TIME,
@@ -39,12 +40,13 @@ from cvt_hpc.models.elastic_belt.belt import (
 from cvt_hpc.models.elastic_belt.imex_stations import implicit_shares
 from cvt_hpc.models.elastic_belt.imex_system import CENTRED, LARGEST_OVERLAP, element_stress
 from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH
-from cvt_hpc.models.elastic_belt.one_system import driven_thrust
+from cvt_hpc.models.elastic_belt.one_system import driven_thrust, free_rates, pulled_by
 from cvt_hpc.models.elastic_belt.rhs import (
     accelerations,
     contact_forces,
     damped_push,
     damping_at,
+    driving_speed_at,
     fresh_contacts,
     load_at,
     memory_transport,
@@ -327,7 +329,7 @@ def _slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
     per_cosine, per_width = 1.0 / cosine, 1.0 / belt.friction_speed
     damping = damping_at(belt, state.scalars[TIME])
     speed_share = speed_share_at(belt, state.scalars[TIME])
-    driving_speed = speed_share * belt.driving_speed
+    driving_speed = driving_speed_at(belt, state)
     blocks, links = work.layers.diagonal, work.layers.links
     for j in range(n):
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
@@ -572,12 +574,15 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
         model.dynamic,
     )
     scalars, count, shapes = state.scalars, model.shapes.shape[1], model.shapes
-    moment = 0.0
+    moment = taken = 0.0
     for j in range(n):
         du, dv0 = work.rate[U, j], columns[2 * j, 0]
-        if belt.arc_share[j] > 0.0 and j >= belt.driven_start:
+        if belt.arc_share[j] > 0.0:
             slopes = stations[TANGENTIAL_SLOPE, j] * dv0 + stations[CROSS_SLOPE, j] * du
-            moment += work.moments[j] + slopes * (belt.driven_radius + fields[W, j])
+            if j >= belt.driven_start:
+                moment += work.moments[j] + slopes * (belt.driven_radius + fields[W, j])
+            else:
+                taken += work.moments[j] - slopes * (belt.driving_radius + fields[W, j])
     for k in range(size):
         moved.p[k] += work.found[k]
     work_done = 0.0
@@ -637,10 +642,18 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
         fields[W, j] = work.rate[W, j]
     if model.steady_flow:
         work_done += _settle(model, moved, work)
-    thrust = driven_thrust(belt, moved.force) - belt.thrust
-    load = belt.ratio * load_at(belt, scalars[TIME])
-    scalars[DRIVEN_SPEED] += step * (moment - load) / belt.driven_inertia
-    scalars[DRIVEN_POSITION] += step * thrust / belt.axial_damping
+    if belt.pulleys.are_free:
+        pull = pulled_by(belt, moved.force, work.moments)
+        pull[0], pull[1] = taken, moment
+        found = free_rates(belt, state, pull)
+        scalars[DRIVEN_SPEED] += step * found[0]
+        scalars[DRIVEN_POSITION] += step * found[1]
+        scalars[FIRST_STATE:] += step * found[2:]
+    else:
+        thrust = driven_thrust(belt, moved.force) - belt.thrust
+        load = belt.ratio * load_at(belt, scalars[TIME])
+        scalars[DRIVEN_SPEED] += step * (moment - load) / belt.driven_inertia
+        scalars[DRIVEN_POSITION] += step * thrust / belt.axial_damping
     scalars[LAYER_WORK] += step * work_done
     scalars[TIME] += step
 

@@ -16,10 +16,11 @@ import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants
 from cvt_hpc.models.elastic_belt.sampling import Outcome
-from cvt_hpc.models.steady_variator.braked import SPEED, Braked
-from cvt_hpc.models.steady_variator.equations import Equations
-from cvt_hpc.models.steady_variator.newton import newton
+from cvt_hpc.models.steady_variator.braked import Braked
+from cvt_hpc.models.steady_variator.equations import SPEED, Equations
+from cvt_hpc.models.steady_variator.newton import Solvable, newton
 from cvt_hpc.models.steady_variator.parameters import OF_THE_COURSE
+from cvt_hpc.models.steady_variator.released import Released, freed, held, nearest
 from cvt_hpc.models.steady_variator.sampled import largest_slip
 from cvt_hpc.models.steady_variator.settling import settled
 from cvt_hpc.physics.capacity import carried_torque
@@ -91,7 +92,10 @@ class SteadyBelt:
     """
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
-        self._parameters = {**parameters, **OF_THE_COURSE, "load": 0.0}
+        given = {**parameters, **OF_THE_COURSE, "load": 0.0}
+        free = freed(given)
+        self._free = None if free is None else Equations(free, belt_constants(free))
+        self._parameters = given if free is None else held(given)
         self._whole = belt = belt_constants(self._parameters)
         # of both regularisation speeds, over the belt's own
         self._wide = max(WIDE / belt.friction_speed, 1.0), max(RING_WIDE / belt.ring_friction_speed, 1.0)
@@ -113,6 +117,8 @@ class SteadyBelt:
         NoSteadyState
             Where no walk comes through.
         """
+        if self._free is not None:
+            return self._released(self._free, load, near)
         if near is not None:
             try:
                 return self._found(self._rise(near.unknowns, near.load, load), load)
@@ -120,10 +126,43 @@ class SteadyBelt:
                 pass
         return self._found(self._first(load), load)
 
+    def _released(self, free: Equations, load: float, near: Steady | None) -> Steady:
+        """State of free pulleys: from one nearby, or else from that of the belt between held ones."""
+        if near is not None:
+
+            def loaded(share: float) -> None:
+                changed = near.load + share * (load - near.load)
+                free.under(load=changed, load_start=changed)
+
+            try:
+                x = self._follow(loaded, near.unknowns, 1.0, "load", AT_HOME, free)
+                return self._state_of(free, x, load)
+            except NoSteadyState:
+                pass
+        start = self._found(self._first(load), load)
+        free.under(load=load, load_start=load)
+        x = free.unknowns(nearest(start.belt, free.belt, start.state))
+        way = Released(free, x)
+
+        def release(share: float) -> None:
+            way.share = share
+
+        x = self._follow(release, x, 1.0, f"pulleys let go at {load:g} N m", AT_HOME, way)
+        return self._state_of(free, x, load)
+
+    @staticmethod
+    def _state_of(equations: Equations, x: np.ndarray, load: float) -> Steady:
+        equations.under(load=load, load_start=load)
+        belt = equations.belt._replace(bridging_stiffness=np.inf)
+        return Steady(load, belt, equations.state(x), x)
+
     def known(self, load: float, unknowns: np.ndarray) -> Steady:
         """State under a load, by unknowns that were found before; ValueError if they are not of this belt."""
-        if unknowns.shape != self._equations.sizes.shape:
-            raise ValueError(f"{unknowns.shape} unknowns of a belt that has {self._equations.sizes.shape}")
+        equations = self._equations if self._free is None else self._free
+        if unknowns.shape != equations.sizes.shape:
+            raise ValueError(f"{unknowns.shape} unknowns of a belt that has {equations.sizes.shape}")
+        if self._free is not None:
+            return self._state_of(self._free, unknowns, load)
         self._own()
         self._load(load)
         return self._found(unknowns, load)
@@ -185,9 +224,7 @@ class SteadyBelt:
         return below if found is None else self._found(*found)
 
     def _found(self, x: np.ndarray, load: float) -> Steady:
-        self._load(load)
-        belt = self._equations.belt._replace(bridging_stiffness=np.inf)
-        return Steady(load, belt, self._equations.state(x), x)
+        return self._state_of(self._equations, x, load)
 
     def _first(self, load: float) -> np.ndarray:
         """Unknowns without a state nearby: marched under the load, or walked from another one."""
@@ -319,6 +356,7 @@ class SteadyBelt:
         step: float,
         name: str,
         tolerance: float = ON_THE_WAY,
+        equations: Solvable | None = None,
     ) -> np.ndarray:
         """Solution at the end of a path, from that at its beginning.
 
@@ -336,12 +374,15 @@ class SteadyBelt:
             Of the path, for the error.
         tolerance : float
             Of each solution.
+        equations : Solvable, optional
+            Those that are changed; by default the belt's.
         """
+        solved = equations or self._equations
         share = 0.0
         while share < 1.0:
             tried = min(1.0, share + step)
             change(tried)
-            found = newton(self._equations, x, tolerance)
+            found = newton(solved, x, tolerance)
             if found is not None:
                 x, share, step = found, tried, 2.0 * step
             else:
