@@ -5,6 +5,7 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt import inert
+from cvt_hpc.models.elastic_belt.bending_settings import bending_inert
 from cvt_hpc.models.elastic_belt.deflection_settings import CONE, MODE_FILES, MODE_KEYS, RITZ, TABLE_KEYS
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert
 from cvt_hpc.models.elastic_belt.ring_settings import ring_inert
@@ -36,6 +37,7 @@ OTHER = {
 AT_REST = (
     pulley_inert({})
     | ring_inert({})
+    | bending_inert({})
     | dict.fromkeys([*CONE, *TABLE_KEYS, *RITZ, *MODE_KEYS, *MODE_FILES], "sheave_deformation bending")
 )
 CASES = [

@@ -43,6 +43,8 @@ SHARED = (
     "contact_sweeps",
     "sheave_deformation",
     "ring_layers",
+    "curvature_terms",
+    "column_bending",
     *MODE_KEYS,
     *RITZ,
 )

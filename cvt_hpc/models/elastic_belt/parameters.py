@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.bending_settings import BENDING, bending_inert, bending_problems
 from cvt_hpc.models.elastic_belt.deflection_settings import (
     DEFLECTION,
     deflection_inert,
@@ -132,6 +133,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "driven_inertia": DRIVEN_INERTIA,
     },
+    "bending": BENDING,
     "deflection": DEFLECTION,
     "pulleys": PULLEYS,
     "shaft": SHAFT,
@@ -185,7 +187,7 @@ def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         if abs(p["play"]) > 0.02 * path:
             problems.append(("play", f"within 2 % of the belt's length {path:.4g} m", f"{p['play']:g} m"))
         problems += deflection_problems(p)
-    return problems + shaft_problems(p) + ring_problems(p)
+    return problems + shaft_problems(p) + bending_problems(p) + ring_problems(p)
 
 
 def inert(parameters: dict[str, Any]) -> dict[str, str]:
@@ -213,5 +215,6 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         (np.isinf(disc), of_disc, "sheave_stiffness inf"),
         (np.isinf(whole), of_disc + of_tilt, "sheave_stiffness inf"),
     )
-    found = {key: setting for holds, keys, setting in cases if holds for key in keys} | ring_inert(p)
-    return friction_inert(p) | course_inert(p) | pulley_inert(p) | deflection_inert(p) | found
+    found = {key: setting for holds, keys, setting in cases if holds for key in keys}
+    parts = friction_inert, course_inert, pulley_inert, deflection_inert, bending_inert, ring_inert
+    return {key: why for part in parts for key, why in part(p).items()} | found

@@ -62,7 +62,15 @@ def ring_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     if tolerance and len(tolerance) != p["ring_layers"]:
         expected = f"one for each of {p['ring_layers']} ring_layers, or none"
         return [("layer_tolerance", expected, str(len(tolerance)))]
-    return []
+    if p["ring_layers"] == 1:
+        return []
+    # terms of the elements' moments and of curvature know the rings as one
+    plain = {"curvature_terms": "none", "column_bending": "off"}
+    return [
+        (key, f'"{value}" with ring_layers above 1', f'"{p[key]}"')
+        for key, value in plain.items()
+        if p.get(key, value) != value
+    ]
 
 
 def rings_rub(parameters: Mapping[str, Any]) -> bool:

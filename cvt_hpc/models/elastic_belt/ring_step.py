@@ -160,13 +160,13 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
     step : float
         Step [s].
     """
-    one, scalars = ImexWork(work.stations), state.scalars
+    one = ImexWork(work.stations)
     lane_sliding(belt, state, work.stations)
     assemble(belt, state, one, step, False)
     couple_layers(belt, work.rings, state, work, step)
     for attempt in range(MOST_PASSES):
         eliminate(belt, state, one, step, attempt > 0)
-        found = substitute(belt, one, scalars, step)
+        found = substitute(belt, state, one, step)
         if found == 0 and attempt == 0:
             break
         if found == 0 or attempt == MOST_PASSES - 1:

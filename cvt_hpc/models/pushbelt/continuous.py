@@ -28,6 +28,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.bending_settings import BENDING
 from cvt_hpc.models.elastic_belt.deflection_settings import DEFLECTION
 from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
 from cvt_hpc.models.elastic_belt.ring_settings import RINGS
@@ -41,6 +42,8 @@ ONLY = {
     "longitudinal_mass": 1.0,
     "sheave_deformation": "bending",
     "ring_layers": 1,
+    "curvature_terms": "none",
+    "column_bending": "off",
     **PULLEY_DEFAULTS,
 }
 # Of the continuum alone
@@ -55,7 +58,8 @@ ABSENT = (
     "modal_peaks",
     "profile_duration",
     *(key for key in DEFLECTION if key != "sheave_deformation"),
-    *(key for key in RINGS if key != "ring_layers"),
+    *(key for key in BENDING if key not in ONLY),
+    *(key for key in RINGS if key not in ONLY),
 )
 
 
