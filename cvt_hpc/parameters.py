@@ -53,7 +53,7 @@ class Column:
 
 @dataclass(frozen=True)
 class FromFile:
-    """How a CSV file gives other parameters.
+    """How a CSV or netCDF file gives other parameters.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ install_slurm() {
 }
 
 install_slurm & # beside the other, as both wait for the network
-prepare_environment mpich,test || { wait; exit 1; }
+prepare_environment mpich,test,discs || { wait; exit 1; }
 wait
 # Where nothing may be written beside the sources, each process rewrites all assertions anew, for 8 s of a core.
 unset PYTHONDONTWRITEBYTECODE

@@ -27,6 +27,7 @@ from cvt_hpc.job.design import Design, read_design, resolve_spacing
 from cvt_hpc.job.document import read_document
 from cvt_hpc.job.for_model import answering_model, handed_to
 from cvt_hpc.job.histories import KEY, read_histories
+from cvt_hpc.job.netcdf_files import SUFFIX, read_netcdf
 from cvt_hpc.job.plausibility import warn_of_bare_numbers
 from cvt_hpc.job.rules import Link, Rule, follow
 from cvt_hpc.job.sampling import sampled_axes
@@ -215,7 +216,8 @@ def _with_files(given: Mapping[str, Any], schema: Schema, source: str) -> dict[s
         for one in file.gives if name else ():
             if one in given:
                 raise mismatch(where, f"either {key} or {one}", "both")
-        raw = read_csv(file, name, source, where) if name else {}
+        read = read_netcdf if name.endswith(SUFFIX) else read_csv
+        raw = read(file, name, source, where) if name else {}
         found |= {one: read_value(schema.parameters[one], value, where) for one, value in raw.items()}
     return found
 

@@ -26,7 +26,8 @@ def friction_file(force_unit: str) -> Parameter:
     columns = {"force": ("N/m", "N") if per_length else ("N",), "speed": ("m/s",), "mu": ("",)}
     if per_length:
         columns["element_pitch"] = ("m",)
-    text = f"CSV file of a friction table, in the place of {', '.join(KEYS)}; columns {', '.join(columns)}"
+    told = f"{', '.join(KEYS)}; columns {', '.join(columns)}"
+    text = f"CSV or netCDF file of a friction table, in the place of {told}"
     file = FromFile(columns, ("speed", "mu"), KEYS, partial(_arranged, force_unit))
     return Parameter("", "", text, file=file)
 

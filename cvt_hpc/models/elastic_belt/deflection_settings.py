@@ -41,7 +41,7 @@ def _table(pulley: str) -> dict[str, Parameter]:
     angle, flexibility = gives = (f"{pulley}_flexibility_angle", f"{pulley}_flexibility")
     columns = {"angle": ("rad",), "other_angle": ("rad",), "flexibility": ("m/N",)}
     told = ", ".join(columns)
-    text = f"CSV file in the place of {' and '.join(gives)}; columns {told} (none: of revolution)"
+    text = f"CSV or netCDF file in the place of {' and '.join(gives)}; columns {told} (none: of revolution)"
     file = FromFile(columns, ("angle", "flexibility"), gives, partial(_arranged, pulley))
     return {
         f"{pulley}_flexibility_file": Parameter("", "", text, file=file),

@@ -1,0 +1,173 @@
+"""netCDF files that give parameters of a job: variables with units, one error for what is wrong.
+
+A file may come from somebody else. HDF5 lets a variable lie in another file, by links, raw storage or virtual
+parts; a few compressed bytes may stand for any number of values. Neither is read.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
+from cvt_hpc.files import read_regular
+from cvt_hpc.job.units import UnitError, to_si
+from cvt_hpc.parameters import Column, FromFile, RowError
+
+if TYPE_CHECKING:
+    import netCDF4
+
+MOST_BYTES = 2**24
+MOST_VALUES = 2**20  # of a variable
+SUFFIX = ".nc"
+
+
+def read_netcdf(file: FromFile, name: str, source: str, where: str) -> dict[str, Any]:
+    """Return the raw values of the parameters that a file gives, by key.
+
+    Each column of `file` is a variable with an attribute `units`. A variable over several dimensions takes
+    the values of the variables with their names, as a table does of its row and column; where both dimensions
+    of a matrix are the same, x, its rows stand for `other_x`. Other variables do not count.
+
+    Parameters
+    ----------
+    file, name, source, where
+        As of `csv_files.read_csv`.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, a link, no regular file, too large or no netCDF, or if a variable is not
+        legal.
+    """
+    path = Path(source).parent / name
+    place = f"{where}: {path}"
+    try:
+        content = read_regular(path, MOST_BYTES)
+    except FileNotFoundError:
+        near = did_you_mean(str(path), sorted(map(str, path.parent.glob(f"*{SUFFIX}"))))
+        raise mismatch(place, "a netCDF file", f"nothing{near}") from None
+    except (OSError, ValueError) as error:  # a NUL in the path
+        raise mismatch(place, "a netCDF file", getattr(error, "strerror", None) or str(error)) from None
+    try:
+        columns = _columns(file, content, place)
+        return file.arrange(columns)
+    except RowError as error:
+        raise mismatch(f"{place}: entry {error.row + 1}", error.expected, error.found) from None
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(f"{place}: {error}") from None
+
+
+def _columns(file: FromFile, content: bytes, place: str) -> dict[str, Column]:
+    import netCDF4
+
+    _refuse_elsewhere(content, place)
+    try:
+        with netCDF4.Dataset("file", memory=content) as dataset:
+            known = dataset.variables
+            for name in file.required:
+                if name not in known:
+                    found = f"none among {', '.join(known)}" if known else "no variables"
+                    raise mismatch(
+                        place, f"a variable {_told(name, file)}", found + did_you_mean(name, known)
+                    )
+            return _in_rows(file, {name: known[name] for name in file.columns if name in known}, place)
+    except (OSError, RuntimeError) as error:
+        raise mismatch(place, "a netCDF file", getattr(error, "strerror", None) or str(error)) from None
+
+
+def _refuse_elsewhere(content: bytes, place: str) -> None:
+    """Raise InputError where something of an HDF5 file lies in another one."""
+    import h5py
+
+    if not content.startswith(b"\x89HDF"):
+        return
+    try:
+        with h5py.File(io.BytesIO(content), "r") as file:
+            for name in file:
+                link = file.get(name, getlink=True)
+                if not isinstance(link, h5py.HardLink):
+                    raise mismatch(f"{place}, {name}", "values in this file", "a link")
+                stored = file[name]
+                if isinstance(stored, h5py.Group):  # with links of its own
+                    raise mismatch(f"{place}, {name}", "a file without groups", "a group")
+                if isinstance(stored, h5py.Dataset) and (stored.is_virtual or stored.external):
+                    raise mismatch(f"{place}, {name}", "values in this file", "values in another one")
+    except (OSError, RuntimeError, KeyError):
+        raise mismatch(place, "a netCDF file", "one that is damaged") from None
+
+
+def _in_rows(file: FromFile, variables: dict[str, netCDF4.Variable], place: str) -> dict[str, Column]:
+    """Return all columns over all combinations of their dimensions."""
+    found = {name: _values(file, name, variable, place) for name, variable in variables.items()}
+    dimensions = {name: _dimensions(name, variables, file, place) for name in variables}
+    for name in list(found):
+        if (other := f"other_{name}") in {own for of in dimensions.values() for own in of} - set(found):
+            found[other], dimensions[other] = found[name], (other,)
+    grid = max(dimensions.values(), key=len)
+    sizes = {}
+    for name, own in dimensions.items():
+        for dimension, size in zip(own, found[name][1].shape, strict=True):
+            if dimension not in grid:
+                raise mismatch(f"{place}, {name}", f"over {' x '.join(grid)}", f"over {' x '.join(own)}")
+            sizes[dimension] = size
+    shape = tuple(sizes[dimension] for dimension in grid)
+    columns = {}
+    for name, (unit, values) in found.items():
+        own = dimensions[name]
+        order = [dimension for dimension in grid if dimension in own]
+        turned = values.transpose([own.index(dimension) for dimension in order])
+        spread = turned.reshape([sizes[dimension] if dimension in own else 1 for dimension in grid])
+        columns[name] = Column(unit, tuple(np.broadcast_to(spread, shape).ravel().tolist()))
+    return columns
+
+
+def _dimensions(
+    name: str, variables: dict[str, netCDF4.Variable], file: FromFile, place: str
+) -> tuple[str, ...]:
+    """Dimensions of a variable; those of a matrix are columns."""
+    own = tuple(variables[name].dimensions)
+    told = " x ".join(own) or "none"
+    if len(own) == 2 and own[0] == own[1]:
+        own = (f"other_{own[0]}", own[1])
+    if not own or (len(own) > 1 and not set(own) <= set(file.columns) - {name}):
+        legal = ", ".join(key for key in file.columns if key != name)
+        raise mismatch(f"{place}, {name}", f"dimensions among {legal}", told)
+    return own
+
+
+def _values(file: FromFile, name: str, variable: netCDF4.Variable, place: str) -> tuple[str, np.ndarray]:
+    """Unit and values [SI] of a variable."""
+    place = f"{place}, {name}"
+    if getattr(variable.dtype, "kind", "") not in "fiu":
+        raise mismatch(place, "numbers", "something else")
+    if math.prod(variable.shape) > MOST_VALUES:
+        raise mismatch(place, f"at most {MOST_VALUES} values", str(math.prod(variable.shape)))
+    unit, factor = _unit(file, name, getattr(variable, "units", ""), place)
+    values = np.ma.filled(np.ma.asarray(variable[...], dtype=float), np.nan) * factor
+    if not np.isfinite(values).all():
+        raise mismatch(place, "finite numbers", "others")
+    return unit, values
+
+
+def _unit(file: FromFile, name: str, told: Any, place: str) -> tuple[str, float]:
+    text = told if isinstance(told, str) else str(told)
+    for si in file.columns[name]:
+        bare = text.strip() in ("", "1")
+        if bare != (not si):
+            continue
+        try:
+            return si, 1.0 if bare else to_si(f"1 {text}", si)
+        except UnitError:
+            continue
+    raise mismatch(place, f"units {_told(name, file)}", show(text) if text else "none")
+
+
+def _told(name: str, file: FromFile) -> str:
+    return " or ".join(f"{name} [{unit}]" if unit else name for unit in file.columns[name])
