@@ -4,7 +4,7 @@ By the belt's own widths of friction it settles nearly everywhere. At some loads
 mesh go round for ever: there friction is widened and dampers reach across gaps, which evens out how elements
 follow each other there, and both are led back by Newton's iteration. Where that does not settle either, or
 where the belt slips through, since constant friction carries less than a falling one, the way begins at
-another load.
+another load. In the last place it begins at the belt in its grooves without load.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.belt import Belt
+from cvt_hpc.models.elastic_belt.belt import Belt, initial_state
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.steady_variator.continuation import (
     AT_HOME,
@@ -25,6 +25,7 @@ from cvt_hpc.models.steady_variator.continuation import (
     NoSteadyState,
     Widths,
 )
+from cvt_hpc.models.steady_variator.newton import newton
 from cvt_hpc.models.steady_variator.settling import settled
 from cvt_hpc.physics.capacity import carried_torque, torque_limit
 from cvt_hpc.physics.friction import friction_coefficient
@@ -101,7 +102,11 @@ class FirstStates:
                 if slips:  # loads below begin on the same curve
                     break
         if not slips:
-            raise missed
+            try:
+                x = self._unmarched()
+                return rise(x, 0.0, load) if load != 0.0 else x
+            except NoSteadyState:
+                raise missed from None
         try:  # falling friction may carry more
             return self._settle(load, OWN, 1.0)
         except SlipsThrough as error:
@@ -151,6 +156,18 @@ class FirstStates:
             x[3 * n : -1] /= faster
             course.faster(1.0, 1.0, wide)
         return self._narrowed(x, load, wide)
+
+    def _unmarched(self) -> np.ndarray:
+        """Unknowns without load, from the belt in its grooves: near where elements do not press."""
+        course = self._course
+        course.own()
+        course.load(0.0)
+        course.friction(0.0, self._wide)
+        course.bridge(0.0)
+        x = course.equations.unknowns(initial_state(self._parameters, course.whole))
+        if (found := newton(course.equations, x, ON_THE_WAY)) is None:
+            raise NoSteadyState("no steady state found without load and with widened friction")
+        return self._narrowed(found, 0.0, self._wide)
 
     def _narrowed(self, x: np.ndarray, load: float, wide: Widths) -> np.ndarray:
         """Unknowns with the belt's own friction and dampers."""
