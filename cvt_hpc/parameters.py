@@ -74,6 +74,22 @@ class FromFile:
 
 
 @dataclass(frozen=True)
+class Notice:
+    """What to tell of a parameter whose values may mean one thing or another, where no key says which.
+
+    Attributes
+    ----------
+    settled_by : str
+        The key that says which: who gives it, by whatever value, is told nothing.
+    text : str
+        What to tell of values other than the default; it follows the file and the parameter's name.
+    """
+
+    settled_by: str
+    text: str
+
+
+@dataclass(frozen=True)
 class Parameter:
     """One quantity that a job file may set.
 
@@ -105,6 +121,8 @@ class Parameter:
         other than 0, draws a warning that it may be in another unit. Every parameter with a unit has them.
     file : FromFile or None
         For a text that is the path of a file: what the file gives. Runs do not know such a parameter.
+    notice : Notice or None
+        What to tell of values other than the default.
     """
 
     default: Any
@@ -119,6 +137,7 @@ class Parameter:
     gives: Substitute | None = None
     sensible: tuple[float, float] | None = None
     file: FromFile | None = None
+    notice: Notice | None = None
 
 
 def positive(

@@ -98,6 +98,11 @@ def sample_count(parameters: Mapping[str, Any]) -> int:
     return max(int(round(parameters["duration"] * parameters["sampling_rate"])), 1)
 
 
+def steps_per_sample(interval: float, step: float) -> int:
+    """Equal steps of at most `step` [s] that make a sampling interval [s]."""
+    return max(math.ceil(interval / step - 1e-9), 1)
+
+
 def start_up_samples(parameters: Mapping[str, Any]) -> int:
     """Samples of a run before its load has risen.
 

@@ -142,7 +142,7 @@ def value_text(coordinate: xr.DataArray, index: int) -> str:
     if coordinate.dtype.kind not in "iuf":
         return str(value)
     if np.isinf(value):
-        return _infinity(str(coordinate.name))
+        return infinity_in_words(str(coordinate.name))
     factor, unit = coordinate_unit(coordinate.attrs)
     return f"{_number(value * factor)} {unit}".strip()
 
@@ -151,7 +151,8 @@ def _number(value: float) -> str:
     return f"{value:.6g}".replace("-", "−")
 
 
-def _infinity(name: str) -> str:
+def infinity_in_words(name: str) -> str:
+    """An infinite value on the axis of that name."""
     return "rigid" if name.endswith("stiffness") else "∞"
 
 
@@ -198,7 +199,7 @@ def ruler(coordinate: xr.DataArray) -> Ruler:
     finite = np.isfinite(centres)
     if np.all(finite):
         return Ruler(centres, _edges(centres), *_exact_ticks(centres), axis_label(coordinate, unit))
-    labels = tuple(_number(c) if np.isfinite(c) else _infinity(name) for c in centres)
+    labels = tuple(_number(c) if np.isfinite(c) else infinity_in_words(name) for c in centres)
     known = centres[finite]
     gap = np.diff(known).mean() if known.size > 1 else 1.0
     start = known[-1] if known.size else 0.0

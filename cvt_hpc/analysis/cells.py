@@ -141,7 +141,7 @@ def draw_cells(
     # the axes have the same place with and without it
     axes.add_image(PcolorImage(axes, x.edges, y.edges, shades, rasterized=True, in_layout=False))
     for inside, lines in hatched.values():
-        axes.add_patch(PathPatch(_area(x, y, inside), rasterized=True, **lines))
+        axes.add_patch(PathPatch(area_of(x, y, inside), rasterized=True, **lines))
     axes.add_collection(LineCollection(_borders(x, y, classes), colors="#202020", linewidths=1.0))
     axes.set(xlim=x.edges[[0, -1]], ylim=y.edges[[0, -1]])
 
@@ -188,16 +188,24 @@ def write_values(
     for row, column in np.argwhere((classes == kind) & np.isfinite(values)):
         (fill,) = fills_of(kind, fills[row : row + 1, column], scale)
         value = values[row, column]
-        axes.annotate(
-            f"{value:.0f}" if value >= 10.0 else f"{value:.2g}",
-            (x.centres[column], y.centres[row]),
-            xytext=(0, 2.5),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            fontsize=8.5,
-            color=_ink_on(fill, "#000000"),
-        )
+        text = f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
+        write_value(axes, (x.centres[column], y.centres[row]), text, fill, above=2.5)
+
+
+def write_value(
+    axes: Axes, place: tuple[float, float], text: str, fill: Array, *, above: float = 0.0, size: float = 8.5
+) -> None:
+    """Write a number at a place in data coordinates [or above it, point] on a cell of a colour (rgba)."""
+    axes.annotate(
+        text,
+        place,
+        xytext=(0, above),
+        textcoords="offset points",
+        ha="center",
+        va="bottom" if above else "center",
+        fontsize=size,
+        color=_ink_on(fill, "#000000"),
+    )
 
 
 def class_legend(
@@ -229,7 +237,7 @@ def class_legend(
     )
 
 
-def _area(x: Ruler, y: Ruler, inside: Mask) -> Path:
+def area_of(x: Ruler, y: Ruler, inside: Mask) -> Path:
     """The outline of some cells: a rectangle around those that follow each other in a row."""
     turns = np.diff(np.pad(inside, ((0, 0), (1, 1))).astype(np.int8))
     (rows, first), (_, end) = np.nonzero(turns == 1), np.nonzero(turns == -1)

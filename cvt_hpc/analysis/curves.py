@@ -17,7 +17,7 @@ from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, val
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.error_axes import COLOURS, MARKERS
-from cvt_hpc.analysis.figures import WIDTH, draw, in_words, styled
+from cvt_hpc.analysis.figures import WIDTH, draw, in_words, legend_columns, styled
 from cvt_hpc.errors import mismatch, one_line, unknown
 from cvt_hpc.variables import Status
 
@@ -25,7 +25,6 @@ HEIGHT = 3.8  # [inch]
 MOST_PANELS = 3  # side by side
 BESIDE = ("-", "--", ":", "-.")
 MARKS = tuple(mark for mark in MARKERS if mark not in {STYLES[kind].mark for kind in WITHOUT_RESULT})
-LEGEND_LETTERS, HANDLE_LETTERS = 84, 8  # across the page, and what a handle with its space takes of them
 
 
 def draw_curve(
@@ -35,7 +34,7 @@ def draw_curve(
     at: Mapping[str, Any] | None = None,
     source: str = "results",
 ) -> Path:
-    """Write the figure of `curve_figure`, with its arguments and errors, as `save_figure` does."""
+    """Write the figure of `curve_figure`."""
     return draw(lambda: curve_figure(dataset, quantities, at, source), out)
 
 
@@ -50,30 +49,21 @@ def curve_figure(
 
     Parameters
     ----------
-    dataset : Dataset
-        Results of a study, as `open_results` returns them. The axis that runs along x in a map does so here;
+    dataset, at, source
+        As of all pictures of results (`figures.py`). The axis that runs along x in a map does so here;
         there is a panel for each value of the one that runs along y.
     quantities : sequence of str
         Numeric variables of one unit. The first is drawn by marks, the others by lines beside it; one with
         further dimensions, such as `strand`, gives a curve for each of their labels.
-    at : mapping, optional
-        Axes to fix: name -> value, as a number [SI] or a text.
-    source : str, optional
-        Where the results are from, for the errors.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Unknown to pyplot; `figure.savefig(path)` writes it.
 
     Raises
     ------
     InputError
-        The dataset holds no results, a single run or no such quantity; quantities differ in unit; `at` names
-        no axis or no value on it; or there would be more than MOST_PANELS panels.
+        As of all pictures; there is no such quantity, quantities differ in unit, or there would be more than
+        MOST_PANELS panels.
     """
     check_results(dataset, source)
-    _check_quantities(dataset, quantities, source)
+    check_quantities(dataset, quantities, source)
     arrangement = arrange(dataset, at or {}, source)
     panels, notes = panels_of(arrangement, source)
     figure = Figure((WIDTH, HEIGHT), layout="constrained")
@@ -99,14 +89,14 @@ def curve_figure(
     for axes in all_axes:
         handles, labels = axes.get_legend_handles_labels()
         legend |= dict(zip(labels, handles, strict=True))
-    most = max(LEGEND_LETTERS // (max(map(len, legend)) + HANDLE_LETTERS), 1)
-    figure.set_figheight(HEIGHT + 0.2 * (len(legend) // most))
+    columns = legend_columns(list(legend))
+    figure.set_figheight(HEIGHT + 0.2 * (len(legend) // columns))
     figure.legend(
         legend.values(),
         legend.keys(),
         loc="outside lower center",
         frameon=False,
-        ncols=min(len(legend), most),
+        ncols=columns,
     )
     job = one_line(dataset.attrs.get("job_name", ""))
     title = f"{label[0].upper()}{label[1:]}: {job}".rstrip(": ")
@@ -114,13 +104,16 @@ def curve_figure(
     return figure
 
 
-def _check_quantities(dataset: xr.Dataset, quantities: Sequence[str], source: str) -> None:
+def check_quantities(
+    dataset: xr.Dataset, quantities: Sequence[str], source: str, *, of_one_unit: bool = True
+) -> None:
+    """Raise InputError unless results hold these quantities, as numbers, and of one unit if so asked."""
     numeric = [str(name) for name, array in dataset.data_vars.items() if array.dtype.kind in "iuf"]
     for name in quantities:
         if name not in numeric:
             raise unknown(f"{source}: {name}", "numeric variable of the results", name, numeric)
         units = [dataset[key].attrs.get("units", "") for key in (quantities[0], name)]
-        if units[0] != units[1]:
+        if of_one_unit and units[0] != units[1]:
             raise mismatch(f"{source}: {name}", f"the unit of {quantities[0]}, {units[0]}", str(units[1]))
 
 

@@ -1,9 +1,22 @@
-"""What all pictures share: a style, units for people, and how they are written."""
+"""What all pictures share: their arguments, a style, units for people, and how they are written.
+
+Pictures of results take
+
+    dataset    Dataset: results of a study over the axes of its job, as `open_results` returns them
+    at         mapping, optional: axes to fix, name -> value, as a number [SI] or a text
+    source     str, optional: where the results are from, for the errors
+
+and pictures of runs a `history` or `histories`, as `simulate` returns them, with their `sources`. A function
+`..._figure` composes a matplotlib Figure, unknown to pyplot, and writes nothing; `figure.savefig(path)` does.
+`draw_...` takes the same arguments, and writes it as `save_figure` does. InputError is raised where a dataset
+holds no results, a single run or not what is to be drawn, or where `at` names no axis or no value on it; what
+else a picture refuses its docstring says.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
 from textwrap import wrap
@@ -26,6 +39,7 @@ WIDTH = 6.4  # [inch]: letters of 10 points stay readable across a page and on a
 RESOLUTION = 170  # dots per inch
 SETTLED = 1000  # pixels: the palette is refined until no more than these, one in a thousand, change colour
 FORMATS = (".png", ".svg", ".pdf")
+LEGEND_LETTERS, HANDLE_LETTERS = 84, 8  # across the page, and what a handle with its space takes of them
 LONGEST_NAME = 26  # letters of a name on an axis
 
 STYLE = {
@@ -119,6 +133,12 @@ def balanced(line: str, width: int) -> str:
     while width > 1 and len(narrower := wrap(line, width - 1)) == len(lines):
         lines, width = narrower, width - 1
     return "\n".join(lines)
+
+
+def legend_columns(labels: Sequence[str]) -> int:
+    """Entries side by side in a legend below a picture of WIDTH."""
+    longest = max((len(label) for label in labels), default=0)
+    return max(min(len(labels), LEGEND_LETTERS // (longest + HANDLE_LETTERS)), 1)
 
 
 def save_figure(figure: Figure, out: Path) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,16 +17,22 @@ from cvt_hpc.errors import mismatch
 
 COLOURS = {"radial_sliding": "#0072b2", "tangential_sliding": "#009e73", "sliding_speed": "#d55e00"}
 LINES = {"radial_sliding": "-", "tangential_sliding": ":", "sliding_speed": "--"}
+HIGHEST = 1500.0  # [Hz]
 LABELS = {"radial_sliding": "radial", "tangential_sliding": "tangential", "sliding_speed": "resulting"}
 
 
 def draw_element(history: xr.Dataset, out: Path, region: str | None = None, source: str = "history") -> Path:
-    """Write the figure of `element_figure`, with its arguments and errors, as `save_figure` does."""
+    """Write the figure of `element_figure`."""
     return draw(lambda: element_figure(history, region, source), out)
 
 
 @styled
-def element_figure(history: xr.Dataset, region: str | None = None, source: str = "history") -> Figure:
+def element_figure(
+    history: xr.Dataset,
+    region: str | None = None,
+    source: str = "history",
+    parts: Sequence[str] = tuple(LABELS),
+) -> Figure:
     """Draw the sliding of an element on the sheaves over time.
 
     Parameters
@@ -33,14 +40,12 @@ def element_figure(history: xr.Dataset, region: str | None = None, source: str =
     history : Dataset
         As `follow_element` takes it.
     region : str, optional
-        "driving" or "driven": one passage through that arc; else as far as the profiles reach.
+        "driving" or "driven": one passage through that arc, with the means at the same places; else as far as
+        the profiles reach.
     source : str, optional
         Where the history is from, for the errors.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Unknown to pyplot; `figure.savefig(path)` writes it.
+    parts : sequence of str
+        What is drawn, of `LABELS`.
 
     Raises
     ------
@@ -51,30 +56,89 @@ def element_figure(history: xr.Dataset, region: str | None = None, source: str =
     time = 1e3 * (followed["time"].values - (followed["time"].values[0] if region else 0.0))
     figure = Figure((WIDTH, 3.6), layout="constrained")
     axes = figure.subplots()
-    for name, label in LABELS.items():
-        style = {"color": COLOURS[name], "ls": LINES[name], "lw": 1.1, "label": label}
+    for name in parts:
+        style = {"color": COLOURS[name], "ls": LINES[name], "lw": 1.1, "label": LABELS[name]}
         axes.plot(time, 1e3 * followed[name].values, **style)
+        if region and name in history:
+            mean = 1e3 * mean_there(history, followed, name)
+            told = "mean at the same place" if name == parts[-1] else None
+            axes.plot(time, mean, color="#8a8a8a", lw=0.9, ls="-", zorder=1.5, label=told)
     if region is None:
         for name in ("driving", "driven"):
             for span in passages(followed, name):
                 axes.axvspan(time[span][0], time[span][-1], color=ARC, lw=0, zorder=0)
-                axes.text(
-                    time[span].mean(),
-                    1.01,
-                    name,
-                    transform=axes.get_xaxis_transform(),
-                    ha="center",
-                    fontsize=9,
-                )
+                place = {"transform": axes.get_xaxis_transform(), "ha": "center", "fontsize": 9}
+                axes.text(time[span].mean(), 1.01, name, **place)
     axes.axhline(0.0, color="#333333", linewidth=0.7, zorder=1)
     axes.grid(linewidth=0.4, alpha=0.5)
     begin = f"time since the element entered the {region} arc [ms]" if region else "time [ms]"
     axes.set(xlabel=begin, ylabel="sliding on the sheaves [mm/s]", xlim=time[[0, -1]])
-    figure.legend(loc="outside lower center", frameon=False, ncols=3)
+    figure.legend(loc="outside lower center", frameon=False, ncols=4)
     common, _ = on_axes([history], [source])
     lines = titles([history], "One element along its path", common)
     figure.suptitle("\n".join(balanced(line, 76) for line in lines))
     return figure
+
+
+@styled
+def swinging_figure(history: xr.Dataset, marks: Mapping[str, Sequence[float]]) -> Figure:
+    """Draw the sliding speed of an element through the driven arc over time, and the spectrum of its swings.
+
+    Parameters
+    ----------
+    history : Dataset
+        As `follow_element` takes it.
+    marks : mapping
+        Frequencies [Hz] that are marked in the spectrum, by the strand whose peaks they are.
+    """
+    passed = one_passage(history, "driven")
+    time = 1e3 * (passed["time"].values - passed["time"].values[0])
+    figure = Figure((WIDTH * 1.2, 3.6), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    style = {"color": COLOURS["sliding_speed"], "lw": 1.1}
+    left.plot(time, 1e3 * passed["sliding_speed"].values, label="of an element", **style)
+    mean = 1e3 * mean_there(history, passed, "sliding_speed")
+    left.plot(time, mean, color="#8a8a8a", lw=0.9, label="mean at the same place")
+    left.set(xlabel="time in the driven arc [ms]", ylabel="sliding on the sheaves [mm/s]", xlim=time[[0, -1]])
+    left.legend(frameon=False, loc="best")
+    lines, amplitude = sliding_spectrum(history)
+    shown = lines <= HIGHEST
+    right.plot(lines[shown], 1e3 * amplitude[shown], **style)
+    for (strand, frequencies), dash in zip(marks.items(), ("--", ":"), strict=True):
+        for k, frequency in enumerate(frequencies):
+            told = f"peaks of {strand}" if k == 0 else None
+            right.axvline(frequency, color="#333333", lw=0.9, ls=dash, label=told)
+    right.set(xlabel="frequency [Hz]", ylabel="swing of the sliding speed [mm/s]", xlim=(0.0, HIGHEST))
+    right.set_ylim(bottom=0.0)
+    right.legend(frameon=False)
+    for axes in (left, right):
+        axes.grid(linewidth=0.4, alpha=0.5)
+    common, _ = on_axes([history], ["history"])
+    words = titles([history], "Sliding in the driven arc", common)
+    figure.suptitle("\n".join(balanced(line, 84) for line in words))
+    return figure
+
+
+def sliding_spectrum(history: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Lines [Hz] and amplitude [m/s] of the sliding speed's swings, rms over the stations of the driven arc.
+
+    By a Hann window over all of the profiles' time: lines that are 2 over that time apart are told apart.
+    """
+    speed = history["momentary_sliding_speed"].values
+    inner = np.flatnonzero(history["region"].values.astype(str) == "driven arc")[5:-5]
+    motion = speed[:, inner] - speed[:, inner].mean(axis=0)
+    window = np.hanning(len(motion))
+    lines = np.fft.rfft(motion * window[:, None], 8 * len(motion), axis=0)
+    interval = float(np.diff(history["profile_time"].values).mean())
+    amplitude = 2.0 * np.sqrt((np.abs(lines) ** 2).mean(axis=1)) / window.sum()
+    return np.fft.rfftfreq(8 * len(motion), interval), amplitude
+
+
+def mean_there(history: xr.Dataset, followed: xr.Dataset, name: str) -> np.ndarray:
+    """The mean of a quantity of the history at the places of a followed element, (time,)."""
+    known = history[name].notnull().values
+    positions = history["position"].values[known]
+    return np.interp(followed["position"].values, positions, history[name].values[known])
 
 
 def followed_of(history: xr.Dataset, region: str | None, source: str = "history") -> xr.Dataset:

@@ -47,38 +47,23 @@ ONE_ROW = Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
 def draw_map(
     dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None, source: str = "results"
 ) -> Path:
-    """Write the figure of `map_figure`, with its arguments and errors, as `save_figure` does."""
+    """Write the figure of `map_figure`."""
     return draw(lambda: map_figure(dataset, at, source), out)
 
 
 @styled
 def map_figure(dataset: xr.Dataset, at: Mapping[str, Any] | None = None, source: str = "results") -> Figure:
-    """Draw where vibration occurs; nothing is written.
+    """Draw where vibration occurs.
 
     Parameters
     ----------
-    dataset : Dataset
-        Results of a study, as `open_results` returns them: `status` and `vibrates` over the job's axes;
+    dataset, at, source
+        As of all pictures of results (`figures.py`): `status` and `vibrates` over the job's axes;
         `amplitude` [m] and `frequency` [Hz], per strand, where known; `inferred_class` of a trace. The
-        stronger strand is shown. Of a study of samples the axes lie along `run`: each run is a mark, and
-        there is a panel for each pair of axes. Results that hold `eigenfrequency` but no `amplitude` are
-        drawn as lines over the axis that else runs along x. Of a study with the axis `disturbance` the runs
-        from the smallest and the largest value make one cell.
-    at : mapping, optional
-        Axes to fix: name -> value, as a number [SI] or a text.
-    source : str, optional
-        Where the results are from, for the errors.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Unknown to pyplot; `figure.savefig(path)` writes it.
-
-    Raises
-    ------
-    InputError
-        The dataset holds no results or a single run, `at` names no axis or no value on it, or the results
-        are of samples and `at` is not empty.
+        stronger strand is shown. Of a study of samples the axes lie along `run`: each run is a mark, there is
+        a panel for each pair of axes, and `at` has to be empty. Results that hold `eigenfrequency` but no
+        `amplitude` are drawn as lines over the axis that else runs along x. Of a study with the axis
+        `disturbance` the runs from the smallest and the largest value make one cell.
     """
     check_results(dataset, source)
     if is_sampled(dataset):

@@ -12,7 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.error_axes import COLOURS
-from cvt_hpc.analysis.figures import STYLE, WIDTH, balanced, display_unit, draw, in_words, styled
+from cvt_hpc.analysis.figures import (
+    STYLE,
+    WIDTH,
+    balanced,
+    display_unit,
+    draw,
+    in_words,
+    legend_columns,
+    styled,
+)
 from cvt_hpc.analysis.telling_apart import on_axes, titles
 from cvt_hpc.errors import InputError, mismatch, unknown
 
@@ -33,7 +42,7 @@ def draw_profile(
     columns: str | None = None,
     sources: Sequence[str] = (),
 ) -> Path:
-    """Write the figure of `profile_figure`, with its arguments and errors, as `save_figure` does."""
+    """Write the figure of `profile_figure`."""
     return draw(lambda: profile_figure(histories, quantities, region, columns, sources), out)
 
 
@@ -59,11 +68,6 @@ def profile_figure(
         An axis of the runs' job that has a column of panels for each value; else all are drawn together.
     sources : sequence of str, optional
         Where the runs are from, for errors, and for the legend where their axes do not tell them apart.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Unknown to pyplot; `figure.savefig(path)` writes it.
 
     Raises
     ------
@@ -97,7 +101,7 @@ def profile_figure(
         (axes.get_legend_handles_labels() for axes in panels[0]), key=lambda pair: len(pair[1])
     )
     if told:
-        figure.legend(handles, told, loc="outside lower center", frameon=False, ncols=min(len(told), 3))
+        figure.legend(handles, told, loc="outside lower center", frameon=False, ncols=legend_columns(told))
     where = f" of the {region} pulley" if region else ""
     lines = titles(histories, f"Along the belt{where}", common)
     figure.suptitle("\n".join(balanced(line, 76) for line in lines), fontsize=STYLE["figure.titlesize"])

@@ -22,6 +22,7 @@ COLOURS = colours_of("inferno_r", 0.0, 0.95)
 DEEPEST = 1e-2  # of the largest amplitude
 WINDOW = 0.04  # [s]: lines of the spectrogram 50 Hz wide
 HIGHEST = 1500.0  # [Hz]
+BAND, NOISE = (300.0, 1500.0), (400.0, 800.0)  # [Hz] of strands' vibration, and of the noise
 ROW = 1.5  # [inch]
 
 
@@ -49,7 +50,7 @@ class Ramp(NamedTuple):
 def draw_ramp(
     histories: Sequence[xr.Dataset], out: Path, of: str = "t1", sources: Sequence[str] = ()
 ) -> Path:
-    """Write the figure of `ramp_figure`, with its arguments and errors, as `save_figure` does."""
+    """Write the figure of `ramp_figure`."""
     return draw(lambda: ramp_figure(histories, of, sources), out)
 
 
@@ -65,11 +66,6 @@ def ramp_figure(histories: Sequence[xr.Dataset], of: str = "t1", sources: Sequen
         "t1" or "t2": the probe of that strand that moves most; or a variable over `time`.
     sources : sequence of str, optional
         Where the runs are from, for errors, and for titles where their axes do not tell them apart.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Unknown to pyplot; `figure.savefig(path)` writes it.
 
     Raises
     ------
@@ -110,8 +106,63 @@ def ramp_figure(histories: Sequence[xr.Dataset], of: str = "t1", sources: Sequen
     return figure
 
 
+@styled
+def course_figure(history: xr.Dataset, of: str) -> Figure:
+    """Draw a quantity over the time of a ramp, and below how far it swings, beside strand t1.
+
+    Parameters
+    ----------
+    history : Dataset
+        As of `ramp_figure`.
+    of : str
+        A variable over `time`.
+    """
+    unit = str(history[of].attrs.get("units", ""))
+    name = in_words(history[of])
+    time, values = history["time"].values, history[of].values
+    figure = Figure((WIDTH, 4.6), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    upper.plot(time, values, color="#0072b2", lw=0.3, rasterized=True)
+    upper.set_ylabel(f"{name} [{unit}]")
+    begun = float(time[np.searchsorted(time, _start_up(history))])
+    beside = lower.twinx()
+    panels = ((lower, of, NOISE, "#0072b2", "-", unit), (beside, "t1", BAND, "#d55e00", "--", "µm"))
+    for axes, what, band, colour, line, scale in panels:
+        ramp = read_ramp(history, what)
+        centres, amplitude = window_amplitudes(ramp.motion, ramp.rate, band, WINDOW)
+        label = name if what == of else "strand t1"
+        axes.plot(begun + centres, amplitude, color=colour, ls=line, lw=1.3, label=label)
+        axes.set_ylabel(f"{label},\namplitude [{scale}]", color=colour)
+        axes.set_ylim(bottom=0.0)
+    loads = read_ramp(history, of)
+    # the ramp is linear, so that its values can be read beside the time
+    rate = (loads.values[-1] - loads.values[0]) / (time[-1] - begun)
+    scale = upper.secondary_xaxis(
+        "top",
+        functions=(
+            lambda at: loads.values[0] + rate * (at - begun),
+            lambda load: begun + (load - loads.values[0]) / rate,
+        ),
+    )
+    scale.set_xlabel(loads.label)
+    lower.set(xlabel="time [s]", xlim=(begun, time[-1]))
+    upper.set_ylim(*_limits(values[time >= begun]))
+    for axes in (upper, lower):
+        axes.grid(lw=0.4, alpha=0.5)
+    common, _ = on_axes([history], ["history"])
+    lines = titles([history], f"{name[0].upper()}{name[1:]} over time", common)
+    lines.append("amplitudes: the moment's at 400 to 800 Hz, the strand's at 300 to 1500 Hz")
+    figure.suptitle("\n".join(balanced(line, 76) for line in lines))
+    return figure
+
+
+def _limits(values: np.ndarray) -> tuple[float, float]:
+    margin = 0.05 * float(np.ptp(values))
+    return float(values.min()) - margin, float(values.max()) + margin
+
+
 def read_ramp(
-    history: xr.Dataset, of: str, source: str = "history", band: tuple[float, float] = (300.0, 1500.0)
+    history: xr.Dataset, of: str, source: str = "history", band: tuple[float, float] = BAND
 ) -> Ramp:
     """What a run does along its ramp, without the start-up before it; arguments as of `ramp_figure`."""
     courses = [name for name in ("load", "driving_speed") if name in history]
@@ -168,7 +219,7 @@ def spectrogram(ramp: Ramp) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return middles, lines[inside], amplitude[:, inside]
 
 
-def envelope(ramp: Ramp, band: tuple[float, float] = (300.0, 1500.0)) -> tuple[np.ndarray, np.ndarray]:
+def envelope(ramp: Ramp, band: tuple[float, float] = BAND) -> tuple[np.ndarray, np.ndarray]:
     """Values of the ramp and amplitude of the motion in a band, in windows."""
     centres, amplitude = window_amplitudes(ramp.motion, ramp.rate, band, WINDOW)
     return ramp.values[np.minimum((centres * ramp.rate).astype(int), ramp.values.size - 1)], amplitude

@@ -28,7 +28,7 @@ NEEDED = ("mean_ring_tension", "mean_push_force")
 def draw_strand_bars(
     dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None, source: str = "results"
 ) -> Path:
-    """Write the figure of `strand_bars_figure`, with its arguments and errors, as `save_figure` does."""
+    """Write the figure of `strand_bars_figure`."""
     return draw(lambda: strand_bars_figure(dataset, at, source), out)
 
 
@@ -38,27 +38,9 @@ def strand_bars_figure(
 ) -> Figure:
     """Draw for each run what each strand carries: ring tension above zero, push force below.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Results of a study, as `open_results` returns them, with `mean_ring_tension` and `mean_push_force`
-        [N] over the job's axes and `strand`. The axis along x of a map does so here; there is a panel for
-        each value of the one that runs along y.
-    at : mapping, optional
-        Axes to fix: name -> value, as a number [SI] or a text.
-    source : str, optional
-        Where the results are from, for the errors.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Unknown to pyplot; `figure.savefig(path)` writes it.
-
-    Raises
-    ------
-    InputError
-        The dataset holds no results, no such forces or a single run; `at` names no axis or no value on it;
-        or there would be too many panels.
+    Arguments as of all pictures of results (`figures.py`), with `mean_ring_tension` and `mean_push_force` [N]
+    over the job's axes and `strand`. The axis along x of a map does so here; there is a panel for each
+    value of the one that runs along y, and too many are refused.
     """
     check_results(dataset, source)
     for name in NEEDED:

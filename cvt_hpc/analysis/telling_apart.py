@@ -8,6 +8,7 @@ from pathlib import Path
 
 import xarray as xr
 
+from cvt_hpc.analysis.arrangement import infinity_in_words
 from cvt_hpc.analysis.histories import place_of
 from cvt_hpc.errors import mismatch, one_line
 
@@ -40,8 +41,9 @@ def on_axes(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[list
 def _axes_of(dataset: xr.Dataset) -> dict[str, str]:
     """By axis of the run's job its value with its name, such as "load 120 N m"."""
     axes = json.loads(dataset.attrs.get("job", "{}")).get("axes", {})
-    told = {text.split(" ")[0]: text for text in place_of(dataset.attrs)}
-    return {key: told[key].replace("_", " ") for key in axes if key in told}
+    told = dict(text.split(" ", 1) for text in place_of(dataset.attrs))
+    texts = {key: text if text != "inf" else infinity_in_words(key) for key, text in told.items()}
+    return {key: f"{key} {texts[key]}".replace("_", " ") for key in axes if key in texts}
 
 
 def titles(histories: Sequence[xr.Dataset], subject: str, common: Sequence[str]) -> list[str]:

@@ -32,7 +32,7 @@ LINE = "#123a6b"
 def draw_waterfall(
     dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None, source: str = "results"
 ) -> Path:
-    """Write the figure of `waterfall_figure`, with its arguments and errors, as `save_figure` does."""
+    """Write the figure of `waterfall_figure`."""
     return draw(lambda: waterfall_figure(dataset, at, source), out)
 
 
@@ -42,27 +42,10 @@ def waterfall_figure(
 ) -> Figure:
     """Draw spectra of all strands over an axis, with the eigenfrequencies where they are known.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Results of a study, as `open_results` returns them: `status`, `vibrates` and `spectrum` [m] over
-        the job's axes, `strand` and `frequency_bin` [Hz]. `eigenfrequency` [Hz] over the axes, `strand` and
-        `half_waves` is drawn as lines.
-    at : mapping, optional
-        Axes to fix: name -> value, as a number [SI] or a text. Of the others the one that runs along x in a
-        map does so here, and the rest are fixed at their first value.
-    source : str, optional
-        Where the results are from, for the errors.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Unknown to pyplot; `figure.savefig(path)` writes it.
-
-    Raises
-    ------
-    InputError
-        The dataset holds no results, no spectra or a single run, or `at` names no axis or no value on it.
+    Arguments as of all pictures of results (`figures.py`), with `status`, `vibrates` and `spectrum` [m] over
+    the job's axes, `strand` and `frequency_bin` [Hz]. `eigenfrequency` [Hz] over the axes, `strand` and
+    `half_waves` is drawn as lines. Of the axes that are not fixed the one that runs along x in a map does so
+    here, and the rest are fixed at their first value.
     """
     check_results(dataset, source)
     if "spectrum" not in dataset or "frequency_bin" not in dataset["spectrum"].dims:

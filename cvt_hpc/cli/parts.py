@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 PICTURES = (".png", ".svg", ".pdf")
+LONGEST_NAME = 100  # letters of a picture's name
 # what --set does
 REPLACE = (
     "replace a value of the job, or an axis by one value, a list [40, 60] or a range {from=, to=, step=}"
@@ -67,6 +69,12 @@ def refuse_ranks(command: str, why: str) -> None:
 
     if (size := detect_launch().size) > 1:
         raise mismatch(command, f"one process, because it {why}", f"{size} started")
+
+
+def picture_beside(path: Path, *words: str) -> Path:
+    """A picture beside a dataset, or in a folder, whose name tells what it shows."""
+    name = "_".join(re.sub(r"[^\w.=+-]+", "_", word) for word in words)
+    return folder_of(path) / f"{name[:LONGEST_NAME]}.png"
 
 
 def check_output(path: Path | None, suffixes: tuple[str, ...]) -> None:

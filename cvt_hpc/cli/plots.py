@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.cli.parts import DONE, PICTURES, add_assignments, add_command, check_output, folder_of, say
-
-LONGEST_NAME = 100  # letters of a picture's name
+from cvt_hpc.cli.parts import DONE, PICTURES, add_assignments, add_command, check_output, picture_beside, say
 
 
 def add(commands: Any) -> None:
@@ -159,8 +156,7 @@ def _opened(files: Sequence[Path]) -> Iterator[list[Any]]:
 def _picture(arguments: argparse.Namespace, *words: str) -> Path:
     """The picture asked for, or one beside the dataset whose name tells what it shows."""
     check_output(arguments.out, PICTURES)
-    name = "_".join(re.sub(r"[^\w.=+-]+", "_", word) for word in words)
-    return arguments.out or folder_of(arguments.path) / f"{name[:LONGEST_NAME]}.png"
+    return arguments.out or picture_beside(arguments.path, *words)
 
 
 def _at(arguments: argparse.Namespace, dataset: Any) -> dict[str, Any]:

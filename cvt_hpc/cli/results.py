@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cvt_hpc.cli.parts import DONE, add_assignments, add_command, complain, folder_of, say
+from cvt_hpc.cli.parts import DONE, add_assignments, add_command, complain, folder_of, picture_beside, say
 
 if TYPE_CHECKING:
     from cvt_hpc.analysis.comparison import Comparison
@@ -18,8 +18,12 @@ def add(commands: Any) -> None:
     """Declare the commands."""
     add_command(commands, "status", _status, "how far a study is", "DIR")
     add_command(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
-    picture = add_command(commands, "map", _map, "draw where vibration occurs", "RESULTS")
-    picture.add_argument("--out", type=Path, metavar="PNG", help="default: map.png beside the dataset")
+    text = "draw where vibration occurs, or quantities over two axes"
+    picture = add_command(commands, "map", _map, text, "RESULTS")
+    text = "variable of the results, such as efficiency, instead of where vibration occurs; may be repeated"
+    picture.add_argument("--show", action="append", default=[], metavar="QUANTITY", help=text)
+    text = "default: map.png, or map_QUANTITY.png, beside the dataset"
+    picture.add_argument("--out", type=Path, metavar="PNG", help=text)
     add_assignments(picture, "--at", "fix an axis at a value")
     text = "draw the figure of a paper that a study repeats, and measure what the paper says of it"
     add_command(commands, "figure", _figure, text, "DIR")
@@ -56,12 +60,16 @@ def _map(arguments: argparse.Namespace) -> int:
         at = read_coordinates(arguments.at, units, str(arguments.path), "--at")
         from cvt_hpc.analysis.maps import draw_map
         from cvt_hpc.analysis.starts import has_starts, start_line
+        from cvt_hpc.analysis.value_maps import draw_value_map
 
-        picture = draw_map(
-            dataset, arguments.out or folder_of(arguments.path) / "map.png", at, str(arguments.path)
-        )
+        source = str(arguments.path)
+        out = arguments.out or picture_beside(arguments.path, "map", *arguments.show)
+        if arguments.show:
+            say(f"map: {draw_value_map(dataset, arguments.show, out, at, source)}")
+            return DONE
+        picture = draw_map(dataset, out, at, source)
         if has_starts(dataset, at):
-            say(start_line(dataset, at, str(arguments.path)))
+            say(start_line(dataset, at, source))
         say(f"map: {picture}")
     return DONE
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.errors import InputError, JobWarning, did_you_mean, mismatch, show
+from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
 from cvt_hpc.job.assignments import (
     Assignments,
     AxisEntry,
@@ -28,6 +27,7 @@ from cvt_hpc.job.document import read_document
 from cvt_hpc.job.for_model import answering_model, handed_to
 from cvt_hpc.job.histories import KEY, read_histories
 from cvt_hpc.job.netcdf_files import SUFFIX, read_netcdf
+from cvt_hpc.job.notices import warn_of_notices
 from cvt_hpc.job.plausibility import warn_of_bare_numbers
 from cvt_hpc.job.rules import Link, Rule, follow
 from cvt_hpc.job.sampling import sampled_axes
@@ -98,7 +98,7 @@ def build_job(
         If anything is wrong with the document or an override.
     """
     job = _build(document, source, overrides, label)
-    _warn_of_scaled_discs(job)
+    warn_of_notices(job)
     return job
 
 
@@ -277,19 +277,6 @@ def refuse_what_is_compared_only(job: Job) -> None:
             where = f"{job.source}: [{job.schema.section_of[key]}] {key}"
             expected = f"{show(parameter.default)} in a job of runs; `cvt-hpc chart` compares other values"
             raise mismatch(where, expected, show(others[0]))
-
-
-def _warn_of_scaled_discs(job: Job) -> None:
-    """Warn of a factor on the sheaves' stiffness if the job leaves open what it is a factor on."""
-    varied: dict[str, Axis | Derived] = {axis.name: axis for axis in job.axes}
-    varied |= {derived.name: derived for derived in job.derived}
-    if "stiffness_of" not in job.parameters or "stiffness_of" in {*job.given, *varied}:
-        return
-    key = "sheave_stiffness"
-    if any(value != 1.0 for value in (varied[key].values if key in varied else (job.parameters[key],))):
-        text = f"{job.source}: [sheaves] {key} scales the discs alone; "
-        text += 'stiffness_of = "sheave" keeps the earlier meaning, disc and tilt; '
-        warnings.warn(f'{text}stiffness_of = "disc" silences this line', JobWarning, stacklevel=3)
 
 
 def _read_name(head: Mapping[str, Any], source: str) -> str:

@@ -32,7 +32,9 @@ from numpy.typing import DTypeLike
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, anywhere, fma, like, maximum, select
 from cvt_hpc.physics.closed_set import factorise_closed, solve_closed
-from cvt_hpc.physics.sheaves import Sheaves, elastic_matrix
+from cvt_hpc.physics.moving_discs import MovingDiscs, inert_part, lane_discs
+from cvt_hpc.physics.ritz import NO_MODES
+from cvt_hpc.physics.sheaves import Sheaves, disc_factor, elastic_matrix
 
 ROUNDS_OF_BLOCK_FLIPS = 10
 
@@ -68,6 +70,8 @@ class Contact(NamedTuple):
         That matrix and its factor, as in `closed_set`; else empty.
     sweeps : int
         Sweeps of projected Gauss-Seidel instead (`lane_gauss_seidel`); 0: none, the exact solution.
+    discs : MovingDiscs
+        Modes with inertia; without any, as in plain numbers, discs follow at once.
     """
 
     weight: np.ndarray
@@ -79,6 +83,7 @@ class Contact(NamedTuple):
     root: np.ndarray
     matrix: Any
     sweeps: int
+    discs: MovingDiscs
 
 
 def lane_contact(wraps: list[Sheaves], dtype: DTypeLike, sweeps: int = 0) -> Contact:
@@ -112,17 +117,22 @@ def lane_contact(wraps: list[Sheaves], dtype: DTypeLike, sweeps: int = 0) -> Con
     root, matrix = np.sqrt(weight[:m]), LaneArray(m, 2 * m, len(wraps), dtype)
     for lane, wrap in enumerate(wraps if has_matrix else []):
         scale = wrap.element_stiffness * root
-        matrix.data[:, :m, lane] = np.eye(m) + scale[:, None] * elastic_matrix(wrap) * root
+        elastic = elastic_matrix(wrap)
+        if wrap.modes.place.size:
+            elastic -= inert_part(wrap.modes, disc_factor(wrap))
+        matrix.data[:, :m, lane] = np.eye(m) + scale[:, None] * elastic * root
     fresh = np.zeros(1, dtype=np.bool_)
     shared = (weight.astype(dtype), wraps[0].tilt[0].astype(dtype), wraps[0].tilt[1].astype(dtype))
-    return Contact(*shared, stations, scalars, fresh, root.astype(dtype), matrix, sweeps)
+    discs = lane_discs([wrap.modes for wrap in wraps], [disc_factor(wrap) for wrap in wraps], dtype)
+    return Contact(*shared, stations, scalars, fresh, root.astype(dtype), matrix, sweeps, discs)
 
 
 def plain_contact(wrap: Sheaves) -> Contact:
-    """All stations closed, for a single wrap in plain numbers."""
-    contact = lane_contact([wrap], np.float64)
+    """All stations closed, for a single wrap in plain numbers; its discs follow at once."""
+    contact = lane_contact([wrap._replace(modes=NO_MODES)], np.float64)
     names = ("stations", "scalars", "matrix")
-    return contact._replace(**{name: getattr(contact, name).data[:, :, 0] for name in names})
+    plain = contact._replace(**{name: getattr(contact, name).data[:, :, 0] for name in names})
+    return plain._replace(discs=contact.discs._replace(states=contact.discs.states.data[:, :, 0]))
 
 
 @kernel

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from enum import IntEnum
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,18 @@ def _table_problems(p: Mapping[str, Any]) -> Problems:
     return []
 
 
+def _kinetic(p: Mapping[str, Any]) -> float:
+    return float(p["kinetic_friction"])
+
+
+def _fallen_from(p: Mapping[str, Any], share: float = 1.0) -> float:
+    return float(p["kinetic_friction"] - share * p["friction_gradient"] * p["stribeck_velocity"])
+
+
+def _of_table(p: Mapping[str, Any]) -> float:
+    return float(np.max(p["table_mu"]))
+
+
 class Law(IntEnum):
     """The laws, as kernels know them, each with its declaration.
 
@@ -53,28 +66,32 @@ class Law(IntEnum):
         The parameters that the law reads.
     problems : callable
         What finds its problems in parameters by name.
+    largest : callable
+        Parameters by name -> the largest coefficient [1], which is that of v -> 0+ but for a table.
     """
 
     reads: tuple[str, ...]
     problems: Callable[[Mapping[str, Any]], Problems]
+    largest: Callable[[Mapping[str, Any]], float]
 
     def __new__(
         cls,
         number: int,
         reads: tuple[str, ...],
         problems: Callable[[Mapping[str, Any]], Problems] = _no_problems,
+        largest: Callable[[Mapping[str, Any]], float] = _fallen_from,
     ) -> Law:
         """Make the member of a number."""
         law = int.__new__(cls, number)
-        law._value_, law.reads, law.problems = number, reads, problems
+        law._value_, law.reads, law.problems, law.largest = number, reads, problems, largest
         return law
 
-    COULOMB = 0, ("kinetic_friction", "friction_gradient"), _coulomb_problems
+    COULOMB = 0, ("kinetic_friction", "friction_gradient"), _coulomb_problems, _kinetic
     LINEAR = 1, FORMULA_PARAMETERS
     STRIBECK = 2, FORMULA_PARAMETERS
-    HYPERBOLIC = 3, ("kinetic_friction", "friction_gradient")
-    CUBIC = 4, FORMULA_PARAMETERS
-    TABLE = 5, ("table_file", *TABLE_PARAMETERS), _table_problems
+    HYPERBOLIC = 3, ("kinetic_friction", "friction_gradient"), _no_problems, _kinetic
+    CUBIC = 4, FORMULA_PARAMETERS, _no_problems, partial(_fallen_from, share=2.0 / 3.0)
+    TABLE = 5, ("table_file", *TABLE_PARAMETERS), _table_problems, _of_table
 
 
 FRICTION_LAWS = tuple(law.name.lower() for law in Law)  # as a job names them
@@ -104,6 +121,17 @@ def friction_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
     if parameters["friction_gradient"] == 0.0:
         inert["stribeck_velocity"] = "friction_gradient 0"
     return inert
+
+
+def largest_friction(parameters: Mapping[str, Any]) -> float:
+    """Largest coefficient of a friction law without problems, at any speed and force [1].
+
+    Parameters
+    ----------
+    parameters : mapping
+        Values by name [SI], of which those of the law count.
+    """
+    return _declared(parameters).largest(parameters)
 
 
 def _declared(parameters: Mapping[str, Any]) -> Law:

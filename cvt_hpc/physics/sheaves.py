@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.physics.ritz import NO_MODES, Modes
+
 STIFFNESS_OF = ("disc", "sheave")  # what `sheave_stiffness` scales
 
 
@@ -34,6 +36,8 @@ class Sheaves(NamedTuple):
     flexibilities : (m, m) or (0, 0) array
         W [m/N] in the place of the local kernel, of discs of the reference stiffness: opening at one station
         under a force at another; empty: the kernel.
+    modes : Modes
+        Of the discs, those whose inertia counts; W has them at rest.
     """
 
     weight: np.ndarray
@@ -45,6 +49,7 @@ class Sheaves(NamedTuple):
     tilt: np.ndarray
     tilt_compliance: float
     flexibilities: np.ndarray
+    modes: Modes
 
 
 def sheaves(
@@ -101,6 +106,7 @@ def sheaves(
         np.array([np.cos(phi), np.sin(phi)]),
         radius * radius / tilt_stiffness,
         np.empty((0, 0)),
+        NO_MODES,
     )
 
 
@@ -139,6 +145,11 @@ def flexibility(sheave: Sheaves) -> np.ndarray:
     """
     m = sheave.weight.size
     return np.eye(m) / sheave.element_stiffness + elastic_matrix(sheave) * sheave.weight
+
+
+def disc_factor(sheave: Sheaves) -> float:
+    """Compliance of the discs, multiple of the reference [1]; 0: rigid."""
+    return sheave.compliance * sheave.disc_compliance
 
 
 def elastic_matrix(sheave: Sheaves) -> np.ndarray:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.job.assignments import Assignments, read_assignments, warn_of_bare_assignments
+from cvt_hpc.job.notices import warn_of_notices
 from cvt_hpc.job.shown import POINT_UNITS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.netcdf import attributes, global_attributes, variable_attributes
@@ -50,6 +51,7 @@ def simulate(job: Job, at: Assignments | None = None) -> xr.Dataset:
     at = read_assignments(given, schema, job.source, "at")
     warn_of_bare_assignments(given, schema, job.source, "at")
     point = job.point_at(at)
+    warn_of_notices(job, {key: (value,) for key, value in at.items()})
     if "lanes" in point and "lanes" not in {*at, *job.given, *(axis.name for axis in job.axes)}:
         point["lanes"] = "stations"
     ((run, record),) = do(job, [point], lambda: None, kept=(0,))

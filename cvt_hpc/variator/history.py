@@ -18,6 +18,19 @@ OVER_TIME = {
     "driven_speed": ("driven speed", "rad s-1", "of the driven pulley"),
 }
 
+# along the belt, of an instant
+ALONG = {
+    "ring_tension": ("ring tension", "N", ""),
+    "push_force": ("push force", "N", "between elements"),
+    "mean_displacement": ("mean displacement", "m", "off the reference path, outward"),
+}
+
+
+def of_means(words: tuple[str, str, str]) -> tuple[str, str, str]:
+    """Long name, unit and comment of a quantity's mean, which says so in one of them."""
+    name, unit, comment = words
+    return words if name.startswith("mean") else (name, unit, ", ".join(filter(None, ("mean", comment))))
+
 
 def dataset(
     run: Any,

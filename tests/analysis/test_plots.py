@@ -8,6 +8,7 @@ from matplotlib.text import Text
 
 from cvt_hpc.analysis.curves import curve_figure
 from cvt_hpc.analysis.figures import STYLE
+from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.analysis.waterfall import waterfall_figure
 from cvt_hpc.analysis.wraps import wrap_figure
 from cvt_hpc.errors import InputError
@@ -207,3 +208,28 @@ def test_what_cannot_be_drawn_is_refused(results, history, compose, message):
     with matplotlib.rc_context(STYLE), pytest.raises(InputError) as caught:
         compose(results, history)
     assert str(caught.value).startswith(message)
+
+
+def test_a_map_of_quantities_has_a_panel_for_each_and_tells_their_numbers(results):
+    results["status"][0, 0] = 2  # failed: what it has left is no result
+    results["vibrates"][-1, -1] = Vibrates.SLIPS
+    results["speed_loss"] = results["speed_loss"].fillna(0.5)
+    figure = value_map_figure(results, ["speed_loss", "strand_tension"])
+    panels = [axes for axes in figure.axes if axes.get_label() != "<colorbar>" and axes.axison]
+    titles = [axes.get_title(loc="left") for axes in panels]
+    assert titles == ["speed loss", "strand tension [kN], t1", "strand tension [kN], t2"]
+    assert (panels[0].get_ylabel(), panels[-1].get_xlabel()) == ("driving speed [rpm]", "load [N m]")
+    texts = [text.get_text() for text in panels[0].texts]
+    shown = results["speed_loss"].values.ravel()[1:]
+    assert texts == [f"{value:.3g}" if value >= 0.1 else f"{value:.2g}" for value in shown]
+    assert "6 runs, of them 1 failed, 1 slipping" in figure.get_suptitle()
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["slipping", "failed"]
+    with pytest.raises(InputError, match="speed_los: "):
+        value_map_figure(results, ["speed_los"])
+
+
+def test_a_quantity_that_does_not_vary_has_one_colour(results):
+    results["speed_loss"] = 0.0 * results["speed_loss"].fillna(0.0) + 50e3
+    results["speed_loss"][0, 0] += 1e-6
+    (image,) = value_map_figure(results, ["speed_loss"]).axes[0].images
+    assert len({tuple(colour) for colour in image.get_array().reshape(-1, 4)}) == 1

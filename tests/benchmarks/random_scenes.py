@@ -35,8 +35,8 @@ FOUND = (
     "refinements",
     "seconds",
 )
-GIVEN = ("ratio", "friction_law", "driving_speed", "thrust", "load_share", "friction_gradient", "friction_memory",
-         "sheave_stiffness", "element_mass", "ring_mass", "bending_stiffness")  # fmt: skip
+GIVEN = ("ratio", "friction_law", "stiffness_of", "driving_speed", "thrust", "load_share", "friction_gradient",
+         "friction_memory", "sheave_stiffness", "element_mass", "ring_mass", "bending_stiffness")  # fmt: skip
 
 
 def scenes(groups: int) -> list[list[dict]]:
@@ -66,7 +66,7 @@ def _scene(ratio: float, law: str, x: np.ndarray) -> dict:
         0.5 * 0.7 * 2.0 ** x[8],
     )
     common = {"ratio": ratio, "friction_law": law, "stiffness_of": "sheave"}
-    return common | dict(zip(GIVEN[2:], map(float, values), strict=True))
+    return common | dict(zip(GIVEN[3:], map(float, values), strict=True))
 
 
 def run_group(scenes_: list[dict], stepper: str, step: float | None) -> list[dict]:

@@ -18,7 +18,13 @@ from cvt_hpc.physics.friction import (
     saturation,
     table_coefficient,
 )
-from cvt_hpc.physics.friction_laws import FRICTION_LAWS, Law, friction_inert, friction_problems
+from cvt_hpc.physics.friction_laws import (
+    FRICTION_LAWS,
+    Law,
+    friction_inert,
+    friction_problems,
+    largest_friction,
+)
 
 # mu(v) of the module's table, for complex v too: mu_k, g, v_s, v
 FORMULAS = {
@@ -50,6 +56,20 @@ def thomsen_fidlin(mu_k, mu_s, x):
 
 def coefficient(kind, mu_k, gradient, v_s, speed):
     return friction_coefficient(friction_law(kind, mu_k, gradient, v_s), speed, 1e5)
+
+
+@pytest.mark.parametrize("kind", FORMULAS)
+@given(levels, gradients, scales, shares)
+def test_the_largest_coefficient_is_that_at_rest(kind, mu_k, gradient, v_s, share):
+    gradient = 0.0 if kind == "coulomb" else gradient
+    given = {"kinetic_friction": mu_k, "friction_gradient": gradient, "stribeck_velocity": v_s}
+    largest = largest_friction({"friction_law": kind} | given)
+    assert largest == pytest.approx(coefficient(kind, mu_k, gradient, v_s, 0.0)[0], rel=1e-12)
+    assert coefficient(kind, mu_k, gradient, v_s, share * v_s)[0] <= largest * (1.0 + 1e-12)
+
+
+def test_the_largest_coefficient_of_a_table_is_its_largest():
+    assert largest_friction({"friction_law": "table", "table_mu": ((0.1, 0.08), (0.12, 0.09))}) == 0.12
 
 
 @pytest.mark.parametrize("kind", FORMULAS)

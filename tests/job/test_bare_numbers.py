@@ -6,16 +6,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cvt_hpc import models
+from cvt_hpc import models, simulate
 from cvt_hpc.cli import main
 from cvt_hpc.errors import JobWarning, UnitWarning
+from cvt_hpc.fit.loading import load_fit
 from cvt_hpc.job import build_job, load_job, rebuild_job
 from cvt_hpc.job.plausibility import warn_of_bare_numbers
 from cvt_hpc.parameters import Parameter
+from cvt_hpc.simulation import history
 
 SPEED = Parameter(300.0, "rad/s", "", sensible=(1.0, 800.0))
 LENGTH = Parameter(0.1, "m", "", sensible=(1e-3, 1.0), allow_infinite=True)
 FORCE = Parameter(1.0, "N", "")
+
+
+JOBS = Path(models.__file__).parents[2] / "jobs"
 
 
 def warned(call, *arguments, **more):
@@ -97,6 +102,39 @@ def test_scaled_sheaves_are_told_unless_the_job_names_what_is_scaled(model, tmp_
     assert shown == [f"cvt-hpc: warning: {told}"]
 
 
+def test_notices_speak_of_a_single_run_and_of_the_ranges_of_a_fit(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def told(source):
+        return [
+            f'{source}: [sheaves] sheave_stiffness scales the discs alone; stiffness_of = "sheave" keeps the earlier '
+            'meaning, disc and tilt; stiffness_of = "disc" silences this line'
+        ]
+
+    monkeypatch.setattr(history, "_history", lambda *_: None)
+    monkeypatch.setattr(history, "do", lambda *_, **__: [(None, {})])
+    document = {"name": "x", "model": "elastic_belt"}
+    plain = build_job(document)
+    assert warned(simulate, plain, {"sheave_stiffness": 1.5}) == told("build_job")
+    assert warned(simulate, plain, {"sheave_stiffness": 1.5, "stiffness_of": "disc"}) == []
+    assert warned(simulate, plain, {"sheave_stiffness": 1.0}) == warned(simulate, plain) == []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        scaled = build_job(document | {"sheaves": {"sheave_stiffness": 2.0}})
+    assert warned(simulate, scaled, {"sheave_stiffness": 1.5}) == []  # it has been told
+
+    fit = Path("fit.toml")
+    text = 'name = "x"\nmodel = "elastic_belt"\n[axes]\nFREE\n[fit]\nalong = { load = [50, 60] }\n[fit.cases]\na = {CASE}\n'
+    text += '[[fit.targets]]\nname = "t"\nmeasure = "vibrating"\nfrom = 50\nto = 60\nstatement = "s"\n'
+    of_range = "sheave_stiffness = { from = 1, to = 2 }", ""
+    of_case = "kinetic_friction = { from = 0.08, to = 0.1 }", " set = { sheave_stiffness = 1.5 } "
+    silent = of_case[0], " factor = { sheave_stiffness = 1 } "
+    for (free, case), expected in ((of_range, told("fit.toml")), (of_case, told("fit.toml")), (silent, [])):
+        fit.write_text(text.replace("FREE", free).replace("CASE", case))
+        assert warned(load_fit, fit) == expected
+        assert warned(load_fit, fit, ["stiffness_of=disc"]) == []
+
+
 def test_commands_say_it_once_on_stderr(write_job, capsys):
     write_job("[scene]\nthrust = 2e4\ndriving_speed = [3000]\n".replace("driving", "[axes]\ndriving"))
     with warnings.catch_warnings():
@@ -108,7 +146,9 @@ def test_commands_say_it_once_on_stderr(write_job, capsys):
 
 
 @pytest.mark.parametrize(
-    "path", sorted((Path(models.__file__).parents[2] / "jobs").glob("*.toml")), ids=lambda path: path.stem
+    "path",
+    sorted(JOBS.glob("*.toml")),
+    ids=lambda path: path.stem,
 )
 def test_jobs_that_are_shipped_draw_none(path):
     if path.stem.startswith("chart_") and path.stem != "chart_ladder":

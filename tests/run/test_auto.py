@@ -242,9 +242,10 @@ def test_a_coarse_run_that_is_not_to_be_trusted_decides_nothing(monkeypatch):
 
 def test_a_full_run_that_slips_through_is_recorded_as_such():
     job = rung_job("auto", duration=0.2)
-    (record,) = run_points(job, [job.point(0) | {"load": 500.0}], lambda: None)
+    (record,) = run_points(job, [job.point(0) | {"load": 450.0}], lambda: None)
     assert (record["status"], record["vibrates"]) == (Status.DONE, Vibrates.SLIPS)
     assert record["rung"] == Rung.FULL and record["slip_margin"] > 0.0
+    assert 200.0 < record["slip_load"] <= 500.0
     assert "slips through" in record["reason"]
     assert np.isnan(record["amplitude"]).all() and record["core_seconds"] > 0.0
 

@@ -6,11 +6,14 @@ import pytest
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.belt import DRIVEN_POSITION, FIRST_STATE, belt_constants, initial_state
+from cvt_hpc.models.elastic_belt.pulley_checks import ABOVE
 from cvt_hpc.models.elastic_belt.pulley_settings import oil_factor, piston_area
 from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVEN_TILT, DRIVING_COS, SHIFT
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
+from cvt_hpc.physics.flank import flank_forces
 from support.fast_runs import FastRuns
 from support.marched import Together, balance, job, mean
+from support.rungs import rung_job
 
 # judged early: sheaves and controllers are still on their way, so that every power takes part
 BASE = {"stations": 64, "duration": 0.08, "load": 80.0, "rise_time": 0.02}
@@ -201,9 +204,30 @@ def test_a_stiff_shaft_is_none():
     assert twice == pytest.approx(0.5 * (bent.driven.tilt_compliance - plain.driven.tilt_compliance))
 
 
+def test_each_pulley_may_have_a_shaft_of_its_own():
+    """Compliances are those of a belt in which both pulleys have one or the other."""
+    one = {key: tuple(value) for key, value in SHAFT.items()}
+    other = {"shaft_lengths": (0.2,), "shaft_diameters": (0.05,), "bearing_positions": (0.01, 0.19)}
+    other |= {"seat_positions": (0.12, 0.07), "shaft_modulus": 1.1e11, "bearing_stiffness": 1e8}
+    own = {f"driven_{key}": value for key, value in other.items()}
+
+    def compliances(**values):
+        belt = belt_constants(job(stations=48, **values).parameters)
+        return belt.driving.tilt_compliance, belt.driven.tilt_compliance
+
+    plain, first, second = compliances(), compliances(**one), compliances(**other)
+    assert compliances(**one, **own) == (first[0], second[1])
+    assert compliances(**own) == (plain[0], second[1])
+    assert compliances(**one, **own, driven_shaft_factor=np.inf) == (first[0], plain[1])
+    assert len({plain[1], first[1], second[1]}) == 3
+
+
 @pytest.mark.parametrize(
     ("tables", "message"),
     [
+        ({"driven_shaft": {"driven_shaft_lengths": [0.1]}}, "driven_shaft_diameters: expected one for each of 1 driven"),
+        ({"driven_shaft": {"driven_shaft_lengths": [0.1], "driven_shaft_diameters": [0.04]}},
+         "driven_bearing_positions: expected two bearings at different"),
         ({"pulleys": {"collar_clearance": -1e-4}}, "collar_clearance: expected >= 0 rad, found -0.0001"),
         ({"pulleys": {"bearing_clearance": "-1 um"}}, "bearing_clearance: expected >= 0 um, found"),
         ({"pulleys": {"collar_clearance": 1e-4}}, "collar_clearance: expected 0, or a tilt_lag"),
@@ -232,3 +256,60 @@ def test_pulleys_that_cannot_be_are_refused(tables, message):
     with pytest.raises(InputError) as caught:
         build_job({"name": "x", "model": "elastic_belt"} | tables, "x.toml")
     assert message in str(caught.value) and str(caught.value).startswith("x.toml: [")
+
+
+MOST = ABOVE * 2 * 0.14 * 50e3 * 0.075 / 2.52 / np.cos(np.deg2rad(11))  # [N m], mu = 0.1 + 0.8 s/m 0.05 m/s
+
+
+@pytest.mark.parametrize(
+    "model", ["elastic_belt", "steady_variator", "linear_stability", "quasi_static_belt", "auto"]
+)
+def test_more_torque_than_can_be_carried_is_refused(model):
+    def built(**values):
+        return rung_job(model, **values)
+
+    for load in (0.999 * MOST, -0.999 * MOST):
+        built(load=load)
+    told = rf"load: expected at most {MOST:.4g} N m in size, 1.1 times what the driven pulley carries under 50 kN"
+    for load in (1.001 * MOST, -1.001 * MOST):
+        with pytest.raises(InputError, match=told):
+            built(load=load)
+    with pytest.raises(InputError, match=r"found 500 N m \(at load = 500 N m\)"):
+        built(axes={"load": [100.0, 500.0]})
+    built(axes={"load": [100.0, 500.0]}, thrust=60e3)
+    built(load=500.0, kinetic_friction=0.12)
+    with pytest.raises(InputError, match="largest coefficient of friction, 0.1, found"):
+        built(load=400.0, friction_law="hyperbolic")
+
+
+def test_a_ramp_may_end_where_the_belt_slips_and_not_begin_there():
+    ramp = {"load_history": "ramp", "load": 600.0}
+    rung_job("elastic_belt", **ramp)
+    with pytest.raises(InputError, match="load_start: expected at most"):
+        rung_job("elastic_belt", **ramp, load_start=500.0)
+    rung_job("slip_limit", load=600.0)  # of which the sign alone counts
+
+
+def test_all_that_presses_counts():
+    def built(load, **freedom):
+        return rung_job("elastic_belt", load=load, **freedom)
+
+    with pytest.raises(InputError, match="what the driving pulley carries under 40 kN"):
+        built(400.0, driving_axial="thrust", driving_thrust=40e3)
+    with pytest.raises(InputError, match="driven pulley carries under 50 kN"):
+        built(480.0, driving_axial="ratio")
+    built(480.0, clamping="torque_ratio", held_torque_ratio=0.8)
+    built(480.0, driven_spring_rate=2e6)  # 3.9 mm of opening would add 7.8 kN
+
+
+def test_no_direction_of_sliding_carries_more():
+    mu, angle, force = 0.3, np.deg2rad(11), 1e5
+    sine, cosine = np.sin(angle), np.cos(angle)
+    ways = np.linspace(0.0, 2.0 * np.pi, 3600, endpoint=False)
+    tangential = [flank_forces(mu, 1e-9, sine, cosine, force, np.sin(way), np.cos(way))[1] for way in ways]
+    # tangential sliding alone, and the normal force that inward sliding adds
+    most = 2.0 * mu * force / cosine
+    assert most < np.abs(tangential).max() < ABOVE * most
+    assert np.abs(tangential).max() == pytest.approx(
+        most / np.sqrt(1.0 - (mu * np.tan(angle)) ** 2), rel=1e-5
+    )

@@ -7,6 +7,7 @@ from cvt_hpc import simulate
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.belt import (
+    FIRST_STATE,
     N_ELEMENT,
     V_ELEMENT,
     V_FILTERED,
@@ -19,6 +20,7 @@ from cvt_hpc.models.elastic_belt.belt import (
 from cvt_hpc.models.elastic_belt.one_system import flat_belt
 from cvt_hpc.models.elastic_belt.one_system import pack as flat_pack
 from cvt_hpc.models.elastic_belt.one_system import rates as flat_rates
+from cvt_hpc.models.elastic_belt.pulleys import DRIVING_COS
 from cvt_hpc.models.quasi_static_belt.basis import (
     own_frequencies,
     splines_of_belt,
@@ -151,11 +153,26 @@ def test_with_inertia_content_is_kept_too():
     assert fields[N_ELEMENT : N_ELEMENT + 2] @ model.belt.cell == pytest.approx(before, rel=1e-13)
 
 
-@pytest.mark.parametrize("longitudinal", ["inertia", "steady_flow"])
-def test_a_quiet_belt_has_the_forces_of_the_whole_one_and_its_powers_close(longitudinal):
+FREE = {
+    "driving_inertia": 0.05,
+    "drive_slope": 5.0,
+    "driving_axial": "thrust",
+    "driving_thrust": 45e3,
+    "driven_spring_rate": 5e6,
+    "tilt_lag": 1e-3,
+    "collar_clearance": 5e-4,
+}
+
+
+@pytest.mark.parametrize(
+    ("longitudinal", "pulleys"),
+    [("inertia", {}), ("steady_flow", {}), ("inertia", FREE)],
+    ids=["inertia", "steady_flow", "free pulleys"],
+)
+def test_a_quiet_belt_has_the_forces_of_the_whole_one_and_its_powers_close(longitudinal, pulleys):
     from cvt_hpc.models.elastic_belt.transient import Transient
 
-    values = {"friction_gradient": 0.0, "friction_law": "coulomb", "stations": 64, "duration": 0.08}
+    values = {"friction_gradient": 0.0, "friction_law": "coulomb", "stations": 64, "duration": 0.08} | pulleys
     common = values | {"judged_fraction": 0.25, "load": 100.0}
     (run,) = batch([parameters(**common, longitudinal=longitudinal)], "split").runs
     document = {"name": "test", "model": "elastic_belt"}
@@ -166,6 +183,12 @@ def test_a_quiet_belt_has_the_forces_of_the_whole_one_and_its_powers_close(longi
     for name, allowed in (("ring_tension t1", 0.03), ("ring_tension t2", 0.03), ("push_force t1", 0.05)):
         expected = whole.channel(name)[whole.judged].mean()
         assert run.channel(name)[run.judged].mean() == pytest.approx(expected, rel=allowed)
+    if pulleys:
+        for name in ("driving_speed", "driven_speed", "axial_force driving", "axial_force driven"):
+            expected = whole.channel(name)[whole.judged].mean()
+            assert run.channel(name)[run.judged].mean() == pytest.approx(expected, rel=5e-3)
+        tilts = [one.state.scalars[FIRST_STATE + DRIVING_COS :][:4] for one in (run, whole)]
+        assert tilts[0] == pytest.approx(tilts[1], abs=2e-5) and np.abs(tilts[1]).max() > 1e-4
     power = {name: run.channel(name)[run.judged].mean() for name in ("driving_power", "load_power")}
     losses = [
         name for name in ("driving_flank_loss", "driven_flank_loss", "ring_loss", "belt_loss", "layer_loss")

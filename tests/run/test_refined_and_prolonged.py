@@ -148,7 +148,7 @@ def test_a_history_covers_the_whole_time(script):
 
 # by seed: decided at once; later; never; refined once; always failing; slipping through; refined, then prolonged
 UNTIL, FAILS = {2: 2 * T, 3: 9.0, 7: 2 * T}, {4: STEPS, 5: 1000, 7: 2 * STEPS}
-POINTS = [{"seed": seed} | ({"load": 500.0} if seed == 6 else {}) for seed in range(1, 8)]
+POINTS = [{"seed": seed} | ({"load": 450.0} if seed == 6 else {}) for seed in range(1, 8)]
 
 
 @pytest.mark.slow

@@ -26,7 +26,7 @@ def history():
 @pytest.fixture(scope="module")
 def failed():
     """Slips through before the judged part begins."""
-    return simulate(job(**LOADED | {"load": 800.0, "duration": 0.08}))
+    return simulate(job(**LOADED | {"load": 450.0, "duration": 0.08}))
 
 
 def test_the_record_is_in_it_bit_by_bit(history):

@@ -29,7 +29,7 @@ SHORT = CHEAP | {"stations": 40}
 DIFFERENT = [
     {"load": 120.0},
     {"load": 60.0, "seed": 3},
-    {"load": 500.0},  # slips through
+    {"load": 450.0},  # slips through
     {"load": 100.0, "sheave_stiffness": np.inf, "stiffness_of": "sheave"},
     {"load": 100.0, "friction_gradient": -1.2, "friction_speed": 0.02},
     {"load": 80.0, "half_wedge_angle": 0.21, "thrust": 40e3, "element_damping": 30.0},
@@ -146,7 +146,7 @@ def test_the_first_outcome_counts():
 def test_work_is_counted_until_the_run_ends(method):
     values = METHODS[method] | {"friction_speed": 0.01}
     batch = Batch(
-        [job(**SHORT | values | {"load": load}).point(0) for load in (120.0, 500.0)], values["stepper"]
+        [job(**SHORT | values | {"load": load}).point(0) for load in (120.0, 450.0)], values["stepper"]
     )
     while batch.running:
         batch.advance(1000)

@@ -16,12 +16,12 @@ LOADED = CHEAP | {"load": 120.0}
 ENDINGS = {
     "done": (LOADED, Status.DONE),
     "diverged": (LOADED | {"step": 50e-6}, Status.FAILED_NUMERICS),
-    "slipped through": (CHEAP | {"load": 500.0}, Status.DONE),
+    "slipped through": (CHEAP | {"load": 450.0}, Status.DONE),
 }
 ALONG_RAMPS = {variable.name for variable in ramp.VARIABLES}
 # known of a run that has slipped through before its end
 OF_THE_SLIDE = {"slip", "axial_force", "open_share", "thrust_ratio", "speed_loss"}
-OF_THE_SLIDE |= {"carried_torque", "torque_ratio", "slip_margin"}
+OF_THE_SLIDE |= {"carried_torque", "torque_ratio", "slip_margin", "slip_load"}
 COST = {"core_seconds", "simulated_seconds", "time_step", "steps", "contact_solves"}
 
 
@@ -88,7 +88,7 @@ def test_numbers_are_missing_only_where_a_run_failed(ending):
         slipped = found["vibrates"] == Vibrates.SLIPS
         known = variable.name in (COST | OF_THE_SLIDE if slipped else COST)
         if status == Status.DONE and not slipped:
-            known = variable.name not in ALONG_RAMPS
+            known = variable.name not in {*ALONG_RAMPS, "slip_load"}
         assert np.all(np.isfinite(found[variable.name]) == known), variable.name
     if status != Status.DONE:
         assert Vibrates(int(found["vibrates"])) is not Vibrates.YES

@@ -1,4 +1,4 @@
-"""Statements of Bullinger, Funk and Pfeiffer 2005 about figs 20 and 21: along the belt at speed ratio 1."""
+"""Statements of Bullinger, Funk and Pfeiffer 2005 about figs 4, 20 and 21: along the belt at ratio 1."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ ALIKE = 0.2  # of two forces that are said to be in equilibrium
 CONSTANT = 0.01  # of a force that is said to be constant
 APART = 1.0  # [N]: push force below which elements count as apart
 FORCES = ("friction_force", "ring_friction")
+SLIDING = ("radial_sliding", "tangential_sliding")
 HALF_TURN = 0.5 * np.pi
 
 
@@ -23,6 +24,66 @@ def _each(kept: Kept, shares: tuple[float, ...] = ALL_RATIOS) -> list[xr.Dataset
 def _front(history: xr.Dataset) -> int:
     """First station of the driving arc at which elements press."""
     return int(np.argmax(over_arc(history, "push_force", "driving").values > APART))
+
+
+def _both_stiffnesses(kept: Kept) -> list[xr.Dataset]:
+    """Elastic sheaves first, then rigid ones."""
+    return [kept.history(sheave_stiffness=stiffness) for stiffness in (1.0, np.inf)]
+
+
+def _has_both_parts(kept: Kept) -> Measured:
+    elastic, _ = _both_stiffnesses(kept)
+    sizes = {
+        pulley: [
+            1e3 * float(np.sqrt(np.mean(over_arc(elastic, name, pulley).values ** 2))) for name in SLIDING
+        ]
+        for pulley in ("driving", "driven")
+    }
+    holds = [0.1 < radial / tangential < 10.0 for radial, tangential in sizes.values()]
+    said = (
+        f"{pulley} {radial:.3g} and {tangential:.3g} mm/s" for pulley, (radial, tangential) in sizes.items()
+    )
+    return Measured(holds, f"radial and tangential (rms): {', '.join(said)}")
+
+
+def _elasticity_gives_radial(kept: Kept) -> Measured:
+    sizes = [
+        1e3
+        * max(
+            float(np.abs(over_arc(history, "radial_sliding", pulley).values).max())
+            for pulley in ("driving", "driven")
+        )
+        for history in _both_stiffnesses(kept)
+    ]
+    return Measured(
+        [sizes[1] < 0.5 * sizes[0]],
+        f"largest radial sliding {sizes[0]:.3g} mm/s on elastic, {sizes[1]:.3g} mm/s on rigid sheaves",
+    )
+
+
+def _friction_is_not_tangential(kept: Kept) -> Measured:
+    elastic, _ = _both_stiffnesses(kept)
+    shares = []
+    for pulley in ("driving", "driven"):
+        radial, tangential = (over_arc(elastic, name, pulley).values for name in SLIDING)
+        normal = over_arc(elastic, "normal_force", pulley).values
+        shares.append(
+            float((normal * np.abs(tangential) / np.hypot(radial, tangential)).sum() / normal.sum())
+        )
+    said = listed(100 * np.array(shares))
+    return Measured(
+        [share < 0.95 for share in shares],
+        f"of friction's size {said} % are tangential on the driving and the driven pulley",
+    )
+
+
+FIGURE_4 = (
+    Statement("Sliding has a radial and a tangential part", _has_both_parts),
+    Statement(
+        "The thrust deforms sheaves and elements, which gives the radial part", _elasticity_gives_radial
+    ),
+    Statement("So friction is not tangential alone, as eq. 2 assumes", _friction_is_not_tangential),
+)
 
 
 def _enters_apart(kept: Kept) -> Measured:

@@ -9,6 +9,7 @@ from cvt_hpc.analysis.statements.verdicts import Measured, Statement, listed
 
 APPROXIMATE = 2.0  # [%]: what is stated as equal
 APART = 1.0  # [N]: push force below which elements count as apart
+RUNNING, RESTING = 3000 * np.pi / 30, 0.1 * np.pi / 30  # [rad/s]
 
 
 def _push(kept: Kept, ratio: float, share: float) -> np.ndarray:
@@ -54,17 +55,19 @@ FIGURE_22 = (
 )
 
 
-def _normal(kept: Kept, share: float) -> np.ndarray:
-    return over_arc(kept.history(load_share=share), "normal_force", "driving").values
+# torque ratio, and speed of the driving pulley [rad/s]
+REVERSED, AT_REST, ALONE, LOADED = (-0.33, RUNNING), (0.0, RESTING), (0.0, RUNNING), (0.63, RUNNING)
+
+
+def _normal(kept: Kept, case: tuple[float, float]) -> np.ndarray:
+    share, speed = case
+    return over_arc(kept.history(load_share=share, driving_speed=speed), "normal_force", "driving").values
 
 
 def _thirds(force: np.ndarray) -> tuple[float, float]:
     """Means over the first and the last third of the wrap."""
     n = force.size // 3
     return float(force[:n].mean()), float(force[-n:].mean())
-
-
-REVERSED, AT_REST, ALONE, LOADED = -0.33, -1e-9, 0.0, 0.63
 
 
 def _symmetric_at_rest(kept: Kept) -> Measured:

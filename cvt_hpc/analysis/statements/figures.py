@@ -9,18 +9,30 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
+from cvt_hpc.analysis.arcs import sliding_figure, spiral_figure
 from cvt_hpc.analysis.curves import curve_figure
+from cvt_hpc.analysis.energy_blocks import blocks_figure
 from cvt_hpc.analysis.figures import draw
 from cvt_hpc.analysis.followed_drawing import element_figure
+from cvt_hpc.analysis.friction_curves import friction_figure
 from cvt_hpc.analysis.profiles import profile_figure
-from cvt_hpc.analysis.ramps import ramp_figure
-from cvt_hpc.analysis.statements import bullinger_along, bullinger_ratios, lebrecht_belt, lebrecht_ramps
+from cvt_hpc.analysis.ramps import course_figure, ramp_figure
+from cvt_hpc.analysis.spectra import spectrum_figure
+from cvt_hpc.analysis.statements import (
+    bullinger_along,
+    bullinger_ratios,
+    lebrecht_belt,
+    lebrecht_excitation,
+    lebrecht_ramps,
+)
 from cvt_hpc.analysis.statements.kept import Kept, opened
 from cvt_hpc.analysis.statements.verdicts import Finding, Statement, judged
 from cvt_hpc.analysis.strand_bars import strand_bars_figure
+from cvt_hpc.analysis.waterfall import waterfall_figure
 from cvt_hpc.errors import unknown
 from cvt_hpc.files import written_aside
 
+SLIDING = ("radial_sliding", "sliding_speed")
 COLUMNS = ("figure", "statement", "verdict", "measured", "why")
 
 
@@ -52,6 +64,7 @@ def _along(
 FIGURES = {
     f"bullinger_{number}": PaperFigure(f"Bullinger et al. 2005, fig. {int(number)}", compose, statements)
     for number, compose, statements in (
+        ("04", lambda kept: sliding_figure(kept.histories), bullinger_along.FIGURE_4),
         ("05", lambda kept: strand_bars_figure(kept.results), bullinger_ratios.FIGURE_5),
         ("20", _along("push_force", "friction_force", "ring_friction"), bullinger_along.FIGURE_20),
         ("21", _along("mean_displacement", "sliding_angle"), bullinger_along.FIGURE_21),
@@ -64,11 +77,23 @@ FIGURES |= {
         f"Lebrecht et al. 2004, fig. {number}", compose, statements
     )
     for number, compose, statements in (
+        ("3.1", lambda kept: course_figure(kept.histories[0], "driving_moment"), lebrecht_ramps.FIGURE_3_1),
+        ("3.2", lambda kept: waterfall_figure(kept.results), lebrecht_belt.FIGURE_3_2),
+        ("3.6", lambda kept: strand_bars_figure(kept.results), lebrecht_belt.FIGURE_3_6),
         ("3.7", lambda kept: curve_figure(kept.results, ["eigenfrequency"]), lebrecht_belt.FIGURE_3_7),
         ("3.9", lambda kept: ramp_figure(kept.histories), lebrecht_ramps.FIGURE_3_9),
-        ("3.10", lambda kept: element_figure(kept.histories[0], "driven"), lebrecht_belt.FIGURE_3_10),
+        ("3.10", lebrecht_belt.swings_figure, lebrecht_belt.FIGURE_3_10),
+        ("3.11", lambda kept: spectrum_figure(kept.run()), lebrecht_belt.FIGURE_3_11),
+        ("3.12", lambda kept: friction_figure(kept.results), lebrecht_excitation.FIGURE_3_12),
         ("3.13", lambda kept: ramp_figure(kept.histories), lebrecht_ramps.FIGURE_3_13),
         ("3.14", lambda kept: ramp_figure(kept.histories), lebrecht_ramps.FIGURE_3_14),
+        ("4.1", lambda kept: spiral_figure(kept.histories[0], "driven"), lebrecht_excitation.FIGURE_4_1),
+        (
+            "4.2",
+            lambda kept: element_figure(kept.histories[0], "driven", parts=SLIDING),
+            lebrecht_excitation.FIGURE_4_2,
+        ),
+        ("4.4", lambda kept: blocks_figure(kept.histories), lebrecht_excitation.FIGURE_4_4),
     )
 }
 

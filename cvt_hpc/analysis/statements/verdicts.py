@@ -60,7 +60,7 @@ def judged(statement: Statement, kept: Kept) -> Finding:
     except InputError as error:  # a run has failed
         return Finding(statement.text, Verdict.UNKNOWN, str(error), statement.why)
     holds = [bool(part) for part in measured.holds]
-    verdict = Verdict.REPRODUCED if all(holds) else Verdict.PARTLY if any(holds) else Verdict.NOT
+    verdict = Verdict.REPRODUCED if holds and all(holds) else Verdict.PARTLY if any(holds) else Verdict.NOT
     why = "" if verdict is Verdict.REPRODUCED else statement.why
     return Finding(statement.text, verdict, measured.numbers, why)
 

@@ -25,6 +25,7 @@ import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Mesh
 from cvt_hpc.models.elastic_belt.fluctuation import at_stations
+from cvt_hpc.variator.history import ALONG
 
 # of a sample, what the quantities below follow from
 NEEDED = (
@@ -56,10 +57,8 @@ SLIDING = {
 WRAP_ANGLE = ("wrap angle", "rad", "from the inlet of the arc")
 # everywhere, of an instant or of a state that does not change
 ELSEWHERE = {
-    "ring_tension": ("ring tension", "N", ""),
-    "push_force": ("push force", "N", "between elements"),
+    **ALONG,
     "contact_force": ("contact force", "N m-1", "axial line force of one flank"),
-    "mean_displacement": ("mean displacement", "m", "off the reference path, outward"),
 }
 
 

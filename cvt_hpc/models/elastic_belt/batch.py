@@ -37,6 +37,7 @@ from cvt_hpc.models.elastic_belt.sampling import (
 )
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
 from cvt_hpc.models.elastic_belt.validity import FAILURES, step_doubt
+from cvt_hpc.recording import steps_per_sample
 from cvt_hpc.variables import Status
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
@@ -122,7 +123,7 @@ class Batch:
         derive(self._belt, self.state, self.work.stations)
         self.plan = recording(p, self.dtype)
         self.interval, self.samples = self.plan.interval, self.plan.samples
-        self.steps_per_sample = max(int(np.ceil(self.interval / p["step"] - 1e-9)), 1)
+        self.steps_per_sample = steps_per_sample(self.interval, p["step"])
         self.step = self.interval / self.steps_per_sample
         self.begun = 0.0
         n = self.plan.mesh.cell.size

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.deflection_settings import flexibilities
+from cvt_hpc.models.elastic_belt.deflection_settings import disc_settings
 from cvt_hpc.models.elastic_belt.pulleys import (
     DRIVEN_COS,
     DRIVING_COS,
@@ -192,7 +192,7 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
         for region, radius in ((0, path.driving_radius), (2, path.driven_radius))
     ]
     wraps = [
-        wrap._replace(flexibilities=flexibilities(p, pulley, wrap.weight.size, wrap.weight[1], radius))
+        wrap._replace(**disc_settings(p, pulley, (wrap.weight.size, wrap.weight[1], radius)))
         for pulley, wrap, radius in zip(
             ("driving", "driven"), wraps, (path.driving_radius, path.driven_radius), strict=True
         )

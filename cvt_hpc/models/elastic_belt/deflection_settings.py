@@ -12,10 +12,16 @@ import numpy as np
 from cvt_hpc.parameters import Column, FromFile, Parameter, RowError, not_negative, positive
 from cvt_hpc.physics.deflection import cone_flexibilities, interpolated, table_problem
 from cvt_hpc.physics.geometry import variator
+from cvt_hpc.physics.ritz import modal_flexibilities, moving_modes
+from cvt_hpc.recording import steps_per_sample
 
 PULLEYS = ("driving", "driven")
 CONE = ("cone_stiffness", "cone_shift")
+RITZ = ("ritz_limit", "ritz_modes", "disc_damping")
 TABLE_KEYS = tuple(f"{pulley}_flexibility{end}" for pulley in PULLEYS for end in ("_file", "_angle", ""))
+OF_MODE = ("mode_harmonic", "mode_flexibility", "mode_mass")
+MODE_KEYS = tuple(f"{pulley}_{key}" for pulley in PULLEYS for key in OF_MODE)
+MODE_FILES = tuple(f"{pulley}_modes_file" for pulley in PULLEYS)
 
 
 def _arranged(pulley: str, columns: Mapping[str, Column]) -> dict[str, Any]:
@@ -58,13 +64,41 @@ def _table(pulley: str) -> dict[str, Parameter]:
     }
 
 
+def _modes(pulley: str) -> dict[str, Parameter]:
+    harmonic, flexibility, mass = gives = tuple(f"{pulley}_{key}" for key in OF_MODE)
+    columns = {"harmonic": ("",), "modal_flexibility": ("m/N",), "modal_mass": ("kg",)}
+
+    def arranged(found: Mapping[str, Column]) -> dict[str, Any]:
+        return {key: list(found[name].values) for key, name in zip(gives, columns, strict=True)}
+
+    text = f"CSV or netCDF file in the place of {', '.join(gives)}; columns {', '.join(columns)}"
+    file = FromFile(columns, tuple(columns), gives, arranged)
+    return {
+        f"{pulley}_modes_file": Parameter("", "", text, file=file),
+        harmonic: Parameter(
+            (), "", f"waves around the {pulley} discs of each of their modes, of both discs of the groove"
+        ),
+        flexibility: Parameter(
+            (),
+            "m/N",
+            "opening of the groove by these modes at rest, at the place of a force on both flanks",
+            minimum=0.0,
+            exclusive=True,
+            sensible=(1e-30, 1e-5),
+        ),
+        mass: Parameter(
+            (), "kg", "masses of these modes; 0: without inertia", minimum=0.0, sensible=(1e-9, 1e9)
+        ),
+    }
+
+
 DEFLECTION: dict[str, Parameter] = {
     "sheave_deformation": Parameter(
         "bending",
         "",
-        "deformation of the discs beside the tilt of their collars: local bending, a tilting cone, or "
-        "flexibilities of a table",
-        choices=("bending", "cone", "flexibilities"),
+        "deformation of the discs beside the tilt of their collars: local bending, a tilting cone, "
+        "flexibilities of a table, or modes with inertia",
+        choices=("bending", "cone", "flexibilities", "ritz"),
     ),
     "cone_stiffness": replace(
         positive(3e5, "N m/rad", "stiffness of a cone against tilting", sensible=(100.0, 1e9)),
@@ -75,15 +109,32 @@ DEFLECTION: dict[str, Parameter] = {
     ),
     **_table("driving"),
     **_table("driven"),
+    **_modes("driving"),
+    **_modes("driven"),
+    "ritz_limit": not_negative(
+        20e3, "Hz", "highest frequency of modes that have inertia; 0: none", sensible=(1.0, 1e6)
+    ),
+    "ritz_modes": Parameter(
+        0, "", "how many modes are kept, the lowest frequencies first; 0: all", minimum=0
+    ),
+    "disc_damping": not_negative(0.005, "", "damping ratio of the discs' modes"),
 }
 
 DEFLECTION_DEFAULTS = {key: parameter.default for key, parameter in DEFLECTION.items() if not parameter.file}
 
 
-def flexibilities(
-    parameters: Mapping[str, Any], pulley: str, stations: int, spacing: float, radius: float
-) -> np.ndarray:
-    """Flexibilities of one pulley's discs at the reference stiffness, (m, m) [m/N]; (0, 0): local bending.
+def kept_modes(parameters: Mapping[str, Any], pulley: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Harmonics, flexibilities [m/N] and masses [kg] of the modes that are kept, by ascending frequency."""
+    harmonic, flexibility, mass = (np.array(parameters[f"{pulley}_{key}"], float) for key in OF_MODE)
+    order = np.argsort(-flexibility * mass, kind="stable")
+    order = order[: parameters["ritz_modes"] or None]
+    return harmonic[order], flexibility[order], mass[order]
+
+
+def disc_settings(
+    parameters: Mapping[str, Any], pulley: str, wrap: tuple[int, float, float]
+) -> dict[str, Any]:
+    """What `Sheaves` have of the discs of one pulley at the reference stiffness beside local bending.
 
     Parameters
     ----------
@@ -91,18 +142,26 @@ def flexibilities(
         Flat values of the run [SI].
     pulley : str
         driving or driven.
-    stations : int
-        Those of the wrap, m.
-    spacing, radius : float
-        Their distance along the arc, and the pitch radius [m].
+    wrap : (int, float, float)
+        Stations m of the wrap, their distance along the arc, and the pitch radius [m].
+
+    Returns
+    -------
+    dict
+        `flexibilities`, (m, m) [m/N], or (0, 0) for local bending, and `modes` where these have inertia.
     """
     p = DEFLECTION_DEFAULTS | dict(parameters)
     if p["sheave_deformation"] == "cone":
-        return cone_flexibilities(stations, spacing, radius, p["cone_stiffness"], p["cone_shift"])
+        return {"flexibilities": cone_flexibilities(*wrap, p["cone_stiffness"], p["cone_shift"])}
     if p["sheave_deformation"] == "flexibilities":
-        table = p[f"{pulley}_flexibility_angle"], p[f"{pulley}_flexibility"]
-        return interpolated(*table, stations, spacing, radius)
-    return np.empty((0, 0))
+        angles, table = p[f"{pulley}_flexibility_angle"], p[f"{pulley}_flexibility"]
+        return {"flexibilities": interpolated(angles, table, *wrap)}
+    if p["sheave_deformation"] == "ritz":
+        kept, interval = kept_modes(p, pulley), 1.0 / p["sampling_rate"]
+        step = interval / steps_per_sample(interval, p["step"])
+        modes = moving_modes(kept, p["ritz_limit"], p["disc_damping"], step, wrap)
+        return {"flexibilities": modal_flexibilities(kept[0], kept[1], *wrap), "modes": modes}
+    return {}
 
 
 def deflection_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
@@ -113,6 +172,8 @@ def deflection_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, s
         return []
     if p.get("contact_sweeps", 0) > 0:
         return [("contact_sweeps", f"0 with sheave_deformation {kind}", f"{p['contact_sweeps']}")]
+    if kind == "ritz":
+        return _ritz_problems(p)
     path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
     if kind == "cone":
         least = min(path.driving_radius, path.driven_radius)
@@ -128,9 +189,35 @@ def deflection_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, s
     return problems
 
 
+def _ritz_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    p = parameters
+    if "contact_sweeps" not in p:
+        return [("sheave_deformation", "bending, cone or flexibilities but by the stepper imex", "ritz")]
+    problems = []
+    for pulley in PULLEYS:
+        sizes = [len(p[f"{pulley}_{key}"]) for key in OF_MODE]
+        if not sizes[0] or len(set(sizes)) > 1:
+            expected = "modes, with one harmonic, flexibility and mass each"
+            problems.append((f"{pulley}_mode_harmonic", expected, " and ".join(map(str, sizes))))
+            continue
+        for n in p[f"{pulley}_mode_harmonic"]:
+            if n < 0.0 or n != round(n):
+                problems.append((f"{pulley}_mode_harmonic", "whole numbers of 0 or more", f"{n:g}"))
+                break
+    # beyond it a step has less than six parts of a period
+    if p.get("step") and p["ritz_limit"] > (most := 1.0 / (2.0 * np.pi * p["step"])):
+        problems.append(("ritz_limit", f"at most {most:.4g} Hz at this step", f"{p['ritz_limit']:g} Hz"))
+    return problems
+
+
 def deflection_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
     """Settings of the deformation without effect, each with the setting that makes it so."""
     kind = (DEFLECTION_DEFAULTS | dict(parameters))["sheave_deformation"]
     setting = f"sheave_deformation {kind}"
-    of_kinds = {"bending": ("local_stiffness", "local_length"), "cone": CONE, "flexibilities": TABLE_KEYS}
+    of_kinds = {
+        "bending": ("local_stiffness", "local_length"),
+        "cone": CONE,
+        "flexibilities": TABLE_KEYS,
+        "ritz": RITZ + MODE_KEYS + MODE_FILES,
+    }
     return {key: setting for other, keys in of_kinds.items() if other != kind for key in keys}

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.models.elastic_belt import OWN_STEPPERS
+from cvt_hpc.models.elastic_belt.deflection_settings import MODE_KEYS, RITZ
 from cvt_hpc.models.elastic_belt.pulley_settings import are_free
 
 # Core-seconds per station and time step of a batch, measured on one core of an EPYC (Zen 5) at 160 stations.
@@ -39,6 +40,8 @@ SHARED = (
     "lanes",
     "contact_sweeps",
     "sheave_deformation",
+    *MODE_KEYS,
+    *RITZ,
 )
 
 

@@ -6,12 +6,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.along_belt import SLIDING, WRAP_ANGLE, along_belt, wrap_angles
+from cvt_hpc.models.elastic_belt.along_belt import (
+    ELSEWHERE,
+    SLIDING,
+    WRAP_ANGLE,
+    along_belt,
+    elsewhere,
+    wrap_angles,
+)
 from cvt_hpc.models.elastic_belt.fluctuation import at_stations
 from cvt_hpc.models.elastic_belt.momentary import PREFIX, last_profiles
 from cvt_hpc.netcdf import attributes
 from cvt_hpc.variator import PULLEYS
-from cvt_hpc.variator.history import dataset
+from cvt_hpc.variator.history import dataset, of_means
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,20 +70,7 @@ def _profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str]]:
     damping = (fed.belt + fed.rings) / dual
     sliding = along_belt(means, run.mesh, run.parameters)
     return {
-        "ring_tension": (at_stations(means["ring_tension"]), "ring tension", "N", "mean"),
-        "push_force": (at_stations(means["push_force"]), "push force", "N", "mean, between elements"),
-        "contact_force": (
-            means["contact_force"],
-            "contact force",
-            "N m-1",
-            "mean axial line force of one flank",
-        ),
-        "mean_displacement": (
-            means["mean_displacement"],
-            "mean displacement",
-            "m",
-            "off the reference path, outward",
-        ),
+        **{name: (values, *of_means(ELSEWHERE[name])) for name, values in elsewhere(means).items()},
         "flank_feed": (fed.flanks / dual, "feed by flank friction", "W m-1", FED),
         "stress_feed": (
             at_stations(fed.stresses) / dual,

@@ -62,6 +62,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     EPS_1,
     SHORT_0,
     SHORT_1,
+    advance_discs,
     arc_sliding,
     cell_strains,
     lane_carry,
@@ -104,6 +105,7 @@ def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
     taken, moment = _advance(belt, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
+    advance_discs(belt, state, step)
     lane_contact_forces(belt, state, stations)
 
 

@@ -28,9 +28,11 @@ from cvt_hpc.models.elastic_belt.belt import (
     bending_bands,
 )
 from cvt_hpc.models.elastic_belt.pulleys import LAWS, STATES
-from cvt_hpc.models.elastic_belt.rhs import speed_share_at
+from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, speed_share_at
 from cvt_hpc.physics.compliance import Contact, lane_contact
 from cvt_hpc.physics.friction import FrictionLaw
+from cvt_hpc.physics.moving_discs import settle
+from cvt_hpc.physics.sheaves import disc_factor
 
 # Constants of each lane, in SI units; what is not named in `Belt` is explained where it is computed below.
 CONSTANTS = (
@@ -301,7 +303,21 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type, sweeps: int 
         put_lane(fields.data, scalars.data, lane, belt, state)
     wraps = [[belt.driving for belt in belts], [belt.driven for belt in belts]]
     contacts = (lane_contact(wraps[0], dtype, sweeps), lane_contact(wraps[1], dtype, sweeps))
+    settle_discs(contacts, belts, states)
     return LaneState(fields, scalars, np.array([states[0].scalars[0]]), contacts)
+
+
+def settle_discs(contacts: tuple[Contact, Contact], belts: list[Belt], states: list[State]) -> None:
+    """Put discs with inertia to rest under the forces that discs without have in these states."""
+    if not any(contact.discs.place.size for contact in contacts):
+        return
+    for lane, (belt, state) in enumerate(zip(belts, states, strict=True)):
+        force = np.zeros(belt.cell.size)
+        contact_forces(belt, state, fresh_contacts(belt), force)
+        wraps = (belt.driving, 0), (belt.driven, belt.driven_start)
+        for contact, (wrap, first) in zip(contacts, wraps, strict=True):
+            pressed = wrap.weight * force[first : first + wrap.weight.size]
+            settle(contact.discs, lane, wrap.modes, disc_factor(wrap), pressed)
 
 
 def parts_of(stations: int, most: int) -> int:

@@ -67,6 +67,7 @@ from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
 from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.lane_gauss_seidel import sweep_lane_contact
+from cvt_hpc.physics.moving_discs import open_gaps, turn_discs
 from cvt_hpc.variator.course import load_course, speed_course, start_damping
 
 MOST_CONTACT_ROUNDS = 200
@@ -280,6 +281,8 @@ def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -
             for k in range(contact.weight.size):
                 tilt = fma(contact.sine[k], other, contact.cosine[k] * one)
                 pushed[k, GAP] = pushed[k, GAP] + tilt
+        if contact.discs.place.size > 0:
+            open_gaps(contact.discs, pushed, GAP)
         if contact.sweeps > 0:
             sweep_lane_contact(contact)
         else:
@@ -290,6 +293,18 @@ def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -
             pushed[k, FORCED] = force
             set_station(stations, row, part, FORCE, force)
             row, part = _next_station(n, row, part)
+
+
+@kernel
+def advance_discs(belt: LaneBelt, state: LaneState, step: float) -> None:
+    """Discs with inertia at the end of a step, before its forces; with the pulleys' speeds there."""
+    share = lane_speed_share(belt, state.time[0], belt.constants[0, BELT_SPEED])
+    turnings, surfaces = lane_pulleys(belt, share, state.scalars)
+    for wrap in range(2):
+        contact = state.contacts[1] if wrap else state.contacts[0]
+        if contact.discs.place.size > 0:
+            turning = like(turnings[1] if wrap else turnings[0], contact.discs.states[0, 0])
+            turn_discs(contact.discs, contact.weight, contact.stations, FORCED, turning, step)
 
 
 @merged_kernel

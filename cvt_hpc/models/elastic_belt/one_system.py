@@ -167,23 +167,28 @@ def driven_moment(belt: Belt, moments: np.ndarray) -> float:
 
 
 @kernel
-def free_rates(belt: Belt, state: State, force: np.ndarray, moments: np.ndarray) -> np.ndarray:
-    """Rates of free pulleys, (10,): the driven one's speed and position, and STATES."""
-    scalars, pull = state.scalars, np.zeros((2, 3))
+def pulled_by(belt: Belt, force: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """What the belt does to its pulleys, (8,).
+
+    The torque that it takes from the driving one, its moment on the driven one [N m], the axial forces, and
+    what tilts the sheaves, driving pulley first [N].
+    """
+    pull = np.zeros(8)
+    pull[0], pull[1] = moments[: belt.driven_start].sum(), driven_moment(belt, moments)
     for wrap in range(2):
         sheave, first = (belt.driven, belt.driven_start) if wrap else (belt.driving, 0)
         for k in range(sheave.weight.size):
             pressed = sheave.weight[k] * force[first + k]
-            pull[wrap, 0] += pressed
-            pull[wrap, 1] += pressed * sheave.tilt[0, k]
-            pull[wrap, 2] += pressed * sheave.tilt[1, k]
-    time = scalars[TIME]
-    pulled = (
-        moments[: belt.driven_start].sum(),
-        driven_moment(belt, moments),
-        (pull[0, 0], pull[1, 0]),
-        (pull[0, 1], pull[0, 2], pull[1, 1], pull[1, 2]),
-    )
+            pull[2 + wrap] += pressed
+            pull[4 + 2 * wrap] += pressed * sheave.tilt[0, k]
+            pull[5 + 2 * wrap] += pressed * sheave.tilt[1, k]
+    return pull
+
+
+@kernel
+def free_rates(belt: Belt, state: State, pull: np.ndarray) -> np.ndarray:
+    """Rates of free pulleys, (10,), by `pulled_by`: the driven one's speed and position, and STATES."""
+    scalars, time = state.scalars, state.scalars[TIME]
     found = pulley_rates(
         belt.pulleys.laws,
         0,
@@ -191,7 +196,7 @@ def free_rates(belt: Belt, state: State, force: np.ndarray, moments: np.ndarray)
         1.0 if time >= belt.rise_time else 0.0,
         (driving_speed_at(belt, state), scalars[DRIVEN_SPEED]),
         scalars[DRIVEN_POSITION],
-        pulled,
+        (pull[0], pull[1], (pull[2], pull[3]), (pull[4], pull[5], pull[6], pull[7])),
         (load_at(belt, time), belt.ratio, belt.thrust, belt.axial_damping),
     )
     return np.array(found)
@@ -242,7 +247,7 @@ def rates(flat: FlatBelt, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     for k in range(flat.remembering.size):
         out[first + k] = rate[V_FILTERED, flat.remembering[k]]
     if flat.loose.size > 0:
-        found = free_rates(belt, state, flat.force, flat.moments)
+        found = free_rates(belt, state, pulled_by(belt, flat.force, flat.moments))
         first += flat.remembering.size
         for k in range(flat.loose.size):
             out[first + k] = found[2 + k]

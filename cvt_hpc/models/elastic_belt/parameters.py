@@ -17,8 +17,8 @@ from cvt_hpc.models.elastic_belt.deflection_settings import (
     deflection_problems,
 )
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert, pulley_problems, shaft_problems
-from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, PULLEYS, SHAFT
-from cvt_hpc.parameters import Parameter, not_negative, positive
+from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, DRIVEN_SHAFT, PULLEYS, SHAFT
+from cvt_hpc.parameters import Notice, Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
 from cvt_hpc.physics.sheaves import STIFFNESS_OF, stiffness_factors
@@ -77,10 +77,17 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
     },
     "sheaves": {
-        "sheave_stiffness": _stiffness(
-            1.0,
-            "",
-            "stiffness of the sheaves' discs, multiple of the reference; inf: rigid; see stiffness_of",
+        "sheave_stiffness": replace(
+            _stiffness(
+                1.0,
+                "",
+                "stiffness of the sheaves' discs, multiple of the reference; inf: rigid; see stiffness_of",
+            ),
+            notice=Notice(
+                "stiffness_of",
+                'scales the discs alone; stiffness_of = "sheave" keeps the earlier meaning, disc and tilt; '
+                'stiffness_of = "disc" silences this line',
+            ),
         ),
         "stiffness_of": Parameter(
             "disc",
@@ -127,6 +134,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     "deflection": DEFLECTION,
     "pulleys": PULLEYS,
     "shaft": SHAFT,
+    "driven_shaft": DRIVEN_SHAFT,
     "friction": FRICTION,
     "mesh": {
         "stations": Parameter(160, "", "cells around the belt", minimum=24, maximum=4096),

@@ -7,24 +7,42 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, shaft_deflection
+from cvt_hpc.models.elastic_belt.pulley_settings import (
+    OWN,
+    PULLEY_DEFAULTS,
+    oil_factor,
+    shaft_deflection,
+    shaft_keys,
+)
 from cvt_hpc.physics import capacity
+from cvt_hpc.physics.friction_laws import largest_friction
 from cvt_hpc.physics.geometry import variator, variator_problems
 from cvt_hpc.physics.sheaves import axial_element_stiffness, stiffness_factors
+from cvt_hpc.variator import LARGEST_DISPLACEMENT, MOST_SPEED, PULLEYS
 
 Problem = tuple[str, str, str]  # key, expected, found
+
+# Over a bound on the torque by nominal radii and tangential friction. Sliding at an angle adds 4e-4, which is
+# 1 / sqrt(1 - mu^2 tan^2 d0) - 1; the rest is for a belt that rides out of its groove by a tenth of a radius.
+ABOVE = 1.1
 
 
 def shaft_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     """Problems of a shaft, in the form of a model's check."""
     p = PULLEY_DEFAULTS | dict(parameters)
-    lengths, diameters = p["shaft_lengths"], p["shaft_diameters"]
+    return _problems_of_shaft(p, "") or _problems_of_shaft(p, OWN)
+
+
+def _problems_of_shaft(p: Mapping[str, Any], prefix: str) -> list[Problem]:
+    lengths, diameters = p[f"{prefix}shaft_lengths"], p[f"{prefix}shaft_diameters"]
     if len(lengths) != len(diameters):
-        return [("shaft_diameters", f"one for each of {len(lengths)} shaft_lengths", str(len(diameters)))]
+        expected = f"one for each of {len(lengths)} {prefix}shaft_lengths"
+        return [(f"{prefix}shaft_diameters", expected, str(len(diameters)))]
     if not lengths:
         return []
     total = sum(lengths)
-    for key, what in (("bearing_positions", "bearings"), ("seat_positions", "sheaves")):
+    for name, what in (("bearing_positions", "bearings"), ("seat_positions", "sheaves")):
+        key = f"{prefix}{name}"
         places = p[key]
         found = ", ".join(f"{place:g} m" for place in places) or "none"
         if len(places) != 2 or places[0] == places[1] or max(places) > total * (1.0 + 1e-9):
@@ -45,9 +63,59 @@ def pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     elif p["tilt_lag"] < (least := least_tilt_lag(p)):
         expected = f"0, or {least:.2g} s and more at this step: tilting is explicit"
         found.append(("tilt_lag", expected, f"{p['tilt_lag']:g} s"))
-    if p["bearing_clearance"] > 0.0 and not p["shaft_lengths"]:
-        found.append(("bearing_clearance", "0, or shaft_lengths", f"{p['bearing_clearance']:g} m"))
-    return found + _controller_problems(p)
+    found += _bearing_problems(p)
+    return found + (_controller_problems(p) or overload_problems(p))
+
+
+def steady_pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+    """Problems of pulleys in a steady state: lags count for nothing there, but something has to hold each."""
+    p = PULLEY_DEFAULTS | dict(parameters)
+    found = _piston_problems(p) + _drive_problems(p) + _bearing_problems(p) + _controller_problems(p)
+    is_driven, is_held = np.isfinite(p["driving_inertia"]), np.isinf(p["driven_inertia"])
+    if is_driven and p["drive_slope"] == 0.0 and not is_held:
+        expected = "above 0, or driven_inertia inf: else no speed of the drive is steady"
+        found.append(("drive_slope", expected, "0 N m s/rad"))
+    if p["driving_axial"] == "ratio" and p["ratio_rate"] == 0.0:
+        expected = "above 0: by its gain alone a controller rests where it began"
+        found.append(("ratio_rate", expected, "0 N/s"))
+    return found or overload_problems(p)
+
+
+def overload_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+    """Problem of a load that is more than any belt carries under the axial forces that are given.
+
+    By `capacity.torque_limit` with the largest coefficient of friction, and ABOVE: a bound on the moment of
+    each pulley's flanks, whatever the belt does. Near it a belt slips through long since, which is a result.
+    A ramp may end there, and tells where the belt slips; its start may not lie there.
+    """
+    p = PULLEY_DEFAULTS | dict(parameters)
+    key = "load_start" if p.get("load_history") == "ramp" else "load"
+    mu, radius = largest_friction(p), p["driven_radius"] / p["ratio"]
+    for pulley, force in _most_axial_force(p).items():
+        most = ABOVE * capacity.torque_limit(mu, force, radius, p["half_wedge_angle"])
+        if abs(p[key]) > most:
+            expected = (
+                f"at most {most:.4g} N m in size, {ABOVE:g} times what the {pulley} pulley carries under "
+                f"{force * 1e-3:.4g} kN by its largest coefficient of friction, {mu:.3g}"
+            )
+            return [(key, expected, f"{p[key]:g} N m")]
+    return []
+
+
+def _most_axial_force(p: Mapping[str, Any]) -> dict[str, float]:
+    """Largest axial force on those pulleys whose thrust is given, or bounded by a controller [N]."""
+    thrusts = {"driven": p["most_thrust"] if p["clamping"] == "torque_ratio" else p["thrust"]}
+    if p["driving_axial"] != "position":
+        is_held = p["driving_axial"] == "ratio"
+        thrusts["driving"] = p["most_thrust"] if is_held else p["driving_thrust"]
+    moved = 2.0 * np.tan(p["half_wedge_angle"]) * LARGEST_DISPLACEMENT
+    speeds = {"driving": p["driving_speed"], "driven": p["driving_speed"] / p["ratio"]}
+    return {
+        pulley: thrust
+        + p[f"{pulley}_spring_rate"] * moved
+        + oil_factor(p[f"{pulley}_piston"], p["oil_density"]) * (MOST_SPEED * speeds[pulley]) ** 2
+        for pulley, thrust in thrusts.items()
+    }
 
 
 def least_tilt_lag(parameters: Mapping[str, Any]) -> float:
@@ -63,10 +131,17 @@ def least_tilt_lag(parameters: Mapping[str, Any]) -> float:
     whole, disc = stiffness_factors(p)
     stiffness = 1.0 / (1.0 / axial_element_stiffness(p) + 1.0 / (whole * disc * p["local_stiffness"]))
     gains = []
-    for radius, wrap in ((path.driving_radius, path.driving_wrap), (path.driven_radius, path.driven_wrap)):
+    sizes = (path.driving_radius, path.driving_wrap), (path.driven_radius, path.driven_wrap)
+    for pulley, (radius, wrap) in zip(PULLEYS, sizes, strict=True):
         tilt = radius * radius / (p["tilt_stiffness"] * p["tilt_factor"] * whole)
-        gains.append(stiffness * radius * wrap * (tilt + shaft_deflection(p, radius)[0] / whole))
+        gains.append(stiffness * radius * wrap * (tilt + shaft_deflection(p, pulley, radius)[0] / whole))
     return float(p["step"] * (1.0 + max(gains)))
+
+
+def _bearing_problems(p: Mapping[str, Any]) -> list[Problem]:
+    if p["bearing_clearance"] == 0.0 or p["shaft_lengths"] or p[f"{OWN}shaft_lengths"]:
+        return []
+    return [("bearing_clearance", "0, or shaft_lengths", f"{p['bearing_clearance']:g} m")]
 
 
 def _piston_problems(p: Mapping[str, Any]) -> list[Problem]:
@@ -119,10 +194,9 @@ def pulley_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
         (not controlled[1], ("held_torque_ratio", "clamping_gain", "clamping_rate"), "clamping constant"),
         (not any(controlled), ("least_thrust", "most_thrust"), "no controller"),
         (not p["driving_piston"] and not p["driven_piston"], ("oil_density",), "no piston"),
-        (
-            not p["shaft_lengths"],
-            ("shaft_modulus", "shaft_factor", "bearing_stiffness", "seat_positions", "bearing_positions"),
-            "no shaft_lengths",
+        *(
+            (not p[f"{prefix}shaft_lengths"], shaft_keys(prefix)[1:], f"no {prefix}shaft_lengths")
+            for prefix in ("", OWN)
         ),
     )
     return {key: setting for holds, keys, setting in cases if holds for key in keys}

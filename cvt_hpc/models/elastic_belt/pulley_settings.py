@@ -143,36 +143,57 @@ PULLEYS: dict[str, Parameter] = {
     ),
 }  # fmt: skip
 
-SHAFT: dict[str, Parameter] = {
-    "shaft_lengths": Parameter(
-        (),
-        "m",
-        "lengths of a shaft's sections, of both pulleys; none: tilt_stiffness includes its bending",
-        minimum=0.0,
-        exclusive=True,
-        sensible=LENGTHS,
-    ),
-    "shaft_diameters": Parameter(
-        (), "m", "diameters of these sections", minimum=0.0, exclusive=True, sensible=LENGTHS
-    ),
-    "shaft_modulus": positive(2.1e11, "Pa", "Young's modulus of the shafts", sensible=(1e9, 1e13)),
-    "shaft_factor": replace(
-        positive(1.0, "", "factor on the stiffness of shaft and bearings; inf: rigid"), allow_infinite=True
-    ),
-    "seat_positions": Parameter(
-        (), "m", "where the fixed and the movable sheave sit along the shaft", minimum=0.0, sensible=LENGTHS
-    ),
-    "bearing_positions": Parameter(
-        (), "m", "where the two bearings sit along the shaft", minimum=0.0, sensible=LENGTHS
-    ),
-    "bearing_stiffness": replace(
-        positive(2e8, "N/m", "radial stiffness of a bearing", sensible=(1e5, 1e12)), allow_infinite=True
-    ),
-}  # fmt: skip
+OWN = "driven_"  # before the keys of a shaft that the driven pulley has of its own
+
+
+def _shaft(prefix: str, of: str, none: str) -> dict[str, Parameter]:
+    keys = {
+        "shaft_lengths": Parameter(
+            (),
+            "m",
+            f"lengths of a shaft's sections, {of}; none: {none}",
+            minimum=0.0,
+            exclusive=True,
+            sensible=LENGTHS,
+        ),
+        "shaft_diameters": Parameter(
+            (), "m", "diameters of these sections", minimum=0.0, exclusive=True, sensible=LENGTHS
+        ),
+        "shaft_modulus": positive(2.1e11, "Pa", "Young's modulus of that shaft", sensible=(1e9, 1e13)),
+        "shaft_factor": replace(
+            positive(1.0, "", "factor on the stiffness of that shaft and its bearings; inf: rigid"),
+            allow_infinite=True,
+        ),
+        "seat_positions": Parameter(
+            (),
+            "m",
+            "where the fixed and the movable sheave sit along that shaft",
+            minimum=0.0,
+            sensible=LENGTHS,
+        ),
+        "bearing_positions": Parameter(
+            (), "m", "where the two bearings sit along that shaft", minimum=0.0, sensible=LENGTHS
+        ),
+        "bearing_stiffness": replace(
+            positive(2e8, "N/m", "radial stiffness of such a bearing", sensible=(1e5, 1e12)),
+            allow_infinite=True,
+        ),
+    }
+    return {f"{prefix}{key}": parameter for key, parameter in keys.items()}
+
+
+SHAFT = _shaft("", "of each pulley that has none of its own", "tilt_stiffness includes its bending")
+DRIVEN_SHAFT = _shaft(OWN, "of the driven pulley alone", "it is as that of the driving one")
+
+
+def shaft_keys(prefix: str) -> tuple[str, ...]:
+    """Keys of a shaft, its sections' lengths first; of both pulleys, or of the driven one (OWN)."""
+    return tuple(DRIVEN_SHAFT if prefix else SHAFT)
+
 
 PULLEY_DEFAULTS = {
     key: parameter.default
-    for table in (PULLEYS, SHAFT)
+    for table in (PULLEYS, SHAFT, DRIVEN_SHAFT)
     for key, parameter in table.items()
     if parameter.gives is None
 }
@@ -198,15 +219,25 @@ def are_free(parameters: Mapping[str, Any]) -> bool:
     )
 
 
-def shaft_deflection(parameters: Mapping[str, Any], radius: float) -> tuple[float, float]:
-    """What a shaft adds to the groove at a radius [m]: compliance [m/N], free opening by its bearings [m]."""
+def shaft_deflection(parameters: Mapping[str, Any], pulley: str, radius: float) -> tuple[float, float]:
+    """What the shaft of a pulley adds to its groove: compliance [m/N], free opening by its bearings [m].
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat values of the run [SI].
+    pulley : str
+        driving or driven.
+    radius : float
+        Its pitch radius [m].
+    """
     p = PULLEY_DEFAULTS | dict(parameters)
-    if not p["shaft_lengths"]:
+    prefix = OWN if pulley == "driven" and p[f"{OWN}shaft_lengths"] else ""
+    lengths, diameters, modulus, factor, places, held, stiffness = (p[key] for key in shaft_keys(prefix))
+    if not lengths:
         return 0.0, 0.0
-    seats, angle = Seats(*p["seat_positions"]), p["half_wedge_angle"]
-    bearings = [Bearing(position, p["bearing_stiffness"]) for position in p["bearing_positions"]]
-    flexibility = beam_flexibility(
-        p["shaft_lengths"], p["shaft_diameters"], p["shaft_modulus"], bearings, seats
-    )
-    opening = free_opening(p["bearing_clearance"], p["bearing_positions"], seats, angle)
-    return shaft_compliance(flexibility, seats, radius, angle) / p["shaft_factor"], opening
+    seats, angle = Seats(*places), p["half_wedge_angle"]
+    bearings = [Bearing(position, stiffness) for position in held]
+    flexibility = beam_flexibility(lengths, diameters, modulus, bearings, seats)
+    opening = free_opening(p["bearing_clearance"], held, seats, angle)
+    return shaft_compliance(flexibility, seats, radius, angle) / factor, opening

@@ -40,6 +40,7 @@ from cvt_hpc.models.elastic_belt.pulley_settings import (
 )
 from cvt_hpc.physics import capacity
 from cvt_hpc.physics.sheaves import Sheaves
+from cvt_hpc.variator import PULLEYS
 
 # Constants of the laws, in SI units: mobilities are 1 / J, or 1 / (T_1 k) of the driving sheave, 0 where the
 # speed or the position is given; `tilt_rate` is 1 / T_1, 0 without a lag; `..._tilt` is kappa [m/N], and
@@ -138,7 +139,7 @@ def with_pulleys(
         Their pitch radii [m].
     """
     p = PULLEY_DEFAULTS | dict(parameters)
-    shafts = [shaft_deflection(p, radius) for radius in radii]
+    shafts = [shaft_deflection(p, pulley, radius) for pulley, radius in zip(PULLEYS, radii, strict=True)]
     bent = [
         wrap._replace(tilt_compliance=wrap.tilt_compliance + compliance)
         for wrap, (compliance, _) in zip(wraps, shafts, strict=True)
@@ -178,6 +179,19 @@ def with_pulleys(
     if lag:
         bent = [wrap._replace(tilt_compliance=0.0) for wrap in bent]
     return bent, Pulleys(laws, are_free(p))
+
+
+def moving_states(pulleys: Pulleys) -> np.ndarray:
+    """Places in STATES of those that anything moves: of the others a law has no rate, and they stay at 0."""
+    laws = pulleys.laws[0]
+    by = {
+        EXCESS: laws[DRIVING_MOBILITY],
+        SHIFT: laws[DRIVING_AXIAL_MOBILITY],
+        RATIO_SUM: laws[RATIO_RATE],
+        CLAMPING_SUM: laws[CLAMPING_RATE],
+        **dict.fromkeys(range(DRIVING_COS, DRIVEN_SIN + 1), laws[TILT_RATE]),
+    }
+    return np.array([state for state in range(len(STATES)) if by[state] > 0.0], dtype=int)
 
 
 def settled_tilt(pulleys: Pulleys, first: int, tilting: np.ndarray) -> np.ndarray:

@@ -66,6 +66,14 @@ VARIABLES = (
     *shared("spectrum", "mean_ring_tension", "mean_push_force", "axial_force", "slip"),
     *AGAINST_SLIP,
     Variable(
+        "slip_load",
+        (),
+        "f8",
+        "N m",
+        "load from which on a pulley of a run that slips through slips grossly for good",
+        words="load at gross slip",
+    ),
+    Variable(
         "piston_force",
         ("pulley",),
         "f8",
@@ -141,7 +149,8 @@ def judge(run: RecordedRun) -> dict[str, Any]:
     if run.failure is not None:
         samples = slide(run)
         shares = [run.channel(f"open_share {pulley}")[samples].mean() for pulley in PULLEYS]
-        return judging.slipped(run) | {"open_share": np.array(shares)}
+        load = run.channel("load")[samples.start]
+        return judging.slipped(run) | {"open_share": np.array(shares), "slip_load": load}
     found = assess(run)
     return found.record() | evaluate(run, found.strongest_probe)
 

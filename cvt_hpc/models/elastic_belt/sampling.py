@@ -41,7 +41,7 @@ from cvt_hpc.models.elastic_belt.pulley_step import opening_by_tilt
 from cvt_hpc.models.elastic_belt.pulleys import EXCESS, SHIFT
 from cvt_hpc.physics.compliance import SOLVES, UNSOLVED
 from cvt_hpc.physics.flank import tangential_sliding
-from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED
+from cvt_hpc.variator import LARGEST_DISPLACEMENT, LEAST_SPEED, MOST_SPEED
 
 SCALARS = (
     "load",
@@ -76,7 +76,6 @@ STEP_RIPPLE = CHANNELS.index("step_ripple")
 PROFILES = (*MOMENTS, "contact_force", "mean_displacement")
 CONTACT_FORCE, MEAN_DISPLACEMENT = range(len(MOMENTS), len(PROFILES))
 
-LARGEST_DISPLACEMENT = 10e-3  # [m]: the belt has left its grooves
 LARGEST_STRAIN = 0.05  # of the rings, which break at 1 %
 LARGEST_ELEMENT_STRAIN = 0.2  # gaps of a fifth: all the play in a few cells
 

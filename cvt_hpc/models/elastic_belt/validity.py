@@ -6,12 +6,12 @@ from typing import Any
 
 from cvt_hpc.models.elastic_belt.belt import Mesh
 from cvt_hpc.models.elastic_belt.sampling import (
-    LARGEST_DISPLACEMENT,
     LARGEST_ELEMENT_STRAIN,
     LARGEST_STRAIN,
     Outcome,
 )
 from cvt_hpc.variables import Status
+from cvt_hpc.variator import LARGEST_DISPLACEMENT
 from cvt_hpc.variator.slip import GAINED, LOST
 
 # What the power balance may leave open, of the power that flows, with cells of REFERENCE_CELL. Sound runs of

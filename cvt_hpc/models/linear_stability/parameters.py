@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from cvt_hpc.models import steady_variator
+from cvt_hpc.models.steady_variator.parameters import OF_LAGS
 from cvt_hpc.parameters import Parameter, not_negative, positive
 
 LEAST_MEMORY = 1e-4  # [s]: what has been held against transients, see README.md
@@ -29,6 +30,9 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     """Problems that lie between parameters: as of `steady_variator`, and a band that is none."""
     p = parameters
     problems = steady_variator.check(p)
+    for key in ("collar_clearance", "bearing_clearance"):
+        if p[key] > 0.0 and p["tilt_lag"] == 0.0:
+            problems.append((key, "0, or a tilt_lag, by which a motion goes on", f"{p[key]:g}"))
     if p["band_low"] >= p["band_high"]:
         expected = f"above band_low = {p['band_low']:g} Hz"
         problems.append(("band_high", expected, f"{p['band_high']:g} Hz"))
@@ -42,4 +46,4 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
 
 def inert(parameters: dict[str, Any]) -> dict[str, str]:
     """Parameters without effect: see `elastic_belt.inert`."""
-    return steady_variator.inert(parameters)
+    return {key: setting for key, setting in steady_variator.inert(parameters).items() if key not in OF_LAGS}

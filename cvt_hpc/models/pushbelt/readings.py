@@ -10,6 +10,7 @@ import numpy as np
 from cvt_hpc.models.pushbelt import belt as f
 from cvt_hpc.models.pushbelt.belt import Belt
 from cvt_hpc.physics.geometry import variator
+from cvt_hpc.variator.history import ALONG, of_means
 from cvt_hpc.variator.path import along
 
 SCALARS = (
@@ -32,8 +33,8 @@ SCALARS = (
     "passing_frequency",
 )
 PROFILES = {
-    "push_force": ("push force", "N", "mean, between elements"),
-    "ring_tension": ("ring tension", "N", "mean"),
+    "push_force": of_means(ALONG["push_force"]),
+    "ring_tension": of_means(ALONG["ring_tension"]),
     "contact_force": ("contact force", "N m-1", "mean normal line force of one flank"),
     "radial_friction": (
         "friction along the meridian",
@@ -51,7 +52,7 @@ PROFILES = {
     "nose_force": ("force of noses", "N", "mean size, of the next element's hole on a nose"),
     "gap": ("gap", "m", "mean, between neighbours at the rocking edge"),
     "tilt": ("tilt of elements", "rad", "mean, against the rings"),
-    "mean_displacement": ("mean displacement", "m", "off the reference path, outward"),
+    "mean_displacement": ALONG["mean_displacement"],
 }
 PLACES = 220  # along the path, at which profiles are recorded: 3 mm of a common belt
 

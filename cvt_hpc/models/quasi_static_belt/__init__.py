@@ -9,7 +9,7 @@ from cvt_hpc.models.elastic_belt import check, inert
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers import taken
 
-PARAMETERS = {table: keys for table, keys in elastic_belt.PARAMETERS.items() if table != "pulleys"} | {
+PARAMETERS = elastic_belt.PARAMETERS | {
     "limit": {
         "limit_frequency": Parameter(
             1000.0,

@@ -21,7 +21,13 @@ from cvt_hpc.models.elastic_belt.belt import (
 from cvt_hpc.models.elastic_belt.imex_stations import implicit_shares
 from cvt_hpc.models.elastic_belt.imex_system import CENTRED, element_stress
 from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH
-from cvt_hpc.models.elastic_belt.rhs import damped_push, damping_at, ring_drag, speed_share_at
+from cvt_hpc.models.elastic_belt.rhs import (
+    damped_push,
+    damping_at,
+    driving_speed_at,
+    ring_drag,
+    speed_share_at,
+)
 from cvt_hpc.models.quasi_static_belt.split_belt import (
     ACROSS,
     ALONG,
@@ -76,7 +82,7 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
     per_cosine, per_width = 1.0 / cosine, 1.0 / belt.friction_speed
     damping = damping_at(belt, state.scalars[TIME])
     speed_share = speed_share_at(belt, state.scalars[TIME])
-    driving_speed = speed_share * belt.driving_speed
+    driving_speed = driving_speed_at(belt, state)
     blocks, links = work.layers.diagonal, work.layers.links
     for j in range(n):
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0

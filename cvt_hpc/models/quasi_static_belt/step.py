@@ -22,6 +22,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
+    FIRST_STATE,
     LAYER_WORK,
     N_ELEMENT,
     TIME,
@@ -31,7 +32,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     U,
     W,
 )
-from cvt_hpc.models.elastic_belt.one_system import driven_thrust
+from cvt_hpc.models.elastic_belt.one_system import driven_thrust, free_rates, pulled_by
 from cvt_hpc.models.elastic_belt.rhs import (
     accelerations,
     load_at,
@@ -110,12 +111,15 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
         model.dynamic,
     )
     scalars, count, shapes = state.scalars, model.shapes.shape[1], model.shapes
-    moment = 0.0
+    moment = taken = 0.0
     for j in range(n):
         du, dv0 = work.rate[U, j], columns[2 * j, 0]
-        if belt.arc_share[j] > 0.0 and j >= belt.driven_start:
+        if belt.arc_share[j] > 0.0:
             slopes = stations[TANGENTIAL_SLOPE, j] * dv0 + stations[CROSS_SLOPE, j] * du
-            moment += work.moments[j] + slopes * (belt.driven_radius + fields[W, j])
+            if j >= belt.driven_start:
+                moment += work.moments[j] + slopes * (belt.driven_radius + fields[W, j])
+            else:
+                taken += work.moments[j] - slopes * (belt.driving_radius + fields[W, j])
     for k in range(size):
         moved.p[k] += work.found[k]
     work_done = 0.0
@@ -175,10 +179,18 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
         fields[W, j] = work.rate[W, j]
     if model.steady_flow:
         work_done += _settle(model, moved, work)
-    thrust = driven_thrust(belt, moved.force) - belt.thrust
-    load = belt.ratio * load_at(belt, scalars[TIME])
-    scalars[DRIVEN_SPEED] += step * (moment - load) / belt.driven_inertia
-    scalars[DRIVEN_POSITION] += step * thrust / belt.axial_damping
+    if belt.pulleys.are_free:
+        pull = pulled_by(belt, moved.force, work.moments)
+        pull[0], pull[1] = taken, moment
+        found = free_rates(belt, state, pull)
+        scalars[DRIVEN_SPEED] += step * found[0]
+        scalars[DRIVEN_POSITION] += step * found[1]
+        scalars[FIRST_STATE:] += step * found[2:]
+    else:
+        thrust = driven_thrust(belt, moved.force) - belt.thrust
+        load = belt.ratio * load_at(belt, scalars[TIME])
+        scalars[DRIVEN_SPEED] += step * (moment - load) / belt.driven_inertia
+        scalars[DRIVEN_POSITION] += step * thrust / belt.axial_damping
     scalars[LAYER_WORK] += step * work_done
     scalars[TIME] += step
 

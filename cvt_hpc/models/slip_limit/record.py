@@ -9,6 +9,7 @@ import numpy as np
 
 from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+from cvt_hpc.variator import GROSS_SLIP
 from cvt_hpc.variator.variables import COORDINATES, shared
 
 if TYPE_CHECKING:
@@ -85,16 +86,18 @@ def _by_formula(p: Mapping[str, Any]) -> dict[str, Any]:
 def _by_states(p: Mapping[str, Any]) -> dict[str, Any]:
     from cvt_hpc.models.elastic_belt.belt import mesh
     from cvt_hpc.models.steady_variator.forces import quantities
-    from cvt_hpc.models.steady_variator.walking import SteadyBelt
+    from cvt_hpc.models.steady_variator.walking import NoSteadyState
 
     if p["sought"] == "thrust":
         limit = _at_least_thrust(p)
-        at_work = {**p, "thrust": p["safety"] * limit.belt.thrust}
-        working = SteadyBelt(at_work).at(p["load"])
+        first, belt = _first({**p, "thrust": p["safety"] * limit.belt.thrust})
+        working = belt.at(p["load"], first)
     else:
         limit, first, belt = _largest(p)
         working = belt.at(limit.load / p["safety"], first)
     found, there = quantities(working, mesh(p)), quantities(limit, mesh(p))
+    if (slip := np.abs(found["slip"]).max()) > GROSS_SLIP:
+        raise NoSteadyState(f"no working point found: at {working.load:.4g} N m a pulley slips by {slip:.3g}")
     by_formula = carried_torque({**p, "thrust": limit.belt.thrust})
     return {
         "limit_torque": limit.load,
@@ -108,11 +111,19 @@ def _by_states(p: Mapping[str, Any]) -> dict[str, Any]:
 
 def _largest(p: Mapping[str, Any]) -> tuple[Steady, Steady, SteadyBelt]:
     """State at the largest load that the thrust carries, the one where the walk began, and their belt."""
+    first, belt = _first(p)
+    return belt.carried(first), first, belt
+
+
+def _first(p: Mapping[str, Any]) -> tuple[Steady, SteadyBelt]:
+    """State where walks begin, under a load that is carried by far, and its belt.
+
+    Near the largest torque there are other states under the same load, up to a driven pulley that stands.
+    """
     from cvt_hpc.models.steady_variator.walking import SteadyBelt
 
     belt = SteadyBelt(p)
-    first = belt.at(np.copysign(FIRST_SHARE, p["load"]) * carried_torque(p))
-    return belt.carried(first), first, belt
+    return belt.at(np.copysign(FIRST_SHARE, p["load"]) * carried_torque(p)), belt
 
 
 def _at_least_thrust(p: Mapping[str, Any]) -> Steady:

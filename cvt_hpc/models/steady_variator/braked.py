@@ -18,15 +18,13 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.sparse import csc_array
 
-from cvt_hpc.models.steady_variator.equations import Equations
+from cvt_hpc.models.steady_variator.equations import MOMENT, SPEED, Equations
 from cvt_hpc.models.steady_variator.newton import newton
 
 # steps of the driven speed, over itself; the longest is 1/20 of the slip that counts as gross
 FIRST, LONGEST, SHORTEST = 1e-4, 2.5e-3, 3e-6
 LEAPS = (3e-4, 1e-3, 3e-3)  # beyond a place where shorter steps do not help
 TRIES = 25  # Newton's steps: ten to fifteen where several cells open at once
-SPEED = -2  # place of the driven speed among the unknowns
-MOMENT = -4  # place of the driven pulley's balance of moments in the residual
 
 
 class Braked:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import belt_constants
 from cvt_hpc.models.steady_variator.equations import Equations
-from cvt_hpc.models.steady_variator.newton import newton
+from cvt_hpc.models.steady_variator.newton import Solvable, newton
 from cvt_hpc.physics.friction import softened
 
 BRIDGING = 10.0  # [N]: dampers push by 100 N or so, which a gap's strain times this does not reach
@@ -114,6 +114,7 @@ class Continuation:
         step: float,
         name: str,
         tolerance: float = ON_THE_WAY,
+        equations: Solvable | None = None,
     ) -> np.ndarray:
         """Solution at the end of a path, from that at its beginning.
 
@@ -131,17 +132,19 @@ class Continuation:
             Of the path, for the error.
         tolerance : float
             Of each solution.
+        equations : Solvable, optional
+            Those that are changed; by default the belt's.
 
         Raises
         ------
         PathEnds
             Where steps of SHORTEST do not come through.
         """
-        share = 0.0
+        solved, share = equations or self.equations, 0.0
         while share < 1.0:
             tried = min(1.0, share + step)
             change(tried)
-            found = newton(self.equations, x, tolerance)
+            found = newton(solved, x, tolerance)
             if found is not None:
                 x, share, step = found, tried, 2.0 * step
             else:

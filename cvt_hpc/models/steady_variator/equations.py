@@ -9,6 +9,8 @@ speeds and contents follow:
 
 As many equations: the rates of u, v_0, v_1 and v_f and of the driven pulley, each by `flat.rates`, so that
 the transient belt is at rest in what is found here; and the content of each layer, which no rate knows.
+Pulleys that are free bring those of their states (`pulleys.STATES`) that anything moves, and their rates;
+where the driven pulley keeps its speed, that is the equation in the place of its balance of moments.
 
 Two complementarity problems are in them. The contact is solved exactly in every evaluation. Elements push or
 are apart, P = max(-EA_0 eps_0 - D v_0,s, 0): that corner is left to Newton's iteration. The damper D acts up
@@ -28,6 +30,7 @@ from scipy.sparse import csc_array, csr_array, vstack
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
+    FIRST_STATE,
     N_ELEMENT,
     V_ELEMENT,
     V_FILTERED,
@@ -36,7 +39,8 @@ from cvt_hpc.models.elastic_belt.belt import (
     W,
     initial_state,
 )
-from cvt_hpc.models.elastic_belt.one_system import ROWS, flat_belt, rates, unpack
+from cvt_hpc.models.elastic_belt.one_system import ROWS, SIZES_OF_STATES, flat_belt, rates, unpack
+from cvt_hpc.models.elastic_belt.pulleys import moving_states
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.steady_variator.linearised import Linearisation
 
@@ -45,6 +49,8 @@ TYPICAL_SPEED = 100.0  # [rad/s]: of the driving pulley, from which on the sizes
 # what counts alike in each unknown: w, eps_0, eps_1, v_f; Q_0, Q_1, driven speed, position
 SIZES = (1e-4, 1e-3, 1e-4, 0.1)
 SIZES_OF_SCALARS = (0.1, 0.1, 1.0, 1e-4)
+SPEED = -2  # place of the driven speed among the unknowns
+MOMENT = -4  # place of the driven pulley's balance of moments in the residual
 
 
 class Equations:
@@ -72,12 +78,23 @@ class Equations:
         first = initial_state(parameters, belt)
         self._contents = first.fields[N_ELEMENT : N_ELEMENT + 2] @ belt.cell
         n, self._memories = belt.cell.size, self._flat.remembering.size
+        self._moving = moving_states(belt.pulleys)
+        # the filtered speeds end here, then come the pulleys' states and four scalars
+        self._filtered = slice(3 * n, 3 * n + self._memories)
+        self._states = slice(self._filtered.stop, self._filtered.stop + self._moving.size)
         counts = (n, n, n, self._memories)
-        self.sizes = np.concatenate([np.repeat(SIZES, counts), SIZES_OF_SCALARS])
-        self.sizes[3 * n : -1] *= min(belt.driving_speed / TYPICAL_SPEED, 1.0)
-        # of the rates: those of u, v_element and v_ring, of the filtered speeds and of the pulley
-        self._rates = np.r_[n : 4 * n, len(ROWS) * n : self._flat.origin.size]
-        self._out = np.empty(self._flat.origin.size)
+        of_states = np.array(SIZES_OF_STATES)[self._moving]
+        self.sizes = np.concatenate([np.repeat(SIZES, counts), of_states, SIZES_OF_SCALARS])
+        slow = min(belt.driving_speed / TYPICAL_SPEED, 1.0)
+        self.sizes[self._filtered] *= slow
+        self.sizes[-4:-1] *= slow
+        # of the rates: those of u, v_element and v_ring, of the filtered speeds and of the pulleys
+        self._loose = len(ROWS) * n + self._memories + self._moving
+        last = self._flat.origin.size
+        filtered = np.arange(len(ROWS) * n, len(ROWS) * n + self._memories)
+        self._rates = np.concatenate([np.arange(n, 4 * n), filtered, self._loose, [last - 2, last - 1]])
+        self._held_speed = first.scalars[DRIVEN_SPEED] if np.isinf(belt.driven_inertia) else None
+        self._out = np.empty(last)
 
     def under(self, **changes: Any) -> None:
         """Go on with other constants of the belt, of the same mesh and sheaves: load, friction."""
@@ -91,8 +108,9 @@ class Equations:
         strains(self.belt, state.fields, eps)
         fluxes = (state.fields[V_ELEMENT : V_ELEMENT + 2] / (1.0 + np.roll(eps, 1, axis=1))).mean(axis=1)
         filtered = state.fields[V_FILTERED, self._flat.remembering]
+        states = state.scalars[FIRST_STATE + self._moving]
         pulley = state.scalars[[DRIVEN_SPEED, DRIVEN_POSITION]]
-        return np.concatenate([state.fields[W], *eps, filtered, fluxes, pulley])
+        return np.concatenate([state.fields[W], *eps, filtered, states, fluxes, pulley])
 
     def state(self, x: np.ndarray) -> State:
         """State of the belt; a copy, its time after any start-up."""
@@ -105,10 +123,14 @@ class Equations:
         Rates are in [m/s^2], [rad/s^2] and [m/s], contents in [m].
         """
         y = self._flat_unknowns(x)
-        if not rates(self._flat, 0.0, y, self._out):
+        flat = self._flat
+        if not rates(flat, 0.0, y, self._out):
             return None
-        contents = self._flat.state.fields[N_ELEMENT : N_ELEMENT + 2] @ self.belt.cell
-        return np.concatenate([self._out[self._rates], contents - self._contents])
+        contents = flat.state.fields[N_ELEMENT : N_ELEMENT + 2] @ self.belt.cell
+        left = np.concatenate([self._out[self._rates], contents - self._contents])
+        if self._held_speed is not None:
+            left[MOMENT] = x[SPEED] - self._held_speed
+        return left
 
     def jacobian(self, x: np.ndarray) -> csc_array:
         """Slopes of the residual, (n, n), about the unknowns of its last call."""
@@ -116,7 +138,11 @@ class Equations:
         chain = self._chain(x)
         n = self.belt.cell.size
         contents = csr_array(np.kron(np.eye(2), self.belt.cell)) @ chain[4 * n : 6 * n]
-        return vstack([slopes.tocsr()[self._rates] @ chain, contents], format="csc")
+        of_rates = slopes.tocsr()[self._rates] @ chain
+        if self._held_speed is not None:
+            held = csr_array(([1.0], ([0], [x.size + SPEED])), shape=(1, x.size))
+            of_rates = vstack([of_rates[: MOMENT + 2], held, of_rates[MOMENT + 3 :]])
+        return vstack([of_rates, contents], format="csc")
 
     def _lengths(self, w: np.ndarray) -> np.ndarray:
         """Lengths 1 + kappa (w + d_i) of both layers' cells, (2, N)."""
@@ -130,7 +156,9 @@ class Equations:
         w, *eps = x[: 3 * n].reshape(3, n)
         speeds = [flux * (1.0 + np.roll(strain, 1)) for flux, strain in zip(x[-4:-2], eps, strict=True)]
         contents = self._lengths(w) / (1.0 + np.array(eps))
-        y = np.concatenate([w, np.zeros(n), *speeds, *contents, x[3 * n : -4], x[-2:]])
+        states = np.zeros(self._flat.loose.size)
+        states[self._moving] = x[self._states]
+        y = np.concatenate([w, np.zeros(n), *speeds, *contents, x[self._filtered], states, x[-2:]])
         return y - self._flat.origin
 
     def _chain(self, x: np.ndarray) -> csr_array:
@@ -153,6 +181,8 @@ class Equations:
             ]
         rest = np.arange(memories)
         entries.append((np.ones(memories), len(ROWS) * n + rest, 3 * n + rest))
+        places = np.arange(self._states.start, self._states.stop)
+        entries.append((np.ones(places.size), self._loose, places))
         entries.append((np.ones(2), self._flat.origin.size - 2 + np.arange(2), count - 2 + np.arange(2)))
         values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
         return csr_array((values, (rows, columns)), shape=(self._flat.origin.size, count))

@@ -20,12 +20,14 @@ from cvt_hpc.models.elastic_belt.along_belt import (
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
+    FIRST_STATE,
     REGIONS,
     V_ELEMENT,
     V_RING,
     Mesh,
     W,
 )
+from cvt_hpc.models.elastic_belt.pulleys import EXCESS
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
 from cvt_hpc.models.steady_variator.sampled import sampled, sampled_profiles
 from cvt_hpc.models.steady_variator.walking import Steady
@@ -66,6 +68,11 @@ class Distributions(NamedTuple):
     displacement: np.ndarray
 
 
+def driving_speed(steady: Steady) -> float:
+    """Speed of the driving pulley [rad/s], which follows where a drive with inertia turns it."""
+    return float(steady.belt.driving_speed + steady.state.scalars[FIRST_STATE + EXCESS])
+
+
 def distributions(steady: Steady) -> Distributions:
     """Forces and speeds around the belt."""
     belt, fields = steady.belt, steady.state.fields
@@ -75,7 +82,7 @@ def distributions(steady: Steady) -> Distributions:
     strains(belt, fields, eps)
     driven = np.arange(n) >= belt.driven_start
     radius = np.where(driven, belt.driven_radius, belt.driving_radius) + fields[W]
-    turning = np.where(driven, steady.state.scalars[DRIVEN_SPEED], belt.driving_speed)
+    turning = np.where(driven, steady.state.scalars[DRIVEN_SPEED], driving_speed(steady))
     sliding = np.where(belt.arc_share > 0.0, fields[V_ELEMENT] - turning * radius, 0.0)
     return Distributions(
         belt.ring_stiffness * eps[1],
@@ -136,7 +143,7 @@ def quantities(steady: Steady, grid: Mesh) -> dict[str, Any]:
         **against_slip(steady.load, carried),
         "open_share": opened,
         "thrust_ratio": axial[0] / axial[1],
-        "speed_loss": 1.0 - belt.ratio * steady.state.scalars[DRIVEN_SPEED] / belt.driving_speed,
+        "speed_loss": 1.0 - belt.ratio * steady.state.scalars[DRIVEN_SPEED] / driving_speed(steady),
         "driven_position": steady.state.scalars[DRIVEN_POSITION],
         "flank_loss": flanks,
         "ring_loss": seen["ring_loss"],

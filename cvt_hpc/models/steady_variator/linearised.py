@@ -1,26 +1,39 @@
 """Jacobian of the belt's rates about a state: local slopes by difference quotients, the contact exactly.
 
 A rate knows its neighbours up to two stations away, but for two things: the axial forces, which the sheaves'
-deformation ties to every displacement of a wrap, and the driven pulley. So the forces count as unknowns of
+deformation ties to every displacement of a wrap, and the pulleys. So the forces count as unknowns of
 their own: stations five apart can then be moved together, and some ninety evaluations give all slopes. With
-the set of closed stations the forces follow from the gaps by a linear system, df = -C^-1 dg.
+the set of closed stations the forces follow from the gaps by a linear system, df = -C^-1 dg. Pulleys know the
+belt by eight numbers (`pulled_by`) alone, so their rows are the slopes with these times those of them.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, csr_array
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.models.elastic_belt.belt import DRIVEN_SPEED, FIELDS, V_FILTERED, W
+from cvt_hpc.models.elastic_belt.belt import (
+    DRIVEN_POSITION,
+    DRIVEN_SPEED,
+    FIELDS,
+    FIRST_STATE,
+    V_FILTERED,
+    W,
+)
 from cvt_hpc.models.elastic_belt.one_system import (
     ROWS,
+    SIZE_OF_POSITION,
     SIZE_OF_SPEED,
     SIZES,
+    SIZES_OF_STATES,
     FlatBelt,
+    free_rates,
+    pulled_by,
     rates_under_forces,
     set_inlets,
 )
+from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVING_COS, EXCESS, SHIFT
 from cvt_hpc.physics.compliance import CLOSED
 from cvt_hpc.physics.sheaves import flexibility
 
@@ -32,6 +45,7 @@ SIZE_OF_FORCE = 1e5  # [N/m]
 # 1e-10 of the steepest slopes.
 INCREMENT = 1e-6
 INCREMENTS = INCREMENT * np.array([*(SIZES[row] for row in range(len(FIELDS))), SIZE_OF_FORCE])
+SIZES_OF_PULL = np.array([100.0, 100.0, *[1e4] * 6])  # of `pulled_by` [N m], [N]
 
 
 @kernel
@@ -50,8 +64,8 @@ def local_slopes(flat: FlatBelt, increments: np.ndarray, near: np.ndarray, turni
     turning : (8, N) array
         Result: slopes of rates and moments with the driven pulley's speed.
     """
-    n, fields, scalars = flat.belt.cell.size, flat.state.fields, flat.state.scalars
-    origin, force, speed = fields.copy(), flat.force.copy(), scalars[DRIVEN_SPEED]
+    n, fields = flat.belt.cell.size, flat.state.fields
+    origin, force = fields.copy(), flat.force.copy()
     ahead, behind = np.zeros((8, n)), np.zeros((8, n))
     # around the ring in strides of five stations, but the first n % 5 of six
     longer = n % STRIDE * (STRIDE + 1)
@@ -71,11 +85,20 @@ def local_slopes(flat: FlatBelt, increments: np.ndarray, near: np.ndarray, turni
                     k = (j + d - REACH) % n
                     for o in range(8):
                         near[o, i, j, d] = (ahead[o, k] - behind[o, k]) / (2.0 * increments[i])
+    slopes_with_scalar(flat, DRIVEN_SPEED, SIZE_OF_SPEED, turning)
+
+
+@kernel
+def slopes_with_scalar(flat: FlatBelt, place: int, size: float, slopes: np.ndarray) -> None:
+    """Slopes of all rates and moments with one of the state's scalars, forces held, into `slopes` (8, N)."""
+    ahead, behind = np.zeros(slopes.shape), np.zeros(slopes.shape)
+    scalars = flat.state.scalars
+    unmoved = scalars[place]
     for sign, out in ((1.0, ahead), (-1.0, behind)):
-        scalars[DRIVEN_SPEED] = speed + sign * INCREMENT * SIZE_OF_SPEED
+        scalars[place] = unmoved + sign * INCREMENT * size
         _evaluate(flat, out)
-    turning[:] = (ahead - behind) / (2.0 * INCREMENT * SIZE_OF_SPEED)
-    scalars[DRIVEN_SPEED] = speed
+    slopes[:] = (ahead - behind) / (2.0 * INCREMENT * size)
+    scalars[place] = unmoved
     set_inlets(flat)
 
 
@@ -84,7 +107,30 @@ def _evaluate(flat: FlatBelt, out: np.ndarray) -> None:
     set_inlets(flat)
     rates_under_forces(flat)
     out[:MOMENT], out[MOMENT] = flat.rate, flat.moments
-    out[MOMENT, : flat.belt.driven_start] = 0.0
+    if flat.loose.size == 0:
+        out[MOMENT, : flat.belt.driven_start] = 0.0
+
+
+@kernel
+def pulley_slopes(flat: FlatBelt, pull: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Slopes of `free_rates`, (10, 18): with `pulled_by`, driven speed, driven position, and STATES.
+
+    `sizes` (18,) are those of what acts, from which increments follow.
+    """
+    scalars, found = flat.state.scalars, np.zeros((10, sizes.size))
+    for k in range(sizes.size):
+        increment = INCREMENT * sizes[k]
+        for sign in (1.0, -1.0):
+            moved = pull.copy()
+            place = DRIVEN_SPEED if k == 8 else DRIVEN_POSITION if k == 9 else FIRST_STATE + k - 10
+            unmoved = scalars[place]
+            if k < 8:
+                moved[k] += sign * increment
+            else:
+                scalars[place] = unmoved + sign * increment
+            found[:, k] += sign * free_rates(flat.belt, flat.state, moved) / (2.0 * increment)
+            scalars[place] = unmoved
+    return found
 
 
 class Linearisation:
@@ -110,7 +156,10 @@ class Linearisation:
         unknown = place.copy()
         unknown[FORCE, np.concatenate(self._arcs)] = self._count + np.arange(sum(map(len, self._arcs)))
         o, i, j, d = np.indices((8, 8, n, STRIDE))
+        self._loose = len(ROWS) * n + flat.remembering.size + np.arange(flat.loose.size)
         place[MOMENT] = self._count - 2
+        if flat.loose.size:  # what is taken from the driving pulley, and put into the driven one
+            place[MOMENT] = self._count + (np.arange(n) >= belt.driven_start)
         place[W] = -1
         rows, columns = place[o, (j + d - REACH) % n], unknown[i, j]
         self._known = (rows >= 0) & (columns >= 0)
@@ -124,6 +173,8 @@ class Linearisation:
         """Jacobian of `flat.rates`, (n, n), about the state of its last call."""
         belt, count, n = flat.belt, self._count, flat.belt.cell.size
         local_slopes(flat, INCREMENTS, self._near, self._turning)
+        if self._loose.size:
+            return self._of_free_pulleys(flat)
         self._near[MOMENT] /= belt.driven_inertia
         self._turning[MOMENT] /= belt.driven_inertia
         driven = self._arcs[1].size
@@ -144,11 +195,45 @@ class Linearisation:
         slopes = csc_array((values[there], (rows[there], columns[there])), shape=(count, count + forces))
         return slopes[:, :count] + slopes[:, count:] @ self._forces(flat)
 
+    def _of_free_pulleys(self, flat: FlatBelt) -> csc_array:
+        """Jacobian where pulleys have states of their own."""
+        belt, count, n = flat.belt, self._count, flat.belt.cell.size
+        excess = np.zeros((8, n))
+        slopes_with_scalar(flat, FIRST_STATE + EXCESS, SIZE_OF_SPEED, excess)
+        width, stations = count + sum(map(len, self._arcs)), np.arange(n)
+        entries = [
+            (self._near[self._known], self._rows, self._columns),
+            (np.ones(n), stations, n + stations),  # w' = u
+        ]
+        for slopes, column in ((self._turning, count - 2), (excess, self._loose[EXCESS])):
+            rows = self._turned_rows
+            entries.append((slopes[self._turned], rows, np.full(rows.size, column)))
+        values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
+        there = values != 0.0
+        local = csr_array((values[there], (rows[there], columns[there])), shape=(count + 2, width))
+        # what acts on the pulleys, by the unknowns and the forces
+        acting = np.zeros((18, width))
+        acting[:2] = local[count:].toarray()
+        first = count
+        for wrap, sheave in enumerate((belt.driving, belt.driven)):
+            own = slice(first, first + sheave.weight.size)
+            acting[2 + wrap, own] = sheave.weight
+            acting[4 + 2 * wrap : 6 + 2 * wrap, own] = sheave.weight * sheave.tilt
+            first = own.stop
+        own_rows = [count - 2, count - 1, *self._loose]
+        acting[8 + np.arange(10), own_rows] = 1.0
+        sizes = np.array([*SIZES_OF_PULL, SIZE_OF_SPEED, SIZE_OF_POSITION, *SIZES_OF_STATES])
+        found = pulley_slopes(flat, pulled_by(belt, flat.force, flat.moments), sizes) @ acting
+        place = csr_array((np.ones(10), (own_rows, np.arange(10))), shape=(count, 10))
+        slopes = (local[:count] + place @ csr_array(found)).tocsc()
+        return slopes[:, :count] + slopes[:, count:] @ self._forces(flat)
+
     def _forces(self, flat: FlatBelt) -> csc_array:
         """Slopes of the axial forces with the unknowns, with the closed stations of the last call."""
         entries, first = [], 0
         wedge = 2.0 * np.tan(flat.belt.half_wedge_angle)
-        for arc, matrix, contact in zip(self._arcs, self._flexibility, flat.contacts, strict=True):
+        wraps = zip(self._arcs, self._flexibility, flat.contacts, strict=True)
+        for wrap, (arc, matrix, contact) in enumerate(wraps):
             closed = np.flatnonzero(contact.stations[:, CLOSED])
             stiffness = np.linalg.inv(matrix[np.ix_(closed, closed)])
             rows, columns = np.meshgrid(first + closed, arc[closed], indexing="ij")
@@ -156,6 +241,21 @@ class Linearisation:
             if first > 0:
                 opening = np.full(closed.size, self._count - 1)
                 entries.append((-stiffness.sum(axis=1), first + closed, opening))
+            if self._loose.size:
+                entries += self._by_states(flat, wrap, closed, stiffness, first)
             first += arc.size
         values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
         return csc_array((values, (rows, columns)), shape=(first, self._count))
+
+    def _by_states(
+        self, flat: FlatBelt, wrap: int, closed: np.ndarray, stiffness: np.ndarray, first: int
+    ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Slopes of a wrap's forces with the states that open its groove: shift and tilts."""
+        sheave = flat.belt.driven if wrap else flat.belt.driving
+        tilted = self._loose[DRIVEN_COS if wrap else DRIVING_COS]
+        openings = [(np.ones(closed.size), self._loose[SHIFT])] if wrap == 0 else []
+        openings += [(sheave.tilt[k, closed], tilted + k) for k in range(2)]
+        return [
+            (-stiffness @ opening, first + closed, np.full(closed.size, column))
+            for opening, column in openings
+        ]

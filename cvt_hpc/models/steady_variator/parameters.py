@@ -6,6 +6,7 @@ from typing import Any
 
 from cvt_hpc.models import elastic_belt
 from cvt_hpc.models.elastic_belt.parameters import shape_problems
+from cvt_hpc.models.elastic_belt.pulley_checks import steady_pulley_problems
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.physics.friction_laws import friction_problems
 
@@ -19,20 +20,27 @@ OF_THE_COURSE = {
     "seed": 1,
 }
 
+# How soon pulleys come to rest, and where a controller begins: without effect on where they rest
+OF_LAGS = ("tilt_lag", "ratio_gain")
+
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     section: {key: parameter for key, parameter in table.items() if key not in OF_THE_COURSE}
     for section, table in elastic_belt.PARAMETERS.items()
-    # of a transient: a steady pulley is turned by a given speed, pressed by a given thrust
-    if section not in ("pulleys", "record")
+    if section != "record"  # of a transient
 }
 
 
 def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     """Problems that lie between parameters: as of `elastic_belt`."""
+    return belt_problems(parameters) or steady_pulley_problems(parameters)
+
+
+def belt_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems of the belt, whatever its load. Result as of `check`."""
     return shape_problems(parameters) + friction_problems(parameters)
 
 
 def inert(parameters: dict[str, Any]) -> dict[str, str]:
     """Parameters without effect: see `elastic_belt.inert`."""
-    found = elastic_belt.inert(parameters | OF_THE_COURSE)
+    found = elastic_belt.inert(parameters | OF_THE_COURSE) | dict.fromkeys(OF_LAGS, "a steady state")
     return {key: setting for key, setting in found.items() if key not in OF_THE_COURSE}

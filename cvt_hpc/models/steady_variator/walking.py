@@ -11,12 +11,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.belt import Belt, State
-from cvt_hpc.models.steady_variator.braked import SPEED, Braked
+from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants
+from cvt_hpc.models.steady_variator.braked import Braked
 from cvt_hpc.models.steady_variator.continuation import AT_HOME, Continuation, NoSteadyState, PathEnds
+from cvt_hpc.models.steady_variator.equations import SPEED, Equations
 from cvt_hpc.models.steady_variator.first_states import FirstStates, SlipsThrough
 from cvt_hpc.models.steady_variator.newton import newton
 from cvt_hpc.models.steady_variator.parameters import OF_THE_COURSE
+from cvt_hpc.models.steady_variator.released import Released, freed, held, nearest
 from cvt_hpc.models.steady_variator.sampled import largest_slip
 from cvt_hpc.variator import GROSS_SLIP
 
@@ -58,7 +60,10 @@ class SteadyBelt:
     """
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
-        p = {**parameters, **OF_THE_COURSE, "load": 0.0}
+        given = {**parameters, **OF_THE_COURSE, "load": 0.0}
+        free = freed(given)
+        self._free = None if free is None else Equations(free, belt_constants(free))
+        p = given if free is None else held(given)
         self._course = Continuation(p)
         self._equations = self._course.equations
         self._first = FirstStates(p, self._course)
@@ -81,6 +86,8 @@ class SteadyBelt:
         NoSteadyState
             Where no walk comes through.
         """
+        if self._free is not None:
+            return self._released(self._free, load, near)
         if near is not None:
             try:
                 return self._found(self._rise(near.unknowns, near.load, load), load)
@@ -88,10 +95,43 @@ class SteadyBelt:
                 pass
         return self._found(self._first.under(load, self._rise), load)
 
+    def _released(self, free: Equations, load: float, near: Steady | None) -> Steady:
+        """State of free pulleys: from one nearby, or else from that of the belt between held ones."""
+        if near is not None:
+
+            def loaded(share: float) -> None:
+                changed = near.load + share * (load - near.load)
+                free.under(load=changed, load_start=changed)
+
+            try:
+                x = self._course.follow(loaded, near.unknowns, 1.0, "load", AT_HOME, free)
+                return self._state_of(free, x, load)
+            except NoSteadyState:
+                pass
+        start = self._found(self._first.under(load, self._rise), load)
+        free.under(load=load, load_start=load)
+        x = free.unknowns(nearest(start.belt, free.belt, start.state))
+        way = Released(free, x)
+
+        def release(share: float) -> None:
+            way.share = share
+
+        x = self._course.follow(release, x, 1.0, f"pulleys let go at {load:g} N m", AT_HOME, way)
+        return self._state_of(free, x, load)
+
+    @staticmethod
+    def _state_of(equations: Equations, x: np.ndarray, load: float) -> Steady:
+        equations.under(load=load, load_start=load)
+        belt = equations.belt._replace(bridging_stiffness=np.inf)
+        return Steady(load, belt, equations.state(x), x)
+
     def known(self, load: float, unknowns: np.ndarray) -> Steady:
         """State under a load, by unknowns that were found before; ValueError if they are not of this belt."""
-        if unknowns.shape != self._equations.sizes.shape:
-            raise ValueError(f"{unknowns.shape} unknowns of a belt that has {self._equations.sizes.shape}")
+        equations = self._equations if self._free is None else self._free
+        if unknowns.shape != equations.sizes.shape:
+            raise ValueError(f"{unknowns.shape} unknowns of a belt that has {equations.sizes.shape}")
+        if self._free is not None:
+            return self._state_of(self._free, unknowns, load)
         self._course.own()
         self._course.load(load)
         return self._found(unknowns, load)
@@ -153,9 +193,7 @@ class SteadyBelt:
         return below if found is None else self._found(*found)
 
     def _found(self, x: np.ndarray, load: float) -> Steady:
-        self._course.load(load)
-        belt = self._equations.belt._replace(bridging_stiffness=np.inf)
-        return Steady(load, belt, self._equations.state(x), x)
+        return self._state_of(self._equations, x, load)
 
     def _rise(self, x: np.ndarray, start: float, load: float) -> np.ndarray:
         """Unknowns under more load; near what friction carries along the curve of states."""

@@ -1,0 +1,196 @@
+"""Maps of quantities over a study's grid, such as efficiency and thrust over ratio and torque ratio."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+from pathlib import Path
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from numpy.typing import NDArray
+
+from cvt_hpc.analysis import cells
+from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, value_text
+from cvt_hpc.analysis.classes import OccurrenceClass, check_results, count_classes, occurrence_classes
+from cvt_hpc.analysis.curves import check_quantities
+from cvt_hpc.analysis.figures import WIDTH, axis_label, display_unit, draw, in_words, styled
+from cvt_hpc.analysis.maps import ONE_ROW
+from cvt_hpc.analysis.scatter import is_sampled
+from cvt_hpc.errors import mismatch, one_line
+
+COLOURS = cells.colours_of("viridis_r", 0.05, 0.85)
+MOST_PANELS = 8
+ROW, FRAME = 0.25, 0.9  # [inch], of a row of cells, and of title and labels
+HIGHEST = 3.6  # [inch], of a panel's cells
+HATCH = cells.STYLES[OccurrenceClass.SLIPPING].hatch
+EQUAL = 1e-6  # of a quantity: what differs less is the same
+NARROWEST, LOWEST = 24.0, 11.0  # [point]: cells into which numbers are written
+OTHERS = (
+    OccurrenceClass.SLIPPING,
+    OccurrenceClass.FAILED,
+    OccurrenceClass.NOT_RUN,
+)  # which runs are marked
+
+
+def draw_value_map(
+    dataset: xr.Dataset,
+    quantities: Sequence[str],
+    out: Path,
+    at: Mapping[str, Any] | None = None,
+    source: str = "results",
+) -> Path:
+    """Write the figure of `value_map_figure`."""
+    return draw(lambda: value_map_figure(dataset, quantities, at, source), out)
+
+
+@styled
+def value_map_figure(
+    dataset: xr.Dataset,
+    quantities: Sequence[str],
+    at: Mapping[str, Any] | None = None,
+    source: str = "results",
+) -> Figure:
+    """Draw quantities over two axes of a study, a panel for each, and for each label of further dimensions.
+
+    Parameters
+    ----------
+    dataset, at, source
+        As of all pictures of results (`figures.py`). x and y are those of `map_figure`; the axis of
+        its panels is fixed at its first value.
+    quantities : sequence of str
+        Numeric variables of the results.
+
+    Raises
+    ------
+    InputError
+        As of all pictures; there is no such quantity, or there would be more than MOST_PANELS panels.
+    """
+    check_results(dataset, source)
+    if is_sampled(dataset):
+        raise mismatch(source, "results over a grid", "samples")
+    check_quantities(dataset, quantities, source, of_one_unit=False)
+    arrangement = arrange(dataset, at or {}, source)
+    shown, notes = _one_panel(arrangement)
+    panels = [panel for name in quantities for panel in _panels(shown[name], arrangement)]
+    if len(panels) > MOST_PANELS:
+        raise mismatch(source, f"at most {MOST_PANELS} panels", f"{len(panels)} of {', '.join(quantities)}")
+    x, y = ruler(shown[arrangement.x]), ruler(shown[arrangement.y]) if arrangement.y else ONE_ROW
+    columns = 1 if len(panels) == 1 else 2
+    rows = -(-len(panels) // columns)
+    height = min(ROW * y.centres.size + 0.3, HIGHEST)
+    figure = Figure(
+        (WIDTH * (1.0 + 0.6 * (columns - 1)), rows * (height + FRAME) + 0.9), layout="constrained"
+    )
+    all_axes = figure.subplots(rows, columns, squeeze=False)
+    kinds = _of_grid(occurrence_classes(shown), arrangement).astype(np.int8)
+    for axes, (title, unit, values) in zip(all_axes.flat, panels, strict=False):
+        _draw_panel(figure, axes, (x, y), kinds, values, unit)
+        axes.set_title(title, loc="left", pad=3)
+    for axes in list(all_axes.flat)[len(panels) :]:
+        axes.set_axis_off()
+    for axes in all_axes[:, 0]:
+        axes.set_ylabel(y.label)
+    for axes in list(all_axes.flat)[: len(panels)][-columns:]:
+        axes.set_xlabel(x.label)
+    job = one_line(dataset.attrs.get("job_name", ""))
+    lines = [f"{job}: {_counted(kinds)}".removeprefix(": "), *notes]
+    figure.suptitle("\n".join(fill(line, 72 * columns) for line in lines))
+    marked: dict[cells.CellClass, cells.ClassStyle] = {
+        kind: cells.STYLES[kind] for kind in OTHERS if (kinds == kind).any()
+    }
+    if marked:
+        cells.class_legend(figure, marked, len(marked))
+    return figure
+
+
+def _counted(kinds: NDArray[np.int8]) -> str:
+    """How many runs there are, and how many of the marked classes."""
+    others = kinds[np.isin(kinds, OTHERS)]
+    return f"{kinds.size} runs" + (f", of them {count_classes(others)}" if others.size else "")
+
+
+def _one_panel(arrangement: Arrangement) -> tuple[xr.Dataset, list[str]]:
+    """The first panel of an arrangement, and what is fixed, in words."""
+    dataset, notes = arrangement.dataset, list(arrangement.notes)
+    if arrangement.panel:
+        axis = dataset[arrangement.panel]
+        notes.append(f"{in_words(axis)} = {value_text(axis, 0)} (first of {axis.size})")
+        dataset = dataset.isel({arrangement.panel: 0})
+    return dataset, notes
+
+
+def _of_grid(array: xr.DataArray, arrangement: Arrangement) -> NDArray[Any]:
+    """Values (row, column) of a variable over x, or over y and x."""
+    names = [name for name in (arrangement.y, arrangement.x) if name]
+    return np.atleast_2d(array.transpose(*names).values)
+
+
+def _panels(array: xr.DataArray, arrangement: Arrangement) -> list[tuple[str, str, NDArray[np.float64]]]:
+    """Title, unit and values in it of each panel that a variable takes."""
+    factor, unit = display_unit(str(array.attrs.get("units", "")))
+    extra = [str(dim) for dim in array.dims if dim not in (arrangement.x, arrangement.y)]
+    found = []
+    for place in product(*(range(array.sizes[dim]) for dim in extra)):
+        at = dict(zip(extra, place, strict=True))
+        labels = [str(array[dim].values[k]) for dim, k in at.items()]
+        title = ", ".join([axis_label(array, unit), *labels])
+        found.append((title, unit, factor * _of_grid(array.isel(at), arrangement)))
+    return found
+
+
+def _draw_panel(
+    figure: Figure,
+    axes: Axes,
+    rulers: tuple[Ruler, Ruler],
+    kinds: NDArray[np.int8],
+    values: NDArray[np.float64],
+    unit: str,
+) -> None:
+    """Cells coloured by a quantity, with its numbers where they have room, and marks of the other runs."""
+    x, y = rulers
+    scale = cells.Scale(COLOURS, _norm(values), unit)
+    is_known = np.isfinite(values) & ~np.isin(kinds, (OccurrenceClass.FAILED, OccurrenceClass.NOT_RUN))
+    # what has a value is coloured by it, as vibrating cells of other maps by their amplitude
+    drawn = np.where(is_known, OccurrenceClass.VIBRATING, kinds).astype(np.int8)
+    nothing = np.zeros(kinds.shape, bool)
+    cells.draw_cells(axes, x, y, drawn, nothing, values, scale)
+    cells.draw_grid(axes, x, y)
+    width = 72 * (WIDTH * 0.8 - 1.5) * np.diff(x.edges).min() / np.ptp(x.edges)
+    height = 72 * min(ROW * y.centres.size + 0.3, HIGHEST) * np.diff(y.edges).min() / np.ptp(y.edges)
+    if width >= NARROWEST and height >= LOWEST:
+        for row, column in np.argwhere(is_known):
+            place, value = (x.centres[column], y.centres[row]), values[row, column]
+            fill_colour = np.asarray(scale.colours(scale.norm(value)))
+            text = f"{value:.3g}" if abs(value) >= 0.1 else f"{value:.2g}"
+            cells.write_value(axes, place, text, fill_colour, size=7.5)
+    cells.draw_marks(axes, x, y, kinds, np.isin(kinds, OTHERS) & ~is_known, 3.5)
+    if (slips := is_known & (kinds == OccurrenceClass.SLIPPING)).any():
+        dots = {
+            "facecolor": "none",
+            "edgecolor": "#ffffff",
+            "linewidth": 0,
+            "hatch": HATCH,
+            "rasterized": True,
+        }
+        axes.add_patch(PathPatch(cells.area_of(x, y, slips), **dots))
+    for ruled, set_ticks in ((x, axes.set_xticks), (y, axes.set_yticks)):
+        if ruled.ticks is not None:
+            set_ticks(ruled.ticks, ruled.tick_labels)
+    if is_known.any():
+        figure.colorbar(ScalarMappable(scale.norm, scale.colours), ax=axes, pad=0.02, label=unit)
+
+
+def _norm(values: NDArray[np.float64]) -> Normalize:
+    """Scale over the finite values; a quantity that does not vary has one colour."""
+    known = values[np.isfinite(values)]
+    if known.size and np.ptp(known) < EQUAL * np.abs(known).max():
+        return Normalize(*(known.mean() + 0.1 * np.abs(known).max() * np.array([-1.0, 1.1])))
+    return cells.norm_over(values)

@@ -1,0 +1,103 @@
+"""Discs with inertia: their eigenforms as Ritz functions (Bullinger et al. 2005, sec. 4.1, eqs 4-6).
+
+The groove opens by y(phi, t) = sum_k (a_k cos(n_k phi) + b_k sin(n_k phi)). In axes that turn with the disc
+
+    m_k (a'' + 2 zeta omega_k a' + omega_k^2 a) = sum_j cos(n_k phi_j) h_j f_j,    m_k = 1 / (c_k omega_k^2),
+
+and so for b with sines: c_k is the modal flexibility [m/N], m_k the mass. At rest w_ij = sum_k c_k
+cos(n_k (phi_i - phi_j)), eq. 10. A station's force falls linearly to both neighbours, and its opening is the
+mean by the same weights: a factor sinc^2(n h / 2 r) on both sides.
+
+A step is of Newmark's mean acceleration in the axes of the disc, which turn by omega dt: of second order,
+without damping of its own. The force at its end comes in by B_k = 1 / (m_k (4 / dt^2 + 4 zeta omega_k / dt +
+omega_k^2)), all else is known before, p_k. So the contact is that of `closed_set` with flexibilities B_k in
+the place of c_k, and gaps that p_k opens. Modes above a limit frequency have no inertia: B_k = c_k, p_k = 0.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Modes(NamedTuple):
+    """Modes of the discs of one wrap that have inertia.
+
+    Attributes
+    ----------
+    shapes : (2 H, m) array
+        Cosines, then sines, of H harmonics at m stations, with the factor above.
+    harmonics : (H,) array
+        Their n.
+    place : (M,) int array
+        Harmonic of each mode.
+    flexibility, pace : (M,) arrays
+        c [m/N] and omega [rad/s] of discs of the reference stiffness.
+    damping, step : float
+        zeta [1] and the time step [s].
+    """
+
+    shapes: np.ndarray
+    harmonics: np.ndarray
+    place: np.ndarray
+    flexibility: np.ndarray
+    pace: np.ndarray
+    damping: float
+    step: float
+
+
+_NONE = np.empty(0)
+NO_MODES = Modes(np.empty((0, 0)), _NONE, np.empty(0, dtype=np.int64), _NONE, _NONE, 0.0, 1.0)
+
+
+def shapes(harmonics: np.ndarray, stations: int, spacing: float, radius: float) -> np.ndarray:
+    """Cosines, then sines, of harmonics at equidistant stations, spread to their neighbours, (2 H, m)."""
+    phi = np.arange(stations) * spacing / radius
+    spread = np.sinc(0.5 * harmonics * spacing / (np.pi * radius))[:, None] ** 2
+    turned = harmonics[:, None] * phi
+    return np.concatenate([spread * np.cos(turned), spread * np.sin(turned)])
+
+
+def modal_flexibilities(
+    harmonic: np.ndarray, flexibility: np.ndarray, stations: int, spacing: float, radius: float
+) -> np.ndarray:
+    """Flexibilities w_ij [m/N] of modes at rest, (m, m).
+
+    Parameters
+    ----------
+    harmonic, flexibility : (M,) arrays
+        n and c [m/N].
+    stations, spacing, radius : int, float, float
+        Of the wrap [m].
+    """
+    forms = shapes(np.asarray(harmonic, float), stations, spacing, radius)
+    return (forms * np.tile(flexibility, 2)[:, None]).T @ forms
+
+
+def moving_modes(
+    table: tuple[np.ndarray, np.ndarray, np.ndarray],
+    limit: float,
+    damping: float,
+    step: float,
+    wrap: tuple[int, float, float],
+) -> Modes:
+    """Return the modes of a table that have inertia, those of frequencies up to `limit` [Hz].
+
+    Parameters
+    ----------
+    table : three (K,) arrays
+        Harmonic, flexibility and mass; 0: none.
+    limit, damping, step : float
+        Limit frequency [Hz], zeta [1], time step [s].
+    wrap : (int, float, float)
+        Stations, their spacing and the pitch radius [m].
+    """
+    harmonic, flexibility, mass = (np.asarray(values, float) for values in table)
+    squares = flexibility * mass * (2.0 * np.pi * limit) ** 2
+    moving = np.flatnonzero((mass > 0.0) & (squares >= 1.0))
+    if not moving.size:
+        return NO_MODES
+    own, place = np.unique(harmonic[moving], return_inverse=True)
+    pace = 1.0 / np.sqrt(flexibility[moving] * mass[moving])
+    return Modes(shapes(own, *wrap), own, place, flexibility[moving], pace, damping, step)
