@@ -5,6 +5,7 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt import inert
+from cvt_hpc.models.elastic_belt.bending_settings import bending_inert
 from cvt_hpc.models.elastic_belt.deflection_settings import CONE, MODE_FILES, MODE_KEYS, RITZ, TABLE_KEYS
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert
 from cvt_hpc.simulation import record_variables
@@ -31,8 +32,10 @@ OTHER = {
     "local_stiffness": 5e9,
     "local_length": 0.02,
 }
-AT_REST = pulley_inert({}) | dict.fromkeys(
-    [*CONE, *TABLE_KEYS, *RITZ, *MODE_KEYS, *MODE_FILES], "sheave_deformation bending"
+AT_REST = (
+    pulley_inert({})
+    | bending_inert({})
+    | dict.fromkeys([*CONE, *TABLE_KEYS, *RITZ, *MODE_KEYS, *MODE_FILES], "sheave_deformation bending")
 )  # of pulleys as they are in every scene here
 CASES = [
     (TABLE, ["friction_gradient", "kinetic_friction", "stribeck_velocity"], "friction_law table"),

@@ -19,6 +19,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     initial_state,
     random_strands,
 )
+from cvt_hpc.models.elastic_belt.column import pressed_strains
 from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK, put_lane
 from cvt_hpc.models.elastic_belt.one_lane_run import OneLaneRun
 from cvt_hpc.models.elastic_belt.rhs import strains
@@ -198,6 +199,7 @@ def damper_power(belt: Belt, state: State) -> float:
     n = belt.cell.size
     eps = np.empty((2, n))
     strains(belt, state.fields, eps)
+    pressed = pressed_strains(belt, state.fields, eps[0])
     power = 0.0
     for layer in range(2):
         v = state.fields[V_ELEMENT + layer]
@@ -207,6 +209,6 @@ def damper_power(belt: Belt, state: State) -> float:
             damped = damper * closing / belt.cell[c]
             if layer == 0:
                 # elements that are apart have none, and it never makes them pull
-                damped = min(damped, -belt.element_stiffness * eps[0, c]) if eps[0, c] < 0.0 else 0.0
+                damped = min(damped, -belt.element_stiffness * pressed[c]) if pressed[c] < 0.0 else 0.0
             power += damped * closing
     return power

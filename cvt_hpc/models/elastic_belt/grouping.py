@@ -40,6 +40,8 @@ SHARED = (
     "lanes",
     "contact_sweeps",
     "sheave_deformation",
+    "curvature_terms",
+    "column_bending",
     *MODE_KEYS,
     *RITZ,
 )

@@ -115,6 +115,7 @@ def _gather(state: LaneState, stations: LaneArray, sampled: Sampled, fields: int
     """Put what is sampled together from linked parts, of the stations' work space its first `fields`."""
     merge_parts(state.fields, sampled.state.fields, state.fields.data.shape[1])
     merge_parts(stations, sampled.stations, fields)
+    merge_parts(state.column, sampled.state.column, state.column.data.shape[1])
     merge_parts(state.scalars, sampled.state.scalars, state.scalars.data.shape[1])
 
 

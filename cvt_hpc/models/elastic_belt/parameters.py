@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.bending_settings import BENDING, bending_inert, bending_problems
 from cvt_hpc.models.elastic_belt.deflection_settings import (
     DEFLECTION,
     deflection_inert,
@@ -131,6 +132,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "driven_inertia": DRIVEN_INERTIA,
     },
+    "bending": BENDING,
     "deflection": DEFLECTION,
     "pulleys": PULLEYS,
     "shaft": SHAFT,
@@ -183,7 +185,7 @@ def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         if abs(p["play"]) > 0.02 * path:
             problems.append(("play", f"within 2 % of the belt's length {path:.4g} m", f"{p['play']:g} m"))
         problems += deflection_problems(p)
-    return problems + shaft_problems(p)
+    return problems + shaft_problems(p) + bending_problems(p)
 
 
 def inert(parameters: dict[str, Any]) -> dict[str, str]:
@@ -212,4 +214,5 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         (np.isinf(whole), of_disc + of_tilt, "sheave_stiffness inf"),
     )
     found = {key: setting for holds, keys, setting in cases if holds for key in keys}
-    return friction_inert(p) | course_inert(p) | pulley_inert(p) | deflection_inert(p) | found
+    parts = friction_inert, course_inert, pulley_inert, deflection_inert, bending_inert
+    return {key: why for part in parts for key, why in part(p).items()} | found
