@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc, sobol_indices
 
+from cvt_hpc.fit.confirming import Confirmed
 from cvt_hpc.fit.evaluating import Evaluation
 from cvt_hpc.fit.job import Fit
 from cvt_hpc.fit.scoring import Course
@@ -57,8 +58,16 @@ class Index(NamedTuple):
     total_high: float
 
 
-def move_each(fit: Fit, evaluation: Evaluation, scene: NDArray[np.float64]) -> list[Moved]:
-    """Move each parameter alone by each factor, and run the first case in full.
+class Around(NamedTuple):
+    """What was found around a set: its name, each parameter moved alone, all of them together."""
+
+    name: str
+    moved: list[Moved]
+    indices: list[Index]
+
+
+def look_around(fit: Fit, evaluation: Evaluation, confirmed: Sequence[Confirmed]) -> list[Around]:
+    """Look around the best set, and around each start of the job if that says so; the best one first.
 
     Parameters
     ----------
@@ -66,9 +75,24 @@ def move_each(fit: Fit, evaluation: Evaluation, scene: NDArray[np.float64]) -> l
         What is fitted.
     evaluation : Evaluation
         Does the runs.
-    scene : (free,) array
-        The set [SI].
+    confirmed : sequence of Confirmed
+        The best one first; the starts are among them.
     """
+    best, *others = confirmed
+    chosen = [best, *(one for one in others if fit.around == "starts" and one.is_start)]
+    studies = [one.name.replace(" ", "_") if one.is_start else "best" for one in chosen]
+    return [
+        Around(
+            one.name,
+            move_each(fit, evaluation, f"distances_{study}", one.scene),
+            sensitivities(fit, evaluation, f"sensitivities_{study}", one.scene),
+        )
+        for one, study in zip(chosen, studies, strict=True)
+    ]
+
+
+def move_each(fit: Fit, evaluation: Evaluation, study: str, scene: NDArray[np.float64]) -> list[Moved]:
+    """Move each parameter of a set [SI] alone by each factor, and run the first case in full."""
     places = [(column, factor) for column in range(len(scene)) for factor in sorted(fit.distances)]
     if not places:
         return []
@@ -76,7 +100,7 @@ def move_each(fit: Fit, evaluation: Evaluation, scene: NDArray[np.float64]) -> l
     for row, (column, factor) in enumerate(places):
         scenes[row, column] *= factor
     (first, *_) = fit.cases
-    found = evaluation.evaluate("distances", scenes, {}, fit.thinned, [first])
+    found = evaluation.evaluate(study, scenes, {}, fit.thinned, [first])
     return [
         Moved(fit.free[column].name, factor, float(moved[column]), courses[first])
         for (column, factor), moved, courses in zip(places, scenes, found.courses, strict=True)
@@ -93,14 +117,10 @@ def reach(moved: list[Moved], parameter: str) -> tuple[float, float]:
     )
 
 
-def sensitivities(fit: Fit, evaluation: Evaluation, scene: NDArray[np.float64]) -> list[Index]:
-    """Sobol indices of the total score and of each target's, all parameters within a part of a set.
+def sensitivities(fit: Fit, evaluation: Evaluation, study: str, scene: NDArray[np.float64]) -> list[Index]:
+    """Sobol indices of the total score and of each target's, all parameters within a part of a set [SI].
 
-    Parameters
-    ----------
-    fit, evaluation, scene
-        As of `move_each`. Parameters are spread evenly by their logarithm, from (1 - nearby) to
-        1 / (1 - nearby) times the set.
+    Parameters are spread evenly by their logarithm, from (1 - nearby) to 1 / (1 - nearby) times the set.
     """
     if not fit.samples:
         return []
@@ -111,7 +131,7 @@ def sensitivities(fit: Fit, evaluation: Evaluation, scene: NDArray[np.float64]) 
     crossed[np.arange(size), :, np.arange(size)] = b.T
     shares = np.concatenate([a[None], b[None], crossed]).reshape(-1, size)
     scenes = scene * (1.0 - fit.nearby) ** (1.0 - 2.0 * shares)
-    found = evaluation.evaluate("sensitivities", scenes, fit.coarse, fit.thinned)
+    found = evaluation.evaluate(study, scenes, fit.coarse, fit.thinned)
     scores = np.column_stack([found.totals, found.scores]).reshape(size + 2, fit.samples, -1)
     names = ["total", *(target.name for target in fit.targets)]
     return [index for k, name in enumerate(names) for index in _indices(fit, name, scores[..., k], rng)]

@@ -14,6 +14,8 @@ from cvt_hpc.fit.job import Fit
 from cvt_hpc.fit.scoring import Course
 from cvt_hpc.fit.search import Found
 
+_START = "start "
+
 
 @dataclass(frozen=True)
 class Confirmed:
@@ -41,6 +43,11 @@ class Confirmed:
     scores: NDArray[np.float64]
     totals: NDArray[np.float64]
     courses: list[dict[str, Course]]
+
+    @property
+    def is_start(self) -> bool:
+        """Whether the job has it as a start."""
+        return self.name.startswith(_START)
 
     @property
     def total(self) -> float:
@@ -78,7 +85,7 @@ def confirm(fit: Fit, evaluation: Evaluation, found: Found) -> list[Confirmed]:
     ]
     confirmed = [
         Confirmed(
-            f"start {place + 1}" if place < starts else found.stages[place],
+            f"{_START}{place + 1}" if place < starts else found.stages[place],
             found.scenes[place],
             float(found.totals[place]),
             np.array([one.scores[row] for one in findings]),

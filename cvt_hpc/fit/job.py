@@ -26,6 +26,12 @@ NUMBERS = {
     "accepted": Parameter(
         0.95, "", "share of the best score from which a candidate counts as as good", minimum=0.0, maximum=1.0
     ),
+    "around": Parameter(
+        "best",
+        "",
+        "sets around which parameters are moved: the best one, or all starts too",
+        choices=("best", "starts"),
+    ),
     "distances": Parameter(
         (0.5, 0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.2, 1.4, 2.0),
         "",
@@ -80,7 +86,7 @@ class Fit:
         A key and its values, for each of which a set is confirmed; empty for once.
     counted : dict
         By quantity, the values between which the motion of a run counts [SI].
-    screened, population, generations, seed, every, confirmed, accepted, distances, nearby, samples
+    screened, population, generations, seed, every, confirmed, accepted, around, distances, nearby, samples
         As `NUMBERS` declares them.
     """
 
@@ -101,6 +107,7 @@ class Fit:
     every: int
     confirmed: int
     accepted: float
+    around: str
     distances: tuple[float, ...]
     nearby: float
     samples: int

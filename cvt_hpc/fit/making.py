@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cvt_hpc.fit import table
-from cvt_hpc.fit.around import move_each, sensitivities
+from cvt_hpc.fit.around import look_around
 from cvt_hpc.fit.confirming import confirm
 from cvt_hpc.fit.evaluating import Evaluation
 from cvt_hpc.fit.job import Fit
@@ -62,17 +62,16 @@ def make_fit(
     found = search(fit, lambda name, scenes: evaluation.evaluate(name, scenes, fit.coarse, fit.thinned), tell)
     confirmed = confirm(fit, evaluation, found)
     best = confirmed[0]
-    moved = move_each(fit, evaluation, best.scene)
-    indices = sensitivities(fit, evaluation, best.scene)
-    of_set, verdicts = table.set_table(fit, found, best, moved, indices), table.verdict_table(fit, best)
+    looked = look_around(fit, evaluation, confirmed)
+    of_set, verdicts = table.set_table(fit, found, best, looked[0]), table.verdict_table(fit, best)
     tables = (
         of_set,
         verdicts,
         table.confirmed_table(fit, confirmed),
         table.candidate_table(fit, found),
         table.conflict_table(fit, found),
-        table.distance_table(fit, moved),
-        table.sensitivity_table(fit, indices),
+        table.distance_table(fit, looked),
+        table.sensitivity_table(fit, looked),
     )
     cost = f"{evaluation.runs} runs, {core_time_in_words(evaluation.core_seconds)}"
     written = tuple(table.write_table(fit, one, out) for one in tables) if process_rank() == 0 else ()
@@ -91,11 +90,12 @@ def plan_lines(fit: Fit) -> Iterator[str]:
     candidates = len(fit.starts) + fit.screened + fit.generations * fit.population
     repeats = max((len(values) for values in fit.repeat.values()), default=1)
     coarse, fine = estimate_cost(fit.coarse_job()), estimate_cost(job)
+    sets = 1 + len(fit.starts) * (fit.around == "starts")
     runs = {
         "search": (candidates * len(fit.cases) * thin, coarse),
         "confirmation": ((len(fit.starts) + fit.confirmed) * repeats * len(fit.cases) * full, fine),
-        "distances": (len(fit.free) * len(fit.distances) * thin, fine),
-        "sensitivities": (fit.samples * (len(fit.free) + 2) * len(fit.cases) * thin, coarse),
+        "distances": (sets * len(fit.free) * len(fit.distances) * thin, fine),
+        "sensitivities": (sets * fit.samples * (len(fit.free) + 2) * len(fit.cases) * thin, coarse),
     }
     yield from columns([[key, f"{n} runs", core_time_in_words(n * each)] for key, (n, each) in runs.items()])
     total = core_time_in_words(sum(n * each for n, each in runs.values()))

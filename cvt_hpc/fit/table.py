@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc import __version__
 from cvt_hpc.files import written_aside
-from cvt_hpc.fit.around import Index, Moved, reach
+from cvt_hpc.fit.around import Around, reach
 from cvt_hpc.fit.confirming import Confirmed
 from cvt_hpc.fit.job import Fit
 from cvt_hpc.fit.scoring import REPRODUCED, Course, areas, verdict
@@ -60,10 +60,10 @@ def write_table(fit: Fit, table: Table, folder: Path) -> Path:
     return path
 
 
-def set_table(fit: Fit, found: Found, best: Confirmed, moved: list[Moved], indices: Sequence[Index]) -> Table:
+def set_table(fit: Fit, found: Found, best: Confirmed, around: Around) -> Table:
     """The set: what is as good, how far each parameter is from silence, and what it decides."""
     good = found.scenes[found.totals >= fit.accepted * found.totals.max()]
-    of_total = {index.parameter: index for index in indices if index.score == "total"}
+    of_total = {index.parameter: index for index in around.indices if index.score == "total"}
     rows: list[Row] = []
     for k, one in enumerate(fit.free):
         likewise = np.quantile(good[:, k], [0.0, 0.5, 1.0])
@@ -71,7 +71,13 @@ def set_table(fit: Fit, found: Found, best: Confirmed, moved: list[Moved], indic
         index = of_total.get(one.name)
         orders = (index.first, index.total) if index else (np.nan, np.nan)
         rows.append(
-            [one.name, fit.job.schema.unit_in_words(one.name), *values, *reach(moved, one.name), *orders]
+            [
+                one.name,
+                fit.job.schema.unit_in_words(one.name),
+                *values,
+                *reach(around.moved, one.name),
+                *orders,
+            ]
         )
     what = (
         f"The best set, found in {best.name}; lowest, median and highest of the {len(good)} candidates "
@@ -134,10 +140,11 @@ def conflict_table(fit: Fit, found: Found) -> Table:
     return Table("conflicts", what, head, sorted(rows, key=lambda row: row[-1]))
 
 
-def distance_table(fit: Fit, moved: Sequence[Moved]) -> Table:
-    """What becomes of the first case where one parameter is moved alone."""
+def distance_table(fit: Fit, looked: Sequence[Around]) -> Table:
+    """What becomes of the first case of each set where one parameter is moved alone."""
     rows = [
         [
+            around.name,
             one.parameter,
             one.factor,
             _shown(fit, one.parameter, one.value),
@@ -145,16 +152,22 @@ def distance_table(fit: Fit, moved: Sequence[Moved]) -> Table:
             "yes" if one.is_out else "no",
             in_words(fit, one.course),
         ]
-        for one in moved
+        for around in looked
+        for one in around.moved
     ]
-    what = "The first case of the best set with one parameter moved alone, in full"
-    return Table("distances", what, ("parameter", "factor", "value", "vibrating", "out", "found"), rows)
+    what = "The first case of a set with one parameter moved alone, in full"
+    head = ("around", "parameter", "factor", "value", "vibrating", "out", "found")
+    return Table("distances", what, head, rows)
 
 
-def sensitivity_table(fit: Fit, indices: Sequence[Index]) -> Table:
-    """Sobol indices of each score."""
-    what = f"Sobol indices with their 95 % bounds, all parameters within {fit.nearby:g} of the best set"
-    return Table("sensitivities", what, ("score", "parameter", *_ORDERS), indices)
+def sensitivity_table(fit: Fit, looked: Sequence[Around]) -> Table:
+    """Sobol indices of each score around each set."""
+    what = (
+        f"Sobol indices with their 95 % bounds, all parameters within {fit.nearby:g} of a set; "
+        f"{fit.samples} base samples"
+    )
+    rows = [(around.name, *index) for around in looked for index in around.indices]
+    return Table("sensitivities", what, ("around", "score", "parameter", *_ORDERS), rows)
 
 
 def set_lines(best: Confirmed, of_set: Table, verdicts: Table) -> Iterator[str]:

@@ -13,11 +13,14 @@ from cvt_hpc.job.document import read_document
 from cvt_hpc.job.loading import refuse_what_is_compared_only
 from cvt_hpc.job.tables import read_set, read_table
 from cvt_hpc.ladder.pushbelt import PUSHBELT
-from cvt_hpc.ladder.rungs import MODEL, Rung, ladder
+from cvt_hpc.ladder.rungs import BESIDE, MODEL, NONE, Rung, ladder
 from cvt_hpc.parameters import Parameter
 
 TABLE = "ladder"
-_REFERENCE = Parameter(MODEL, "", "model of the reference", choices=(MODEL, PUSHBELT))
+_KEYS = {
+    "reference": Parameter(MODEL, "", "model of the reference", choices=(MODEL, PUSHBELT)),
+    "beside": Parameter(NONE, "", "a dearer model beside the rungs", choices=(NONE, *BESIDE)),
+}
 
 
 class Ladder(NamedTuple):
@@ -44,8 +47,8 @@ def load_ladder(path: str | Path, overrides: Assignments = ()) -> Ladder:
     Parameters
     ----------
     path : str or Path
-        A TOML file. Its table [ladder] may have `reference`, elastic_belt or pushbelt, and for the pushbelt
-        `set`, a table of what else that has.
+        A TOML file. Its table [ladder] may have `beside`, one of BESIDE, and `reference`, elastic_belt
+        or pushbelt, for the pushbelt with `set`, a table of what else that has.
     overrides : mapping, or sequence of "KEY=VALUE"
         As `load_job` takes them; ladder.KEY replaces a key of the table.
 
@@ -61,10 +64,11 @@ def load_ladder(path: str | Path, overrides: Assignments = ()) -> Ladder:
     table = document.pop(TABLE, {})
     if isinstance(table, Mapping):
         table = {**table, **{key: structured(value) for key, value in own.items()}}
-    reference = read_table({"reference": _REFERENCE}, table, where, ("set",))["reference"]
+    read = read_table(_KEYS, table, where, ("set",))
+    reference, beside = read["reference"], read["beside"]
     settings = read_set(table, where)
     if settings and reference != PUSHBELT:
         raise mismatch(f"{where} set", f'reference = "{PUSHBELT}", for which it is', show(reference))
     job = build_job(document, source, replaced, "--set")
     refuse_what_is_compared_only(job)
-    return Ladder(job, *ladder(job, settings if reference == PUSHBELT else None))
+    return Ladder(job, *ladder(job, settings if reference == PUSHBELT else None, beside))

@@ -1,4 +1,8 @@
-"""The rungs of the elastic belt's ladder that a job of it can be done on, from the cheapest up."""
+"""The rungs of the elastic belt's ladder that a job of it can be done on, from the cheapest up.
+
+Beside them stands a model that takes longer than the elastic belt and answers the same questions, if a job
+asks for it.
+"""
 
 from __future__ import annotations
 
@@ -49,9 +53,13 @@ _LOWER: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
     "coarse": ("auto", {"question": "forces", "least_margin": 0.0}, QUESTIONS),
     "auto": ("auto", {"question": "occurrence"}, ("occurrence", "onset")),
 }
+NONE = "none"
+BESIDE = ("quasi_static_belt",)
 
 
-def ladder(job: Job, pushbelt: Mapping[str, Any] | None = None) -> tuple[tuple[Rung, ...], dict[str, str]]:
+def ladder(
+    job: Job, pushbelt: Mapping[str, Any] | None = None, beside: str = NONE
+) -> tuple[tuple[Rung, ...], dict[str, str]]:
     """Return the rungs of a job, and why others refuse it.
 
     Parameters
@@ -60,12 +68,14 @@ def ladder(job: Job, pushbelt: Mapping[str, Any] | None = None) -> tuple[tuple[R
         Of the elastic belt, a grid with `load` among its axes.
     pushbelt : mapping, optional
         What else the pushbelt has, as `pushbelt_jobs` takes it: the reference is a pushbelt then.
+    beside : str
+        One of BESIDE that is asked for, or NONE.
 
     Returns
     -------
     rungs : tuple of Rung
-        From the cheapest up: the job itself, a pushbelt if asked for, the reference last. The reference is
-        the rung before it, refined.
+        From the cheapest up, then what is asked for beside them, the job itself, a pushbelt if asked for, the
+        reference last. The reference is the rung before it, refined.
     refusals : dict
         What was wrong, by the name of the rung.
 
@@ -76,7 +86,8 @@ def ladder(job: Job, pushbelt: Mapping[str, Any] | None = None) -> tuple[tuple[R
     """
     _check(job)
     rungs, refusals = [], {}
-    for name, (model, table, answers) in _LOWER.items():
+    models = _LOWER if beside == NONE else _LOWER | {beside: (beside, {}, QUESTIONS)}
+    for name, (model, table, answers) in models.items():
         try:
             rungs.append(Rung(name, answers, _handed(job, model, table)))
         except InputError as error:

@@ -1,26 +1,41 @@
-"""Growth of small motions by what is quasi-static, and how: quasi_static_growth.py [LOAD [MEMORY_MS ...]].
+"""Growth of small motions by what is quasi-static, and how.
 
-The elastic belt's Jacobian about its steady state, with coordinates across the belt and motion along it replaced as
+    quasi_static_growth.py > jobs/results/quasi_static_growth.csv              # all cases, defaults at 120 N m
+    quasi_static_growth.py range > jobs/results/quasi_static_growth_range.csv  # some, over loads, of three sets
+
+The sets are the defaults, and the sets A and B of `jobs/lebrecht_fitted.toml`. The elastic belt's Jacobian about its steady state, with coordinates across the belt and motion along it replaced as
 `cvt_hpc/models/quasi_static_belt/README.md` says. One line for each: memory, split, motion along the path, whose rates
 slide, limits, then the fastest growth of all and that between 250 and 900 Hz.
 """
 
 import sys
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 from scipy.linalg import eigvals
 
+from cvt_hpc import load_job
 from cvt_hpc.models.elastic_belt.belt import mesh
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates
 from cvt_hpc.models.quasi_static_belt import PARAMETERS
 from cvt_hpc.models.quasi_static_belt.basis import split_basis
-from cvt_hpc.models.quasi_static_belt.step import lag_drag, layer_shares
+from cvt_hpc.models.quasi_static_belt.split_belt import lag_drag, layer_shares
 from cvt_hpc.models.steady_variator.equations import LATE
 from cvt_hpc.models.steady_variator.linearised import Linearisation
-from cvt_hpc.models.steady_variator.walking import SteadyBelt
+from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 
 DEFAULTS = {key: p.default for table in PARAMETERS.values() for key, p in table.items()} | {"duration": 0.4}
+FITTED = Path(__file__).parents[2] / "jobs" / "lebrecht_fitted.toml"
+LOADS = 80.0, 100.0, 120.0, 160.0, 200.0  # [N m]
+OVER_LOADS = (  # as `cases` has them
+    ("stations", "inertia", 1, 1e3, 1e3),
+    ("free_splines", "inertia", 1, 1e3, 1e3),
+    ("stations", "lag", 1, 1e3, 1e3),
+    ("stations", "steady_flow", 1, 1e3, 1e3),
+    *((split, "steady_flow", 1, 1e3, 1e3) for split in ("held_splines", "free_splines", "modes")),
+    ("free_splines", "steady_flow", 0, 1e3, 1e3),
+)
 LIGHTER = 100.0  # of "light": by how much deviations from a layer's mean speed have less mass
 
 
@@ -148,18 +163,44 @@ def fastest(values):
     return f"{value.real:.0f},{value.imag / (2.0 * np.pi):.0f}"
 
 
+def sets():
+    """Yield name and parameters [SI] of each set."""
+    yield "defaults", DEFAULTS
+    job = load_job(FITTED, {"sheave_stiffness": 1.0, "load": [LOADS[0]]})
+    for place, name in enumerate("AB"):
+        yield name, DEFAULTS | {key: value for key, value in job.point(place).items() if key in DEFAULTS}
+
+
+def told(parameters, load, memory, asked):
+    """Yield a line for each case, about the steady state under a load."""
+    parameters = parameters | {"friction_memory": memory, "load": load}
+    linear = Linear(parameters, load)
+    for case in asked:
+        values = eigvals(state_matrix(linear, parameters, *case))
+        values = values[values.imag > -1e-6]
+        band = values[(values.imag > 2.0 * np.pi * 250.0) & (values.imag < 2.0 * np.pi * 900.0)]
+        yield ",".join([f"{1e3 * memory:g}", *map(str, case), fastest(values), fastest(band)])
+
+
 def main():
     """Print the table."""
-    load, *memories = map(float, sys.argv[1:] or ("120",))
-    print("memory_ms,split,along,all_slide,limit_Hz,layers_limit_Hz,growth,at_Hz,growth_in_band,at_Hz")
-    for memory in memories or (0.3, 0.1, 0.0):
-        parameters = DEFAULTS | {"friction_memory": 1e-3 * memory, "load": load}
-        linear = Linear(parameters, load)
-        for case in cases():
-            values = eigvals(state_matrix(linear, parameters, *case))
-            values = values[values.imag > -1e-6]
-            band = values[(values.imag > 2.0 * np.pi * 250.0) & (values.imag < 2.0 * np.pi * 900.0)]
-            print(",".join(map(str, (memory, *case))), fastest(values), fastest(band), sep=",", flush=True)
+    head = (
+        "memory_ms,split,along,all_slide,limit_Hz,layers_limit_Hz,growth,at_Hz,growth_in_band,in_band_at_Hz"
+    )
+    if sys.argv[1:] == ["range"]:
+        print("set,load," + head)
+        for (name, parameters), load in product(sets(), LOADS):
+            for memory in (parameters["friction_memory"], 0.0):
+                try:
+                    for line in told(parameters, load, memory, OVER_LOADS):
+                        print(f"{name},{load:g},{line}", flush=True)
+                except NoSteadyState as error:
+                    print(f"{name},{load:g},{1e3 * memory:g},{error}", flush=True)
+        return
+    print(head)
+    for memory in (3e-4, 1e-4, 0.0):
+        for line in told(DEFAULTS, 120.0, memory, cases()):
+            print(line, flush=True)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ import xarray as xr
 from cvt_hpc.cli import main
 from cvt_hpc.job import load_job
 from cvt_hpc.ladder.costs import cost_left
+from cvt_hpc.ladder.loading import load_ladder
 from cvt_hpc.ladder.rungs import ladder
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
 from support.cf import cf_findings
@@ -76,6 +77,16 @@ def test_each_rung_does_the_same_runs_as_far_as_it_knows_them(job):
     # a chosen step has three digits
     finer = {"step_error": 1 / 1.5, "step": 1 / 1.5}
     assert changed == pytest.approx({"stations": 1.5, **finer, "duration": 2.0}, rel=2e-3)
+
+
+def test_a_dearer_model_stands_beside_the_rungs_if_it_is_asked_for(job, capsys):
+    rungs, _ = load_ladder(job, ["ladder.beside=quasi_static_belt"])[1:]
+    assert [rung.name for rung in rungs[-3:]] == ["quasi_static_belt", "elastic_belt", "reference"]
+    beside = rungs[-3].job
+    assert beside.stepper == "split" and beside.parameters["stations"] == 48 and beside.size == 2
+    assert main(["ladder", str(job), "--set", "ladder.beside=quasi_static"]) == 2
+    told = 'beside: expected one of none, quasi_static_belt, found "quasi_static"; did you mean quasi_static_belt?'
+    assert told in capsys.readouterr().err
 
 
 def test_a_rung_that_refuses_the_job_is_named(job):

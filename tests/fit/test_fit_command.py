@@ -149,7 +149,7 @@ def test_conflicts_are_pairs_that_nobody_meets_together(job):
 def test_sensitivities_are_those_of_the_law(job, tmp_path):
     """Within 30 % of the set the frequency follows from the gradient alone, and the window from the mass."""
     fit = load_fit(job, ["fit.samples=64", "fit.nearby=0.3"])
-    indices = sensitivities(fit, Evaluation(fit, tmp_path / "out"), np.array([0.25, -1.44]))
+    indices = sensitivities(fit, Evaluation(fit, tmp_path / "out"), "around", np.array([0.25, -1.44]))
     found = {(index.score, index.parameter): index for index in indices}
     for score, decides, other in (
         ("band", "friction_gradient", "element_mass"),
@@ -177,6 +177,20 @@ def test_runs_that_the_model_refuses_do_not_count(job, window, tmp_path):
     assert len(window) == 2 * (41 + 31)
     with pytest.raises(InputError, match="load: expected at most 300 N m at this thrust"):
         evaluation.evaluate("all", scenes, {}, np.array([400.0]), ["as_built"])
+
+
+def test_starts_are_looked_around_as_the_best_set_is(job, tmp_path, capsys):
+    assert main(["fit", "x.toml", "--set", "fit.around=starts", "--set", "fit.generations=1"]) == 0
+    for name in ("distances", "sensitivities"):
+        _, rows = read(tmp_path / "out" / "x" / f"{name}.csv")
+        sets = list(dict.fromkeys(row["around"] for row in rows))
+        assert len(sets) == 2 and sets[1] == "start 1" and sets[0] != "start 1"
+        assert sum(row["around"] == "start 1" for row in rows) == len(rows) // 2
+    # the window of the start begins at 27.8 N m, with 1.03 times its mass at 27 N m; the loads are 10 N m apart
+    _, rows = read(tmp_path / "out" / "x" / "distances.csv")
+    of_start = {(r["parameter"], r["factor"]): r for r in rows if r["around"] == "start 1"}
+    assert float(of_start["element_mass", "4"]["value"]) == 3.6
+    assert of_start["element_mass", "1.03"]["found"] == "vibrates 30-50"
 
 
 def test_a_fit_that_was_stopped_goes_on(job, window, monkeypatch, capsys, tmp_path):

@@ -155,7 +155,7 @@ def test_jobs_that_are_shipped_draw_none(path):
         from cvt_hpc.chart import load_chart as load
     elif path.stem == "branch":
         from cvt_hpc.bifurcation import load_diagram as load
-    elif path.stem == "ladder_pushbelt":
+    elif path.stem.startswith("ladder_"):
         from cvt_hpc.ladder.loading import load_ladder as load
     elif path.stem == "fit_lebrecht":
         from cvt_hpc.fit.loading import load_fit as load

@@ -71,6 +71,22 @@ CASES = {
     "driven by its driven pulley": CONTROLLED
     | {"driven_inertia": np.inf, "driving_inertia": 0.05, "rise_time": 0.03},
 }
+CASES |= {
+    "path's curvature, narrow column": {
+        "curvature_terms": "path",
+        "column_bending": "rocking",
+        "column_stiffness": 2.0,
+        "outer_edge": 3e-4,
+        "inner_edge": 2e-4,
+    },
+    "straight at rest, wide column": {
+        "curvature_terms": "straight",
+        "bending_stiffness": 0.05,
+        "column_bending": "rocking",
+        "column_stiffness": 20.0,
+        "outer_edge": 3e-3,
+    },
+}
 STEP = 1e-7
 
 

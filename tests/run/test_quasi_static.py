@@ -28,7 +28,8 @@ from cvt_hpc.models.quasi_static_belt.basis import (
     transverse_stiffness,
 )
 from cvt_hpc.models.quasi_static_belt.coupled import chain, solve_chain, solve_dense
-from cvt_hpc.models.quasi_static_belt.step import march, motion, refresh, split_belt, work_space
+from cvt_hpc.models.quasi_static_belt.split_belt import motion, refresh, split_belt, work_space
+from cvt_hpc.models.quasi_static_belt.step import march
 from cvt_hpc.models.quasi_static_belt.transient import batch
 from support.rungs import rung_job
 

@@ -5,8 +5,10 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt import inert
+from cvt_hpc.models.elastic_belt.bending_settings import bending_inert
 from cvt_hpc.models.elastic_belt.deflection_settings import CONE, MODE_FILES, MODE_KEYS, RITZ, TABLE_KEYS
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert
+from cvt_hpc.models.elastic_belt.ring_settings import ring_inert
 from cvt_hpc.simulation import record_variables
 from support.marched import fresh_record, job
 
@@ -31,9 +33,13 @@ OTHER = {
     "local_stiffness": 5e9,
     "local_length": 0.02,
 }
-AT_REST = pulley_inert({}) | dict.fromkeys(
-    [*CONE, *TABLE_KEYS, *RITZ, *MODE_KEYS, *MODE_FILES], "sheave_deformation bending"
-)  # of pulleys as they are in every scene here
+# of pulleys, rings and discs as they are in every scene here
+AT_REST = (
+    pulley_inert({})
+    | ring_inert({})
+    | bending_inert({})
+    | dict.fromkeys([*CONE, *TABLE_KEYS, *RITZ, *MODE_KEYS, *MODE_FILES], "sheave_deformation bending")
+)
 CASES = [
     (TABLE, ["friction_gradient", "kinetic_friction", "stribeck_velocity"], "friction_law table"),
     ({"friction_law": "coulomb", "friction_gradient": 0.0}, ["stribeck_velocity"], "friction_gradient 0"),

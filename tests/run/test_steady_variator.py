@@ -16,12 +16,14 @@ from cvt_hpc.models.elastic_belt.belt import (
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.sampling import Outcome
-from cvt_hpc.models.steady_variator import walking
+from cvt_hpc.models.steady_variator import first_states
+from cvt_hpc.models.steady_variator.continuation import OWN, Continuation
 from cvt_hpc.models.steady_variator.equations import Equations
+from cvt_hpc.models.steady_variator.first_states import FirstStates, least_sliding
 from cvt_hpc.models.steady_variator.forces import distributions, quantities
 from cvt_hpc.models.steady_variator.newton import newton
 from cvt_hpc.models.steady_variator.record import Found, judge
-from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
+from cvt_hpc.models.steady_variator.walking import NoSteadyState, SlipsThrough, SteadyBelt
 from cvt_hpc.variables import Status, Vibrates
 from support.fast_runs import FastRuns
 from support.rungs import rung_record
@@ -108,22 +110,21 @@ def test_the_way_does_not_matter():
 def test_jacobian():
     parameters = DEFAULTS | {"load_start": 0.0}
     equations = Equations(parameters, belt_constants(parameters))
-    for rounding in (0.0, 1e-4):
-        equations.rounding = rounding
-        x = steady()[0].unknowns.copy()
-        assert equations.residual(x) is not None
-        matrix = equations.jacobian(x).toarray()
-        random = np.random.default_rng(3).normal(size=x.size) * equations.sizes * 1e-6
-        # elements' strains apart, whose corners are somewhere between
-        random[96 : 2 * 96] = 0.0
-        change = equations.residual(x + random) - equations.residual(x - random)
-        assert matrix @ (2.0 * random) == pytest.approx(change, rel=1e-4, abs=3e-6 * np.abs(change).max())
+    x = steady()[0].unknowns.copy()
+    assert equations.residual(x) is not None
+    matrix = equations.jacobian(x).toarray()
+    random = np.random.default_rng(3).normal(size=x.size) * equations.sizes * 1e-6
+    # elements' strains apart, whose corners are somewhere between
+    random[96 : 2 * 96] = 0.0
+    change = equations.residual(x + random) - equations.residual(x - random)
+    assert matrix @ (2.0 * random) == pytest.approx(change, rel=1e-4, abs=3e-6 * np.abs(change).max())
 
 
 def test_newton_gives_up_where_it_is_lost():
     parameters = DEFAULTS | {"load_start": 0.0}
-    equations = Equations(parameters, belt_constants(parameters))
-    assert newton(equations, equations.initial(), 1e-7) is None
+    belt = belt_constants(parameters)
+    equations = Equations(parameters, belt)
+    assert newton(equations, equations.unknowns(initial_state(parameters, belt)), 1e-7) is None
 
 
 def test_friction_carries_what_bullinger_says():
@@ -141,17 +142,19 @@ def test_a_load_beyond_what_friction_carries():
     with pytest.raises(NoSteadyState, match="400 N m"):
         SteadyBelt(DEFAULTS | {"stations": 48}).at(400.0)
     record = rung_record("steady_variator", load=400.0, stations=48)
-    assert record["status"] == Status.FAILED_NUMERICS and b"400 N m" in record["reason"].encode()
+    assert (record["status"], record["vibrates"]) == (Status.DONE, Vibrates.SLIPS)
+    assert "slips through under 400 N m: from" in record["reason"]
 
 
 def test_a_load_that_does_not_settle_is_reached_from_each_of_the_loads_beside_it(monkeypatch):
     """And a march that runs away from a load that brakes has not slipped through: it diverges."""
-    monkeypatch.setattr(walking, "settled", lambda *_: Outcome.RAN_AWAY)
-    belt = SteadyBelt(DEFAULTS | {"stations": 48})
+    monkeypatch.setattr(first_states, "settled", lambda *_: Outcome.RAN_AWAY)
+    parameters = DEFAULTS | {"stations": 48, "load_start": 0.0}
+    first = FirstStates(parameters, Continuation(parameters))
     with pytest.raises(NoSteadyState, match="does not settle under 60 N m"):
-        belt._settle(60.0)
-    with pytest.raises(NoSteadyState, match="slips through under -60 N m"):
-        belt._settle(-60.0)
+        first._settled(60.0)
+    with pytest.raises(SlipsThrough, match="slips through under -60 N m"):
+        first._settled(-60.0)
 
     begun = []
 
@@ -161,17 +164,43 @@ def test_a_load_that_does_not_settle_is_reached_from_each_of_the_loads_beside_it
             raise NoSteadyState(f"not from {start:g}")
         return x
 
-    def settle(load):
+    def settle(load, wide):
         if load == 60.0:
             raise NoSteadyState("not at 60")
         return np.zeros(1)
 
-    def widened(load):
-        raise NoSteadyState("nor by rounded corners")
+    monkeypatch.setattr(first, "_settle", settle)
+    assert first.under(60.0, rise) == 0.0 and len(set(begun)) == 3
 
-    for name, double in (("_rise", rise), ("_settle", settle), ("_widened", widened)):
-        monkeypatch.setattr(belt, name, double)
-    assert belt._first(60.0) == 0.0 and len(set(begun)) == 3
+
+def test_wider_friction_is_tried_where_a_march_by_its_own_does_not_settle(monkeypatch):
+    first, tried = FirstStates(DEFAULTS | {"stations": 48}, Continuation(DEFAULTS | {"stations": 48})), []
+
+    def settle(load, wide):
+        tried.append(wide)
+        if wide == OWN:
+            raise NoSteadyState("goes round for ever")
+        return np.zeros(1)
+
+    monkeypatch.setattr(first, "_settle", settle)
+    assert first.under(60.0, None) == 0.0
+    # 0.3 and 10 m/s over 30 and 10 mm/s
+    assert tried == [OWN, pytest.approx((10.0, 1000.0))]
+
+
+def test_a_load_that_takes_faster_sliding_than_the_belt_runs_is_refused():
+    """tanh(v / v_reg) of the torque that twice the thrust carries at friction's highest level."""
+    belt = belt_constants(DEFAULTS | {"load": 0.0, "load_start": 0.0, "driving_speed": 0.01})
+    most = 4.0 * DEFAULTS["thrust"] * belt.driving_radius / np.cos(DEFAULTS["half_wedge_angle"])
+    most *= DEFAULTS["kinetic_friction"] - DEFAULTS["friction_gradient"] * DEFAULTS["stribeck_velocity"]
+    v = least_sliding(belt, 60.0)
+    assert most * np.tanh(v / DEFAULTS["friction_speed"]) == pytest.approx(60.0, rel=1e-9)
+    assert least_sliding(belt, -60.0) == v and least_sliding(belt, 1.01 * most) == 0.0
+    record = rung_record("steady_variator", load=60.0, driving_speed=0.01, stations=48)
+    assert (
+        record["status"] == Status.FAILED_NUMERICS
+        and "m/s of sliding on, and the belt runs at" in record["reason"]
+    )
 
 
 def test_record_is_that_of_the_state():

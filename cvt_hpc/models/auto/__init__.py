@@ -13,7 +13,7 @@ ANSWERED_BY = {
     "frequencies": ("strand", "at which frequencies a strand can vibrate needs only the strand"),
     "growth": ("linear_stability", "whether small motions grow needs only the steady state's eigenvalues"),
 }
-PARAMETERS = elastic_belt.PARAMETERS | {
+PARAMETERS = {table: keys for table, keys in elastic_belt.PARAMETERS.items() if table != "rings"} | {
     "auto": {
         "question": Parameter(
             "occurrence",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +26,10 @@ from cvt_hpc.models.elastic_belt.lane_forces import derive
 from cvt_hpc.models.elastic_belt.march import Sampled, march_explicit, march_imex
 from cvt_hpc.models.elastic_belt.momentary import Momentary
 from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, recording
+from cvt_hpc.models.elastic_belt.ring_march import march_rings
+from cvt_hpc.models.elastic_belt.ring_settings import layer_count
+from cvt_hpc.models.elastic_belt.ring_step import RingWork, parted_ring_work, ring_work
+from cvt_hpc.models.elastic_belt.rings import ring_constants, with_layers, without_saddle_friction
 from cvt_hpc.models.elastic_belt.sampling import (
     CHANNELS,
     CONTACT_SOLVES,
@@ -41,7 +46,8 @@ from cvt_hpc.recording import steps_per_sample
 from cvt_hpc.variables import Status
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
-Step = tuple[Callable[[LaneState], ImexWork | ExplicitWork], Callable[..., None]]  # work space, march
+# work space, march
+Step = tuple[Callable[[LaneState], ImexWork | ExplicitWork | RingWork], Callable[..., None]]
 STEPS: dict[str, Step] = {"imex": (imex_work, march_imex), "explicit": (explicit_work, march_explicit)}
 
 
@@ -115,10 +121,17 @@ class Batch:
         self.belts = [belt_constants(point) for point in padded]
         self.dtype = PRECISIONS[p["precision"]]
         starts = [initial_state(point, belt) for point, belt in zip(padded, self.belts, strict=True)]
+        self._work_space, self._march = STEPS[stepper]
+        self.is_layered = layer_count(p) > 1
+        if self.is_layered:
+            rings = [ring_constants(point, belt) for point, belt in zip(padded, self.belts, strict=True)]
+            self.belts = [without_saddle_friction(belt) for belt in self.belts]
+            starts = [with_layers(*each) for each in zip(starts, self.belts, rings, strict=True)]
+            self._work_space = partial(ring_work, belts=self.belts, rings=rings)
+            self._march = march_rings
         self._sweeps = p["contact_sweeps"] if stepper == "imex" else 0
         self.state = lane_state(self.belts, starts, self.dtype, self._sweeps)
         self._belt = lane_belt(self.belts, self.dtype)
-        self._work_space, self._march = STEPS[stepper]
         self.work = self._work_space(self.state)
         derive(self._belt, self.state, self.work.stations)
         self.plan = recording(p, self.dtype)
@@ -150,6 +163,8 @@ class Batch:
         for k, array in enumerate(lane_arrays(self.state, self.work, self.ended)):
             array.data[:] = np.stack([run.lane[k] for run in paused], axis=-1)
         self.state.time[0] = paused[0].time
+        if isinstance(self.work, RingWork):
+            self.work.sums.data[:] = 0.0  # of a judged part that has yet to come
 
     @property
     def runs(self) -> tuple[LaneRun, ...]:
@@ -185,7 +200,7 @@ class Batch:
             marched = (
                 parted(self._belt, self._parts),
                 parted_state(self.state, self._parts),
-                type(self.work)(split(self.work.stations, self._parts)),
+                _parted_work(self.work, self._parts),
             )
         by_sample = first >= self.momentary.first and last > first
         ends = range(first + 1, last + 1) if by_sample else [last]
@@ -228,6 +243,8 @@ class Batch:
         self.begun = self.ended.data[0, ENDED_AT] = runs[0].time
         if self.done > self.plan.first_judged:
             self.profiles[1].data[:] = np.nan  # what the other has summed up is not known
+            if isinstance(self.work, RingWork):
+                self.work.sums.data[:] = np.nan
 
     def history(self, lane: int) -> np.ndarray:
         """Rows of a run so far, (done, S + C); put in order of lanes and channels once all are there.
@@ -245,6 +262,13 @@ class Batch:
                 ordered[k, :, : self._recorded] = earlier.T
             self._ordered = ordered
         return self._ordered[lane].T
+
+
+def _parted_work(work: Any, parts: int) -> Any:
+    """A step's work space for linked parts."""
+    if isinstance(work, RingWork):
+        return parted_ring_work(work, parts)
+    return type(work)(split(work.stations, parts))
 
 
 class LaneRun(RecordedRun):
@@ -282,6 +306,12 @@ class LaneRun(RecordedRun):
         if found is None and self.batch.stepper == "imex":
             found = step_doubt(self.step, transverse_limit(self.parameters))
         return found
+
+    @property
+    def layer_sums(self) -> np.ndarray | None:
+        """As of `RecordedRun`."""
+        work = self.batch.work
+        return work.sums.data[:, :, self._lane] if isinstance(work, RingWork) else None
 
     @property
     def momentary(self) -> np.ndarray | None:

@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.bending import bending_bands, bending_load, squared_curvature
+from cvt_hpc.models.elastic_belt.bending_settings import BENDING_DEFAULTS, CURVATURE_TERMS, has_column
 from cvt_hpc.models.elastic_belt.deflection_settings import disc_settings
 from cvt_hpc.models.elastic_belt.pulleys import (
     DRIVEN_COS,
@@ -47,7 +49,9 @@ class Belt(NamedTuple):
     """Everything the kernels need, in SI units; N stations around the belt.
 
     Arrays of cells and stations have shape (N,), `per_...` being reciprocals, the span that of two cells;
-    `bending` is (N, 5): force per length on station j from the displacements of stations j-2 .. j+2;
+    `bending` is (N, 5): force per length on station j from the displacements of stations j-2 .. j+2,
+    `bending_load` that without displacement; `squared_curvature` is kappa^2 at the stations where curvature
+    terms count, else 0, and `curvature_terms` the place among those in CURVATURE_TERMS;
     `ring_relief` is the tension at which the rings' own weight bears them. `belt_speed` is that of the pitch
     line at `driving_speed`; along a ramp of speed both follow `rhs.speed_share_at`. `element_mass` and
     `ring_mass` are the inertia along the path, `mass` that across it. Across a gap the elements' damper may
@@ -64,6 +68,9 @@ class Belt(NamedTuple):
     arc_curvature: np.ndarray
     arc_share: np.ndarray
     bending: np.ndarray
+    bending_load: np.ndarray
+    squared_curvature: np.ndarray
+    curvature_terms: int
     ring_mass: np.ndarray
     ring_relief: np.ndarray
     element_mass: float
@@ -74,6 +81,10 @@ class Belt(NamedTuple):
     ring_stiffness: float
     element_damping: float
     bridging_stiffness: float
+    has_column: bool
+    column_stiffness: float
+    outer_edge: float
+    inner_edge: float
     ring_damping: float
     transverse_damping: float
     ring_offset: float
@@ -104,6 +115,8 @@ class Belt(NamedTuple):
 
 class State(NamedTuple):
     """The state: `fields` (7, N) in the order of FIELDS, `scalars` (12,) in the order of SCALARS.
+
+    Of rings in n layers `fields` is (7 + 2 n, N), see `rings.py`.
 
     The work of the layers' dampers [J] until it is asked for is no state of the belt.
     """
@@ -169,7 +182,7 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     Belt
         For the kernels.
     """
-    p, grid = parameters, mesh(parameters)
+    p, grid = BENDING_DEFAULTS | dict(parameters), mesh(parameters)
     path, cell = grid.path, grid.cell
     dual = 0.5 * (cell + np.roll(cell, 1))
     kappa = np.array([1.0 / path.driving_radius, 0.0, 1.0 / path.driven_radius, 0.0])[grid.region]
@@ -199,7 +212,7 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     ]
     wraps, freedom = with_pulleys(p, wraps, (path.driving_radius, path.driven_radius))
     law = given_law(p)
-    quantity = ramped(p)
+    quantity, terms = ramped(p), CURVATURE_TERMS.index(p["curvature_terms"])
     computed = dict(
         cell=cell,
         dual=dual,
@@ -209,7 +222,11 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
         curvature=kappa,
         arc_curvature=np.maximum(kappa, np.roll(kappa, 1)),
         arc_share=arc_share,
-        bending=bending_bands(cell, dual, p["bending_stiffness"]),
+        bending=bending_bands(cell, dual, p["bending_stiffness"], kappa, terms),
+        bending_load=bending_load(cell, dual, p["bending_stiffness"], kappa, terms),
+        squared_curvature=squared_curvature(cell, dual, kappa) * (terms > 0),
+        curvature_terms=terms,
+        has_column=has_column(p),
         ring_mass=p["longitudinal_mass"] * ring_mass,
         ring_relief=ring_mass * belt_speed * belt_speed,
         element_mass=p["longitudinal_mass"] * p["element_mass"],
@@ -236,19 +253,6 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
 def _pair(values: np.ndarray) -> np.ndarray:
     """Sum of a cell quantity over the two cells of each station."""
     return values + np.roll(values, 1)
-
-
-def bending_bands(cell: np.ndarray, dual: np.ndarray, stiffness: float) -> np.ndarray:
-    """Bands of -D^T diag(EI dual) D / dual, D the second difference: the gradient of the bending energy."""
-    n = cell.size
-    second = np.zeros((n, n))
-    for j in range(n):
-        left, right = 1.0 / (cell[j - 1] * dual[j]), 1.0 / (cell[j] * dual[j])
-        second[j, j - 1] += left
-        second[j, (j + 1) % n] += right
-        second[j, j] -= left + right
-    force = -stiffness * (second.T * dual) @ second / dual[:, None]
-    return np.array([[force[j, (j + k) % n] for k in range(-2, 3)] for j in range(n)])
 
 
 def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:

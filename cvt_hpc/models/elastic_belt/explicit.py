@@ -51,6 +51,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneBelt,
     LaneState,
 )
+from cvt_hpc.models.elastic_belt.lane_column import across_by_curvature, column_across
 from cvt_hpc.models.elastic_belt.lane_forces import (
     COEFFICIENT,
     EPS_0,
@@ -73,6 +74,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     lane_sliding,
     lane_speed_share,
     lane_transverse,
+    pressed_strain,
     ring_grip,
 )
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
@@ -142,6 +144,7 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
     centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
     damping = lane_damping(belt, state.time[0])
     mobility, element_mobility, ring_mobility = step / mass, step / c[0, ELEMENT_MASS], step / ring_mass
+    masses = c[0, ELEMENT_MASS], ring_mass
     rise, zero = acceleration * step, like(0.0, sine)
     taken = moment = net_left = ring_left = stress_left_0 = stress_left_1 = zero
     gap_left_0 = gap_left_1 = zero
@@ -150,7 +153,7 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
         j = k if k >= 0 else n - 1
         per_cell = belt.per_cell[j]
         v0, v1 = fields[j, V_ELEMENT], fields[j, V_RING]
-        push = element_stiffness * minimum(stations[j, EPS_0], 0.0)
+        push = element_stiffness * minimum(pressed_strain(belt, state, stations, j), 0.0)
         ring_right = ring_stiffness * stations[j, EPS_1]
         net_right = push + (ring_right - centrifugal)
         gap_0 = (ahead(fields, j, V_ELEMENT) - v0) * per_cell
@@ -167,6 +170,10 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
             across = lane_transverse(belt, fields, j, net_left, net_right, bending)
             across = fma(-gyroscopic, (ahead(fields, j, U) - behind(fields, j, U)) * span, across)
             across = fma(-acceleration * mass, slope, across)
+            if belt.has_column:
+                across += column_across(belt, state, j)
+            if belt.is_curved:
+                across += across_by_curvature(belt, state, j, bending, belt_speed, masses)
             v_radial = fma(full_speed, slope, u)
             outward = -damping * v_radial
             along_element = (stress_0 - stress_left_0) * per_dual
@@ -199,6 +206,11 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
             stations[j, DU] = (across + outward) * mobility
             dv_0 = fma(along_element, element_mobility, -full_speed * (step * gap_left_0))
             dv_1 = fma(-(belt_speed + v1), step * gap_left_1, along_ring)
+            if belt.is_curved:
+                turning = belt.ring_curvature[j] * u * step
+                dv_0 = fma(-turning, full_speed, dv_0)
+                longer = fma(offset, belt.ring_curvature[j], 1.0)
+                dv_1 = fma(-turning, (belt_speed + v1) / longer, dv_1)
             stations[j, DV_0], stations[j, DV_1] = dv_0 - rise, dv_1 - rise
         net_left, ring_left, stress_left_0, stress_left_1 = net_right, ring_right, stress_0, stress_1
         gap_left_0, gap_left_1 = gap_0, gap_1

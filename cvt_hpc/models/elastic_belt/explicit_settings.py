@@ -7,6 +7,7 @@ waves. Over the map of jobs/lebrecht_2004.toml the limit is 0.19 us where fricti
 where it falls least.
 """
 
+from cvt_hpc.models.elastic_belt.ring_settings import refuse_layers
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers.facts import LANES, Facts
 
@@ -41,3 +42,6 @@ PARAMETERS = {
         "lanes": LANES,
     }
 }
+
+
+check = refuse_layers  # its kernels know the rings as one

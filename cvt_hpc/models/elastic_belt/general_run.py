@@ -11,6 +11,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt import one_system
 from cvt_hpc.models.elastic_belt.belt import (
     V_ELEMENT,
+    V_RING,
     Belt,
     Mesh,
     State,
@@ -19,9 +20,13 @@ from cvt_hpc.models.elastic_belt.belt import (
     initial_state,
     random_strands,
 )
+from cvt_hpc.models.elastic_belt.column import pressed_strains
 from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK, put_lane
 from cvt_hpc.models.elastic_belt.one_lane_run import OneLaneRun
 from cvt_hpc.models.elastic_belt.rhs import strains
+from cvt_hpc.models.elastic_belt.ring_settings import layer_count
+from cvt_hpc.models.elastic_belt.ring_system import LayeredForm
+from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.sparsity import SparseJacobian
 from cvt_hpc.models.elastic_belt.validity import FAILURES
@@ -82,18 +87,16 @@ class GeneralTransient(Marched, OneLaneRun):
         Name of a general stepper that the model does not refuse.
     """
 
-    form: type[Any] = Form  # what a model has instead has the same methods
-
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
         p = parameters
         self.done = 0
         self.prolong(p)
         self.belt = belt_constants(p)
         self._disturbed = False
-        self._form = self.form(self.belt, self.mesh, p)
-        first = initial_state(p, self.belt)
-        start = self._form.pack(first)
-        self._make_lane(self.belt, first)
+        form: type[Any] = LayeredForm if layer_count(p) > 1 else Form
+        self._form = form(self.belt, self.mesh, p)
+        start = self._form.pack(initial_state(p, self.belt))
+        self._make_lane(self.belt, self._form.state(0.0, start))
         self.marching = Marching(stepper, p, self._form.system, start, self.interval)
         self._stable = STABLE.get(stepper, np.inf)
         self._fastest = np.random.default_rng(0).normal(size=start.size)
@@ -198,6 +201,7 @@ def damper_power(belt: Belt, state: State) -> float:
     n = belt.cell.size
     eps = np.empty((2, n))
     strains(belt, state.fields, eps)
+    pressed = pressed_strains(belt, state.fields, eps[0])
     power = 0.0
     for layer in range(2):
         v = state.fields[V_ELEMENT + layer]
@@ -207,6 +211,13 @@ def damper_power(belt: Belt, state: State) -> float:
             damped = damper * closing / belt.cell[c]
             if layer == 0:
                 # elements that are apart have none, and it never makes them pull
-                damped = min(damped, -belt.element_stiffness * eps[0, c]) if eps[0, c] < 0.0 else 0.0
+                damped = min(damped, -belt.element_stiffness * pressed[c]) if pressed[c] < 0.0 else 0.0
             power += damped * closing
+    for k in range(FIRST_LAYER, (FIRST_LAYER + state.fields.shape[0]) // 2):
+        # beside what the layers' mean speed takes
+        share = 2.0 / (state.fields.shape[0] - FIRST_LAYER)
+        v = state.fields[k] - state.fields[V_RING]
+        for c in range(n):
+            closing = v[c + 1 if c < n - 1 else 0] - v[c]
+            power += share * belt.ring_damping * closing * closing / belt.cell[c]
     return power

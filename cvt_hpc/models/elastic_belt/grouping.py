@@ -16,6 +16,8 @@ STEP_COST = {"imex": 1.3e-7, "explicit": 6.2e-8}
 # Share of that which a run takes whose stations fill all lanes; in fewer parts it takes up to the whole.
 ALONE_SHARE = {"imex": 0.3, "explicit": 0.6}
 
+COST_PER_LAYER = 0.3  # of a ring layer, beside the rings as one
+
 LANES = {"double": 8, "single": 16}  # what registers of 64 bytes hold
 # What the runs of a batch have in common: the mesh, the law's kind, and the course of time.
 SHARED = (
@@ -40,6 +42,9 @@ SHARED = (
     "lanes",
     "contact_sweeps",
     "sheave_deformation",
+    "ring_layers",
+    "curvature_terms",
+    "column_bending",
     *MODE_KEYS,
     *RITZ,
 )
@@ -60,6 +65,8 @@ def cost(parameters: Mapping[str, Any], stepper: str, step_cost: Mapping[str, fl
     p = parameters
     is_alone = np.equal(p.get("lanes", "runs"), "stations")
     share = np.where(is_alone, ALONE_SHARE.get(stepper, 1.0), 1.0)[()]
+    layers = np.asarray(p.get("ring_layers", 1))
+    share = share * np.where(layers > 1, 1.0 + COST_PER_LAYER * layers, 1.0)[()]
     return share * step_cost.get(stepper, 1e-5) * p["stations"] * p["duration"] / p.get("step", 1e-6)
 
 

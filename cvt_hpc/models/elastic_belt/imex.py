@@ -57,6 +57,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneBelt,
     LaneState,
 )
+from cvt_hpc.models.elastic_belt.lane_column import foresee_column, lane_column
 from cvt_hpc.models.elastic_belt.lane_forces import (
     EPS_0,
     EPS_1,
@@ -70,6 +71,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     lane_pulleys,
     lane_sliding,
     lane_speed_share,
+    pressed_strain,
 )
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 
@@ -89,28 +91,34 @@ def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
     step : float
         Step [s].
     """
-    stations, scalars = work.stations, state.scalars
+    stations = work.stations
     lane_sliding(belt, state, stations)
     assemble(belt, state, work, step, False)
+    if belt.has_column:
+        foresee_column(belt, state, stations, PUSH, step)
     for attempt in range(MOST_PASSES):
         eliminate(belt, state, work, step, attempt > 0)
-        found = substitute(belt, work, scalars, step)
+        found = substitute(belt, state, work, step)
         if found == 0 and attempt == 0:
             break
         if found == 0 or attempt == MOST_PASSES - 1:
-            _forget(work)
+            forget(work)
             break
         if found & TURNS_BACK:
             assemble(belt, state, work, step, True)
-    taken, moment = _advance(belt, state, work, step)
+            if belt.has_column:
+                foresee_column(belt, state, stations, PUSH, step)
+    taken, moment = advance_belt(belt, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
     advance_discs(belt, state, step)
     lane_contact_forces(belt, state, stations)
+    if belt.has_column:
+        lane_column(belt, state, stations, EPS_0)
 
 
 @kernel
-def _forget(work: ImexWork) -> None:
+def forget(work: ImexWork) -> None:
     """Clear the marks of what a step had to do again."""
     stations = work.stations
     for j in range(stations.rows):
@@ -118,7 +126,7 @@ def _forget(work: ImexWork) -> None:
 
 
 @kernel
-def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
+def advance_belt(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
     """Apply the increments, and find the new strains; the flanks' torques.
 
     What they take from the driving pulley, where that is free, and their moment on the driven one [N m].
@@ -150,7 +158,7 @@ def _advance(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
     work_done = zero
     for j in range(n - 1, -1, -1):
         per_cell = belt.per_cell[j]
-        v0, dv0, eps = fields[j, V_ELEMENT], stations[j, DV_0], stations[j, EPS_0]
+        v0, dv0, eps = fields[j, V_ELEMENT], stations[j, DV_0], pressed_strain(belt, state, stations, j)
         v1, dv1 = fields[j, V_RING], stations[j, DV_1]
         new_0, new_1 = v0 + dv0, v1 + dv1
         flux_0, flux_1 = first_0, first_1

@@ -40,9 +40,9 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneBelt,
     LaneState,
 )
+from cvt_hpc.models.elastic_belt.lane_column import across_by_curvature, column_across
 from cvt_hpc.models.elastic_belt.lane_forces import (
     COEFFICIENT,
-    EPS_0,
     EPS_1,
     FACTOR,
     FIELDS_OF_FORCES,
@@ -55,6 +55,8 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     lane_damping,
     lane_speed_share,
     lane_transverse,
+    pressed_behind,
+    pressed_strain,
     ring_grip,
 )
 from cvt_hpc.physics.flank import flank_shares
@@ -126,7 +128,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
     ring_friction, per_ring_width = c[0, RING_FRICTION], 1.0 / c[0, RING_FRICTION_SPEED]
     ring_relief = c[0, RING_RELIEF] * speed_share * speed_share
     centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
-    half_gyroscopic = -0.5 * gyroscopic
+    half_gyroscopic, masses = -0.5 * gyroscopic, (element_mass, ring_mass)
     damping = lane_damping(belt, state.time[0])
     base_mass = fma(mass, per_step, 0.5 * damping)
     element_rate = element_mass * per_step
@@ -141,12 +143,18 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
             ring_stiffness * behind(stations, j, EPS_1),
             ring_stiffness * stations[j, EPS_1],
         )
-        net_left = fma(element_stiffness, minimum(behind(stations, j, EPS_0), 0.0), ring_left - centrifugal)
-        net_right = fma(element_stiffness, minimum(stations[j, EPS_0], 0.0), ring_right - centrifugal)
+        net_left = minimum(pressed_behind(belt, state, stations, j), 0.0)
+        net_left = fma(element_stiffness, net_left, ring_left - centrifugal)
+        net_right = minimum(pressed_strain(belt, state, stations, j), 0.0)
+        net_right = fma(element_stiffness, net_right, ring_right - centrifugal)
         slope = (ahead(fields, j, W) - behind(fields, j, W)) * span
         transverse = lane_transverse(belt, fields, j, net_left, net_right, bending)
         transverse = fma(-gyroscopic, (ahead(fields, j, U) - behind(fields, j, U)) * span, transverse)
         transverse = fma(-acceleration * mass, slope, transverse)
+        if belt.has_column:
+            transverse += column_across(belt, state, j)
+        if belt.is_curved:
+            transverse += across_by_curvature(belt, state, j, bending, belt_speed, masses)
         full_speed = belt_speed + v0
         v_radial = fma(full_speed, slope, u)
         outward = -damping * v_radial
@@ -200,6 +208,11 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
         along_element = fma(outward, slope, along_element)
         mobility = 1.0 / radial_mass
         push, lag = (transverse + outward) * mobility, cross * mobility
+        if belt.is_curved:
+            # the mean velocity of the step but for what it owes to the layers' speeds
+            turning = belt.ring_curvature[j] * fma(0.5, push, u)
+            along_element = fma(-turning * element_mass, full_speed, along_element)
+            along_ring = fma(-turning * ring_mass, belt_speed + v1, along_ring)
         if anywhere(share > 0.0):
             stations[j, LAG], stations[j, SLOPE], stations[j, D_01] = lag, slope, dual * coupling
         stations[j, D_00], stations[j, D_11] = dual * fma(-cross, lag, element), dual * ring

@@ -49,11 +49,14 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     ELEMENT_DAMPING,
     ELEMENT_STIFFNESS,
     FRICTION_SPEED,
+    GIVE,
+    PRESSED,
     REPEATS,
     RING_DAMPING,
     RING_FRICTION_SPEED,
     RING_OFFSET,
     RING_STIFFNESS,
+    SHIFT,
     LaneBelt,
     LaneState,
 )
@@ -137,6 +140,10 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
             outflow = fma(0.5 * kappa * belt.cell[j], lifts, outflow)
         per_length = (step * per_cell) * stations[j, PER_CONTENT_0]
         at_end = fma(per_length, outflow, eps)
+        if belt.has_column:
+            strained, eps = at_end - eps, state.column[j, PRESSED]
+            at_end = fma(state.column[j, GIVE], strained, eps + state.column[j, SHIFT])
+            per_length *= state.column[j, GIVE]
         stress_0, e0 = element_stress(
             element_stiffness,
             element_damping * per_cell,
@@ -197,7 +204,7 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
 
 
 @kernel
-def substitute(belt: LaneBelt, work: ImexWork, scalars: LaneArray, step: float) -> int:
+def substitute(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> int:
     """Back substitution: DV become the increments of v_element and v_ring. Why the step has to be done again.
 
     0: it has not. Else it marks the places and returns the sum of its reasons:
@@ -208,7 +215,7 @@ def substitute(belt: LaneBelt, work: ImexWork, scalars: LaneArray, step: float) 
     - MEETS: elements that the step has taken as apart would be pressed together. Their push would set in a
       step late, go on by one cell a step instead of at the speed of waves, and pile up.
     """
-    stations, c = work.stations, belt.constants
+    stations, scalars, c = work.stations, state.scalars, belt.constants
     last = stations.rows - 1
     n0, n1 = stations[last, DV_0], stations[last, DV_1]
     # of the last row behind, the ring's last one where a lane is a ring
@@ -226,7 +233,7 @@ def substitute(belt: LaneBelt, work: ImexWork, scalars: LaneArray, step: float) 
             z0 = fma(stations[j, I_00], e0, fma(i01, e1, z0))
             z1 = fma(i01, e0, fma(stations[j, I_11], e1, z1))
             if anywhere(link <= 0.0):
-                met |= _meeting(belt, stations, j, n0 - z0, step)
+                met |= _meeting(belt, state, stations, j, n0 - z0, step)
             n0, n1 = z0, z1
             stations[j, DV_0], stations[j, DV_1] = n0, n1
         share = belt.arc_share[j]
@@ -245,7 +252,7 @@ def substitute(belt: LaneBelt, work: ImexWork, scalars: LaneArray, step: float) 
             if anywhere(back):
                 turned |= _mark(stations, j, RING_REVERSING, back)
     if anywhere(stations[last, LINK_0] <= 0.0):
-        met |= _meeting(belt, stations, last, from_ahead(n0) - stations[last, DV_0], step)
+        met |= _meeting(belt, state, stations, last, from_ahead(n0) - stations[last, DV_0], step)
     reasons = TURNS_BACK * anywhere(turned) + MEETS * anywhere(met)
     if reasons:
         repeats = scalars[0, REPEATS]
@@ -254,9 +261,11 @@ def substitute(belt: LaneBelt, work: ImexWork, scalars: LaneArray, step: float) 
 
 
 @merged_kernel
-def _meeting(belt: LaneBelt, stations: LaneArray, j: int, opening, step: float):
+def _meeting(belt: LaneBelt, state: LaneState, stations: LaneArray, j: int, opening, step: float):
     """Where elements of cell j that the step has taken as apart newly overlap, as `opening` [m/s] changes."""
     per_length = (step * belt.per_cell[j]) * stations[j, PER_CONTENT_0]
+    if belt.has_column:
+        per_length *= state.column[j, GIVE]
     overlap = fma(per_length, opening, stations[j, AHEAD]) < -LARGEST_OVERLAP
     overlap &= stations[j, LINK_0] <= 0.0
     if anywhere(overlap):

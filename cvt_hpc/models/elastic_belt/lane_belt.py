@@ -17,6 +17,7 @@ from cvt_hpc.lanes import LaneArray, split
 from cvt_hpc.models.elastic_belt.belt import (
     DRIVEN_POSITION,
     DRIVEN_SPEED,
+    FIELDS,
     FIRST_STATE,
     N_ELEMENT,
     N_RING,
@@ -25,8 +26,8 @@ from cvt_hpc.models.elastic_belt.belt import (
     V_RING,
     Belt,
     State,
-    bending_bands,
 )
+from cvt_hpc.models.elastic_belt.bending import bending_bands, bending_load
 from cvt_hpc.models.elastic_belt.pulleys import LAWS, STATES
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, speed_share_at
 from cvt_hpc.physics.compliance import Contact, lane_contact
@@ -73,6 +74,9 @@ CONSTANTS = (
     "start_share",
     "driving_cell",
     "driven_cell",
+    "column_stiffness",
+    "outer_edge",
+    "inner_edge",
     *LAWS,
 )
 FIRST_LAW = len(CONSTANTS) - len(LAWS)
@@ -114,6 +118,9 @@ FIRST_LAW = len(CONSTANTS) - len(LAWS)
     START_SHARE,
     DRIVING_CELL,
     DRIVEN_CELL,
+    COLUMN_STIFFNESS,
+    OUTER_EDGE,
+    INNER_EDGE,
 ) = range(FIRST_LAW)
 
 # Scalars of the state, of each lane, double in any precision: the driven pulley's two, the work of the
@@ -121,6 +128,37 @@ FIRST_LAW = len(CONSTANTS) - len(LAWS)
 # from FIRST_STATE on what free pulleys have beside.
 LANE_SCALARS = ("driven_speed", "driven_position", "layer_work", "repeats", *STATES)
 SPEED, POSITION, LAYER_WORK, REPEATS = range(FIRST_STATE)
+
+# Of the column, in `LaneState.column`: of the stations the deviation of curvature from the path's [1/m], its
+# change within a step, and the moment [N m]; of the cells -P / EA, its slopes with the strain and with the
+# curvature at both ends [m], its change within a step by turning, the moments of both halves times their
+# content [N m^2], and the energy per content [N].
+COLUMN = (
+    "deviation",
+    "turning",
+    "column_moment",
+    "pressed",
+    "give",
+    "turn_near",
+    "turn_far",
+    "shift",
+    "bearing_near",
+    "bearing_far",
+    "column_energy",
+)
+(
+    DEVIATION,
+    TURNING,
+    COLUMN_MOMENT,
+    PRESSED,
+    GIVE,
+    TURN_NEAR,
+    TURN_FAR,
+    SHIFT,
+    BEARING_NEAR,
+    BEARING_FAR,
+    COLUMN_ENERGY,
+) = range(len(COLUMN))
 
 LEAST_ROWS = 3  # of a part of a run: bending reaches two stations
 
@@ -139,9 +177,11 @@ class LaneBelt(NamedTuple):
         ring_mass (1 + ring_offset ring_curvature), and so with its centrifugal relief.
     bending : (N, 5) array
         As in `Belt`, for a bending stiffness of 1 N m^2.
+    bending_load, squared_curvature : (N,) arrays
+        As in `Belt`, the load for a bending stiffness of 1 N m^2.
     on_driven, enters : (N,) arrays
         Whether (1) a station lies on the driven half, from `driven_start` on, and is the first of an arc.
-    constants : (1, 59) LaneArray
+    constants : (1, 62) LaneArray
         CONSTANTS.
     driven_start : int
         First station of the driven arc.
@@ -155,6 +195,8 @@ class LaneBelt(NamedTuple):
         Whether some run's driving speed changes.
     is_free : bool
         Whether the pulleys have the states and laws of `pulleys.py`.
+    is_curved, has_column : bool
+        Whether curvature terms count, and whether pressed elements bear a bending moment.
     """
 
     cell: np.ndarray
@@ -167,6 +209,8 @@ class LaneBelt(NamedTuple):
     arc_share: np.ndarray
     ring_curvature: np.ndarray
     bending: np.ndarray
+    bending_load: np.ndarray
+    squared_curvature: np.ndarray
     on_driven: np.ndarray
     enters: np.ndarray
     constants: LaneArray
@@ -177,6 +221,8 @@ class LaneBelt(NamedTuple):
     ramp_end: float
     speed_ramps: bool
     is_free: bool
+    is_curved: bool
+    has_column: bool
 
 
 class LaneState(NamedTuple):
@@ -185,19 +231,23 @@ class LaneState(NamedTuple):
     Attributes
     ----------
     fields : (N, 7) LaneArray
-        FIELDS at each station: layers' speeds less the belt speed of `time`; contents less 1 + kappa d_i.
+        FIELDS at each station: layers' speeds less the belt speed of `time`; contents less 1 + kappa d_i. Of
+        rings in n layers (N, 7 + 2 n), see `rings.py`.
     scalars : (1, 12) LaneArray of doubles
         LANE_SCALARS.
     time : (1,) array
         [s]
     contacts : pair of Contact
         Driving and driven wrap.
+    column : (N, 11) LaneArray
+        COLUMN of these fields; without rows where elements bear no moment.
     """
 
     fields: LaneArray
     scalars: LaneArray
     time: np.ndarray
     contacts: tuple[Contact, Contact]
+    column: LaneArray
 
 
 def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
@@ -228,7 +278,9 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
         "arc_curvature": first.arc_curvature,
         "arc_share": first.arc_share,
         "ring_curvature": _ring_curvature(first),
-        "bending": bending_bands(cell, dual, 1.0),
+        "bending": bending_bands(cell, dual, 1.0, kappa, first.curvature_terms),
+        "bending_load": bending_load(cell, dual, 1.0, kappa, first.curvature_terms),
+        "squared_curvature": first.squared_curvature,
         "on_driven": stations >= first.driven_start,
         "enters": (stations == 0) | (stations == first.driven_start),
     }
@@ -242,6 +294,8 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
         ramp_end=first.ramp_end,
         speed_ramps=any(belt.speed_start != belt.driving_speed for belt in belts),
         is_free=first.pulleys.are_free,
+        is_curved=first.curvature_terms > 0,
+        has_column=first.has_column,
     )
 
 
@@ -304,7 +358,8 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type, sweeps: int 
     wraps = [[belt.driving for belt in belts], [belt.driven for belt in belts]]
     contacts = (lane_contact(wraps[0], dtype, sweeps), lane_contact(wraps[1], dtype, sweeps))
     settle_discs(contacts, belts, states)
-    return LaneState(fields, scalars, np.array([states[0].scalars[0]]), contacts)
+    column = LaneArray(n if belts[0].has_column else 0, len(COLUMN), lanes, dtype)
+    return LaneState(fields, scalars, np.array([states[0].scalars[0]]), contacts, column)
 
 
 def settle_discs(contacts: tuple[Contact, Contact], belts: list[Belt], states: list[State]) -> None:
@@ -330,7 +385,8 @@ def parts_of(stations: int, most: int) -> int:
 
 def parted_state(state: LaneState, parts: int) -> LaneState:
     """State of one run, its stations in linked parts; time and contacts remain those of `state`."""
-    return state._replace(fields=split(state.fields, parts), scalars=alike(state.scalars, parts))
+    linked = split(state.fields, parts), alike(state.scalars, parts), split(state.column, parts)
+    return state._replace(fields=linked[0], scalars=linked[1], column=linked[2])
 
 
 def parted(belt: LaneBelt, parts: int) -> LaneBelt:
@@ -371,6 +427,7 @@ def put_lane(fields: np.ndarray, scalars: np.ndarray, lane: int, belt: Belt, sta
     belt_speed = speed_share_at(belt, state.scalars[TIME]) * belt.belt_speed
     values[V_ELEMENT] -= belt_speed
     values[V_RING] -= belt_speed
+    values[len(FIELDS) : (len(values) + len(FIELDS)) // 2] -= belt_speed  # ring layers, where there are
     values[N_ELEMENT] -= 1.0
     values[N_RING] -= 1.0 + belt.curvature * belt.ring_offset
     fields[:, :, lane] = values.T
@@ -385,6 +442,7 @@ def take_lane(state: LaneState, lane: int, belt: Belt) -> State:
     belt_speed = speed_share_at(belt, state.time[0]) * belt.belt_speed
     values[V_ELEMENT] += belt_speed
     values[V_RING] += belt_speed
+    values[len(FIELDS) : (len(values) + len(FIELDS)) // 2] += belt_speed
     values[N_ELEMENT] += 1.0
     values[N_RING] += 1.0 + belt.curvature * belt.ring_offset
     scalars = state.scalars.data[0, :, lane]

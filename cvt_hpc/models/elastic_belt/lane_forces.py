@@ -51,6 +51,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LOAD_START,
     MASS,
     POSITION,
+    PRESSED,
     RING_FRICTION_SPEED,
     RING_MASS,
     RING_OFFSET,
@@ -61,6 +62,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneBelt,
     LaneState,
 )
+from cvt_hpc.models.elastic_belt.lane_column import lane_column
 from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVING_COS, EXCESS, SHIFT
 from cvt_hpc.physics.compliance import FORCED, GAP, contact_force, solve_contact
 from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
@@ -89,6 +91,20 @@ def derive(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Contact forces and strains of the present state."""
     lane_contact_forces(belt, state, stations)
     lane_strains(belt, state, stations)
+    if belt.has_column:
+        lane_column(belt, state, stations, EPS_0)
+
+
+@merged_kernel
+def pressed_strain(belt: LaneBelt, state: LaneState, stations: LaneArray, j: int):
+    """-P / EA of cell j, positive where its elements are apart."""
+    return state.column[j, PRESSED] if belt.has_column else stations[j, EPS_0]
+
+
+@merged_kernel
+def pressed_behind(belt: LaneBelt, state: LaneState, stations: LaneArray, j: int):
+    """As `pressed_strain`, of the cell behind station j."""
+    return behind(state.column, j, PRESSED) if belt.has_column else behind(stations, j, EPS_0)
 
 
 @kernel

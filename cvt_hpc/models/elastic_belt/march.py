@@ -64,8 +64,8 @@ def march_imex(
         for taken in range(steps):
             note_speeds(belt, state, work.stations, taken, steps)
             step_imex(belt, state, work, step)
-        _take_sample(state, work.stations, sampled, sensing, rows, k, profiles, ended)
-    _gather(state, work.stations, sampled, work.stations.data.shape[1])
+        take_sample(state, work.stations, sampled, sensing, rows, k, profiles, ended)
+    gather(state, work.stations, sampled, work.stations.data.shape[1])
 
 
 @kernel
@@ -88,12 +88,12 @@ def march_explicit(
         for taken in range(steps):
             note_speeds(belt, state, work.stations, taken, steps)
             step_explicit(belt, state, work, step)
-        _take_sample(state, work.stations, sampled, sensing, rows, k, profiles, ended)
-    _gather(state, work.stations, sampled, work.stations.data.shape[1])
+        take_sample(state, work.stations, sampled, sensing, rows, k, profiles, ended)
+    gather(state, work.stations, sampled, work.stations.data.shape[1])
 
 
 @kernel
-def _take_sample(
+def take_sample(
     state: LaneState,
     stations: LaneArray,
     sampled: Sampled,
@@ -104,17 +104,18 @@ def _take_sample(
     ended: LaneArray,
 ) -> None:
     """Sample what is marched, which may be in parts."""
-    _gather(state, stations, sampled, FIELDS_OF_FORCES)
+    gather(state, stations, sampled, FIELDS_OF_FORCES)
     sample(sampled.belt, sampled.state, sampled.stations, sensing, rows, k, profiles, ended)
     # a sample takes it to its end
     state.scalars[0, LAYER_WORK] = like(sampled.state.scalars[0, LAYER_WORK], state.scalars[0, LAYER_WORK])
 
 
 @kernel
-def _gather(state: LaneState, stations: LaneArray, sampled: Sampled, fields: int) -> None:
+def gather(state: LaneState, stations: LaneArray, sampled: Sampled, fields: int) -> None:
     """Put what is sampled together from linked parts, of the stations' work space its first `fields`."""
     merge_parts(state.fields, sampled.state.fields, state.fields.data.shape[1])
     merge_parts(stations, sampled.stations, fields)
+    merge_parts(state.column, sampled.state.column, state.column.data.shape[1])
     merge_parts(state.scalars, sampled.state.scalars, state.scalars.data.shape[1])
 
 

@@ -12,12 +12,15 @@ from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
 from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES
+from cvt_hpc.models.elastic_belt.lane_rings import SUMS, audit_layers, lane_rings
 from cvt_hpc.models.elastic_belt.march import sample_state
 from cvt_hpc.models.elastic_belt.momentary import Momentary
 from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, recording
-from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFILES, Outcome
+from cvt_hpc.models.elastic_belt.ring_settings import layer_count
+from cvt_hpc.models.elastic_belt.rings import ring_constants, without_saddle_friction
+from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFILES, SCALARS, Outcome
 
-_sample = called_alike(sample_state)
+_sample, _audit_layers = called_alike(sample_state), called_alike(audit_layers)
 
 
 class OneLaneRun(RecordedRun):
@@ -41,13 +44,25 @@ class OneLaneRun(RecordedRun):
             rows.data[: self.done, :, 0] = self.rows
         self._rows = rows
         self._momentary = Momentary([parameters], plan.mesh.cell.size)
+        # of the part that is not judged, and of the judged one
+        self._layer_sums = [LaneArray(layer_count(parameters) + 1, len(SUMS), 1) for _ in range(2)]
 
     def _make_lane(self, belt: Belt, first: State) -> None:
         """The same run as a single lane, which is what can be sampled."""
+        count = layer_count(self.parameters)
+        if count > 1:
+            self._rings = lane_rings([belt], [ring_constants(self.parameters, belt)], np.float64)
+            self._layers = LaneArray(self.mesh.cell.size, count, 1)
+            belt = without_saddle_friction(belt)
         self._lane_belt = lane_belt([belt], np.float64)
         self._lane = lane_state([belt], [first], np.float64)
         self._stations = LaneArray(self.mesh.cell.size, FIELDS_OF_FORCES, 1)
         self._ended = LaneArray(1, len(ENDED), 1)
+
+    @property
+    def layer_sums(self) -> np.ndarray | None:
+        """As of `RecordedRun`."""
+        return self._layer_sums[1].data[:, :, 0] if layer_count(self.parameters) > 1 else None
 
     @property
     def momentary(self) -> np.ndarray | None:
@@ -64,7 +79,8 @@ class OneLaneRun(RecordedRun):
         self.done, self._disturbed = run.done, run.done > self._plan.kick
         self._rows.data[: self.done, :, 0] = run.rows
         if self.done > self._plan.first_judged:
-            self._profiles[1].data[:] = np.nan  # what the other has summed up is not known
+            for sums in (self._profiles[1], self._layer_sums[1]):
+                sums.data[:] = np.nan  # what the other has summed up is not known
 
     def _sample_lane(self) -> Outcome:
         """Record what the lane holds; `done` is left to the caller."""
@@ -73,6 +89,10 @@ class OneLaneRun(RecordedRun):
         profiles = LaneArray(*self._profiles[1].data.shape) if is_kept else sums
         place = self._plan.sensing, self._rows, self.done, profiles, self._ended
         _sample(self._lane_belt, self._lane, self._stations, *place)
+        if layer_count(self.parameters) > 1:
+            first, layer_sums = self._sensed + len(SCALARS), self._layer_sums[int(is_judged)]
+            of_layers = self._lane_belt, self._rings, self._lane, self._layers, self._rows
+            _audit_layers(*of_layers, self.done, first, profiles, layer_sums)
         if is_kept:
             self._momentary.note(self.done, profiles)
             if is_judged:

@@ -77,8 +77,6 @@ class FlatBelt(NamedTuple):
         What the unknowns are counted from.
     start : float
         Simulated time at t = 0 [s].
-    rounding : float
-        Strain over which the corner of the push force, where elements part, is rounded off; 0 in every run.
     force, eps, rate, moments : (N,), (2, N), (7, N), (N,) arrays
         Work space: axial line forces, strains, rates, moments on the driven pulley.
     """
@@ -90,7 +88,6 @@ class FlatBelt(NamedTuple):
     loose: np.ndarray
     origin: np.ndarray
     start: float
-    rounding: float
     force: np.ndarray
     eps: np.ndarray
     rate: np.ndarray
@@ -118,7 +115,7 @@ def flat_belt(belt: Belt, start: float = 0.0) -> FlatBelt:
     origin = np.concatenate([rows, np.zeros(remembering.size + loose.size), driven])
     state = State(np.zeros((len(FIELDS), n)), np.zeros(len(SCALARS)))
     work = np.zeros(n), np.zeros((2, n)), np.zeros((len(FIELDS), n)), np.zeros(n)
-    return FlatBelt(belt, state, fresh_contacts(belt), remembering, loose, origin, start, 0.0, *work)
+    return FlatBelt(belt, state, fresh_contacts(belt), remembering, loose, origin, start, *work)
 
 
 def pack(flat: FlatBelt, state: State) -> np.ndarray:
@@ -212,10 +209,6 @@ def rates_under_forces(flat: FlatBelt) -> None:
     strains(belt, state.fields, flat.eps)
     memory_rates(belt, state, rate)
     content_rates(belt, state, flat.eps, rate)
-    if flat.rounding > 0.0:
-        for c in range(belt.cell.size):
-            eps = flat.eps[0, c]
-            flat.eps[0, c] = 0.5 * (eps - np.sqrt(eps * eps + flat.rounding * flat.rounding))
     accelerations(belt, state, flat.force, flat.eps, rate, flat.moments)
 
 

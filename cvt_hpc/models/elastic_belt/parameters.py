@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.bending_settings import BENDING, bending_inert, bending_problems
 from cvt_hpc.models.elastic_belt.deflection_settings import (
     DEFLECTION,
     deflection_inert,
@@ -18,6 +19,7 @@ from cvt_hpc.models.elastic_belt.deflection_settings import (
 )
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert, pulley_problems, shaft_problems
 from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, DRIVEN_SHAFT, PULLEYS, SHAFT
+from cvt_hpc.models.elastic_belt.ring_settings import RINGS, ring_inert, ring_problems, rings_rub
 from cvt_hpc.parameters import Notice, Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
@@ -131,10 +133,12 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "driven_inertia": DRIVEN_INERTIA,
     },
+    "bending": BENDING,
     "deflection": DEFLECTION,
     "pulleys": PULLEYS,
     "shaft": SHAFT,
     "driven_shaft": DRIVEN_SHAFT,
+    "rings": RINGS,
     "friction": FRICTION,
     "mesh": {
         "stations": Parameter(160, "", "cells around the belt", minimum=24, maximum=4096),
@@ -183,7 +187,7 @@ def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         if abs(p["play"]) > 0.02 * path:
             problems.append(("play", f"within 2 % of the belt's length {path:.4g} m", f"{p['play']:g} m"))
         problems += deflection_problems(p)
-    return problems + shaft_problems(p)
+    return problems + shaft_problems(p) + bending_problems(p) + ring_problems(p)
 
 
 def inert(parameters: dict[str, Any]) -> dict[str, str]:
@@ -204,7 +208,7 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
     of_disc, of_tilt = ("local_stiffness", "local_length"), ("tilt_stiffness", "tilt_factor")
     cases = (
         (p["disturbance"] == 0.0, ("seed",), "disturbance 0"),
-        (p["ring_friction"] == 0.0, ("ring_friction_speed",), "ring_friction 0"),
+        (not rings_rub(p), ("ring_friction_speed",), "ring_friction 0"),
         (p["sheave_stiffness"] == 1.0, ("stiffness_of",), "sheave_stiffness 1"),
         (np.isinf(p["tilt_factor"]), of_tilt[:1], "tilt_factor inf"),
         (np.isinf(p["tilt_stiffness"]), of_tilt[1:], "tilt_stiffness inf"),
@@ -212,4 +216,5 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         (np.isinf(whole), of_disc + of_tilt, "sheave_stiffness inf"),
     )
     found = {key: setting for holds, keys, setting in cases if holds for key in keys}
-    return friction_inert(p) | course_inert(p) | pulley_inert(p) | deflection_inert(p) | found
+    parts = friction_inert, course_inert, pulley_inert, deflection_inert, bending_inert, ring_inert
+    return {key: why for part in parts for key, why in part(p).items()} | found

@@ -27,6 +27,8 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     AXIAL_DAMPING,
     BELT_SPEED,
     BENDING_STIFFNESS,
+    COLUMN_ENERGY,
+    COLUMN_MOMENT,
     COSINE,
     DRIVEN_INERTIA,
     DRIVEN_RADIUS,
@@ -56,8 +58,8 @@ from cvt_hpc.models.elastic_belt.lane_belt import (
     LaneBelt,
     LaneState,
 )
+from cvt_hpc.models.elastic_belt.lane_column import curving
 from cvt_hpc.models.elastic_belt.lane_forces import (
-    EPS_0,
     EPS_1,
     FORCE,
     LEAST_SHARE_OF_WIDTH,
@@ -65,6 +67,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     lane_load,
     lane_pulleys,
     lane_speed_share,
+    pressed_strain,
     saddle_pressure,
 )
 from cvt_hpc.models.elastic_belt.moments import (
@@ -168,16 +171,24 @@ def audit(
         ring_here = ring_mass * longer
         moving = element_mass * v0 * v0 + ring_here * v1 * v1 + mass * u * u
         stored += (0.5 * dual) * (moving - c[0, BENDING_STIFFNESS] * w * bent)
-        pressed, stretched = minimum(stations[j, EPS_0], 0.0), stations[j, EPS_1]
+        if belt.is_curved:
+            stored -= dual * c[0, BENDING_STIFFNESS] * w * belt.bending_load[j]
+        pressed = minimum(pressed_strain(belt, state, stations, j), 0.0)
+        stretched = stations[j, EPS_1]
         rings = fields[j, N_ELEMENT + 1] + 1.0 + belt.curvature[j] * offset
         elastic = (fields[j, N_ELEMENT] + 1.0) * element_stiffness * pressed * pressed
+        if belt.has_column:
+            elastic = (fields[j, N_ELEMENT] + 1.0) * state.column[j, COLUMN_ENERGY]
         tension, push = ring_stiffness * stretched, -element_stiffness * pressed
         opening = fields[b, V_ELEMENT] - fields[j, V_ELEMENT]
         lifting = 0.5 * right * belt.curvature[j] * (u + fields[b, U])
         lifting += (fields[b, W] - w) * (fields[b, U] - u) * belt.per_cell[j]
         working = push * opening - tension * (fields[b, V_RING] - fields[j, V_RING])
         working -= (tension - push - centrifugal) * lifting
-        damped = -element_stiffness * stations[j, EPS_0] - element_damping * belt.per_cell[j] * opening
+        if belt.has_column:
+            working -= state.column[j, COLUMN_MOMENT] * dual * curving(belt, fields, j, U)
+        damped = -element_stiffness * pressed_strain(belt, state, stations, j)
+        damped -= element_damping * belt.per_cell[j] * opening
         if summed:
             add_stresses(profiles, j, working, tension, push, maximum(damped, zero) - push)
         stored += (0.5 * right) * (elastic + rings * ring_stiffness * stretched * stretched)

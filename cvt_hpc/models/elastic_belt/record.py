@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt import fluctuation
+from cvt_hpc.models.elastic_belt import fluctuation, ring_record
 from cvt_hpc.models.elastic_belt.belt import MODES
 from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.models.elastic_belt.history import histories
@@ -112,6 +112,7 @@ VARIABLES = (
         "m s-1",
         "speed that alternates from step to step, root mean square over the belt's mass and the judged part",
     ),
+    *ring_record.VARIABLES,
     *fluctuation.VARIABLES,
     Variable("least_strand_force", (), "f8", "N", "smallest T - P - m v^2 in a strand: below 0 it is slack"),
 )
@@ -129,6 +130,7 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     return {
         **COORDINATES,
         **of_peaks,
+        **ring_record.coordinates(parameters),
         "arc_part": Coordinate(
             np.arange(1, fluctuation.ARC_PARTS + 1), "1", "part of the wrap", "from its inlet to its outlet"
         ),
@@ -193,6 +195,7 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
         "thrust_power": thrust,
         **{name: loss for name, loss in losses.items() if "flank" not in name},
         "step_ripple": np.sqrt(np.mean(run.channel("step_ripple")[judged] ** 2)),
+        **ring_record.layer_record(run),
         **fluctuation_record(run),
         "least_strand_force": run.channel("least_strand_force")[judged].min(),
     }

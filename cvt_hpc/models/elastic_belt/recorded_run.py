@@ -123,6 +123,10 @@ class RecordedRun:
             """Simulated time [s]."""
 
         @property
+        def layer_sums(self) -> np.ndarray | None:
+            """`lane_rings.SUMS` of ring layers over the judged part, (n + 1, 6); None where rings are one."""
+
+        @property
         def momentary(self) -> np.ndarray | None:
             """What `Momentary` has kept of the run."""
 
@@ -171,6 +175,12 @@ class RecordedRun:
         """
         count = self.done - self._plan.first_judged if self.failure is None else 0
         return dict(zip(PROFILES, self._sums.T / (count if count > 0 else np.nan), strict=True))
+
+    @property
+    def layer_means(self) -> np.ndarray | None:
+        """As `layer_sums`, means."""
+        count = self.done - self._plan.first_judged if self.failure is None else 0
+        return None if self.layer_sums is None else self.layer_sums / (count if count > 0 else np.nan)
 
     @property
     def fluctuation(self) -> Fluctuation:

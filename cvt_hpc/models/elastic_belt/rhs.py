@@ -40,6 +40,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     U,
     W,
 )
+from cvt_hpc.models.elastic_belt.column import column_across, column_forces
 from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVING_COS, EXCESS, SHIFT
 from cvt_hpc.physics.compliance import Contact, plain_contact, solve_wrap
 from cvt_hpc.physics.flank import flank_forces, flank_sliding
@@ -193,13 +194,17 @@ def accelerations(
     belt_speed, driving_speed = speed_share * belt.belt_speed, driving_speed_at(belt, state)
     acceleration = belt_acceleration_at(belt, state.scalars[TIME])
     centrifugal = belt.mass * belt_speed * belt_speed
-    damping = damping_at(belt, state.scalars[TIME])
+    damping, light = damping_at(belt, state.scalars[TIME]), belt.mass - belt.element_mass
+    pressed, moment = eps[0], eps[0]
+    if belt.has_column:
+        pressed, moment = np.empty(n), np.empty(n)
+        column_forces(belt, state.fields, eps[0], pressed, moment)
     for j in range(n):
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
         left, right, dual = belt.cell[a], belt.cell[j], belt.dual[j]
         ring_left, ring_right = belt.ring_stiffness * eps[1, a], belt.ring_stiffness * eps[1, j]
-        push_left = max(-belt.element_stiffness * eps[0, a], 0.0)
-        push_right = max(-belt.element_stiffness * eps[0, j], 0.0)
+        push_left = max(-belt.element_stiffness * pressed[a], 0.0)
+        push_right = max(-belt.element_stiffness * pressed[j], 0.0)
         net_left, net_right = ring_left - push_left - centrifugal, ring_right - push_right - centrifugal
         slope = (w[b] - w[a]) / (left + right)
 
@@ -211,6 +216,14 @@ def accelerations(
         transverse -= belt.mass * acceleration * slope
         for k in range(5):
             transverse += belt.bending[j, k] * w[(j + k - 2) % n]
+        if belt.has_column:
+            transverse += column_across(belt, moment, j)
+        turning = 0.0
+        if belt.curvature_terms > 0:
+            turning = 0.5 * (right * belt.curvature[j] + left * belt.curvature[a]) / dual
+            transverse += belt.bending_load[j]
+            transverse += turning * belt.element_mass * (v0[j] * v0[j] - belt_speed * belt_speed)
+            transverse += turning * light * (v1[j] * v1[j] - belt_speed * belt_speed)
         v_radial = u[j] + v0[j] * slope
         outward = -damping * v_radial
 
@@ -218,8 +231,8 @@ def accelerations(
         stress_left = ring_left + belt.ring_damping * (v1[j] - v1[a]) / left
         stress_right = ring_right + belt.ring_damping * (v1[b] - v1[j]) / right
         along_ring = (stress_right - stress_left) / dual
-        push_left = damped_push(belt, eps[0, a], (v0[j] - v0[a]) / left)
-        push_right = damped_push(belt, eps[0, j], (v0[b] - v0[j]) / right)
+        push_left = damped_push(belt, pressed[a], (v0[j] - v0[a]) / left)
+        push_right = damped_push(belt, pressed[j], (v0[b] - v0[j]) / right)
         along_element = -(push_right - push_left) / dual
 
         share, moments[j] = belt.arc_share[j], 0.0
@@ -242,6 +255,8 @@ def accelerations(
             along_element -= (1.0 + belt.ring_offset * belt.arc_curvature[j]) * drag
         along_element += outward * slope
         rate[U, j] = (transverse + outward) / belt.mass
+        along_element -= turning * belt.element_mass * v0[j] * u[j]
+        along_ring -= turning * light * v1[j] * u[j]
         rate[V_ELEMENT, j] = along_element / belt.element_mass - v0[j] * (v0[j] - v0[a]) / left
         rate[V_RING, j] = along_ring / belt.ring_mass[j] - v1[j] * (v1[j] - v1[a]) / left
 

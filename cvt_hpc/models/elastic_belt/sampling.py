@@ -32,6 +32,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     lane_load,
     lane_pulleys,
     lane_speed_share,
+    pressed_strain,
     step_ripple,
 )
 from cvt_hpc.models.elastic_belt.moments import MOMENTS, add
@@ -233,11 +234,12 @@ def sample(
         middle = sensing.middles[strand]
         rows[k, sensed + Scalar.RING_TENSION_T1 + strand] = ring_stiffness * stations[middle, EPS_1]
         rows[k, sensed + Scalar.PUSH_FORCE_T1 + strand] = maximum(
-            -element_stiffness * stations[middle, EPS_0], 0.0
+            -element_stiffness * pressed_strain(belt, state, stations, middle), 0.0
         )
         for j in range(sensing.starts[strand], sensing.stops[strand]):
             net = ring_stiffness * stations[j, EPS_1]
-            net = fma(element_stiffness, minimum(stations[j, EPS_0], 0.0), net)
+            pressed = minimum(pressed_strain(belt, state, stations, j), 0.0)
+            net = fma(element_stiffness, pressed, net)
             least = minimum(net, least)
     rows[k, sensed + Scalar.LEAST_STRAND_FORCE] = least - centrifugal
     driving_speed = like(c[0, DRIVING_SPEED], speed) * lane_speed_share(belt, state.time[0], speed)

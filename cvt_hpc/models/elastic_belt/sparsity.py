@@ -32,6 +32,13 @@ REACH = {
     N_ELEMENT: {W: (-1, 2), V_ELEMENT: (0, 1), N_ELEMENT: (-1, 1)},
     N_RING: {W: (-1, 2), V_RING: (0, 1), N_RING: (-1, 1)},
 }
+# With a column that bears a moment, which knows strains and turning of the cells around, and by the path's
+# curvature, which turns what runs along the belt into what moves across it, and back
+OF_COLUMN = {
+    U: {N_ELEMENT: (-2, 1)},
+    V_ELEMENT: {W: (-2, 2)},
+}
+OF_CURVATURE = {U: {V_RING: (0, 0)}, V_RING: {U: (0, 0)}}
 # A station's flank forces and filtered speed: beyond the above they know what happens on the driven pulley,
 # and where the belt enters its filtered speed is that of sliding there
 ON_FLANK = {U: (-1, 0), V_ELEMENT: (-1, 0), W: (-2, 1), V_FILTERED: (-1, 0)}
@@ -53,9 +60,11 @@ def pattern(flat: FlatBelt) -> csc_array:
             known = (rows >= 0) & (columns >= 0)
             found[rows[known], columns[known]] = True
 
-    for row, reaches in REACH.items():
-        for unknown, (behind, ahead) in reaches.items():
-            mark(row, unknown, np.arange(n), range(behind, ahead + 1))
+    more = [OF_COLUMN] * belt.has_column + [OF_CURVATURE] * (belt.curvature_terms > 0)
+    for reach in (REACH, *more):
+        for row, reaches in reach.items():
+            for unknown, (behind, ahead) in reaches.items():
+                mark(row, unknown, np.arange(n), range(behind, ahead + 1))
     for sheave, first in ((belt.driving, 0), (belt.driven, belt.driven_start)):
         arc = np.arange(first, first + sheave.weight.size)
         for row in (U, V_ELEMENT, V_FILTERED):

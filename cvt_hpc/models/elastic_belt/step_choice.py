@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.bending_settings import whole_bending_stiffness
 from cvt_hpc.parameters import Substitute
 from cvt_hpc.physics.geometry import cell_counts, variator, variator_problems
 from cvt_hpc.physics.sheaves import axial_element_stiffness
@@ -37,6 +38,8 @@ NEEDS = (
     "flank_stiffness",
     "element_factor",
     "half_wedge_angle",
+    "column_bending",
+    "column_stiffness",
 )
 
 
@@ -57,7 +60,7 @@ def transverse_limit(parameters: Mapping[str, Any]) -> float:
     cell = min(length / count for length, count in zip(path.lengths, counts, strict=True))
     slope = np.tan(p["half_wedge_angle"])
     force = 2.0 * slope * p["thrust"] / path.driven_wrap
-    stiffness = 16.0 * p["bending_stiffness"] / cell**4 + 4.0 * force / cell**2
+    stiffness = 16.0 * whole_bending_stiffness(p) / cell**4 + 4.0 * force / cell**2
     stiffness += 4.0 * slope**2 * axial_element_stiffness(p)
     return float(2.0 / np.sqrt(stiffness / (p["element_mass"] + p["ring_mass"])))
 

@@ -28,14 +28,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt.bending_settings import BENDING
 from cvt_hpc.models.elastic_belt.deflection_settings import DEFLECTION
 from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
+from cvt_hpc.models.elastic_belt.ring_settings import RINGS
 from cvt_hpc.physics.sheaves import axial_element_stiffness
 
 RIGID = 1e12  # [N/m]: of a mode that does not open; it gives way by 0.1 um under 100 kN
 
 # By key of the continuum the only value that the pushbelt has a counterpart of
-ONLY = {"driving_position": 0.0, "longitudinal_mass": 1.0, "sheave_deformation": "bending", **PULLEY_DEFAULTS}
+ONLY = {
+    "driving_position": 0.0,
+    "longitudinal_mass": 1.0,
+    "sheave_deformation": "bending",
+    "ring_layers": 1,
+    "curvature_terms": "none",
+    "column_bending": "off",
+    **PULLEY_DEFAULTS,
+}
 # Of the continuum alone
 ABSENT = (
     "reference_tension",
@@ -48,6 +58,8 @@ ABSENT = (
     "modal_peaks",
     "profile_duration",
     *(key for key in DEFLECTION if key != "sheave_deformation"),
+    *(key for key in BENDING if key not in ONLY),
+    *(key for key in RINGS if key not in ONLY),
 )
 
 

@@ -9,7 +9,10 @@ from cvt_hpc.models.elastic_belt import check, inert
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers import taken
 
-PARAMETERS = elastic_belt.PARAMETERS | {
+# elements without a moment, no curvature terms, and the rings as one
+PARAMETERS = {
+    table: keys for table, keys in elastic_belt.PARAMETERS.items() if table not in ("bending", "rings")
+} | {
     "limit": {
         "limit_frequency": Parameter(
             1000.0,

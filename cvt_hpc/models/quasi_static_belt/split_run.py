@@ -23,7 +23,8 @@ from cvt_hpc.models.elastic_belt.one_lane_run import OneLaneRun
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.validity import FAILURES
 from cvt_hpc.models.quasi_static_belt.basis import split_basis
-from cvt_hpc.models.quasi_static_belt.step import march, motion, refresh, split_belt, work_space
+from cvt_hpc.models.quasi_static_belt.split_belt import motion, refresh, split_belt, work_space
+from cvt_hpc.models.quasi_static_belt.step import march
 from cvt_hpc.variables import Status
 
 BEYOND_LIMIT = 1.25  # of 2 / w of the fastest dynamic shape: contact may be stiffer than at rest

@@ -46,7 +46,6 @@ from cvt_hpc.models.steady_variator.linearised import Linearisation
 
 LATE = 1e9  # [s]: load and damping are those after any start-up
 TYPICAL_SPEED = 100.0  # [rad/s]: of the driving pulley, from which on the sizes of speeds are those below
-TYPICAL_SLIDING = 0.1  # [m/s]: filtered speed to begin with
 # what counts alike in each unknown: w, eps_0, eps_1, v_f; Q_0, Q_1, driven speed, position
 SIZES = (1e-4, 1e-3, 1e-4, 0.1)
 SIZES_OF_SCALARS = (0.1, 0.1, 1.0, 1e-4)
@@ -70,19 +69,15 @@ class Equations:
         With dampers that act up to where their push has ended.
     sizes : (n,) array
         Typical size of each unknown.
-    rounding : float
-        Strain over which the corner of the push force is rounded off [1]; 0: not.
     """
 
     def __init__(self, parameters: Mapping[str, Any], belt: Belt) -> None:
         self.belt = belt._replace(bridging_stiffness=belt.element_stiffness)
-        self.rounding = 0.0
         self._flat = flat_belt(self.belt, LATE)
         self._linearise = Linearisation(self._flat)
         first = initial_state(parameters, belt)
         self._contents = first.fields[N_ELEMENT : N_ELEMENT + 2] @ belt.cell
         n, self._memories = belt.cell.size, self._flat.remembering.size
-        self._initial = first
         self._moving = moving_states(belt.pulleys)
         # the filtered speeds end here, then come the pulleys' states and four scalars
         self._filtered = slice(3 * n, 3 * n + self._memories)
@@ -106,12 +101,6 @@ class Equations:
         self.belt = self.belt._replace(**changes)
         self._flat = self._flat._replace(belt=self.belt)
 
-    def initial(self) -> np.ndarray:
-        """Unknowns near the steady state without load: the belt in its grooves, strains uniform."""
-        x = self.unknowns(self._initial)
-        x[self._filtered] = TYPICAL_SLIDING
-        return x
-
     def unknowns(self, state: State) -> np.ndarray:
         """Unknowns nearest to a state."""
         n = self.belt.cell.size
@@ -134,7 +123,7 @@ class Equations:
         Rates are in [m/s^2], [rad/s^2] and [m/s], contents in [m].
         """
         y = self._flat_unknowns(x)
-        flat = self._flat._replace(rounding=self.rounding)
+        flat = self._flat
         if not rates(flat, 0.0, y, self._out):
             return None
         contents = flat.state.fields[N_ELEMENT : N_ELEMENT + 2] @ self.belt.cell
@@ -145,7 +134,7 @@ class Equations:
 
     def jacobian(self, x: np.ndarray) -> csc_array:
         """Slopes of the residual, (n, n), about the unknowns of its last call."""
-        slopes = self._linearise(self._flat._replace(rounding=self.rounding))
+        slopes = self._linearise(self._flat)
         chain = self._chain(x)
         n = self.belt.cell.size
         contents = csr_array(np.kron(np.eye(2), self.belt.cell)) @ chain[4 * n : 6 * n]

@@ -27,6 +27,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     Mesh,
     W,
 )
+from cvt_hpc.models.elastic_belt.column import pressed_strains
 from cvt_hpc.models.elastic_belt.pulleys import EXCESS
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
 from cvt_hpc.models.steady_variator.sampled import sampled, sampled_profiles
@@ -86,7 +87,7 @@ def distributions(steady: Steady) -> Distributions:
     sliding = np.where(belt.arc_share > 0.0, fields[V_ELEMENT] - turning * radius, 0.0)
     return Distributions(
         belt.ring_stiffness * eps[1],
-        np.maximum(-belt.element_stiffness * eps[0], 0.0),
+        np.maximum(-belt.element_stiffness * pressed_strains(belt, fields, eps[0]), 0.0),
         force,
         fields[V_ELEMENT].copy(),
         fields[V_RING].copy(),
@@ -111,7 +112,7 @@ def layer_loss(steady: Steady) -> float:
     eps = np.empty((2, belt.cell.size))
     strains(belt, fields, eps)
     opening, stretching = (np.roll(v, -1) - v for v in fields[V_ELEMENT : V_RING + 1])
-    elastic = -belt.element_stiffness * eps[0]
+    elastic = -belt.element_stiffness * pressed_strains(belt, fields, eps[0])
     pushed = np.maximum(elastic - belt.element_damping * opening / belt.cell, 0.0)
     rings = belt.ring_damping * stretching**2 / belt.cell
     return float((rings - (pushed - np.maximum(elastic, 0.0)) * opening).sum())

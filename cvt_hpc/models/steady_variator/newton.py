@@ -1,9 +1,8 @@
-"""Newton's iteration for equations with corners: full steps, or damped ones where these do not lead home.
+"""Newton's iteration for equations with corners, by full steps.
 
 With the corners sharp a full step solves the equations for the presumed set of pressed elements, and the next
 set follows from its signs: the active-set iteration of complementarity problems, which ends after a few sets.
-Shortening its steps only hinders it. Far from home, and with corners rounded off, the step is shortened until
-the next one would be smaller (Deuflhard's natural monotonicity test), whatever the equations' units.
+Shortening its steps, or rounding off the corners, only hinders it.
 """
 
 from __future__ import annotations
@@ -15,9 +14,7 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
 FULL_STEPS = 15  # a good start needs 3 to 6, a far one 12
-DAMPED_STEPS = 25
 FAR = 1e4  # of the unknowns' sizes: a step beyond, such as 1 m of w, does not come back
-SHORTEST = 1e-2  # of a full step: a direction that asks for less does not lead home
 
 
 class Solvable(Protocol):
@@ -32,35 +29,27 @@ class Solvable(Protocol):
         """Slopes of the residual, about the unknowns of its last call."""
 
 
-def newton(
-    equations: Solvable,
-    x: np.ndarray,
-    tolerance: float,
-    damped: bool = False,
-    most: int = FULL_STEPS,
-) -> np.ndarray | None:
+def newton(equations: Solvable, x: np.ndarray, tolerance: float, most: int = FULL_STEPS) -> np.ndarray | None:
     """Solve the steady equations.
 
     Parameters
     ----------
     equations : Solvable
-        With their constants and rounding.
+        With their constants.
     x : (n,) array
         Where to begin; left as it is.
     tolerance : float
         Root mean square of what a further step would be, over the unknowns' sizes.
-    damped : bool
-        Shorten steps that do not lead home.
     most : int
-        Of full steps.
+        Of steps.
 
     Returns
     -------
     (n,) array or None
         The solution; None where the iteration does not end.
     """
-    residual, share = equations.residual(x), 1.0
-    for _ in range(DAMPED_STEPS if damped else most):
+    residual = equations.residual(x)
+    for _ in range(most):
         if residual is None or not np.all(np.isfinite(residual)):
             return None
         matrix = equations.jacobian(x)
@@ -71,23 +60,13 @@ def newton(
         except RuntimeError:  # exactly singular
             return None
         step = -factors.solve(residual)
-        size = _size(equations, step)
-        if not size < FAR:
+        if not _size(equations, step) < FAR:
             return None
-        share = min(1.0, 4.0 * share) if damped else 1.0
-        while True:
-            found = x + share * step
-            residual = equations.residual(found)
-            # by the same factors, what the next step would be
-            ahead = np.inf if residual is None else _size(equations, factors.solve(residual))
-            if not damped or ahead <= (1.0 - 0.25 * share) * size:
-                break
-            share *= 0.5
-            if share < SHORTEST:
-                return None
-        if share == 1.0 and ahead < tolerance:
-            return found
-        x = found
+        x = x + step
+        residual = equations.residual(x)
+        # by the same factors, what the next step would be
+        if residual is not None and _size(equations, factors.solve(residual)) < tolerance:
+            return x
     return None
 
 

@@ -26,7 +26,7 @@ OF_LAGS = ("tilt_lag", "ratio_gain")
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     section: {key: parameter for key, parameter in table.items() if key not in OF_THE_COURSE}
     for section, table in elastic_belt.PARAMETERS.items()
-    if section != "record"  # of a transient
+    if section not in ("rings", "record")  # of a transient
 }
 
 

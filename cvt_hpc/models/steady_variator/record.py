@@ -66,6 +66,10 @@ def solve(parameters: Mapping[str, Any]) -> Found | ValueError:
 
 def judge(solution: Found | ValueError) -> dict[str, Any]:
     """The record of a run, its cost apart."""
+    from cvt_hpc.models.steady_variator.walking import SlipsThrough
+
+    if isinstance(solution, SlipsThrough):
+        return {"status": Status.DONE, "vibrates": Vibrates.SLIPS, "reason": str(solution)}
     if isinstance(solution, ValueError):
         return {"status": Status.FAILED_NUMERICS, "reason": str(solution)}
     largest = np.abs(solution.values["slip"]).max()

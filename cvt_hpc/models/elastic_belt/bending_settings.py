@@ -1,0 +1,73 @@
+"""What a job may set of the belt's bending: curvature terms, and the moment of the pressed elements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from cvt_hpc.parameters import Parameter, not_negative, positive
+
+CURVATURE_TERMS = ("none", "path", "straight")
+EDGES = ("outer_edge", "inner_edge")
+
+BENDING: dict[str, Parameter] = {
+    "curvature_terms": Parameter(
+        "none",
+        "",
+        "terms of the path's curvature in the transverse motion (Bullinger et al. 2005, eqs 14-21): none, or "
+        "those of a belt whose shape at rest is the path, or straight",
+        choices=CURVATURE_TERMS,
+    ),
+    "column_bending": Parameter(
+        "off",
+        "",
+        "rocking: pressed elements bear a bending moment, and rock on the edges of their faces (eqs 22-24)",
+        choices=("off", "rocking"),
+    ),
+    "column_stiffness": positive(
+        0.5,
+        "N m^2",
+        "EI of the pressed elements while their faces rest on each other",
+        sensible=(0.0001, 10000.0),
+    ),
+    "outer_edge": not_negative(
+        1e-3,
+        "m",
+        "k+: from the pitch line outwards to the edge of the elements' faces",
+        sensible=(1e-6, 0.05),
+    ),
+    "inner_edge": not_negative(
+        0.0, "m", "k-: from the pitch line inwards to the edge of the elements' faces", sensible=(1e-6, 0.05)
+    ),
+}
+
+BENDING_DEFAULTS = {key: parameter.default for key, parameter in BENDING.items()}
+
+
+def has_column(parameters: Mapping[str, Any]) -> bool:
+    """Whether pressed elements bear a bending moment."""
+    return bool(parameters.get("column_bending", "off") == "rocking")
+
+
+def whole_bending_stiffness(parameters: Mapping[str, Any]) -> float:
+    """Largest bending stiffness that the belt may have [N m^2], pressed elements included.
+
+    Of the parameters it reads those alone that have an effect.
+    """
+    column = parameters["column_stiffness"] if has_column(parameters) else 0.0
+    return float(parameters["bending_stiffness"] + column)
+
+
+def bending_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems of the belt's bending: (key, expected, found)."""
+    p = BENDING_DEFAULTS | dict(parameters)
+    if p["curvature_terms"] != "none" and p["longitudinal_mass"] != 1.0:
+        return [("curvature_terms", "none with longitudinal_mass other than 1", p["curvature_terms"])]
+    return []
+
+
+def bending_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+    """Settings of the belt's bending without effect, each with the setting that makes it so."""
+    if has_column(parameters):
+        return {}
+    return dict.fromkeys(("column_stiffness", *EDGES), "column_bending off")

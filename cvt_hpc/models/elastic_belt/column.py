@@ -1,0 +1,127 @@
+"""The column of pressed elements: its push force and its bending moment, with edges on which elements rock.
+
+Faces reach from k- inside to k+ outside of the pitch line. What they carry, the push force P and its moment M
+(P times its distance outwards from the pitch line), lies between the edges: P >= 0, -k- P <= M <= k+ P.
+Between the faces the bodies give way by P / EA and bend by M / EI. So the complementary energy is
+P^2 / 2 EA + M^2 / 2 EI within that cone, and the energy of a column under the strain eps of its pitch line
+and the curvature kappa, per length,
+
+    U(eps, kappa) = max over the cone of  -P eps - M kappa - P^2 / 2 EA - M^2 / 2 EI,
+    P = -dU/deps,   M = -dU/dkappa:
+
+- faces that rest on each other, |EI kappa| <= k |EA eps|: P = -EA eps, M = -EI kappa, a beam;
+- elements that rock on the edge at y (-k- where kappa > 0, k+ where kappa < 0): M = y P and
+  P = -EA (eps + y kappa) / (1 + y^2 EA / EI), the edge's strain against bodies that bend under y P;
+- apart: neither.
+
+At a given P this is M of Bullinger et al. 2005, eq. 24. Their eqs 32 and 41 have P = -EA eps beside it, at
+any curvature: then dP/dkappa = 0 while dM/deps is not where elements rock, so no energy belongs to both, and
+a cycle of eps and kappa does work. Here the edge's strain counts, and none does.
+
+The force M kappa_s along the column, of second order and at most (k P)^2 / 2 EI where an arc ends, is left
+out.
+
+On the path itself elements touch without force at eps_0 = 0, whatever k-: eps = eps_0 + k- kappa_path. Both
+halves of a cell have the cell's strain, each the curvature of its own station.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel, merged_kernel
+from cvt_hpc.lanes import absolute, fma, maximum, select
+from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, Belt, W
+
+
+@merged_kernel
+def rocking_column(eps, kappa, stiffness, bending, outer, inner):
+    """Forces of the column under a strain and a curvature.
+
+    Parameters
+    ----------
+    eps, kappa
+        Strain of the pitch line [1], curvature [1/m].
+    stiffness, bending
+        EA [N], EI [N m^2].
+    outer, inner
+        k+, k- [m].
+
+    Returns
+    -------
+    strain, give, turn, moment
+        -P / EA; where elements are apart the gap's strain at the edge that meets first. Its slopes with eps
+        and with kappa [m], and M [N m].
+    """
+    edge = select(kappa > 0.0, -inner, outer)
+    bent = bending * kappa
+    give = bending / fma(stiffness * edge, edge, bending)
+    strain = give * fma(edge, kappa, eps)
+    rests = absolute(bent) <= -stiffness * absolute(edge) * eps
+    moment = select(rests, -bent, edge * maximum(-stiffness * strain, 0.0))
+    return select(rests, eps, strain), select(rests, 1.0, give), select(rests, 0.0, give * edge), moment
+
+
+@merged_kernel
+def deviating_curvature(belt: Belt, w: np.ndarray, j: int) -> float:
+    """What the belt's curvature at station j has beyond its path's [1/m]."""
+    n = belt.cell.size
+    a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
+    turned = ((w[b] - w[j]) / belt.cell[j] - (w[j] - w[a]) / belt.cell[a]) / belt.dual[j]
+    return -turned - belt.squared_curvature[j] * w[j]
+
+
+@kernel
+def column_forces(
+    belt: Belt, fields: np.ndarray, eps: np.ndarray, pressed: np.ndarray, moment: np.ndarray
+) -> None:
+    """Push and moment of the column around the belt.
+
+    Parameters
+    ----------
+    belt, fields
+        Constants, fields of the state.
+    eps : (N,) array
+        Strain of the elements in the cells.
+    pressed : (N,) array
+        Result: -P / EA in the cells, mean of both halves; positive where elements are apart.
+    moment : (N,) array
+        Result: M at the stations [N m].
+    """
+    n, w = belt.cell.size, fields[W]
+    moment[:] = 0.0
+    for c in range(n):
+        closed, least = 0.0, np.inf
+        for half in range(2):
+            j = (c + half) % n
+            kappa = belt.curvature[c] + deviating_curvature(belt, w, j)
+            strain, _, _, borne = rocking_column(
+                eps[c] + belt.inner_edge * belt.curvature[c],
+                kappa,
+                belt.element_stiffness,
+                belt.column_stiffness,
+                belt.outer_edge,
+                belt.inner_edge,
+            )
+            closed += 0.5 * min(strain, 0.0)
+            least = min(strain, least)
+            moment[j] += 0.5 * belt.cell[c] * fields[N_ELEMENT, c] * borne / belt.dual[j]
+        pressed[c] = closed if closed < 0.0 else least
+
+
+@merged_kernel
+def column_across(belt: Belt, moment: np.ndarray, j: int) -> float:
+    """Line force of the column's moment across the belt at station j, outwards [N/m]."""
+    n = belt.cell.size
+    a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
+    turned = (moment[b] - moment[j]) / belt.cell[j] - (moment[j] - moment[a]) / belt.cell[a]
+    return -turned / belt.dual[j] - belt.squared_curvature[j] * moment[j]
+
+
+@kernel
+def pressed_strains(belt: Belt, fields: np.ndarray, eps: np.ndarray) -> np.ndarray:
+    """-P / EA in the cells, (N,), positive where elements are apart; `eps` (N,) is their strain."""
+    pressed = eps.copy()
+    if belt.has_column:
+        column_forces(belt, fields, eps, pressed, np.empty(eps.size))
+    return pressed

@@ -1,0 +1,78 @@
+"""What the record of a run holds of ring layers: tension and speed by layer, loss and sliding by surface."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cvt_hpc.models.elastic_belt.lane_rings import LOSS, SLIDING, SPEED_SUM, TENSION
+from cvt_hpc.models.elastic_belt.ring_settings import MOST_LAYERS, layer_count
+from cvt_hpc.variables import Coordinate, Variable
+
+if TYPE_CHECKING:
+    from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
+
+VARIABLES = (
+    Variable(
+        "layer_tension",
+        ("ring_layer", "strand"),
+        "f8",
+        "N",
+        "mean tension of each ring layer in the middle of the strand; nan: no such layer",
+        words="tension by ring layer",
+    ),
+    Variable(
+        "layer_speed",
+        ("ring_layer",),
+        "f8",
+        "m s-1",
+        "mean speed of each ring layer around the belt",
+        words="speed by ring layer",
+    ),
+    Variable(
+        "surface_loss",
+        ("ring_surface",),
+        "f8",
+        "W",
+        "mean loss of each sliding surface of the rings; together they are ring_loss",
+        words="loss by ring surface",
+    ),
+    Variable(
+        "surface_sliding",
+        ("ring_surface", "pulley"),
+        "f8",
+        "m s-1",
+        "mean size of the sliding speed of each surface of the rings on the arc",
+        words="sliding by ring surface",
+    ),
+)
+
+
+def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+    """Dimensions of VARIABLES where the rings are layers: as many as there can be, for jobs that vary it."""
+    if layer_count(parameters) == 1:
+        return {}
+    words = "0: saddle; k: between the layers k and k + 1; behind the outermost layer the elements' ears"
+    return {
+        "ring_layer": Coordinate(np.arange(1, MOST_LAYERS + 1), "1", "ring layer", "the inner one first"),
+        "ring_surface": Coordinate(np.arange(MOST_LAYERS + 1), "1", "surface of ring layers", words),
+    }
+
+
+def layer_record(run: RecordedRun) -> dict[str, Any]:
+    """Values of VARIABLES from a finished run; none where the rings are one."""
+    means = run.layer_means
+    if means is None:
+        return {}
+    padded = np.full((MOST_LAYERS + 1, means.shape[1]), np.nan)
+    padded[: len(means)] = means
+    # the ears have no layer behind them
+    padded[len(means) - 1, TENSION:] = np.nan
+    return {
+        "layer_tension": padded[:MOST_LAYERS, TENSION : TENSION + 2],
+        "layer_speed": padded[:MOST_LAYERS, SPEED_SUM],
+        "surface_loss": padded[:, LOSS],
+        "surface_sliding": padded[:, SLIDING : SLIDING + 2],
+    }

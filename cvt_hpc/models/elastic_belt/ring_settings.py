@@ -1,0 +1,94 @@
+"""What a job may set of the rings as a stack of layers, what does not fit together, and what has no effect.
+
+No paper gives numbers: thickness and friction are assumptions, those of common belts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from cvt_hpc.parameters import Parameter, not_negative, positive
+
+MOST_LAYERS = 12  # of pushbelts that are built: 9 to 12
+
+RINGS: dict[str, Parameter] = {
+    "ring_layers": Parameter(
+        1,
+        "",
+        "ring layers, each with a speed and a length of its own, that share mass and stiffness of the rings; "
+        "1: all rings as one",
+        minimum=1,
+        maximum=MOST_LAYERS,
+    ),
+    "layer_thickness": not_negative(
+        0.185e-3,
+        "m",
+        "thickness of a ring layer; ring_offset is that of the middle of the stack",
+        (1e-6, 5e-3),
+    ),
+    "layer_tolerance": Parameter(
+        (),
+        "",
+        "length of each layer over the one that fits, k_i, inner layer first; none: all fit",
+        minimum=0.99,
+        maximum=1.01,
+    ),
+    "layer_friction": not_negative(0.08, "", "kinetic friction coefficient between ring layers"),
+    "ring_static_factor": Parameter(
+        1.0,
+        "",
+        "static over kinetic friction, among layers, at the saddle and at the elements' ears",
+        minimum=1.0,
+        maximum=10.0,
+    ),
+    "ring_stribeck_speed": positive(
+        0.05, "m/s", "speed over which that static friction falls to the kinetic one", sensible=(1e-4, 10.0)
+    ),
+}
+
+RING_DEFAULTS = {key: parameter.default for key, parameter in RINGS.items()}
+
+
+def layer_count(parameters: Mapping[str, Any]) -> int:
+    """Number of ring layers."""
+    return int(parameters.get("ring_layers", 1))
+
+
+def ring_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems of the layers, in the form of a model's check."""
+    p = RING_DEFAULTS | dict(parameters)
+    tolerance = p["layer_tolerance"]
+    if tolerance and len(tolerance) != p["ring_layers"]:
+        expected = f"one for each of {p['ring_layers']} ring_layers, or none"
+        return [("layer_tolerance", expected, str(len(tolerance)))]
+    if p["ring_layers"] == 1:
+        return []
+    # terms of the elements' moments and of curvature know the rings as one
+    plain = {"curvature_terms": "none", "column_bending": "off"}
+    return [
+        (key, f'"{value}" with ring_layers above 1', f'"{p[key]}"')
+        for key, value in plain.items()
+        if p.get(key, value) != value
+    ]
+
+
+def rings_rub(parameters: Mapping[str, Any]) -> bool:
+    """Whether rings have friction, at the saddle or among each other."""
+    p = RING_DEFAULTS | dict(parameters)
+    return bool(p["ring_friction"] > 0.0 or (p["ring_layers"] > 1 and p["layer_friction"] > 0.0))
+
+
+def ring_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+    """Settings of the layers without effect, each with the setting that makes it so."""
+    p = RING_DEFAULTS | dict(parameters)
+    if p["ring_layers"] == 1:
+        return dict.fromkeys((key for key in RINGS if key != "ring_layers"), "ring_layers 1")
+    return {"ring_stribeck_speed": "ring_static_factor 1"} if p["ring_static_factor"] == 1.0 else {}
+
+
+def refuse_layers(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """The check of a method that knows one ring layer only."""
+    count = layer_count(parameters)
+    told = "1 with the explicit step; layers take imex or a general method such as dormand_prince"
+    return [("ring_layers", told, str(count))] if count > 1 else []

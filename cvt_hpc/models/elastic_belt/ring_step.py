@@ -1,0 +1,389 @@
+"""The fast step of the elastic belt with ring layers: `imex` with the layers eliminated at each station.
+
+At a station friction couples elements, layer 1, .., layer n and, where the outer layer bears on the ears,
+the elements again; along the belt only stresses couple. The tension of the rings as one is treated as `imex`
+does, by backward Euler: it is a force f that all layers have in common. So the chain of the layers is
+eliminated station by station,
+
+    A dv = r + f 1 + b dv_0,      dv the layers' increments, dv_0 the elements',
+
+and what is left is the 2x2 block of `imex`, of elements and the layers' mean dv_1, exactly:
+
+    f = (n dv_1 - 1.A^-1 r - dv_0 1.A^-1 b) / 1.A^-1 1.
+
+A layer's tension beyond the mean, T_k - T / n, is explicit (leapfrog): waves of layers against each other,
+at 5 km/s. Where these cross more than a cell in a step, what layers move against their mean has as much more
+inertia as keeps the step stable,
+
+    factor = max(1, 1.1 (EA dt^2 / h^2 + 2 D dt / h^2) / m),
+
+some 40 at 4.6 us and 160 stations, 1 below 0.75 us: the error vanishes with the step. Friction is implicit,
+with its slope, or where it would turn sliding about by itself with as much of the secant as prevents that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from cvt_hpc.kernels import kernel, merged_kernel
+from cvt_hpc.lanes import LaneArray, ahead, anywhere, around, behind, fma, like, maximum, split
+from cvt_hpc.models.elastic_belt.belt import N_RING, V_ELEMENT, V_RING, Belt, W
+from cvt_hpc.models.elastic_belt.imex import MOST_PASSES, advance_belt, forget
+from cvt_hpc.models.elastic_belt.imex_stations import (
+    D_00,
+    D_01,
+    D_11,
+    DV_0,
+    DV_1,
+    Y_0,
+    Y_1,
+    ImexWork,
+    assemble,
+    imex_work,
+)
+from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
+from cvt_hpc.models.elastic_belt.lane_belt import (
+    BELT_SPEED,
+    ELEMENT_MASS,
+    LAYER_WORK,
+    RING_FRICTION_SPEED,
+    RING_OFFSET,
+    LaneBelt,
+    LaneState,
+)
+from cvt_hpc.models.elastic_belt.lane_forces import (
+    EPS_1,
+    LEAST_SHARE_OF_WIDTH,
+    PER_CONTENT_1,
+    SADDLE,
+    SHORT_1,
+    advance_discs,
+    lane_acceleration,
+    lane_contact_forces,
+    lane_sliding,
+    lane_speed_share,
+)
+from cvt_hpc.models.elastic_belt.lane_rings import (
+    DAMPING_RATE,
+    FIRST_OFFSET,
+    LAYER_DAMPING,
+    LAYER_FRICTION_LEVEL,
+    LAYER_MASS,
+    LAYER_RELIEF,
+    LAYER_STIFFNESS,
+    PER_STRIBECK,
+    PER_WIDTH,
+    SADDLE_FRICTION_LEVEL,
+    STATIC_EXCESS,
+    STRESS_RATE,
+    SUMS,
+    LaneRings,
+    lane_rings,
+    layer_strain,
+    parted_rings,
+    surface_factors,
+)
+from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
+from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER, Rings
+from cvt_hpc.physics.layers import ring_friction
+
+# Fields of RingWork.layers, STRIDE of each layer: strain; of the eliminated chain the increment by its own
+# forces, those per common force, per increment of the elements by way of the ears, and of the layer, or the
+# elements, below. Before that the sum of inward forces below the layer, after it the flux of content. Behind
+# them, of the station, what gives f, and the force of the ears.
+EPS, PART, COMMON, ELEMENTS, LINK = range(5)
+STRIDE = 5
+OWN_SUM, ELEMENT_SUM, PER_COMMON_SUM, ON_EARS = FIELDS_OF_STATION = range(4)
+
+
+class RingWork(NamedTuple):
+    """Work space of the step.
+
+    Attributes
+    ----------
+    stations : (N, 43) LaneArray
+        As of `ImexWork`.
+    layers : (N, 5 n + 4) LaneArray
+        See above.
+    rings : LaneRings
+        Constants of the layers.
+    whole : LaneRings
+        The same for samples, which like the other two are not in parts.
+    audited : (N, n) LaneArray
+        Work space of samples.
+    sums : (n + 1, 6) LaneArray of doubles
+        `lane_rings.SUMS` over the judged part.
+    """
+
+    stations: LaneArray
+    layers: LaneArray
+    rings: LaneRings
+    whole: LaneRings
+    audited: LaneArray
+    sums: LaneArray
+
+
+def ring_work(state: LaneState, belts: Sequence[Belt], rings: Sequence[Rings]) -> RingWork:
+    """Work space for a state; `derive` has to be called before the first step."""
+    rows, _, lanes = state.fields.data.shape
+    dtype, count = state.fields.data.dtype, rings[0].length.size
+    constants = lane_rings(belts, rings, dtype)
+    return RingWork(
+        imex_work(state).stations,
+        LaneArray(rows, STRIDE * count + len(FIELDS_OF_STATION), lanes, dtype),
+        constants,
+        constants,
+        LaneArray(rows, count, lanes, dtype),
+        LaneArray(count + 1, len(SUMS), lanes),
+    )
+
+
+def parted_ring_work(work: RingWork, parts: int) -> RingWork:
+    """Work space of one run, its stations in linked parts."""
+    return work._replace(
+        stations=split(work.stations, parts),
+        layers=split(work.layers, parts),
+        rings=parted_rings(work.rings, parts),
+    )
+
+
+@kernel
+def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) -> None:
+    """One step, of a belt whose rings as one do not rub.
+
+    Parameters
+    ----------
+    belt, state, work
+        Constants, state (advanced in place), work space, that holds what `derive` finds of this state, and
+        the layers' strains.
+    step : float
+        Step [s].
+    """
+    one = ImexWork(work.stations)
+    lane_sliding(belt, state, work.stations)
+    assemble(belt, state, one, step, False)
+    couple_layers(belt, work.rings, state, work, step)
+    for attempt in range(MOST_PASSES):
+        eliminate(belt, state, one, step, attempt > 0)
+        found = substitute(belt, state, one, step)
+        if found == 0 and attempt == 0:
+            break
+        if found == 0 or attempt == MOST_PASSES - 1:
+            forget(one)
+            break
+        if found & TURNS_BACK:
+            assemble(belt, state, one, step, True)
+            couple_layers(belt, work.rings, state, work, step)
+    taken, moment = advance_belt(belt, state, one, step)
+    advance_layers(belt, work.rings, state, work, step)
+    advance_pulleys(belt, state, taken, moment, step)
+    state.time[0] += step
+    advance_discs(belt, state, step)
+    lane_contact_forces(belt, state, work.stations)
+
+
+@merged_kernel
+def heavier_by(rings: LaneRings, step: float):
+    """Factor on the inertia of what layers move against their mean."""
+    c = rings.constants
+    needed = 1.1 * (step * step * c[0, STRESS_RATE] + step * c[0, DAMPING_RATE])
+    return maximum(needed, 1.0)
+
+
+@kernel
+def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: RingWork, step: float) -> None:
+    """Eliminate the layers: their part of the blocks and right side of elements and rings as one."""
+    n, fields, stations, layers, c = rings.number, state.fields, work.stations, work.layers, rings.constants
+    sine = belt.constants[0, RING_OFFSET]
+    share = lane_speed_share(belt, state.time[0], sine)
+    belt_speed = share * belt.constants[0, BELT_SPEED]
+    acceleration = lane_acceleration(belt, state.time[0], step)
+    per_step = 1.0 / step
+    mass, stiffness, damping = c[0, LAYER_MASS], c[0, LAYER_STIFFNESS], c[0, LAYER_DAMPING]
+    heavier = heavier_by(rings, step)
+    relief = c[0, LAYER_RELIEF] * share * share
+    excess, per_stribeck, per_width = c[0, STATIC_EXCESS], c[0, PER_STRIBECK], c[0, PER_WIDTH]
+    least = LEAST_SHARE_OF_WIDTH * belt.constants[0, RING_FRICTION_SPEED]
+    zero = like(0.0, sine)
+    free = 1.0 / (heavier * mass * per_step)
+    # reduced masses over the step: of two layers, and of the inner one, with all it takes along, and elements
+    between = 0.5 * heavier * mass * per_step
+    inner = mass / (1.0 / n + (1.0 - 1.0 / n) / heavier)
+    element_mass = belt.constants[0, ELEMENT_MASS]
+    at_saddle = inner * element_mass / (inner + element_mass) * per_step
+    for j in range(fields.rows):
+        dual, per_dual, turn = belt.dual[j], belt.per_dual[j], belt.ring_curvature[j]
+        per_cell, per_left = belt.per_cell[j], behind(belt.per_cell, j, 0)
+        united, united_a = fields[j, V_RING], behind(fields, j, V_RING)
+        united_b = ahead(fields, j, V_RING)
+        # a layer's share of the stress as one, on both sides
+        even_l = fma(stiffness, behind(stations, j, EPS_1), damping * per_left * (united - united_a))
+        even_r = fma(stiffness, stations[j, EPS_1], damping * per_cell * (united_b - united))
+        longer = fma(belt.constants[0, RING_OFFSET], turn, 1.0)
+        carried = fma((belt_speed + united) * per_left, united - united_a, acceleration)
+        carried = (heavier - 1.0) * mass * longer * carried
+        on_arc = anywhere(belt.arc_share[j] > 0.0)
+        is_driven = belt.on_driven[j] > 0.5
+        element = fields[j, V_ELEMENT]
+        left = right = largest = below = zero
+        if on_arc:
+            left = (0.5 * per_dual) * behind(belt.cell, j, 0) * behind(belt.curvature, j, 0) * stiffness
+            right = (0.5 * per_dual) * belt.cell[j] * belt.curvature[j] * stiffness
+            for k in range(n):
+                layers[j, STRIDE * k + PART] = below
+                weight = relief * turn * fma(c[0, FIRST_OFFSET + k], turn, 1.0)
+                inward = fma(left, behind(layers, j, STRIDE * k), fma(right, layers[j, STRIDE * k], -weight))
+                below += inward
+                largest = maximum(below, largest)
+        # of the surface above the present layer: friction, slope, the factor of the layer below it
+        drag_up = stiff_up = factor_up = zero
+        # of the ears: friction on the elements and its slopes
+        ear_drag = ear_stiff = ear_cross = zero
+        pressed = largest - below
+        on_ears = on_arc and anywhere(pressed > 0.0)
+        if on_ears:
+            above_factor, below_factor = surface_factors(rings, n, is_driven)
+            outer = fields[j, FIRST_LAYER + n - 1]
+            sliding = fma(below_factor, belt_speed + outer, -above_factor * (belt_speed + element))
+            secant, slope = ring_friction(
+                sliding, c[0, SADDLE_FRICTION_LEVEL], rings.falls, excess, per_stribeck, per_width, least
+            )
+            drag_up = pressed * secant * sliding
+            stiff_up = maximum(pressed * slope, fma(pressed, secant, -at_saddle))
+            factor_up = below_factor
+            ear_drag, ear_stiff = above_factor * drag_up, above_factor * above_factor * stiff_up
+            ear_cross = above_factor * below_factor * stiff_up
+        # of the layer above: its link to this one, inverse pivot and increments
+        link = pivot = part = common = elements = zero
+        own_sum = element_sum = common_sum = own_element = element_element = zero
+        drag = stiff = cross = below_factor = zero
+        for k in range(n - 1, -1, -1):
+            first = STRIDE * k
+            v, v_a = fields[j, FIRST_LAYER + k], behind(fields, j, FIRST_LAYER + k)
+            v_b = ahead(fields, j, FIRST_LAYER + k)
+            stress_l = fma(stiffness, behind(layers, j, first), damping * per_left * (v - v_a)) - even_l
+            stress_r = fma(stiffness, layers[j, first], damping * per_cell * (v_b - v)) - even_r
+            inertia = heavier * mass * fma(c[0, FIRST_OFFSET + k], turn, 1.0)
+            moved = fma((belt_speed + v) * per_left, v - v_a, acceleration)
+            force = fma(stress_r - stress_l, per_dual, fma(-inertia, moved, carried))
+            if not on_arc:
+                part = free * force
+                own_sum += part
+                common_sum += free
+                layers[j, first + PART] = part
+            else:
+                diagonal = inertia * per_step
+                by_common, by_elements = fma(link, common, 1.0), link * elements
+                pressed = largest - layers[j, first + PART]
+                above_factor, below_factor = surface_factors(rings, k, is_driven)
+                under = fields[j, FIRST_LAYER + k - 1] if k > 0 else element
+                sliding = fma(below_factor, belt_speed + under, -above_factor * (belt_speed + v))
+                level = c[0, LAYER_FRICTION_LEVEL] if k > 0 else c[0, SADDLE_FRICTION_LEVEL]
+                secant, slope = ring_friction(
+                    sliding, level, rings.falls, excess, per_stribeck, per_width, least
+                )
+                secant *= pressed
+                drag = secant * sliding
+                # not less than what keeps friction from turning sliding about within the step
+                stiff = maximum(pressed * slope, secant - (between if k > 0 else at_saddle))
+                cross = above_factor * below_factor * stiff
+                force += above_factor * drag - factor_up * drag_up
+                diagonal += above_factor * above_factor * stiff + factor_up * factor_up * stiff_up
+                diagonal = fma(-link * link, pivot, diagonal)
+                force = fma(link, part, force)
+                drag_up, stiff_up, factor_up, link = drag, stiff, below_factor, cross
+                pivot = 1.0 / diagonal
+                part, common = pivot * force, pivot * by_common
+                own_sum, common_sum = fma(part, by_common, own_sum), fma(common, by_common, common_sum)
+                layers[j, first + PART], layers[j, first + COMMON] = part, common
+                layers[j, first + LINK] = pivot * cross
+                if on_ears or k == 0:
+                    if k == n - 1:
+                        by_elements += ear_cross
+                    elements = pivot * by_elements
+                    if on_ears:
+                        layers[j, first + ELEMENTS] = elements
+                    if k == 0:
+                        by_elements += cross
+                        elements = fma(pivot, cross, elements)
+                    element_sum = fma(elements, by_common, element_sum)
+                    own_element = fma(part, by_elements, own_element)
+                    element_element = fma(elements, by_elements, element_element)
+        per_common = 1.0 / common_sum
+        last = STRIDE * n
+        layers[j, last + OWN_SUM], layers[j, last + ELEMENT_SUM] = own_sum, element_sum
+        layers[j, last + PER_COMMON_SUM], layers[j, last + ON_EARS] = per_common, pressed
+        if on_arc:
+            # the inner surface's friction on the elements
+            taken = below_factor * drag
+            stiff = fma(below_factor * below_factor, stiff, ear_stiff - element_element)
+            stiff = fma(element_sum * per_common, element_sum, stiff)
+            push = fma(-own_sum * per_common, element_sum, own_element + ear_drag - taken)
+            stations[j, D_00] = fma(dual, stiff, stations[j, D_00])
+            stations[j, Y_0] = fma(dual, push, stations[j, Y_0])
+        # the rings as one neither rub nor turn sliding about
+        stations[j, SADDLE] = 0.0
+        stations[j, D_01] = -(n * dual) * element_sum * per_common
+        united_rate = n * mass * longer * per_step
+        stations[j, D_11] = dual * fma(-(heavier - 1.0), united_rate, (n * n) * per_common)
+        stations[j, Y_1] = (n * dual) * own_sum * per_common
+
+
+@kernel
+def advance_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: RingWork, step: float) -> None:
+    """Apply the layers' increments; their strains, and those of the rings as one."""
+    n, fields, stations, layers, c = rings.number, state.fields, work.stations, work.layers, rings.constants
+    offset = belt.constants[0, RING_OFFSET]
+    belt_speed = lane_speed_share(belt, state.time[0], offset) * belt.constants[0, BELT_SPEED]
+    damping, last = c[0, LAYER_DAMPING], STRIDE * n
+    free = step / (heavier_by(rings, step) * c[0, LAYER_MASS])
+    lost = zero = offset * 0.0
+    for j in range(fields.rows + 1):
+        if j < fields.rows:
+            element = stations[j, DV_0]
+            common = fma(stations[j, DV_1], n, -layers[j, last + OWN_SUM])
+            common = fma(-layers[j, last + ELEMENT_SUM], element, common) * layers[j, last + PER_COMMON_SUM]
+            on_arc = anywhere(belt.arc_share[j] > 0.0)
+            on_ears = on_arc and anywhere(layers[j, last + ON_EARS] > 0.0)
+            change, total = element, zero
+            for k in range(n):
+                first = STRIDE * k
+                own = layers[j, first + PART]
+                if on_arc:
+                    own = fma(layers[j, first + COMMON], common, own)
+                    if on_ears:
+                        own = fma(layers[j, first + ELEMENTS], element, own)
+                    change = fma(layers[j, first + LINK], change, own)
+                else:
+                    change = fma(free, common, own)
+                v = fields[j, FIRST_LAYER + k] + change
+                fields[j, FIRST_LAYER + k] = v
+                total += v
+                # content that goes through, less that by the belt speed; 1 / (1 + eps) by its series
+                eps = behind(layers, j, first)
+                short = fma(-eps, fma(-eps, 1.0 - eps, 1.0), 1.0)
+                layers[j, first + PART] = fma(-belt_speed, eps, v) * short
+            fields[j, V_RING] = total / n
+        if j > 0:
+            # the cell behind the station, whose old strain is no longer needed
+            i = j - 1
+            kappa, per_cell = belt.curvature[i], belt.per_cell[i]
+            bent = (fields[i, W] + ahead(fields, i, W)) * (0.5 * kappa)
+            united, mean = ahead(fields, i, V_RING) - fields[i, V_RING], zero
+            for k in range(n):
+                first, row = STRIDE * k, FIRST_LAYER + n + k
+                outflow = ahead(layers, i, first + PART) - layers[i, first + PART]
+                fields[i, row] = fma(-step * per_cell, outflow, fields[i, row])
+                eps = layer_strain(rings, state, i, k, kappa, bent)
+                layers[i, first] = eps
+                mean += eps
+                closing = ahead(fields, i, FIRST_LAYER + k) - fields[i, FIRST_LAYER + k] - united
+                lost = fma(damping * per_cell * closing, closing, lost)
+            mean = mean / n
+            longer, short = fma(offset, kappa, 1.0), 1.0 / (mean + 1.0)
+            stations[i, EPS_1], stations[i, SHORT_1] = mean, short
+            stations[i, PER_CONTENT_1] = (mean + 1.0) / (bent + longer)
+            fields[i, N_RING] = fma(-longer, mean, bent) * short
+    work_done = state.scalars[0, LAYER_WORK]
+    state.scalars[0, LAYER_WORK] = work_done + around(like(lost, work_done)) * step

@@ -1,0 +1,232 @@
+"""Ring layers in their plain form: the elastic belt whose rings are n bands that slide on each other.
+
+All layers follow the path with the elements; each has a speed v_k and a content n_k of its own:
+
+    stretch   eps_k = (1 + kappa (w + d_k)) / n_k - 1,   T_k = EA_k eps_k
+    content   n_k,t + (v_k / (1 + eps_k)),s = 0
+    speed     m_k (v_k,t + v_k v_k,s) = T_k,s + a_k q_k - b_k+1 q_k+1
+
+with q_k the friction at the layer's inner surface, q_1 that of the saddle (Bullinger et al. 2005, eqs 43-48).
+A layer that turns about a pulley with v_k has the speed v_k (1 + c kappa) / (1 + d_k kappa) at a surface c
+above the pitch line: these are the factors a of the layer above a surface and b of the one below, and by
+virtual power also the shares of its friction that act along their neutral lines. Of elements d = 0.
+
+For the belt's other parts the rings are one: with the mean strain, whose tension is the sum of all, and the
+mean speed. Rows V_RING and N_RING of a state have these. The layers' own rows follow `FIELDS`: n speeds, then
+n contents less 1 + kappa d_k.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.models.elastic_belt.belt import FIELDS, N_RING, V_ELEMENT, V_RING, Belt, State, W
+from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH
+from cvt_hpc.models.elastic_belt.ring_settings import RING_DEFAULTS, layer_count
+from cvt_hpc.physics.layers import ring_friction, stack_forces
+
+FIRST_LAYER = len(FIELDS)  # row of a state with the first layer's speed
+
+
+class Rings(NamedTuple):
+    """Constants of n layers, in SI units; each has an n-th of the rings' mass, stiffness and damping.
+
+    Attributes
+    ----------
+    mass, relief, stiffness, damping : float
+        Inertia along the path per length [kg/m], tension that the layer's weight bears at the nominal speed
+        [N], EA [N], damping [N s].
+    offset : (n,) array
+        Neutral lines over the pitch line, d_k [m].
+    surface : (n + 1,) array
+        Surfaces over the pitch line: saddle, between layers, ears [m].
+    kinetic : (n + 1,) array
+        Kinetic friction coefficients of the surfaces.
+    static_excess, stribeck_speed, friction_speed : float
+        Static over kinetic friction less 1; speed of that fall, and of the regularisation [m/s].
+    length : (n,) array
+        Length of each layer without tension [m].
+    """
+
+    mass: float
+    relief: float
+    stiffness: float
+    damping: float
+    offset: np.ndarray
+    surface: np.ndarray
+    kinetic: np.ndarray
+    static_excess: float
+    stribeck_speed: float
+    friction_speed: float
+    length: np.ndarray
+
+
+def ring_constants(parameters: Mapping[str, Any], belt: Belt) -> Rings:
+    """Constants of the layers of one run.
+
+    Parameters
+    ----------
+    parameters : dict
+        Resolved parameters of the run [SI].
+    belt : Belt
+        Its constants.
+    """
+    p = RING_DEFAULTS | dict(parameters)
+    n, thickness = layer_count(p), p["layer_thickness"]
+    offset = p["ring_offset"] + thickness * (np.arange(n) - 0.5 * (n - 1))
+    surface = np.append(offset - 0.5 * thickness, offset[-1] + 0.5 * thickness)
+    kinetic = np.array([p["ring_friction"], *[p["layer_friction"]] * (n - 1), p["ring_friction"]])
+    # the path at each neutral line is longer by the angle that it turns about
+    fitting = (belt.cell.sum() + (belt.cell @ belt.curvature) * offset) / (
+        1.0 + p["reference_tension"] / p["ring_stiffness"]
+    )
+    return Rings(
+        mass=p["longitudinal_mass"] * p["ring_mass"] / n,
+        relief=p["ring_mass"] / n * belt.belt_speed**2,
+        stiffness=p["ring_stiffness"] / n,
+        damping=p["ring_damping"] / n,
+        offset=offset,
+        surface=surface,
+        kinetic=kinetic,
+        static_excess=p["ring_static_factor"] - 1.0,
+        stribeck_speed=p["ring_stribeck_speed"],
+        friction_speed=p["ring_friction_speed"],
+        length=fitting * np.array(p["layer_tolerance"] or [1.0] * n),
+    )
+
+
+def without_saddle_friction(belt: Belt) -> Belt:
+    """The belt whose rings as one do not rub: their layers do."""
+    return belt._replace(ring_friction=0.0)
+
+
+def with_layers(state: State, belt: Belt, rings: Rings) -> State:
+    """A state whose rings are one, with layers that have its speed and are strained alike all around."""
+    n = rings.length.size
+    fields = np.zeros((FIRST_LAYER + 2 * n, belt.cell.size))
+    fields[:FIRST_LAYER] = state.fields
+    w = state.fields[W]
+    bent = belt.curvature * 0.5 * (w + np.roll(w, -1))
+    for k in range(n):
+        stretched = 1.0 + bent + belt.curvature * rings.offset[k]
+        content = stretched * rings.length[k] / (belt.cell @ stretched)
+        fields[FIRST_LAYER + k] = state.fields[V_RING]
+        fields[FIRST_LAYER + n + k] = content - 1.0 - belt.curvature * rings.offset[k]
+    found = State(fields, state.scalars.copy())
+    unite_layers(belt, rings, found, np.empty((n, belt.cell.size)))
+    return found
+
+
+@kernel
+def unite_layers(belt: Belt, rings: Rings, state: State, eps: np.ndarray) -> None:
+    """Strains of the layers into `eps` (n, N), and of the rings as one into their rows of the state."""
+    fields, n = state.fields, rings.length.size
+    cells = belt.cell.size
+    for c in range(cells):
+        kappa = belt.curvature[c]
+        bent = kappa * 0.5 * (fields[W, c] + fields[W, (c + 1) % cells])
+        strain = speed = 0.0
+        for k in range(n):
+            more = fields[FIRST_LAYER + n + k, c]
+            eps[k, c] = (bent - more) / (1.0 + kappa * rings.offset[k] + more)
+            strain += eps[k, c]
+            speed += fields[FIRST_LAYER + k, c]
+        fields[V_RING, c] = speed / n
+        fields[N_RING, c] = (1.0 + bent + kappa * belt.ring_offset) / (1.0 + strain / n)
+
+
+@kernel
+def surface_friction(
+    belt: Belt,
+    rings: Rings,
+    state: State,
+    eps: np.ndarray,
+    share: float,
+    j: int,
+    normal: np.ndarray,
+    sliding: np.ndarray,
+) -> None:
+    """Normal line forces [N/m] and sliding speeds [m/s] of the surfaces at station j, (n + 1,) each.
+
+    Sliding is that of what lies below a surface against what lies above; `share` is the belt's speed over its
+    nominal one.
+    """
+    n, kappa = rings.length.size, belt.arc_curvature[j]
+    a = j - 1 if j > 0 else belt.cell.size - 1
+    left, right = belt.cell[a] * belt.curvature[a], belt.cell[j] * belt.curvature[j]
+    turn = 0.5 * (left + right) / belt.dual[j]
+    inward = np.empty(n)
+    for k in range(n):
+        tension = 0.5 * rings.stiffness * (left * eps[k, a] + right * eps[k, j]) / belt.dual[j]
+        weight = rings.relief * share * share * (1.0 + rings.offset[k] * turn)
+        inward[k] = tension - weight * turn
+    stack_forces(inward, normal)
+    below = element = state.fields[V_ELEMENT, j]
+    for k in range(n + 1):
+        above = state.fields[FIRST_LAYER + k, j] / (1.0 + rings.offset[k] * kappa) if k < n else element
+        sliding[k] = (1.0 + rings.surface[k] * kappa) * (below - above)
+        below = above
+
+
+@kernel
+def layer_rates(
+    belt: Belt, rings: Rings, state: State, eps: np.ndarray, share: float, rate: np.ndarray
+) -> None:
+    """Rates of the layers' speeds and contents, and what the surfaces' friction adds to the elements' speed.
+
+    Parameters
+    ----------
+    belt, rings
+        Constants.
+    state : State
+        With layers.
+    eps : (n, N) array
+        Their strains.
+    share : float
+        Belt speed over its nominal one.
+    rate : (2 n + 1, N) array
+        Result: of the speeds [m/s^2] and contents [1/s], then what is to be added for the elements [m/s^2].
+    """
+    n, cells = rings.length.size, belt.cell.size
+    normal, sliding = np.empty(n + 1), np.empty(n + 1)
+    v = state.fields[FIRST_LAYER : FIRST_LAYER + n]
+    for j in range(cells):
+        a, b = j - 1 if j > 0 else cells - 1, j + 1 if j < cells - 1 else 0
+        kappa = belt.arc_curvature[j]
+        weighted = 0.5 * (belt.cell[a] * belt.curvature[a] + belt.cell[j] * belt.curvature[j]) / belt.dual[j]
+        for k in range(n):
+            left = rings.stiffness * eps[k, a] + rings.damping * (v[k, j] - v[k, a]) / belt.cell[a]
+            right = rings.stiffness * eps[k, j] + rings.damping * (v[k, b] - v[k, j]) / belt.cell[j]
+            rate[k, j] = (right - left) / belt.dual[j]
+        rate[2 * n, j] = 0.0
+        if belt.arc_share[j] > 0.0:
+            surface_friction(belt, rings, state, eps, share, j, normal, sliding)
+            for k in range(n + 1):
+                secant, _ = ring_friction(
+                    sliding[k],
+                    rings.kinetic[k],
+                    True,
+                    rings.static_excess,
+                    1.0 / rings.stribeck_speed,
+                    1.0 / rings.friction_speed,
+                    LEAST_SHARE_OF_WIDTH * rings.friction_speed,
+                )
+                drag = (1.0 + rings.surface[k] * kappa) * normal[k] * secant * sliding[k]
+                if k < n:
+                    rate[k, j] += drag / (1.0 + rings.offset[k] * kappa)
+                else:
+                    rate[2 * n, j] += drag / belt.element_mass
+                if k > 0:
+                    rate[k - 1, j] -= drag / (1.0 + rings.offset[k - 1] * kappa)
+                else:
+                    rate[2 * n, j] -= drag / belt.element_mass
+        for k in range(n):
+            rate[k, j] /= rings.mass * (1.0 + rings.offset[k] * weighted)
+            rate[k, j] -= v[k, j] * (v[k, j] - v[k, a]) / belt.cell[a]
+            inflow = v[k, j] / (1.0 + eps[k, a if v[k, j] >= 0.0 else j])
+            outflow = v[k, b] / (1.0 + eps[k, j if v[k, b] >= 0.0 else b])
+            rate[n + k, j] = (inflow - outflow) / belt.cell[j]

@@ -1,0 +1,191 @@
+"""Increments of all speeds in a step: the coordinates' dense system, into which the layers' is eliminated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, TIME, U
+from cvt_hpc.models.elastic_belt.imex_system import LARGEST_OVERLAP
+from cvt_hpc.models.elastic_belt.rhs import speed_share_at
+from cvt_hpc.models.quasi_static_belt.coupled import solve_chain, solve_dense
+from cvt_hpc.models.quasi_static_belt.split_belt import (
+    ACROSS,
+    ALONG,
+    ALONG_RING,
+    CROSS_SLOPE,
+    ELEMENT_HOOP,
+    ELEMENT_STRAIN_AHEAD,
+    ELEMENT_STRESS,
+    HOOP_STRESS,
+    MEETING,
+    RADIAL_SLOPE,
+    RADIAL_SPEED,
+    REVERSING,
+    RING_HOOP,
+    RING_REVERSING,
+    RING_STRESS,
+    SADDLE_SPEED,
+    TANGENTIAL_SPEED,
+    Motion,
+    SplitBelt,
+    Work,
+)
+
+
+@kernel
+def solve_increments(model: SplitBelt, moved: Motion, work: Work) -> None:
+    """Increments of the coordinates' rates into `found`, of the layers' speeds into the chain's column 0."""
+    belt, stations, shapes, size = model.belt, work.stations, model.shapes, model.shapes.shape[1]
+    n, slow, matrix = belt.cell.size, model.dynamic, work.matrix
+    speed = speed_share_at(belt, moved.state.scalars[TIME]) * belt.belt_speed
+    whole = size + 2 if model.steady_flow else size
+    np.dot(model.inertia, moved.p, work.row)
+    for i in range(size):
+        for k in range(size):
+            matrix[i, k] = model.inertia[i, k] + speed * model.gyration[i, k]
+        matrix[i, whole] = -work.row[i] if i >= slow else 0.0
+    for i in range(size, whole):
+        matrix[i, : whole + 1] = 0.0
+        matrix[:size, i] = 0.0
+    if model.steady_flow:
+        for j in range(n):
+            cross, blocks = stations[CROSS_SLOPE, j], work.layers.diagonal
+            matrix[size, size] += blocks[j, 0]
+            matrix[size + 1, size + 1] += blocks[j, 2]
+            matrix[size, size + 1] += blocks[j, 1]
+            matrix[size + 1, size] += blocks[j, 1]
+            matrix[size, whole] += stations[ALONG, j]
+            matrix[size + 1, whole] += stations[ALONG_RING, j]
+            for i in range(size):
+                matrix[i, size] += shapes[j, i] * cross
+                matrix[size, i] += shapes[j, i] * cross
+    else:
+        _fill_chain(model, work)
+        solve_chain(work.layers)
+    _reduce(model, work)
+    solve_dense(matrix, whole, work.found)
+    columns, vector = work.layers.columns, work.vector
+    vector[:] = 0.0
+    vector[:size] = work.found[:size]
+    np.dot(shapes, vector, work.rate[U])
+    if model.steady_flow:
+        for j in range(n):
+            columns[2 * j, 0], columns[2 * j + 1, 0] = work.found[size], work.found[size + 1]
+        return
+    # the solution for the right side less those for the coordinates
+    closing = work.closing
+    closing[:] = 0.0
+    closing[0] = 1.0
+    closing[1 : size + 1] = -work.found[:size]
+    columns[:, 0] = np.dot(columns, closing)
+
+
+@kernel
+def _fill_chain(model: SplitBelt, work: Work) -> None:
+    """Right side of the layers' system, and its coupling with the coordinates."""
+    belt, stations, shapes, columns, size = (
+        model.belt,
+        work.stations,
+        model.shapes,
+        work.layers.columns,
+        model.shapes.shape[1],
+    )
+    n = belt.cell.size
+    columns[:] = 0.0
+    for j in range(n):
+        a = j - 1 if j > 0 else n - 1
+        columns[2 * j, 0] = stations[ALONG, j] + stations[ELEMENT_STRESS, j] - stations[ELEMENT_STRESS, a]
+        columns[2 * j + 1, 0] = stations[ALONG_RING, j] + stations[RING_STRESS, j] - stations[RING_STRESS, a]
+        cross = stations[CROSS_SLOPE, j]
+        if cross != 0.0:
+            row = columns[2 * j]
+            for k in range(size):
+                row[1 + k] += cross * shapes[j, k]
+    for j in range(n):
+        if belt.curvature[j] == 0.0:
+            continue
+        # a cell that moves outwards is stretched, and pulls at the stations at both its ends
+        b, half = j + 1 if j < n - 1 else 0, 0.5 * belt.curvature[j] * belt.cell[j]
+        for layer in range(2):
+            pull = half * stations[RING_HOOP if layer else ELEMENT_HOOP, j]
+            here, ahead = columns[2 * j + layer], columns[2 * b + layer]
+            for k in range(size):
+                stretched = pull * (shapes[j, k] + shapes[b, k])
+                here[1 + k] -= stretched
+                ahead[1 + k] += stretched
+
+
+@kernel
+def _reduce(model: SplitBelt, work: Work) -> None:
+    """Add the forces at the stations and their slopes to the dense system, with what the layers leave."""
+    belt, stations, shapes, columns, size = (
+        model.belt,
+        work.stations,
+        model.shapes,
+        work.layers.columns,
+        model.shapes.shape[1],
+    )
+    n, matrix = belt.cell.size, work.matrix
+    whole = size + 2 if model.steady_flow else size
+    row = work.row
+    for j in range(n):
+        cross, slope = stations[CROSS_SLOPE, j], stations[RADIAL_SLOPE, j]
+        right = stations[ACROSS, j]
+        for k in range(size):
+            row[k] = slope * shapes[j, k]
+        if not model.steady_flow and belt.arc_share[j] > 0.0:
+            done = columns[2 * j]
+            right -= cross * done[0]
+            for k in range(size):
+                row[k] -= cross * done[1 + k]
+            for side in range(2):
+                c = j if side == 0 else (j - 1 if j > 0 else n - 1)
+                if belt.curvature[c] == 0.0:
+                    continue
+                b, half = c + 1 if c < n - 1 else 0, 0.5 * belt.curvature[c] * belt.cell[c]
+                pull_0, pull_1 = half * stations[ELEMENT_HOOP, c], half * stations[RING_HOOP, c]
+                stiff = half * (pull_0 + pull_1)
+                e0, e1, e2, e3 = columns[2 * b], columns[2 * c], columns[2 * b + 1], columns[2 * c + 1]
+                right -= half * stations[HOOP_STRESS, c]
+                right -= pull_0 * (e0[0] - e1[0]) + pull_1 * (e2[0] - e3[0])
+                for k in range(size):
+                    row[k] += stiff * (shapes[c, k] + shapes[b, k])
+                    row[k] -= pull_0 * (e0[1 + k] - e1[1 + k]) + pull_1 * (e2[1 + k] - e3[1 + k])
+        for i in range(size):
+            shape = shapes[j, i]
+            if shape == 0.0:
+                continue
+            to = matrix[i]
+            to[whole] += shape * right
+            for k in range(size):
+                to[k] += shape * row[k]
+
+
+@kernel
+def contradicts(model: SplitBelt, moved: Motion, work: Work) -> bool:
+    """Mark where the step contradicts what it took for granted; whether anywhere newly. As `imex_system`."""
+    belt, stations, columns = model.belt, work.stations, work.layers.columns
+    n, found = belt.cell.size, False
+    for j in range(n):
+        dv0, dv1 = columns[2 * j, 0], columns[2 * j + 1, 0]
+        if belt.arc_share[j] > 0.0:
+            v_radial, v_tangential = stations[RADIAL_SPEED, j], stations[TANGENTIAL_SPEED, j]
+            squared = v_radial * v_radial + v_tangential * v_tangential
+            back = v_radial * work.rate[U, j] + v_tangential * dv0 < -squared
+            back = back and squared > belt.friction_speed * belt.friction_speed
+            if back and stations[REVERSING, j] < 0.5:
+                stations[REVERSING, j], found = 1.0, True
+            saddle = stations[SADDLE_SPEED, j]
+            change = (1.0 + belt.ring_offset * belt.arc_curvature[j]) * dv0 - dv1
+            back = abs(saddle) > belt.ring_friction_speed and saddle * (saddle + change) < 0.0
+            if back and stations[RING_REVERSING, j] < 0.5:
+                stations[RING_REVERSING, j], found = 1.0, True
+        if model.steady_flow or work.layers.links[0, j] > 0.0:
+            continue
+        b = j + 1 if j < n - 1 else 0
+        per_length = model.step / (belt.cell[j] * moved.state.fields[N_ELEMENT, j])
+        overlap = stations[ELEMENT_STRAIN_AHEAD, j] + per_length * (columns[2 * b, 0] - dv0)
+        if overlap < -LARGEST_OVERLAP and stations[MEETING, j] < 0.5:
+            stations[MEETING, j], found = 1.0, True
+    return found

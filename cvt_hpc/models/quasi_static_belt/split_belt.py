@@ -1,0 +1,216 @@
+"""The quasi-static belt as its step has it: constants, motion, work space.
+
+Rows of `Work.stations` are named here: what a step knows at each station.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.models.elastic_belt.belt import Belt, Mesh, State, U, W
+from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
+from cvt_hpc.models.quasi_static_belt.basis import Basis
+from cvt_hpc.models.quasi_static_belt.coupled import Chain, chain
+from cvt_hpc.physics.compliance import Contact
+
+# rows of Work.stations
+(
+    ACROSS,
+    ALONG,
+    ALONG_RING,
+    RADIAL_SLOPE,
+    CROSS_SLOPE,
+    TANGENTIAL_SLOPE,
+    RADIAL_SPEED,
+    TANGENTIAL_SPEED,
+    STIFFNESS_OF_SADDLE,
+    SADDLE_SPEED,
+    UNSTRESSED,
+    MEETING,
+    REVERSING,
+    RING_REVERSING,
+    ELEMENT_STRAIN_AHEAD,
+    ELEMENT_STRESS,
+    RING_STRESS,
+    HOOP_STRESS,
+    ELEMENT_HOOP,
+    RING_HOOP,
+) = range(20)
+
+
+class SplitBelt(NamedTuple):
+    """Constants of a run and its step.
+
+    Attributes
+    ----------
+    belt : Belt
+        As of the elastic belt.
+    shapes : (N, D + L) array
+        Dynamic shapes first.
+    dynamic : int
+        Their number D.
+    step : float
+        [s]
+    inertia : (D + L, D + L) array
+        M / dt of the dynamic ones, dt / (1 - exp(-dt / T)) K of the lagging ones [N s/m].
+    gyration : (D + L, D + L) array
+        Half of the gyroscopic matrix per belt speed, antisymmetric [N s^2/m^2].
+    steady_flow : bool
+        Each layer has one speed.
+    drag : (2,) array
+        Of the material against its layer's mean motion, with the steady flow [N s/m^2].
+    share : (2, N) array
+        The layers' mass at the stations over the layer's whole mass [1].
+    """
+
+    belt: Belt
+    shapes: np.ndarray
+    dynamic: int
+    step: float
+    inertia: np.ndarray
+    gyration: np.ndarray
+    steady_flow: bool
+    drag: np.ndarray
+    share: np.ndarray
+
+
+class Motion(NamedTuple):
+    """State of a run.
+
+    Attributes
+    ----------
+    state : State
+        As of the elastic belt; its u is what slides.
+    q, p : (D + L,) arrays
+        Coordinates [m] and their rates [m/s].
+    contacts : pair of Contact
+        Closed sets.
+    force : (N,) array
+        Axial line forces of `state` [N/m].
+    eps : (2, N) array
+        Strains of `state`.
+    counts : (3,) int array
+        Steps, steps done again, solves of the contact.
+    """
+
+    state: State
+    q: np.ndarray
+    p: np.ndarray
+    contacts: tuple[Contact, Contact]
+    force: np.ndarray
+    eps: np.ndarray
+    counts: np.ndarray
+
+
+class Work(NamedTuple):
+    """Work space: at the stations (20, N), rates (7, N), moments (N,); the layers; the dense system."""
+
+    stations: np.ndarray
+    rate: np.ndarray
+    moments: np.ndarray
+    layers: Chain
+    matrix: np.ndarray
+    row: np.ndarray
+    found: np.ndarray
+    vector: np.ndarray
+    closing: np.ndarray
+
+
+def lag_drag(belt: Belt, grid: Mesh, lag: float) -> np.ndarray:
+    """Drag (2,) [N s/m^2] by which the longest wave of a layer settles with a time constant [s]."""
+    longest = 2.0 * np.pi / grid.path.path_length
+    return np.array([belt.element_stiffness, belt.ring_stiffness]) * longest**2 * lag
+
+
+def layer_shares(belt: Belt) -> np.ndarray:
+    """The layers' mass at the stations over the layer's whole mass, (2, N) [1]."""
+    layers = np.array([np.full(belt.cell.size, belt.element_mass), belt.ring_mass]) * belt.dual
+    return layers / layers.sum(axis=1, keepdims=True)
+
+
+def split_belt(
+    belt: Belt, grid: Mesh, basis: Basis, limit: float, longitudinal: str, step: float
+) -> SplitBelt:
+    """Constants of a run.
+
+    Parameters
+    ----------
+    belt, grid, basis
+        The belt, its mesh and its shapes.
+    limit : float
+        Limit frequency [Hz].
+    longitudinal : str
+        As the parameter of the job.
+    step : float
+        [s]
+    """
+    lag = 1.0 / (2.0 * np.pi * limit)
+    shapes = np.ascontiguousarray(np.hstack([basis.dynamic, basis.lagging]))
+    count, slow = shapes.shape[1], basis.dynamic.shape[1]
+    inertia = np.zeros((count, count))
+    inertia[:slow, :slow] = (basis.dynamic.T * (belt.mass * belt.dual)) @ basis.dynamic / step
+    held = basis.lagging.T @ basis.stiffness @ basis.lagging
+    inertia[slow:, slow:] = step / -np.expm1(-step / lag) * held
+    difference = np.roll(np.eye(belt.cell.size), 1, axis=1) - np.roll(np.eye(belt.cell.size), -1, axis=1)
+    # 2 m v u_s, a difference of the neighbours over both cells, times the length of the station: half of it
+    gyration = 0.5 * belt.mass * shapes.T @ difference @ shapes
+    return SplitBelt(
+        belt,
+        shapes,
+        slow,
+        step,
+        inertia,
+        np.ascontiguousarray(0.5 * (gyration - gyration.T)),
+        longitudinal == "steady_flow",
+        lag_drag(belt, grid, lag),
+        layer_shares(belt),
+    )
+
+
+def work_space(model: SplitBelt) -> Work:
+    """Work space of a step."""
+    n, size = model.belt.cell.size, model.shapes.shape[1] + 2
+    width = 8 * ((size + 1 + 7) // 8)
+    return Work(
+        np.zeros((20, n)),
+        np.zeros((7, n)),
+        np.zeros(n),
+        chain(n, model.shapes.shape[1]),
+        np.zeros((size, width)),
+        np.zeros(model.shapes.shape[1]),
+        np.zeros(size),
+        np.zeros(model.shapes.shape[1]),
+        np.zeros(8 * ((model.shapes.shape[1] + 3 + 7) // 8)),
+    )
+
+
+def motion(model: SplitBelt, state: State) -> Motion:
+    """Motion nearest to a state: its displacement by the shapes, its speeds by the dynamic ones."""
+    belt, weight = model.belt, np.sqrt(model.belt.dual)
+    fields = state.fields.copy()
+    q = np.linalg.lstsq(model.shapes * weight[:, None], weight * fields[W], rcond=None)[0]
+    p, slow = np.zeros_like(q), model.dynamic
+    if slow:
+        p[:slow] = np.linalg.lstsq(model.shapes[:, :slow] * weight[:, None], weight * fields[U], rcond=None)[
+            0
+        ]
+    fields[W], fields[U] = model.shapes @ q, model.shapes @ p
+    found = State(fields, state.scalars.copy())
+    n = belt.cell.size
+    moved = Motion(
+        found, q, p, fresh_contacts(belt), np.zeros(n), np.zeros((2, n)), np.zeros(3, dtype=np.int64)
+    )
+    refresh(model, moved)
+    return moved
+
+
+@kernel
+def refresh(model: SplitBelt, moved: Motion) -> bool:
+    """Strains and contact forces of the present state; whether the contact has a solution."""
+    strains(model.belt, moved.state.fields, moved.eps)
+    solves = contact_forces(model.belt, moved.state, moved.contacts, moved.force)
+    moved.counts[2] += solves
+    return solves > 0

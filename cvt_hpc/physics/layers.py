@@ -1,0 +1,73 @@
+"""Laws of a stack of ring layers on the elements' saddles: how they press on each other, and how they rub.
+
+Surfaces are counted from the saddle, 0, to that between the outermost layer and the elements' ears, n. The
+forces per length g_k = (T_k - m_k v^2) kappa press layer k inward. Layers are in contact with a neighbour or
+not: those that would leave the stack outward bear on the ears.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel, merged_kernel
+from cvt_hpc.lanes import absolute, decay, fma, maximum, reciprocals
+
+
+@kernel
+def stack_forces(inward: np.ndarray, normal: np.ndarray) -> None:
+    """Normal line forces of the surfaces of a stack (Bullinger et al. 2005, eqs 44 and 48).
+
+    Equilibrium of each layer is N_k - N_k+1 = g_k with N >= 0. Below the layer where the sum of g from the
+    saddle on is largest all layers press inward, above it outward: N_k is that sum less the sum below surface
+    k, and where every layer presses inward the sum of g from layer k outward.
+
+    Parameters
+    ----------
+    inward : (n,) array
+        g_k of the layers, innermost first [N/m].
+    normal : (n + 1,) array
+        Result: saddle, between layers, ears [N/m].
+    """
+    below = largest = 0.0
+    for k in range(inward.size):
+        normal[k] = -below
+        below += inward[k]
+        largest = max(largest, below)
+    normal[inward.size] = -below
+    normal += largest
+
+
+@merged_kernel
+def ring_friction(speed, kinetic, falls, static_excess, per_stribeck, per_width, least):
+    """Friction coefficient of the rings by the size of their sliding: its secant and its slope.
+
+    mu = mu_k (1 + (mu_s / mu_k - 1) exp(-|v| / v_st)) tanh(|v| / v_reg)
+
+    Parameters
+    ----------
+    speed
+        Sliding speed, any sign [m/s]; lanes or a plain number, as all that follow but `falls`.
+    kinetic, static_excess
+        mu_k, and mu_s / mu_k - 1.
+    falls : bool
+        Whether mu_s is larger than mu_k anywhere.
+    per_stribeck, per_width
+        1 / v_st, 1 / v_reg [s/m].
+    least
+        Sliding speed below which friction is linear, 1e-3 v_reg and less [m/s].
+
+    Returns
+    -------
+    secant, slope
+        mu / |v|, and the derivative of mu by the tanh alone, which is not negative [s/m].
+    """
+    size = maximum(absolute(speed), least)
+    level = kinetic
+    if falls:
+        level = kinetic * fma(static_excess, decay(size * per_stribeck), 1.0)
+    # tanh(x) = (1 - e^-2x) / (1 + e^-2x) and 1 / |v| by one division
+    rest = decay(size * (2.0 * per_width))
+    per_sum, per_size = reciprocals(1.0 + rest, size)
+    factor = (1.0 - rest) * per_sum
+    secant, slope = level * factor * per_size, level * per_width * fma(-factor, factor, 1.0)
+    return secant, slope
