@@ -1,6 +1,6 @@
 """Descriptions of the sheaves' discs side by side, over the loads of sheave_deformation.toml.
 
-python -P jobs/sheave_deformation.py [TABLE.csv]; by default jobs/results/sheave_deformation.csv. Of each run:
+python jobs/sheave_deformation.py [TABLE.csv]; by default jobs/results/sheave_deformation.csv. Of each run:
 vibration, axial force, how the contact force is distributed over the driven arc, efficiency, and cost.
 """
 

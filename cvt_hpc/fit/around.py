@@ -38,7 +38,9 @@ class Moved(NamedTuple):
 
     @property
     def is_out(self) -> bool:
-        """Whether nothing vibrates any more; what is undecided or failed may."""
+        """Whether nothing vibrates any more; what is undecided, failed or not run at all may."""
+        if (self.course.classes == OccurrenceClass.NOT_RUN).all():
+            return False
         open_ = (OccurrenceClass.UNDECIDED, OccurrenceClass.IRREGULAR, OccurrenceClass.FAILED)
         return not (self.course.vibrates | np.isin(self.course.classes, open_) & self.course.counted).any()
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cvt_hpc.errors import InputError
 from cvt_hpc.files import refuse_link
 from cvt_hpc.fit.job import Case, Fit
 from cvt_hpc.fit.scoring import Course, score, total
@@ -19,6 +20,8 @@ from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 
 if TYPE_CHECKING:
     import xarray as xr
+
+_NOT_RUN: dict[str, Any] = {"class": OccurrenceClass.NOT_RUN, "counted": False}
 
 
 class Stopped(Exception):
@@ -106,17 +109,17 @@ class Evaluation:
         Stopped
             If runs are left.
         InputError
-            If the folder holds another job, or a candidate is not legal.
+            If the folder holds another job, or the model refuses all runs.
         """
         asked = {case: self._fit.cases[case] for case in cases or self._fit.cases}
-        job = study_of(self._fit, name, scenes, settings, values, asked)
+        job, legal = study_of(self._fit, name, scenes, settings, values, asked)
         folder = self._out / name
         refuse_link(folder)
         report = run(job, folder, fresh=self._fresh)
         if report.remaining:
             raise Stopped(report.exit_status)
         with open_results(folder) as dataset:
-            courses = self._courses(dataset, len(scenes), list(asked), values)
+            courses = self._courses(dataset, legal, list(asked), values)
             self.runs += job.size
             self.core_seconds += float(np.nansum(dataset["core_seconds"]))
         targets = self._fit.targets if not cases else ()
@@ -125,10 +128,12 @@ class Evaluation:
         return Findings(scenes, scores, totals, courses)
 
     def _courses(
-        self, dataset: xr.Dataset, candidates: int, cases: Sequence[str], values: NDArray[np.float64]
+        self, dataset: xr.Dataset, legal: NDArray[np.bool_], cases: Sequence[str], values: NDArray[np.float64]
     ) -> list[dict[str, Course]]:
-        shape = candidates, len(cases), len(values)
-        fields = {name: array.reshape(shape) for name, array in _fields(self._fit, dataset).items()}
+        fields = {}
+        for name, found in _fields(self._fit, dataset).items():
+            array = fields[name] = np.full(legal.shape, _NOT_RUN.get(name, np.nan), found.dtype)
+            array[legal] = found
         classes, counted = fields.pop("class"), fields.pop("counted")
         return [
             {
@@ -137,7 +142,7 @@ class Evaluation:
                 )
                 for j, case in enumerate(cases)
             }
-            for k in range(candidates)
+            for k in range(len(legal))
         ]
 
 
@@ -148,8 +153,10 @@ def study_of(
     settings: Mapping[str, Any],
     values: NDArray[np.float64],
     cases: Mapping[str, Case],
-) -> Job:
+) -> tuple[Job, NDArray[np.bool_]]:
     """Return the study of candidates: for each of them, each case and each value a run, the last one fastest.
+
+    Without the runs that the model refuses, as under more torque than any belt carries: they do not count.
 
     Parameters
     ----------
@@ -157,6 +164,11 @@ def study_of(
         As `Evaluation.evaluate` takes them.
     cases : mapping
         Those that are run.
+
+    Returns
+    -------
+    Job, (candidates, case, value) array
+        The study, and which runs it has.
     """
     own = {key: fit.job.parameters[key] for case in cases.values() for key in (*case.set, *case.factor)}
     base = {**own, **dict(zip((one.name for one in fit.free), scenes.T, strict=True))}
@@ -167,15 +179,29 @@ def study_of(
         for j, case in enumerate(cases.values()):
             of_case = case.set.get(key, of_candidates)
             column[:, j, :] = np.reshape(of_case * np.float64(case.factor.get(key, 1.0)), (-1, 1))
-        axes[key] = column.ravel().tolist()
-    axes[fit.along] = np.broadcast_to(values, shape).ravel().tolist()
-    document = fit.job.resolved()
+        axes[key] = column
+    axes[fit.along] = np.broadcast_to(values, shape)
+    document, known = fit.job.resolved(), (fit.job.source, fit.job.units, dict(settings), "[fit]")
+    scene = rebuild_job(document, *known)
+    legal = np.empty(shape, dtype=bool)
+    for place in np.ndindex(shape):
+        legal[place] = _is_legal(scene, {key: float(column[place]) for key, column in axes.items()})
+    if not legal.any():
+        legal[:] = True  # the study says why
     document |= {
         "name": f"{fit.job.name}_{name}",
-        "axes": axes,
-        "design": {"kind": "listed", "runs": int(np.prod(shape))},
+        "axes": {key: column[legal].tolist() for key, column in axes.items()},
+        "design": {"kind": "listed", "runs": int(legal.sum())},
     }
-    return rebuild_job(document, fit.job.source, fit.job.units, dict(settings), "[fit]")
+    return rebuild_job(document, *known), legal
+
+
+def _is_legal(scene: Job, at: Mapping[str, float]) -> bool:
+    try:
+        scene.point_at(at)
+    except InputError:
+        return False
+    return True
 
 
 def _fields(fit: Fit, dataset: xr.Dataset) -> dict[str, NDArray]:

@@ -56,7 +56,7 @@ def make_fit(
     Stopped
         If a study was stopped early.
     InputError
-        If a folder holds another study or cannot be written to, or a candidate is not legal.
+        If a folder holds another study or cannot be written to, or the model refuses all runs.
     """
     evaluation = Evaluation(fit, out, fresh=fresh)
     found = search(fit, lambda name, scenes: evaluation.evaluate(name, scenes, fit.coarse, fit.thinned), tell)

@@ -1,8 +1,9 @@
 """How well the runs of a candidate meet a statement: a score from 0 to 1, by one law for each measure.
 
 A score never takes a run for what it is not: one that failed, is undecided or irregular neither vibrates
-nor is quiet. A run that slips, or lies beyond a bound of `counted` such as one near gross slip, does not
-count: it does not vibrate, whatever it does, and silence is asked of the other runs alone.
+nor is quiet. A run that slips, that the model refuses since no belt carries its load, or that lies beyond a
+bound of `counted` such as one near gross slip, does not count: it does not vibrate, whatever it does, and
+silence is asked of the other runs alone.
 """
 
 from __future__ import annotations

@@ -30,6 +30,7 @@ _OPEN = (
     OccurrenceClass.IRREGULAR,
     OccurrenceClass.FAILED,
     OccurrenceClass.SLIPPING,
+    OccurrenceClass.NOT_RUN,
 )
 _SPREAD = ("lowest", "highest")
 _ORDERS = ("first", "first_low", "first_high", "total", "total_low", "total_high")

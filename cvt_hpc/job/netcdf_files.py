@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import math
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 MOST_BYTES = 2**24
 MOST_VALUES = 2**20  # of a variable
 SUFFIX = ".nc"
+_HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def read_netcdf(file: FromFile, name: str, source: str, where: str) -> dict[str, Any]:
@@ -86,7 +88,7 @@ def _refuse_elsewhere(content: bytes, place: str) -> None:
     """Raise InputError where something of an HDF5 file lies in another one."""
     import h5py
 
-    if not content.startswith(b"\x89HDF"):
+    if _HDF5 not in content:  # netCDF looks for it behind a block of the user's, too
         return
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
@@ -145,12 +147,17 @@ def _dimensions(
 def _values(file: FromFile, name: str, variable: netCDF4.Variable, place: str) -> tuple[str, np.ndarray]:
     """Unit and values [SI] of a variable."""
     place = f"{place}, {name}"
-    if getattr(variable.dtype, "kind", "") not in "fiu":
+    if getattr(variable.dtype, "kind", None) not in ("f", "i", "u"):
         raise mismatch(place, "numbers", "something else")
     if math.prod(variable.shape) > MOST_VALUES:
         raise mismatch(place, f"at most {MOST_VALUES} values", str(math.prod(variable.shape)))
     unit, factor = _unit(file, name, getattr(variable, "units", ""), place)
-    values = np.ma.filled(np.ma.asarray(variable[...], dtype=float), np.nan) * factor
+    try:
+        with warnings.catch_warnings(action="error", category=UserWarning):
+            read = variable[...]
+    except UserWarning as warning:  # scale_factor and the like, of which netCDF4 would do nothing
+        raise mismatch(place, "numbers that can be unpacked", str(warning).rstrip(".")) from None
+    values = np.ma.filled(np.ma.asarray(read, dtype=float), np.nan) * factor
     if not np.isfinite(values).all():
         raise mismatch(place, "finite numbers", "others")
     return unit, values

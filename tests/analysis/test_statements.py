@@ -46,6 +46,6 @@ def test_the_page_has_a_row_for_all_that_the_papers_state():
 
 
 def test_the_page_is_made_of_the_tables(tmp_path):
-    subprocess.run([sys.executable, ROOT / "jobs/coverage.py", tmp_path / "page.md"], check=True)
+    subprocess.run([sys.executable, ROOT / "jobs/paper_coverage.py", tmp_path / "page.md"], check=True)
     page = ROOT / "docs/coverage.md"
     assert (tmp_path / "page.md").read_text() == page.read_text()

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from cvt_hpc.cli import main
+from cvt_hpc.errors import InputError
 from cvt_hpc.fit.around import sensitivities
 from cvt_hpc.fit.evaluating import Evaluation
 from cvt_hpc.fit.loading import load_fit
 from cvt_hpc.fit.search import Found
 from cvt_hpc.fit.table import conflict_table
 from cvt_hpc.study import run
+from cvt_hpc.vibration.classes import OccurrenceClass
 
 # The window begins at 25 N m / element_mass, so that these targets ask for a mass of 0.25 kg/m and a gradient of -1.44 s/m
 JOB = """
@@ -159,6 +161,22 @@ def test_sensitivities_are_those_of_the_law(job, tmp_path):
     assert np.isnan(found["rigid", "element_mass"].first)  # never anything but silence
     of_total = found["total", "element_mass"]
     assert of_total.total_low < of_total.total < of_total.total_high
+
+
+def test_runs_that_the_model_refuses_do_not_count(job, window, tmp_path):
+    job.write_text(JOB.replace("rigid = {", 'light = { set = { thrust = "15 kN" } }\nrigid = {'))
+    fit = load_fit(job)
+    scenes, evaluation = np.array([[0.25, -1.44], [0.2, -1.44]]), Evaluation(fit, tmp_path / "out")
+    for courses in evaluation.evaluate("some", scenes, {}, fit.values, ["as_built", "light"]).courses:
+        whole, light = courses["as_built"], courses["light"]
+        refused = light.values > 150.0
+        assert np.array_equal(light.classes, np.where(refused, OccurrenceClass.NOT_RUN, whole.classes))
+        assert not light.counted[refused].any() and np.isnan(light.quantities["amplitude"][refused]).all()
+        kept = light.quantities["amplitude"][~refused]
+        assert np.array_equal(kept, whole.quantities["amplitude"][~refused])
+    assert len(window) == 2 * (41 + 31)
+    with pytest.raises(InputError, match="load: expected at most 300 N m at this thrust"):
+        evaluation.evaluate("all", scenes, {}, np.array([400.0]), ["as_built"])
 
 
 def test_starts_are_looked_around_as_the_best_set_is(job, tmp_path, capsys):

@@ -118,6 +118,17 @@ def test_what_no_disc_has_gets_one_line(job, values, dims, told):
         load_job(job)
 
 
+def test_what_is_no_number_gets_one_line(job):
+    with netCDF4.Dataset(job.parent / "driving.nc", "a") as file:
+        file["flexibility"].scale_factor = "x"
+    assert refusal(job).startswith(", flexibility: expected numbers that can be unpacked, found ")
+    with netCDF4.Dataset(job.parent / "driving.nc", "w") as file:
+        file.createDimension("angle", 9)
+        for name in ("angle", "flexibility"):
+            file.createVariable(name, str, ("angle",))
+    assert refusal(job) == ", angle: expected numbers, found something else"
+
+
 def test_a_missing_variable_names_those_that_are_there(job):
     with netCDF4.Dataset(job.parent / "driving.nc", "a") as file:
         file.renameVariable("flexibility", "flexibilty")
@@ -152,11 +163,12 @@ def test_nothing_is_read_from_elsewhere(job):
         "a group": lambda file: file.create_group("flexibility"),
     }
     for found, make in makers.items():
-        with h5py.File(table, "w") as file:
-            file["angle"] = ANGLES
-            make(file)
-        assert refusal(job).startswith(", flexibility: expected ")
-        assert refusal(job).endswith(f", found {found.strip()}")
+        for block in (0, 512):  # of the user's, before all that is HDF5
+            with h5py.File(table, "w", userblock_size=block) as file:
+                file["angle"] = ANGLES
+                make(file)
+            assert refusal(job).startswith(", flexibility: expected ")
+            assert refusal(job).endswith(f", found {found.strip()}")
 
 
 def test_a_few_bytes_for_many_values_are_refused(job):

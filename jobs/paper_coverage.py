@@ -1,4 +1,4 @@
-"""Write what holds of two papers: coverage.py PAGE.md, by docs/coverage.toml and results/figures."""
+"""Write what holds of two papers: paper_coverage.py PAGE.md, by docs/coverage.toml and results/figures."""
 
 import csv
 import sys
@@ -17,7 +17,7 @@ What W. Lebrecht, F. Pfeiffer and H. Ulbrich (04CVT-32, 2004) and M. Bullinger, 
 (2005) state, the command that shows it here, what it gives, and whether that is what they state. First all
 of both papers, then each figure.
 
-Made by `python jobs/coverage.py docs/coverage.md` from `docs/coverage.toml` and from the tables in
+Made by `python jobs/paper_coverage.py docs/coverage.md` from `docs/coverage.toml` and from the tables in
 `jobs/results/figures`. Each of these is that of a job, below "figure `NAME`":
 `cvt-hpc run jobs/figures/NAME.toml && cvt-hpc figure out/NAME` leaves `figure.png` and `statements.csv`. A
 statement is reproduced where all parts of its measure hold, partly where some do. The papers' pictures have
