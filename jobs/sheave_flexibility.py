@@ -1,7 +1,8 @@
 """Flexibilities and eigenforms of a pulley's discs by finite elements: sheave_flexibility.py FOLDER
 
 Writes FOLDER/driving.nc and FOLDER/driven.nc, which `driving_flexibility_file`, `driving_modes_file` and the
-like of a job's table [deflection] take, for the radii and wraps of one speed ratio. Needs the extra `discs`.
+like of a job's table [deflection] take, for the radii and wraps of one speed ratio. Needs the extra `discs`:
+pip install -e ".[discs]".
 Options set sizes: --outer-radius "85 mm", --ratio 2.0.
 
 A disc is a body of revolution: a conical flank, a thickness that changes linearly from hub to rim, clamped to
@@ -260,11 +261,13 @@ def both(disc: Disc, scene: Scene) -> dict[str, xr.Dataset]:
     Raises
     ------
     InputError
-        If the contact lies beside the disc, or a size is not above 0.
+        If the contact lies beside the disc, a size is not above 0, or the disc is incompressible.
     """
     for key, value in (asdict(disc) | asdict(scene)).items():
-        if not value > 0.0:
-            raise mismatch(key, "a number above 0", f"{value:g}")
+        if not 0.0 < value < np.inf:
+            raise mismatch(key, "a finite number above 0", f"{value:g}")
+    if disc.poisson_ratio >= 0.5:
+        raise mismatch("poisson_ratio", "a number below 0.5", f"{disc.poisson_ratio:g}")
     path = variator(scene.ratio, scene.driven_radius, scene.centre_distance)
     radii, half = (path.driving_radius, path.driven_radius), 0.5 * disc.flank_height
     for radius in radii:

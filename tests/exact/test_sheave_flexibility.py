@@ -128,7 +128,8 @@ def test_both_pulleys_have_tables_that_a_job_takes(tmp_path):
     ("arguments", "told"),
     [
         (["--outer-radius", "70 mm"], "flank: expected within 0.022 to 0.07 m, found 0.071 to 0.079 m"),
-        (["--modulus", "-1 GPa"], "modulus: expected a number above 0, found -1e+09"),
+        (["--modulus", "-1 GPa"], "modulus: expected a finite number above 0, found -1e+09"),
+        (["--poisson-ratio", "0.5"], "poisson_ratio: expected a number below 0.5, found 0.5"),
         (["--cell", "1 kg"], "--cell: expected a number in m, found 1 kg"),
     ],
 )

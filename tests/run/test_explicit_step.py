@@ -23,7 +23,7 @@ from cvt_hpc.models.elastic_belt.belt import (
     belt_constants,
     initial_state,
 )
-from cvt_hpc.models.elastic_belt.one_system import driven_moment, driven_thrust, free_rates
+from cvt_hpc.models.elastic_belt.one_system import driven_moment, driven_thrust, free_rates, pulled_by
 from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS
 from cvt_hpc.models.elastic_belt.rhs import (
     accelerations,
@@ -129,7 +129,7 @@ def plain_step(belt, before, step):
     closing = (driven_thrust(belt, force) - belt.thrust) / belt.axial_damping
     turning = (driven_moment(belt, moments) - load) / belt.driven_inertia
     if belt.pulleys.are_free:
-        turning, closing, *others = free_rates(belt, before, force, moments)
+        turning, closing, *others = free_rates(belt, before, pulled_by(belt, force, moments))
         scalars[FIRST_STATE:] += step * np.array(others)
     scalars[DRIVEN_SPEED] += step * turning
     scalars[TIME] += step

@@ -248,6 +248,7 @@ def test_each_pulley_may_have_a_shaft_of_its_own():
           "scene": {"speed_history": "ramp"}}, "speed_history: expected constant"),
         ({"sheaves": {"driven_inertia": float("inf")}}, "driven_inertia: expected finite"),
         ({"pulleys": {"driven_piston": [0.08, 0.02]}}, "driven_piston: expected an inner and a larger outer"),
+        ({"pulleys": {"driven_piston": [0.08]}}, "driven_piston: expected an inner and a larger outer"),
         ({"pulleys": {"driven_pressure": "20 bar"}}, "driven_pressure: expected driven_piston beside it"),
         ({"pulleys": {"least_thrust": "200 kN"}}, "least_thrust: expected less than most_thrust"),
     ],

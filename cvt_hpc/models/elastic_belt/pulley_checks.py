@@ -63,8 +63,8 @@ def pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     elif p["tilt_lag"] < (least := least_tilt_lag(p)):
         expected = f"0, or {least:.2g} s and more at this step: tilting is explicit"
         found.append(("tilt_lag", expected, f"{p['tilt_lag']:g} s"))
-    found += _bearing_problems(p)
-    return found + (_controller_problems(p) or overload_problems(p))
+    found += _bearing_problems(p) + _controller_problems(p)
+    return found or overload_problems(p)
 
 
 def steady_pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
