@@ -240,8 +240,8 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
         drag_up = stiff_up = factor_up = zero
         # of the ears: friction on the elements and its slopes
         ear_drag = ear_stiff = ear_cross = zero
-        pressed = largest - below
-        on_ears = on_arc and anywhere(pressed > 0.0)
+        bearing = largest - below
+        on_ears = on_arc and anywhere(bearing > 0.0)
         if on_ears:
             above_factor, below_factor = surface_factors(rings, n, is_driven)
             outer = fields[j, FIRST_LAYER + n - 1]
@@ -249,8 +249,8 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
             secant, slope = ring_friction(
                 sliding, c[0, SADDLE_FRICTION_LEVEL], rings.falls, excess, per_stribeck, per_width, least
             )
-            drag_up = pressed * secant * sliding
-            stiff_up = maximum(pressed * slope, fma(pressed, secant, -at_saddle))
+            drag_up = bearing * secant * sliding
+            stiff_up = maximum(bearing * slope, fma(bearing, secant, -at_saddle))
             factor_up = below_factor
             ear_drag, ear_stiff = above_factor * drag_up, above_factor * above_factor * stiff_up
             ear_cross = above_factor * below_factor * stiff_up
@@ -313,7 +313,7 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
         per_common = 1.0 / common_sum
         last = STRIDE * n
         layers[j, last + OWN_SUM], layers[j, last + ELEMENT_SUM] = own_sum, element_sum
-        layers[j, last + PER_COMMON_SUM], layers[j, last + ON_EARS] = per_common, pressed
+        layers[j, last + PER_COMMON_SUM], layers[j, last + ON_EARS] = per_common, bearing
         if on_arc:
             # the inner surface's friction on the elements
             taken = below_factor * drag
