@@ -3,9 +3,10 @@
 # Needs the environment of jobs/quickstart.sh; out/pulleys_* keep what is done. Values are assumptions, see the job.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-PATH=$PWD/.venv/bin:$PATH
-table=jobs/results/pulleys.csv
+job=pulleys
+labels=part
 columns=(amplitude frequency axial_force sheave_tilt driving_power lag_loss speed_loss torque_ratio power_residual)
+source jobs/parts.sh
 
 # a shaft of 220 mm, 45 mm thick between the sheaves; its collar is as much stiffer as to leave the driven pulley as it was
 shaft=(--set 'shaft_lengths=["30 mm", "50 mm", "60 mm", "50 mm", "30 mm"]'
@@ -14,16 +15,6 @@ shaft=(--set 'shaft_lengths=["30 mm", "50 mm", "60 mm", "50 mm", "30 mm"]'
 collar=(--set 'tilt_stiffness=3.94e5 N m/rad')
 short=(--set 'step=2 us') # short lags of the tilt need it, the shortest 1 us
 
-part() { # NAME SETTINGS...
-  local name=$1
-  shift
-  cvt-hpc run jobs/pulleys.toml --set name="pulleys_$name" "$@" > /dev/null
-  python jobs/tabulate.py "out/pulleys_$name" "out/pulleys_$name/table.csv" "${columns[@]}" > /dev/null
-  [ -s "$table.part" ] || sed -n '1s/^/part,/p' "out/pulleys_$name/table.csv" > "$table.part"
-  sed -n "2,\$s/^/$name,/p" "out/pulleys_$name/table.csv" >> "$table.part"
-}
-
-rm -f "$table.part"
 still=(--set 'driven_spring_rate=0 N/m')
 part none "${still[@]}"
 part none_2us "${still[@]}" "${short[@]}"
@@ -43,4 +34,4 @@ part shaft "${still[@]}" "${shaft[@]}"
 part shaft_and_collar "${still[@]}" "${shaft[@]}" "${collar[@]}"
 part shaft_rigid "${still[@]}" "${shaft[@]}" --set shaft_factor=inf
 part bearing_clearance "${still[@]}" "${shaft[@]}" "${collar[@]}" "${short[@]}" --set 'tilt_lag=0.05 ms' --set 'bearing_clearance=20 um'
-mv "$table.part" "$table"
+joined

@@ -3,21 +3,12 @@
 # Needs the environment of jobs/quickstart.sh; out/ring_layers_* keep what is done. Values are assumptions, see the job.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-PATH=$PWD/.venv/bin:$PATH
-table=jobs/results/ring_layers.csv
+job=ring_layers
+labels=part
 columns=(amplitude frequency ring_loss loss efficiency mean_ring_tension mean_push_force layer_speed layer_tension surface_loss
   surface_sliding step_ripple power_residual)
+source jobs/parts.sh
 
-part() { # NAME SETTINGS...
-  local name=$1
-  shift
-  cvt-hpc run jobs/ring_layers.toml --set name="ring_layers_$name" "$@" > /dev/null
-  python jobs/tabulate.py "out/ring_layers_$name" "out/ring_layers_$name/table.csv" "${columns[@]}" > /dev/null
-  [ -s "$table.part" ] || sed -n '1s/^/part,/p' "out/ring_layers_$name/table.csv" > "$table.part"
-  sed -n "2,\$s/^/$name,/p" "out/ring_layers_$name/table.csv" >> "$table.part"
-}
-
-rm -f "$table.part"
 nine=(--set 'ring_layers=[9]')
 part number
 # the stack as thick as nine layers, 1.665 mm
@@ -26,4 +17,4 @@ part stack_of_6 --set 'ring_layers=[6]' --set 'layer_thickness=0.2775 mm'
 part step_2us "${nine[@]}" --set 'step=2 us'
 part oiled_layers "${nine[@]}" --set 'layer_friction=0.03'
 part inner_ring_long "${nine[@]}" --set 'layer_tolerance=[1.0002, 1, 1, 1, 1, 1, 1, 1, 1]'
-mv "$table.part" "$table"
+joined

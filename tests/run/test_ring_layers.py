@@ -332,6 +332,8 @@ def test_layers_that_hold_to_each_other_are_the_rings_as_one():
         ({"ring_layers": 2, "layer_tolerance": (1.0, -1.0)}, "layer_tolerance"),
         ({"ring_layers": 2, "layer_friction": -0.1}, "layer_friction"),
         ({"ring_layers": 2, "layer_thickness": -1e-4}, "layer_thickness"),
+        ({"ring_layers": 9, "layer_thickness": 0.02}, "layer_thickness: expected rings within .* radius"),
+        ({"ring_offset": -0.2}, "ring_offset: expected rings within .* radius"),
         ({"ring_layers": 2, "curvature_terms": "path"}, 'curvature_terms: expected "none" with ring_layers above 1'),
         ({"ring_layers": 2, "column_bending": "rocking"}, 'column_bending: expected "off" with ring_layers above 1'),
         ({"ring_layers": 2, "stepper": "explicit"}, "ring_layers: expected 1 with the explicit step"),

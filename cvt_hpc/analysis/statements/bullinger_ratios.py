@@ -51,7 +51,12 @@ FIGURE_22 = (
         "For both speed ratios the increase of P after the driven entry disappears for high r",
         _rise_disappears,
     ),
-    Statement("since the sliding angle is then below pi/2", _angle_below_at_high_ratio),
+    Statement(
+        "since the sliding angle is then below pi/2",
+        _angle_below_at_high_ratio,
+        "in underdrive sliding still turns behind the entry at r 0.85, and there P still rises a little: "
+        "angle and rise go together",
+    ),
 )
 
 

@@ -57,8 +57,8 @@ def bending_bands(
         Lengths of cells and of stations [m], curvature of the path in the cells [1/m].
     stiffness : float
         EI [N m^2].
-    terms : str
-        none, path or straight.
+    terms : int
+        NONE, PATH or STRAIGHT.
     """
     n = cell.size
     second = second_difference(cell, dual)

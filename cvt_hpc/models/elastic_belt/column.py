@@ -50,8 +50,8 @@ def rocking_column(eps, kappa, stiffness, bending, outer, inner):
     Returns
     -------
     strain, give, turn, moment
-        -P / EA; where elements are apart the gap's strain at the edge that meets first. Its slopes with eps
-        and with kappa [m], and M [N m].
+        -P / EA; where elements are apart, the positive number that the same formula gives of the strain of
+        the edge that meets first. Its slopes with eps and with kappa [m], and M [N m].
     """
     edge = select(kappa > 0.0, -inner, outer)
     bent = bending * kappa

@@ -19,7 +19,13 @@ from cvt_hpc.models.elastic_belt.deflection_settings import (
 )
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert, pulley_problems, shaft_problems
 from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, DRIVEN_SHAFT, PULLEYS, SHAFT
-from cvt_hpc.models.elastic_belt.ring_settings import RINGS, ring_inert, ring_problems, rings_rub
+from cvt_hpc.models.elastic_belt.ring_settings import (
+    RINGS,
+    ring_inert,
+    ring_problems,
+    rings_rub,
+    stack_problems,
+)
 from cvt_hpc.parameters import Notice, Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
@@ -183,10 +189,11 @@ def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     p = parameters
     problems = variator_problems(p)
     if not problems:
-        path = variator(p["ratio"], p["driven_radius"], p["centre_distance"]).path_length
-        if abs(p["play"]) > 0.02 * path:
-            problems.append(("play", f"within 2 % of the belt's length {path:.4g} m", f"{p['play']:g} m"))
-        problems += deflection_problems(p)
+        path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
+        if abs(p["play"]) > 0.02 * path.path_length:
+            expected = f"within 2 % of the belt's length {path.path_length:.4g} m"
+            problems.append(("play", expected, f"{p['play']:g} m"))
+        problems += deflection_problems(p) + stack_problems(p, min(path.driving_radius, path.driven_radius))
     return problems + shaft_problems(p) + bending_problems(p) + ring_problems(p)
 
 

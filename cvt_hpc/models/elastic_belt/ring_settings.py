@@ -73,6 +73,18 @@ def ring_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     ]
 
 
+def stack_problems(parameters: Mapping[str, Any], least_radius: float) -> list[tuple[str, str, str]]:
+    """Rings that reach the axis of the smaller pulley, of the radius [m]: result as of a model's check."""
+    p = RING_DEFAULTS | dict(parameters)
+    key = "layer_thickness" if p["ring_layers"] > 1 else "ring_offset"
+    stack = p["ring_layers"] * p["layer_thickness"] if p["ring_layers"] > 1 else 0.0
+    innermost = p["ring_offset"] - 0.5 * stack
+    if innermost > -least_radius:
+        return []
+    expected = f"rings within the smaller pulley's radius of {1e3 * least_radius:.4g} mm"
+    return [(key, expected, f"{p[key]:g} m, the innermost {-1e3 * innermost:.4g} mm below the pitch line")]
+
+
 def rings_rub(parameters: Mapping[str, Any]) -> bool:
     """Whether rings have friction, at the saddle or among each other."""
     p = RING_DEFAULTS | dict(parameters)
