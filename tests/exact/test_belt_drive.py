@@ -100,8 +100,8 @@ def test_slopes_of_contacts_are_those_of_their_forces(treatment):
             step = step.reshape(6, 4)
             sides.append(forces(made, q + TAU * step, u + step, turned))
         slope = (sides[0] - sides[1]) / (2.0 * h)
-        # rounding of forces of some 10 N leaves 1e-8 N s/m
-        np.testing.assert_allclose(slope, matrix[:, k], rtol=0, atol=3e-7 * abs(matrix[:, k]).max())
+        # rounding of forces of some 10 N leaves 2e-8 N s/m, the step h a few 1e-7 of the largest slope
+        np.testing.assert_allclose(slope, matrix[:, k], rtol=0, atol=2e-8 + 3e-7 * abs(matrix[:, k]).max())
 
 
 def test_contacts_give_pulleys_what_they_take_of_the_belt_but_for_losses():

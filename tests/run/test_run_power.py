@@ -205,8 +205,8 @@ TERMS = {
     "rings' damper": ({"ring_damping": 100.0}, {"ring_damping": 0.0}, ["layer_loss"]),
     "ring friction": ({"ring_friction": 0.1}, {"ring_friction": 0.0}, ["ring_loss"]),
     "flank friction": (
-        {"kinetic_friction": 0.1} | CONSTANT,
-        {"kinetic_friction": 1e-12} | CONSTANT,
+        {"kinetic_friction": 0.1, "load": 0.0} | CONSTANT,
+        {"kinetic_friction": 1e-12, "load": 0.0} | CONSTANT,  # which carries no load
         ["driving_flank_loss", "driven_flank_loss", "driving_power"],
     ),
     "sheave": ({}, {"lag_stiffness": 2e20}, ["lag_loss", "thrust_power"]),
