@@ -1,4 +1,4 @@
-"""Laws of contacts in lanes: one-sided contact and what a step takes at it, friction's coefficient and memory."""
+"""Contacts in lanes: one-sided contact, what a step takes at it, and friction's coefficient and memory."""
 
 from __future__ import annotations
 

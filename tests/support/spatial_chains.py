@@ -80,8 +80,8 @@ def state(fields, pulleys=(0.0, 0.0, 1e-6, 1e-6, 0.0, 0.0), modes=0):
     )
 
 
-def spinning_ring(nodes, radius, speed, ring_stiffness):
-    """Fields of a free ring that spins in equilibrium, counter-clockwise [m], [rad/s], [N]."""
+def spinning_ring(nodes, radius, speed):
+    """Fields of a free ring that spins in equilibrium, counter-clockwise [m], [rad/s]."""
     angle = 2.0 * np.pi * np.arange(nodes) / nodes
     none = np.zeros(nodes)
     fields = np.zeros((nodes, b.STATE_FIELDS))

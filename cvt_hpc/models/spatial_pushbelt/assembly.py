@@ -1,7 +1,7 @@
 """Residuals of an iterate, and the linear system of Newton's method, in lanes.
 
-Every law between two elements is a magnitude along a direction of 16 numbers, so that the block of an element with
-the one behind is the transpose of that one's with it.
+Every law between two elements is a magnitude along a direction of 16 numbers, so that the block of an
+element with the one behind is the transpose of that one's with it.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Lateral bending of the ring packages in lanes: shear and change of slope from element to element.
 
-Shear (z_j - z_i) / h - (psi_i + psi_j) / 2 and change of slope psi_j - psi_i have constant directions. Both laws
-act at the mean BETA q_{k+1} + (1 - 2 BETA) q_k + BETA q_{k-1}: with BETA 1/4 the step is stable for any stiffness
-and damps nothing, and the frequency f of a mode errs by -(2 pi f dt)^2 / 12 of itself. So does the spring that
-turns an element with the ring's slope.
+Shear (z_j - z_i) / h - (psi_i + psi_j) / 2 and change of slope psi_j - psi_i have constant directions. Both
+laws act at the mean BETA q_{k+1} + (1 - 2 BETA) q_k + BETA q_{k-1}: with BETA 1/4 the step is stable for
+any stiffness and damps nothing, and the frequency f of a mode errs by -(2 pi f dt)^2 / 12 of itself. So
+does the spring that turns an element with the ring's slope.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
 """The free chain in lanes: positions at q*, inertia, tension in two lines, pitch and yaw of elements.
 
-Index i is an element and j the next one. Directions are those at q_k. Magnitudes are those at q* = q_k + dt X_k,
-from where on they are linear in the change of the speeds X.
+Index i is an element and j the next one. Directions are those at q_k. Magnitudes are those at q* = q_k + dt
+X_k, from where on they are linear in the change of the speeds X.
 
-The packages lie on the lines r + b a and r - b a, b being `package_distance`. t is the direction of either at an
-element, from the one behind to the one ahead, e that up to the next element. One material flows through both.
+The packages lie on the lines r + b a and r - b a, b being `package_distance`. t is the direction of either
+at an element, from the one behind to the one ahead, e that up to the next element. One material flows
+through both.
 """
 
 from __future__ import annotations

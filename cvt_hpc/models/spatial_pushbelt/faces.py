@@ -1,7 +1,7 @@
-"""Front of each element against the rear of the next one, in lanes: four points, unilateral, without friction.
+"""Front of each element against the rear of the next one, in lanes: four one-sided points without friction.
 
-A point P of the front, at height h and half width b, has the gap g = (r_j - P) . x_j - t / 2 to the rear plane.
-It grows by the speeds times (-x_j, x_j x (P - r_i)) of element i and (x_j, (P - r_j) x x_j) of j.
+A point P of the front, at height h and half width b, has the gap g = (r_j - P) . x_j - t / 2 to the rear
+plane. It grows by the speeds times (-x_j, x_j x (P - r_i)) of element i and (x_j, (P - r_j) x x_j) of j.
 """
 
 from __future__ import annotations

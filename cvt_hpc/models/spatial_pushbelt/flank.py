@@ -1,14 +1,15 @@
 """Flanks of the elements on the frustums of the sheaves, in lanes: two heights on each side, with friction.
 
-A point Q on side s of an element, +1 right and -1 left, at the distance rho from the axis k of its pulley and at
-axial position z along it, has with the mid plane C and pitch radius R the gap
+A point Q on side s of an element, +1 right and -1 left, at the distance rho from the axis k of its pulley
+and at axial position z along it, has with the mid plane C and pitch radius R the gap
 
     g = (B + (rho - R) tan d0) cos d0 - s (z - C) cos d0,    n = sin d0 e_r - s cos d0 k = grad g.
 
-B is half the width of an element on its pitch line. The meridian of the sheave is m = cos d0 e_r + s sin d0 k,
-and the direction of rotation e_t = k x e_r. The force on the element is N n less friction along m and e_t,
-against the speeds of Q over the sheave in these directions. Slip speeds take directions and the lever of Q at
-mid step: at either end of a step they would add false sliding of v phi' dt / 2 and of lever times omega^2 dt / 2.
+B is half the width of an element on its pitch line. The meridian of the sheave is m = cos d0 e_r + s sin d0
+k, and the direction of rotation e_t = k x e_r. The force on the element is N n less friction along m and
+e_t, against the speeds of Q over the sheave in these directions. Slip speeds take directions and the lever
+of Q at mid step: at either end of a step they would add false sliding of v phi' dt / 2 and of lever times
+omega^2 dt / 2.
 """
 
 from __future__ import annotations
@@ -171,8 +172,8 @@ def predict_flanks(belt, state, pulleys, step, dt):
 def flank_forces(belt, state, pulleys, increments, openings, shapes, step, iterate, dt):
     """Normal and friction forces of an iterate with their slopes; sets the residuals.
 
-    `increments` are the changes of the border's unknowns since the last step: of the driven pulley's speed, and
-    of the openings of the driving and the driven sheaves.
+    `increments` are the changes of the border's unknowns since the last step: of the driven pulley's speed,
+    and of the openings of the driving and the driven sheaves.
     """
     modes = belt.modal_stiffness.shape[1]
     stiffness, width = 0.5 * belt.flank_stiffness, belt.friction_speed

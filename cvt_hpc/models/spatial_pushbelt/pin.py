@@ -1,12 +1,12 @@
 """The pin of each element in the hole of the next one, in lanes: what holds neighbours side by side.
 
-The pin's centre P lies at the front of element i, the hole's centre at the rear of element j, both `pin_height`
-above the saddle. Their offset across x_j is free up to the clearance in all directions; beyond, the hole pushes
-back elastically and without friction, along the offset.
+The pin's centre P lies at the front of element i, the hole's centre at the rear of element j, both
+`pin_height` above the saddle. Their offset across x_j is free up to the clearance in all directions;
+beyond, the hole pushes back elastically and without friction, along the offset.
 
 Its size grows by the speeds times (n, (P - r_i) x n) of element i and -(n, (P - r_j) x n) of j, n being its
-direction. This is the contact of a circle with the ellipse in which its plane cuts the hole (Schindler 2008, eq.
-25), but for the clearance times 1 - cos of the tilt between both: a nanometre at 3 mrad.
+direction. This is the contact of a circle with the ellipse in which its plane cuts the hole (Schindler
+2008, eq. 25), but for the clearance times 1 - cos of the tilt between both: a nanometre at 3 mrad.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What the laws of a step take from the motion, in lanes: losses, and what the step damps by itself.
 
-As in the planar pushbelt (`models.pushbelt.power`, which derives it) a force takes its magnitude times the mean
-rate (X + X_old) / 2 along its direction. Bending of the rings and the yaw spring damp nothing.
+As in the planar pushbelt (`models.pushbelt.power`, which derives it) a force takes its magnitude times the
+mean rate (X + X_old) / 2 along its direction. Bending of the rings and the yaw spring damp nothing.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ _FIRST, _COUNT = FLANK_LOSS, TILT_DAMPED + 1 - FLANK_LOSS  # totals that are add
 
 @kernel
 def book_pairs(belt, state, work, dt):
-    """Add to the totals what a solved step takes between elements and along the rings, before it is accepted."""
+    """Add to the totals what a solved step takes between elements and in the rings, before it is accepted."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     has_pins = belt.pin_clearance < np.inf
     contact = 0.5 * belt.contact_stiffness

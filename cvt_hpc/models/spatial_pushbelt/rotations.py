@@ -1,7 +1,7 @@
 """Vectors of three numbers in lanes, and rotations of an element.
 
-The directions x (running), o (outward) and a = o x x (axial) of an element are columns of its orientation. In
-that order they are left-handed; a rotation turns each alike.
+The directions x (running), o (outward) and a = o x x (axial) of an element are columns of its orientation.
+In that order they are left-handed; a rotation turns each alike.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def unit(a):
 
 @register_jitable
 def turning(omega, dt):
-    """Factors of a rotation by the vector dt omega, for `turned`: exact to rounding below a tenth of a radian."""
+    """Factors of a rotation by the vector dt omega, for `turned`: exact below a tenth of a radian."""
     square = dt * dt * dot(omega, omega)
     first = dt * (1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0))))
     second = dt * dt * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)))

@@ -1,7 +1,7 @@
 """Rings on the saddles, in lanes: friction along the belt, one law for both packages of an element.
 
-The slip sigma = v - mean over both lines of t . p' grows by the speeds times (-t, -b a x t, 1). Along t ring and
-element are free of each other but for friction, across it the ring goes with the element.
+The slip sigma = v - mean over both lines of t . p' grows by the speeds times (-t, -b a x t, 1). Along t
+ring and element are free of each other but for friction, across it the ring goes with the element.
 """
 
 from __future__ import annotations

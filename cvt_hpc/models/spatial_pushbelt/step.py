@@ -1,7 +1,7 @@
 """Steps of the spatial pushbelt in time.
 
-From q_k and X_{k-1/2} a step finds X_{k+1/2}. The magnitudes of stiff laws are those at q_{k+1} = q_k +
-dt X_{k+1/2} and all directions those at q_k: implicit Euler along the direction of each law, symplectic Euler
+From q_k and X_{k-1/2} a step finds X_{k+1/2}. The magnitudes of stiff laws are those at q_{k+1} = q_k + dt
+X_{k+1/2} and all directions those at q_k: implicit Euler along the direction of each law, symplectic Euler
 for what is slow. Lateral bending of the rings has a law of its own that damps nothing (`bending`).
 """
 
@@ -11,7 +11,6 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import absolute, ahead, around, like, maximum
-from cvt_hpc.models.spatial_pushbelt._temporary_solve import solve
 from cvt_hpc.models.spatial_pushbelt.assembly import assemble_pairs, border_system, linear_blocks, residuals
 from cvt_hpc.models.spatial_pushbelt.belt import (
     CHANGE,
@@ -71,6 +70,7 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
 )
 from cvt_hpc.models.spatial_pushbelt.bending import bending_forces, predict_bending
 from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across
+from cvt_hpc.models.spatial_pushbelt.cyclic import solve
 from cvt_hpc.models.spatial_pushbelt.faces import face_forces, predict_faces
 from cvt_hpc.models.spatial_pushbelt.flank import (
     add_flank_blocks,
@@ -421,8 +421,8 @@ def advance(belt, newton, state, work, inputs, steps, dt):
         Work space.
     inputs : (2, INPUTS) array
         Speed of the driving pulley, thrusts on the loose sheaves, torque of the load, speed of the driving
-        radius by what moves the driving sheave, and axial speeds of both mid planes, at the start and at the end
-        (`belt.IN_SPEED` and so on): between, they change linearly.
+        radius by what moves the driving sheave, and axial speeds of both mid planes, at the start and at
+        the end (`belt.IN_SPEED` and so on): between, they change linearly.
     steps : int
         Number of steps.
     dt : float

@@ -1,4 +1,4 @@
-"""Temporary cyclic solve of 8 x 8 blocks."""
+"""Cyclic systems of 8 x 8 blocks in linked lanes, as `models.pushbelt.cyclic` has those of 4 x 4."""
 
 from numba.extending import register_jitable
 
@@ -523,6 +523,7 @@ def _substitute(blocks):
 
 @kernel
 def solve(blocks, scratch, reduced, size):
+    """Solve for all right sides in place; A and U are lost."""
     _eliminate(blocks, scratch)
     _solve_separators(blocks, reduced)
     _substitute(blocks)
