@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +18,8 @@ CONTRADICTING = 1  # exit status of `compare`: some cells are quiet in one study
 
 def add(commands: Any) -> None:
     """Declare the commands."""
-    add_command(commands, "status", _status, "how far a study is", "DIR")
+    status = add_command(commands, "status", _status, "how far a study is", "DIR")
+    status.add_argument("--json", action="store_true", help="for programs: one line of JSON, times in s")
     add_command(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
     text = "draw where vibration occurs, or quantities over two axes"
     picture = add_command(commands, "map", _map, text, "RESULTS")
@@ -40,7 +43,7 @@ def _status(arguments: argparse.Namespace) -> int:
 
     status = read_status(arguments.path)
     complain(*status.warnings)
-    say(*status_lines(status))
+    say(*([json.dumps(asdict(status))] if arguments.json else status_lines(status)))
     return DONE
 
 
