@@ -17,7 +17,13 @@ from cvt_hpc.study.forecast.needs import size_in_words
 LEAST_DISK = 1e9  # [byte]: records and results.nc of a million runs take about as much
 PATIENCE = 60.0  # [s] for a program that is tried out
 _RANKS = 2
-_COUNT_RANKS = "from mpi4py import MPI; print(MPI.COMM_WORLD.size, MPI.Get_library_version().split()[0])"
+# One rank answers for all: lines of two may come mixed
+_COUNT_RANKS = """
+from mpi4py import MPI
+counted = MPI.COMM_WORLD.allreduce(1)
+if MPI.COMM_WORLD.rank == 0:
+    print(f"{counted} {MPI.Get_library_version().split()[0]}")
+"""
 
 
 class Finding(NamedTuple):
@@ -90,7 +96,7 @@ def _mpi(installed: bool) -> Finding:
         return Finding(False, "MPI", "mpi4py without an mpirun", "add that of its MPI library to PATH")
     command = [launcher, "-n", str(_RANKS), sys.executable, "-c", _COUNT_RANKS]
     lines = _said(command)
-    if len(lines) == _RANKS and all(line.startswith(f"{_RANKS} ") for line in lines):
+    if len(lines) == 1 and lines[0].startswith(f"{_RANKS} "):
         return Finding(True, "MPI", f"{_RANKS} ranks by {launcher} ({lines[0].split()[1]})")
     advice = f"`{launcher}` does not fit the MPI library of mpi4py; {serial}"
     return Finding(
