@@ -18,12 +18,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
-from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, value_text
+from cvt_hpc.analysis.arrangement import CHOSEN, Arrangement, Ruler, Sides, arrange, ruler, value_text
 from cvt_hpc.analysis.classes import (
     OccurrenceClass,
     at_strongest_strand,
@@ -36,6 +35,7 @@ from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.figures import WIDTH, draw, headline, in_words, styled
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 from cvt_hpc.analysis.starts import has_starts, join_starts
+from cvt_hpc.errors import mismatch
 from cvt_hpc.variables import Vibrates
 
 MOST_STACKED = 5  # panels in one column; more go into two
@@ -45,14 +45,25 @@ ONE_ROW = Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
 
 
 def draw_map(
-    dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None, source: str = "results"
+    dataset: xr.Dataset,
+    out: Path,
+    at: Mapping[str, Any] | None = None,
+    source: str = "results",
+    sides: Sides = CHOSEN,
+    vmax: float | None = None,
 ) -> Path:
     """Write the figure of `map_figure`."""
-    return draw(lambda: map_figure(dataset, at, source), out)
+    return draw(lambda: map_figure(dataset, at, source, sides, vmax), out)
 
 
 @styled
-def map_figure(dataset: xr.Dataset, at: Mapping[str, Any] | None = None, source: str = "results") -> Figure:
+def map_figure(
+    dataset: xr.Dataset,
+    at: Mapping[str, Any] | None = None,
+    source: str = "results",
+    sides: Sides = CHOSEN,
+    vmax: float | None = None,
+) -> Figure:
     """Draw where vibration occurs.
 
     Parameters
@@ -64,15 +75,24 @@ def map_figure(dataset: xr.Dataset, at: Mapping[str, Any] | None = None, source:
         a panel for each pair of axes, and `at` has to be empty. Results that hold `eigenfrequency` but no
         `amplitude` are drawn as lines over the axis that else runs along x. Of a study with the axis
         `disturbance` the runs from the smallest and the largest value make one cell.
+    sides : Sides
+        Which axis runs along x, along y and over the panels; of a grid.
+    vmax : float
+        Amplitude at which the colours end [m]; by default that of 98 % of the vibrating cells, where few lie
+        far above it.
     """
     check_results(dataset, source)
     if is_sampled(dataset):
-        return scatter_figure(dataset, at or {}, source)
+        if sides != CHOSEN:
+            raise mismatch(
+                f"{source}: x, y, panel", "results over a grid", "samples, in a panel for each pair"
+            )
+        return scatter_figure(dataset, at or {}, source, vmax)
     if "eigenfrequency" in dataset and "amplitude" not in dataset:
-        return eigenfrequency_figure(dataset, at or {}, source)
+        return eigenfrequency_figure(dataset, at or {}, source, sides)
     if has_starts(dataset, at or {}):
         dataset = join_starts(dataset)
-    return _grid_figure(arrange(dataset, at or {}, source))
+    return _grid_figure(arrange(dataset, at or {}, source, sides), vmax)
 
 
 @dataclass(frozen=True)
@@ -128,7 +148,7 @@ class Sheet:
         return width >= 22 and height >= 22  # [point]
 
 
-def _grid_figure(arrangement: Arrangement) -> Figure:
+def _grid_figure(arrangement: Arrangement, vmax: float | None) -> Figure:
     """Compose the map of a study over a grid; to be called within STYLE."""
     sheet = sheet_of(arrangement)
     has_frequency = bool(np.isfinite(sheet.frequency).any())
@@ -136,7 +156,8 @@ def _grid_figure(arrangement: Arrangement) -> Figure:
     blocks = 2 if has_frequency and not written else 1
     figure = Figure((WIDTH, blocks * sheet.rows * sheet.panel_height + 1.9), layout="constrained")
     axes = figure.subplots(blocks * sheet.rows, sheet.columns, sharex=True, sharey=True, squeeze=False)
-    amplitude = cells.Scale(cells.AMPLITUDE_COLOURS, cells.norm_over(sheet.amplitude, 0.0), "amplitude [µm]")
+    norm = cells.norm_over(sheet.amplitude, 0.0, None if vmax is None else 1e6 * vmax)
+    amplitude = cells.Scale(cells.AMPLITUDE_COLOURS, norm, "amplitude [µm]")
     draw_block(figure, axes[: sheet.rows], sheet, sheet.amplitude, amplitude)
     texts = [(OccurrenceClass.IRREGULAR, sheet.irregular)] if sheet.has_room else []
     texts += [(OccurrenceClass.VIBRATING, sheet.frequency)] if written else []
@@ -204,10 +225,7 @@ def draw_block(
             cells.draw_marks(ax, sheet.x, sheet.y, classes, ~inferred, mark)
         _label_panel(ax, sheet, panel)
     if np.isfinite(values).any():
-        bar = figure.colorbar(
-            ScalarMappable(scale.norm, scale.colours), ax=axes, aspect=12 * len(axes), pad=0.02
-        )
-        bar.set_label(scale.label)
+        cells.colour_bar(figure, scale, values, ax=axes, aspect=12 * len(axes), pad=0.02)
 
 
 def _label_panel(ax: Axes, sheet: Sheet, panel: int) -> None:
