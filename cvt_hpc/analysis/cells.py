@@ -60,7 +60,6 @@ STYLES: dict[CellClass, ClassStyle] = {
     OccurrenceClass.IRREGULAR: ClassStyle("#f3dca3", "#7a4b00", "#ffffff", "|||", "*", 1.8),
 }
 LEGEND_COLUMNS = 5
-IF_PRESENT = (OccurrenceClass.SLIPPING, OccurrenceClass.IRREGULAR)  # in the legend where they occur
 
 # Of maps from two starts: lighter than any vibration, and hatched the other way than what is undecided.
 OF_STARTS: dict[CellClass, ClassStyle] = {
