@@ -54,18 +54,20 @@ def add(commands: Any) -> None:
     for command, name in names.items():
         text = f"default: {name}.png beside the dataset"
         command.add_argument("--out", type=Path, metavar="PNG", help=text)
+    waterfall.add_argument("--x", metavar="AXIS", help="axis of the study that runs along x")
     for command in (waterfall, curve, strands):
         add_assignments(command, "--at", "fix an axis at a value")
 
 
 def _waterfall(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.arrangement import Sides
     from cvt_hpc.analysis.waterfall import draw_waterfall
     from cvt_hpc.study import open_results
 
     out = _picture(arguments, "waterfall", *arguments.at)
     with open_results(arguments.path) as dataset:
         at = _at(arguments, dataset)
-        say(f"picture: {draw_waterfall(dataset, out, at, str(arguments.path))}")
+        say(f"picture: {draw_waterfall(dataset, out, at, str(arguments.path), Sides(arguments.x))}")
     return DONE
 
 

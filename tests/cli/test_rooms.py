@@ -69,6 +69,7 @@ def test_imports_run_downwards():
         (
             {"cvt_hpc.files.written_aside"},
             {
+                "job",
                 "study",
                 "analysis",
                 "chart",

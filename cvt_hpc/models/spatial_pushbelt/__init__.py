@@ -1,0 +1,1 @@
+"""The spatial pushbelt of rigid elements on two flexible ring packages (Schindler 2008)."""
