@@ -13,6 +13,7 @@ from cvt_hpc.cli.parts import (
     add_assignments,
     add_command,
     add_sides,
+    check_output,
     complain,
     folder_of,
     picture_beside,
@@ -45,6 +46,9 @@ def add(commands: Any) -> None:
     picture.add_argument("--vmax", metavar="VALUE", help=text)
     text = "draw the figure of a paper that a study repeats, and measure what the paper says of it"
     add_command(commands, "figure", _figure, text, "DIR")
+    text = "write a page about a study: what was found, a map with values, failed runs, cost, assumptions"
+    page = add_command(commands, "report", _report, text, "RESULTS")
+    page.add_argument("--out", type=Path, metavar="HTML", help="default: report.html beside the dataset")
     text = "compare two studies, cell by cell; exit status 1: some contradict"
     compare = add_command(commands, "compare", _compare, text, "RESULTS")
     compare.add_argument("other", type=Path, metavar="RESULTS", help="the one to compare with it")
@@ -110,6 +114,17 @@ def _figure(arguments: argparse.Namespace) -> int:
 
     picture, table, findings = figure_of(arguments.path)
     say(*finding_lines(findings), f"picture: {picture}", f"table: {table}")
+    return DONE
+
+
+def _report(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.report import write_report
+    from cvt_hpc.study import open_results
+
+    out = arguments.out or folder_of(arguments.path) / "report.html"
+    check_output(out, (".html",))
+    with open_results(arguments.path) as dataset:
+        say(f"report: {write_report(dataset, out, str(arguments.path))}")
     return DONE
 
 

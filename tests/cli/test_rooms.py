@@ -76,6 +76,7 @@ def test_imports_run_downwards():
                 "ladder",
                 "bifurcation",
                 "fit",
+                "report",
                 "archives",
                 "output_folder",
                 "netcdf",
