@@ -17,15 +17,16 @@ from scipy.optimize import brentq
 
 from cvt_hpc.physics.geometry import driven_radius, variator
 
-SIDES = {"left": 1.0, "right": -1.0}  # seen along the belt with the rings' outer side up
+# of a pulley the side of its loose sheave: right is where the belt is seen to run counter-clockwise
+SIDES = {"left": -1, "right": 1, "both": 0}
 
 
 def axial_offset(parameters: Mapping[str, Any], aligned_ratio: float) -> float:
-    """Axial offset of the driven pulley's mid plane from the driving one's [m], towards the left.
+    """Axial offset of the driven pulley's mid plane from the driving one's [m], towards the right.
 
-    Of each pulley one sheave alone moves, on the side s_l (+1: left), so that its mid plane goes along:
+    Of each pulley one sheave alone moves, on the side s_l (1: right), so that its mid plane goes along:
     C = -s_l tan d0 (R - R_1), R_1 being the radius at which the pulleys are aligned. With the loose sheaves
-    on opposite sides, left at the driving pulley, that is
+    on opposite sides, right at the driving pulley, that is
 
         e = tan d0 [(R_dr - R_dr1) + (R_dn - R_dn1)],  about -tan d0 (R_dn - R_dr)^2 / (pi a)
 
@@ -35,7 +36,7 @@ def axial_offset(parameters: Mapping[str, Any], aligned_ratio: float) -> float:
     ----------
     parameters : mapping
         `ratio`, `driven_radius`, `centre_distance`, `half_wedge_angle` [SI], and `driving_loose_side` and
-        `driven_loose_side`, "left" or "right".
+        `driven_loose_side`, of SIDES.
     aligned_ratio : float
         The ratio without offset.
 

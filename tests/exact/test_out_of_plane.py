@@ -23,7 +23,7 @@ OFFSETS = {1.35: -0.1096, 2.0: -0.5300, 2.5: -0.8522}
 ROUNDED = 1e-4
 
 
-def scene(ratio, sides=("left", "right")):
+def scene(ratio, sides=("right", "left")):
     radius = driven_radius(ratio, BELT, DISTANCE)
     loose = {f"{pulley}_loose_side": side for pulley, side in zip(("driving", "driven"), sides, strict=True)}
     angle = math.radians(11.0)
@@ -47,12 +47,12 @@ def test_pulleys_whose_loose_sheaves_are_opposite_are_out_of_line_by_both_radii(
     assert axial_offset(asked, ratio) == pytest.approx(0.0, abs=1e-15)
     # a ratio and its inverse have the same radii, at the other pulleys
     assert axial_offset(scene(1.0 / ratio), 1.0) == pytest.approx(found, rel=1e-10)
-    mirrored = axial_offset(scene(ratio, ("right", "left")), 1.0)
+    mirrored = axial_offset(scene(ratio, ("left", "right")), 1.0)
     assert mirrored == -found
 
 
 def test_pulleys_whose_loose_sheaves_are_on_one_side_are_out_of_line_by_the_difference():
-    asked = scene(2.0, ("left", "left"))
+    asked = scene(2.0, ("right", "right"))
     difference = 0.5 * asked["driven_radius"]
     assert axial_offset(asked, 1.0) == pytest.approx(-math.tan(math.radians(11.0)) * difference, rel=1e-12)
 

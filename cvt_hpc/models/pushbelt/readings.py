@@ -64,8 +64,8 @@ class Readings:
     ----------
     parameters : mapping
         Resolved parameters of the run [SI].
-    belt : Belt
-        Its constants.
+    belt : NamedTuple
+        Its constants, of whichever equations: the `pitch_depth` counts.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Readings:
         Path coordinates of profiles [m].
     """
 
-    def __init__(self, parameters: Mapping[str, Any], belt: Belt) -> None:
+    def __init__(self, parameters: Mapping[str, Any], belt: Any) -> None:
         p = parameters
         self.belt = belt
         self.path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])

@@ -169,12 +169,21 @@ def histories(run: ElementRun) -> xr.Dataset:
     """
     from cvt_hpc.models.pushbelt.readings import PROFILES
 
+    return history(run, PROFILES, {})
+
+
+def history(
+    run: ElementRun,
+    profiles: Mapping[str, tuple[str, str, str]],
+    over_time: Mapping[str, tuple[str, str, str]],
+) -> xr.Dataset:
+    """What `histories` returns, with the words of a model's profiles and of its own channels over time."""
     touching = "at which the flanks touch the sheaves"
-    over_time = {f"{k}_radius": (f"{k} radius", "m", touching) for k in PULLEYS}
+    told = {f"{k}_radius": (f"{k} radius", "m", touching) for k in PULLEYS}
     comment = "mean over the middle half of the strand"
     for name in ("push force", "ring tension"):
-        over_time |= {f"{name.replace(' ', '_')} {k}": (f"{name} {k}", "N", comment) for k in STRANDS}
-    over_time |= {f"axial_force {k}": (f"axial force {k}", "N", "") for k in PULLEYS}
-    profiles = {name: (values, *PROFILES[name]) for name, values in run.profiles.items()}
+        told |= {f"{name.replace(' ', '_')} {k}": (f"{name} {k}", "N", comment) for k in STRANDS}
+    told |= {f"axial_force {k}": (f"axial force {k}", "N", "") for k in PULLEYS}
+    along = {name: (values, *profiles[name]) for name, values in run.profiles.items()}
     region = np.array(REGIONS)[regions(run.path, run.places)]
-    return dataset(run, over_time, profiles, run.places, region)
+    return dataset(run, {**told, **over_time}, along, run.places, region)

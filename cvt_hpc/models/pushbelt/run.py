@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.models.pushbelt import belt
-from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Reading, Readings
+from cvt_hpc.models.pushbelt.parameters import MODES, path_length
+from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Readings
 from cvt_hpc.models.pushbelt.start_up import StartUps, fingerprint
 from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
 from cvt_hpc.physics.geometry import driven_radius
@@ -82,7 +83,7 @@ class ElementRun(SampledRun):
         """Set how steps are solved, constants, state and work space."""
         raise NotImplementedError
 
-    def _read(self) -> Reading:
+    def _read(self) -> Any:
         """What is read at the sample that is reached."""
         raise NotImplementedError
 
@@ -272,3 +273,46 @@ class ElementRun(SampledRun):
         rotation = 0.5 * belt.inertia * passing * speed**2 * turning
         thrust = p["thrust"] * multiple(p, "thrust", p["duration"])  # a profile ends before the judged part
         return OF_ROTATION * rotation + OF_THRUST * self.step * thrust * speed
+
+
+def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """What a `start` takes, from flat parameters of a run [SI]."""
+    p, length = parameters, path_length(parameters)
+    pitch = length / p["elements"]
+    rigid = np.isinf(p["sheave_stiffness"])
+    return {
+        "ratio": p["ratio"],
+        "centre_distance": p["centre_distance"],
+        "belt_length": length,
+        "elements": p["elements"],
+        "element_mass": p["element_mass"] * pitch,
+        "element_height": p["element_height"],
+        "pitch_depth": p["ring_offset"],
+        "head_height": p["head_height"],
+        "play": p["play"],
+        "ring_mass": p["ring_mass"] * length,
+        "ring_stiffness": p["ring_stiffness"],
+        "ring_strain": 1e-4,
+        "half_wedge_angle": p["half_wedge_angle"],
+        "flank_stiffness": p["flank_stiffness"] * pitch,
+        "contact_stiffness": p["edge_stiffness"] / pitch,
+        **{key: p[key] for key in ("nose_height", "nose_clearance", "nose_stiffness")},
+        "angle_stiffness": p["tilt_spring"] * pitch,
+        "angle_damping": p["tilt_damper"] * pitch,
+        "transverse_damping": p["transverse_damping"],
+        "friction_law": p["friction_law"],
+        "kinetic_friction": p["kinetic_friction"],
+        "friction_gradient": p["friction_gradient"],
+        "stribeck_velocity": p["stribeck_velocity"],
+        "friction_memory": p["friction_memory"],
+        "ring_friction": p["ring_friction"],
+        "friction_speed": p["friction_speed"],
+        "ring_friction_speed": p["ring_friction_speed"],
+        "driven_inertia": p["driven_inertia"],
+        "driving_rate": p["sheave_rate"] if p["driving_thrust"] > 0.0 else 0.0,
+        "driven_rate": p["sheave_rate"],
+        "modal_stiffness": () if rigid else p["sheave_stiffness"] * np.array([p[key] for key in MODES]),
+        "driving_speed": p["speed_start"]
+        if ramped(p) == "speed"
+        else p["driving_speed"] * multiple(p, "driving_speed", 0.0),
+    }
