@@ -1,7 +1,7 @@
 """Vibration-occurrence maps of metal pushbelt CVTs: thousands of transient runs under MPI.
 
 `build_job`, `load_job`, `simulate`, `run`, `open_results`, `map_figure` and `history_figure`; what they need
-is imported at their first use.
+is imported at their first use. Datasets of results have `dataset.cvt` (`accessor.py`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _EXPORTS = {
     "history_figure": "cvt_hpc.analysis.histories",
     "load_job": "cvt_hpc.job",
     "map_figure": "cvt_hpc.analysis.maps",
-    "open_results": "cvt_hpc.study",
+    "open_results": "cvt_hpc.accessor",
     "run": "cvt_hpc.study",
     "simulate": "cvt_hpc.simulation",
 }

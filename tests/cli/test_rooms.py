@@ -69,12 +69,14 @@ def test_imports_run_downwards():
         (
             {"cvt_hpc.files.written_aside"},
             {
+                "job",
                 "study",
                 "analysis",
                 "chart",
                 "ladder",
                 "bifurcation",
                 "fit",
+                "report",
                 "archives",
                 "output_folder",
                 "netcdf",

@@ -17,6 +17,7 @@ CALM = {"stations": 48, "load": 60.0, "friction_gradient": 0.0}
 SCENES = {
     "lag": {"tilt_lag": 1e-3},
     "clearance": {"tilt_lag": 1e-3, "collar_clearance": 5e-4},
+    "clearance without lag": {"collar_clearance": 5e-4},
     "spring and oil": {"driven_spring_rate": 5e6, "driven_piston": (0.02, 0.08)},
     "drive": {"driving_inertia": 0.05, "drive_slope": 5.0},
     "given driven speed": {"driving_inertia": 0.05, "driven_inertia": np.inf},

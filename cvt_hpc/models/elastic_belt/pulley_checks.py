@@ -57,9 +57,9 @@ def pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     found = _piston_problems(p) + _drive_problems(p)
     if p["tilt_lag"] == 0.0:
         for key in ("collar_clearance", "bearing_clearance"):
-            if p[key] > 0.0:
-                expected = "0, or a tilt_lag: a sheave is within its clearance for a time only"
-                found.append((key, expected, f"{p[key]:g}"))
+            if p[key] > 0.0 and p.get("contact_sweeps", 0) > 0:
+                expected = f"0 with {key} and no tilt_lag"
+                found.append(("contact_sweeps", expected, f"{p['contact_sweeps']}"))
     elif p["tilt_lag"] < (least := least_tilt_lag(p)):
         expected = f"0, or {least:.2g} s and more at this step: tilting is explicit"
         found.append(("tilt_lag", expected, f"{p['tilt_lag']:g} s"))
