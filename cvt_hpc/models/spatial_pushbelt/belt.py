@@ -330,8 +330,9 @@ class Workspace(NamedTuple):
 
 
 SIZE = 8  # unknowns of an element
+RIGHT = 3 * SIZE * SIZE  # field of a row of blocks at which its right sides begin
 
-# Fields of Workspace.step. Directions and levers are those at q_k where not said otherwise; PREDICTED is at q*.
+# Fields of Workspace.step. Directions and levers are at q_k where not said otherwise; PREDICTED is at q*.
 PREDICTED_POSITION = 0  # 3
 PREDICTED_HEADING = 3  # 3
 PREDICTED_OUTWARD = 6  # 3
@@ -390,7 +391,12 @@ BY_NORMAL = 56  # 12: forces of the flanks' points by their normal forces
 YIELD = 68  # 4: decrease of normal forces by the opening of the sheaves
 FRICTION_SLOPES = 72  # 16: of the friction forces M, T by the slips M, T, at each point mm, mt, tm, tt
 RESIDUAL = 88  # 8
-ITERATE_FIELDS = RESIDUAL + 8
+TORQUE_ROW = 96  # 6: decrease of the driven pulley's torque by the speeds of an element, and by their own
+TORQUE_OWN = 102  # by the speed of the pulley,
+TORQUE_OPENING = 103  # and by the opening of the sheaves
+NORMAL_ROW = 104  # 6: decrease of a flank's axial force by the speeds of an element,
+NORMAL_YIELD = 110  # and by the opening of the sheaves
+ITERATE_FIELDS = 111
 
 
 def workspace(belt: Belt, nodes: int) -> Workspace:
@@ -405,7 +411,7 @@ def workspace(belt: Belt, nodes: int) -> Workspace:
         step=lanes(rows, STEP_FIELDS),
         iterate=lanes(rows, ITERATE_FIELDS),
         shapes=lanes(rows, max(modes, 1)),
-        blocks=lanes(rows, 3 * SIZE * SIZE + SIZE * columns),
+        blocks=lanes(rows, RIGHT + SIZE * columns),
         scratch=lanes(1, 4 * SIZE * SIZE + SIZE * columns),
         reduced=np.zeros((SIZE * parts, SIZE * parts + columns)),
         border=np.zeros((columns - 1, columns)),
