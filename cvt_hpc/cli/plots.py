@@ -43,6 +43,10 @@ def add(commands: Any) -> None:
     element.add_argument("--data", type=Path, metavar="FILE.nc", help=text)
     text = "tension and push force of the strands over an axis, as bars"
     strands = add_command(kinds, "strands", _strands, text, "RESULTS")
+    text = "the belt in the last periods of a run, magnified, as a moving picture"
+    animation = add_command(kinds, "animation", _animation, text, "HISTORY")
+    text = "FILE.gif, or FILE.mp4 where there is ffmpeg (default: HISTORY.gif beside it)"
+    animation.add_argument("--out", type=Path, metavar="GIF", help=text)
     names = {
         strands: "strands",
         waterfall: "waterfall",
@@ -90,6 +94,18 @@ def _strands(arguments: argparse.Namespace) -> int:
     with open_results(arguments.path) as dataset:
         at = _at(arguments, dataset)
         say(f"picture: {draw_strand_bars(dataset, out, at, str(arguments.path))}")
+    return DONE
+
+
+def _animation(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.animation import check_animation, draw_animation
+    from cvt_hpc.analysis.telling_apart import history_files
+
+    (file,) = history_files([arguments.path])
+    out = arguments.out or file.with_suffix(".gif")
+    check_animation(out)
+    with _opened([file]) as (history,):
+        say(f"animation: {draw_animation(history, out, str(file))}")
     return DONE
 
 
