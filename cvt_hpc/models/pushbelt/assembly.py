@@ -93,7 +93,7 @@ from cvt_hpc.models.pushbelt.belt import (
     V_FILTERED,
     V,
 )
-from cvt_hpc.models.pushbelt.laws import coefficient, pressed, remembered
+from cvt_hpc.physics.contact_laws import coefficient, pressed, remembered
 from cvt_hpc.physics.primal_dual import dual_of, friction
 
 RIGHT = 48  # field of a row of blocks at which its right sides begin (`cyclic`)

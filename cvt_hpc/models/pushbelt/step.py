@@ -82,9 +82,9 @@ from cvt_hpc.models.pushbelt.belt import (
 )
 from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
 from cvt_hpc.models.pushbelt.cyclic import solve
-from cvt_hpc.models.pushbelt.laws import remembered
 from cvt_hpc.models.pushbelt.nose import add_nose_blocks, nose_forces, predict_noses
 from cvt_hpc.models.pushbelt.power import book
+from cvt_hpc.physics.contact_laws import remembered
 
 _LARGE = 1e100  # more than any speed or power that means something
 
