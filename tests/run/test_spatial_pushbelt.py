@@ -50,9 +50,15 @@ def test_both_pulleys_take_the_lateral_force_of_misaligned_strands(misaligned):
     assert found["status"] == Status.DONE and found["unsolved_share"] == 0.0
     driving, driven = found["net_axial_force"]
     assert driving == pytest.approx(-driven, rel=0.01)
-    net = found["mean_ring_tension"] - found["mean_push_force"] - 1.464 * 14.87**2
-    strand = misaligned.path.strand_length
-    clamped = sum(clamped_force(OFFSET, strand, tension, 47.6, 2.4e6) for tension in net)
+    net = (
+        found["mean_ring_tension"]
+        - found["mean_push_force"]
+        - 1.4635 * (100.0 * np.pi * 0.063896 / 1.35) ** 2
+    )
+    strand, offset = misaligned.path.strand_length, found["final_misalignment"]
+    clamped = sum(clamped_force(offset, strand, tension, 47.6, 2.4e6) for tension in net)
+    assert found["beam_axial_force"] == pytest.approx([clamped, -clamped], rel=1e-3)
+    assert found["string_axial_force"][0] == pytest.approx(net.sum() * offset / strand, rel=1e-3)
     # a belt runs through the arcs' ends, where elements slide and rings turn: not held as a clamped beam is
     assert 0.6 * clamped < driving < clamped
     assert found["sheave_force"].reshape(2, 2).mean(axis=1) == pytest.approx(found["axial_force"])
