@@ -81,6 +81,23 @@ def steady_pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     return found or overload_problems(p)
 
 
+def slipping_pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+    """Problems of pulleys whose driven one is slowed down until the belt slips, and no other moves freely."""
+    p = PULLEY_DEFAULTS | dict(parameters)
+    found = _piston_problems(p) + _bearing_problems(p)
+    if p["driving_axial"] != "position":
+        expected = "position: a driving sheave that is free shifts before the belt slips"
+        found.append(("driving_axial", expected, p["driving_axial"]))
+    if p["clamping"] != "constant":
+        found.append(("clamping", "constant: the thrust is given, or sought", p["clamping"]))
+    if np.isfinite(p["driving_inertia"]):
+        expected = "inf: the speed of the driving pulley is given"
+        found.append(("driving_inertia", expected, f"{p['driving_inertia']:g} kg m^2"))
+    if np.isinf(p["driven_inertia"]):
+        found.append(("driven_inertia", "finite: slip slows the driven pulley down", "inf"))
+    return found
+
+
 def overload_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     """Problem of a load that is more than any belt carries under the axial forces that are given.
 

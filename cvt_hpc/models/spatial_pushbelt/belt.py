@@ -16,6 +16,7 @@ import numpy as np
 
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.pushbelt.start import parts_of
+from cvt_hpc.solvers.linked_blocks import empty_scratch, empty_system, field_of_right
 
 # Fields of the state of an element. Speeds are those at the middle of the last step.
 POSITION = 0  # 3: middle of the saddle line, which is the ring line and the assumed centre of gravity [m]
@@ -302,11 +303,10 @@ class Workspace(NamedTuple):
     shapes : (rows, modes) LaneArray
         psi_k at the elements.
     blocks : (rows, 192 + 8 columns) LaneArray
-        The system of an iteration, with a column for the residual and one for each unknown of the border.
-    scratch : (1, ...) LaneArray
-        Blocks and sums.
-    reduced : (8 lanes, 8 lanes + columns) array
-        System of the parts' last elements.
+        The system of an iteration (`solvers.linked_blocks`), with a column for the residual and one for each
+        unknown of the border.
+    scratch : (3, 192 + 8 columns) LaneArray
+        Of the solver, and sums.
     border : (columns - 1, columns) array
         System of the border, its right side last.
     inputs : (INPUTS,) array
@@ -322,7 +322,6 @@ class Workspace(NamedTuple):
     shapes: LaneArray
     blocks: LaneArray
     scratch: LaneArray
-    reduced: np.ndarray
     border: np.ndarray
     inputs: np.ndarray
     increments: np.ndarray
@@ -330,7 +329,7 @@ class Workspace(NamedTuple):
 
 
 SIZE = 8  # unknowns of an element
-RIGHT = 3 * SIZE * SIZE  # field of a row of blocks at which its right sides begin
+RIGHT = field_of_right(SIZE)  # field of a row of blocks at which its right sides begin
 
 # Fields of Workspace.step. Directions and levers are at q_k where not said otherwise; PREDICTED is at q*.
 PREDICTED_POSITION = 0  # 3
@@ -411,9 +410,8 @@ def workspace(belt: Belt, nodes: int) -> Workspace:
         step=lanes(rows, STEP_FIELDS),
         iterate=lanes(rows, ITERATE_FIELDS),
         shapes=lanes(rows, max(modes, 1)),
-        blocks=lanes(rows, RIGHT + SIZE * columns),
-        scratch=lanes(1, 4 * SIZE * SIZE + SIZE * columns),
-        reduced=np.zeros((SIZE * parts, SIZE * parts + columns)),
+        blocks=empty_system(nodes, parts, SIZE, columns),
+        scratch=empty_scratch(parts, SIZE, columns),
         border=np.zeros((columns - 1, columns)),
         inputs=np.zeros(INPUTS),
         increments=np.zeros(columns - 1),

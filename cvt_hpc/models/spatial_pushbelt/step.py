@@ -70,7 +70,6 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
 )
 from cvt_hpc.models.spatial_pushbelt.bending import bending_forces, predict_bending
 from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across
-from cvt_hpc.models.spatial_pushbelt.cyclic import solve
 from cvt_hpc.models.spatial_pushbelt.faces import face_forces, predict_faces
 from cvt_hpc.models.spatial_pushbelt.flank import (
     add_flank_blocks,
@@ -92,7 +91,10 @@ from cvt_hpc.models.spatial_pushbelt.rotations import (
     vector,
 )
 from cvt_hpc.models.spatial_pushbelt.saddle import saddle_forces
+from cvt_hpc.solvers.cyclic_blocks import block_size
+from cvt_hpc.solvers.linked_blocks import solve
 
+_BLOCK = block_size(SIZE)
 _LARGE = 1e100  # more than any speed or power that means something
 
 
@@ -212,10 +214,14 @@ def _assemble(belt, state, work, dt):
 
 @kernel
 def _solve(belt, state, work, dt):
-    """Solve for the correction: of the border in its last column, of elements without its part in blocks."""
-    solve(work.blocks, work.scratch, work.reduced, SIZE)
+    """Solve for the correction: of the border in its last column, of elements without its part in blocks.
+
+    Return whether the system was regular.
+    """
+    is_regular = solve(work.blocks, work.scratch, _BLOCK)
     border_system(belt, state.elements, work.shapes, work.iterate, work.blocks, work.scratch, work.border, dt)
     _solve_border(work.border)
+    return is_regular
 
 
 @kernel
@@ -297,7 +303,8 @@ def _newton(belt, newton, state, work, load, dt):
             _name_fault(state, element, work.kept)
             return iteration, change, power
         _assemble(belt, state, work, dt)
-        _solve(belt, state, work, dt)
+        if not _solve(belt, state, work, dt):
+            return iteration, np.inf, power
         share = 0.5 if iteration >= newton.first_half_step else 1.0
         change = _correct(
             newton, state.elements, work.blocks, work.border, state.increments, work.scratch, share
