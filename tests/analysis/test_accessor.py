@@ -1,5 +1,8 @@
 """`dataset.cvt` on made-up studies: classes, onsets, boundaries, and pictures laid out as asked."""
 
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -93,3 +96,34 @@ def test_a_map_is_laid_out_as_asked():
 def test_what_there_is_not_is_named(call, told):
     with pytest.raises(InputError, match=told.replace("?", r"\?")):
         call(study())
+
+
+def test_a_table_is_read_as_the_dataset_that_it_was_made_of(tmp_path):
+    rows = runpy.run_path(str(Path(__file__).parents[2] / "jobs" / "tabulate.py"))["rows"]
+    made = study()
+    made["core_seconds"] = made["status"].astype(float)
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join(rows(made, ("amplitude", "frequency"))))
+    found = cvt_hpc.read_table(path)
+    assert found["load"].attrs["units"] == "N m" and found.amplitude.attrs["units"] == "m"
+    np.testing.assert_array_equal(found.status, made.status)
+    done = made.status == Status.DONE
+    np.testing.assert_array_equal(found.vibrates.where(done), made.vibrates.where(done))
+    np.testing.assert_allclose(found.amplitude, made.amplitude.where(done), atol=0.51e-8)  # two digits in um
+    np.testing.assert_allclose(found.frequency, made.frequency.where(done), atol=0.051)  # one digit in Hz
+    np.testing.assert_array_equal(found.cvt.onset(), made.cvt.onset())
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "load,amplitude\n1,2\n",
+        "load,status,vibrates\n1,done\n",
+        "load,status,vibrates\n1,done,no\n1,done,no\n",
+    ],
+)
+def test_what_is_no_table_of_a_study_is_refused(text, tmp_path):
+    (tmp_path / "x.csv").write_text(text)
+    with pytest.raises(InputError, match="x.csv: expected a "):
+        cvt_hpc.read_table(tmp_path / "x.csv")
