@@ -203,7 +203,7 @@ class ElementRun(SampledRun):
     def _why(self, outcome: int) -> str:
         if outcome == self.fields.NOT_CONVERGED:
             return f"the equations of a step were not solved, {self._fault()}"
-        return "the state is not a number"
+        return "the state is not a number, or the equations of a step are singular"
 
     def _fault(self) -> str:
         """Where the last step that was not solved was not."""
