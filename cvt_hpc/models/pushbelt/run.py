@@ -91,6 +91,10 @@ class ElementRun(SampledRun):
         """Kinetic and elastic energy of belt and pulleys [J]."""
         raise NotImplementedError
 
+    def _tilting_inertia(self) -> float:
+        """Moment of inertia of an element about its axial direction [kg m^2]."""
+        return self._belt.inertia
+
     def advance(self, samples: int) -> tuple[Status, str] | None:
         """March on.
 
@@ -199,7 +203,7 @@ class ElementRun(SampledRun):
     def _why(self, outcome: int) -> str:
         if outcome == self.fields.NOT_CONVERGED:
             return f"the equations of a step were not solved, {self._fault()}"
-        return "the state is not a number"
+        return "the state is not a number, or the equations of a step are singular"
 
     def _fault(self) -> str:
         """Where the last step that was not solved was not."""
@@ -209,7 +213,7 @@ class ElementRun(SampledRun):
 
     def _slipped(self) -> str | None:
         """Whether the driven pulley runs far from the speed that the present radii give without slip."""
-        driving_speed, driven_speed, driving_radius, driven_radius = self._state.pulleys
+        driving_speed, driven_speed, driving_radius, driven_radius = self._state.pulleys[:4]
         driving, driven = driving_speed * driving_radius, driven_speed * driven_radius
         if driven < LEAST_SPEED * driving:
             return LOST
@@ -266,11 +270,11 @@ class ElementRun(SampledRun):
 
     def _most_damped(self) -> float:
         """Most that the steps of a sound run without vibration damp by themselves [W]."""
-        p, belt, path = self.parameters, self._belt, self.path
+        p, path = self.parameters, self.path
         speed = self.mean_driving_speed(self.judged) * path.driving_radius
         passing = speed / self._readings.pitch
         turning = path.driving_radius**-2 + path.driven_radius**-2
-        rotation = 0.5 * belt.inertia * passing * speed**2 * turning
+        rotation = 0.5 * self._tilting_inertia() * passing * speed**2 * turning
         thrust = p["thrust"] * multiple(p, "thrust", p["duration"])  # a profile ends before the judged part
         return OF_ROTATION * rotation + OF_THRUST * self.step * thrust * speed
 

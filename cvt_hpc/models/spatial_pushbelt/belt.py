@@ -249,8 +249,8 @@ class Newton(NamedTuple):
         Failed steps in a row with which a run ends.
     """
 
-    tolerance: float = 1e-3
-    power_tolerance: float = 1.0
+    tolerance: float = 3e-3
+    power_tolerance: float = 5.0
     roll_length: float = 1e-2
     pitch_length: float = 2e-3
     slope_length: float = 1e-3

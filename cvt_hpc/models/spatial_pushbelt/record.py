@@ -9,6 +9,7 @@ import numpy as np
 
 from cvt_hpc.models.pushbelt import record as pushbelt
 from cvt_hpc.models.spatial_pushbelt.readings import ANGLES, LATERAL, PROFILES, SHEAVES, SIDES
+from cvt_hpc.physics.out_of_plane import clamped_force
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
 from cvt_hpc.variator.judging import each, mean
@@ -45,6 +46,22 @@ VARIABLES = (
     Variable("sheave_loss", ("sheave",), "f8", "W", "mean friction power of the flanks at each sheave"),
     Variable(
         "net_axial_force", ("pulley",), "f8", "N", "mean force of the belt on both sheaves, to the right"
+    ),
+    Variable(
+        "beam_axial_force",
+        ("pulley",),
+        "f8",
+        "N",
+        "the same by both strands as beams under their mean forces, held without slope at the arcs",
+        words="clamped strands",
+    ),
+    Variable(
+        "string_axial_force",
+        ("pulley",),
+        "f8",
+        "N",
+        "the same by both strands as strings under their mean forces",
+        words="strings",
     ),
     Variable(
         "strand_one_sidedness",
@@ -131,7 +148,17 @@ def _evaluate(run: ElementRun) -> dict[str, Any]:
         one, other = np.nansum(left[inside]), np.nansum(right[inside])
         return (other - one) / (other + one) if other + one > 0.0 else np.nan
 
+    p, path, offset = run.parameters, run.path, mean(run, "misalignment")
+    speed = run.mean_driving_speed(run.judged) * path.driving_radius
+    centrifugal = (p["element_mass"] + p["ring_mass"]) * speed**2
+    net = each(run, "ring_tension", STRANDS) - each(run, "push_force", STRANDS) - centrifugal
+    stiffness = p["lateral_bending_stiffness"], p["lateral_shear_stiffness"]
+    # a strand that is pushed more than it is pulled is no string, and counts as one without tension
+    held = [clamped_force(offset, path.strand_length, max(force, 0.0), *stiffness) for force in net]
+    signs = np.array([1.0, -1.0])  # the driving pulley is pulled to where the driven one is
     return {
+        "beam_axial_force": signs * sum(held),
+        "string_axial_force": signs * offset / path.strand_length * np.maximum(net, 0.0).sum(),
         "sheave_force": forces,
         "sheave_loss": each(run, "sheave_loss", SHEAVES),
         "net_axial_force": forces[1::2] - forces[::2],
