@@ -47,7 +47,6 @@ DRIVEN = 61  # 1 where the nearer pulley is the driven one, else 0
 CHANGE = 62  # 8: of the speeds in the last step, from which the next one starts
 STATE_FIELDS = CHANGE + 8
 POINTS = 4  # contact points of an element at its flanks, and at the front to the next one
-SIDES = (-1.0, -1.0, 1.0, 1.0)  # of the flanks' points
 
 # Entries of the state of the pulleys: speeds [rad/s], radii at which the flanks' pitch line runs without
 # penetration [m], positions of the mid planes between their sheaves along the axes [m]
