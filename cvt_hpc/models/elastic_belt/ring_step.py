@@ -277,8 +277,8 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
                 own_sum += part
                 layers[j, STRIDE * k + PART] = part
         else:
-            # Friction of all surfaces first: each is a long chain of operations, of which a processor works on
-            # several at a time only where no elimination is between them.
+            # Friction of all surfaces first: each is a long chain of operations, and a processor works on
+            # several of them at a time only where no elimination is in between.
             for k in range(n):
                 first = STRIDE * k
                 above_factor, below_factor = surface_factors(rings, k, is_driven)
@@ -286,15 +286,14 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
                 over = fields[j, FIRST_LAYER + k]
                 sliding = fma(below_factor, belt_speed + under, -above_factor * (belt_speed + over))
                 level = c[0, LAYER_FRICTION_LEVEL] if k > 0 else c[0, SADDLE_FRICTION_LEVEL]
-                secant, slope = ring_friction(
-                    sliding, level, rings.falls, excess, per_stribeck, per_width, least
-                )
                 pressed = largest - layers[j, first + PART]
-                secant *= pressed
+                secant, slope = ring_friction(
+                    sliding, level * pressed, rings.falls, excess, per_stribeck, per_width, least
+                )
                 layers[j, first + DRAG] = secant * sliding
                 # not less than what keeps friction from turning sliding about within the step
                 enough = secant - (between if k > 0 else at_saddle)
-                layers[j, first + STIFF] = maximum(pressed * slope, enough)
+                layers[j, first + STIFF] = maximum(slope, enough)
             # of the surface above the present layer: friction, slope, the factor of the layer below it
             drag_up = stiff_up = factor_up = zero
             # of the ears: friction on the elements and its slopes
@@ -304,11 +303,12 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
                 above_factor, below_factor = surface_factors(rings, n, is_driven)
                 outer = fields[j, FIRST_LAYER + n - 1]
                 sliding = fma(below_factor, belt_speed + outer, -above_factor * (belt_speed + element))
+                level = bearing * c[0, SADDLE_FRICTION_LEVEL]
                 secant, slope = ring_friction(
-                    sliding, c[0, SADDLE_FRICTION_LEVEL], rings.falls, excess, per_stribeck, per_width, least
+                    sliding, level, rings.falls, excess, per_stribeck, per_width, least
                 )
-                drag_up = bearing * secant * sliding
-                stiff_up = maximum(bearing * slope, fma(bearing, secant, -at_saddle))
+                drag_up = secant * sliding
+                stiff_up = maximum(slope, secant - at_saddle)
                 factor_up = below_factor
                 ear_drag, ear_stiff = above_factor * drag_up, above_factor * above_factor * stiff_up
                 ear_cross = above_factor * below_factor * stiff_up
