@@ -1,7 +1,7 @@
 """Vibration-occurrence maps of metal pushbelt CVTs: thousands of transient runs under MPI.
 
-`build_job`, `load_job`, `simulate`, `run`, `open_results`, `map_figure` and `history_figure`; what they need
-is imported at their first use.
+`build_job`, `load_job`, `simulate`, `run`, `open_results`, `read_table`, `map_figure` and `history_figure`;
+what they need is imported at their first use. Datasets of results have `dataset.cvt` (`accessor.py`).
 """
 
 from __future__ import annotations
@@ -10,14 +10,24 @@ from importlib import import_module
 from typing import Any
 
 __version__ = "0.1.0"
-__all__ = ["build_job", "history_figure", "load_job", "map_figure", "open_results", "run", "simulate"]
+__all__ = [
+    "build_job",
+    "history_figure",
+    "load_job",
+    "map_figure",
+    "open_results",
+    "read_table",
+    "run",
+    "simulate",
+]
 
 _EXPORTS = {
     "build_job": "cvt_hpc.job",
     "history_figure": "cvt_hpc.analysis.histories",
     "load_job": "cvt_hpc.job",
     "map_figure": "cvt_hpc.analysis.maps",
-    "open_results": "cvt_hpc.study",
+    "open_results": "cvt_hpc.accessor",
+    "read_table": "cvt_hpc.accessor",
     "run": "cvt_hpc.study",
     "simulate": "cvt_hpc.simulation",
 }

@@ -238,7 +238,7 @@ def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
         code = function.__code__
         content = _digest(repr((code.co_code, code.co_consts, code.co_names)).encode())
     else:
-        if place := _place():
+        if place := cache_folder():
             compiled._cache = _Cache(compiled, place / f"{function.__module__}-{content}")
     compiled._set_uuid(f"{name}-{content}")
     return compiled
@@ -364,8 +364,8 @@ def _digest(content: bytes) -> str:
 
 
 @cache
-def _place() -> Path | None:
-    """The folder of all folders with machine code; None if nothing can be kept."""
+def cache_folder() -> Path | None:
+    """Return the folder of all folders with machine code; None if nothing can be kept."""
     if chosen := numba.config.CACHE_DIR:
         bases = [Path(chosen).absolute()]
     else:
@@ -522,7 +522,7 @@ def _claims_file() -> int:
     OSError
         If there is none to be had.
     """
-    place = _place()
+    place = cache_folder()
     if place is None:
         raise FileNotFoundError("no folder for machine code")
     return os.open(place / "claims", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)

@@ -30,8 +30,10 @@ for lag in 0.05 0.1 0.2 2; do
   part "tilt_lag_${lag}ms" "${still[@]}" "${short[@]}" --set "tilt_lag=$lag ms"
 done
 part collar_clearance "${still[@]}" "${short[@]}" --set 'tilt_lag=0.05 ms' --set 'collar_clearance=0.5 mrad'
+part collar_clearance_without_lag "${still[@]}" --set 'collar_clearance=0.5 mrad'
 part shaft "${still[@]}" "${shaft[@]}"
 part shaft_and_collar "${still[@]}" "${shaft[@]}" "${collar[@]}"
 part shaft_rigid "${still[@]}" "${shaft[@]}" --set shaft_factor=inf
 part bearing_clearance "${still[@]}" "${shaft[@]}" "${collar[@]}" "${short[@]}" --set 'tilt_lag=0.05 ms' --set 'bearing_clearance=20 um'
+part bearing_clearance_without_lag "${still[@]}" "${shaft[@]}" "${collar[@]}" --set 'bearing_clearance=20 um'
 joined

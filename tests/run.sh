@@ -5,25 +5,25 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . jobs/environment.sh
 
-# The batch files are tested with a real Slurm, which the tests start themselves. Without one they are skipped, or, in
-# continuous integration (CI=true), fail.
-install_slurm() {
-    local packages=(slurmctld slurmd slurm-client munge)
-    if PATH="$PATH:/usr/sbin:/sbin" type slurmctld slurmd sbatch munged > /dev/null 2>&1; then
+# The batch files are tested with a real Slurm, which the tests start themselves, and reports in a real browser. Without
+# these the tests are skipped, or, in continuous integration (CI=true), fail.
+install_packages() {
+    local packages=(slurmctld slurmd slurm-client munge chromium)
+    if PATH="$PATH:/usr/sbin:/sbin" type slurmctld slurmd sbatch munged chromium > /dev/null 2>&1; then
         return
     fi
     if [ "$(id -u)" -ne 0 ] || ! command -v apt-get > /dev/null; then
-        echo "No Slurm here, and only root on Debian can install it: apt-get install ${packages[*]}"
+        echo "No Slurm or no browser here, and only root on Debian can install them: apt-get install ${packages[*]}"
         return
     fi
-    echo "Installing a Slurm for the tests of the batch files (once): apt-get install ${packages[*]}"
+    echo "Installing a Slurm and a browser for the tests (once): apt-get install ${packages[*]}"
     if ! { apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install --no-install-recommends \
         "${packages[@]}"; } > /dev/null; then
-        echo "No Slurm here, and it could not be installed: apt-get install ${packages[*]}"
+        echo "No Slurm or no browser here, and they could not be installed: apt-get install ${packages[*]}"
     fi
 }
 
-install_slurm & # beside the other, as both wait for the network
+install_packages & # beside the other, as both wait for the network
 prepare_environment mpich,test,discs || { wait; exit 1; }
 wait
 # Where nothing may be written beside the sources, each process rewrites all assertions anew, for 8 s of a core.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -40,12 +40,23 @@ class Arrangement:
     notes: tuple[str, ...]
 
 
-def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> Arrangement:
+class Sides(NamedTuple):
+    """Axes of a study that are to run along x, along y and over the panels; None: the program chooses."""
+
+    x: str | None = None
+    y: str | None = None
+    panel: str | None = None
+
+
+CHOSEN = Sides()
+
+
+def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Sides = CHOSEN) -> Arrangement:
     """Choose what a map shows.
 
-    `load` runs along x, or `load_share`, else the last numeric axis; `friction_gradient` along y,
-    `sheave_stiffness` over the panels, else the first axes that are left. Further axes are fixed at their
-    first value.
+    Where `sides` leave it open `load` runs along x, or `load_share`, else the last numeric axis;
+    `friction_gradient` along y, `sheave_stiffness` over the panels, else the first axes that are left.
+    Further axes are fixed at their first value.
 
     Parameters
     ----------
@@ -55,13 +66,17 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> Arrangem
         Axes to fix: name -> value on the axis, as a number [SI] or a text.
     source : str
         Where the results are from, for the errors.
+    sides : Sides
+        Which axis is to run where.
 
     Raises
     ------
     InputError
-        `at` names no axis, or no value on it; or no axis is left to draw.
+        `at` names no axis, or no value on it; `sides` name no axis, a fixed one, or one twice; or no axis is
+        left to draw.
     """
     axes = list(map(str, dataset["status"].dims))
+    _check_sides(sides, axes, at, source)
     notes = []
     for name, value in at.items():
         if name not in axes:
@@ -76,11 +91,11 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> Arrangem
             "`cvt-hpc simulate` draws one"
         )
     numeric = [name for name in free if dataset[name].dtype.kind in "iuf"]
-    x = next((name for name in ("load", "load_share") if name in numeric), (numeric or free)[-1])
-    rest = [name for name in free if name != x]
+    rest = [name for name in free if name not in sides]
+    x = sides.x or _take_along_x(rest, numeric, source)
     # The panels' axis must not be taken for y where there is another one to take.
-    y = _take(rest, "friction_gradient", avoid="sheave_stiffness")
-    panel = _take(rest, "sheave_stiffness")
+    y = sides.y or _take(rest, "friction_gradient", avoid="sheave_stiffness")
+    panel = sides.panel or _take(rest, "sheave_stiffness")
     for name in rest:
         count = dataset.sizes[name]
         notes.append(f"{in_words(dataset[name])} = {value_text(dataset[name], 0)} (first of {count})")
@@ -89,6 +104,28 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> Arrangem
         if dataset[name].dtype.kind in "iuf":
             dataset = dataset.sortby(name)
     return Arrangement(dataset, x, y, panel, tuple(notes))
+
+
+def _check_sides(sides: Sides, axes: list[str], at: Mapping[str, Any], source: str) -> None:
+    for side, name in sides._asdict().items():
+        if name is None:
+            continue
+        if name not in axes:
+            raise unknown(f"{source}: {side} {name}", "axis of the results", name, axes)
+        if name in at:
+            raise mismatch(f"{source}: {side} {name}", "an axis that is not fixed", f"{name} fixed by at")
+        if sides.count(name) > 1:
+            raise mismatch(f"{source}: {side} {name}", "an axis on one side", f"{name} on several")
+
+
+def _take_along_x(names: list[str], numeric: list[str], source: str) -> str:
+    """Take the axis that runs along x off the list; InputError where the other sides have left none."""
+    if not names:
+        raise mismatch(f"{source}: x", "an axis that is left for it", "all of them fixed or on other sides")
+    free = [name for name in names if name in numeric] or names
+    chosen = next((name for name in ("load", "load_share") if name in free), free[-1])
+    names.remove(chosen)
+    return chosen
 
 
 def along_x(arrangement: Arrangement) -> tuple[xr.Dataset, list[str]]:

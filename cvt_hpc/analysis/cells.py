@@ -9,9 +9,11 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Colormap, ListedColormap, Normalize, to_rgba
-from matplotlib.figure import FigureBase
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.image import PcolorImage
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
@@ -25,6 +27,11 @@ from cvt_hpc.vibration.agreement import PairClass
 from cvt_hpc.vibration.hysteresis import StartClass
 
 Array = NDArray[np.float64]
+MOST, FAR, MANY = (
+    0.98,
+    1.5,
+    20,
+)  # share of values on a scale, where the others reach so far beyond; of so many
 Mask = NDArray[np.bool_]
 CellClass = OccurrenceClass | StartClass | PairClass
 
@@ -53,7 +60,6 @@ STYLES: dict[CellClass, ClassStyle] = {
     OccurrenceClass.IRREGULAR: ClassStyle("#f3dca3", "#7a4b00", "#ffffff", "|||", "*", 1.8),
 }
 LEGEND_COLUMNS = 5
-IF_PRESENT = (OccurrenceClass.SLIPPING, OccurrenceClass.IRREGULAR)  # in the legend where they occur
 
 # Of maps from two starts: lighter than any vibration, and hatched the other way than what is undecided.
 OF_STARTS: dict[CellClass, ClassStyle] = {
@@ -96,13 +102,29 @@ class Scale:
     label: str
 
 
-def norm_over(values: Array, lowest: float | None = None) -> Normalize:
-    """Scale over the finite values, from `lowest` if given."""
+def norm_over(values: Array, lowest: float | None = None, highest: float | None = None) -> Normalize:
+    """Scale over the finite values, from `lowest` and to `highest` if given.
+
+    Else a few values far above the others do not flatten these: the scale then ends at the MOST share.
+    """
     known = values[np.isfinite(values)]
     if known.size == 0:
-        return Normalize(0.0, 1.0)
+        return Normalize(0.0, 1.0) if highest is None else Normalize(lowest or 0.0, highest)
     low, high = known.min() if lowest is None else lowest, known.max()
+    most = low + FAR * (np.quantile(known, MOST) - low)
+    if highest is not None:
+        high = highest
+    elif known.size >= MANY and high > most > low:
+        high = np.quantile(known, MOST)
     return Normalize(low, high) if high > low else Normalize(low - 0.5, high + 0.5)
+
+
+def colour_bar(figure: Figure, scale: Scale, values: Array, **options: Any) -> Colorbar:
+    """Draw the colour bar of a scale; it has a point where values lie beyond its end."""
+    above, below = np.nanmax(values) > scale.norm.vmax, np.nanmin(values) < scale.norm.vmin
+    extend = {(True, True): "both", (True, False): "max", (False, True): "min"}.get((above, below), "neither")
+    mappable = ScalarMappable(scale.norm, scale.colours)
+    return figure.colorbar(mappable, extend=extend, label=scale.label, **options)
 
 
 def draw_cells(

@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.arrangement import along_x, arrange, ruler
+from cvt_hpc.analysis.arrangement import CHOSEN, Sides, along_x, arrange, ruler
 from cvt_hpc.analysis.figures import WIDTH, axis_label
 from cvt_hpc.errors import one_line
 
@@ -18,7 +18,9 @@ COLOUR = "#1f4e8c"
 HEIGHT = 3.6  # [inch]
 
 
-def eigenfrequency_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> Figure:
+def eigenfrequency_figure(
+    dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Sides = CHOSEN
+) -> Figure:
     """Compose the picture: a panel for each strand, a line for each number of half waves.
 
     Parameters
@@ -29,13 +31,15 @@ def eigenfrequency_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: st
         Axes to fix: name -> value, as a number [SI] or a text; further ones are fixed at their first value.
     source : str
         Where the results are from, for the errors.
+    sides : Sides
+        Which axis runs along x.
 
     Returns
     -------
     Figure
         Where a strand holds no shape its lines have gaps.
     """
-    arrangement = arrange(dataset, at, source)
+    arrangement = arrange(dataset, at, source, sides)
     shown, notes = along_x(arrangement)
     along = ruler(shown[arrangement.x])
     figure = Figure((WIDTH, HEIGHT), layout="constrained")

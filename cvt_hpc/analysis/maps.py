@@ -10,7 +10,7 @@ amplitude is written where there is room.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -18,12 +18,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
-from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, value_text
+from cvt_hpc.analysis.arrangement import CHOSEN, Arrangement, Ruler, Sides, arrange, ruler, value_text
 from cvt_hpc.analysis.classes import (
     OccurrenceClass,
     at_strongest_strand,
@@ -36,23 +35,36 @@ from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.figures import WIDTH, draw, headline, in_words, styled
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 from cvt_hpc.analysis.starts import has_starts, join_starts
+from cvt_hpc.errors import mismatch
 from cvt_hpc.variables import Vibrates
 
-MOST_STACKED = 5  # panels in one column; more go into two
+PAGE, FRAME = 10.5, 1.9  # [inch]: most of a page's height, and what title, labels and legend take of it
+MOST_COLUMNS, NAMED = 4, 2  # panels side by side; in how many columns each has room for the name of its axis
 SMALLEST_APART = 3.0  # [point]: on smaller cells marks, and the lines between, would hide the classes
 TITLE_HEIGHT = 0.42  # [inch], of a panel with the space around it
 ONE_ROW = Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
 
 
 def draw_map(
-    dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None, source: str = "results"
+    dataset: xr.Dataset,
+    out: Path,
+    at: Mapping[str, Any] | None = None,
+    source: str = "results",
+    sides: Sides = CHOSEN,
+    vmax: float | None = None,
 ) -> Path:
     """Write the figure of `map_figure`."""
-    return draw(lambda: map_figure(dataset, at, source), out)
+    return draw(lambda: map_figure(dataset, at, source, sides, vmax), out)
 
 
 @styled
-def map_figure(dataset: xr.Dataset, at: Mapping[str, Any] | None = None, source: str = "results") -> Figure:
+def map_figure(
+    dataset: xr.Dataset,
+    at: Mapping[str, Any] | None = None,
+    source: str = "results",
+    sides: Sides = CHOSEN,
+    vmax: float | None = None,
+) -> Figure:
     """Draw where vibration occurs.
 
     Parameters
@@ -64,15 +76,24 @@ def map_figure(dataset: xr.Dataset, at: Mapping[str, Any] | None = None, source:
         a panel for each pair of axes, and `at` has to be empty. Results that hold `eigenfrequency` but no
         `amplitude` are drawn as lines over the axis that else runs along x. Of a study with the axis
         `disturbance` the runs from the smallest and the largest value make one cell.
+    sides : Sides
+        Which axis runs along x, along y and over the panels; of a grid.
+    vmax : float
+        Amplitude at which the colours end [m]; by default that of 98 % of the vibrating cells, where few lie
+        far above it.
     """
     check_results(dataset, source)
     if is_sampled(dataset):
-        return scatter_figure(dataset, at or {}, source)
+        if sides != CHOSEN:
+            raise mismatch(
+                f"{source}: x, y, panel", "results over a grid", "samples, in a panel for each pair"
+            )
+        return scatter_figure(dataset, at or {}, source, vmax)
     if "eigenfrequency" in dataset and "amplitude" not in dataset:
-        return eigenfrequency_figure(dataset, at or {}, source)
+        return eigenfrequency_figure(dataset, at or {}, source, sides)
     if has_starts(dataset, at or {}):
         dataset = join_starts(dataset)
-    return _grid_figure(arrange(dataset, at or {}, source))
+    return _grid_figure(arrange(dataset, at or {}, source, sides), vmax)
 
 
 @dataclass(frozen=True)
@@ -87,16 +108,32 @@ class Sheet:
     amplitude: NDArray[np.float64]  # [um], nan where a run does not vibrate
     frequency: NDArray[np.float64]  # [Hz], likewise
     irregular: NDArray[np.float64]  # amplitude [um] of runs that are irregular, nan elsewhere
+    columns: int = 1  # panels side by side
+
+    @property
+    def writes_frequency(self) -> bool:
+        """Whether the dominant frequency is written into the cells; else it has panels of its own."""
+        return self.has_room and self.has_frequency
+
+    @property
+    def has_frequency(self) -> bool:
+        """Whether that of any cell is known."""
+        return bool(np.isfinite(self.frequency).any())
+
+    @property
+    def blocks(self) -> int:
+        """Sets of panels above each other: amplitude, and frequency where it is not written into them."""
+        return 2 if self.has_frequency and not self.writes_frequency else 1
+
+    @property
+    def height(self) -> float:
+        """Of the picture [inch]."""
+        return self.blocks * self.rows * self.panel_height + FRAME
 
     @property
     def panels(self) -> int:
         """Number of panels."""
         return len(self.classes)
-
-    @property
-    def columns(self) -> int:
-        """Panels side by side."""
-        return 1 if self.panels <= MOST_STACKED else 2
 
     @property
     def rows(self) -> int:
@@ -128,33 +165,31 @@ class Sheet:
         return width >= 22 and height >= 22  # [point]
 
 
-def _grid_figure(arrangement: Arrangement) -> Figure:
+def _grid_figure(arrangement: Arrangement, vmax: float | None) -> Figure:
     """Compose the map of a study over a grid; to be called within STYLE."""
     sheet = sheet_of(arrangement)
-    has_frequency = bool(np.isfinite(sheet.frequency).any())
-    written = has_frequency and sheet.has_room
-    blocks = 2 if has_frequency and not written else 1
-    figure = Figure((WIDTH, blocks * sheet.rows * sheet.panel_height + 1.9), layout="constrained")
-    axes = figure.subplots(blocks * sheet.rows, sheet.columns, sharex=True, sharey=True, squeeze=False)
-    amplitude = cells.Scale(cells.AMPLITUDE_COLOURS, cells.norm_over(sheet.amplitude, 0.0), "amplitude [µm]")
+    figure = Figure((WIDTH, sheet.height), layout="constrained")
+    axes = figure.subplots(sheet.blocks * sheet.rows, sheet.columns, sharex=True, sharey=True, squeeze=False)
+    norm = cells.norm_over(sheet.amplitude, 0.0, None if vmax is None else 1e6 * vmax)
+    amplitude = cells.Scale(cells.AMPLITUDE_COLOURS, norm, "amplitude [µm]")
     draw_block(figure, axes[: sheet.rows], sheet, sheet.amplitude, amplitude)
     texts = [(OccurrenceClass.IRREGULAR, sheet.irregular)] if sheet.has_room else []
-    texts += [(OccurrenceClass.VIBRATING, sheet.frequency)] if written else []
+    texts += [(OccurrenceClass.VIBRATING, sheet.frequency)] if sheet.writes_frequency else []
     for kind, values in texts:
         panels = zip(axes.flat, sheet.classes, values, sheet.amplitude, strict=False)
         for ax, classes, numbers, fills in panels:
             cells.write_values(ax, sheet.x, sheet.y, kind, classes, numbers, fills, amplitude)
-    if has_frequency and not written:
+    if sheet.blocks == 2:
         frequency = cells.Scale(
             cells.FREQUENCY_COLOURS, cells.norm_over(sheet.frequency), "dominant frequency [Hz]"
         )
         draw_block(figure, axes[sheet.rows :], sheet, sheet.frequency, frequency)
-    figure.suptitle(_title(sheet, written))
+    figure.suptitle(_title(sheet))
     figure.supylabel(sheet.y.label, fontsize=10)
     styles, columns = cells.STYLES, cells.LEGEND_COLUMNS
     if "starts" in arrangement.dataset.attrs:
         styles, columns = cells.STYLES | cells.OF_STARTS, 3  # as wide as the page with the longest label
-    shown = {k: s for k, s in styles.items() if k not in cells.IF_PRESENT or np.any(sheet.classes == k)}
+    shown = {kind: style for kind, style in styles.items() if np.any(sheet.classes == kind)}
     cells.class_legend(figure, shown, columns, with_inferred=bool(sheet.inferred.any()))
     return figure
 
@@ -175,7 +210,7 @@ def sheet_of(arrangement: Arrangement) -> Sheet:
         # of a cell from two starts the amplitude is that from the small one
         irregular &= grid(dataset["vibrates"]) == Vibrates.IRREGULAR
     amplitude = grid(at_strongest_strand(dataset, "amplitude")) * 1e6
-    return Sheet(
+    sheet = Sheet(
         arrangement,
         ruler(dataset[arrangement.x]),
         ruler(dataset[arrangement.y]) if arrangement.y else ONE_ROW,
@@ -185,6 +220,8 @@ def sheet_of(arrangement: Arrangement) -> Sheet:
         np.where(vibrating, grid(at_strongest_strand(dataset, "frequency")), np.nan),
         np.where(irregular, amplitude, np.nan),
     )
+    laid_out = [replace(sheet, columns=count) for count in range(1, min(MOST_COLUMNS, sheet.panels) + 1)]
+    return next((one for one in laid_out if one.height <= PAGE), laid_out[-1])
 
 
 def draw_block(
@@ -204,10 +241,7 @@ def draw_block(
             cells.draw_marks(ax, sheet.x, sheet.y, classes, ~inferred, mark)
         _label_panel(ax, sheet, panel)
     if np.isfinite(values).any():
-        bar = figure.colorbar(
-            ScalarMappable(scale.norm, scale.colours), ax=axes, aspect=12 * len(axes), pad=0.02
-        )
-        bar.set_label(scale.label)
+        cells.colour_bar(figure, scale, values, ax=axes, aspect=12 * len(axes), pad=0.02)
 
 
 def _label_panel(ax: Axes, sheet: Sheet, panel: int) -> None:
@@ -215,7 +249,8 @@ def _label_panel(ax: Axes, sheet: Sheet, panel: int) -> None:
     name = sheet.arrangement.panel
     if name:
         text = value_text(sheet.arrangement.dataset[name], panel)
-        ax.set_title(f"{in_words(sheet.arrangement.dataset[name])}: {text}", loc="left", pad=3)
+        heading = f"{in_words(sheet.arrangement.dataset[name])}: " if sheet.columns <= NAMED else ""
+        ax.set_title(f"{heading}{text}", loc="left", pad=3)
     if sheet.x.ticks is not None:
         ax.set_xticks(sheet.x.ticks, sheet.x.tick_labels)
     if sheet.y.ticks is not None:
@@ -226,7 +261,7 @@ def _label_panel(ax: Axes, sheet: Sheet, panel: int) -> None:
         ax.set_xlabel(sheet.x.label)
 
 
-def _title(sheet: Sheet, written: bool) -> str:
+def _title(sheet: Sheet) -> str:
     """What, of which job, how many runs of each class, and what is fixed."""
     runs, inferred = sheet.classes[~sheet.inferred], sheet.classes[sheet.inferred]
     attributes = sheet.arrangement.dataset.attrs
@@ -237,7 +272,9 @@ def _title(sheet: Sheet, written: bool) -> str:
     if inferred.size:
         lines.append(f"{inferred.size} cells inferred: {count_classes(inferred)}")
     lines.extend(sheet.arrangement.notes)
-    if written:
+    if sheet.arrangement.panel and sheet.columns > NAMED:
+        lines.append(f"panels: {in_words(sheet.arrangement.dataset[sheet.arrangement.panel])}")
+    if sheet.writes_frequency:
         lines.append("in the cells: dominant frequency [Hz]")
     if sheet.has_room and np.isfinite(sheet.irregular).any():
         lines.append("in irregular cells: amplitude [µm]")

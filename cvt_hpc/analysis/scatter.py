@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.axis import XAxis, YAxis
-from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.markers import MarkerStyle
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -32,7 +31,9 @@ def is_sampled(dataset: xr.Dataset) -> bool:
     return dataset["status"].dims == ("run",)
 
 
-def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> Figure:
+def scatter_figure(
+    dataset: xr.Dataset, at: Mapping[str, Any], source: str, vmax: float | None = None
+) -> Figure:
     """Compose the map of a sampled study.
 
     Parameters
@@ -44,6 +45,8 @@ def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> F
         Has to be empty: no two samples lie at one value of an axis.
     source : str
         Where the results are from, for the error.
+    vmax : float
+        Amplitude at which the colours end [m].
 
     Raises
     ------
@@ -57,10 +60,11 @@ def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> F
     amplitude = np.where(
         classes == OccurrenceClass.VIBRATING, at_strongest_strand(dataset, "amplitude") * 1e6, np.nan
     )
-    scale = cells.Scale(cells.AMPLITUDE_COLOURS, cells.norm_over(amplitude, 0.0), "amplitude [µm]")
+    norm = cells.norm_over(amplitude, 0.0, None if vmax is None else 1e6 * vmax)
+    scale = cells.Scale(cells.AMPLITUDE_COLOURS, norm, "amplitude [µm]")
     panels = draw_samples(figure, dataset, classes, amplitude, scale)
     if np.isfinite(amplitude).any():
-        figure.colorbar(ScalarMappable(scale.norm, scale.colours), ax=panels, pad=0.02).set_label(scale.label)
+        cells.colour_bar(figure, scale, amplitude, ax=panels, pad=0.02)
     title = [headline(dataset.attrs), f"{classes.size} samples: {count_classes(classes)}"]
     names = _axes(dataset)
     if len(names) > MOST_AXES:

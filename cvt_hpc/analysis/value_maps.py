@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
-from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, value_text
+from cvt_hpc.analysis.arrangement import CHOSEN, Arrangement, Ruler, Sides, arrange, ruler, value_text
 from cvt_hpc.analysis.classes import OccurrenceClass, check_results, count_classes, occurrence_classes
 from cvt_hpc.analysis.curves import check_quantities
 from cvt_hpc.analysis.figures import WIDTH, axis_label, display_unit, draw, in_words, styled
@@ -46,9 +45,11 @@ def draw_value_map(
     out: Path,
     at: Mapping[str, Any] | None = None,
     source: str = "results",
+    sides: Sides = CHOSEN,
+    vmax: float | None = None,
 ) -> Path:
     """Write the figure of `value_map_figure`."""
-    return draw(lambda: value_map_figure(dataset, quantities, at, source), out)
+    return draw(lambda: value_map_figure(dataset, quantities, at, source, sides, vmax), out)
 
 
 @styled
@@ -57,6 +58,8 @@ def value_map_figure(
     quantities: Sequence[str],
     at: Mapping[str, Any] | None = None,
     source: str = "results",
+    sides: Sides = CHOSEN,
+    vmax: float | None = None,
 ) -> Figure:
     """Draw quantities over two axes of a study, a panel for each, and for each label of further dimensions.
 
@@ -67,17 +70,24 @@ def value_map_figure(
         its panels is fixed at its first value.
     quantities : sequence of str
         Numeric variables of the results.
+    sides : Sides
+        Which axis runs along x, along y, and which one is fixed instead of the panels of `map_figure`.
+    vmax : float
+        Value at which the colours end, in the unit of the quantity [SI].
 
     Raises
     ------
     InputError
-        As of all pictures; there is no such quantity, or there would be more than MOST_PANELS panels.
+        As of all pictures; there is no such quantity; there would be more than MOST_PANELS panels; or one end
+        of the colours is given for several quantities.
     """
     check_results(dataset, source)
     if is_sampled(dataset):
         raise mismatch(source, "results over a grid", "samples")
     check_quantities(dataset, quantities, source, of_one_unit=False)
-    arrangement = arrange(dataset, at or {}, source)
+    if vmax is not None and len(quantities) > 1:
+        raise mismatch(f"{source}: vmax", "one quantity", ", ".join(quantities))
+    arrangement = arrange(dataset, at or {}, source, sides)
     shown, notes = _one_panel(arrangement)
     panels = [panel for name in quantities for panel in _panels(shown[name], arrangement)]
     if len(panels) > MOST_PANELS:
@@ -92,7 +102,8 @@ def value_map_figure(
     all_axes = figure.subplots(rows, columns, squeeze=False)
     kinds = _of_grid(occurrence_classes(shown), arrangement).astype(np.int8)
     for axes, (title, unit, values) in zip(all_axes.flat, panels, strict=False):
-        _draw_panel(figure, axes, (x, y), kinds, values, unit)
+        factor, _ = display_unit(str(shown[quantities[0]].attrs.get("units", "")))
+        _draw_panel(figure, axes, (x, y), kinds, values, unit, None if vmax is None else factor * vmax)
         axes.set_title(title, loc="left", pad=3)
     for axes in list(all_axes.flat)[len(panels) :]:
         axes.set_axis_off()
@@ -153,10 +164,11 @@ def _draw_panel(
     kinds: NDArray[np.int8],
     values: NDArray[np.float64],
     unit: str,
+    vmax: float | None,
 ) -> None:
     """Cells coloured by a quantity, with its numbers where they have room, and marks of the other runs."""
     x, y = rulers
-    scale = cells.Scale(COLOURS, _norm(values), unit)
+    scale = cells.Scale(COLOURS, _norm(values, vmax), unit)
     is_known = np.isfinite(values) & ~np.isin(kinds, (OccurrenceClass.FAILED, OccurrenceClass.NOT_RUN))
     # what has a value is coloured by it, as vibrating cells of other maps by their amplitude
     drawn = np.where(is_known, OccurrenceClass.VIBRATING, kinds).astype(np.int8)
@@ -185,12 +197,12 @@ def _draw_panel(
         if ruled.ticks is not None:
             set_ticks(ruled.ticks, ruled.tick_labels)
     if is_known.any():
-        figure.colorbar(ScalarMappable(scale.norm, scale.colours), ax=axes, pad=0.02, label=unit)
+        cells.colour_bar(figure, scale, values, ax=axes, pad=0.02)
 
 
-def _norm(values: NDArray[np.float64]) -> Normalize:
+def _norm(values: NDArray[np.float64], vmax: float | None) -> Normalize:
     """Scale over the finite values; a quantity that does not vary has one colour."""
     known = values[np.isfinite(values)]
-    if known.size and np.ptp(known) < EQUAL * np.abs(known).max():
+    if vmax is None and known.size and np.ptp(known) < EQUAL * np.abs(known).max():
         return Normalize(*(known.mean() + 0.1 * np.abs(known).max() * np.array([-1.0, 1.1])))
-    return cells.norm_over(values)
+    return cells.norm_over(values, None, vmax)

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.arrangement import Ruler, along_x, arrange, ruler
+from cvt_hpc.analysis.arrangement import CHOSEN, Ruler, Sides, along_x, arrange, ruler
 from cvt_hpc.analysis.cells import colours_of
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.figures import WIDTH, draw, styled
@@ -30,28 +30,35 @@ LINE = "#123a6b"
 
 
 def draw_waterfall(
-    dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None, source: str = "results"
+    dataset: xr.Dataset,
+    out: Path,
+    at: Mapping[str, Any] | None = None,
+    source: str = "results",
+    sides: Sides = CHOSEN,
 ) -> Path:
     """Write the figure of `waterfall_figure`."""
-    return draw(lambda: waterfall_figure(dataset, at, source), out)
+    return draw(lambda: waterfall_figure(dataset, at, source, sides), out)
 
 
 @styled
 def waterfall_figure(
-    dataset: xr.Dataset, at: Mapping[str, Any] | None = None, source: str = "results"
+    dataset: xr.Dataset,
+    at: Mapping[str, Any] | None = None,
+    source: str = "results",
+    sides: Sides = CHOSEN,
 ) -> Figure:
     """Draw spectra of all strands over an axis, with the eigenfrequencies where they are known.
 
     Arguments as of all pictures of results (`figures.py`), with `status`, `vibrates` and `spectrum` [m] over
     the job's axes, `strand` and `frequency_bin` [Hz]. `eigenfrequency` [Hz] over the axes, `strand` and
-    `half_waves` is drawn as lines. Of the axes that are not fixed the one that runs along x in a map does so
-    here, and the rest are fixed at their first value.
+    `half_waves` is drawn as lines. Of the axes that are not fixed the one that runs along x in a map, or that
+    of `sides`, does so here, and the rest are fixed at their first value.
     """
     check_results(dataset, source)
     if "spectrum" not in dataset or "frequency_bin" not in dataset["spectrum"].dims:
         found = few_of(list(map(str, dataset.data_vars)), 6)
         raise mismatch(source, "results with the variable spectrum", found)
-    arrangement = arrange(dataset, at or {}, source)
+    arrangement = arrange(dataset, at or {}, source, sides)
     shown, notes = along_x(arrangement)
     x = ruler(shown[arrangement.x])
     amplitude = 1e6 * shown["spectrum"].transpose("strand", "frequency_bin", arrangement.x).values

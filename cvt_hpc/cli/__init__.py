@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from typing import Any, NoReturn
 
 from cvt_hpc import __version__
-from cvt_hpc.cli import checking, experiments, plots, results, single_run, sweep
+from cvt_hpc.cli import checking, experiments, plots, results, single_run, starting, sweep
 from cvt_hpc.cli.parts import BAD_INPUT, DONE, INTERRUPTED, complain, speaks
 from cvt_hpc.errors import CRASHED, InputError, JobWarning, mismatch, one_line, show
 
@@ -133,6 +133,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"cvt_hpc {__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    for group in (sweep, results, plots, single_run, experiments, checking):
+    for group in (sweep, results, plots, single_run, experiments, checking, starting):
         group.add(commands)
+    parser.set_defaults(parser=parser)
     return parser

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from cvt_hpc.errors import mismatch, one_line
 
 if TYPE_CHECKING:
+    from cvt_hpc.analysis.arrangement import Sides
     from cvt_hpc.job import Job
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -45,6 +46,19 @@ def add_assignments(command: argparse.ArgumentParser, flag: str, text: str) -> N
     """Add an option that sets values, KEY=VALUE."""
     text = f"{text}; may be repeated"
     command.add_argument(flag, action="append", default=[], metavar="KEY=VALUE", help=text)
+
+
+def add_sides(command: argparse.ArgumentParser) -> None:
+    """Add the options that lay axes of a study out; `sides_of` reads them."""
+    for side, place in (("x", "along x"), ("y", "along y"), ("panel", "over the panels")):
+        command.add_argument(f"--{side}", metavar="AXIS", help=f"axis of the study that runs {place}")
+
+
+def sides_of(arguments: argparse.Namespace) -> Sides:
+    """Return which axes are to run where."""
+    from cvt_hpc.analysis.arrangement import Sides
+
+    return Sides(arguments.x, arguments.y, arguments.panel)
 
 
 def add_folder(command: argparse.ArgumentParser, earlier: str) -> None:

@@ -43,6 +43,10 @@ def add(commands: Any) -> None:
     element.add_argument("--data", type=Path, metavar="FILE.nc", help=text)
     text = "tension and push force of the strands over an axis, as bars"
     strands = add_command(kinds, "strands", _strands, text, "RESULTS")
+    text = "the belt in the last periods of a run, magnified, as a moving picture"
+    animation = add_command(kinds, "animation", _animation, text, "HISTORY")
+    text = "FILE.gif, or FILE.mp4 where there is ffmpeg (default: HISTORY.gif beside it)"
+    animation.add_argument("--out", type=Path, metavar="GIF", help=text)
     names = {
         strands: "strands",
         waterfall: "waterfall",
@@ -54,18 +58,20 @@ def add(commands: Any) -> None:
     for command, name in names.items():
         text = f"default: {name}.png beside the dataset"
         command.add_argument("--out", type=Path, metavar="PNG", help=text)
+    waterfall.add_argument("--x", metavar="AXIS", help="axis of the study that runs along x")
     for command in (waterfall, curve, strands):
         add_assignments(command, "--at", "fix an axis at a value")
 
 
 def _waterfall(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.arrangement import Sides
     from cvt_hpc.analysis.waterfall import draw_waterfall
     from cvt_hpc.study import open_results
 
     out = _picture(arguments, "waterfall", *arguments.at)
     with open_results(arguments.path) as dataset:
         at = _at(arguments, dataset)
-        say(f"picture: {draw_waterfall(dataset, out, at, str(arguments.path))}")
+        say(f"picture: {draw_waterfall(dataset, out, at, str(arguments.path), Sides(arguments.x))}")
     return DONE
 
 
@@ -88,6 +94,18 @@ def _strands(arguments: argparse.Namespace) -> int:
     with open_results(arguments.path) as dataset:
         at = _at(arguments, dataset)
         say(f"picture: {draw_strand_bars(dataset, out, at, str(arguments.path))}")
+    return DONE
+
+
+def _animation(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.animation import check_animation, draw_animation
+    from cvt_hpc.analysis.telling_apart import history_files
+
+    (file,) = history_files([arguments.path])
+    out = arguments.out or file.with_suffix(".gif")
+    check_animation(out)
+    with _opened([file]) as (history,):
+        say(f"animation: {draw_animation(history, out, str(file))}")
     return DONE
 
 

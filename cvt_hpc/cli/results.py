@@ -3,12 +3,27 @@
 from __future__ import annotations
 
 import argparse
+import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cvt_hpc.cli.parts import DONE, add_assignments, add_command, complain, folder_of, picture_beside, say
+from cvt_hpc.cli.parts import (
+    DONE,
+    add_assignments,
+    add_command,
+    add_sides,
+    check_output,
+    complain,
+    folder_of,
+    picture_beside,
+    say,
+    sides_of,
+)
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from cvt_hpc.analysis.comparison import Comparison
 
 CONTRADICTING = 1  # exit status of `compare`: some cells are quiet in one study and vibrate in the other
@@ -16,7 +31,8 @@ CONTRADICTING = 1  # exit status of `compare`: some cells are quiet in one study
 
 def add(commands: Any) -> None:
     """Declare the commands."""
-    add_command(commands, "status", _status, "how far a study is", "DIR")
+    status = add_command(commands, "status", _status, "how far a study is", "DIR")
+    status.add_argument("--json", action="store_true", help="for programs: one line of JSON, times in s")
     add_command(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
     text = "draw where vibration occurs, or quantities over two axes"
     picture = add_command(commands, "map", _map, text, "RESULTS")
@@ -25,8 +41,14 @@ def add(commands: Any) -> None:
     text = "default: map.png, or map_QUANTITY.png, beside the dataset"
     picture.add_argument("--out", type=Path, metavar="PNG", help=text)
     add_assignments(picture, "--at", "fix an axis at a value")
+    add_sides(picture)
+    text = "value at which the colours end, such as '20 um' (default: that of 98 %% of the cells)"
+    picture.add_argument("--vmax", metavar="VALUE", help=text)
     text = "draw the figure of a paper that a study repeats, and measure what the paper says of it"
     add_command(commands, "figure", _figure, text, "DIR")
+    text = "write a page about a study: what was found, a map with values, failed runs, cost, assumptions"
+    page = add_command(commands, "report", _report, text, "RESULTS")
+    page.add_argument("--out", type=Path, metavar="HTML", help="default: report.html beside the dataset")
     text = "compare two studies, cell by cell; exit status 1: some contradict"
     compare = add_command(commands, "compare", _compare, text, "RESULTS")
     compare.add_argument("other", type=Path, metavar="RESULTS", help="the one to compare with it")
@@ -40,7 +62,7 @@ def _status(arguments: argparse.Namespace) -> int:
 
     status = read_status(arguments.path)
     complain(*status.warnings)
-    say(*status_lines(status))
+    say(*([json.dumps(asdict(status))] if arguments.json else status_lines(status)))
     return DONE
 
 
@@ -64,14 +86,27 @@ def _map(arguments: argparse.Namespace) -> int:
 
         source = str(arguments.path)
         out = arguments.out or picture_beside(arguments.path, "map", *arguments.show)
+        sides = sides_of(arguments)
+        vmax = _colour_end(arguments.vmax, dataset, arguments.show[0] if arguments.show else "amplitude")
         if arguments.show:
-            say(f"map: {draw_value_map(dataset, arguments.show, out, at, source)}")
+            say(f"map: {draw_value_map(dataset, arguments.show, out, at, source, sides, vmax)}")
             return DONE
-        picture = draw_map(dataset, out, at, source)
+        picture = draw_map(dataset, out, at, source, sides, vmax)
         if has_starts(dataset, at):
             say(start_line(dataset, at, source))
         say(f"map: {picture}")
     return DONE
+
+
+def _colour_end(text: str | None, dataset: xr.Dataset, shown: str) -> float | None:
+    """Return the value at which colours end [SI], in the unit of what is shown."""
+    from cvt_hpc.job.values import read_value
+    from cvt_hpc.parameters import positive
+
+    if text is None:
+        return None
+    unit = str(dataset[shown].attrs.get("units", "")) if shown in dataset else ""
+    return read_value(positive(1.0, "" if unit == "1" else unit, ""), text, "--vmax")
 
 
 def _figure(arguments: argparse.Namespace) -> int:
@@ -79,6 +114,17 @@ def _figure(arguments: argparse.Namespace) -> int:
 
     picture, table, findings = figure_of(arguments.path)
     say(*finding_lines(findings), f"picture: {picture}", f"table: {table}")
+    return DONE
+
+
+def _report(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.report import write_report
+    from cvt_hpc.study import open_results
+
+    out = arguments.out or folder_of(arguments.path) / "report.html"
+    check_output(out, (".html",))
+    with open_results(arguments.path) as dataset:
+        say(f"report: {write_report(dataset, out, str(arguments.path))}")
     return DONE
 
 

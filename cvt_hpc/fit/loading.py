@@ -15,7 +15,7 @@ from cvt_hpc.errors import mismatch, show, unknown
 from cvt_hpc.fit.job import NUMBERS, TABLE, Case, Fit, Free, share_of
 from cvt_hpc.fit.targets import read_targets, unit_of
 from cvt_hpc.job import Job, build_job
-from cvt_hpc.job.assignments import Assignments, split_assignments
+from cvt_hpc.job.assignments import Assignments, split_assignments, structured
 from cvt_hpc.job.axes import read_values
 from cvt_hpc.job.document import read_document
 from cvt_hpc.job.notices import warn_of_notices
@@ -37,7 +37,7 @@ def load_fit(path: str | Path, overrides: Assignments = ()) -> Fit:
     path : str or Path
         A TOML file: a job whose [axes] are the ranges of the free parameters, with a table [fit].
     overrides : mapping, or sequence of "KEY=VALUE"
-        As `load_job` takes them; fit.KEY replaces a number of the table [fit].
+        As `load_job` takes them; fit.KEY replaces a number, or the list of factors, of the table [fit].
 
     Raises
     ------
@@ -48,14 +48,14 @@ def load_fit(path: str | Path, overrides: Assignments = ()) -> Fit:
     where = f"{source}: [{TABLE}]"
     replaced = split_assignments(overrides, source, "--set")
     prefix = f"{TABLE}."
-    put = {key.removeprefix(prefix): replaced.pop(key) for key in [*replaced] if key.startswith(prefix)}
+    own_keys = [key for key in replaced if key.startswith(prefix)]
+    put = {key.removeprefix(prefix): structured(replaced.pop(key)) for key in own_keys}
     if TABLE not in document:
         raise mismatch(where, "a table of cases and targets", "nothing")
     table = document.pop(TABLE)
     for key in put:
-        if key not in NUMBERS or kind_of(NUMBERS[key]) is tuple:
-            numbers = [name for name, one in NUMBERS.items() if kind_of(one) is not tuple]
-            raise unknown(f"{source}: --set {prefix}{key}", "number of [fit]", key, numbers)
+        if key not in NUMBERS:
+            raise unknown(f"{source}: --set {prefix}{key}", "number of [fit]", key, NUMBERS)
     if isinstance(table, Mapping):
         table = {**table, **put}
     own = read_table(NUMBERS, table, where, _TABLES)

@@ -136,7 +136,7 @@ def _build(
     label = label or ("override" if isinstance(overrides, Mapping) else "--set")
     pairs = split_assignments(overrides, source, label)
     head = {**document, **{key: value for key, value in pairs.items() if key in HEADER}}
-    name, description = _read_name(head, source), _read_description(head, source)
+    name, description = read_name(head, source), _read_description(head, source)
     schema = load_schema(head.get("model"), head.get("stepper"), source)
     _check_top_level(document, schema, source)
     written = _written(document, pairs, schema, source, label) if units is None else {}
@@ -279,7 +279,8 @@ def refuse_what_is_compared_only(job: Job) -> None:
             raise mismatch(where, expected, show(others[0]))
 
 
-def _read_name(head: Mapping[str, Any], source: str) -> str:
+def read_name(head: Mapping[str, Any], source: str) -> str:
+    """Return the name of a job, which is also that of its output folder; InputError where it is no word."""
     name = head.get("name")
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         expected = "a word of letters, digits, '.', '_' and '-' (it names the output folder)"

@@ -188,7 +188,9 @@ def _stepper(model: Model, stepper: Any, source: str) -> str:
     where = f"{source}: stepper"
     if isinstance(stepper, str) and stepper in model.steppers:
         return model.steppers[stepper]
-    owners = {name: other for other in MODELS for name in load_model(other).steppers if name not in STEPPERS}
+    places = {name: place for other in MODELS for name, place in load_model(other).steppers.items()}
+    # a step lives with one model, whichever others take it: cvt_hpc.models.<model>.<module>
+    owners = {name: place.split(".")[2] for name, place in places.items() if name not in STEPPERS}
     _known(stepper, STEPPERS | owners, "stepper", source, told=model.steppers)
     if not model.steppers:
         raise mismatch(where, f"none, since {model.name} has no transient", show(stepper))

@@ -87,7 +87,7 @@ def _tables(job: Job, schema: Schema) -> dict[str, list[tuple[str, ...]]]:
         rows: list[tuple[str, ...]] = []
         for key, parameter in table.items():
             kind = kinds.get(key, "default")
-            value = _value_in_words(schema, key, job.parameters[key]) if key in job.parameters else "none"
+            value = value_in_words(schema, key, job.parameters[key]) if key in job.parameters else "none"
             text = parameter.description
             text += f" ({', '.join(parameter.choices)})" if parameter.choices else ""
             text = f"without effect with {inert[key]}: {text}" if key in inert else text
@@ -96,8 +96,8 @@ def _tables(job: Job, schema: Schema) -> dict[str, list[tuple[str, ...]]]:
     return tables
 
 
-def _value_in_words(schema: Schema, key: str, value: Any) -> str:
-    """Return a value for people; a long list as its length and its ends."""
+def value_in_words(schema: Schema, key: str, value: Any) -> str:
+    """Return a value [SI] of a job for people; a long list as its length and its ends."""
     if not isinstance(value, tuple):
         in_customary = "" if key in schema.units else angle_in_words(value, schema.parameters[key].unit)
         return schema.in_words(key, value) + (f" ({in_customary})" if in_customary else "")

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis.classes import at_strongest_strand, occurrence_classes
 from cvt_hpc.ladder.audit import FORCES
-from cvt_hpc.ladder.onsets import onsets, paired_errors
 from cvt_hpc.ladder.rungs import REFERENCE, Rung
 from cvt_hpc.models.linear_stability.modes import DECAY
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass
+from cvt_hpc.vibration.onsets import onsets, paired_errors
 
 Array = NDArray[np.float64]
 

@@ -13,5 +13,6 @@ MODELS = {
     "pushbelt": "cvt_hpc.models.pushbelt",
     "quasi_static_belt": "cvt_hpc.models.quasi_static_belt",
     "slip_limit": "cvt_hpc.models.slip_limit",
+    "spatial_pushbelt": "cvt_hpc.models.spatial_pushbelt",
     "steady_variator": "cvt_hpc.models.steady_variator",
 }

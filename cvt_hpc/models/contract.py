@@ -140,7 +140,7 @@ class Batch(Protocol):
 
 
 class Declaration(Protocol):
-    """The package of a model: what a job may set of it.
+    """The package of a model: what a job may set of it. The first line of its docstring says what it is.
 
     It may also have `check(parameters)`, which yields (key, expected, found) of what does not fit together;
     `inert(parameters)`, the keys without effect with the reason of each; `GIVES`, by stepper and key what a
@@ -204,6 +204,11 @@ class Model:
     def __init__(self, name: str) -> None:
         self.name = name
         self._declared: Any = import_module(MODELS[name])
+
+    @property
+    def title(self) -> str:
+        """What the model is, in one line: the first one of its package's docstring."""
+        return (self._declared.__doc__ or "").strip().split("\n")[0]
 
     @property
     def parameters(self) -> dict[str, dict[str, Parameter]]:

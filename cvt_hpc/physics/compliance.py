@@ -16,7 +16,8 @@ h_k the length that station k stands for. The kernel's inverse is tridiagonal (M
 two; so for a given set of closed stations the solution takes one tridiagonal solve and a 2x2 system. The set
 is found by flipping every station that violates its sign, warm from the last set, and, should that not
 settle, by flipping the first violator only, which ends for every P-matrix (Murty 1974); this matrix is
-symmetric positive definite. A matrix of flexibilities in the place of the kernel takes `closed_set`.
+symmetric positive definite. A matrix of flexibilities in the place of the kernel takes `closed_set`. A
+collar with clearance adds one scalar equation to each solution (`clearance.py`).
 
 Of a single run by plain numbers, or of several at once, each lane with stiffnesses and gaps of its own: lanes
 that have found their set repeat their last solve, with the same numbers, until the slowest has found its own.
@@ -31,6 +32,7 @@ from numpy.typing import DTypeLike
 
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, anywhere, fma, like, maximum, select
+from cvt_hpc.physics.clearance import bearing_direction, principal_axes
 from cvt_hpc.physics.closed_set import factorise_closed, solve_closed
 from cvt_hpc.physics.moving_discs import MovingDiscs, inert_part, lane_discs
 from cvt_hpc.physics.ritz import NO_MODES
@@ -43,9 +45,12 @@ GAP, PUSH, DIAGONAL, PIVOT, MULTIPLIER, RESPONSE_1, RESPONSE_2, Y, CLOSED, FORCE
 # fields of Contact.scalars
 ELEMENT_STIFFNESS, COMPLIANCE, DISC_COMPLIANCE, OFF_DIAGONAL, TILT_COMPLIANCE = range(5)
 INVERSE_11, INVERSE_12, INVERSE_22, ROUND_OFF, SOLVES, UNSOLVED = range(5, 11)
+CLEARANCE, LEAST_LOAD, DIRECTION_ERROR, AXIS_COSINE, AXIS_SINE, LARGER, LESSER = range(11, 18)
+LOOSE_1, LOOSE_2 = range(18, 20)
 
 # Forces are 1e5 N/m and come from openings that are 1 % of their parts: what each precision leaves of them.
 _ROUND_OFF = {np.dtype(np.float64): 1e-6, np.dtype(np.float32): 2.0}
+_DIRECTION_ERROR = {np.dtype(np.float64): 1e-13, np.dtype(np.float32): 1e-6}  # some ten roundings
 
 
 class Contact(NamedTuple):
@@ -59,9 +64,11 @@ class Contact(NamedTuple):
         Gap of the rigid bodies [m] (set by the caller), -c_e times the opening without f / c_e [N/m]; the
         local kernel's diagonal, factors, the tilt's response, work space, closed set (1 or 0), and the force
         that the caller takes from it [N/m].
-    scalars : (1, 11) LaneArray or array
+    scalars : (1, 20) LaneArray or array
         Constants of the wrap, the inverse of the tilt's 2x2 system, the round-off of forces [N/m]; linear
-        solves so far, and whether (1) a search for the closed set did not end.
+        solves so far, and whether (1) a search for the closed set did not end. Of a collar with clearance:
+        c [m], the load from which on it bears [N], the error of its direction, the principal axis of L and
+        its eigenvalues [N], and the opening c p of the last solution [m].
     fresh : (1,) bool array
         False until the factors belong to the closed set.
     root : (m,) or (0,) array
@@ -72,6 +79,8 @@ class Contact(NamedTuple):
         Sweeps of projected Gauss-Seidel instead (`lane_gauss_seidel`); 0: none, the exact solution.
     discs : MovingDiscs
         Modes with inertia; without any, as in plain numbers, discs follow at once.
+    has_clearance : bool
+        Whether any lane's collar has.
     """
 
     weight: np.ndarray
@@ -84,6 +93,7 @@ class Contact(NamedTuple):
     matrix: Any
     sweeps: int
     discs: MovingDiscs
+    has_clearance: bool
 
 
 def lane_contact(wraps: list[Sheaves], dtype: DTypeLike, sweeps: int = 0) -> Contact:
@@ -100,9 +110,13 @@ def lane_contact(wraps: list[Sheaves], dtype: DTypeLike, sweeps: int = 0) -> Con
     """
     weight = wraps[0].weight
     stations = LaneArray(weight.size, 10, len(wraps), dtype)
-    scalars = LaneArray(1, 11, len(wraps), dtype)
+    scalars = LaneArray(1, 20, len(wraps), dtype)
     stations.data[:, CLOSED] = 1.0
     scalars.data[:, ROUND_OFF] = _ROUND_OFF[np.dtype(dtype)]
+    scalars.data[:, LEAST_LOAD] = _ROUND_OFF[np.dtype(dtype)] * weight.sum()
+    scalars.data[:, DIRECTION_ERROR] = _DIRECTION_ERROR[np.dtype(dtype)]
+    # the inverse of a tilt that is part of a matrix
+    scalars.data[:, [INVERSE_11, INVERSE_22]] = 1.0
     for lane, wrap in enumerate(wraps):
         stations.data[:, DIAGONAL, lane] = wrap.diagonal
         scalars.data[0, :INVERSE_11, lane] = (
@@ -112,6 +126,7 @@ def lane_contact(wraps: list[Sheaves], dtype: DTypeLike, sweeps: int = 0) -> Con
             wrap.off_diagonal,
             wrap.tilt_compliance,
         )
+        scalars.data[0, CLEARANCE, lane] = wrap.clearance
     has_matrix = wraps[0].flexibilities.size > 0
     m = weight.size if has_matrix else 0
     root, matrix = np.sqrt(weight[:m]), LaneArray(m, 2 * m, len(wraps), dtype)
@@ -124,7 +139,10 @@ def lane_contact(wraps: list[Sheaves], dtype: DTypeLike, sweeps: int = 0) -> Con
     fresh = np.zeros(1, dtype=np.bool_)
     shared = (weight.astype(dtype), wraps[0].tilt[0].astype(dtype), wraps[0].tilt[1].astype(dtype))
     discs = lane_discs([wrap.modes for wrap in wraps], [disc_factor(wrap) for wrap in wraps], dtype)
-    return Contact(*shared, stations, scalars, fresh, root.astype(dtype), matrix, sweeps, discs)
+    has_clearance = any(wrap.clearance > 0.0 for wrap in wraps)
+    return Contact(
+        *shared, stations, scalars, fresh, root.astype(dtype), matrix, sweeps, discs, has_clearance
+    )
 
 
 def plain_contact(wrap: Sheaves) -> Contact:
@@ -152,12 +170,21 @@ def _bend(m: int, stations) -> None:
 @kernel
 def _factorise(contact: Contact) -> None:
     """Factors and tilt responses for the present closed set."""
+    if contact.root.size > 0:
+        factorise_closed(contact.matrix, contact.stations, CLOSED, contact.weight.size)
+        if contact.has_clearance:
+            _respond_by_matrix(contact)
+    else:
+        _factorise_kernel(contact)
+    if contact.has_clearance:
+        _loosen(contact)
+    contact.fresh[0] = True
+
+
+@kernel
+def _factorise_kernel(contact: Contact) -> None:
     stations, scalars, weight = contact.stations, contact.scalars, contact.weight
     m = weight.size
-    if contact.root.size > 0:
-        factorise_closed(contact.matrix, stations, CLOSED, m)
-        contact.fresh[0] = True
-        return
     ce, off = scalars[0, ELEMENT_STIFFNESS], scalars[0, OFF_DIAGONAL]
     whole = ce * scalars[0, COMPLIANCE]
     grip = whole * scalars[0, DISC_COMPLIANCE]
@@ -184,7 +211,67 @@ def _factorise(contact: Contact) -> None:
     per_determinant = 1.0 / (s11 * s22 - s12 * s12)
     scalars[0, INVERSE_11], scalars[0, INVERSE_22] = s22 * per_determinant, s11 * per_determinant
     scalars[0, INVERSE_12] = -s12 * per_determinant
-    contact.fresh[0] = True
+
+
+@kernel
+def _respond_by_matrix(contact: Contact) -> None:
+    """The tilt's response where it is part of a matrix: opening under a groove that tilts by 1 m."""
+    stations, ce = contact.stations, contact.scalars[0, ELEMENT_STIFFNESS]
+    for b in range(2):
+        tilt = contact.sine if b else contact.cosine
+        for j in range(contact.weight.size):
+            stations[j, MULTIPLIER] = tilt[j] + 0.0 * ce
+        solve_closed(contact.matrix, contact.root, stations, (CLOSED, MULTIPLIER, Y, PIVOT), ce)
+        for j in range(contact.weight.size):
+            stations[j, RESPONSE_1 + b] = -stations[j, PIVOT] / ce
+
+
+@kernel
+def _loosen(contact: Contact) -> None:
+    """L of `clearance.py` by its principal axes."""
+    stations, scalars = contact.stations, contact.scalars
+    gain = scalars[0, CLEARANCE] * scalars[0, ELEMENT_STIFFNESS]
+    m11, m12, m22 = like(0.0, gain), like(0.0, gain), like(0.0, gain)
+    for j in range(contact.weight.size):
+        h = gain * stations[j, CLOSED] * contact.weight[j]
+        m11 += h * contact.cosine[j] * stations[j, RESPONSE_1]
+        m12 += h * contact.cosine[j] * stations[j, RESPONSE_2]
+        m22 += h * contact.sine[j] * stations[j, RESPONSE_2]
+    i11, i12, i22 = scalars[0, INVERSE_11], scalars[0, INVERSE_12], scalars[0, INVERSE_22]
+    cosine, sine, larger, lesser = principal_axes(
+        fma(m11, i11, m12 * i12), fma(m11, i12, m12 * i22), fma(m12, i12, m22 * i22)
+    )
+    scalars[0, AXIS_COSINE], scalars[0, AXIS_SINE] = cosine, sine
+    scalars[0, LARGER], scalars[0, LESSER] = larger, lesser
+
+
+@kernel
+def _give_way(contact: Contact) -> None:
+    """PUSH of a sheave that tilts by its clearance beside its compliance."""
+    stations, scalars, weight = contact.stations, contact.scalars, contact.weight
+    ce = scalars[0, ELEMENT_STIFFNESS]
+    one, other = like(0.0, ce), like(0.0, ce)
+    for j in range(weight.size):
+        pressed = weight[j] * stations[j, CLOSED] * stations[j, PUSH]
+        one, other = fma(contact.cosine[j], pressed, one), fma(contact.sine[j], pressed, other)
+    cosine, sine = scalars[0, AXIS_COSINE], scalars[0, AXIS_SINE]
+    p_1, p_2, left = bearing_direction(
+        fma(cosine, one, sine * other),
+        fma(cosine, other, -sine * one),
+        scalars[0, LARGER],
+        scalars[0, LESSER],
+        scalars[0, LEAST_LOAD],
+        scalars[0, DIRECTION_ERROR],
+    )
+    scalars[0, UNSOLVED] = select(left, like(1.0, ce), scalars[0, UNSOLVED])
+    clearance = scalars[0, CLEARANCE]
+    one, other = clearance * fma(cosine, p_1, -sine * p_2), clearance * fma(sine, p_1, cosine * p_2)
+    scalars[0, LOOSE_1], scalars[0, LOOSE_2] = one, other
+    t1 = -ce * (scalars[0, INVERSE_11] * one + scalars[0, INVERSE_12] * other)
+    t2 = -ce * (scalars[0, INVERSE_12] * one + scalars[0, INVERSE_22] * other)
+    for j in range(weight.size):
+        opened = fma(t2, stations[j, RESPONSE_2], t1 * stations[j, RESPONSE_1])
+        stations[j, PUSH] = stations[j, PUSH] + opened
 
 
 @kernel
@@ -196,6 +283,8 @@ def _pushes(contact: Contact) -> bool:
         solve_closed(contact.matrix, contact.root, stations, (CLOSED, GAP, Y, PUSH), ce)
     else:
         _push_by_kernel(contact)
+    if contact.has_clearance:
+        _give_way(contact)
     wrong = ce < 0.0
     for j in range(contact.weight.size):
         push = stations[j, PUSH]

@@ -38,6 +38,8 @@ class Sheaves(NamedTuple):
         under a force at another; empty: the kernel.
     modes : Modes
         Of the discs, those whose inertia counts; W has them at rest.
+    clearance : float
+        Opening of the groove [m] by which collar and shaft tilt before they bear.
     """
 
     weight: np.ndarray
@@ -50,6 +52,7 @@ class Sheaves(NamedTuple):
     tilt_compliance: float
     flexibilities: np.ndarray
     modes: Modes
+    clearance: float = 0.0
 
 
 def sheaves(

@@ -10,13 +10,15 @@ from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.pushbelt import belt as b
 from cvt_hpc.models.pushbelt import start as starting
 from cvt_hpc.models.pushbelt import transient
-from cvt_hpc.models.pushbelt.assembly import RIGHT
-from cvt_hpc.models.pushbelt.cyclic import solve
+from cvt_hpc.models.pushbelt.assembly import RIGHT, assemble
+from cvt_hpc.models.pushbelt.nose import add_nose_blocks
 from cvt_hpc.models.pushbelt.parameters import falling_limit, path_length
 from cvt_hpc.models.pushbelt.readings import Reading
 from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start, workspace
 from cvt_hpc.models.pushbelt.start_up import fingerprint
 from cvt_hpc.models.pushbelt.step import _correct, _evaluate, _prepare, _solve, advance
+from cvt_hpc.solvers.cyclic_blocks import block_size
+from cvt_hpc.solvers.linked_blocks import solve
 
 # Assumptions, but for centre distance, belt length, elements and their mass, which are a public data set's.
 ASSUMED = {
@@ -218,30 +220,23 @@ def test_newton_correction_is_that_of_differences(law):
         assert found == pytest.approx(wanted, abs=1e-5 * np.abs(wanted).max())
 
 
-@pytest.mark.parametrize("lanes", [8, 2])
-def test_cyclic_system_against_a_dense_one(lanes, monkeypatch):
-    monkeypatch.setattr(starting, "parts_of", lambda nodes: lanes)
-    rows, columns = 5, 8
-    n, rng = rows * lanes, np.random.default_rng(4)
-    a, u = rng.normal(size=(n, 4, 4)) + 8.0 * np.eye(4), rng.normal(size=(n, 4, 4))
-    right = rng.normal(size=(n, columns, 4))
-    blocks = LaneArray(rows, 48 + 4 * columns, lanes, linked=lanes > 1)
-    values = np.zeros((n, 48 + 4 * columns))
-    values[:, :16] = a.transpose(0, 2, 1).reshape(n, 16)
-    values[:, 16:32] = u.transpose(0, 2, 1).reshape(n, 16)
-    values[:, 48:] = right.reshape(n, -1)
-    write(blocks, values)
-    scratch = LaneArray(1, 48 + 4 * columns, lanes, linked=lanes > 1)
-    solve(blocks, scratch, np.zeros((4 * lanes, 4 * lanes + columns)))
-
-    dense = np.zeros((n, 4, n, 4))
-    for i in range(n):
-        dense[i, :, i] += a[i]
-        dense[i, :, (i + 1) % n] += u[i]
-        dense[(i + 1) % n, :, i] += u[i].T
-    wanted = np.linalg.solve(dense.reshape(4 * n, 4 * n), right.transpose(0, 2, 1).reshape(4 * n, columns))
-    found = of_lanes(blocks)[:, 48:].reshape(n, columns, 4).transpose(0, 2, 1).reshape(4 * n, columns)
-    assert found == pytest.approx(wanted, abs=1e-13)
+def test_the_linear_system_is_solved_to_rounding():
+    belt, state, work, _ = shaken(5)
+    _prepare(belt, state, work, STEP)
+    evaluated(belt, state, work, STEP)
+    assemble(belt, state.elements, work.shapes, work.step, work.iterate, work.blocks)
+    add_nose_blocks(state.elements, work.step, work.iterate, work.blocks)
+    system = fields(work.blocks)
+    a, u, right = (
+        columns.reshape(64, -1, 4).transpose(0, 2, 1)
+        for columns in (system[:, :16], system[:, 16:32], system[:, RIGHT:])
+    )
+    assert solve(work.blocks, work.scratch, block_size(4))
+    x = fields(work.blocks)[:, RIGHT:].reshape(64, -1, 4).transpose(0, 2, 1)
+    terms = np.concatenate([np.roll(u, 1, 0).transpose(0, 2, 1), a, u], 2)
+    unknowns = np.concatenate([np.roll(x, 1, 0), x, np.roll(x, -1, 0)], 1)
+    # 1e-14 of the terms of each equation: some ten roundings, though the matrix has a condition of 1e6
+    assert np.all(abs(terms @ unknowns - right) <= 1e-14 * (abs(terms) @ abs(unknowns)))
 
 
 def test_free_spinning_ring():

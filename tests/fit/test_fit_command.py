@@ -212,6 +212,14 @@ def test_a_fit_that_was_stopped_goes_on(job, window, monkeypatch, capsys, tmp_pa
     assert len(window) == 2 * runs  # none twice
 
 
+def test_factors_are_set_as_a_list(job, capsys):
+    assert load_fit(job, ["fit.distances=[0.8, 1.25]"]).distances == (0.8, 1.25)
+    assert load_fit(job, {"fit.distances": [2.0]}).distances == (2.0,)
+    for value, found in (("0.8", '"0.8"'), ("[0.8, -1]", "[0.8, -1.0]")):
+        assert main(["fit", "x.toml", "--set", f"fit.distances={value}"]) == 2
+        assert f"found {found}" in capsys.readouterr().err
+
+
 def test_shares_and_scenes_are_inverse(job):
     fit = load_fit(job)
     shares = np.random.default_rng(1).random((5, 2))

@@ -67,6 +67,7 @@ CASES = {
     "rising": {"rise_time": 0.03},  # the start-up's damping and load, half way
     "rigid": {"sheave_stiffness": np.inf, "stiffness_of": "sheave", "load": -80.0},
     "free pulleys": FREE | {"driving_axial": "thrust"},
+    "clearance without lag": {"collar_clearance": 1e-3},
     "controlled pulleys": FREE | CONTROLLED,
     "driven by its driven pulley": CONTROLLED
     | {"driven_inertia": np.inf, "driving_inertia": 0.05, "rise_time": 0.03},

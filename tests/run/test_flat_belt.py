@@ -38,6 +38,7 @@ CASES = {
     "free pulleys": FREE,
     "memory": {},
     "no memory": {"friction_memory": 0.0},
+    "clearance without lag": {"collar_clearance": 5e-4},
     "rigid": {"sheave_stiffness": np.inf, "stiffness_of": "sheave"},
 }
 

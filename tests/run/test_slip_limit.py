@@ -5,6 +5,7 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt.belt import mesh
+from cvt_hpc.models.elastic_belt.pulley_settings import oil_factor
 from cvt_hpc.models.steady_variator.forces import quantities
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.variables import Status
@@ -34,6 +35,28 @@ def test_least_thrust_of_a_limit_torque_is_the_thrust():
     back = rung_record("slip_limit", stations=STATIONS, sought="thrust", load=found["limit_torque"])
     assert back["limit_thrust"] == pytest.approx(50e3, rel=5e-3)
     assert back["axial_force"][1] == pytest.approx(1.3 * back["limit_thrust"], rel=1e-8)
+
+
+def test_free_pulleys_slip_where_held_ones_do_under_the_same_axial_force():
+    """Oil presses like so much more thrust; slip slows it by some per cent more at the limit than at work."""
+    found = rung_record("slip_limit", stations=STATIONS, driven_piston=(0.02, 0.08))
+    speed = found["load_power"] / (2.52 * found["working_torque"])
+    oil = oil_factor((0.02, 0.08), 850.0) * speed**2
+    assert found["axial_force"][1] == pytest.approx(50e3 + oil, rel=1e-9)
+    held = rung_record("slip_limit", stations=STATIONS, thrust=50e3 + oil)
+    assert found["limit_torque"] == pytest.approx(held["limit_torque"], rel=0.15 * oil / 50e3)
+    assert oil > 100.0 and abs(found["power_residual"]) < 5e-3
+
+
+def test_a_clearance_that_goes_to_none_leaves_the_limit():
+    none = rung_record("slip_limit", stations=STATIONS)
+    limits = [
+        rung_record("slip_limit", stations=STATIONS, collar_clearance=clearance)["limit_torque"]
+        for clearance in (1e-8, 5e-4)
+    ]
+    assert limits[0] == pytest.approx(none["limit_torque"], rel=1e-6)
+    # a loose collar opens the groove in the middle of the arc: a little less is carried
+    assert -1e-2 < limits[1] / none["limit_torque"] - 1.0 < -1e-4
 
 
 def test_a_thrust_for_no_load_and_a_torque_ratio_of_one_are_refused():

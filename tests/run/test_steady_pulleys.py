@@ -17,6 +17,7 @@ CALM = {"stations": 48, "load": 60.0, "friction_gradient": 0.0}
 SCENES = {
     "lag": {"tilt_lag": 1e-3},
     "clearance": {"tilt_lag": 1e-3, "collar_clearance": 5e-4},
+    "clearance without lag": {"collar_clearance": 5e-4},
     "spring and oil": {"driven_spring_rate": 5e6, "driven_piston": (0.02, 0.08)},
     "drive": {"driving_inertia": 0.05, "drive_slope": 5.0},
     "given driven speed": {"driving_inertia": 0.05, "driven_inertia": np.inf},
@@ -134,7 +135,11 @@ def test_a_thrust_that_no_opening_meets_has_no_state():
         ("steady_variator", {"collar_clearance": -1e-4}, "collar_clearance: expected >= 0 rad"),
         ("steady_variator", {"bearing_clearance": 1e-5}, "bearing_clearance: expected 0, or shaft_lengths"),
         ("linear_stability", {"collar_clearance": 1e-4}, "collar_clearance: expected 0, or a tilt_lag"),
-        ("slip_limit", {"driving_axial": "thrust"}, "unknown key"),
+        ("slip_limit", {"driving_axial": "thrust"}, "driving_axial: expected position"),
+        ("slip_limit", {"clamping": "torque_ratio"}, "clamping: expected constant"),
+        ("slip_limit", {"driving_inertia": 0.05}, "driving_inertia: expected inf"),
+        ("slip_limit", {"driven_inertia": np.inf}, "driven_inertia: expected finite"),
+        ("slip_limit", {"driven_piston": (0.08, 0.02)}, "driven_piston: expected an inner"),
     ],
 )
 def test_what_cannot_be_is_refused(model, values, message):

@@ -11,6 +11,7 @@ from cvt_hpc.models import (
     oscillator,
     pushbelt,
     quasi_static_belt,
+    spatial_pushbelt,
     steady_variator,
     strand,
 )
@@ -32,6 +33,8 @@ from cvt_hpc.models.pushbelt import record as pushbelt_record
 from cvt_hpc.models.pushbelt import transient as pushbelt_transient
 from cvt_hpc.models.quasi_static_belt import record as quasi_static_belt_record
 from cvt_hpc.models.quasi_static_belt import transient as quasi_static_belt_transient
+from cvt_hpc.models.spatial_pushbelt import record as spatial_pushbelt_record
+from cvt_hpc.models.spatial_pushbelt import transient as spatial_pushbelt_transient
 from cvt_hpc.models.steady_variator import record as steady_variator_record
 from cvt_hpc.models.strand import record as strand_record
 
@@ -46,6 +49,7 @@ declared = moving_string
 declared = oscillator
 declared = pushbelt
 declared = quasi_static_belt
+declared = spatial_pushbelt
 declared = steady_variator
 declared = strand
 
@@ -59,6 +63,7 @@ recorded = linear_stability_record
 recorded = oscillator_record
 recorded = pushbelt_record
 recorded = quasi_static_belt_record
+recorded = spatial_pushbelt_record
 recorded = steady_variator_record
 recorded = strand_record
 
@@ -71,3 +76,4 @@ marched = moving_string_transient
 marched = oscillator_transient
 marched = pushbelt_transient
 marched = quasi_static_belt_transient
+marched = spatial_pushbelt_transient

@@ -62,9 +62,9 @@ from cvt_hpc.models.pushbelt.belt import (
     Z,
 )
 from cvt_hpc.models.pushbelt.chain import contact_gap, contact_levers, radial, turned
-from cvt_hpc.models.pushbelt.laws import coefficient
 from cvt_hpc.multibody.rcm_beam import line_point
 from cvt_hpc.multibody.rcm_chain import PER_ELEMENT, add_to_column
+from cvt_hpc.physics.contact_laws import coefficient
 
 
 @kernel

@@ -98,7 +98,6 @@ from cvt_hpc.models.pushbelt.belt import (
     V,
 )
 from cvt_hpc.models.pushbelt.chain import turned
-from cvt_hpc.models.pushbelt.laws import remembered
 from cvt_hpc.multibody.rcm_beam import mean_strain
 from cvt_hpc.multibody.rcm_chain import (
     PER_ELEMENT,
@@ -108,6 +107,7 @@ from cvt_hpc.multibody.rcm_chain import (
     along_row,
     assemble,
 )
+from cvt_hpc.physics.contact_laws import remembered
 from cvt_hpc.solvers.cyclic_blocks import factor, solve
 
 _LARGE = 1e100  # more than any speed that means something

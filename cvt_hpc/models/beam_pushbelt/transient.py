@@ -16,6 +16,7 @@ from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import belt as fields
 from cvt_hpc.models.pushbelt import transient as pushbelt
 from cvt_hpc.models.pushbelt.readings import Reading
+from cvt_hpc.models.pushbelt.run import OF_LOSS
 from cvt_hpc.models.sampled import MOST_UNSOLVED
 from cvt_hpc.multibody.rcm_beam import energies
 from cvt_hpc.variables import Status
@@ -55,7 +56,7 @@ class Transient(pushbelt.Transient):
     def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
         """As of `pushbelt`; but the balance holds what steps damp, which theta above 1/2 may do at will."""
         unsolved, flow = record["unsolved_share"], max(abs(record["driving_power"]), record["loss"])
-        either = (self._most_damped() + pushbelt.OF_LOSS * record["loss"]) / flow
+        either = (self._most_damped() + OF_LOSS * record["loss"]) / flow
         most = either if self._method.theta <= 0.5 else np.inf
         if not unsolved <= MOST_UNSOLVED:
             why = f"{unsolved:.1%} of the steps were not solved, the last {self._fault()}"

@@ -282,8 +282,10 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     ):
         stations = slice(grid.starts[region], grid.starts[region] + sheave.weight.size)
         force = np.full(sheave.weight.size, pull / (2.0 * tangent * radius))
-        tilt = settled_tilt(belt.pulleys, tilted, sheave.tilt @ (sheave.weight * force))
+        tilting = sheave.tilt @ (sheave.weight * force)
+        tilt = settled_tilt(belt.pulleys, tilted, tilting)
         states[tilted : tilted + 2] = tilt
+        tilt = tilt + sheave.clearance * tilting / np.linalg.norm(tilting)
         w[stations] = -(flexibility(sheave) @ force + tilt @ sheave.tilt) / (2.0 * tangent)
         arcs.append((stations, sheave.weight, radius))
     w[arcs[0][0]] -= p["driving_position"] / (2.0 * tangent)

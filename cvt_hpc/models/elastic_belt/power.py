@@ -90,7 +90,7 @@ from cvt_hpc.models.elastic_belt.power_terms import (
     STORED_ENERGY,
     THRUST_POWER,
 )
-from cvt_hpc.models.elastic_belt.pulley_step import audit_pulleys
+from cvt_hpc.models.elastic_belt.pulley_step import audit_pulleys, taken_by_clearance
 from cvt_hpc.models.elastic_belt.pulleys import SHIFT
 from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
@@ -248,6 +248,8 @@ def audit(
     rows[k, first + LAG_LOSS] = c[0, AXIAL_DAMPING] * axial_speed * axial_speed
     rows[k, first + SEATING_LOSS] = seating
     rows[k, first + STORED_ENERGY] = stored
+    if state.contacts[0].has_clearance or state.contacts[1].has_clearance:
+        rows[k, first + STORED_ENERGY] = rows[k, first + STORED_ENERGY] - taken_by_clearance(state)
     if belt.is_free:
         audit_pulleys(belt, state, like(driving, speed), like(turned, speed), rows, k, first)
     scalars[0, LAYER_WORK] = 0.0

@@ -57,9 +57,9 @@ def pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     found = _piston_problems(p) + _drive_problems(p)
     if p["tilt_lag"] == 0.0:
         for key in ("collar_clearance", "bearing_clearance"):
-            if p[key] > 0.0:
-                expected = "0, or a tilt_lag: a sheave is within its clearance for a time only"
-                found.append((key, expected, f"{p[key]:g}"))
+            if p[key] > 0.0 and p.get("contact_sweeps", 0) > 0:
+                expected = f"0 with {key} and no tilt_lag"
+                found.append(("contact_sweeps", expected, f"{p['contact_sweeps']}"))
     elif p["tilt_lag"] < (least := least_tilt_lag(p)):
         expected = f"0, or {least:.2g} s and more at this step: tilting is explicit"
         found.append(("tilt_lag", expected, f"{p['tilt_lag']:g} s"))
@@ -79,6 +79,23 @@ def steady_pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
         expected = "above 0: by its gain alone a controller rests where it began"
         found.append(("ratio_rate", expected, "0 N/s"))
     return found or overload_problems(p)
+
+
+def slipping_pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+    """Problems of pulleys whose driven one is slowed down until the belt slips, and no other moves freely."""
+    p = PULLEY_DEFAULTS | dict(parameters)
+    found = _piston_problems(p) + _bearing_problems(p)
+    if p["driving_axial"] != "position":
+        expected = "position: a driving sheave that is free shifts before the belt slips"
+        found.append(("driving_axial", expected, p["driving_axial"]))
+    if p["clamping"] != "constant":
+        found.append(("clamping", "constant: the thrust is given, or sought", p["clamping"]))
+    if np.isfinite(p["driving_inertia"]):
+        expected = "inf: the speed of the driving pulley is given"
+        found.append(("driving_inertia", expected, f"{p['driving_inertia']:g} kg m^2"))
+    if np.isinf(p["driven_inertia"]):
+        found.append(("driven_inertia", "finite: slip slows the driven pulley down", "inf"))
+    return found
 
 
 def overload_problems(parameters: Mapping[str, Any]) -> list[Problem]:

@@ -42,7 +42,7 @@ from cvt_hpc.models.elastic_belt.pulleys import (
     drive_torque,
     pulley_rates,
 )
-from cvt_hpc.physics.compliance import COMPLIANCE, FORCED, TILT_COMPLIANCE, Contact
+from cvt_hpc.physics.compliance import COMPLIANCE, FORCED, LOOSE_1, LOOSE_2, TILT_COMPLIANCE, Contact
 
 
 @kernel
@@ -144,7 +144,23 @@ def opening_by_tilt(state: LaneState, wrap: int):
     give = like(contact.scalars[0, COMPLIANCE] * contact.scalars[0, TILT_COMPLIANCE], total)
     tilted = FIRST_STATE + (DRIVEN_COS if wrap else DRIVING_COS)
     one, other = fma(give, one, scalars[0, tilted]), fma(give, other, scalars[0, tilted + 1])
+    if contact.has_clearance:
+        one = one + like(contact.scalars[0, LOOSE_1], total)
+        other = other + like(contact.scalars[0, LOOSE_2], total)
     return sqrt(fma(one, one, other * other))
+
+
+@kernel
+def taken_by_clearance(state: LaneState):
+    """What closed stations do not store of half their force times overlap [J]: a loose collar takes it up."""
+    energy = like(0.0, state.scalars[0, SPEED])
+    for wrap in range(2):
+        contact = state.contacts[1] if wrap else state.contacts[0]
+        if contact.has_clearance:
+            total, one, other = _pull(contact, energy)
+            loose = like(contact.scalars[0, LOOSE_1], energy), like(contact.scalars[0, LOOSE_2], energy)
+            energy = fma(0.5 * loose[0], one, fma(0.5 * loose[1], other, energy))
+    return energy
 
 
 @kernel

@@ -9,7 +9,7 @@ course, or the load; a speed that is given has an infinite inertia. `thrust` is 
 its reference together, the spring's change c z and F_omega = C omega^2 come to it. q is the opening of the
 groove, the same for both axes of the collar and the shaft (`physics/shaft.py`), c its part that is free: a
 collar within its clearance moves against the oil alone. A sheave without a lag is no state: its q is part of
-the contact (`physics/compliance.py`), to which T_1 -> 0 leads.
+the contact (`physics/compliance.py`, with clearance `physics/clearance.py`), to which T_1 -> 0 leads.
 
 Two controllers, both PI with limits, whose gains are assumptions:
 
@@ -178,6 +178,8 @@ def with_pulleys(
     laws = np.array([[named[key] if key in named else p[key] for key in LAWS]])
     if lag:
         bent = [wrap._replace(tilt_compliance=0.0) for wrap in bent]
+    else:
+        bent = [wrap._replace(clearance=opening) for wrap, opening in zip(bent, free, strict=True)]
     return bent, Pulleys(laws, are_free(p))
 
 

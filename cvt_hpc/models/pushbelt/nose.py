@@ -30,7 +30,7 @@ from cvt_hpc.models.pushbelt.belt import (
     Y,
     Z,
 )
-from cvt_hpc.models.pushbelt.laws import pressed
+from cvt_hpc.physics.contact_laws import pressed
 
 
 @register_jitable

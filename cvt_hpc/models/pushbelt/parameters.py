@@ -312,21 +312,27 @@ def falling_limit(parameters: Mapping[str, Any]) -> float:
     return float(0.5 * without + np.sqrt(0.25 * without**2 + without * p["friction_memory"]))
 
 
-def string_limit(parameters: Mapping[str, Any]) -> float:
-    """Longest step with which the strands' transverse motion, which is explicit, is stable [s].
+def most_tension(parameters: Mapping[str, Any]) -> float:
+    """Tension of the tighter strand under thrust and load [N], by which explicit steps are limited.
 
-    It is pitch / sqrt(T / m) of a string in steps of symplectic Euler. The tension is that of the tighter
-    strand under thrust and load, estimated by the equilibrium of an arc and of a pulley, with half as much
-    again for what arcs add.
+    It is estimated by the equilibrium of an arc and of a pulley, with half as much again for what arcs add.
     """
     p = parameters
     driving = p["driven_radius"] / p["ratio"]
     wrap = np.pi + 2.0 * np.arcsin((p["driven_radius"] - driving) / p["centre_distance"])
-    mass = p["element_mass"] + p["ring_mass"]
-    centrifugal = mass * (_driving_speeds(p)[1] * driving) ** 2
+    centrifugal = (p["element_mass"] + p["ring_mass"]) * (_driving_speeds(p)[1] * driving) ** 2
     held = 2.0 * _most_thrust(p) * np.tan(p["half_wedge_angle"]) / wrap + centrifugal
-    tension = 1.5 * (held + 0.5 * max(map(abs, (*extremes(p, "load"), p["load_start"]))) / driving)
-    return float(path_length(p) / p["elements"] * np.sqrt(mass / tension))
+    return float(1.5 * (held + 0.5 * max(map(abs, (*extremes(p, "load"), p["load_start"]))) / driving))
+
+
+def string_limit(parameters: Mapping[str, Any]) -> float:
+    """Longest step with which the strands' transverse motion, which is explicit, is stable [s].
+
+    It is pitch / sqrt(T / m) of a string in steps of symplectic Euler, T being `most_tension`.
+    """
+    p = parameters
+    mass = p["element_mass"] + p["ring_mass"]
+    return float(path_length(p) / p["elements"] * np.sqrt(mass / most_tension(p)))
 
 
 def inert(parameters: dict[str, Any]) -> dict[str, str]:

@@ -13,10 +13,9 @@ damps by that, and it is neither physics nor an error in the balance of power.
 from __future__ import annotations
 
 import numpy as np
-from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import ahead, around, like, maximum
+from cvt_hpc.lanes import ahead, around, like
 from cvt_hpc.models.pushbelt.belt import (
     ANGLE_I,
     ANGLE_J,
@@ -69,15 +68,9 @@ from cvt_hpc.models.pushbelt.belt import (
     U_Z,
     V,
 )
+from cvt_hpc.physics.contact_laws import damped
 
 _FIRST, _COUNT = FLANK_LOSS, TILT_DAMPED + 1 - FLANK_LOSS  # totals that are added up here
-
-
-@register_jitable
-def damped(gap, change, stiffness):
-    """Energy [J] that a step takes at a one-sided contact, by the gap at its end and its mean change [m]."""
-    now, before = maximum(-gap, 0.0), maximum(2.0 * change - gap, 0.0)
-    return stiffness * (0.25 * (before * before - now * now) - now * change)
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -64,8 +64,8 @@ class Readings:
     ----------
     parameters : mapping
         Resolved parameters of the run [SI].
-    belt : Belt
-        Its constants.
+    belt : NamedTuple
+        Its constants, of whichever equations: the `pitch_depth` counts.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Readings:
         Path coordinates of profiles [m].
     """
 
-    def __init__(self, parameters: Mapping[str, Any], belt: Belt) -> None:
+    def __init__(self, parameters: Mapping[str, Any], belt: Any) -> None:
         p = parameters
         self.belt = belt
         self.path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
@@ -95,6 +95,47 @@ class Readings:
         self.probes = starts[:, None] + strand * shares
         self.middles = starts + 0.5 * strand
         self.places = (np.arange(PLACES) + 0.5) * (self.path.path_length / PLACES)
+
+
+class OnPath:
+    """Elements on the path at one sample, and what is read there of their values.
+
+    Parameters
+    ----------
+    where : Readings
+        Where it is read.
+    saddles : (n, 2) array
+        Their saddle points in the plane, in the order of the belt [m].
+
+    Attributes
+    ----------
+    position : (n,) array
+        Path coordinates [m].
+    offset : (n,) array
+        Outwards of the path [m].
+    """
+
+    def __init__(self, where: Readings, saddles: np.ndarray) -> None:
+        self._path, self._probes, self._middles = where.path, where.probes, where.middles
+        self.position, offset = along(where.path, where.centre_distance, saddles)
+        self.offset = offset - where.belt.pitch_depth  # the path is that of the pitch line
+
+    def at_probes(self, values: np.ndarray) -> np.ndarray:
+        """Values (n,) interpolated at the probes, (2 p,)."""
+        order, length = np.argsort(self.position), self._path.path_length
+        return np.interp(self._probes.ravel(), self.position[order], values[order], period=length)
+
+    def middles(self) -> np.ndarray:
+        """Weights of the elements in means over the middle half of each strand, (2, n)."""
+        quarter = 0.25 * self._path.strand_length
+        inside = (np.abs(self.position - self._middles[:, None]) < quarter).astype(float)
+        return inside / inside.sum(axis=1, keepdims=True)
+
+    def sums(self, rows: Sequence[np.ndarray]) -> np.ndarray:
+        """Sums of values (n,) over the elements at each place, and their number, (rows + 1, place)."""
+        share = self.position / self._path.path_length
+        place = np.minimum((share * PLACES).astype(int), PLACES - 1)
+        return np.array([np.bincount(place, row, PLACES) for row in (*rows, np.ones(place.size))])
 
 
 class Reading:
@@ -112,17 +153,12 @@ class Reading:
 
     def __init__(self, where: Readings, elements: np.ndarray, pulleys: np.ndarray) -> None:
         self._where, self._elements, self._pulleys = where, elements, pulleys
-        saddles = elements[:, [f.Y, f.Z]]
-        self._position, offset = along(where.path, where.centre_distance, saddles)
-        self._offset = offset - where.belt.pitch_depth  # the path is that of the pitch line
+        self._path = OnPath(where, elements[:, [f.Y, f.Z]])
         self._push = elements[:, f.EDGE] + elements[:, f.HEAD]
 
     def displacement(self) -> np.ndarray:
         """Displacement at the probes, outwards, (2 p,) [m]."""
-        order, length = np.argsort(self._position), self._where.path.path_length
-        return np.interp(
-            self._where.probes.ravel(), self._position[order], self._offset[order], period=length
-        )
+        return self._path.at_probes(self._path.offset)
 
     def scalars(self) -> list[float]:
         """SCALARS."""
@@ -140,9 +176,7 @@ class Reading:
         weights /= np.maximum(pressed, 1e-9)[:, None]
         running = np.where(pressed > 0.0, weights @ self._contact_radii(), np.nan)
         slip = weights @ e[:, f.FLANK_SLIP_T] / (pulleys[f.DRIVING_SPEED] * self._where.path.driving_radius)
-        quarter = 0.25 * self._where.path.strand_length
-        inside = (np.abs(self._position - self._where.middles[:, None]) < quarter).astype(float)
-        inside /= inside.sum(axis=1, keepdims=True)
+        inside = self._path.middles()
         ring_loss = e[:, f.RING_FRICTION] @ e[:, f.RING_SLIP]
         groups = (inside @ self._push, inside @ e[:, f.TENSION], both @ thrust, running, slip, both @ loss)
         # elements over the time of a revolution: their speeds over the length of their line
@@ -176,12 +210,9 @@ class Reading:
             np.abs(e[:, f.NOSE]),
             _edge_gap(e, ahead, where.belt),
             -rising,
-            self._offset,
-            np.ones(len(e)),
+            self._path.offset,
         ]
-        share = self._position / where.path.path_length
-        place = np.minimum((share * PLACES).astype(int), PLACES - 1)
-        return np.array([np.bincount(place, row, PLACES) for row in rows])
+        return self._path.sums(rows)
 
     def stored_energy(self, openings: np.ndarray) -> float:
         """Kinetic and elastic energy of belt, driven pulley and sheaves with `openings` (2, modes) [J]."""

@@ -21,7 +21,7 @@ from cvt_hpc.vibration import assessment, ramp
 if TYPE_CHECKING:
     import xarray as xr
 
-    from cvt_hpc.models.pushbelt.transient import Transient
+    from cvt_hpc.models.pushbelt.run import ElementRun
 
 IDLE = 0.02  # of the largest push force: what is below does not press
 # Measured on one core of an EPYC (Zen 5): core-seconds per element and step, and per sample
@@ -100,23 +100,23 @@ def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
     return p["duration"] * (each * p["elements"] / p["step"] + SAMPLE_COST * p["sampling_rate"])
 
 
-def judge(run: Transient) -> dict[str, Any]:
+def judge(run: ElementRun) -> dict[str, Any]:
     """The record of a run that has reached its end, or slipped through before, its cost apart.
 
     Parameters
     ----------
-    run : Transient
+    run : ElementRun
         With all samples recorded, or those until it slipped through.
     """
     if run.failure is not None:
-        return judging.slipped(run) | _speeds(run, slide(run))
+        return judging.slipped(run) | speeds(run, slide(run))
     found = judging.assess(run)
-    return found.record() | _evaluate(run, found.strongest_probe)
+    return found.record() | evaluate(run, found.strongest_probe)
 
 
-def _evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
-    """Values of a finished run, of VARIABLES beyond the verdict; as `judging.evaluate`, which has a part."""
-    judged = run.judged
+def evaluate(run: ElementRun, strongest_probe: np.ndarray) -> dict[str, Any]:
+    """Values of a finished run of VARIABLES beyond the verdict; as `judging.evaluate`, which has a part."""
+    judged, fields = run.judged, run.fields
     driving, load = run.mean_rate(fields.WORK_IN), run.mean_rate(fields.WORK_OUT)
     ring = run.mean_rate(fields.RING_LOSS)
     belt, tilt = run.mean_rate(fields.BELT_LOSS), run.mean_rate(fields.DAMPING_LOSS)
@@ -130,7 +130,7 @@ def _evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     return {
         **judging.evaluate(run, strongest_probe),
         **capacity(run, judged),
-        **_speeds(run, judged),
+        **speeds(run, judged),
         **power_balance(driving, load, loss, storing, thrust, damped.sum()),
         "thrust_power": thrust,
         "numerical_damping": damped,
@@ -146,7 +146,7 @@ def _evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     }
 
 
-def _speeds(run: Transient, samples: slice) -> dict[str, Any]:
+def speeds(run: ElementRun, samples: slice) -> dict[str, Any]:
     """Radii on which the belt runs, and what sliding takes from the speed, in some samples."""
     radii = [run.channel(f"running_radius {pulley}")[samples] for pulley in PULLEYS]
     rims = [run.channel(f"{k}_speed")[samples] * radius for k, radius in zip(PULLEYS, radii, strict=True)]
@@ -154,12 +154,12 @@ def _speeds(run: Transient, samples: slice) -> dict[str, Any]:
     return {"slip_loss": float(np.mean(1.0 - rims[1] / rims[0])), "running_radius": found}
 
 
-def histories(run: Transient) -> xr.Dataset:
+def histories(run: ElementRun) -> xr.Dataset:
     """Histories over `time` and means by `position` of a run, finished or failed.
 
     Parameters
     ----------
-    run : Transient
+    run : ElementRun
         With the samples that it has.
 
     Returns
@@ -169,12 +169,21 @@ def histories(run: Transient) -> xr.Dataset:
     """
     from cvt_hpc.models.pushbelt.readings import PROFILES
 
+    return history(run, PROFILES, {})
+
+
+def history(
+    run: ElementRun,
+    profiles: Mapping[str, tuple[str, str, str]],
+    over_time: Mapping[str, tuple[str, str, str]],
+) -> xr.Dataset:
+    """What `histories` returns, with the words of a model's profiles and of its own channels over time."""
     touching = "at which the flanks touch the sheaves"
-    over_time = {f"{k}_radius": (f"{k} radius", "m", touching) for k in PULLEYS}
+    told = {f"{k}_radius": (f"{k} radius", "m", touching) for k in PULLEYS}
     comment = "mean over the middle half of the strand"
     for name in ("push force", "ring tension"):
-        over_time |= {f"{name.replace(' ', '_')} {k}": (f"{name} {k}", "N", comment) for k in STRANDS}
-    over_time |= {f"axial_force {k}": (f"axial force {k}", "N", "") for k in PULLEYS}
-    profiles = {name: (values, *PROFILES[name]) for name, values in run.profiles.items()}
+        told |= {f"{name.replace(' ', '_')} {k}": (f"{name} {k}", "N", comment) for k in STRANDS}
+    told |= {f"axial_force {k}": (f"axial force {k}", "N", "") for k in PULLEYS}
+    along = {name: (values, *profiles[name]) for name, values in run.profiles.items()}
     region = np.array(REGIONS)[regions(run.path, run.places)]
-    return dataset(run, over_time, profiles, run.places, region)
+    return dataset(run, {**told, **over_time}, along, run.places, region)

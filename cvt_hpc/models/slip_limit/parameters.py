@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from cvt_hpc.models import steady_variator
+from cvt_hpc.models.elastic_belt.pulley_checks import slipping_pulley_problems
 from cvt_hpc.models.steady_variator.parameters import belt_problems
 from cvt_hpc.parameters import Parameter
 
@@ -25,14 +26,13 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         # 1.3 is a common choice for clamping forces, and an assumption
         "safety": Parameter(1.3, "", "limit over working point, of torque or thrust", minimum=1.0),
     },
-    # pulleys turn by a given speed under the thrust that is given, or sought
-    **{name: table for name, table in steady_variator.PARAMETERS.items() if name != "pulleys"},
+    **steady_variator.PARAMETERS,
 }
 
 
 def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     """Problems that lie between parameters: those of the belt, or a thrust sought for no load."""
-    problems = belt_problems(parameters)
+    problems = belt_problems(parameters) + slipping_pulley_problems(parameters)
     if parameters["sought"] == "thrust" and parameters["load"] == 0.0:
         problems.append(("load", 'other than 0 where sought = "thrust"', "0 N m"))
     return problems

@@ -66,6 +66,7 @@ class SteadyBelt:
         p = given if free is None else held(given)
         self._course = Continuation(p)
         self._equations = self._course.equations
+        self._own = self._equations if self._free is None else self._free
         self._first = FirstStates(p, self._course)
 
     def at(self, load: float, near: Steady | None = None) -> Steady:
@@ -127,9 +128,8 @@ class SteadyBelt:
 
     def known(self, load: float, unknowns: np.ndarray) -> Steady:
         """State under a load, by unknowns that were found before; ValueError if they are not of this belt."""
-        equations = self._equations if self._free is None else self._free
-        if unknowns.shape != equations.sizes.shape:
-            raise ValueError(f"{unknowns.shape} unknowns of a belt that has {equations.sizes.shape}")
+        if unknowns.shape != self._own.sizes.shape:
+            raise ValueError(f"{unknowns.shape} unknowns of a belt that has {self._own.sizes.shape}")
         if self._free is not None:
             return self._state_of(self._free, unknowns, load)
         self._course.own()
@@ -149,11 +149,15 @@ class SteadyBelt:
         As far as they are found; in the direction in which the load's size grows they go on past the largest
         torque that friction carries.
         """
+        return self._braked(self._own, near.unknowns, sign)
+
+    def _braked(self, equations: Equations, x: np.ndarray, sign: float) -> Iterator[Steady]:
+        """As `braked`, of the free pulleys or of the held ones."""
         self._course.own()
-        self._course.load(0.0)
-        for x, load in Braked(self._equations).along(near.unknowns, sign, AT_HOME):
-            yield self._found(x, load)
-            self._course.load(0.0)
+        equations.under(load=0.0, load_start=0.0)
+        for found, load in Braked(equations).along(x, sign, AT_HOME):
+            yield self._state_of(equations, found, load)
+            equations.under(load=0.0, load_start=0.0)
 
     def carried(self, near: Steady) -> Steady:
         """State at the largest load that friction carries while neither pulley slips grossly.
@@ -185,12 +189,12 @@ class SteadyBelt:
 
     def _at_slip(self, below: Steady, beyond: Steady) -> Steady:
         """State at which a pulley just does not slip grossly, between two states."""
-        self._course.load(0.0)
+        self._own.under(load=0.0, load_start=0.0)
         slips = [largest_slip(state.belt, state.state) for state in (below, beyond)]
         share = (GROSS_SLIP - slips[0]) / (slips[1] - slips[0])
         x = below.unknowns + share * (beyond.unknowns - below.unknowns)
-        found = Braked(self._equations).at(x[SPEED], x, AT_HOME)
-        return below if found is None else self._found(*found)
+        found = Braked(self._own).at(x[SPEED], x, AT_HOME)
+        return below if found is None else self._state_of(self._own, *found)
 
     def _found(self, x: np.ndarray, load: float) -> Steady:
         return self._state_of(self._equations, x, load)
@@ -203,7 +207,7 @@ class SteadyBelt:
             x, reached = ended.x, start + ended.share * (load - start)
         before = self._found(x, reached)
         farthest, sign = reached, 1.0 if load < reached else -1.0  # a larger load slows the driven pulley
-        for state in self.braked(before, sign):
+        for state in self._braked(self._equations, before.unknowns, sign):
             if (before.load - load) * (state.load - load) <= 0.0:
                 return self._between(before, state, load)
             before = state

@@ -1,4 +1,4 @@
-"""Laws of contacts in lanes: unilateral contact, coefficient of friction and its memory."""
+"""Contacts in lanes: one-sided contact, what a step takes at it, and friction's coefficient and memory."""
 
 from __future__ import annotations
 
@@ -30,3 +30,10 @@ def remembered(filtered, size, memory, dt):
     """
     share = dt / (dt + memory)
     return memory / (dt + memory) * filtered + share * size, share
+
+
+@register_jitable
+def damped(gap, change, stiffness):
+    """Energy [J] that a step takes at a one-sided contact, by the gap at its end and its mean change [m]."""
+    now, before = maximum(-gap, 0.0), maximum(2.0 * change - gap, 0.0)
+    return stiffness * (0.25 * (before * before - now * now) - now * change)

@@ -1,0 +1,153 @@
+"""The vibrating belt as a moving picture, magnified, with its scale."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import xarray as xr
+from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from cvt_hpc.analysis.figures import STYLE
+from cvt_hpc.errors import mismatch, one_line
+from cvt_hpc.files import written_aside
+from cvt_hpc.physics.geometry import variator
+from cvt_hpc.variator.path import points_at
+
+FORMATS = (".gif", ".mp4")
+PERIODS, FRAMES = 2, 24  # of the vibration, and pictures of each
+RATE = 12  # pictures a second: a period takes two seconds
+LARGEST = 0.12  # of the distance of the shafts: the largest displacement that is drawn
+PLACES = 400  # along the belt
+BELT, REST, PULLEY = "#d55e00", "#8a8a8a", "#e4e8ec"
+
+
+def check_animation(out: Path) -> None:
+    """Raise InputError unless the suffix names a moving picture that this machine can write."""
+    if out.suffix.lower() not in FORMATS:
+        raise mismatch(str(out), f"a moving picture: {', '.join(FORMATS)}", out.suffix or "no suffix")
+    if out.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
+        raise mismatch(str(out), "ffmpeg, which writes .mp4, or a name in .gif", "none on this machine")
+
+
+def draw_animation(history: xr.Dataset, out: Path, source: str = "history") -> Path:
+    """Write the belt in the last periods of a run as a moving picture.
+
+    Parameters
+    ----------
+    history : Dataset
+        Of a run of a variator, as `simulate` returns it: `displacement` [m] over `time` and `probe`, with
+        `probe_position` [m].
+    out : Path
+        A name in .gif, or in .mp4 where there is ffmpeg; its folder is made if needed.
+    source : str
+        Where the history is from, for the errors.
+
+    Raises
+    ------
+    InputError
+        The history is none of a variator, the suffix names no moving picture, or the system refuses.
+    """
+    out = Path(out)
+    check_animation(out)
+    ratio, driven_radius, distance = _geometry(history, source)
+    path = variator(ratio, driven_radius, distance)
+    time, motion, period = _last_periods(history)
+    size = float(np.abs(motion).max()) or 1.0
+    factor = LARGEST * distance / size
+    places = np.linspace(0.0, path.path_length, PLACES)
+    rest, angle, _ = points_at(path, distance, places)
+    normal = np.stack([np.sin(angle), -np.cos(angle)], 1)  # outwards
+    shapes = _along_belt(history, motion, places, path.path_length)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure((6.4, 3.9), layout="constrained")
+        axes = figure.subplots()
+        pulleys = ((0.0, path.driving_radius, "driving"), (distance, path.driven_radius, "driven"))
+        for centre, radius, name in pulleys:
+            axes.add_patch(Circle((1e3 * centre, 0.0), 1e3 * radius, color=PULLEY, zorder=0))
+            axes.text(1e3 * centre, 0.0, name, ha="center", va="center", fontsize=9)
+        axes.plot(*(1e3 * rest.T), color=REST, lw=0.8, ls="--")
+        (belt,) = axes.plot(*(1e3 * rest.T), color=BELT, lw=2.0)
+        axes.set(aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
+        margin = 1.3e3 * LARGEST * distance
+        axes.set_xlim(1e3 * rest[:, 0].min() - margin, 1e3 * rest[:, 0].max() + margin)
+        axes.set_ylim(1e3 * rest[:, 1].min() - margin, 1e3 * rest[:, 1].max() + margin)
+        name = one_line(str(history.attrs.get("job_name", "")))
+        told = (
+            f"{name}: {1.0 / period:.0f} Hz, at most {1e6 * size:.3g} µm, drawn {factor:.0f} times as large"
+        )
+        axes.set_title(told.removeprefix(": "), fontsize=10)
+        for strand, height in (("t1", -1.0), ("t2", 1.0)):
+            place = 0.35 * distance, height * 0.5 * (path.driving_radius + path.driven_radius)
+            axes.text(
+                1e3 * place[0], 1e3 * place[1] + 14.0 * height, strand, ha="center", va="center", fontsize=9
+            )
+        clock = axes.text(0.99, 0.02, "", transform=axes.transAxes, ha="right", fontsize=9)
+
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # laid out once, for all pictures
+
+        def draw(frame: int) -> tuple:
+            moved = rest + factor * shapes[frame][:, None] * normal
+            belt.set_data(*(1e3 * moved.T))
+            clock.set_text(f"{1e3 * (time[frame] - time[0]):.2f} ms")
+            return belt, clock
+
+        moving = FuncAnimation(figure, draw, frames=len(time), blit=False)
+        writer = PillowWriter(RATE) if out.suffix.lower() == ".gif" else FFMpegWriter(RATE)
+        with written_aside(out, parents=True) as aside:
+            named = aside.with_name(f"{aside.name}{out.suffix.lower()}")  # the writer goes by the suffix
+            try:
+                moving.save(named, writer=writer, dpi=100)
+                named.replace(aside)
+            finally:
+                named.unlink(missing_ok=True)
+    return out
+
+
+def _geometry(history: xr.Dataset, source: str) -> tuple[float, float, float]:
+    """Ratio, driven radius and distance of the shafts [m] of a run."""
+    try:
+        point = json.loads(history.attrs["point"])
+        found = tuple(float(point[key]) for key in ("ratio", "driven_radius", "centre_distance"))
+    except (KeyError, TypeError, ValueError):
+        found = ()
+    if len(found) != 3 or "probe_position" not in history:
+        raise mismatch(
+            source, "the history of a run of a variator, with displacement at probes", "another one"
+        )
+    return found
+
+
+def _last_periods(history: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Times [s] of the pictures, the motion at them about its mean (time, probe) [m], and the period [s]."""
+    time = history["time"].values
+    motion = history["displacement"].transpose("time", "probe").values
+    judged = motion[int((1.0 - float(history.attrs.get("judged_fraction", 0.5))) * len(time)) :]
+    motion = motion - judged.mean(0)
+    strongest = int(np.abs(judged - judged.mean(0)).max(0).argmax())
+    signal = judged[:, strongest] - judged[:, strongest].mean()
+    interval = float(np.diff(time).mean())
+    spectrum = np.abs(np.fft.rfft(signal * np.hanning(signal.size)))
+    frequency = np.fft.rfftfreq(signal.size, interval)[max(int(spectrum[1:].argmax()) + 1, 1)]
+    period = 1.0 / float(frequency)
+    shown = np.linspace(max(time[-1] - PERIODS * period, time[0]), time[-1], PERIODS * FRAMES)
+    return shown, CubicSpline(time, motion)(shown), period
+
+
+def _along_belt(
+    history: xr.Dataset, motion: NDArray[np.float64], places: NDArray[np.float64], length: float
+) -> NDArray[np.float64]:
+    """Displacement (time, place) between the probes, by a periodic spline around the belt [m]."""
+    position = history["probe_position"].values
+    order = np.argsort(position)
+    closed = np.append(position[order], position[order[0]] + length)
+    values = np.concatenate([motion[:, order], motion[:, order[:1]]], 1)
+    spline = CubicSpline(closed, values, axis=1, bc_type="periodic")
+    return spline(closed[0] + np.mod(places - closed[0], length))

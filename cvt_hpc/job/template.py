@@ -1,0 +1,179 @@
+"""What a job may set, in words: the models, the keys of one, and a commented job file to begin with."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+from cvt_hpc.errors import mismatch
+from cvt_hpc.files import written_aside
+from cvt_hpc.job.loading import read_name
+from cvt_hpc.job.plausibility import angle_in_words
+from cvt_hpc.job.schema import Schema, load_schema
+from cvt_hpc.job.units import to_si
+from cvt_hpc.job.values import in_words, kind_of
+from cvt_hpc.models import MODELS
+from cvt_hpc.models.contract import load_model
+from cvt_hpc.parameters import Parameter
+from cvt_hpc.tables import columns
+
+# What a study varies first, where the model knows it: load as a share of what friction carries, its gradient
+_FIRST_AXES = {"load_share": (0.2, 0.4, 0.6), "friction_gradient": None}
+_SHARES = (0.5, 1.0, 1.5)  # of the default, else
+_LONGEST = 120  # letters of a line
+
+
+def model_lines() -> list[str]:
+    """Return a line for each model: its name and what it is."""
+    return list(columns([(name, load_model(name).title) for name in sorted(MODELS)]))
+
+
+def key_lines(model: str) -> list[str]:
+    """Return what a job of a model may set: tables, keys, defaults, units, choices and meanings.
+
+    Raises
+    ------
+    InputError
+        If there is no such model.
+    """
+    schema = load_schema(model, None, "models")
+    loaded = load_model(model)
+    lines = [f"{model}: {loaded.title}"]
+    lines += (
+        [f"steppers: {', '.join(loaded.steppers)} (default: {schema.stepper})"] if loaded.steppers else []
+    )
+    for section, table in schema.sections.items():
+        rows = [(key, _default_in_words(parameter), _meaning(parameter)) for key, parameter in table.items()]
+        lines += ["", f"[{section}]", *columns(rows)]
+    return lines
+
+
+def job_template(name: str, model: str, source: str) -> str:
+    """Return a job file of a model in which each key stands commented out, with its default and meaning.
+
+    As it stands it is a small study along one axis, with all else at its default.
+
+    Parameters
+    ----------
+    name : str
+        Of the job and its output folder.
+    model : str
+        A model whose runs are recorded.
+    source : str
+        What asks for it, for the error.
+
+    Raises
+    ------
+    InputError
+        If the name is no word, there is no such model, or `cvt-hpc run` has no use for it.
+    """
+    read_name({"name": name}, source)
+    schema = load_schema(model, None, source)
+    loaded = load_model(model)
+    if not loaded.is_recorded:
+        raise mismatch(f"{source}: model", "a model whose runs are recorded", f"{model}, for charts alone")
+    axis = _axis(schema)
+    lines = [
+        f"# A study with the model {model}: {loaded.title}",
+        "# Each key stands here with its default: take away the # to change it. Defaults that no paper gives",
+        f"# are assumptions. `cvt-hpc check {name}.toml` shows what this file does and what it costs,",
+        f"# `cvt-hpc run {name}.toml` does it, and `cvt-hpc map out/{name}` draws the result.",
+        "",
+        f'name = "{name}"',
+        f'model = "{model}"',
+        'description = ""',
+    ]
+    if loaded.steppers:
+        lines += [f'# stepper = "{schema.stepper}"  # {", ".join(loaded.steppers)}']
+    lines += [
+        "",
+        "[axes]  # what the study varies: any key with a number or a choice",
+        axis,
+    ]
+    for section, table in schema.sections.items():
+        lines += ["", f"[{section}]"]
+        for key, parameter in table.items():
+            lines += [*_commented(_meaning(parameter)), f"# {key} = {_as_toml(parameter)}"]
+    return "\n".join(lines) + "\n"
+
+
+def write_template(name: str, model: str) -> Path:
+    """Write a `job_template` to the file NAME.toml of this folder, and return its path.
+
+    Raises
+    ------
+    InputError
+        As of `job_template`, or if there is a file of this name or it cannot be written.
+    """
+    text = job_template(name, model, "init")
+    path = Path(f"{name}.toml")
+    if os.path.lexists(path):
+        raise mismatch(str(path), "a name that is free", "a file of this name")
+    with written_aside(path) as aside:
+        aside.write_text(text)
+    return path
+
+
+def _meaning(parameter: Parameter) -> str:
+    choices = f" ({', '.join(parameter.choices)})" if parameter.choices else ""
+    return parameter.description + choices
+
+
+def _default_in_words(parameter: Parameter) -> str:
+    if parameter.default is None:
+        return f"none {parameter.unit}".rstrip()
+    in_customary = angle_in_words(parameter.default, parameter.unit) if kind_of(parameter) is float else ""
+    return in_words(parameter.default, parameter.unit) + (f" ({in_customary})" if in_customary else "")
+
+
+def _commented(text: str) -> list[str]:
+    """Return a text as lines of a comment, broken between words."""
+    lines = ["#"]
+    for word in text.split():
+        if len(lines[-1]) + 1 + len(word) > _LONGEST:
+            lines.append("#")
+        lines[-1] += f" {word}"
+    return lines
+
+
+def _as_toml(parameter: Parameter) -> str:
+    """Return the default as a job file writes it: read again it is the same value to the last digit."""
+    value, unit = parameter.default, parameter.unit
+    if value is None:
+        return f'"... {unit}"' if unit else "..."
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, tuple):
+        return _list_as_toml(value)
+    if isinstance(value, int) or not unit or not math.isfinite(value):
+        return repr(value)
+    texts = (angle_in_words(value, unit), in_words(value, unit), f"{value!r} {unit}")
+    return next(f'"{text}"' for text in texts if text and to_si(text, unit) == value)
+
+
+def _list_as_toml(values: tuple) -> str:
+    items = (_list_as_toml(item) if isinstance(item, tuple) else repr(item) for item in values)
+    return f"[{', '.join(items)}]"
+
+
+def _axis(schema: Schema) -> str:
+    """Return a line with the axis of a first study: given values of a key, or some about its default."""
+    known = schema.parameters
+    preferred = [key for key in _FIRST_AXES if key in known]
+    key = next(key for key in (*preferred, *known) if _FIRST_AXES.get(key) or _may_be_varied(known[key]))
+    unit = known[key].unit
+    values = _FIRST_AXES.get(key) or [share * known[key].default for share in _SHARES]
+    texts = [f'"{in_words(value, unit)}"' if unit else in_words(value, unit) for value in values]
+    return f"{key} = [{', '.join(texts)}]"
+
+
+def _may_be_varied(parameter: Parameter) -> bool:
+    """Whether all shares of the default are legal and differ."""
+    default = parameter.default
+    if not isinstance(default, float) or not math.isfinite(default) or default == 0.0:
+        return False
+    low, high = sorted((_SHARES[0] * default, _SHARES[-1] * default))
+    return parameter.minimum < low and high < parameter.maximum

@@ -1,0 +1,322 @@
+"""A run of a belt of rigid elements, whichever equations march it.
+
+It starts from geometry, is clamped and loaded, and recorded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.models.pushbelt import belt
+from cvt_hpc.models.pushbelt.parameters import MODES, path_length
+from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Readings
+from cvt_hpc.models.pushbelt.start_up import StartUps, fingerprint
+from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
+from cvt_hpc.physics.geometry import driven_radius
+from cvt_hpc.variables import Status
+from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, STRANDS
+from cvt_hpc.variator.course import load_course
+from cvt_hpc.variator.profiles import multiple
+from cvt_hpc.variator.slip import GAINED, LOST
+from cvt_hpc.vibration.ramped import ramped
+
+COURSES = ("load", "driving_speed")
+FIRST_THRUST = 500.0  # [N]: with which the run begins, so that the belt settles in the grooves
+CLAMPED = 0.5  # of the rise time: until then the thrust rises, from then on the load, lest the belt slips
+# What the power balance may leave open beside the equations' tolerance: elastic sheaves lean along the arc,
+# which has no part in the elements' forces. Sound runs leave up to 0.5 % of the losses.
+OF_LOSS = 0.02  # [1]
+# What the step may damp by itself beside that share of the losses: one of the energy of rotation of elements
+# that meet and leave an arc, and of thrust times belt speed, by step. Without vibration sound runs damp by up
+# to 85 % of these two.
+OF_ROTATION, OF_THRUST = 1.5, 10.0  # [1], [1/s]
+
+_start_ups = StartUps()
+forget = _start_ups.forget
+
+
+class ElementRun(SampledRun):
+    """One run of a belt of rigid elements, advanced sample by sample.
+
+    It begins at the end of its start-up where another run of this process has marched the same one.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Resolved parameters of the run [SI], those of the stepper among them.
+    stepper : str
+        The model's own.
+
+    Attributes
+    ----------
+    fields : module
+        `belt` of the model, by whose names the entries of inputs, pulleys, totals and counters are known.
+    """
+
+    fields: Any = belt
+    _channels: tuple[str, ...] = (*COURSES, *SCALARS)
+    _profiles: Sequence[str] = tuple(PROFILES)
+    _directions: tuple[str, ...] = STRANDS  # of the displacement at the probes of the strands
+    _belt: Any
+    _method: Any  # how steps are solved, state and work space, as `_advance` takes them
+    _state: Any
+    _work: Any
+    _advance: Callable[..., int]
+
+    def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
+        p = parameters
+        super().__init__(p)
+        self._begin(p)
+        self._readings = Readings(p, self._belt)
+        sums = len(self._profiles) + 1, self._readings.places.size
+        probes = np.tile(self._readings.probes, (len(self._directions) // len(STRANDS), 1))
+        self._record(self._channels, self._directions, probes, self.fields.TOTALS + 1, sums)
+        clamped = int(CLAMPED * p["rise_time"] / self.interval + 1e-9)
+        self._start_up = min(clamped, self.first_judged)
+        self._start_up_key = self._key_of_start_up()
+        self._go_on_from(_start_ups.find(self._start_up_key))
+
+    def _begin(self, p: Mapping[str, Any]) -> None:
+        """Set how steps are solved, constants, state and work space."""
+        raise NotImplementedError
+
+    def _read(self) -> Any:
+        """What is read at the sample that is reached."""
+        raise NotImplementedError
+
+    def _stored_energy(self, found: Any) -> float:
+        """Kinetic and elastic energy of belt and pulleys [J]."""
+        raise NotImplementedError
+
+    def _tilting_inertia(self) -> float:
+        """Moment of inertia of an element about its axial direction [kg m^2]."""
+        return self._belt.inertia
+
+    def advance(self, samples: int) -> tuple[Status, str] | None:
+        """March on.
+
+        Parameters
+        ----------
+        samples : int
+            How many samples at most; 0 compiles only.
+
+        Returns
+        -------
+        (Status, str) or None
+            Why the run ends here.
+        """
+        if samples == 0:
+            self._compile()
+        for _ in range(min(samples, self.samples - self.done)):
+            inputs = self._inputs_along(self.done)
+            outcome = self._march(inputs, self._steps_per_sample)
+            if outcome:
+                self.failure = Status.FAILED_NUMERICS, self._why(outcome)
+                break
+            self._take_sample(inputs[1])
+            if (slipped := self._slipped()) is not None:
+                self.failure = self._early_end(slipped)
+                break
+            if self.done == self._start_up:
+                _start_ups.keep(self._start_up_key, self._reached())
+        return self.failure
+
+    def _key_of_start_up(self) -> str:
+        """All that the samples before the load acts follow from."""
+        course = [self._inputs_along(sample) for sample in range(self._start_up)]
+        marched = self._belt, self._method, self._state, self.interval, self._steps_per_sample, course
+        return fingerprint(type(self).__module__, marched, self._readings, self.parameters["ratio"])
+
+    def _go_on_from(self, start_up: tuple[np.ndarray, ...] | None) -> None:
+        """Be at the end of the start-up, where another run has marched it."""
+        if start_up is None:
+            return
+        self.done = self._start_up
+        for own, kept in zip(self._reached(), start_up, strict=True):
+            own[...] = kept
+
+    def _reached(self) -> tuple[np.ndarray, ...]:
+        """Views of all that marching has changed so far, where nothing is judged yet."""
+        return self._state.elements.data, *self._state[1:], *self._recorded()
+
+    def _march(self, inputs: np.ndarray, steps: int) -> int:
+        return self._advance(self._belt, self._method, self._state, self._work, inputs, steps, self.step)
+
+    def _compile(self) -> None:
+        self._march(self._inputs_along(0), 0)
+
+    def _inputs_along(self, sample: int) -> np.ndarray:
+        """Inputs at the start and at the end of a sample, (2, INPUTS)."""
+        ends = [(sample + end) * self.interval for end in (0, 1)]
+        shift = 0.0
+        if self._belt.driving_rate == 0.0 and self.parameters["ratio_profile"]:
+            before, after = map(self._prescribed_radius, ends)
+            shift = (after - before) / self.interval
+        return np.array([[*self._inputs(time), shift] for time in ends])
+
+    def _prescribed_radius(self, time: float) -> float:
+        """Radius to which the position of the driving sheave brings the belt at a time [m]."""
+        p = self.parameters
+        ratio = p["ratio"] * multiple(p, "ratio", time)
+        return driven_radius(ratio, self.path.path_length, p["centre_distance"]) / ratio
+
+    def _inputs(self, time: float) -> tuple[float, float, float, float]:
+        """Speed [rad/s], thrusts on both pulleys [N] and torque on the driven one [N m] at a time."""
+        p = self.parameters
+        rise, end = p["rise_time"], p["duration"]
+        load = self.load(time)
+        share = 1.0
+        if ramped(p) == "speed":
+            begun = p["speed_start"] / p["driving_speed"]
+            share = begun + (1.0 - begun) * min(max((time - rise) / (end - rise), 0.0), 1.0)
+        clamped = load_course.py_func(time, CLAMPED * rise, rise, 1.0, 1.0)
+        driving, driven = (
+            FIRST_THRUST + clamped * (p[name] * multiple(p, name, time) - FIRST_THRUST)
+            for name in ("driving_thrust", "thrust")
+        )
+        speed = share * p["driving_speed"] * multiple(p, "driving_speed", time)
+        return speed, driving, driven, p["ratio"] * load
+
+    def load(self, time: float) -> float:
+        """Torque at the driving pulley without losses [N m]."""
+        p = self.parameters
+        begun = p["load_start"] if ramped(p) == "load" else p["load"]
+        clamped = CLAMPED * p["rise_time"]
+        rise, end = p["rise_time"] - clamped, p["duration"] - clamped
+        course = load_course.py_func(max(time - clamped, 0.0), rise, end, begun, p["load"])
+        return course * multiple(p, "load", time)
+
+    def _take_sample(self, inputs: np.ndarray) -> None:
+        found = self._read()
+        speed, torque = inputs[self.fields.IN_SPEED], inputs[self.fields.IN_LOAD]
+        load = torque / self.parameters["ratio"]
+        stored = np.nan
+        if self.done >= self.first_judged:
+            stored = self._stored_energy(found)
+            self._sums += found.profiles()
+        row = [*found.displacement(), load, speed, *found.scalars()]
+        self._keep(row, [*self._state.totals, stored])
+
+    def _why(self, outcome: int) -> str:
+        if outcome == self.fields.NOT_CONVERGED:
+            return f"the equations of a step were not solved, {self._fault()}"
+        return "the state is not a number, or the equations of a step are singular"
+
+    def _fault(self) -> str:
+        """Where the last step that was not solved was not."""
+        counters = self._state.counters
+        contact = self.fields.CONTACTS[counters[self.fields.FAILED_CONTACT]]
+        return f"at the {contact} contact of element {counters[self.fields.FAILED_ELEMENT]}"
+
+    def _slipped(self) -> str | None:
+        """Whether the driven pulley runs far from the speed that the present radii give without slip."""
+        driving_speed, driven_speed, driving_radius, driven_radius = self._state.pulleys[:4]
+        driving, driven = driving_speed * driving_radius, driven_speed * driven_radius
+        if driven < LEAST_SPEED * driving:
+            return LOST
+        return GAINED if driven > MOST_SPEED * driving else None
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self._state.totals[self.fields.TIME])
+
+    def mean_rate(self, total: int) -> float:
+        """Mean rate over the judged part of one of the totals, by its index; TOTALS: of the stored energy."""
+        part, time = self._totals[self.judged], self.fields.TIME
+        return float((part[-1, total] - part[0, total]) / (part[-1, time] - part[0, time]))
+
+    @property
+    def profiles(self) -> dict[str, np.ndarray]:
+        """Profiles at places along the path, (place,), means of the judged part; nan without elements."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            means = self._sums[:-1] / self._sums[-1]
+        return dict(zip(self._profiles, means, strict=True))
+
+    @property
+    def path(self) -> Any:
+        """The reference path."""
+        return self._readings.path
+
+    @property
+    def places(self) -> np.ndarray:
+        """Path coordinates of the profiles, (place,) [m]."""
+        return self._readings.places
+
+    def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
+        """Why a run that reached its end is not to be trusted, by its values; None where it is.
+
+        Parameters
+        ----------
+        record : dict
+            With `power_residual`, `numerical_damping`, `driving_power`, `loss` and `unsolved_share`.
+        """
+        unsolved, open_power = record["unsolved_share"], abs(record["power_residual"])
+        flow, small = max(abs(record["driving_power"]), record["loss"]), OF_LOSS * record["loss"]
+        damped, most_damped = record["numerical_damping"].sum(), self._most_damped() + small
+        most_open = (small + self.parameters["power_tolerance"]) / flow
+        if not unsolved <= MOST_UNSOLVED:
+            why = f"{unsolved:.1%} of the steps were not solved, the last {self._fault()}"
+        elif not open_power <= most_open:
+            why = f"the power balance is open by {open_power:.3g}, not by {most_open:.3g} or less"
+        elif not damped <= most_damped:
+            why = f"the time step itself damps {damped:.4g} W, not {most_damped:.4g} W or less"
+        else:
+            return None
+        return Status.FAILED_NUMERICS, why
+
+    def _most_damped(self) -> float:
+        """Most that the steps of a sound run without vibration damp by themselves [W]."""
+        p, path = self.parameters, self.path
+        speed = self.mean_driving_speed(self.judged) * path.driving_radius
+        passing = speed / self._readings.pitch
+        turning = path.driving_radius**-2 + path.driven_radius**-2
+        rotation = 0.5 * self._tilting_inertia() * passing * speed**2 * turning
+        thrust = p["thrust"] * multiple(p, "thrust", p["duration"])  # a profile ends before the judged part
+        return OF_ROTATION * rotation + OF_THRUST * self.step * thrust * speed
+
+
+def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """What a `start` takes, from flat parameters of a run [SI]."""
+    p, length = parameters, path_length(parameters)
+    pitch = length / p["elements"]
+    rigid = np.isinf(p["sheave_stiffness"])
+    return {
+        "ratio": p["ratio"],
+        "centre_distance": p["centre_distance"],
+        "belt_length": length,
+        "elements": p["elements"],
+        "element_mass": p["element_mass"] * pitch,
+        "element_height": p["element_height"],
+        "pitch_depth": p["ring_offset"],
+        "head_height": p["head_height"],
+        "play": p["play"],
+        "ring_mass": p["ring_mass"] * length,
+        "ring_stiffness": p["ring_stiffness"],
+        "ring_strain": 1e-4,
+        "half_wedge_angle": p["half_wedge_angle"],
+        "flank_stiffness": p["flank_stiffness"] * pitch,
+        "contact_stiffness": p["edge_stiffness"] / pitch,
+        **{key: p[key] for key in ("nose_height", "nose_clearance", "nose_stiffness")},
+        "angle_stiffness": p["tilt_spring"] * pitch,
+        "angle_damping": p["tilt_damper"] * pitch,
+        "transverse_damping": p["transverse_damping"],
+        "friction_law": p["friction_law"],
+        "kinetic_friction": p["kinetic_friction"],
+        "friction_gradient": p["friction_gradient"],
+        "stribeck_velocity": p["stribeck_velocity"],
+        "friction_memory": p["friction_memory"],
+        "ring_friction": p["ring_friction"],
+        "friction_speed": p["friction_speed"],
+        "ring_friction_speed": p["ring_friction_speed"],
+        "driven_inertia": p["driven_inertia"],
+        "driving_rate": p["sheave_rate"] if p["driving_thrust"] > 0.0 else 0.0,
+        "driven_rate": p["sheave_rate"],
+        "modal_stiffness": () if rigid else p["sheave_stiffness"] * np.array([p[key] for key in MODES]),
+        "driving_speed": p["speed_start"]
+        if ramped(p) == "speed"
+        else p["driving_speed"] * multiple(p, "driving_speed", 0.0),
+    }

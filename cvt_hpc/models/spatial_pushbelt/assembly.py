@@ -1,0 +1,388 @@
+"""Residuals of an iterate, and the linear system of Newton's method, in lanes.
+
+Every law between two elements is a magnitude along a direction of 16 numbers, so that the block of an
+element with the one behind is the transpose of that one's with it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba.extending import register_jitable
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.lanes import around, behind, fma, like
+from cvt_hpc.models.spatial_pushbelt.belt import (
+    CHANGE,
+    CHORD_I,
+    CHORD_J,
+    DIAGONAL,
+    DRIVEN,
+    FLANK,
+    FLANK_FRICTION_T,
+    GYROSCOPIC,
+    HEADING,
+    INERTIA,
+    LINK,
+    MID_RADIUS,
+    NORMAL,
+    NORMAL_ROW,
+    NORMAL_YIELD,
+    OMEGA,
+    PAIR_I,
+    PAIR_J,
+    PIN_LEVER_I,
+    PIN_LEVER_J,
+    PIN_NORMAL,
+    PIN_SLOPE,
+    POINTS,
+    PREDICTED_YAW,
+    RESIDUAL,
+    RIGHT,
+    RING_LINE,
+    RING_SLOPE,
+    SPEED,
+    STIFF,
+    STIFF_I,
+    STIFF_II,
+    STIFF_IJ,
+    STIFF_J,
+    STIFF_JJ,
+    TENSION_I,
+    TENSION_J,
+    TENSION_SLOPE,
+    TORQUE_OPENING,
+    TORQUE_OWN,
+    TORQUE_ROW,
+    TURN_I,
+    TURN_J,
+    YAW,
+)
+from cvt_hpc.models.spatial_pushbelt.bending import BETA, bending_slopes
+from cvt_hpc.models.spatial_pushbelt.rotations import (
+    dot,
+    joined,
+    matrix,
+    minus,
+    moved,
+    of_matrix,
+    of_symmetric,
+    of_transposed,
+    plus,
+    plus_product,
+    plus_square,
+    store,
+    symmetric,
+    symmetric_sum,
+    three,
+    times,
+    vector,
+    vector_ahead,
+    vector_behind,
+)
+
+_U = 64  # field of a row of blocks at which the block with the next element begins
+
+
+@register_jitable
+def _store_upper(array, j, first, uu, uw, ww, uv, wv, vv, up, wp, pp):
+    """Set the upper half of a symmetric block by columns: u, omega, v, psi."""
+    store(array, j, first, (uu[0], uu[1], uu[2]))
+    store(array, j, first + 3, (uu[3], uu[4], uu[5]))
+    store(array, j, first + 6, (uw[0], uw[1], uw[2]))
+    array[j, first + 9] = ww[0]
+    store(array, j, first + 10, (uw[3], uw[4], uw[5]))
+    array[j, first + 13], array[j, first + 14] = ww[1], ww[2]
+    store(array, j, first + 15, (uw[6], uw[7], uw[8]))
+    store(array, j, first + 18, (ww[3], ww[4], ww[5]))
+    store(array, j, first + 21, uv)
+    store(array, j, first + 24, wv)
+    array[j, first + 27] = vv
+    store(array, j, first + 28, up)
+    store(array, j, first + 31, wp)
+    array[j, first + 34], array[j, first + 35] = like(0.0, vv), pp
+
+
+@register_jitable
+def _store_columns(array, j, first, m, row, column):
+    """Set a part of 3 x 3 of a block of 8 x 8."""
+    store(array, j, first + 8 * column + row, (m[0], m[1], m[2]))
+    store(array, j, first + 8 * column + 8 + row, (m[3], m[4], m[5]))
+    store(array, j, first + 8 * column + 16 + row, (m[6], m[7], m[8]))
+
+
+@register_jitable
+def _columns(array, j, first, row, column):
+    """A part of 3 x 3 of a block of 8 x 8."""
+    first += 8 * column + row
+    return three(vector(array, j, first), vector(array, j, first + 8), vector(array, j, first + 16))
+
+
+@kernel
+def linear_blocks(belt, step, dt):
+    """Blocks of inertia, dampers, tension, pitch, yaw and bending: DIAGONAL and LINK of each element."""
+    steep = 0.5 * (dt * belt.angle_stiffness + belt.angle_damping)
+    yawing = BETA * dt * belt.yaw_stiffness + belt.yaw_damping
+    shear, bend = bending_slopes(belt, dt)
+    per_pitch = 1.0 / belt.pitch
+    for j in range(step.rows):
+        uu, uw, ww = (
+            symmetric(step, j, INERTIA),
+            matrix(step, j, INERTIA + 6),
+            symmetric(step, j, INERTIA + 15),
+        )
+        none = like(0.0, uu[0])
+        n = step[j, NORMAL], step[j, NORMAL + 1], none
+        uu = plus_square(uu, like(belt.transverse_damping, none), n)
+        axial = like(belt.lateral_damping + 2.0 * shear * per_pitch * per_pitch, none)
+        uu = uu[0], uu[1], uu[2], uu[3], uu[4], uu[5] + axial
+        y = vector(step, j, YAW)
+        ww = plus_square(ww, like(yawing, none), y)
+        wp = times(like(-yawing, none), y)
+        up = none, none, none
+        pp = like(belt.ring_rotary_inertia / dt + yawing + 0.5 * shear + 2.0 * bend, none)
+
+        # the segment ahead, of which this element is i
+        k, a, b = step[j, TENSION_SLOPE], vector(step, j, TENSION_I), vector(step, j, TENSION_I + 3)
+        uu, uw, ww = plus_square(uu, k, a), plus_product(uw, k, a, b), plus_square(ww, k, b)
+        uv, wv, vv = times(k, a), times(k, b), like(belt.ring_mass / dt, none) + k
+        p, q = vector(step, j, CHORD_I), vector(step, j, CHORD_J)
+        s, t = vector(step, j, TURN_I), vector(step, j, TURN_J)
+        d = like(steep, none)
+        uu = plus_square(plus_square(uu, d, p), d, q)
+        uw, ww = plus_product(uw, -d, p, s), plus_square(ww, d, s)
+
+        e, f = vector(step, j, TENSION_J), vector(step, j, TENSION_J + 3)
+        nothing = none, none, none, none, none, none, none, none, none
+        link = plus_product(plus_product(plus_product(nothing, -k, a, e), -d, p, p), -d, q, q)
+        link = (
+            link[0],
+            link[1],
+            link[2],
+            link[3],
+            link[4],
+            link[5],
+            link[6],
+            link[7],
+            link[8] - shear * per_pitch * per_pitch,
+        )
+        _store_columns(step, j, LINK, link, 0, 0)
+        _store_columns(step, j, LINK, plus_product(plus_product(nothing, -k, b, e), d, s, p), 3, 0)
+        _store_columns(step, j, LINK, plus_product(plus_product(nothing, -k, a, f), -d, q, t), 0, 3)
+        _store_columns(step, j, LINK, plus_product(nothing, -k, b, f), 3, 3)
+        for c in range(3):
+            step[j, LINK + 8 * c + 6] = -k * step[j, TENSION_J + c]
+            step[j, LINK + 8 * c + 30] = -k * step[j, TENSION_J + 3 + c]
+            step[j, LINK + 8 * c + 7] = 0.0
+            step[j, LINK + 8 * c + 31] = 0.0
+        half = 0.5 * shear * per_pitch
+        step[j, LINK + 23] = -half
+        store(step, j, LINK + 48, times(-k, a))
+        store(step, j, LINK + 51, times(-k, b))
+        step[j, LINK + 54] = -k
+        for row in range(7):
+            step[j, LINK + 56 + row] = 0.0
+        step[j, LINK + 55] = 0.0
+        step[j, LINK + 58] = half
+        step[j, LINK + 63] = 0.25 * shear - bend
+
+        # the segment behind, of which it is j
+        k, a, b = (
+            behind(step, j, TENSION_SLOPE),
+            vector_behind(step, j, TENSION_J),
+            vector_behind(step, j, TENSION_J + 3),
+        )
+        uu, uw, ww = plus_square(uu, k, a), plus_product(uw, k, a, b), plus_square(ww, k, b)
+        uv, wv, vv = moved(uv, k, a), moved(wv, k, b), vv + k
+        p, q = vector_behind(step, j, CHORD_I), vector_behind(step, j, CHORD_J)
+        t = vector_behind(step, j, TURN_J)
+        uu = plus_square(plus_square(uu, d, p), d, q)
+        uw, ww = plus_product(uw, d, q, t), plus_square(ww, d, t)
+        _store_upper(step, j, DIAGONAL, uu, uw, ww, uv, wv, vv, up, wp, pp)
+
+
+@kernel
+def residuals(belt, state, increments, openings, shapes, load, step, iterate, scratch, border, dt):
+    """Residuals of all equations: of elements in `iterate`, of the border in the last column of `border`.
+
+    Forces of flanks and saddles stand in the residuals already.
+
+    Returns
+    -------
+    float
+        Power residual of the belt [W].
+    """
+    modes = belt.modal_stiffness.shape[1]
+    last = border.shape[1] - 1
+    ring, rotary = belt.ring_mass / dt, belt.ring_rotary_inertia / dt
+    yawing = BETA * dt * belt.yaw_stiffness + belt.yaw_damping
+    power = torque = like(0.0, state[0, FLANK])
+    for k in range(2 * modes):
+        scratch[0, k] = 0.0
+    for j in range(step.rows):
+        du, dw = vector(state, j, CHANGE), vector(state, j, CHANGE + 3)
+        dv, dp = state[j, CHANGE + 6], state[j, CHANGE + 7]
+        u, omega = plus(vector(state, j, SPEED), du), plus(vector(state, j, OMEGA), dw)
+        mass = symmetric(step, j, INERTIA)
+        coupling = matrix(step, j, INERTIA + 6)
+        f = plus(vector(iterate, j, RESIDUAL), vector(iterate, j, PAIR_I))
+        f = minus(
+            plus(f, vector_behind(iterate, j, PAIR_J)), plus(of_symmetric(mass, du), of_matrix(coupling, dw))
+        )
+        drag = belt.transverse_damping * fma(step[j, NORMAL], u[0], step[j, NORMAL + 1] * u[1])
+        f = (
+            f[0] - drag * step[j, NORMAL],
+            f[1] - drag * step[j, NORMAL + 1],
+            f[2] - belt.lateral_damping * u[2],
+        )
+        y = vector(step, j, YAW)
+        moment = step[j, PREDICTED_YAW] + yawing * (dot(y, dw) - dp)
+        g = plus(vector(iterate, j, RESIDUAL + 3), vector(iterate, j, PAIR_I + 3))
+        g = plus(plus(g, vector_behind(iterate, j, PAIR_J + 3)), vector(step, j, GYROSCOPIC))
+        g = minus(g, plus(of_transposed(coupling, du), of_symmetric(symmetric(step, j, INERTIA + 15), dw)))
+        g = moved(g, -moment, y)
+        h = iterate[j, RESIDUAL + 6] + iterate[j, PAIR_I + 6] + behind(iterate, j, PAIR_J + 6) - ring * dv
+        s = iterate[j, PAIR_I + 7] + behind(iterate, j, PAIR_J + 7) - rotary * dp + moment
+        store(iterate, j, RESIDUAL, f)
+        store(iterate, j, RESIDUAL + 3, g)
+        iterate[j, RESIDUAL + 6], iterate[j, RESIDUAL + 7] = h, s
+
+        power += dot(u, f) + dot(omega, g) + (state[j, SPEED + 6] + dv) * h + (state[j, SPEED + 7] + dp) * s
+        driven = state[j, DRIVEN]
+        for p in range(POINTS):
+            torque += driven * step[j, MID_RADIUS + p] * state[j, FLANK_FRICTION_T + p]
+        if modes > 0:
+            axial = 0.5 * belt.cosine * (state[j, FLANK] + state[j, FLANK + 1])
+            axial = axial + 0.5 * belt.cosine * (state[j, FLANK + 2] + state[j, FLANK + 3])
+            for k in range(modes):
+                scratch[0, modes + k] += driven * axial * shapes[j, k]
+                scratch[0, k] += (1.0 - driven) * axial * shapes[j, k]
+    for k in range(2 * modes):
+        scratch[0, k] = around(scratch[0, k])
+        pulley, mode = k // modes, k % modes
+        opening = openings[pulley, mode] + increments[1 + k]
+        border[1 + k, last] = scratch.data[0, k, 0] - belt.modal_stiffness[pulley, mode] * opening
+    scratch[0, 0], scratch[0, 1] = around(torque), around(power)
+    border[0, last] = scratch.data[0, 0, 0] - load - belt.driven_inertia * increments[0] / dt
+    return scratch.data[0, 1, 0]
+
+
+@kernel
+def assemble_pairs(belt, state, step, iterate, blocks):
+    """Blocks of all but the flanks, and the first right side: what takes the residuals to zero."""
+    has_pins = belt.pin_clearance < np.inf
+    for j in range(step.rows):
+        x = vector_ahead(state, j, HEADING)
+        k, i, jj = iterate[j, STIFF], vector(iterate, j, STIFF_I), vector(iterate, j, STIFF_J)
+        uu = plus_product(_columns(step, j, LINK, 0, 0), -k, x, x)
+        wu = plus_product(_columns(step, j, LINK, 3, 0), like(1.0, k), i, x)
+        uw = plus_product(_columns(step, j, LINK, 0, 3), like(-1.0, k), x, jj)
+        ww = _columns(step, j, LINK, 3, 3)
+        ww = three(
+            plus((ww[0], ww[1], ww[2]), vector(iterate, j, STIFF_IJ)),
+            plus((ww[3], ww[4], ww[5]), vector(iterate, j, STIFF_IJ + 3)),
+            plus((ww[6], ww[7], ww[8]), vector(iterate, j, STIFF_IJ + 6)),
+        )
+        if has_pins:
+            n, k = vector(step, j, PIN_NORMAL), iterate[j, PIN_SLOPE]
+            a, b = vector(step, j, PIN_LEVER_I), vector(step, j, PIN_LEVER_J)
+            uu, wu = plus_product(uu, -k, n, n), plus_product(wu, -k, a, n)
+            uw, ww = plus_product(uw, -k, n, b), plus_product(ww, -k, a, b)
+        _store_columns(blocks, j, _U, uu, 0, 0)
+        _store_columns(blocks, j, _U, wu, 3, 0)
+        _store_columns(blocks, j, _U, uw, 0, 3)
+        _store_columns(blocks, j, _U, ww, 3, 3)
+        for c in range(6):
+            blocks[j, _U + 8 * c + 6], blocks[j, _U + 8 * c + 7] = (
+                step[j, LINK + 8 * c + 6],
+                step[j, LINK + 8 * c + 7],
+            )
+        for field in range(48, 64):
+            blocks[j, _U + field] = step[j, LINK + field]
+
+        d = DIAGONAL
+        uu = symmetric(step, j, d)
+        uw = three(vector(step, j, d + 6), vector(step, j, d + 10), vector(step, j, d + 15))
+        ww = joined((step[j, d + 9], step[j, d + 13], step[j, d + 14]), vector(step, j, d + 18))
+        # the contacts ahead, of which this element is i
+        k = iterate[j, STIFF]
+        uu, uw = plus_square(uu, k, x), plus_product(uw, like(-1.0, k), x, i)
+        ww = symmetric_sum(ww, symmetric(iterate, j, STIFF_II))
+        if has_pins:
+            n, k, a = vector(step, j, PIN_NORMAL), iterate[j, PIN_SLOPE], vector(step, j, PIN_LEVER_I)
+            uu, uw, ww = plus_square(uu, k, n), plus_product(uw, k, n, a), plus_square(ww, k, a)
+        # those behind, of which it is j
+        x, k = vector(state, j, HEADING), behind(iterate, j, STIFF)
+        uu = plus_square(uu, k, x)
+        uw = plus_product(uw, like(1.0, k), x, vector_behind(iterate, j, STIFF_J))
+        own = joined(vector_behind(iterate, j, STIFF_JJ), vector_behind(iterate, j, STIFF_JJ + 3))
+        ww = symmetric_sum(ww, own)
+        if has_pins:
+            n, k = vector_behind(step, j, PIN_NORMAL), behind(iterate, j, PIN_SLOPE)
+            b = vector_behind(step, j, PIN_LEVER_J)
+            uu, uw, ww = plus_square(uu, k, n), plus_product(uw, k, n, b), plus_square(ww, k, b)
+        # friction of the ring
+        k, t, s = iterate[j, RING_SLOPE], vector(step, j, RING_LINE), vector(step, j, RING_LINE + 3)
+        uu, uw, ww = plus_square(uu, k, t), plus_product(uw, k, t, s), plus_square(ww, k, s)
+        uv, wv = moved(vector(step, j, d + 21), -k, t), moved(vector(step, j, d + 24), -k, s)
+
+        store(blocks, j, 0, (uu[0], uu[1], uu[3]))
+        store(blocks, j, 8, (uu[1], uu[2], uu[4]))
+        store(blocks, j, 16, (uu[3], uu[4], uu[5]))
+        store(blocks, j, 3, (uw[0], uw[3], uw[6]))
+        store(blocks, j, 11, (uw[1], uw[4], uw[7]))
+        store(blocks, j, 19, (uw[2], uw[5], uw[8]))
+        _store_columns(blocks, j, 0, uw, 0, 3)
+        store(blocks, j, 27, (ww[0], ww[1], ww[3]))
+        store(blocks, j, 35, (ww[1], ww[2], ww[4]))
+        store(blocks, j, 43, (ww[3], ww[4], ww[5]))
+        up, wp = vector(step, j, d + 28), vector(step, j, d + 31)
+        blocks[j, 6], blocks[j, 14], blocks[j, 22] = uv
+        blocks[j, 30], blocks[j, 38], blocks[j, 46] = wv
+        blocks[j, 7], blocks[j, 15], blocks[j, 23] = up
+        blocks[j, 31], blocks[j, 39], blocks[j, 47] = wp
+        store(blocks, j, 48, uv)
+        store(blocks, j, 51, wv)
+        blocks[j, 54], blocks[j, 55] = step[j, d + 27] + k, step[j, d + 34]
+        store(blocks, j, 56, up)
+        store(blocks, j, 59, wp)
+        blocks[j, 62], blocks[j, 63] = step[j, d + 34], step[j, d + 35]
+        for field in range(8):
+            blocks[j, RIGHT + field] = iterate[j, RESIDUAL + field]
+
+
+@kernel
+def border_system(belt, state, shapes, iterate, blocks, scratch, border, dt):
+    """The border's own equations, less what the solved columns of the elements contribute to them.
+
+    The first column of `blocks` holds the solution without border, the others those for its columns.
+    """
+    modes = belt.modal_stiffness.shape[1]
+    unknowns = border.shape[0]
+    for row in range(unknowns):
+        for column in range(unknowns + 1):
+            scratch[0, column] = 0.0
+        pulley, mode = 0, 0
+        if row > 0:
+            pulley, mode = (row - 1) // modes, (row - 1) % modes
+        for j in range(iterate.rows):
+            driven = state[j, DRIVEN]
+            if row == 0:
+                weight, first = like(1.0, driven), TORQUE_ROW
+                scratch[0, 1] += iterate[j, TORQUE_OWN]
+                by_opening = iterate[j, TORQUE_OPENING]
+            else:
+                weight, first = shapes[j, mode] * (driven if pulley == 1 else 1.0 - driven), NORMAL_ROW
+                by_opening = weight * iterate[j, NORMAL_YIELD]
+            a, b = times(weight, vector(iterate, j, first)), times(weight, vector(iterate, j, first + 3))
+            for m in range(modes):
+                scratch[0, 2 + m] += (1.0 - driven) * by_opening * shapes[j, m]
+                scratch[0, 2 + modes + m] += driven * by_opening * shapes[j, m]
+            for column in range(unknowns + 1):
+                at = RIGHT + 8 * column
+                scratch[0, column] -= dot(a, vector(blocks, j, at)) + dot(b, vector(blocks, j, at + 3))
+        for column in range(unknowns + 1):
+            scratch[0, column] = around(scratch[0, column])
+        border[row, unknowns] += scratch.data[0, 0, 0]
+        for column in range(unknowns):
+            border[row, column] = scratch.data[0, 1 + column, 0]
+        border[row, row] += belt.driven_inertia / dt if row == 0 else belt.modal_stiffness[pulley, mode]

@@ -1,0 +1,418 @@
+"""The constants, state and work space of a spatial pushbelt, as its kernels take them.
+
+Arrays hold one row an element, in linked lanes (`cvt_hpc.lanes.rings`): the ring of elements is cut into
+equal parts, one for each lane of a register.
+
+The frame is global: pulleys lie side by side in the plane (y, z), the driving centre at the origin and the
+driven one at y = centre_distance, and the third coordinate is axial. Right is the side of the greater axial
+coordinate, left the other. Vectors take three fields in that order.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.pushbelt.start import parts_of
+from cvt_hpc.solvers.linked_blocks import empty_scratch, empty_system, field_of_right
+
+# Fields of the state of an element. Speeds are those at the middle of the last step.
+POSITION = 0  # 3: middle of the saddle line, which is the ring line and the assumed centre of gravity [m]
+HEADING = 3  # 3: running direction x of the element, a unit vector
+OUTWARD = 6  # 3: its outward direction o, a unit vector; a = o x x is its axial one
+SLOPE = 9  # of the ring's line in the axial direction [rad]
+SPEED = 10  # 8: velocity of that point [m/s], angular velocity [rad/s], V and SLOPE_RATE
+OMEGA = SPEED + 3
+V = SPEED + 6  # speed of the ring's material along its line [m/s]
+SLOPE_RATE = SPEED + 7  # [rad/s]
+LENGTH = 18  # unstretched length of the ring up to the next element [m]
+TENSION = 19  # of both ring packages up to the next element [N]
+SADDLE = 20  # normal force of both ring packages on the element [N]
+PUSH = 21  # 4: contact forces to the next element: edge left, edge right, head left, head right [N]
+PIN = 25  # force of the next element's hole on the pin [N]
+FLANK = 26  # 4: normal forces at the flanks: left low, left high, right low, right high [N]
+FLANK_SLIP_M = 30  # 4: sliding speed along the meridian of the sheave, outwards [m/s]
+FLANK_SLIP_T = 34  # 4: sliding speed in the direction of rotation, element over sheave [m/s]
+FLANK_FRICTION_M = 38  # 4: friction forces against these speeds [N]
+FLANK_FRICTION_T = 42  # 4
+FLANK_DUAL_M = 46  # 4: directions of friction as the Newton iteration has them, at most 1 in size
+FLANK_DUAL_T = 50  # 4
+V_FILTERED = 54  # 4: sliding speeds at which the friction law of the flanks is read [m/s]
+RING_SLIP = 58  # of the ring over the saddle, forwards [m/s]
+RING_FRICTION = 59  # friction force of the element against that [N]
+RING_DUAL = 60
+DRIVEN = 61  # 1 where the nearer pulley is the driven one, else 0
+CHANGE = 62  # 8: of the speeds in the last step, from which the next one starts
+STATE_FIELDS = CHANGE + 8
+POINTS = 4  # contact points of an element at its flanks, and at the front to the next one
+
+# Entries of the state of the pulleys: speeds [rad/s], radii at which the flanks' pitch line runs without
+# penetration [m], positions of the mid planes between their sheaves along the axes [m]
+DRIVING_SPEED, DRIVEN_SPEED, DRIVING_RADIUS, DRIVEN_RADIUS, DRIVING_MIDDLE, DRIVEN_MIDDLE = range(6)
+PULLEY_FIELDS = DRIVEN_MIDDLE + 1
+
+# Entries of the loads of the last step: axial forces that press each sheave outwards [N], and torques of the
+# belt on the pulleys in the direction of rotation [N m]
+DRIVING_LEFT, DRIVING_RIGHT, DRIVEN_LEFT, DRIVEN_RIGHT, DRIVING_TORQUE, DRIVEN_TORQUE = range(6)
+LOADS = DRIVEN_TORQUE + 1
+
+# Entries of the inputs, at the start and at the end of a call
+(
+    IN_SPEED,  # of the driving pulley [rad/s]
+    IN_DRIVING_THRUST,  # on the loose sheaves [N]
+    IN_DRIVEN_THRUST,
+    IN_LOAD,  # torque [N m]
+    IN_DRIVING_SHIFT,  # speed of the driving radius by what moves the driving sheave [m/s]
+    IN_DRIVING_DRIFT,  # axial speeds of the pulleys' mid planes, beside what the loose sheaves do [m/s]
+    IN_DRIVEN_DRIFT,
+) = range(7)
+INPUTS = IN_DRIVEN_DRIFT + 1
+
+# Entries of the totals: time, and what adds up over it
+(
+    TIME,  # [s]
+    WORK_IN,  # of the driving shaft [J]
+    WORK_OUT,  # against the load [J]
+    THRUST_WORK,  # that what holds the sheaves takes up as they move [J]
+    FLANK_LOSS,  # [J]
+    RING_LOSS,  # [J]
+    DAMPING_LOSS,  # of the rotation of elements against the rings, pitch and yaw [J]
+    BELT_LOSS,  # of the transverse damping [J]
+    ELEMENT_DAMPED,  # by the step itself, at contacts and pins between elements (`power`) [J]
+    FLANK_DAMPED,  # at flanks and modes of the sheaves [J]
+    RING_DAMPED,  # by the stretching of the ring [J]
+    TILT_DAMPED,  # by the springs of the elements' pitch [J]
+    POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
+) = range(13)
+TOTALS = 13
+DAMPED = {  # what the step damps by itself, by the springs and contacts at which it does
+    "elements": ELEMENT_DAMPED,
+    "flanks": FLANK_DAMPED,
+    "ring": RING_DAMPED,
+    "tilt": TILT_DAMPED,
+}
+
+# Entries of the counters
+STEPS, ITERATIONS, FAILED_STEPS, STATUS, FAILED_ELEMENT, FAILED_CONTACT, IN_A_ROW = range(7)
+COUNTERS = 7
+# values of STATUS
+CONVERGED, NOT_CONVERGED, NOT_FINITE = range(3)
+# values of FAILED_CONTACT
+CONTACTS = (
+    "edge left",
+    "edge right",
+    "head left",
+    "head right",
+    "pin",
+    "flank left low",
+    "flank left high",
+    "flank right low",
+    "flank right high",
+    "ring",
+)
+
+
+class Belt(NamedTuple):
+    """Constants of a belt and its pulleys; of an element where not said otherwise.
+
+    Attributes
+    ----------
+    centre_distance : float
+        [m]
+    axes : (2, 3) array
+        Directions of the driving and the driven axis, unit vectors; without tilt (0, 0, 1).
+    loose_side : (2,) array
+        Of each pulley 1 where the right sheave moves, -1 where the left one does, 0 where both do.
+    sine, cosine : float
+        Of the half wedge angle.
+    half_width : float
+        From the middle to either flank on the pitch line [m].
+    flank_reach : float
+        Of the flanks' contact points above and below the pitch line [m].
+    thickness : float
+        [m]
+    pitch : float
+        Distance of neighbours [m].
+    pitch_depth, head_height : float
+        Of the pitch line below the saddles, which is that of the rocking edge, and of the head's contacts
+        above them [m].
+    edge_width, head_width : float
+        From the middle to the contacts at the rocking edge and at the head [m].
+    package_distance : float
+        From the middle to the line of either ring package [m].
+    pin_height, pin_clearance, pin_stiffness : float
+        Of pin and hole above the saddles [m], play to all sides [m], infinite without pins, and [N/m].
+    mass : float
+        [kg]
+    roll_inertia, yaw_inertia, pitch_inertia : float
+        About the element's x, o and a [kg m^2].
+    ring_mass, ring_rotary_inertia : float
+        Of both packages for each element [kg], and against a change of slope [kg m^2].
+    ring_stiffness, ring_bending, ring_shear : float
+        EA [N], lateral EI [N m^2] and lateral k G A [N] of both packages.
+    flank_stiffness : float
+        Normal force at each flank by its penetration, shared by its two points [N/m].
+    contact_stiffness : float
+        Of the contacts at an edge and at a head, shared by its two points [N/m].
+    angle_stiffness, angle_damping : float
+        Of an element's pitch against each segment of the ring, half at each end [N m/rad], [N m s/rad].
+    yaw_stiffness, yaw_damping : float
+        Of an element's yaw against the slope of the ring [N m/rad], [N m s/rad].
+    transverse_damping, lateral_damping : float
+        Force against the speed across the path in the plane, and out of it [N s/m].
+    flank_law, flank_kinetic, flank_gradient, flank_speed : int, float, float, float
+        Friction law at the flanks (`physics.friction`).
+    friction_memory : float
+        Time constant of the sliding speed at which that law is read [s].
+    ring_friction : float
+        Friction coefficient of the rings on the saddles.
+    friction_speed, ring_friction_speed : float
+        v_reg of both: friction is mu N tanh(|v| / v_reg) [m/s].
+    driven_inertia : float
+        [kg m^2]
+    driving_rate, driven_rate : float
+        Radial speed of the belt by the excess of a loose sheave's thrust over the belt's axial force on it
+        [m/(s N)]; 0: the sheave is fixed.
+    modal_stiffness : (2, modes) array
+        S_k of the opening of each sheave of a pulley as sum a_k psi_k(phi), psi 1, cos, sin, cos 2, ...
+        [N/m]; none: rigid sheaves.
+    lean_lag : float
+        Time constant with which the difference of a pulley's two sheaves follows their load [s].
+    """
+
+    centre_distance: float
+    axes: np.ndarray
+    loose_side: np.ndarray
+    sine: float
+    cosine: float
+    half_width: float
+    flank_reach: float
+    thickness: float
+    pitch: float
+    pitch_depth: float
+    head_height: float
+    edge_width: float
+    head_width: float
+    package_distance: float
+    pin_height: float
+    pin_clearance: float
+    pin_stiffness: float
+    mass: float
+    roll_inertia: float
+    yaw_inertia: float
+    pitch_inertia: float
+    ring_mass: float
+    ring_rotary_inertia: float
+    ring_stiffness: float
+    ring_bending: float
+    ring_shear: float
+    flank_stiffness: float
+    contact_stiffness: float
+    angle_stiffness: float
+    angle_damping: float
+    yaw_stiffness: float
+    yaw_damping: float
+    transverse_damping: float
+    lateral_damping: float
+    flank_law: int
+    flank_kinetic: float
+    flank_gradient: float
+    flank_speed: float
+    friction_memory: float
+    ring_friction: float
+    friction_speed: float
+    ring_friction_speed: float
+    driven_inertia: float
+    driving_rate: float
+    driven_rate: float
+    modal_stiffness: np.ndarray
+    lean_lag: float
+
+
+class Newton(NamedTuple):
+    """How a step is solved.
+
+    Attributes
+    ----------
+    tolerance : float
+        Largest correction of a speed [m/s]; angular velocities count with the lengths below.
+    power_tolerance : float
+        Largest power residual of the whole belt [W].
+    roll_length, pitch_length, slope_length : float
+        Of angular velocities in the plane, out of it, and of the rate of the ring's slope [m].
+    most_iterations, first_half_step : int
+        Iterations a step, and the first one whose correction is halved.
+    most_failures : int
+        Failed steps in a row with which a run ends.
+    """
+
+    tolerance: float = 3e-3
+    power_tolerance: float = 5.0
+    roll_length: float = 1e-2
+    pitch_length: float = 2e-3
+    slope_length: float = 1e-3
+    most_iterations: int = 20
+    first_half_step: int = 16
+    most_failures: int = 20
+
+
+class BeltState(NamedTuple):
+    """State of a run, which `step.advance` takes on.
+
+    Attributes
+    ----------
+    elements : (rows, STATE_FIELDS) LaneArray
+        Element p rows + j lies in row j, lane p.
+    pulleys : (PULLEY_FIELDS,) array
+        Speeds, radii and positions of mid planes.
+    openings, leans : (2, modes) array
+        Of each pulley: the sheaves open by a_k, and the right one b_k more, the left one b_k less [m].
+    increments : (1 + 2 modes,) array
+        Changes in the last step of the border's unknowns: speed of the driven pulley, openings.
+    loads : (LOADS,) array
+        Axial forces on the four sheaves and torques on the pulleys in the last step; no part of what a run
+        goes on from.
+    totals : (TOTALS,) array
+        What has added up since the start.
+    counters : (COUNTERS,) int array
+        Work done, and how the last call ended.
+    """
+
+    elements: LaneArray
+    pulleys: np.ndarray
+    openings: np.ndarray
+    leans: np.ndarray
+    increments: np.ndarray
+    loads: np.ndarray
+    totals: np.ndarray
+    counters: np.ndarray
+
+
+class Workspace(NamedTuple):
+    """What `step.advance` writes to and needs no longer afterwards; `workspace` makes one.
+
+    Attributes
+    ----------
+    step : (rows, STEP_FIELDS) LaneArray
+        Geometry, directions and the linear laws of a step.
+    iterate : (rows, ITERATE_FIELDS) LaneArray
+        Forces, slopes and residuals of an iterate.
+    shapes : (rows, modes) LaneArray
+        psi_k at the elements.
+    blocks : (rows, 192 + 8 columns) LaneArray
+        The system of an iteration (`solvers.linked_blocks`), with a column for the residual and one for each
+        unknown of the border.
+    scratch : (3, 192 + 8 columns) LaneArray
+        Of the solver, and sums.
+    border : (columns - 1, columns) array
+        System of the border, its right side last.
+    inputs : (INPUTS,) array
+        Inputs of the step.
+    increments : (1 + 2 modes,) array
+        `BeltState.increments` at its start.
+    kept : (2, STATE_FIELDS) array
+        States of two elements before the last correction.
+    """
+
+    step: LaneArray
+    iterate: LaneArray
+    shapes: LaneArray
+    blocks: LaneArray
+    scratch: LaneArray
+    border: np.ndarray
+    inputs: np.ndarray
+    increments: np.ndarray
+    kept: np.ndarray
+
+
+SIZE = 8  # unknowns of an element
+RIGHT = field_of_right(SIZE)  # field of a row of blocks at which its right sides begin
+
+# Fields of Workspace.step. Directions and levers are at q_k where not said otherwise; PREDICTED is at q*.
+PREDICTED_POSITION = 0  # 3
+PREDICTED_HEADING = 3  # 3
+PREDICTED_OUTWARD = 6  # 3
+MID_OUTWARD = 9  # 3: at mid step
+MID_AXIAL = 12  # 3
+RING_LINE = 15  # 6: gradient of the ring's speed over an element by velocity and angular velocity
+TENSION_I = 21  # 6: direction of the tension at this element, beside 1 of V, and at the next one, beside -1
+TENSION_J = 27  # 6
+PREDICTED_TENSION = 33
+TENSION_SLOPE = 34
+START_SLIP = 35  # of the ring at the old speeds
+CHORD_I = 36  # 3: gradient of the pitch against the segment ahead by the velocity of the next element
+CHORD_J = 39  # 3: of that of the next element
+TURN_I = 42  # 3: by its own angular velocity
+TURN_J = 45  # 3
+PREDICTED_MOMENT_I = 48
+PREDICTED_MOMENT_J = 49
+SHEAR = 50  # of the ring at q_k [rad]
+BEND = 51  # change of its slope up to the next element at q_k [rad]
+YAW = 52  # 3: gradient of yaw by angular velocity
+PREDICTED_YAW = 55  # moment of the yaw spring at q_k and of its damper at the old speeds
+NORMAL = 56  # 2: across the path in the plane, of the strand or radial
+PUSH_LEVER_I = 58  # 12: rates of the gaps at the front by angular velocities
+PUSH_LEVER_J = 70  # 12
+PUSH_GAP = 82  # 4
+PIN_NORMAL = 86  # 3
+PIN_LEVER_I = 89  # 3
+PIN_LEVER_J = 92  # 3
+PIN_GAP = 95
+RADIAL = 96  # 12: e_r of the flanks' points
+MID_RADIAL = 108  # 12: at mid step
+MID_RADIUS = 120  # 4
+FLANK_GAP = 124  # 4: without opening of the sheaves
+INERTIA = 128  # 21: mass of element and ring, 6 x 6, the upper half by columns; over the step
+GYROSCOPIC = 149  # 3: moment
+DIAGONAL = 152  # 36: blocks of the linear laws, the upper half by columns: of an element,
+LINK = DIAGONAL + 36  # 64: and of it with the next one, by columns
+STEP_FIELDS = LINK + 64
+
+# Fields of Workspace.iterate
+ITERATE_TENSION = 0
+PAIR_I = 1  # 8: forces between an element and the next one, on this one and on that one
+PAIR_J = 9  # 8
+STIFF = 17  # sums of the slopes of contacts at the front: 1, levers, and products of levers
+STIFF_I = 18  # 3
+STIFF_J = 21  # 3
+STIFF_II = 24  # 6: upper half by columns
+STIFF_JJ = 30  # 6
+STIFF_IJ = 36  # 9: by columns
+PIN_SLOPE = 45
+PUSH_REACHED = 46  # 4: gaps [m]
+PIN_REACHED = 50
+FLANK_REACHED = 51  # 4
+RING_SLOPE = 55  # decrease of the ring's friction by its slip
+BY_NORMAL = 56  # 12: forces of the flanks' points by their normal forces
+YIELD = 68  # 4: decrease of normal forces by the opening of the sheaves
+FRICTION_SLOPES = 72  # 16: of the friction forces M, T by the slips M, T, at each point mm, mt, tm, tt
+RESIDUAL = 88  # 8
+TORQUE_ROW = 96  # 6: decrease of the driven pulley's torque by the speeds of an element, and by their own
+TORQUE_OWN = 102  # by the speed of the pulley,
+TORQUE_OPENING = 103  # and by the opening of the sheaves
+NORMAL_ROW = 104  # 6: decrease of a flank's axial force by the speeds of an element,
+NORMAL_YIELD = 110  # and by the opening of the sheaves
+ITERATE_FIELDS = 111
+
+
+def workspace(belt: Belt, nodes: int) -> Workspace:
+    """Work space for a belt of so many nodes."""
+    parts, modes = parts_of(nodes), belt.modal_stiffness.shape[1]
+    rows, columns = nodes // parts, 2 + 2 * modes
+
+    def lanes(count: int, fields: int) -> LaneArray:
+        return LaneArray(count, fields, parts, linked=parts > 1)
+
+    return Workspace(
+        step=lanes(rows, STEP_FIELDS),
+        iterate=lanes(rows, ITERATE_FIELDS),
+        shapes=lanes(rows, max(modes, 1)),
+        blocks=empty_system(nodes, parts, SIZE, columns),
+        scratch=empty_scratch(parts, SIZE, columns),
+        border=np.zeros((columns - 1, columns)),
+        inputs=np.zeros(INPUTS),
+        increments=np.zeros(columns - 1),
+        kept=np.zeros((2, STATE_FIELDS)),
+    )

@@ -1,0 +1,243 @@
+"""The free chain in lanes: positions at q*, inertia, tension in two lines, pitch and yaw of elements.
+
+Index i is an element and j the next one. Directions are those at q_k. Magnitudes are those at q* = q_k + dt
+X_k, from where on they are linear in the change of the speeds X.
+
+The packages lie on the lines r + b a and r - b a, b being `package_distance`. t is the direction of either
+at an element, from the one behind to the one ahead, e that up to the next element. One material flows
+through both.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba.extending import register_jitable
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.lanes import ahead, behind, fma, like, select
+from cvt_hpc.models.spatial_pushbelt.belt import (
+    CHANGE,
+    CHORD_I,
+    CHORD_J,
+    DRIVEN,
+    DRIVEN_RADIUS,
+    DRIVING_RADIUS,
+    GYROSCOPIC,
+    HEADING,
+    INERTIA,
+    ITERATE_TENSION,
+    LENGTH,
+    MID_AXIAL,
+    MID_OUTWARD,
+    NORMAL,
+    OMEGA,
+    OUTWARD,
+    PAIR_I,
+    PAIR_J,
+    POSITION,
+    PREDICTED_HEADING,
+    PREDICTED_MOMENT_I,
+    PREDICTED_MOMENT_J,
+    PREDICTED_OUTWARD,
+    PREDICTED_POSITION,
+    PREDICTED_TENSION,
+    PREDICTED_YAW,
+    RING_LINE,
+    SLOPE,
+    SLOPE_RATE,
+    SPEED,
+    START_SLIP,
+    TENSION_I,
+    TENSION_J,
+    TENSION_SLOPE,
+    TURN_I,
+    TURN_J,
+    YAW,
+    V,
+)
+from cvt_hpc.models.spatial_pushbelt.rotations import (
+    cross,
+    dot,
+    minus,
+    moved,
+    of_symmetric,
+    plus,
+    plus_product,
+    plus_square,
+    store,
+    store_matrix,
+    store_symmetric,
+    times,
+    turned,
+    turning,
+    unit,
+    vector,
+    vector_ahead,
+    vector_behind,
+)
+
+
+@register_jitable
+def package_lines(d, turn, b):
+    """Directions and sizes of d + b turn and d - b turn."""
+    right, right_size = unit(moved(d, b, turn))
+    left, left_size = unit(moved(d, -b, turn))
+    return right, left, right_size, left_size
+
+
+@kernel
+def predict(belt, state, pulleys, step, dt):
+    """Everything of the free chain that belongs to a single element."""
+    b = belt.package_distance
+    # of the strands, the common tangents of both pulleys
+    sine = (pulleys[DRIVEN_RADIUS] - pulleys[DRIVING_RADIUS]) / belt.centre_distance
+    cosine = np.sqrt(1.0 - sine * sine)
+    half = 0.5 * belt.ring_mass / dt
+    mass, roll = belt.mass / dt, belt.roll_inertia / dt
+    yaw, pitch = belt.yaw_inertia / dt, belt.pitch_inertia / dt
+    for j in range(state.rows):
+        r, x, o = vector(state, j, POSITION), vector(state, j, HEADING), vector(state, j, OUTWARD)
+        u, omega = vector(state, j, SPEED), vector(state, j, OMEGA)
+        a = cross(o, x)
+        store(step, j, PREDICTED_POSITION, moved(r, dt, u))
+        factors = turning(omega, dt)
+        store(step, j, PREDICTED_HEADING, turned(x, omega, factors))
+        store(step, j, PREDICTED_OUTWARD, turned(o, omega, factors))
+        factors = turning(omega, 0.5 * dt)
+        middle_o = turned(o, omega, factors)
+        store(step, j, MID_OUTWARD, middle_o)
+        store(step, j, MID_AXIAL, turned(a, omega, factors))
+
+        front = cross(vector_ahead(state, j, OUTWARD), vector_ahead(state, j, HEADING))
+        back = cross(vector_behind(state, j, OUTWARD), vector_behind(state, j, HEADING))
+        d = minus(vector_ahead(state, j, POSITION), vector_behind(state, j, POSITION))
+        right, left, _, _ = package_lines(d, minus(front, back), b)
+        lever = times(b, a)
+        right_lever, left_lever = cross(lever, right), cross(left, lever)
+        line = times(0.5, plus(right, left))
+        line_lever = times(0.5, plus(right_lever, left_lever))
+        store(step, j, RING_LINE, line)
+        store(step, j, RING_LINE + 3, line_lever)
+        step[j, START_SLIP] = state[j, V] - dot(line, u) - dot(line_lever, omega)
+
+        # ring mass goes with the element only across its lines
+        none = like(0.0, r[0])
+        total = like(mass + 2.0 * half, none)
+        uu = total, none, total, none, none, total
+        uu = plus_square(plus_square(uu, -half, right), -half, left)
+        uw = none, none, none, none, none, none, none, none, none
+        uw = plus_product(plus_product(uw, -half, right, right_lever), -half, left, left_lever)
+        swing = like(2.0 * half * b * b, none)
+        ww = swing, none, swing, none, none, swing
+        ww = plus_square(ww, -2.0 * half * b * b, a)
+        ww = plus_square(plus_square(ww, -half, right_lever), -half, left_lever)
+        own = none, none, none, none, none, none
+        own = plus_square(plus_square(plus_square(own, roll, x), yaw, o), pitch, a)
+        # at the middle between the last two speeds and the next one
+        spin = moved(omega, 0.5, vector(state, j, CHANGE + 3))
+        store(step, j, GYROSCOPIC, times(-dt, cross(spin, of_symmetric(own, spin))))
+        ww = ww[0] + own[0], ww[1] + own[1], ww[2] + own[2], ww[3] + own[3], ww[4] + own[4], ww[5] + own[5]
+        store_symmetric(step, j, INERTIA, uu)
+        store_matrix(step, j, INERTIA + 6, uw)
+        store_symmetric(step, j, INERTIA + 15, ww)
+
+        # yaw x_3 - psi
+        y = x[1], -x[0], none
+        store(step, j, YAW, y)
+        rate = dot(y, omega) - state[j, SLOPE_RATE]
+        step[j, PREDICTED_YAW] = belt.yaw_stiffness * (x[2] - state[j, SLOPE]) + belt.yaw_damping * rate
+
+        driven = r[0] > 0.5 * belt.centre_distance
+        centre = select(driven, like(belt.centre_distance, none), 0.0)
+        state[j, DRIVEN] = select(driven, like(1.0, none), 0.0)
+        side = select(r[1] < 0.0, like(-1.0, none), 1.0)
+        reach = cosine * r[0] + side * sine * r[1]
+        strand = (reach > 0.0) & (reach < cosine * belt.centre_distance)
+        p = moved(moved(r, 0.5 * dt, u), -belt.pitch_depth, middle_o)
+        radial, _ = unit((p[0] - centre, p[1], none))
+        step[j, NORMAL] = select(strand, like(-sine, none), radial[0])
+        step[j, NORMAL + 1] = select(strand, side * cosine, radial[1])
+
+
+@kernel
+def link(belt, state, step, dt):
+    """What the free chain needs of pairs of neighbours: tension and pitch."""
+    b = belt.package_distance
+    stiffness, damping = 0.5 * belt.angle_stiffness, 0.5 * belt.angle_damping
+    for j in range(state.rows):
+        oi, oj = vector(state, j, OUTWARD), vector_ahead(state, j, OUTWARD)
+        ai, aj = cross(oi, vector(state, j, HEADING)), cross(oj, vector_ahead(state, j, HEADING))
+        chord = minus(vector_ahead(state, j, POSITION), vector(state, j, POSITION))
+        right, left, _, _ = package_lines(chord, minus(aj, ai), b)
+        e = times(0.5, plus(right, left))
+        roll = times(0.5 * b, minus(right, left))
+        store(step, j, TENSION_I, minus(e, vector(step, j, RING_LINE)))
+        store(step, j, TENSION_I + 3, minus(cross(ai, roll), vector(step, j, RING_LINE + 3)))
+        store(step, j, TENSION_J, minus(e, vector_ahead(step, j, RING_LINE)))
+        store(step, j, TENSION_J + 3, minus(cross(aj, roll), vector_ahead(step, j, RING_LINE + 3)))
+
+        pi, pj = vector(step, j, PREDICTED_OUTWARD), vector_ahead(step, j, PREDICTED_OUTWARD)
+        bi, bj = (
+            cross(pi, vector(step, j, PREDICTED_HEADING)),
+            cross(pj, vector_ahead(step, j, PREDICTED_HEADING)),
+        )
+        predicted = minus(vector_ahead(step, j, PREDICTED_POSITION), vector(step, j, PREDICTED_POSITION))
+        _, _, right_size, left_size = package_lines(predicted, minus(bj, bi), b)
+        per_unstretched = 1.0 / (state[j, LENGTH] + dt * (step[j, START_SLIP] - ahead(step, j, START_SLIP)))
+        mean = 0.5 * (right_size + left_size)
+        step[j, PREDICTED_TENSION] = belt.ring_stiffness * (mean * per_unstretched - 1.0)
+        step[j, TENSION_SLOPE] = dt * belt.ring_stiffness * per_unstretched
+
+        # sine e . o of the angle between the chord and an element
+        e, size = unit(chord)
+        per_length = 1.0 / size
+        chord_i = times(per_length, moved(oi, -dot(e, oi), e))
+        chord_j = times(per_length, moved(oj, -dot(e, oj), e))
+        turn_i, turn_j = cross(oi, e), cross(oj, e)
+        store(step, j, CHORD_I, chord_i)
+        store(step, j, CHORD_J, chord_j)
+        store(step, j, TURN_I, turn_i)
+        store(step, j, TURN_J, turn_j)
+        f, _ = unit(predicted)
+        du = minus(vector_ahead(state, j, SPEED), vector(state, j, SPEED))
+        rate_i = dot(chord_i, du) + dot(turn_i, vector(state, j, OMEGA))
+        rate_j = dot(chord_j, du) + dot(turn_j, vector_ahead(state, j, OMEGA))
+        step[j, PREDICTED_MOMENT_I] = stiffness * dot(f, pi) + damping * rate_i
+        step[j, PREDICTED_MOMENT_J] = stiffness * dot(f, pj) + damping * rate_j
+
+
+@kernel
+def chain_forces(belt, state, step, iterate, dt):
+    """Tension and moments of pitch of an iterate; sets the pairs' forces."""
+    steep = 0.5 * (dt * belt.angle_stiffness + belt.angle_damping)
+    for j in range(step.rows):
+        ui, uj = vector(state, j, CHANGE), vector_ahead(state, j, CHANGE)
+        wi, wj = vector(state, j, CHANGE + 3), vector_ahead(state, j, CHANGE + 3)
+        ti, tj = vector(step, j, TENSION_I), vector(step, j, TENSION_J)
+        li, lj = vector(step, j, TENSION_I + 3), vector(step, j, TENSION_J + 3)
+        stretch = dot(ti, ui) + dot(li, wi) + state[j, CHANGE + 6]
+        stretch -= dot(tj, uj) + dot(lj, wj) + ahead(state, j, CHANGE + 6)
+        tension = fma(-step[j, TENSION_SLOPE], stretch, step[j, PREDICTED_TENSION])
+        iterate[j, ITERATE_TENSION] = tension
+
+        du = minus(uj, ui)
+        ci, cj = vector(step, j, CHORD_I), vector(step, j, CHORD_J)
+        si, sj = vector(step, j, TURN_I), vector(step, j, TURN_J)
+        moment_i = fma(steep, dot(ci, du) + dot(si, wi), step[j, PREDICTED_MOMENT_I])
+        moment_j = fma(steep, dot(cj, du) + dot(sj, wj), step[j, PREDICTED_MOMENT_J])
+        push = moved(times(moment_i, ci), moment_j, cj)
+        store(iterate, j, PAIR_I, moved(push, tension, ti))
+        store(iterate, j, PAIR_I + 3, moved(times(tension, li), -moment_i, si))
+        iterate[j, PAIR_I + 6] = tension
+        store(iterate, j, PAIR_J, moved(times(-tension, tj), -1.0, push))
+        store(iterate, j, PAIR_J + 3, moved(times(-tension, lj), -moment_j, sj))
+        iterate[j, PAIR_J + 6] = -tension
+
+
+@register_jitable
+def pull_across(step, iterate, j, o):
+    """Force of the ring's tension on an element along o [N]."""
+    ahead_of_it, behind_it = iterate[j, ITERATE_TENSION], behind(iterate, j, ITERATE_TENSION)
+    return ahead_of_it * dot(vector(step, j, TENSION_I), o) - behind_it * dot(
+        vector_behind(step, j, TENSION_J), o
+    )

@@ -1,0 +1,122 @@
+"""Front of each element against the rear of the next one, in lanes: four one-sided points without friction.
+
+A point P of the front, at height h and half width b, has the gap g = (r_j - P) . x_j - t / 2 to the rear
+plane. It grows by the speeds times (-x_j, x_j x (P - r_i)) of element i and (x_j, (P - r_j) x x_j) of j.
+"""
+
+from __future__ import annotations
+
+from numba.extending import register_jitable
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.lanes import fma, like
+from cvt_hpc.models.spatial_pushbelt.belt import (
+    CHANGE,
+    HEADING,
+    OUTWARD,
+    PAIR_I,
+    PAIR_J,
+    POINTS,
+    POSITION,
+    PREDICTED_HEADING,
+    PREDICTED_OUTWARD,
+    PREDICTED_POSITION,
+    PUSH,
+    PUSH_GAP,
+    PUSH_LEVER_I,
+    PUSH_LEVER_J,
+    PUSH_REACHED,
+    STIFF,
+    STIFF_I,
+    STIFF_II,
+    STIFF_IJ,
+    STIFF_J,
+    STIFF_JJ,
+)
+from cvt_hpc.models.spatial_pushbelt.rotations import (
+    accumulate,
+    cross,
+    dot,
+    minus,
+    moved,
+    plus_product,
+    plus_square,
+    store,
+    store_matrix,
+    store_symmetric,
+    times,
+    vector,
+    vector_ahead,
+)
+from cvt_hpc.physics.contact_laws import pressed
+
+
+@register_jitable
+def front_point(belt, p):
+    """Height above the saddle and side of a point of the front: edge left, edge right, head left, right."""
+    side = 2.0 * (p % 2) - 1.0
+    if p < 2:
+        return -belt.pitch_depth, side * belt.edge_width
+    return belt.head_height, side * belt.head_width
+
+
+@register_jitable
+def face_gap(ri, xi, oi, rj, xj, thickness, height, side):
+    """Gap [m], and P - r_i."""
+    arm = moved(moved(moved(times(0.0, xi), 0.5 * thickness, xi), height, oi), side, cross(oi, xi))
+    return dot(minus(minus(rj, ri), arm), xj) - 0.5 * thickness, arm
+
+
+@kernel
+def predict_faces(belt, state, step):
+    """Gaps at q*, and levers at q_k."""
+    thickness = belt.thickness
+    for j in range(state.rows):
+        ri, rj = vector(state, j, POSITION), vector_ahead(state, j, POSITION)
+        xi, xj = vector(state, j, HEADING), vector_ahead(state, j, HEADING)
+        oi = vector(state, j, OUTWARD)
+        si, sj = vector(step, j, PREDICTED_POSITION), vector_ahead(step, j, PREDICTED_POSITION)
+        yi, yj = vector(step, j, PREDICTED_HEADING), vector_ahead(step, j, PREDICTED_HEADING)
+        pi = vector(step, j, PREDICTED_OUTWARD)
+        for p in range(POINTS):
+            height, side = front_point(belt, p)
+            _, arm = face_gap(ri, xi, oi, rj, xj, thickness, height, side)
+            store(step, j, PUSH_LEVER_I + 3 * p, cross(xj, arm))
+            store(step, j, PUSH_LEVER_J + 3 * p, cross(minus(arm, minus(rj, ri)), xj))
+            gap, _ = face_gap(si, yi, pi, sj, yj, thickness, height, side)
+            step[j, PUSH_GAP + p] = gap
+
+
+@kernel
+def face_forces(belt, state, step, iterate, dt):
+    """Forces and sums of their slopes of an iterate; adds to the pairs' forces."""
+    stiffness = 0.5 * belt.contact_stiffness
+    for j in range(step.rows):
+        x = vector_ahead(state, j, HEADING)
+        closing = dot(x, minus(vector_ahead(state, j, CHANGE), vector(state, j, CHANGE)))
+        wi, wj = vector(state, j, CHANGE + 3), vector_ahead(state, j, CHANGE + 3)
+        none = like(0.0, closing)
+        force = slope = none
+        turn_i = turn_j = slope_i = slope_j = none, none, none
+        ii = jj = none, none, none, none, none, none
+        ij = none, none, none, none, none, none, none, none, none
+        for p in range(POINTS):
+            a, b = vector(step, j, PUSH_LEVER_I + 3 * p), vector(step, j, PUSH_LEVER_J + 3 * p)
+            gap = fma(dt, closing + dot(a, wi) + dot(b, wj), step[j, PUSH_GAP + p])
+            push, k = pressed(gap, stiffness)
+            state[j, PUSH + p], iterate[j, PUSH_REACHED + p] = push, gap
+            k = dt * k
+            force, slope = force + push, slope + k
+            turn_i, turn_j = moved(turn_i, push, a), moved(turn_j, push, b)
+            slope_i, slope_j = moved(slope_i, k, a), moved(slope_j, k, b)
+            ii, jj, ij = plus_square(ii, k, a), plus_square(jj, k, b), plus_product(ij, k, a, b)
+        iterate[j, STIFF] = slope
+        store(iterate, j, STIFF_I, slope_i)
+        store(iterate, j, STIFF_J, slope_j)
+        store_symmetric(iterate, j, STIFF_II, ii)
+        store_symmetric(iterate, j, STIFF_JJ, jj)
+        store_matrix(iterate, j, STIFF_IJ, ij)
+        accumulate(iterate, j, PAIR_I, times(-force, x))
+        accumulate(iterate, j, PAIR_I + 3, turn_i)
+        accumulate(iterate, j, PAIR_J, times(force, x))
+        accumulate(iterate, j, PAIR_J + 3, turn_j)

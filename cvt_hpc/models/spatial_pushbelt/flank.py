@@ -1,0 +1,361 @@
+"""Flanks of the elements on the frustums of the sheaves, in lanes: two heights on each side, with friction.
+
+A point Q on side s of an element, +1 right and -1 left, at the distance rho from the axis k of its pulley
+and at axial position z along it, has with the mid plane C and pitch radius R the gap
+
+    g = (B + (rho - R) tan d0) cos d0 - s (z - C) cos d0,    n = sin d0 e_r - s cos d0 k = grad g.
+
+B is half the width of an element on its pitch line. The meridian of the sheave is m = cos d0 e_r + s sin d0
+k, and the direction of rotation e_t = k x e_r. The force on the element is N n less friction along m and
+e_t, against the speeds of Q over the sheave in these directions. Slip speeds take directions and the lever
+of Q at mid step: at either end of a step they would add false sliding of v phi' dt / 2 and of lever times
+omega^2 dt / 2.
+"""
+
+from __future__ import annotations
+
+from numba.extending import register_jitable
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.lanes import fma, like, select, sqrt
+from cvt_hpc.models.spatial_pushbelt.belt import (
+    BY_NORMAL,
+    CHANGE,
+    DRIVEN,
+    DRIVEN_MIDDLE,
+    DRIVEN_RADIUS,
+    DRIVEN_SPEED,
+    DRIVING_MIDDLE,
+    DRIVING_RADIUS,
+    DRIVING_SPEED,
+    FLANK,
+    FLANK_DUAL_M,
+    FLANK_DUAL_T,
+    FLANK_FRICTION_M,
+    FLANK_FRICTION_T,
+    FLANK_GAP,
+    FLANK_REACHED,
+    FLANK_SLIP_M,
+    FLANK_SLIP_T,
+    FRICTION_SLOPES,
+    HEADING,
+    MID_AXIAL,
+    MID_OUTWARD,
+    MID_RADIAL,
+    MID_RADIUS,
+    NORMAL_ROW,
+    NORMAL_YIELD,
+    OMEGA,
+    OUTWARD,
+    POINTS,
+    POSITION,
+    PREDICTED_HEADING,
+    PREDICTED_OUTWARD,
+    PREDICTED_POSITION,
+    RADIAL,
+    RESIDUAL,
+    RIGHT,
+    SPEED,
+    TORQUE_OPENING,
+    TORQUE_OWN,
+    TORQUE_ROW,
+    V_FILTERED,
+    YIELD,
+)
+from cvt_hpc.models.spatial_pushbelt.rotations import (
+    accumulate,
+    cross,
+    dot,
+    moved,
+    plus,
+    plus_cross,
+    store,
+    times,
+    unit,
+    vector,
+)
+from cvt_hpc.physics.contact_laws import coefficient, pressed, remembered
+from cvt_hpc.physics.primal_dual import dual_of, friction
+
+
+@register_jitable
+def flank_point(belt, p):
+    """Side, height above the saddle and half width of a point: left low, left high, right low, right high."""
+    side = 1.0 if p >= 2 else -1.0
+    reach = (2.0 * (p % 2) - 1.0) * belt.flank_reach
+    return side, reach - belt.pitch_depth, belt.half_width + reach * belt.sine / belt.cosine
+
+
+@register_jitable
+def lever_of(o, a, side, height, width):
+    """Q - r."""
+    return moved(times(height, o), side * width, a)
+
+
+@register_jitable
+def frustum(q, centre, axis):
+    """e_r, rho and axial position of a point."""
+    d = q[0] - centre, q[1], q[2]
+    along = dot(d, axis)
+    radial, radius = unit(moved(d, -along, axis))
+    return radial, radius, along
+
+
+@register_jitable
+def frustum_gap(belt, side, radius, along, groove, middle):
+    """Gap [m] between a sheave and a point."""
+    return belt.cosine * (belt.half_width - side * (along - middle)) + belt.sine * (radius - groove)
+
+
+@register_jitable
+def pulley_axis(belt, driven):
+    """Axis of the pulley of an element."""
+    axes = belt.axes
+    return (
+        axes[0, 0] + driven * (axes[1, 0] - axes[0, 0]),
+        axes[0, 1] + driven * (axes[1, 1] - axes[0, 1]),
+        axes[0, 2] + driven * (axes[1, 2] - axes[0, 2]),
+    )
+
+
+@register_jitable
+def of_pulley(driving, driven_one, driven):
+    """What belongs to the pulley of an element, of two numbers."""
+    return driving + driven * (driven_one - driving)
+
+
+@register_jitable
+def flank_directions(belt, radial, axis, side):
+    """n, m and e_t from e_r."""
+    n = moved(times(belt.sine, radial), -side * belt.cosine, axis)
+    m = moved(times(belt.cosine, radial), side * belt.sine, axis)
+    return n, m, cross(axis, radial)
+
+
+@register_jitable
+def along_arc(belt, state, j):
+    """Cosine and sine of the angle at which the pitch line of an element stands about its pulley."""
+    o = vector(state, j, OUTWARD)
+    y = state[j, POSITION] - belt.pitch_depth * o[0] - state[j, DRIVEN] * belt.centre_distance
+    z = state[j, POSITION + 1] - belt.pitch_depth * o[1]
+    per_radius = 1.0 / sqrt(y * y + z * z)
+    return y * per_radius, z * per_radius
+
+
+@kernel
+def predict_flanks(belt, state, pulleys, step, dt):
+    """Directions at q_k and at mid step, gaps at q*."""
+    for j in range(state.rows):
+        driven = state[j, DRIVEN]
+        centre, axis = driven * belt.centre_distance, pulley_axis(belt, driven)
+        groove = of_pulley(pulleys[DRIVING_RADIUS], pulleys[DRIVEN_RADIUS], driven)
+        middle = of_pulley(pulleys[DRIVING_MIDDLE], pulleys[DRIVEN_MIDDLE], driven)
+        r, o = vector(state, j, POSITION), vector(state, j, OUTWARD)
+        a = cross(o, vector(state, j, HEADING))
+        half = moved(r, 0.5 * dt, vector(state, j, SPEED))
+        half_o, half_a = vector(step, j, MID_OUTWARD), vector(step, j, MID_AXIAL)
+        s, po = vector(step, j, PREDICTED_POSITION), vector(step, j, PREDICTED_OUTWARD)
+        pa = cross(po, vector(step, j, PREDICTED_HEADING))
+        for p in range(POINTS):
+            side, height, width = flank_point(belt, p)
+            radial, _, _ = frustum(plus(r, lever_of(o, a, side, height, width)), centre, axis)
+            store(step, j, RADIAL + 3 * p, radial)
+            radial, radius, _ = frustum(
+                plus(half, lever_of(half_o, half_a, side, height, width)), centre, axis
+            )
+            store(step, j, MID_RADIAL + 3 * p, radial)
+            step[j, MID_RADIUS + p] = radius
+            _, radius, along = frustum(plus(s, lever_of(po, pa, side, height, width)), centre, axis)
+            step[j, FLANK_GAP + p] = frustum_gap(belt, side, radius, along, groove, middle)
+
+
+@kernel
+def flank_forces(belt, state, pulleys, increments, openings, shapes, step, iterate, dt):
+    """Normal and friction forces of an iterate with their slopes; sets the residuals.
+
+    `increments` are the changes of the border's unknowns since the last step: of the driven pulley's speed,
+    and of the openings of the driving and the driven sheaves.
+    """
+    modes = belt.modal_stiffness.shape[1]
+    stiffness, width = 0.5 * belt.flank_stiffness, belt.friction_speed
+    driving_speed, driven_speed = pulleys[DRIVING_SPEED], pulleys[DRIVEN_SPEED] + increments[0]
+    for j in range(step.rows):
+        driven = state[j, DRIVEN]
+        axis = pulley_axis(belt, driven)
+        rotation = of_pulley(driving_speed, driven_speed, driven)
+        opening = like(0.0, driven)
+        for k in range(modes):
+            driving = openings[0, k] + increments[1 + k]
+            driven_one = openings[1, k] + increments[1 + modes + k]
+            opening = opening + of_pulley(driving, driven_one, driven) * shapes[j, k]
+        opening = belt.cosine * opening
+        du, dw = vector(state, j, CHANGE), vector(state, j, CHANGE + 3)
+        u, omega = plus(vector(state, j, SPEED), du), plus(vector(state, j, OMEGA), dw)
+        o = vector(state, j, OUTWARD)
+        a = cross(o, vector(state, j, HEADING))
+        half_o, half_a = vector(step, j, MID_OUTWARD), vector(step, j, MID_AXIAL)
+        none = like(0.0, driven)
+        force = turn = none, none, none
+        for p in range(POINTS):
+            side, height, half_width = flank_point(belt, p)
+            lever = lever_of(o, a, side, height, half_width)
+            n, m, t = flank_directions(belt, vector(step, j, RADIAL + 3 * p), axis, side)
+            gap = fma(dt, dot(n, plus(du, cross(dw, lever))), step[j, FLANK_GAP + p] + opening)
+            normal, stiff = pressed(gap, stiffness)
+            iterate[j, FLANK_REACHED + p], iterate[j, YIELD + p] = gap, stiff
+
+            half = lever_of(half_o, half_a, side, height, half_width)
+            _, half_m, half_t = flank_directions(belt, vector(step, j, MID_RADIAL + 3 * p), axis, side)
+            q = plus(u, cross(omega, half))
+            along, around_it = dot(half_m, q), fma(-step[j, MID_RADIUS + p], rotation, dot(half_t, q))
+            dual_m, dual_t = dual_of(
+                along,
+                around_it,
+                state[j, FLANK_SLIP_M + p],
+                state[j, FLANK_SLIP_T + p],
+                state[j, FLANK_DUAL_M + p],
+                state[j, FLANK_DUAL_T + p],
+                width,
+            )
+            state[j, FLANK_DUAL_M + p], state[j, FLANK_DUAL_T + p] = dual_m, dual_t
+            state[j, FLANK_SLIP_M + p], state[j, FLANK_SLIP_T + p] = along, around_it
+            size = sqrt(along * along + around_it * around_it)
+            filtered, share = remembered(state[j, V_FILTERED + p], size, belt.friction_memory, dt)
+            mu, fall = coefficient(
+                belt.flank_law, belt.flank_kinetic, belt.flank_gradient, belt.flank_speed, filtered
+            )
+            grip_m, grip_t, mm, mt, tm, tt = friction(
+                along, around_it, size, dual_m, dual_t, mu, share * fall, width
+            )
+            state[j, FLANK + p] = normal
+            state[j, FLANK_FRICTION_M + p] = normal * grip_m
+            state[j, FLANK_FRICTION_T + p] = normal * grip_t
+            first = FRICTION_SLOPES + 4 * p
+            iterate[j, first], iterate[j, first + 1] = normal * mm, normal * mt
+            iterate[j, first + 2], iterate[j, first + 3] = normal * tm, normal * tt
+            by_normal = moved(moved(n, -grip_m, m), -grip_t, t)
+            store(iterate, j, BY_NORMAL + 3 * p, by_normal)
+            force = moved(force, normal, by_normal)
+            turn = moved(turn, normal, cross(lever, by_normal))
+        store(iterate, j, RESIDUAL, force)
+        store(iterate, j, RESIDUAL + 3, turn)
+        iterate[j, RESIDUAL + 6] = 0.0
+        iterate[j, RESIDUAL + 7] = 0.0
+
+
+@register_jitable
+def filter_slips(belt, state, j, p, dt):
+    """Take the sliding speed at which the friction law is read to the end of the step."""
+    along, around_it = state[j, FLANK_SLIP_M + p], state[j, FLANK_SLIP_T + p]
+    size = sqrt(along * along + around_it * around_it)
+    filtered, _ = remembered(state[j, V_FILTERED + p], size, belt.friction_memory, dt)
+    state[j, V_FILTERED + p] = select(state[j, FLANK + p] > 0.0, filtered, size)
+
+
+@register_jitable
+def _add_column(blocks, j, column, low, low_lever, high, high_lever):
+    """Add the forces of two points and their moments to a column of an element's block."""
+    first = 8 * column
+    accumulate(blocks, j, first, plus(low, high))
+    turn = plus_cross(vector(blocks, j, first + 3), low_lever, low)
+    store(blocks, j, first + 3, plus_cross(turn, high_lever, high))
+
+
+@register_jitable
+def _point_slopes(belt, step, iterate, j, p, axes, dt):
+    """How the force of a point falls, and by what: three forces, and their rows by velocity and by turning.
+
+    The forces are those for each unit of the gap's rate and of both slips; then the lever, and t.
+    """
+    axis, o, a, half_o, half_a = axes
+    side, height, half_width = flank_point(belt, p)
+    lever = lever_of(o, a, side, height, half_width)
+    n, m, t = flank_directions(belt, vector(step, j, RADIAL + 3 * p), axis, side)
+    half = lever_of(half_o, half_a, side, height, half_width)
+    _, half_m, half_t = flank_directions(belt, vector(step, j, MID_RADIAL + 3 * p), axis, side)
+    first = FRICTION_SLOPES + 4 * p
+    by_gap = times(dt * iterate[j, YIELD + p], vector(iterate, j, BY_NORMAL + 3 * p))
+    by_m = moved(times(iterate[j, first], m), iterate[j, first + 2], t)
+    by_t = moved(times(iterate[j, first + 1], m), iterate[j, first + 3], t)
+    turns = cross(lever, n), cross(half, half_m), cross(half, half_t)
+    return (by_gap, by_m, by_t), (n, half_m, half_t), turns, lever, t
+
+
+@register_jitable
+def _column(forces, rows, k):
+    """The forces times entry k of their rows; k is a plain number of the source."""
+    return moved(moved(times(rows[0][k], forces[0]), rows[1][k], forces[1]), rows[2][k], forces[2])
+
+
+@kernel
+def add_flank_blocks(belt, state, shapes, step, iterate, blocks, dt):
+    """Add the slopes to the blocks, set the right sides of the border's unknowns and its rows."""
+    modes = belt.modal_stiffness.shape[1]
+    for j in range(step.rows):
+        driven = state[j, DRIVEN]
+        o = vector(state, j, OUTWARD)
+        a = cross(o, vector(state, j, HEADING))
+        axes = pulley_axis(belt, driven), o, a, vector(step, j, MID_OUTWARD), vector(step, j, MID_AXIAL)
+        none = like(0.0, driven)
+        drive = drive_turn = give = give_turn = none, none, none
+        torque = torque_turn = press = press_turn = none, none, none
+        own = by_opening = yielding = none
+        for p in range(0, POINTS, 2):
+            low, rows, turns, lever, t = _point_slopes(belt, step, iterate, j, p, axes, dt)
+            high, high_rows, high_turns, high_lever, high_t = _point_slopes(
+                belt, step, iterate, j, p + 1, axes, dt
+            )
+            column, other = _column(low, rows, 0), _column(high, high_rows, 0)
+            _add_column(blocks, j, 0, column, lever, other, high_lever)
+            column, other = _column(low, rows, 1), _column(high, high_rows, 1)
+            _add_column(blocks, j, 1, column, lever, other, high_lever)
+            column, other = _column(low, rows, 2), _column(high, high_rows, 2)
+            _add_column(blocks, j, 2, column, lever, other, high_lever)
+            column, other = _column(low, turns, 0), _column(high, high_turns, 0)
+            _add_column(blocks, j, 3, column, lever, other, high_lever)
+            column, other = _column(low, turns, 1), _column(high, high_turns, 1)
+            _add_column(blocks, j, 4, column, lever, other, high_lever)
+            column, other = _column(low, turns, 2), _column(high, high_turns, 2)
+            _add_column(blocks, j, 5, column, lever, other, high_lever)
+            for q in range(2):
+                if q == 1:
+                    low, rows, turns, lever, t = high, high_rows, high_turns, high_lever, high_t
+                first, by_normal = FRICTION_SLOPES + 4 * (p + q), vector(iterate, j, BY_NORMAL + 3 * (p + q))
+                stiff, radius = iterate[j, YIELD + p + q], step[j, MID_RADIUS + p + q]
+                tm, tt = iterate[j, first + 2], iterate[j, first + 3]
+                g = times(-radius * driven, low[2])
+                drive, drive_turn = plus(drive, g), plus_cross(drive_turn, lever, g)
+                if modes > 0:
+                    g = times(belt.cosine * stiff, by_normal)
+                    give, give_turn = plus(give, g), plus_cross(give_turn, lever, g)
+                    push = 0.5 * belt.cosine * dt * stiff
+                    press, press_turn = moved(press, push, rows[0]), moved(press_turn, push, turns[0])
+                    yielding += 0.5 * belt.cosine * belt.cosine * stiff
+                # decrease of the torque by the speeds of the element
+                grip, weight = -dot(t, by_normal), radius * driven
+                held = weight * grip * dt * stiff
+                slide, swing = -weight * tm, -weight * tt
+                torque = moved(moved(moved(torque, held, rows[0]), slide, rows[1]), swing, rows[2])
+                torque_turn = moved(
+                    moved(moved(torque_turn, held, turns[0]), slide, turns[1]), swing, turns[2]
+                )
+                own += weight * radius * tt
+                by_opening += weight * grip * belt.cosine * stiff
+        store(iterate, j, TORQUE_ROW, torque)
+        store(iterate, j, TORQUE_ROW + 3, torque_turn)
+        store(iterate, j, NORMAL_ROW, press)
+        store(iterate, j, NORMAL_ROW + 3, press_turn)
+        iterate[j, TORQUE_OWN], iterate[j, TORQUE_OPENING] = own, by_opening
+        iterate[j, NORMAL_YIELD] = yielding
+        store(blocks, j, RIGHT + 8, drive)
+        store(blocks, j, RIGHT + 11, drive_turn)
+        blocks[j, RIGHT + 14] = 0.0
+        blocks[j, RIGHT + 15] = 0.0
+        for k in range(2 * modes):
+            pulley = driven if k >= modes else 1.0 - driven
+            weight = pulley * shapes[j, k % modes]
+            first = RIGHT + 16 + 8 * k
+            store(blocks, j, first, times(weight, give))
+            store(blocks, j, first + 3, times(weight, give_turn))
+            blocks[j, first + 6] = 0.0
+            blocks[j, first + 7] = 0.0

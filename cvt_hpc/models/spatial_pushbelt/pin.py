@@ -1,0 +1,97 @@
+"""The pin of each element in the hole of the next one, in lanes: what holds neighbours side by side.
+
+The pin's centre P lies at the front of element i, the hole's centre at the rear of element j, both
+`pin_height` above the saddle. Their offset across x_j is free up to the clearance in all directions;
+beyond, the hole pushes back elastically and without friction, along the offset.
+
+Its size grows by the speeds times (n, (P - r_i) x n) of element i and -(n, (P - r_j) x n) of j, n being its
+direction. This is the contact of a circle with the ellipse in which its plane cuts the hole (Schindler
+2008, eq. 25), but for the clearance times 1 - cos of the tilt between both: a nanometre at 3 mrad.
+"""
+
+from __future__ import annotations
+
+from numba.extending import register_jitable
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.lanes import fma, maximum, sqrt
+from cvt_hpc.models.spatial_pushbelt.belt import (
+    CHANGE,
+    HEADING,
+    OUTWARD,
+    PAIR_I,
+    PAIR_J,
+    PIN,
+    PIN_GAP,
+    PIN_LEVER_I,
+    PIN_LEVER_J,
+    PIN_NORMAL,
+    PIN_REACHED,
+    PIN_SLOPE,
+    POSITION,
+    PREDICTED_HEADING,
+    PREDICTED_OUTWARD,
+    PREDICTED_POSITION,
+)
+from cvt_hpc.models.spatial_pushbelt.rotations import (
+    accumulate,
+    cross,
+    dot,
+    minus,
+    moved,
+    plus,
+    store,
+    times,
+    vector,
+    vector_ahead,
+)
+from cvt_hpc.physics.contact_laws import pressed
+
+_LEAST = 1e-12  # offset that has a direction [m]
+
+
+@register_jitable
+def pin_offset(ri, xi, oi, rj, xj, oj, thickness, height):
+    """Offset of pin and hole across x_j, its size [m], and P - r_i."""
+    arm = moved(times(0.5 * thickness, xi), height, oi)
+    d = moved(moved(plus(minus(ri, rj), arm), 0.5 * thickness, xj), -height, oj)
+    d = moved(d, -dot(d, xj), xj)
+    return d, sqrt(dot(d, d)), arm
+
+
+@kernel
+def predict_pins(belt, state, step):
+    """Gaps at q*, directions and levers at q_k."""
+    thickness, height = belt.thickness, belt.pin_height
+    for j in range(state.rows):
+        ri, rj = vector(state, j, POSITION), vector_ahead(state, j, POSITION)
+        xi, xj = vector(state, j, HEADING), vector_ahead(state, j, HEADING)
+        oi, oj = vector(state, j, OUTWARD), vector_ahead(state, j, OUTWARD)
+        d, size, arm = pin_offset(ri, xi, oi, rj, xj, oj, thickness, height)
+        n = times(1.0 / maximum(size, _LEAST), d)
+        store(step, j, PIN_NORMAL, n)
+        store(step, j, PIN_LEVER_I, cross(arm, n))
+        store(step, j, PIN_LEVER_J, cross(plus(minus(ri, rj), arm), n))
+        si, sj = vector(step, j, PREDICTED_POSITION), vector_ahead(step, j, PREDICTED_POSITION)
+        yi, yj = vector(step, j, PREDICTED_HEADING), vector_ahead(step, j, PREDICTED_HEADING)
+        pi, pj = vector(step, j, PREDICTED_OUTWARD), vector_ahead(step, j, PREDICTED_OUTWARD)
+        _, size, _ = pin_offset(si, yi, pi, sj, yj, pj, thickness, height)
+        step[j, PIN_GAP] = belt.pin_clearance - size
+
+
+@kernel
+def pin_forces(belt, state, step, iterate, dt):
+    """Forces and their slopes of an iterate; adds to the pairs' forces."""
+    for j in range(step.rows):
+        n, a, b = vector(step, j, PIN_NORMAL), vector(step, j, PIN_LEVER_I), vector(step, j, PIN_LEVER_J)
+        du = minus(vector(state, j, CHANGE), vector_ahead(state, j, CHANGE))
+        parting = (
+            dot(n, du) + dot(a, vector(state, j, CHANGE + 3)) - dot(b, vector_ahead(state, j, CHANGE + 3))
+        )
+        gap = fma(-dt, parting, step[j, PIN_GAP])
+        force, k = pressed(gap, belt.pin_stiffness)
+        state[j, PIN], iterate[j, PIN_REACHED], iterate[j, PIN_SLOPE] = force, gap, dt * k
+        accumulate(iterate, j, PAIR_I, times(-force, n))
+        accumulate(iterate, j, PAIR_I + 3, times(-force, a))
+        accumulate(iterate, j, PAIR_J, times(force, n))
+        accumulate(iterate, j, PAIR_J + 3, times(force, b))

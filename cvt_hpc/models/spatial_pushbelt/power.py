@@ -1,0 +1,187 @@
+"""What the laws of a step take from the motion, in lanes: losses, and what the step damps by itself.
+
+As in the planar pushbelt (`models.pushbelt.power`, which derives it) a force takes its magnitude times the
+mean rate (X + X_old) / 2 along its direction. Bending of the rings and the yaw spring damp nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.lanes import ahead, around, like
+from cvt_hpc.models.spatial_pushbelt.belt import (
+    BELT_LOSS,
+    CHANGE,
+    CHORD_I,
+    CHORD_J,
+    DAMPING_LOSS,
+    DRIVEN,
+    DRIVEN_SPEED,
+    DRIVING_SPEED,
+    ELEMENT_DAMPED,
+    FLANK,
+    FLANK_DAMPED,
+    FLANK_FRICTION_M,
+    FLANK_FRICTION_T,
+    FLANK_LOSS,
+    FLANK_REACHED,
+    HEADING,
+    MID_RADIUS,
+    NORMAL,
+    OUTWARD,
+    PIN_LEVER_I,
+    PIN_LEVER_J,
+    PIN_NORMAL,
+    PIN_REACHED,
+    POINTS,
+    PUSH_LEVER_I,
+    PUSH_LEVER_J,
+    PUSH_REACHED,
+    RADIAL,
+    RING_DAMPED,
+    RING_FRICTION,
+    RING_LOSS,
+    SPEED,
+    TENSION_I,
+    TENSION_J,
+    TENSION_SLOPE,
+    TILT_DAMPED,
+    TURN_I,
+    TURN_J,
+    YAW,
+)
+from cvt_hpc.models.spatial_pushbelt.flank import (
+    along_arc,
+    flank_directions,
+    flank_point,
+    lever_of,
+    of_pulley,
+    pulley_axis,
+)
+from cvt_hpc.models.spatial_pushbelt.rotations import (
+    cross,
+    dot,
+    minus,
+    moved,
+    plus,
+    vector,
+    vector_ahead,
+)
+from cvt_hpc.models.spatial_pushbelt.saddle import ring_slip
+from cvt_hpc.physics.contact_laws import damped
+
+_FIRST, _COUNT = FLANK_LOSS, TILT_DAMPED + 1 - FLANK_LOSS  # totals that are added up here
+
+
+@kernel
+def book_pairs(belt, state, work, dt):
+    """Add to the totals what a solved step takes between elements and in the rings, before it is accepted."""
+    elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
+    has_pins = belt.pin_clearance < np.inf
+    contact = 0.5 * belt.contact_stiffness
+    ring = tilt = drag = between = stretching = turning = like(0.0, elements[0, FLANK])
+    for j in range(step.rows):
+        du, dw = vector(elements, j, CHANGE), vector(elements, j, CHANGE + 3)
+        ju, jw = vector_ahead(elements, j, CHANGE), vector_ahead(elements, j, CHANGE + 3)
+        u, w = moved(vector(elements, j, SPEED), 0.5, du), moved(vector(elements, j, SPEED + 3), 0.5, dw)
+        next_u = moved(vector_ahead(elements, j, SPEED), 0.5, ju)
+        next_w = moved(vector_ahead(elements, j, SPEED + 3), 0.5, jw)
+        v = elements[j, SPEED + 6] + 0.5 * elements[j, CHANGE + 6]
+        next_v = ahead(elements, j, SPEED + 6) + 0.5 * ahead(elements, j, CHANGE + 6)
+
+        stretch = dot(vector(step, j, TENSION_I), u) + dot(vector(step, j, TENSION_I + 3), w) + v
+        stretch -= dot(vector(step, j, TENSION_J), next_u) + dot(vector(step, j, TENSION_J + 3), next_w)
+        stretch -= next_v
+        stretching += step[j, TENSION_SLOPE] * stretch * stretch
+
+        apart, more = minus(next_u, u), minus(ju, du)
+        chord_i, chord_j = vector(step, j, CHORD_I), vector(step, j, CHORD_J)
+        turn_i, turn_j = vector(step, j, TURN_I), vector(step, j, TURN_J)
+        rate_i, rate_j = dot(chord_i, apart) + dot(turn_i, w), dot(chord_j, apart) + dot(turn_j, next_w)
+        last_i = rate_i + 0.5 * (dot(chord_i, more) + dot(turn_i, dw))
+        last_j = rate_j + 0.5 * (dot(chord_j, more) + dot(turn_j, jw))
+        tilt += 0.5 * belt.angle_damping * (last_i * rate_i + last_j * rate_j)
+        turning += 0.5 * dt * belt.angle_stiffness * (rate_i * rate_i + rate_j * rate_j)
+        y = vector(step, j, YAW)
+        yaw = dot(y, w) - elements[j, SPEED + 7] - 0.5 * elements[j, CHANGE + 7]
+        last = yaw + 0.5 * (dot(y, dw) - elements[j, CHANGE + 7])
+        tilt += belt.yaw_damping * yaw * last
+
+        closing = dot(vector_ahead(elements, j, HEADING), apart)
+        for p in range(POINTS):
+            a, b = vector(step, j, PUSH_LEVER_I + 3 * p), vector(step, j, PUSH_LEVER_J + 3 * p)
+            change = dt * (closing + dot(a, w) + dot(b, next_w))
+            between += damped(iterate[j, PUSH_REACHED + p], change, contact)
+        if has_pins:
+            a, b = vector(step, j, PIN_LEVER_I), vector(step, j, PIN_LEVER_J)
+            change = dt * (dot(vector(step, j, PIN_NORMAL), apart) - dot(a, w) + dot(b, next_w))
+            between += damped(iterate[j, PIN_REACHED], change, belt.pin_stiffness)
+
+        ring += elements[j, RING_FRICTION] * ring_slip(elements, step, j, 0.5)
+        n_y, n_z = step[j, NORMAL], step[j, NORMAL + 1]
+        across = n_y * u[0] + n_z * u[1]
+        drag += belt.transverse_damping * across * (across + 0.5 * (n_y * du[0] + n_z * du[1]))
+        drag += belt.lateral_damping * u[2] * (u[2] + 0.5 * du[2])
+    for k in range(_COUNT):
+        scratch[0, k] = 0.0
+    scratch[0, RING_LOSS - _FIRST] = dt * ring
+    scratch[0, DAMPING_LOSS - _FIRST], scratch[0, BELT_LOSS - _FIRST] = dt * tilt, dt * drag
+    scratch[0, ELEMENT_DAMPED - _FIRST] = between
+    scratch[0, RING_DAMPED - _FIRST], scratch[0, TILT_DAMPED - _FIRST] = dt * stretching, dt * turning
+    for k in range(_COUNT):
+        scratch[0, k] = around(scratch[0, k])
+        state.totals[_FIRST + k] += scratch.data[0, k, 0]
+
+
+@kernel
+def book_flanks(belt, state, work, dt):
+    """Add to the totals what a solved step takes at the flanks, before it is accepted."""
+    elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
+    modes = belt.modal_stiffness.shape[1]
+    driving_speed = state.pulleys[DRIVING_SPEED]
+    driven_speed = state.pulleys[DRIVEN_SPEED] + 0.5 * state.increments[0]
+    flank = sheaves = like(0.0, elements[0, FLANK])
+    for j in range(step.rows):
+        u = moved(vector(elements, j, SPEED), 0.5, vector(elements, j, CHANGE))
+        w = moved(vector(elements, j, SPEED + 3), 0.5, vector(elements, j, CHANGE + 3))
+        driven = elements[j, DRIVEN]
+        axis = pulley_axis(belt, driven)
+        rotation = of_pulley(driving_speed, driven_speed, driven)
+        o = vector(elements, j, OUTWARD)
+        a = cross(o, vector(elements, j, HEADING))
+        # the groove opens where an element is, and is another where it gets to
+        opening, lean, bend = like(0.0, driven), like(0.0, driven), like(0.0, driven)
+        c, s = along_arc(belt, elements, j)
+        cosine, sine = like(1.0, c), like(0.0, c)
+        for k in range(modes):
+            order = 0.5 * (k + k % 2)
+            if k % 2 == 1:
+                cosine, sine = cosine * c - sine * s, sine * c + cosine * s
+                slope = -order * sine
+            else:
+                slope = order * cosine
+            open_ = of_pulley(state.openings[0, k], state.openings[1, k], driven)
+            lean, bend = lean + open_ * slope, bend + open_ * order * order * work.shapes[j, k]
+            driving = 0.5 * (state.increments[1 + k] + work.increments[1 + k])
+            driven_one = 0.5 * (state.increments[1 + modes + k] + work.increments[1 + modes + k])
+            opening = opening + of_pulley(driving, driven_one, driven) * work.shapes[j, k]
+        for p in range(POINTS):
+            side, height, width = flank_point(belt, p)
+            lever = lever_of(o, a, side, height, width)
+            n, m, t = flank_directions(belt, vector(step, j, RADIAL + 3 * p), axis, side)
+            q = plus(u, cross(w, lever))
+            around_it, radius = dot(t, q), step[j, MID_RADIUS + p]
+            flank += elements[j, FLANK_FRICTION_M + p] * dot(m, q)
+            flank += elements[j, FLANK_FRICTION_T + p] * (around_it - radius * rotation)
+            angle = dt * around_it / radius
+            change = dt * dot(n, q) + belt.cosine * (opening + angle * lean)
+            sheaves += damped(iterate[j, FLANK_REACHED + p], change, 0.5 * belt.flank_stiffness)
+            # an element presses at the step's end where it was at its start: modes lag by that angle
+            sheaves += belt.cosine * elements[j, FLANK + p] * angle * angle * bend
+    scratch[0, 0], scratch[0, 1] = around(dt * flank), around(sheaves)
+    state.totals[FLANK_LOSS] += scratch.data[0, 0, 0]
+    state.totals[FLANK_DAMPED] += scratch.data[0, 1, 0]
+    for k in range(2 * modes):
+        change = 0.5 * (state.increments[1 + k] + work.increments[1 + k])
+        state.totals[FLANK_DAMPED] += 2.0 * belt.modal_stiffness[k // modes, k % modes] * change * change

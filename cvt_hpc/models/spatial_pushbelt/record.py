@@ -1,0 +1,193 @@
+"""What the record of a run of the spatial pushbelt holds, what a run costs, and how it is judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cvt_hpc.models.pushbelt import record as pushbelt
+from cvt_hpc.models.spatial_pushbelt.readings import ANGLES, LATERAL, PROFILES, SHEAVES, SIDES
+from cvt_hpc.physics.out_of_plane import clamped_force
+from cvt_hpc.variables import Coordinate, Variable
+from cvt_hpc.variator import PULLEYS, STRANDS, judging
+from cvt_hpc.variator.judging import each, mean
+from cvt_hpc.variator.path import REGIONS, regions
+from cvt_hpc.variator.slip import slide
+from cvt_hpc.variator.variables import frequency_bins
+from cvt_hpc.vibration.signals import amplitude_spectrum
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from cvt_hpc.models.pushbelt.run import ElementRun
+
+_LARGEST = (*(f"largest_{angle}" for angle in ANGLES), "largest_nose_force")
+# Measured on one core of an EPYC (Zen 5): core-seconds per element and step, and per sample
+RIGID_COST, ELASTIC_COST, SAMPLE_COST = 4e-6, 5e-6, 5e-4
+
+_ACROSS = ("amplitude", "frequency", "growth_rate", "amplitude_scatter")  # told of both planes
+VARIABLES = (
+    *pushbelt.VARIABLES,
+    Variable("lateral_amplitude", ("strand",), "f8", "m", "as amplitude, out of the plane"),
+    Variable("lateral_frequency", ("strand",), "f8", "Hz", "as frequency, out of the plane"),
+    Variable("lateral_growth_rate", ("strand",), "f8", "s-1", "as growth_rate, out of the plane"),
+    Variable("lateral_amplitude_scatter", ("strand",), "f8", "1", "as amplitude_scatter, out of the plane"),
+    Variable(
+        "lateral_spectrum",
+        ("strand", "frequency_bin"),
+        "f8",
+        "m",
+        "at the probe strongest out of the plane",
+        words="lateral amplitude spectrum",
+    ),
+    Variable("sheave_force", ("sheave",), "f8", "N", "mean axial force of the belt on each sheave, outwards"),
+    Variable("sheave_loss", ("sheave",), "f8", "W", "mean friction power of the flanks at each sheave"),
+    Variable(
+        "net_axial_force", ("pulley",), "f8", "N", "mean force of the belt on both sheaves, to the right"
+    ),
+    Variable(
+        "beam_axial_force",
+        ("pulley",),
+        "f8",
+        "N",
+        "the same by both strands as beams under their mean forces, held without slope at the arcs",
+        words="clamped strands",
+    ),
+    Variable(
+        "string_axial_force",
+        ("pulley",),
+        "f8",
+        "N",
+        "the same by both strands as strings under their mean forces",
+        words="strings",
+    ),
+    Variable(
+        "strand_one_sidedness",
+        ("strand",),
+        "f8",
+        "1",
+        "push force of the right side less the left one's over both, means over the strand",
+        words="one-sided push in strands",
+    ),
+    Variable(
+        "arc_one_sidedness",
+        ("pulley",),
+        "f8",
+        "1",
+        "push force of the right side less the left one's over both, means over the arc",
+        words="one-sided push in arcs",
+    ),
+    *(
+        Variable(f"largest_{angle}", (), "f8", "rad", f"largest {words} of an element over the judged part")
+        for angle, words in zip(
+            ANGLES, ("lateral lean", "yaw out of the plane", "tilt against the rings"), strict=True
+        )
+    ),
+    Variable("largest_nose_force", (), "f8", "N", "largest force of a nose over the judged part"),
+    Variable(
+        "final_misalignment", (), "f8", "m", "mean axial offset of the pulleys' mid planes as sheaves stand"
+    ),
+)
+
+
+def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+    """Coordinates of the record's dimensions.
+
+    Parameters
+    ----------
+    parameters : dict
+        Flat parameters of the job.
+    """
+    sheave = Coordinate(np.array(SHEAVES), "", "sheave", "pulley and side")
+    return {**pushbelt.coordinates(parameters), "sheave": sheave}
+
+
+def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
+    """Core-seconds of a run; of parameters that are arrays, an array."""
+    p = parameters
+    each_step = np.where(np.isinf(p["sheave_stiffness"]), RIGID_COST, ELASTIC_COST)[()]
+    return p["duration"] * (each_step * p["elements"] / p["step"] + SAMPLE_COST * p["sampling_rate"])
+
+
+def judge(run: ElementRun) -> dict[str, Any]:
+    """The record of a run that has reached its end, or slipped through before, its cost apart.
+
+    Both planes are judged alike, and together: a belt vibrates if a strand does in either. A ramp is judged
+    by the plane of the belt alone.
+
+    Parameters
+    ----------
+    run : ElementRun
+        With all samples recorded, or those until it slipped through.
+    """
+    if run.failure is not None:
+        return judging.slipped(run) | pushbelt.speeds(run, slide(run))
+    found = judging.assess(run, (*STRANDS, *LATERAL))
+    strands, record = len(STRANDS), found.record()
+    probes, lateral = np.split(found.strongest_probe, [strands])
+    if lateral.size:
+        record |= {f"lateral_{name}": record[name][strands:] for name in _ACROSS}
+        record |= {name: values[:strands] for name, values in record.items() if np.size(values) > strands}
+        p, moved = run.parameters, run.displacement[run.judged][:, lateral]
+        spectrum = amplitude_spectrum(moved, p["sampling_rate"], frequency_bins(p).values)
+        record["lateral_spectrum"] = spectrum.T
+    return record | pushbelt.evaluate(run, probes) | _evaluate(run)
+
+
+def _evaluate(run: ElementRun) -> dict[str, Any]:
+    """Values of a finished run that the planar pushbelt has not."""
+    forces = each(run, "sheave_force", SHEAVES)
+    largest = {name: float(run.channel(name)[run.judged].max()) for name in _LARGEST}
+    left, right = (run.profiles[f"push_force_{side}"] for side in SIDES)
+    where = regions(run.path, run.places)
+
+    def one_sided(name: str) -> float:
+        inside = where == REGIONS.index(name)
+        one, other = np.nansum(left[inside]), np.nansum(right[inside])
+        return (other - one) / (other + one) if other + one > 0.0 else np.nan
+
+    p, path, offset = run.parameters, run.path, mean(run, "misalignment")
+    speed = run.mean_driving_speed(run.judged) * path.driving_radius
+    centrifugal = (p["element_mass"] + p["ring_mass"]) * speed**2
+    net = each(run, "ring_tension", STRANDS) - each(run, "push_force", STRANDS) - centrifugal
+    stiffness = p["lateral_bending_stiffness"], p["lateral_shear_stiffness"]
+    # a strand that is pushed more than it is pulled is no string, and counts as one without tension
+    held = [clamped_force(offset, path.strand_length, max(force, 0.0), *stiffness) for force in net]
+    signs = np.array([1.0, -1.0])  # the driving pulley is pulled to where the driven one is
+    return {
+        "beam_axial_force": signs * sum(held),
+        "string_axial_force": signs * offset / path.strand_length * np.maximum(net, 0.0).sum(),
+        "sheave_force": forces,
+        "sheave_loss": each(run, "sheave_loss", SHEAVES),
+        "net_axial_force": forces[1::2] - forces[::2],
+        "strand_one_sidedness": np.array([one_sided(strand) for strand in STRANDS]),
+        "arc_one_sidedness": np.array([one_sided(pulley) for pulley in PULLEYS]),
+        **largest,
+        "final_misalignment": mean(run, "misalignment"),
+    }
+
+
+def histories(run: ElementRun) -> xr.Dataset:
+    """Histories over `time` and means by `position` of a run, finished or failed.
+
+    Parameters
+    ----------
+    run : ElementRun
+        With the samples that it has.
+
+    Returns
+    -------
+    Dataset
+        That of the planar pushbelt; probes of t1_lateral and t2_lateral move out of the plane, to the right.
+    """
+    outwards = "of the belt on the sheave, outwards"
+    over_time = {f"sheave_force {k}": (f"axial force {k}", "N", outwards) for k in SHEAVES}
+    over_time["misalignment"] = ("misalignment", "m", "axial offset of the pulleys' mid planes")
+    for angle in ANGLES:
+        over_time[f"largest_{angle}"] = (f"largest {angle}", "rad", "of any element")
+    over_time["largest_nose_force"] = ("largest force of a nose", "N", "of any element")
+    found = pushbelt.history(run, PROFILES, over_time)
+    found["displacement"].attrs["comment"] = "transverse, outward; of lateral probes axial, to the right"
+    return found

@@ -1,0 +1,233 @@
+"""Vectors of three numbers in lanes, and rotations of an element.
+
+The directions x (running), o (outward) and a = o x x (axial) of an element are columns of its orientation.
+In that order they are left-handed; a rotation turns each alike.
+"""
+
+from __future__ import annotations
+
+from numba.extending import register_jitable
+
+from cvt_hpc.lanes import ahead, behind, fma, sqrt
+
+
+@register_jitable
+def vector(array, j, first):
+    """Three fields of a row."""
+    return array[j, first], array[j, first + 1], array[j, first + 2]
+
+
+@register_jitable
+def vector_ahead(array, j, first):
+    """Three fields of the row ahead."""
+    return ahead(array, j, first), ahead(array, j, first + 1), ahead(array, j, first + 2)
+
+
+@register_jitable
+def vector_behind(array, j, first):
+    """Three fields of the row behind."""
+    return behind(array, j, first), behind(array, j, first + 1), behind(array, j, first + 2)
+
+
+@register_jitable
+def store(array, j, first, v):
+    """Set three fields of a row."""
+    array[j, first], array[j, first + 1], array[j, first + 2] = v[0], v[1], v[2]
+
+
+@register_jitable
+def accumulate(array, j, first, v):
+    """Add to three fields of a row."""
+    array[j, first] += v[0]
+    array[j, first + 1] += v[1]
+    array[j, first + 2] += v[2]
+
+
+@register_jitable
+def plus(a, b):
+    """A + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@register_jitable
+def minus(a, b):
+    """A - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@register_jitable
+def times(s, a):
+    """S a."""
+    return s * a[0], s * a[1], s * a[2]
+
+
+@register_jitable
+def moved(a, s, b):
+    """A + s b."""
+    return fma(s, b[0], a[0]), fma(s, b[1], a[1]), fma(s, b[2], a[2])
+
+
+@register_jitable
+def dot(a, b):
+    """A . b."""
+    return fma(a[0], b[0], fma(a[1], b[1], a[2] * b[2]))
+
+
+@register_jitable
+def cross(a, b):
+    """A x b."""
+    return (
+        fma(a[1], b[2], -(a[2] * b[1])),
+        fma(a[2], b[0], -(a[0] * b[2])),
+        fma(a[0], b[1], -(a[1] * b[0])),
+    )
+
+
+@register_jitable
+def plus_cross(c, a, b):
+    """C + a x b."""
+    return (
+        fma(a[1], b[2], fma(-a[2], b[1], c[0])),
+        fma(a[2], b[0], fma(-a[0], b[2], c[1])),
+        fma(a[0], b[1], fma(-a[1], b[0], c[2])),
+    )
+
+
+@register_jitable
+def unit(a):
+    """Direction and size of a vector."""
+    size = sqrt(dot(a, a))
+    return times(1.0 / size, a), size
+
+
+@register_jitable
+def turning(omega, dt):
+    """Factors of a rotation by the vector dt omega, for `turned`: exact below a tenth of a radian."""
+    square = dt * dt * dot(omega, omega)
+    first = dt * (1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0))))
+    second = dt * dt * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)))
+    return first, second
+
+
+@register_jitable
+def turned(v, omega, factors):
+    """A vector turned by a rotation vector (Rodrigues), of which `turning` gives the factors."""
+    once = cross(omega, v)
+    return moved(moved(v, factors[0], once), factors[1], cross(omega, once))
+
+
+@register_jitable
+def squared_up(x, o):
+    """Two unit vectors across each other, from two that are so but for rounding."""
+    x = times(1.5 - 0.5 * dot(x, x), x)
+    o = moved(o, -dot(x, o), x)
+    return x, times(1.5 - 0.5 * dot(o, o), o)
+
+
+# Symmetric matrices of 3 x 3 by the columns of their upper half, others by columns.
+
+
+@register_jitable
+def plus_square(m, k, v):
+    """M + k v v', symmetric."""
+    p, q, r = k * v[0], k * v[1], k * v[2]
+    return (
+        fma(p, v[0], m[0]),
+        fma(p, v[1], m[1]),
+        fma(q, v[1], m[2]),
+        fma(p, v[2], m[3]),
+        fma(q, v[2], m[4]),
+        fma(r, v[2], m[5]),
+    )
+
+
+@register_jitable
+def plus_product(m, k, u, v):
+    """M + k u v'."""
+    p, q, r = k * v[0], k * v[1], k * v[2]
+    return (
+        fma(p, u[0], m[0]),
+        fma(p, u[1], m[1]),
+        fma(p, u[2], m[2]),
+        fma(q, u[0], m[3]),
+        fma(q, u[1], m[4]),
+        fma(q, u[2], m[5]),
+        fma(r, u[0], m[6]),
+        fma(r, u[1], m[7]),
+        fma(r, u[2], m[8]),
+    )
+
+
+@register_jitable
+def joined(a, b):
+    """A symmetric matrix of two halves."""
+    return a[0], a[1], a[2], b[0], b[1], b[2]
+
+
+@register_jitable
+def three(a, b, c):
+    """A matrix of three columns."""
+    return a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]
+
+
+@register_jitable
+def symmetric_sum(m, n):
+    """M + N, symmetric."""
+    return m[0] + n[0], m[1] + n[1], m[2] + n[2], m[3] + n[3], m[4] + n[4], m[5] + n[5]
+
+
+@register_jitable
+def symmetric(array, j, first):
+    """Six fields of a row as a symmetric matrix."""
+    return joined(vector(array, j, first), vector(array, j, first + 3))
+
+
+@register_jitable
+def matrix(array, j, first):
+    """Nine fields of a row as a matrix."""
+    return three(vector(array, j, first), vector(array, j, first + 3), vector(array, j, first + 6))
+
+
+@register_jitable
+def store_symmetric(array, j, first, m):
+    """Set six fields of a row."""
+    store(array, j, first, (m[0], m[1], m[2]))
+    store(array, j, first + 3, (m[3], m[4], m[5]))
+
+
+@register_jitable
+def store_matrix(array, j, first, m):
+    """Set nine fields of a row."""
+    store(array, j, first, (m[0], m[1], m[2]))
+    store(array, j, first + 3, (m[3], m[4], m[5]))
+    store(array, j, first + 6, (m[6], m[7], m[8]))
+
+
+@register_jitable
+def of_symmetric(m, v):
+    """M v, symmetric."""
+    return (
+        fma(m[0], v[0], fma(m[1], v[1], m[3] * v[2])),
+        fma(m[1], v[0], fma(m[2], v[1], m[4] * v[2])),
+        fma(m[3], v[0], fma(m[4], v[1], m[5] * v[2])),
+    )
+
+
+@register_jitable
+def of_matrix(m, v):
+    """M v."""
+    return (
+        fma(m[0], v[0], fma(m[3], v[1], m[6] * v[2])),
+        fma(m[1], v[0], fma(m[4], v[1], m[7] * v[2])),
+        fma(m[2], v[0], fma(m[5], v[1], m[8] * v[2])),
+    )
+
+
+@register_jitable
+def of_transposed(m, v):
+    """M' v."""
+    return (
+        fma(m[0], v[0], fma(m[1], v[1], m[2] * v[2])),
+        fma(m[3], v[0], fma(m[4], v[1], m[5] * v[2])),
+        fma(m[6], v[0], fma(m[7], v[1], m[8] * v[2])),
+    )

@@ -1,0 +1,242 @@
+"""Start of a spatial pushbelt from the geometry of its path: constants and state from given values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.models.pushbelt.start import equal_chords, in_lanes, path_of
+from cvt_hpc.models.spatial_pushbelt.belt import (
+    COUNTERS,
+    DRIVEN,
+    HEADING,
+    LENGTH,
+    LOADS,
+    OMEGA,
+    OUTWARD,
+    POSITION,
+    SLOPE,
+    SLOPE_RATE,
+    SPEED,
+    STATE_FIELDS,
+    TENSION,
+    TOTALS,
+    Belt,
+    BeltState,
+    V,
+)
+from cvt_hpc.physics.friction_laws import Law
+from cvt_hpc.physics.geometry import Variator
+from cvt_hpc.physics.out_of_plane import SIDES
+from cvt_hpc.variator.path import points_at, regions
+
+SEED_MODES = 5  # half waves of a strand that the disturbance at the start is made of
+
+
+def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
+    """Constants from values as `start` takes them, and the distance of neighbours [m]."""
+    g = given
+    mass, angle = g["element_mass"], g["half_wedge_angle"]
+    thickness = chord - g["play"] / g["elements"]
+    height, width = g["element_height"], g["element_width"]
+    turned = np.array([[0.0, 0.0, 1.0], [np.tan(g["axis_tilt"]), np.tan(g["axis_skew"]), 1.0]])
+    return Belt(
+        centre_distance=float(g["centre_distance"]),
+        axes=turned / np.linalg.norm(turned, axis=1)[:, None],
+        loose_side=np.array([float(SIDES[side]) for side in g["loose_sides"]]),
+        sine=float(np.sin(angle)),
+        cosine=float(np.cos(angle)),
+        half_width=float(0.5 * width),
+        flank_reach=float(g["flank_reach"]),
+        thickness=float(thickness),
+        pitch=float(chord),
+        pitch_depth=float(g["pitch_depth"]),
+        head_height=float(g["head_height"]),
+        edge_width=float(g["edge_half_width"]),
+        head_width=float(g["head_half_width"]),
+        package_distance=float(g["package_arm"]),
+        pin_height=float(g["nose_height"]),
+        pin_clearance=float(g["nose_clearance"]),
+        pin_stiffness=float(g["nose_stiffness"]),
+        mass=float(mass),
+        roll_inertia=float(mass * (height**2 + width**2) / 12.0),
+        yaw_inertia=float(mass * (width**2 + thickness**2) / 12.0),
+        pitch_inertia=float(mass * (height**2 + thickness**2) / 12.0),
+        ring_mass=float(g["ring_mass"] / g["elements"]),
+        ring_rotary_inertia=float(g["ring_mass"] / g["elements"] * g["strip_width"] ** 2 / 12.0),
+        ring_stiffness=float(g["ring_stiffness"]),
+        ring_bending=float(g["ring_bending"]),
+        ring_shear=float(g["ring_shear"]),
+        flank_stiffness=float(g["flank_stiffness"]),
+        contact_stiffness=float(g["contact_stiffness"]),
+        angle_stiffness=float(g["angle_stiffness"]),
+        angle_damping=float(g["angle_damping"]),
+        yaw_stiffness=float(g["yaw_stiffness"]),
+        yaw_damping=float(g["yaw_damping"]),
+        transverse_damping=float(g["transverse_damping"] * chord),
+        lateral_damping=float(g["lateral_damping"] * chord),
+        flank_law=int(Law[g["friction_law"].upper()]),
+        flank_kinetic=float(g["kinetic_friction"]),
+        flank_gradient=float(g["friction_gradient"]),
+        flank_speed=float(g["stribeck_velocity"]),
+        friction_memory=float(g["friction_memory"]),
+        ring_friction=float(g["ring_friction"]),
+        friction_speed=float(g["friction_speed"]),
+        ring_friction_speed=float(g["ring_friction_speed"]),
+        driven_inertia=float(g["driven_inertia"]),
+        driving_rate=float(g["driving_rate"]),
+        driven_rate=float(g["driven_rate"]),
+        modal_stiffness=np.array(g["modal_stiffness"], dtype=np.float64).reshape(2, -1),
+        lean_lag=float(g["lean_lag"]),
+    )
+
+
+class SideLine:
+    """Where the belt lies out of the plane at the start, along its path.
+
+    On the arcs in the mid planes of the pulleys, on the strands along cubics with the slopes of the arcs'
+    ends, as a beam without tension lies between them; there with a disturbance, whose slope vanishes at the
+    ends.
+
+    Parameters
+    ----------
+    path : Variator
+        [m]
+    belt : Belt
+        Constants.
+    middles : (float, float)
+        Axial positions of the mid planes [m].
+    disturbance : float
+        Largest displacement of it [m].
+    seed : int
+        By which the amplitudes of its modes are drawn.
+    """
+
+    def __init__(
+        self, path: Variator, belt: Belt, middles: tuple[float, float], disturbance: float, seed: int
+    ) -> None:
+        self._path, self._belt, self._middles = path, belt, middles
+        self._starts = np.concatenate([[0.0], np.cumsum(path.lengths)[:3]])
+        shares = np.linspace(0.0, 1.0, 1001)
+        self._modes = np.random.default_rng(seed).uniform(-1.0, 1.0, (2, SEED_MODES))
+        self._modes *= disturbance / np.abs([self._disturbed(k, shares)[0] for k in (0, 1)]).max()
+
+    def _disturbed(self, strand: int, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement on a strand by the share of its length, and its derivative by it."""
+        x = np.pi * share
+        found = np.zeros_like(x), np.zeros_like(x)
+        for n, size in enumerate(self._modes[strand], start=1):
+            wave, slope = np.sin(n * x), n * np.cos(n * x)
+            found = (
+                found[0] + size * np.sin(x) * wave,
+                found[1] + size * np.pi * (np.cos(x) * wave + np.sin(x) * slope),
+            )
+        return found
+
+    def _on_pulley(self, k: int, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Axial position [m] and slope of the mid plane of a pulley at path coordinates (n,) [m]."""
+        axis = self._belt.axes[k]
+        points, angle, _ = points_at(self._path, self._belt.centre_distance, position)
+        y = points[:, 0] - k * self._belt.centre_distance
+        height = self._middles[k] / axis[2] - (axis[0] * y + axis[1] * points[:, 1]) / axis[2]
+        return height, -(axis[0] * np.cos(angle) + axis[1] * np.sin(angle)) / axis[2]
+
+    def at(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Axial positions (n,) [m], slopes (n,), and axes of the elements (n, 3) at path coordinates [m]."""
+        path, axes = self._path, self._belt.axes
+        region = regions(path, position)
+        height, slope = np.zeros(position.size), np.zeros(position.size)
+        direction = np.zeros((position.size, 3))
+        for k in (0, 1):
+            on_arc = region == 2 * k
+            height[on_arc], slope[on_arc] = self._on_pulley(k, position[on_arc])
+            direction[on_arc] = axes[k]
+            on_strand = region == 2 * k + 1
+            start, length = self._starts[2 * k + 1], path.strand_length
+            ends = np.array([start, np.nextafter(start + length, 0.0)])
+            (w0, s0), (w1, s1) = (self._on_pulley(p, ends[e : e + 1]) for p, e in ((k, 0), (1 - k, 1)))
+            x = (position[on_strand] - start) / length
+            rise = w1 - w0
+            m0, m1 = s0 * length, s1 * length
+            seed, seed_slope = self._disturbed(k, x)
+            cubic = w0 + m0 * x + (3.0 * rise - 2.0 * m0 - m1) * x**2 + (m0 + m1 - 2.0 * rise) * x**3
+            change = m0 + 2.0 * (3.0 * rise - 2.0 * m0 - m1) * x + 3.0 * (m0 + m1 - 2.0 * rise) * x**2
+            height[on_strand], slope[on_strand] = cubic + seed, (change + seed_slope) / length
+            smooth = (x * x * (3.0 - 2.0 * x))[:, None]
+            direction[on_strand] = (1.0 - smooth) * axes[k] + smooth * axes[1 - k]
+        return height, slope, direction
+
+
+def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
+    """Constants and a state from which a belt can run in: equal chords along the ideal path, at its speed.
+
+    Parameters
+    ----------
+    given : mapping
+        Values [SI] as `transient.given` names them, those of an element for each of `elements`.
+
+    Returns
+    -------
+    Belt, BeltState
+        The flanks just touch, but for the disturbance; the rings have the strain `ring_strain`. Half of the
+        misalignment is the driving pulley's.
+    """
+    g = given
+    nodes, path = g["elements"], path_of(g)
+    s, chord = equal_chords(lambda s: points_at(path, g["centre_distance"], s)[0], path.path_length, nodes)
+    belt = belt_of(g, chord)
+    pitch, _, curvature = points_at(path, belt.centre_distance, s)
+    middles = -0.5 * g["misalignment"], 0.5 * g["misalignment"]
+    height, slope, axial = SideLine(path, belt, middles, g["disturbance"], g["seed"]).at(s)
+    along = np.roll(pitch, -1, axis=0) - np.roll(pitch, 1, axis=0)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    heading = np.column_stack([along, slope])
+    heading /= np.linalg.norm(heading, axis=1)[:, None]
+    outward = np.cross(heading, axial)
+    outward /= np.linalg.norm(outward, axis=1)[:, None]
+    axial = np.cross(outward, heading)
+    points = np.column_stack([pitch, height]) + belt.pitch_depth * outward
+
+    ahead = np.roll(points, -1, axis=0) - points
+    arms = belt.package_distance * (np.roll(axial, -1, axis=0) - axial)
+    lines = 0.5 * (np.linalg.norm(ahead + arms, axis=1) + np.linalg.norm(ahead - arms, axis=1))
+    speed = g["driving_speed"] * path.driving_radius
+    # elements that run along the path turn as the path does, in the plane and out of it
+    slope_rate = speed * (np.roll(slope, -1) - np.roll(slope, 1)) / (2.0 * chord)
+    plane_outward = np.column_stack([along[:, 1], -along[:, 0], np.zeros(nodes)])
+    omega = speed * curvature[:, None] * np.array([0.0, 0.0, 1.0]) + slope_rate[:, None] * plane_outward
+    fields = np.zeros((nodes, STATE_FIELDS))
+    fields[:, POSITION : POSITION + 3] = points
+    fields[:, HEADING : HEADING + 3], fields[:, OUTWARD : OUTWARD + 3] = heading, outward
+    fields[:, SLOPE], fields[:, SLOPE_RATE] = slope, slope_rate
+    running = speed + belt.pitch_depth * speed * curvature
+    fields[:, SPEED : SPEED + 2] = running[:, None] * along
+    fields[:, SPEED + 2] = speed * slope
+    fields[:, OMEGA : OMEGA + 3] = omega
+    fields[:, V] = speed * lines.sum() / (nodes * chord)
+    fields[:, LENGTH] = lines / (1.0 + g["ring_strain"])
+    fields[:, TENSION] = belt.ring_stiffness * g["ring_strain"]
+    fields[:, DRIVEN] = points[:, 0] > 0.5 * belt.centre_distance
+    pulleys = np.array(
+        [
+            g["driving_speed"],
+            speed / path.driven_radius,
+            path.driving_radius,
+            path.driven_radius,
+            *middles,
+        ]
+    )
+    modes = belt.modal_stiffness.shape[1]
+    state = BeltState(
+        in_lanes(fields),
+        pulleys,
+        np.zeros((2, modes)),
+        np.zeros((2, modes)),
+        np.zeros(1 + 2 * modes),
+        np.zeros(LOADS),
+        np.zeros(TOTALS),
+        np.zeros(COUNTERS, np.int64),
+    )
+    return belt, state

@@ -1,0 +1,82 @@
+"""A transient run of the spatial pushbelt: it starts from geometry, is clamped and loaded, and recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.kernels import called_alike
+from cvt_hpc.models.marched import batches_of_one
+from cvt_hpc.models.pushbelt import run
+from cvt_hpc.models.pushbelt.run import COURSES, ElementRun
+from cvt_hpc.models.pushbelt.start import of_lanes
+from cvt_hpc.models.spatial_pushbelt import belt
+from cvt_hpc.models.spatial_pushbelt.belt import Newton, workspace
+from cvt_hpc.models.spatial_pushbelt.parameters import LOOSE_SIDES, package_arm
+from cvt_hpc.models.spatial_pushbelt.readings import LATERAL, PROFILES, SCALARS, Reading
+from cvt_hpc.models.spatial_pushbelt.start import start
+from cvt_hpc.models.spatial_pushbelt.step import advance
+from cvt_hpc.variator import STRANDS
+
+CHANNELS = (*COURSES, *SCALARS)
+
+
+class Transient(ElementRun):
+    """One run of the spatial pushbelt; parameters as of `ElementRun`.
+
+    Displacement is in the plane at the probes of both strands, outwards, and then out of it at the same ones,
+    to the right.
+    """
+
+    fields = belt
+    _channels = CHANNELS
+    _profiles = tuple(PROFILES)
+    _directions = (*STRANDS, *LATERAL)
+
+    def _begin(self, p: Mapping[str, Any]) -> None:
+        self._advance = called_alike(advance)
+        self._belt, self._state = start(given(p))
+        self._work = workspace(self._belt, p["elements"])
+        self._method = Newton(
+            tolerance=p["speed_tolerance"],
+            power_tolerance=p["power_tolerance"],
+            most_iterations=p["most_iterations"],
+        )
+
+    def _inputs_along(self, sample: int) -> np.ndarray:
+        still = np.zeros((2, belt.INPUTS - belt.IN_DRIVING_DRIFT))
+        return np.column_stack([super()._inputs_along(sample), still])
+
+    def _read(self) -> Reading:
+        state = self._state
+        return Reading(self._readings, of_lanes(state.elements), state.pulleys, state.loads)
+
+    def _tilting_inertia(self) -> float:
+        return self._belt.pitch_inertia
+
+    def _stored_energy(self, found: Reading) -> float:
+        return found.stored_energy(self._state.openings, self._state.leans)
+
+
+def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """What `start` takes, from flat parameters of a run [SI]."""
+    p, shared = parameters, run.given(parameters)
+    pitch = shared["belt_length"] / p["elements"]
+    same = ("element_width", "flank_reach", "edge_half_width", "head_half_width", "strip_width")
+    scene = ("misalignment", "axis_tilt", "axis_skew", "disturbance", "seed", "lateral_damping", "lean_lag")
+    return {
+        **shared,
+        **{key: p[key] for key in (*same, *scene)},
+        "package_arm": package_arm(p),
+        "ring_bending": p["lateral_bending_stiffness"],
+        "ring_shear": p["lateral_shear_stiffness"],
+        "yaw_stiffness": p["yaw_spring"] * pitch,
+        "yaw_damping": p["yaw_damper"] * pitch,
+        "loose_sides": tuple(p[key] for key in LOOSE_SIDES),
+    }
+
+
+batch = batches_of_one(Transient)
+forget = run.forget

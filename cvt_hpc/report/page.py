@@ -1,0 +1,198 @@
+"""One self-contained HTML page about a study."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping
+from io import BytesIO
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jinja2
+import numpy as np
+import xarray as xr
+
+from cvt_hpc.analysis.arrangement import Arrangement, arrange
+from cvt_hpc.analysis.classes import check_results
+from cvt_hpc.analysis.figures import RESOLUTION
+from cvt_hpc.analysis.maps import map_figure, sheet_of
+from cvt_hpc.analysis.scatter import is_sampled
+from cvt_hpc.errors import InputError, one_line
+from cvt_hpc.files import written_aside
+from cvt_hpc.job import Job, rebuild_job
+from cvt_hpc.job.summary import core_time_in_words, value_in_words, values_in_words
+from cvt_hpc.models.contract import load_model
+from cvt_hpc.report.findings import failures, summary, window_sentences
+
+MOST_FAILURES = 30  # kinds of failure in the table
+# What tells how well a run was computed, where its model records it
+_QUALITY = ("power_residual", "step_ripple", "refinements", "time_step", "simulated_seconds", "core_seconds")
+
+
+class Row(NamedTuple):
+    """A parameter of the job: value in words, what it is, and whether it is other than the default."""
+
+    key: str
+    value: str
+    meaning: str
+    changed: bool
+
+
+def write_report(dataset: xr.Dataset, out: Path, source: str = "results") -> Path:
+    """Write the page.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        Results of a study, as `open_results` returns them, of any model and earlier version.
+    out : Path
+        The page; its folder is made if needed.
+    source : str
+        Where the results are from, for the errors.
+
+    Returns
+    -------
+    Path
+        `out`. The page needs no network: the plotting library, which draws the map with the values of its
+        cells, is in it, and the printed map for browsers without scripts.
+
+    Raises
+    ------
+    InputError
+        If the dataset holds no results of a study, or the system refuses.
+    """
+    check_results(dataset, source)
+    templates = jinja2.Environment(loader=jinja2.PackageLoader("cvt_hpc.report", "."), autoescape=True)
+    page = templates.get_template("page.html").render(_content(dataset, source))
+    with written_aside(Path(out), parents=True) as aside:
+        aside.write_text(page, encoding="utf-8")
+    return Path(out)
+
+
+def _content(dataset: xr.Dataset, source: str) -> dict[str, Any]:
+    attributes = {str(key): str(value) for key, value in dataset.attrs.items()}
+    job = _job(attributes, source)
+    arrangement = _arrangement(dataset, source)
+    found = failures(dataset)
+    return {
+        "name": one_line(attributes.get("job_name", source)),
+        "description": attributes.get("title", ""),
+        "model": f"{job.model}: {load_model(job.model).title}" if job else "",
+        "axes": _axes(dataset, job),
+        "summary": summary(dataset),
+        "sentences": list(window_sentences(arrangement)) if arrangement else [],
+        "notes": arrangement.notes if arrangement else (),
+        "picture": _picture(dataset, source),
+        "interactive": _interactive(arrangement),
+        "failures": found[:MOST_FAILURES],
+        "failed": sum(count for *_, count in found),
+        "cost": _cost(dataset),
+        "quality": _quality(dataset),
+        "parameters": _parameters(job) if job else {},
+        "provenance": _provenance(attributes),
+    }
+
+
+def _job(attributes: Mapping[str, str], source: str) -> Job | None:
+    """The job of a dataset; None where this version of the program cannot read it any more."""
+    try:
+        return rebuild_job(json.loads(attributes["job"]), source, {})
+    except (InputError, KeyError, ValueError, RecursionError):
+        return None
+
+
+def _arrangement(dataset: xr.Dataset, source: str) -> Arrangement | None:
+    """How a map lays the study out; None of samples and of single runs."""
+    if is_sampled(dataset) or not dataset["status"].dims:
+        return None
+    return arrange(dataset, {}, source)
+
+
+def _axes(dataset: xr.Dataset, job: Job | None) -> list[tuple[str, str, str]]:
+    """Name, meaning and values of each axis."""
+    if job is not None:
+        schema = job.schema
+        return [
+            (axis.name, schema.parameters[axis.name].description, values_in_words(axis, schema))
+            for axis in job.axes
+        ]
+    names = map(str, dataset["status"].dims)
+    return [(name, str(dataset[name].attrs.get("long_name", "")), str(dataset.sizes[name])) for name in names]
+
+
+def _picture(dataset: xr.Dataset, source: str) -> str:
+    """The printed map as a PNG in base64; "" where there is nothing to draw."""
+    try:
+        figure = map_figure(dataset, {}, source)
+    except InputError:
+        return ""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=RESOLUTION)
+    return base64.b64encode(buffer.getvalue()).decode()
+
+
+def _interactive(arrangement: Arrangement | None) -> str:
+    """The map with values, as HTML with the plotting library; "" where it has too many panels, or none."""
+    from cvt_hpc.report.interactive import MOST_PANELS, map_with_values
+
+    if (
+        arrangement is None
+        or "eigenfrequency" in arrangement.dataset
+        and "amplitude" not in arrangement.dataset
+    ):
+        return ""
+    sheet = sheet_of(arrangement)
+    if sheet.panels > MOST_PANELS:
+        return ""
+    settings = {"responsive": True, "displaylogo": False}
+    return map_with_values(sheet).to_html(
+        full_html=False, include_plotlyjs=True, div_id="map", config=settings
+    )
+
+
+def _cost(dataset: xr.Dataset) -> str:
+    if "core_seconds" not in dataset:
+        return ""
+    seconds = dataset["core_seconds"].values
+    known = seconds[np.isfinite(seconds)]
+    if not known.size:
+        return ""
+    return (
+        f"{core_time_in_words(known.sum())} in all; a run took {np.median(known):.3g} s of a core (median), "
+        f"{known.max():.3g} s at most."
+    )
+
+
+def _quality(dataset: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
+    """Name, meaning, unit, median and largest size of what tells how well the runs were computed."""
+    rows = []
+    for name in _QUALITY:
+        if name not in dataset:
+            continue
+        values = np.abs(dataset[name].values.astype(float).ravel())
+        values = values[np.isfinite(values)]
+        if values.size:
+            attributes = dataset[name].attrs
+            unit = str(attributes.get("units", "")).removeprefix("1")
+            meaning = str(attributes.get("comment", attributes.get("long_name", "")))
+            rows.append((name, meaning, unit, f"{np.median(values):.3g}", f"{values.max():.3g}"))
+    return rows
+
+
+def _parameters(job: Job) -> dict[str, list[Row]]:
+    """Values of all keys by table; the defaults are assumptions of the program."""
+    schema, varied = job.schema, {axis.name for axis in job.axes}
+    return {
+        section: [
+            Row(key, value_in_words(schema, key, value), parameter.description, value != parameter.default)
+            for key, parameter in table.items()
+            if key not in varied and (value := job.parameters.get(key)) is not None and value != ()
+        ]
+        for section, table in schema.sections.items()
+    }
+
+
+def _provenance(attributes: Mapping[str, str]) -> list[tuple[str, str]]:
+    names = ("source", "command", "host", "versions", "git_revision", "job_fingerprint", "history")
+    return [(name.replace("_", " "), attributes[name]) for name in names if attributes.get(name)]

@@ -1,0 +1,129 @@
+"""`dataset.cvt` on made-up studies: classes, onsets, boundaries, and pictures laid out as asked."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import cvt_hpc
+from cvt_hpc.analysis.classes import OccurrenceClass
+from cvt_hpc.analysis.maps import PAGE
+from cvt_hpc.errors import InputError
+from cvt_hpc.variables import Status, Vibrates
+from support.studies import GRADIENTS, LOADS, STIFFNESSES, study
+
+NO, YES, SLIPS = Vibrates.NO, Vibrates.YES, Vibrates.SLIPS
+
+
+def results(rows, loads=(20.0, 40.0, 60.0, 80.0, 100.0)):
+    """A study of one row of verdicts for each gradient."""
+    vibrates = np.array(rows, np.int8)
+    axes = {
+        "friction_gradient": ("friction_gradient", np.arange(len(rows)) * -0.2, {"units": "s m-1"}),
+        "load": ("load", np.array(loads), {"units": "N m"}),
+    }
+    dims = ("friction_gradient", "load")
+    return xr.Dataset(
+        {"status": (dims, np.full(vibrates.shape, Status.DONE)), "vibrates": (dims, vibrates)}, axes
+    )
+
+
+def test_opening_results_gives_datasets_their_methods():
+    assert cvt_hpc.open_results and hasattr(xr.Dataset, "cvt")
+
+
+def test_boundaries_lie_midway_and_onset_is_where_a_window_begins():
+    rows = [
+        [NO, NO, YES, YES, NO],
+        [YES, YES, NO, NO, YES],  # from the first load on: that window has no onset
+        [NO, NO, NO, NO, NO],
+        [NO, SLIPS, YES, NO, YES],  # what is neither quiet nor vibrating is passed over
+    ]
+    found = results(rows).cvt.boundary()
+    assert found.dims == ("friction_gradient", "boundary") and found.attrs["units"] == "N m"
+    nan = np.nan
+    np.testing.assert_array_equal(found, [[50, 90, nan], [50, 90, nan], [nan] * 3, [40, 70, 90]])
+    np.testing.assert_array_equal(found.rising, [[1, 0, nan], [0, 1, nan], [nan] * 3, [1, 0, 1]])
+    onset = results(rows).cvt.onset()
+    np.testing.assert_array_equal(onset, [50, 90, nan, 40])
+    assert onset.attrs == {"units": "N m", "long_name": "onset of vibration in load"}
+    # the order of an axis changes nothing
+    turned = results([row[::-1] for row in rows], (100.0, 80.0, 60.0, 40.0, 20.0))
+    np.testing.assert_array_equal(turned.cvt.onset(), onset)
+    along = results(rows).cvt.boundary("friction_gradient").sel(load=20.0)
+    np.testing.assert_allclose(along.dropna("boundary"), [-0.3, -0.1])
+
+
+def test_a_failed_run_is_no_boundary():
+    study = results([[NO, NO, YES, YES, YES]])
+    study["status"][0, 1] = Status.FAILED_NUMERICS
+    assert study.cvt.onset() == 40.0  # midway between the quiet 20 and the vibrating 60 N m
+
+
+def test_the_strongest_strand_where_the_run_vibrates():
+    dataset = study()
+    strongest = dataset.cvt.strongest()
+    vibrating = dataset.cvt.classes() == OccurrenceClass.VIBRATING
+    assert np.isfinite(strongest).values.tolist() == vibrating.values.tolist()
+    inside = dataset.amplitude.max("strand").where(vibrating)
+    np.testing.assert_array_equal(strongest.transpose(*inside.dims), inside)
+
+
+def test_a_map_is_laid_out_as_asked():
+    figure = study().cvt.map(x="sheave_stiffness", y="load", panel="friction_gradient")
+    panels = [axes for axes in figure.axes if axes.get_title(loc="left")]
+    assert len(panels) == 2 * len(GRADIENTS)  # amplitude and frequency
+    assert figure.get_figheight() <= PAGE
+    assert panels[-1].get_xlim()[1] > STIFFNESSES[0] and panels[0].get_ylim()[1] > LOADS[-1]
+    figure = study().cvt.map(x="sheave_stiffness", vmax=5e-6, load=LOADS[3])
+    bar = next(axes for axes in figure.axes if axes.get_label() == "<colorbar>")
+    assert bar.get_ylim()[1] == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda ds: ds.cvt.map(x="lod"), "x lod: unknown axis of the results; did you mean load?"),
+        (lambda ds: ds.cvt.map(x="load", y="load"), "expected an axis on one side"),
+        (lambda ds: ds.cvt.map(x="load", load=LOADS[0]), "expected an axis that is not fixed"),
+        (lambda ds: ds.cvt.onset("strand"), "expected one of the axes"),
+        (lambda ds: ds.cvt.strongest("amplitud"), "did you mean amplitude?"),
+        (lambda ds: xr.Dataset().cvt.onset(), "expected results of a study"),
+    ],
+)
+def test_what_there_is_not_is_named(call, told):
+    with pytest.raises(InputError, match=told.replace("?", r"\?")):
+        call(study())
+
+
+def test_a_table_is_read_as_the_dataset_that_it_was_made_of(tmp_path):
+    rows = runpy.run_path(str(Path(__file__).parents[2] / "jobs" / "tabulate.py"))["rows"]
+    made = study()
+    made["core_seconds"] = made["status"].astype(float)
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join(rows(made, ("amplitude", "frequency"))))
+    found = cvt_hpc.read_table(path)
+    assert found["load"].attrs["units"] == "N m" and found.amplitude.attrs["units"] == "m"
+    np.testing.assert_array_equal(found.status, made.status)
+    done = made.status == Status.DONE
+    np.testing.assert_array_equal(found.vibrates.where(done), made.vibrates.where(done))
+    np.testing.assert_allclose(found.amplitude, made.amplitude.where(done), atol=0.51e-8)  # two digits in um
+    np.testing.assert_allclose(found.frequency, made.frequency.where(done), atol=0.051)  # one digit in Hz
+    np.testing.assert_array_equal(found.cvt.onset(), made.cvt.onset())
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "load,amplitude\n1,2\n",
+        "load,status,vibrates\n1,done\n",
+        "load,status,vibrates\n1,done,no\n1,done,no\n",
+    ],
+)
+def test_what_is_no_table_of_a_study_is_refused(text, tmp_path):
+    (tmp_path / "x.csv").write_text(text)
+    with pytest.raises(InputError, match="x.csv: expected a "):
+        cvt_hpc.read_table(tmp_path / "x.csv")

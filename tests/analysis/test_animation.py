@@ -1,0 +1,67 @@
+"""The belt as a moving picture."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from PIL import Image
+
+from cvt_hpc.analysis.animation import FRAMES, PERIODS, _along_belt, _last_periods, draw_animation
+from cvt_hpc.errors import InputError
+from cvt_hpc.physics.geometry import variator
+
+POINT = {"ratio": 2.5, "driven_radius": 0.075, "centre_distance": 0.155}
+
+
+def history(frequency=500.0):
+    """A standing wave of t1, 20 um about an offset of 1 mm, which the picture leaves out."""
+    path = variator(**POINT)
+    start = path.lengths[0]
+    position = start + path.strand_length * np.array([1, 2, 3, 4, 5]) / 6
+    position = np.append(position, [0.0, start + 2.0 * path.strand_length])
+    time = np.arange(4000) / 20e3
+    shape = np.append(np.sin(np.pi * np.array([1, 2, 3, 4, 5]) / 6), [0.0, 0.0])
+    motion = 1e-3 + 20e-6 * np.sin(2 * np.pi * frequency * time)[:, None] * shape
+    return xr.Dataset(
+        {"displacement": (("time", "probe"), motion)},
+        {"time": time, "probe_position": ("probe", position)},
+        {"point": json.dumps(POINT), "judged_fraction": 0.5, "job_name": "wave"},
+    )
+
+
+def test_the_picture_shows_the_last_periods_at_the_probes_and_between():
+    run = history()
+    time, motion, period = _last_periods(run)
+    assert period == pytest.approx(1 / 500, rel=1e-3)
+    assert time.size == PERIODS * FRAMES and np.ptp(time) == pytest.approx(PERIODS * period)
+    expected = 20e-6 * np.sin(2 * np.pi * 500 * time)
+    np.testing.assert_allclose(motion[:, 2], expected, atol=1e-8)  # the spline over 40 samples a period
+    length = variator(**POINT).path_length
+    along = _along_belt(run, motion, run.probe_position.values, length)
+    np.testing.assert_allclose(along, motion, atol=1e-12)
+
+
+def test_a_moving_picture_is_written(tmp_path):
+    with Image.open(draw_animation(history(), tmp_path / "belt.gif")) as picture:
+        assert picture.n_frames == PERIODS * FRAMES
+    assert [path.name for path in tmp_path.iterdir()] == ["belt.gif"]
+    assert (tmp_path / "belt.gif").stat().st_size < 1e6
+
+
+@pytest.mark.parametrize(
+    ("made", "name", "told"),
+    [
+        (history, "belt.png", "expected a moving picture: .gif, .mp4"),
+        (lambda: history().drop_attrs(), "belt.gif", "expected the history of a run of a variator"),
+        (
+            lambda: xr.Dataset(attrs={"point": "[]"}),
+            "belt.gif",
+            "expected the history of a run of a variator",
+        ),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(made, name, told, tmp_path):
+    with pytest.raises(InputError, match=told):
+        draw_animation(made(), tmp_path / name)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,114 @@
+"""What somebody needs who begins: a job to fill in, the keys of a model, a look at the machine, completion."""
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+
+import pytest
+
+from cvt_hpc.job import build_job
+from cvt_hpc.job.template import job_template
+from cvt_hpc.models import MODELS
+from cvt_hpc.models.contract import load_model
+from cvt_hpc.study import doctor
+
+RECORDED = [name for name in MODELS if load_model(name).is_recorded]
+
+
+@pytest.mark.parametrize("model", RECORDED)
+def test_a_template_is_a_job_and_so_is_all_that_is_commented_out_in_it(model):
+    text = job_template("first", model, "init")
+    job = build_job(tomllib.loads(text))
+    assert (job.name, job.model, len(job)) == ("first", model, 3)
+    # every key with its default, but what stands in the place of another one, and the load beside its share
+    uncommented = re.sub(r"(?m)^# (?!load =)(\w+ = )(?!.*\.\.\.)", r"\1", text)
+    assert uncommented.count("\n#") < text.count("\n#")
+    filled = build_job(tomllib.loads(uncommented))
+    assert filled.fingerprint() == job.fingerprint()
+    in_the_place_of_others = {
+        key for key, parameter in job.schema.parameters.items() if parameter.default is None
+    }
+    follow = {parameter.gives.key for parameter in job.schema.parameters.values() if parameter.gives}
+    assert set(job.parameters) - in_the_place_of_others - follow - {"load"} <= filled.given
+
+
+def test_init_writes_a_job_that_check_takes_and_overwrites_nothing(call, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, out, err = call("init", "mine", "--model", "criterion")
+    assert (status, err) == (0, [])
+    assert out[1] == "next: cvt-hpc check mine.toml; cvt-hpc run mine.toml; cvt-hpc map out/mine"
+    assert call("check", "mine.toml")[0] == 0
+    (tmp_path / "mine.toml").write_text("kept")
+    assert call("init", "mine") == (
+        2,
+        [],
+        ["cvt-hpc: mine.toml: expected a name that is free, found a file of this name"],
+    )
+    assert (tmp_path / "mine.toml").read_text() == "kept"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["../x"], "init: name: expected a word of letters"),
+        (["x", "--model", "elastic_bel"], "did you mean elastic_belt?"),
+        (["x", "--model", "moving_string"], "found moving_string, for charts alone"),
+    ],
+)
+def test_init_refuses_what_would_be_no_job(call, tmp_path, monkeypatch, arguments, told):
+    monkeypatch.chdir(tmp_path)
+    status, out, err = call("init", *arguments)
+    assert (status, out, len(err)) == (2, [], 1)
+    assert told in err[0]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_models_tells_each_model_and_its_keys(call):
+    status, out, err = call("models")
+    assert (status, err) == (0, [])
+    assert [line.split()[0] for line in out[: len(MODELS)]] == sorted(MODELS)
+    told = [" ".join(line.split()) for line in call("models", "criterion")[1]]
+    assert "half_wedge_angle 0.1919862177 rad (11 deg) half wedge angle of the groove" in told
+    assert call("models", "nothing")[0] == 2
+
+
+def test_doctor_names_what_is_wrong_and_what_to_do(call, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(
+        doctor, "_said", lambda command: ["1 MPICH", "1 MPICH"]
+    )  # ranks that do not see each other
+    monkeypatch.setattr(doctor, "versions", lambda: {"python": "3", "mpi4py": "4"})
+    monkeypatch.setattr(doctor, "LEAST_DISK", 1e30)
+    status, out, err = call("doctor")
+    assert (status, err) == (1, [])
+    told = {line.split(":")[0] for line in out}
+    assert {"ok       versions", "ok       machine", "trouble  disk", "trouble  MPI"} <= told
+    advice = out[out.index(next(line for line in out if "trouble  MPI" in line)) + 1]
+    assert "does not fit the MPI library" in advice
+
+
+@pytest.mark.slow
+def test_doctor_starts_two_ranks():
+    found = next(finding for finding in doctor.examine(doctor.Path()) if finding.what == "MPI")
+    assert found.fine and found.found.startswith("2 ranks by ")
+
+
+def test_completion_names_all_commands():
+    script = subprocess.run(
+        [sys.executable, "-m", "cvt_hpc", "completion", "bash"], capture_output=True, text=True, check=True
+    ).stdout
+    assert subprocess.run(["bash", "-n"], input=script, text=True).returncode == 0
+    commands = re.search(r"(?m)^_shtab_cvt_hpc_subparsers=\((.*)\)$", script)[1]
+    assert {"run", "map", "init", "doctor"} <= set(commands.split())
+
+
+def test_status_for_programs(call, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert call("init", "mine", "--model", "criterion")[0] == 0
+    assert call("run", "mine.toml")[0] == 0
+    status, out, _ = call("status", "out/mine", "--json")
+    assert (status, len(out)) == (0, 1)
+    told = json.loads(out[0])
+    assert (told["name"], told["total"], told["done"], told["left"]) == ("mine", 3, 3, 0)

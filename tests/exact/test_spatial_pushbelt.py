@@ -1,0 +1,290 @@
+"""The spatial pushbelt between its pulleys: planar limit, mirror, balances, laws of contacts, elastic sheaves."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from cvt_hpc.models.pushbelt import belt as p
+from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start
+from cvt_hpc.models.pushbelt.start import workspace as planar_workspace
+from cvt_hpc.models.pushbelt.step import advance as planar_advance
+from cvt_hpc.models.spatial_pushbelt import belt as b
+from cvt_hpc.models.spatial_pushbelt.flank import flank_forces
+from cvt_hpc.models.spatial_pushbelt.step import _prepare, advance
+from cvt_hpc.physics.friction_laws import Law
+from tests.exact.test_pushbelt import SPEED, THRUST, given
+from tests.support import spatial_chains as chains
+
+NODES, STEP, TORQUE = 104, 1e-5, 60.0
+LOAD = 1.35 * TORQUE
+RAMP = 1500  # steps
+OFFSET = 0.5e-3  # of the driven pulley along its axis [m]
+MODES = ((6e8, 3e8, 3e8), (6e8, 3e8, 3e8))  # [N/m]
+
+
+def inputs(thrusts, loads, fields=b.INPUTS, drift=0.0):
+    """Inputs of a call: thrust and load at its start and end."""
+    found = np.zeros((2, fields))
+    found[:, b.IN_SPEED] = SPEED
+    found[:, b.IN_DRIVEN_THRUST], found[:, b.IN_LOAD] = thrusts, loads
+    found[:, b.IN_DRIVEN_DRIFT :] = drift
+    return found
+
+
+def scene(offset=OFFSET, modal=(), nodes=NODES, **constants):
+    """Constants, state and work space of a belt under its thrust and load, 45 ms from its start."""
+    planar, planar_state = start(given(nodes, transverse_damping=0.0, modal_stiffness=modal or ((), ())))
+    belt, state = chains.beside_planar(planar, planar_state, **constants)
+    work = b.workspace(belt, nodes)
+    for thrusts, loads, drift, steps in (
+        ((500.0, THRUST), (0.0, 0.0), offset / (RAMP * STEP), RAMP),
+        ((THRUST, THRUST), (0.0, LOAD), 0.0, RAMP),
+        ((THRUST, THRUST), (LOAD, LOAD), 0.0, RAMP),
+    ):
+        assert advance(belt, b.Newton(), state, work, inputs(thrusts, loads, drift=drift), steps, STEP) == 0
+    return belt, state, work
+
+
+def stored(belt, state):
+    """Kinetic energy of belt and driven pulley, and that of rings, flanks and sheaves [J]."""
+    energy, _, _ = chains.energy_and_momentum(belt, of_lanes(state.elements))
+    pressed = of_lanes(state.elements)[:, b.FLANK : b.FLANK + 4]
+    energy += np.sum(pressed**2) / belt.flank_stiffness
+    energy += np.sum(belt.modal_stiffness * (state.openings**2 + state.leans**2))
+    return energy + 0.5 * belt.driven_inertia * state.pulleys[b.DRIVEN_SPEED] ** 2
+
+
+@cache
+def revolution(**changes):
+    """What a belt does in a revolution: mean powers [W], loads, which contacts of an element touch at a time."""
+    belt, state, work = scene(**{key: MODES if key == "modal" else value for key, value in changes.items()})
+    before, energy, loads = state.totals.copy(), stored(belt, state), []
+    touching = set(), set()  # points of flanks, points of fronts
+    for _ in range(450):
+        hold = inputs((THRUST, THRUST), (LOAD, LOAD))
+        assert advance(belt, b.Newton(), state, work, hold, 10, STEP) == 0
+        loads.append(state.loads.copy())
+        f = of_lanes(state.elements)
+        for seen, first in zip(touching, (b.FLANK, b.PUSH), strict=True):
+            seen |= {tuple(row) for row in f[:, first : first + 4] > 0.0}
+    spent = state.totals - before
+    rate = spent / spent[b.TIME]
+    rate[b.TIME] = (stored(belt, state) - energy) / spent[b.TIME]
+    return belt, state, rate, np.mean(loads, axis=0), touching
+
+
+def test_in_its_plane_it_is_the_planar_belt():
+    # one height of flank points on the pitch line, as the planar belt has; what turns out of the plane is held
+    planar, planar_state = start(given(NODES))
+    held = {"flank_reach": 0.0, "roll_inertia": 1.0, "yaw_inertia": 1.0}
+    belt, state = chains.beside_planar(planar, planar_state, **held)
+    work, planar_work = b.workspace(belt, NODES), planar_workspace(planar, NODES)
+    for thrusts, loads, steps in (
+        ((500.0, THRUST), (0.0, 0.0), RAMP),
+        ((THRUST, THRUST), (0.0, LOAD), RAMP),
+        ((THRUST, THRUST), (LOAD, LOAD), 4 * RAMP),
+    ):
+        assert advance(belt, b.Newton(), state, work, inputs(thrusts, loads), steps, STEP) == 0
+        flat = inputs(thrusts, loads, 5)
+        assert planar_advance(planar, p.Newton(), planar_state, planar_work, flat, steps, STEP) == 0
+    f, g = of_lanes(state.elements), of_lanes(planar_state.elements)
+    assert np.abs(f[:, 2]).max() < 1e-12
+    assert np.abs(f[:, [5, 8]]).max() < 1e-12
+    side = np.where(f[:, 1] < 0.0, 0, 1)
+    on_strand = (f[:, 0] > 0.05) & (f[:, 0] < 0.105)
+    push, flat_push = f[:, b.PUSH : b.PUSH + 4].sum(1), g[:, p.EDGE] + g[:, p.HEAD]
+    for strand in (0, 1):
+        there = on_strand & (side == strand)
+        assert f[there, b.TENSION].mean() == pytest.approx(g[there, p.TENSION].mean(), rel=6e-3)
+        assert push[there].mean() == pytest.approx(flat_push[there].mean(), rel=6e-3, abs=2.0)
+    thrust = g[:, p.FLANK] * planar.cosine + g[:, p.FLANK_FRICTION_M] * planar.sine
+    driving = float(((1.0 - g[:, p.DRIVEN]) * thrust).sum())
+    # the planar belt's sliding along the meridian is v_r / cos d0, not v_r cos d0: 4 % of a part of friction
+    assert state.loads[b.DRIVING_LEFT] == pytest.approx(driving, rel=6e-3)
+    assert state.loads[b.DRIVING_RIGHT] == pytest.approx(state.loads[b.DRIVING_LEFT], rel=1e-12)
+    for spatial, flat in (
+        (b.FLANK_LOSS, p.FLANK_LOSS),
+        (b.RING_LOSS, p.RING_LOSS),
+        (b.DAMPING_LOSS, p.DAMPING_LOSS),
+    ):
+        assert state.totals[spatial] == pytest.approx(planar_state.totals[flat], rel=1e-2)
+
+
+def test_what_is_symmetric_stays_in_its_plane():
+    _, state, _ = scene(offset=0.0)
+    f = of_lanes(state.elements)
+    assert np.abs(f[:, 2]).max() < 1e-12
+    assert np.abs(f[:, b.SLOPE]).max() < 1e-9
+    assert f[:, b.FLANK] == pytest.approx(f[:, b.FLANK + 2], abs=1e-3)
+
+
+def test_a_mirrored_offset_gives_the_mirrored_motion():
+    found = []
+    for sign in (1.0, -1.0):
+        planar, planar_state = start(given(NODES, transverse_damping=0.0))
+        tilt = sign * 2e-3
+        axes = np.array([[0.0, 0.0, 1.0], [tilt, 0.0, np.sqrt(1.0 - tilt * tilt)]])
+        belt, state = chains.beside_planar(
+            planar, planar_state, loose_side=sign * np.array([1.0, -1.0]), axes=axes, pin_clearance=1e-4
+        )
+        work = b.workspace(belt, NODES)
+        ramp = inputs((500.0, 5e3), (0.0, 20.0), drift=sign * 0.2)
+        assert advance(belt, b.Newton(tolerance=1e-9), state, work, ramp, 200, STEP) == 0
+        found.append((of_lanes(state.elements).copy(), state.loads.copy()))
+    (f, loads), (g, mirrored) = found
+    assert np.abs(f[:, 2]).max() > 1e-5
+    signs = np.array([1.0, 1.0, -1.0])
+    for first in (b.POSITION, b.HEADING, b.OUTWARD):
+        assert f[:, first : first + 3] == pytest.approx(g[:, first : first + 3] * signs, abs=1e-12)
+    assert loads[[0, 1, 2, 3]] == pytest.approx(mirrored[[1, 0, 3, 2]], rel=1e-6)
+
+
+SCENES = {
+    "coulomb": {},
+    "falling": {"flank_law": int(Law.STRIBECK), "flank_gradient": -0.3, "friction_memory": 3e-4},
+    "elastic": {"modal": "elastic"},
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_power_is_balanced(name):
+    _, state, rate, loads, _ = revolution(**SCENES[name])
+    lost = rate[b.FLANK_LOSS : b.POWER_RESIDUAL]
+    assert (lost >= 0.0).all()
+    left = rate[b.WORK_IN] - rate[b.WORK_OUT] - rate[b.THRUST_WORK] - lost.sum() - rate[b.TIME]
+    assert abs(left) < 3e-4 * rate[b.WORK_IN]
+    assert state.counters[b.FAILED_STEPS] <= 2
+    # what the belt does to one pulley along the axis it takes from the other
+    net = loads[b.DRIVING_RIGHT] - loads[b.DRIVING_LEFT], loads[b.DRIVEN_RIGHT] - loads[b.DRIVEN_LEFT]
+    assert net[0] > 80.0
+    assert net[0] + net[1] == pytest.approx(0.0, abs=0.02 * net[0])
+    assert -loads[b.DRIVING_TORQUE] == pytest.approx(TORQUE, rel=0.03)
+
+
+def test_contacts_keep_their_laws():
+    _, state, _, _, (flanks, fronts) = revolution()
+    f = of_lanes(state.elements)
+    normal = f[:, b.FLANK : b.FLANK + 4]
+    slip = np.hypot(f[:, b.FLANK_SLIP_M : b.FLANK_SLIP_M + 4], f[:, b.FLANK_SLIP_T : b.FLANK_SLIP_T + 4])
+    force = np.hypot(
+        f[:, b.FLANK_FRICTION_M : b.FLANK_FRICTION_M + 4], f[:, b.FLANK_FRICTION_T : b.FLANK_FRICTION_T + 4]
+    )
+    pressed = normal > 0.0
+    assert force == pytest.approx(0.09 * normal * np.tanh(slip / 5e-4), abs=1e-6)
+    against = f[:, b.FLANK_FRICTION_M : b.FLANK_FRICTION_M + 4] * f[:, b.FLANK_SLIP_M : b.FLANK_SLIP_M + 4]
+    assert (against >= 0.0).all()
+    for part in (normal, f[:, b.PUSH : b.PUSH + 4], f[:, b.SADDLE]):
+        assert (part >= 0.0).all()
+    # every kind of contact opens, closes, sticks and slips: none, left only, right only, all, top only
+    yes, no = True, False
+    assert {(no, no, no, no), (yes, yes, yes, yes)} <= flanks
+    assert any((pair[0] or pair[1]) and not (pair[2] or pair[3]) for pair in flanks)
+    assert any((pair[2] or pair[3]) and not (pair[0] or pair[1]) for pair in flanks)
+    assert any((pair[1] or pair[3]) and not (pair[0] or pair[2]) for pair in flanks)
+    assert (slip[pressed] < 1e-4).any()
+    assert (slip[pressed] > 5e-3).any()
+    assert {(no, no, no, no), (yes, no, no, no), (no, yes, no, no), (yes, yes, no, no)} <= fronts
+    assert any(pair[2] or pair[3] for pair in fronts)
+
+
+def test_slip_limit():
+    # a belt that slips all along the driving arc carries 2 mu F R / cos d0, whatever its offset
+    belt, state, work = scene(driven_inertia=0.2)
+    overload = inputs((14e3, 14e3), (300.0, 300.0))
+    advance(belt, b.Newton(), state, work, overload, 4500, STEP)
+    f = of_lanes(state.elements)
+    flank, driving = f[:, b.FLANK : b.FLANK + 4], f[:, b.DRIVEN] < 0.5
+    assert (f[driving, b.FLANK_SLIP_T : b.FLANK_SLIP_T + 4][flank[driving] > 10.0] < -1.0).all()
+    radius = np.linalg.norm(f[:, :2] - belt.pitch_depth * f[:, 6:8], axis=1)[:, None]
+    heights = np.array([-1.0, 1.0, -1.0, 1.0]) * belt.flank_reach
+    carried = (flank * (radius + heights))[driving].sum() / flank[driving].sum()
+    thrust = 0.5 * state.loads[: b.DRIVEN_LEFT].sum()
+    limit = 2.0 * belt.flank_kinetic * carried / belt.cosine
+    assert -state.loads[b.DRIVING_TORQUE] / thrust == pytest.approx(limit, rel=1e-3)
+
+
+def test_a_clamped_element_without_friction():
+    # each flank carries N: 2 N sin d0 outwards, N cos d0 along the axis, and no moment where both heights are alike
+    planar, planar_state = start(given(NODES, kinetic_friction=0.0, ring_friction=0.0))
+    belt, state = chains.beside_planar(planar, planar_state)
+    state.pulleys[[b.DRIVING_RADIUS, b.DRIVEN_RADIUS]] += 1e-5
+    work = b.workspace(belt, NODES)
+    f = of_lanes(state.elements)
+    f[:, b.SPEED : b.SPEED + 8] = 0.0
+    state.elements.data[:] = in_lanes(f).data
+    _prepare(belt, state, work, 1e-9)
+    flank_forces(
+        belt,
+        state.elements,
+        state.pulleys,
+        state.increments,
+        state.openings,
+        work.shapes,
+        work.step,
+        work.iterate,
+        1e-9,
+    )
+    found, forces = of_lanes(work.iterate), of_lanes(state.elements)[:, b.FLANK : b.FLANK + 4]
+    normal = forces.sum(1)
+    pressed = normal > 0.0
+    outward = np.hypot(found[:, b.RESIDUAL], found[:, b.RESIDUAL + 1])
+    assert pressed.sum() > 40
+    assert outward[pressed] == pytest.approx(normal[pressed] * belt.sine, rel=1e-4)
+    assert np.abs(found[:, b.RESIDUAL + 2]).max() < 1e-9 * normal.max()
+    # the penetration 1e-5 sin d0 on both points of stiffness c / 2
+    middle = np.argmax(pressed & (np.abs(f[:, 1]) < 1e-3) & (f[:, 0] < 0.0))
+    assert forces[middle] == pytest.approx(0.5 * belt.flank_stiffness * 1e-5 * belt.sine, rel=2e-2)
+
+
+def test_stiff_sheaves_are_rigid_ones():
+    rigid, stiff = scene(), scene(modal=((1e14, 1e14, 1e14), (1e14, 1e14, 1e14)))
+    for k in (b.DRIVING_LEFT, b.DRIVEN_RIGHT, b.DRIVING_TORQUE):
+        assert stiff[1].loads[k] == pytest.approx(rigid[1].loads[k], rel=5e-3)
+    assert np.abs(stiff[1].openings).max() < 1e-9
+
+
+def test_sheaves_lean_by_the_difference_of_their_loads():
+    _, state, _, loads, _ = revolution(modal="elastic")
+    # the first mode opens a sheave evenly by force over stiffness; it follows within a millisecond
+    difference = 0.5 * (loads[b.DRIVING_RIGHT] - loads[b.DRIVING_LEFT])
+    assert state.leans[0, 0] * 6e8 == pytest.approx(difference, rel=0.3)
+    assert state.openings[0, 0] * 6e8 == pytest.approx(loads[: b.DRIVEN_LEFT].mean(), rel=0.05)
+
+
+def test_pins_push_back_beyond_their_clearance():
+    nodes, clearance, pitch = 16, 1e-4, 0.02
+    belt = chains.belt(
+        pin_clearance=clearance, pin_stiffness=1e6, pitch=pitch, thickness=0.9 * pitch, contact_stiffness=0.0
+    )
+    # a straight line, closed upon itself, far from the pulleys
+    fields = np.zeros((nodes, b.STATE_FIELDS))
+    fields[:, 0], fields[:, 1] = pitch * np.arange(nodes), 1.0
+    fields[:, 3], fields[:, 7] = 1.0, -1.0
+    fields[:, b.LENGTH], fields[-1, b.LENGTH] = pitch, (nodes - 1) * pitch
+    fields[3, 1] += 1.2 * clearance
+    fields[3, 2] = 1.6 * clearance
+    state, work = chains.state(fields), b.workspace(belt, nodes)
+    assert advance(belt, b.Newton(tolerance=1e-12), state, work, np.zeros((2, b.INPUTS)), 1, 1e-9) == 0
+    f = of_lanes(state.elements)
+    # of both pairs of element 3: stiffness times what is beyond the clearance, along the offset
+    assert f[[2, 3], b.PIN] == pytest.approx(1e6 * clearance, rel=1e-3)
+    assert np.delete(f[:, b.PIN], [2, 3]) == pytest.approx(0.0, abs=1e-12)
+    push = belt.mass * f[3, b.SPEED + 1] / 1e-9, belt.mass * f[3, b.SPEED + 2] / 1e-9
+    assert push[0] == pytest.approx(-2.0 * 0.6 * 1e6 * clearance, rel=0.3)
+    _, momentum, _ = chains.energy_and_momentum(belt, f)
+    assert np.abs(momentum).max() < 1e-6 * abs(belt.mass * f[3, b.SPEED + 1])
+
+
+def test_a_step_that_is_not_solved_names_its_contact():
+    belt, state, work = scene()
+    hold = inputs((THRUST, THRUST), (LOAD, 1.5 * LOAD))
+    strict = b.Newton(tolerance=1e-14, most_iterations=3, most_failures=2)
+    assert advance(belt, strict, state, work, hold, 10, STEP) == b.NOT_CONVERGED
+    assert state.counters[b.IN_A_ROW] == 2
+    assert 0 <= state.counters[b.FAILED_ELEMENT] < NODES
+    assert 0 <= state.counters[b.FAILED_CONTACT] < len(b.CONTACTS)
+    broken = of_lanes(state.elements).copy()
+    broken[5, b.SPEED] = np.nan
+    state.elements.data[:] = in_lanes(broken).data
+    assert advance(belt, b.Newton(), state, work, hold, 10, STEP) == b.NOT_FINITE

@@ -1,0 +1,222 @@
+"""Runs of the spatial pushbelt, as a job asks for them."""
+
+import numpy as np
+import pytest
+
+from cvt_hpc.cli import main
+from cvt_hpc.errors import InputError
+from cvt_hpc.job import build_job
+from cvt_hpc.models.pushbelt.parameters import most_tension, path_length, string_limit
+from cvt_hpc.models.spatial_pushbelt.parameters import roll_limit
+from cvt_hpc.models.spatial_pushbelt.readings import ANGLES, SHEAVES
+from cvt_hpc.models.spatial_pushbelt.record import histories, judge
+from cvt_hpc.models.spatial_pushbelt.transient import Transient, given
+from cvt_hpc.physics.out_of_plane import axial_offset, clamped_force
+from cvt_hpc.simulation import run_point
+from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.variator.path import regions
+
+# A belt of few elements between rigid sheaves, clamped and loaded within a quarter of a revolution
+BELT = {"elements": 104, "band_high": 1000.0, "sheave_stiffness": np.inf, "rise_time": 0.01, "duration": 0.04}
+OFFSET = 5e-4  # [m]
+
+
+def job(**values):
+    return build_job(
+        {"name": "spatial", "model": values.pop("model", "spatial_pushbelt")},
+        "spatial",
+        {**BELT, "most_refinements": 0, "longest_duration": values.get("duration", 0.04), "load": 60.0}
+        | values,
+    )
+
+
+def record(**values):
+    asked = job(**values)
+    return run_point(asked, asked.point(0), lambda: None)
+
+
+@pytest.fixture(scope="module")
+def misaligned():
+    asked = job(misalignment=OFFSET)
+    run = Transient(asked.point(0), "newton")
+    run.advance(run.samples)
+    return run
+
+
+def test_both_pulleys_take_the_lateral_force_of_misaligned_strands(misaligned):
+    """The force of one pulley is that of the other, and of the order of two clamped strands under their tension."""
+    asked = job(misalignment=OFFSET)
+    found = run_point(asked, asked.point(0), lambda: None)
+    assert found["status"] == Status.DONE and found["unsolved_share"] == 0.0
+    driving, driven = found["net_axial_force"]
+    assert driving == pytest.approx(-driven, rel=0.01)
+    net = (
+        found["mean_ring_tension"]
+        - found["mean_push_force"]
+        - 1.4635 * (100.0 * np.pi * 0.063896 / 1.35) ** 2
+    )
+    strand, offset = misaligned.path.strand_length, found["final_misalignment"]
+    clamped = sum(clamped_force(offset, strand, tension, 47.6, 2.4e6) for tension in net)
+    assert found["beam_axial_force"] == pytest.approx([clamped, -clamped], rel=1e-3)
+    assert found["string_axial_force"][0] == pytest.approx(net.sum() * offset / strand, rel=1e-3)
+    # a belt runs through the arcs' ends, where elements slide and rings turn: not held as a clamped beam is
+    assert 0.6 * clamped < driving < clamped
+    assert found["sheave_force"].reshape(2, 2).mean(axis=1) == pytest.approx(found["axial_force"])
+    assert found["sheave_loss"].reshape(2, 2).sum(axis=1) == pytest.approx(found["flank_loss"])
+    assert found["final_misalignment"] == pytest.approx(OFFSET, rel=0.1)
+    assert abs(found["power_residual"]) < 1e-3
+    # the slopes of the strand are those of the elements, which yaw with it
+    assert 0.5 * 1.5 * OFFSET / strand < found["largest_yaw"] < 3.0 * 1.5 * OFFSET / strand
+
+
+def test_the_loose_sheave_has_the_thrust(misaligned):
+    """On the driven pulley the left sheave moves until it carries the thrust; the other one has the net force more."""
+    left, right = (
+        misaligned.channel(f"sheave_force driven {side}")[-200:].mean() for side in ("left", "right")
+    )
+    assert left == pytest.approx(20e3, rel=0.02)
+    assert right - left < -50.0
+
+
+def test_profiles_and_histories_agree_with_the_record(misaligned):
+    dataset, found = histories(misaligned), judge(misaligned)
+    assert dataset.sizes["probe"] == 2 * misaligned.displacement.shape[1] // 2
+    profiles = misaligned.profiles
+    both = profiles["contact_force_left"] + profiles["contact_force_right"]
+    known = np.isfinite(both)
+    assert both[known] == pytest.approx(2.0 * profiles["contact_force"][known])
+    assert profiles["push_force_left"] + profiles["push_force_right"] == pytest.approx(
+        profiles["push_force"], nan_ok=True
+    )
+    # elements lie in the mid planes of the arcs, and go over along the strands
+    region = regions(misaligned.path, misaligned.places)
+    for which, at in ((0, -0.5), (2, 0.5)):
+        assert np.nanmedian(profiles["lateral_position"][region == which]) == pytest.approx(
+            at * OFFSET, rel=0.15
+        )
+    assert (
+        np.nanmax(profiles["ring_slope"][region == 1]) > 0.0 > np.nanmin(profiles["ring_slope"][region == 3])
+    )
+    for sheave in SHEAVES:
+        assert dataset[f"sheave_force_{sheave.replace(' ', '_')}"].attrs["units"] == "N"
+    for angle in ANGLES:
+        assert found[f"largest_{angle}"] == dataset[f"largest_{angle}"].values[misaligned.judged].max()
+    assert set(found["lateral_amplitude"].shape) == set(found["amplitude"].shape) == {2}
+
+
+def test_an_aligned_belt_stays_in_its_plane_and_a_seed_leads_it_out():
+    values = {
+        "duration": 0.016,
+        "rise_time": 0.004,
+        "band_low": 700.0,
+        "driving_loose_side": "both",
+        "driven_loose_side": "both",
+    }
+    still = Transient(job(disturbance=0.0, **values).point(0), "newton")
+    still.advance(still.samples)
+    lateral = still.displacement[:, len(still.probes) // 2 :]
+    assert np.abs(lateral).max() < 1e-12 and still.failure is None
+    seeded = Transient(job(disturbance=1e-6, **values).point(0), "newton")
+    seeded.advance(seeded.samples)
+    lateral = seeded.displacement[:, len(seeded.probes) // 2 :]
+    assert 1e-8 < np.abs(lateral).max() < 1e-3
+
+
+def test_the_vibration_of_both_planes_is_judged_together():
+    run = Transient(job().point(0), "newton")
+    probes = [probe.label for probe in run.probes]
+    assert probes[:5] == [f"t1 {k}" for k in range(1, 6)] and probes[10] == "t1_lateral 1"
+    time = run.interval * np.arange(run.samples)
+    run._rows[:], run._totals[:], run.done = 0.0, np.linspace(0.0, 1.0, run.samples)[:, None], run.samples
+    run._rows[:, run.channels.index("driving_speed") + len(probes)] = 314.0
+    run._sums[:] = 1.0
+    run._rows[:, probes.index("t2_lateral 3")] = 2e-5 * np.sin(2.0 * np.pi * 600.0 * time)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = judge(run)
+    assert found["vibrates"] == Vibrates.YES and "t2_lateral" in found["reason"]
+    assert found["lateral_amplitude"] == pytest.approx([0.0, 2e-5], rel=0.02)
+    assert found["lateral_frequency"][1] == pytest.approx(600.0, rel=0.01)
+    assert (
+        found["amplitude"] == pytest.approx([0.0, 0.0])
+        and found["spectrum"].shape == found["lateral_spectrum"].shape
+    )
+
+
+def test_misalignment_follows_from_the_ratio_at_which_pulleys_are_aligned():
+    belt = {"belt_length": 0.6612, "elements": 216, "band_high": 600.0}
+    for ratio in (0.7, 1.35, 2.5):
+        point = job(ratio=ratio, aligned_ratio=1.0, **belt).point(0)
+        assert point["misalignment"] == axial_offset(point, 1.0) < 0.0
+    assert job(ratio=1.35, aligned_ratio=1.35, **belt).point(0)["misalignment"] == pytest.approx(
+        0.0, abs=1e-15
+    )
+    with pytest.raises(InputError, match="aligned_ratio: expected either aligned_ratio or misalignment"):
+        job(aligned_ratio=1.0, misalignment=1e-4)
+
+
+def test_lateral_stiffness_follows_from_the_strips():
+    point = job(bending_share=1.0).point(0)
+    # 18 strips of 185 um, of which EA is: each bends about its stiff axis
+    assert point["lateral_bending_stiffness"] == pytest.approx(6e6 * 9.75e-3**2 / 12.0)
+    assert job().point(0)["lateral_bending_stiffness"] == 47.6
+
+
+def test_super_elements_turn_as_stiffly_as_their_elements():
+    few, many = (given(job(elements=n).point(0)) for n in (108, 432))
+    assert few["yaw_stiffness"] == pytest.approx(4.0 * many["yaw_stiffness"]) == pytest.approx(8.0, rel=1e-3)
+
+
+def test_the_longest_step_is_that_of_the_strand_or_of_roll():
+    """Pitch sqrt(m' / T), and the waves of roll, of a torsion string: rings at +-b on elements that are plates."""
+    p = job(elements=432).point(0)
+    pitch = path_length(p) / 432
+    assert string_limit(p) == pytest.approx(pitch * np.sqrt(1.4635 / most_tension(p)), rel=1e-3)
+    inertia = 1.214 * (24e-3**2 + 13e-3**2) / 12.0 + 0.2495 * (7.5e-3**2 + 9.75e-3**2 / 12.0)
+    assert roll_limit(p) == pytest.approx(
+        pitch * np.sqrt(inertia / (most_tension(p) * (7.5e-3**2 + 9.75e-3**2 / 12.0))), rel=1e-6
+    )
+
+
+@pytest.mark.parametrize(
+    ("values", "complaint"),
+    [
+        ("belt.play=-0.1 mm", "[belt] play: expected >= 0 mm, found"),
+        ("belt.play=7 mm", "[belt] play: expected less than the pitch of the elements"),
+        ("scene.belt_length=300 mm", "[scene] belt_length: expected more than 0.31 m, twice the centre distance"),
+        ("scene.ratio=0.3", "[scene] ratio: expected pulleys that do not overlap"),
+        ("sheaves.outer_radius=60 mm", "[scene] ratio: expected radii within the sheaves, 0 to 0.06 m, found 1.35"),
+        ("scene.misalignment=8.7 mm", "[scene] misalignment: expected at most 0.00862 m, so that flanks meet the sheaves"),
+        ("scene.axis_tilt=25 mrad", "[scene] axis_tilt: expected >= -20 and <= 20 mrad, found"),
+        ("scene.misalinment=1 mm", "[scene] misalinment: unknown key; did you mean misalignment?"),
+        ("belt.nose_clearance=-0.1 mm", "[belt] nose_clearance: expected >= 0 mm, found"),
+        ("belt.lateral_bending_stiffness=-1 N m^2", "[belt] lateral_bending_stiffness: expected > 0 N m^2, found"),
+        ("belt.yaw_spring=-1 N", "[belt] yaw_spring: expected >= 0 N, found"),
+        ("belt.element_mass=-1 kg/m", "[belt] element_mass: expected > 0 kg/m, found"),
+        ("belt.edge_half_width=13 mm", "[belt] edge_half_width: expected at most half of element_width, 0.012 m, found"),
+        ("sheaves.half_wedge_angle=4 deg", "[sheaves] half_wedge_angle: expected >= 5 and <= 20 deg, found"),
+        ("sheaves.half_wedge_angle=21 deg", "[sheaves] half_wedge_angle: expected >= 5 and <= 20 deg, found"),
+        ("sheaves.driving_loose_side=top", '[sheaves] driving_loose_side: expected one of left, right, both, found "top"'),
+        ("belt.elements=60", "[belt] elements: expected 100 or more, or coarse = true, found 60"),
+        ("numerics.step=1 ms", "[numerics] step: expected at most 0.000122 s, pitch over the speed of transverse"),
+        ("numerics.step=0.121 ms", "[numerics] step: expected at most 0.000121 s, pitch over the speed of torsional"),
+        ("friction.friction_gradient=-80 s/m", "[numerics] step: expected at most"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_told_in_a_line_and_nothing_is_computed(
+    values, complaint, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    table, assignment = values.split(".", 1)
+    key, value = assignment.split("=")
+    text = {"belt": {"elements": 104}, "vibration": {"band_high": 1000}}
+    number = value.replace(".", "").isdigit()
+    text.setdefault(table, {})[key] = value if not number else float(value) if "." in value else int(value)
+    lines = ['name = "x"', 'model = "spatial_pushbelt"']
+    for name, entries in text.items():
+        lines += [f"[{name}]", *(f"{k} = {v!r}" for k, v in entries.items())]
+    (tmp_path / "x.toml").write_text("\n".join(lines).replace("'", '"'))
+    assert main(["run", "x.toml"]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1
+    assert err.startswith(f"cvt-hpc: x.toml: {complaint}"), err
+    assert [path.name for path in tmp_path.iterdir()] == ["x.toml"]

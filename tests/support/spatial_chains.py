@@ -1,0 +1,159 @@
+"""Scenes of the spatial pushbelt's kernels, made from arrays."""
+
+import numpy as np
+
+from cvt_hpc.models.pushbelt import belt as p
+from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes
+from cvt_hpc.models.spatial_pushbelt import belt as b
+from cvt_hpc.physics.friction_laws import Law
+
+WEDGE = np.deg2rad(11.0)
+
+
+def belt(**given):
+    """Constants of 432 elements of 1.53 mm as the design has them; without pins, dampers and modes."""
+    mass, thickness = 1.858e-3, 1.53e-3
+    square = mass / 12.0
+    constants = {
+        "centre_distance": 0.155,
+        "axes": np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]]),
+        "loose_side": np.zeros(2),
+        "sine": np.sin(WEDGE),
+        "cosine": np.cos(WEDGE),
+        "half_width": 12e-3,
+        "flank_reach": 3e-3,
+        "thickness": thickness,
+        "pitch": 661.2e-3 / 432,
+        "pitch_depth": 1.5e-3,
+        "head_height": 4e-3,
+        "edge_width": 10e-3,
+        "head_width": 5e-3,
+        "package_distance": 7.5e-3,
+        "pin_height": 2.5e-3,
+        "pin_clearance": np.inf,
+        "pin_stiffness": 1e8,
+        "mass": mass,
+        "roll_inertia": square * (24e-3**2 + 13e-3**2),
+        "yaw_inertia": square * (24e-3**2 + thickness**2),
+        "pitch_inertia": square * (13e-3**2 + thickness**2),
+        "ring_mass": 0.165 / 432,
+        "ring_rotary_inertia": 0.165 / 432 * 9.75e-3**2 / 12.0,
+        "ring_stiffness": 6.0e6,
+        "ring_bending": 47.6,
+        "ring_shear": 2.4e6,
+        "flank_stiffness": 5e7,
+        "contact_stiffness": 1e9,
+        "angle_stiffness": 0.0,
+        "angle_damping": 0.0,
+        "yaw_stiffness": 0.0,
+        "yaw_damping": 0.0,
+        "transverse_damping": 0.0,
+        "lateral_damping": 0.0,
+        "flank_law": int(Law.COULOMB),
+        "flank_kinetic": 0.0,
+        "flank_gradient": 0.0,
+        "flank_speed": 0.1,
+        "friction_memory": 0.0,
+        "ring_friction": 0.0,
+        "friction_speed": 5e-4,
+        "ring_friction_speed": 5e-4,
+        "driven_inertia": 0.01,
+        "driving_rate": 0.0,
+        "driven_rate": 0.0,
+        "modal_stiffness": np.zeros((2, 0)),
+        "lean_lag": 1e-3,
+    }
+    return b.Belt(**constants | given)
+
+
+def state(fields, pulleys=(0.0, 0.0, 1e-6, 1e-6, 0.0, 0.0), modes=0):
+    """A state of elements (nodes, STATE_FIELDS) beside pulleys too small to be touched."""
+    return b.BeltState(
+        in_lanes(fields),
+        np.array(pulleys, dtype=float),
+        np.zeros((2, modes)),
+        np.zeros((2, modes)),
+        np.zeros(1 + 2 * modes),
+        np.zeros(b.LOADS),
+        np.zeros(b.TOTALS),
+        np.zeros(b.COUNTERS, np.int64),
+    )
+
+
+def spinning_ring(nodes, radius, speed):
+    """Fields of a free ring that spins in equilibrium, counter-clockwise [m], [rad/s]."""
+    angle = 2.0 * np.pi * np.arange(nodes) / nodes
+    none = np.zeros(nodes)
+    fields = np.zeros((nodes, b.STATE_FIELDS))
+    fields[:, :3] = radius * np.stack([np.cos(angle), np.sin(angle), none], 1)
+    fields[:, 3:6] = np.stack([-np.sin(angle), np.cos(angle), none], 1)
+    fields[:, 6:9] = np.stack([np.cos(angle), np.sin(angle), none], 1)
+    fields[:, b.SPEED : b.SPEED + 3] = speed * radius * fields[:, 3:6]
+    fields[:, b.OMEGA + 2] = speed
+    fields[:, b.V] = speed * radius
+    return fields
+
+
+def energy_and_momentum(constants, fields):
+    """Kinetic energy, with that of lateral bending and stretching [J], momentum and its moment about 0."""
+    r, x, o = fields[:, 0:3], fields[:, 3:6], fields[:, 6:9]
+    a = np.cross(o, x)
+    u, w = fields[:, b.SPEED : b.SPEED + 3], fields[:, b.OMEGA : b.OMEGA + 3]
+    v, rate = fields[:, b.V], fields[:, b.SLOPE_RATE]
+    inertias = constants.roll_inertia, constants.yaw_inertia, constants.pitch_inertia
+    spin = sum(k * d * np.sum(d * w, 1)[:, None] for k, d in zip(inertias, (x, o, a), strict=True))
+    momentum, moment = constants.mass * u, constants.mass * np.cross(r, u) + spin
+    energy = 0.5 * np.sum(u * momentum) + 0.5 * np.sum(w * spin)
+    energy += 0.5 * constants.ring_rotary_inertia * np.sum(rate**2)
+    for side in (1.0, -1.0):
+        p = r + side * constants.package_distance * a
+        t = np.roll(p, -1, 0) - np.roll(p, 1, 0)
+        t /= np.linalg.norm(t, axis=1)[:, None]
+        q = u + side * constants.package_distance * np.cross(w, a)
+        q = q + (v - np.sum(t * q, 1))[:, None] * t
+        momentum = momentum + 0.5 * constants.ring_mass * q
+        moment = moment + 0.5 * constants.ring_mass * np.cross(p, q)
+        energy += 0.25 * constants.ring_mass * np.sum(q**2)
+    h = constants.pitch
+    slope = fields[:, b.SLOPE]
+    shear = (np.roll(r[:, 2], -1) - r[:, 2]) / h - 0.5 * (slope + np.roll(slope, -1))
+    energy += 0.5 * constants.ring_shear * h * np.sum(shear**2)
+    energy += 0.5 * constants.ring_bending / h * np.sum((np.roll(slope, -1) - slope) ** 2)
+    strain = fields[:, b.TENSION] / constants.ring_stiffness
+    energy += 0.5 * constants.ring_stiffness * np.sum(strain**2 * fields[:, b.LENGTH])
+    return energy, momentum.sum(0), moment.sum(0)
+
+
+__all__ = ["belt", "energy_and_momentum", "of_lanes", "spinning_ring", "state"]
+
+
+def beside_planar(planar, planar_state, **given):
+    """Constants and state of the spatial belt that is the planar one where it stays in its plane."""
+    nodes = of_lanes(planar_state.elements).shape[0]
+    group = 432.0 / nodes
+    shared = {name: getattr(planar, name) for name in b.Belt._fields if hasattr(planar, name)}
+    f = of_lanes(planar_state.elements)
+    first, last = f[0, [p.Y, p.Z]], f[1, [p.Y, p.Z]]
+    thickness, square = planar.thickness, planar.mass / 12.0
+    constants = belt(
+        **shared
+        | {
+            "pitch": float(np.linalg.norm(last - first)),
+            "roll_inertia": square * (24e-3**2 + 13e-3**2),
+            "yaw_inertia": square * (24e-3**2 + thickness**2),
+            "pitch_inertia": planar.inertia,
+            "ring_rotary_inertia": planar.ring_mass * 9.75e-3**2 / 12.0,
+            "yaw_stiffness": 2.0 * group,
+            "yaw_damping": 5e-5 * group,
+        }
+        | given
+    )
+    fields = np.zeros((nodes, b.STATE_FIELDS))
+    fields[:, 0:2], fields[:, 3:5] = f[:, [p.Y, p.Z]], f[:, [p.HEADING_Y, p.HEADING_Z]]
+    fields[:, 6:8] = np.stack([f[:, p.HEADING_Z], -f[:, p.HEADING_Y]], 1)
+    fields[:, b.SPEED : b.SPEED + 2] = f[:, [p.U_Y, p.U_Z]]
+    fields[:, b.OMEGA + 2], fields[:, b.V] = f[:, p.OMEGA], f[:, p.V]
+    fields[:, b.LENGTH], fields[:, b.TENSION] = f[:, p.LENGTH], f[:, p.TENSION]
+    fields[:, b.DRIVEN] = f[:, p.DRIVEN]
+    modes = constants.modal_stiffness.shape[1]
+    return constants, state(fields, [*planar_state.pulleys, 0.0, 0.0], modes)
