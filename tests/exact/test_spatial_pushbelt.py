@@ -13,8 +13,8 @@ from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.flank import flank_forces
 from cvt_hpc.models.spatial_pushbelt.step import _prepare, advance
 from cvt_hpc.physics.friction_laws import Law
-from tests.exact.test_pushbelt import SPEED, THRUST, given
 from tests.support import spatial_chains as chains
+from tests.support.pushbelts import SPEED, THRUST, given
 
 NODES, STEP, TORQUE = 104, 1e-5, 60.0
 LOAD = 1.35 * TORQUE
