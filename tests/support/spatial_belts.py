@@ -1,4 +1,4 @@
-"""A spatial pushbelt between its pulleys under thrust and load, for tests and for what is timed of it."""
+"""A spatial pushbelt under its thrust and load, beside the common planar one."""
 
 import numpy as np
 
@@ -12,7 +12,6 @@ NODES, STEP, TORQUE = 104, 1e-5, 60.0
 LOAD = 1.35 * TORQUE
 RAMP = 1500  # steps
 OFFSET = 0.5e-3  # of the driven pulley along its axis [m]
-MODES = ((6e8, 3e8, 3e8), (6e8, 3e8, 3e8))  # [N/m]
 
 
 def inputs(thrusts, loads, fields=b.INPUTS, drift=0.0):
