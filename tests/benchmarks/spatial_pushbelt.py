@@ -10,9 +10,13 @@ Takes two minutes; the machine ought to be idle.
 """
 
 import argparse
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.spatial_pushbelt import belt as b
