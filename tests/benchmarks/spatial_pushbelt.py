@@ -2,7 +2,7 @@
 
     python tests/benchmarks/spatial_pushbelt.py [--turns 3]
 
-The scene is that of `tests/exact/test_spatial_pushbelt.py` with pins: ratio 1.35, 100 pi rad/s, 20 kN, 60 N m,
+The scene is that of `tests/support/spatial_belts.py` with pins: ratio 1.35, 100 pi rad/s, 20 kN, 60 N m,
 Coulomb friction at flanks and rings, and an offset of 0.5 mm. Each row is the least of a few turns of 2 ms, 45 ms
 after the start; beside it iterations a step, steps that were not solved, and what the balance of power leaves open
 over the turns. Prints a table, and the time of the first call, in which kernels are compiled if they are not yet.
@@ -10,14 +10,19 @@ Takes two minutes; the machine ought to be idle.
 """
 
 import argparse
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.step import advance
-from tests.exact.test_spatial_pushbelt import LOAD, THRUST, inputs, scene, stored
+from support.pushbelts import THRUST
+from support.spatial_belts import LOAD, inputs, scene, stored
 
 FIVE = ((6e8, 3e8, 3e8, 9e8, 9e8),) * 2  # [N/m]
 ROWS = (

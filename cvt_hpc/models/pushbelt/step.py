@@ -86,6 +86,7 @@ from cvt_hpc.models.pushbelt.power import book
 from cvt_hpc.physics.contact_laws import remembered
 from cvt_hpc.solvers.cyclic_blocks import block_size
 from cvt_hpc.solvers.linked_blocks import solve
+from cvt_hpc.solvers.small_system import solve_small
 
 _SIZE = block_size(4)  # unknowns of an element: both speeds, rotation, speed of the ring
 _LARGE = 1e100  # more than any speed or power that means something
@@ -106,21 +107,6 @@ def _shapes(belt, step, shapes):
                 shapes[j, k] = sine
             else:
                 shapes[j, k] = 1.0
-
-
-@kernel
-def _solve_border(border):
-    """Solve the border's equations, by elimination without pivoting."""
-    size = border.shape[0]
-    for p in range(size):
-        per_pivot = 1.0 / border[p, p]
-        for c in range(p, size + 1):
-            border[p, c] *= per_pivot
-        for r in range(size):
-            if r != p:
-                factor = border[r, p]
-                for c in range(p, size + 1):
-                    border[r, c] -= factor * border[p, c]
 
 
 @kernel
@@ -203,7 +189,7 @@ def _solve(belt, state, work, dt):
         add_nose_blocks(elements, step, iterate, work.blocks)
     is_regular = solve(work.blocks, work.scratch, _SIZE)
     border_system(belt, elements, work.shapes, step, iterate, work.blocks, work.scratch, work.border, dt)
-    _solve_border(work.border)
+    solve_small(work.border)
     return is_regular
 
 

@@ -308,6 +308,8 @@ class Workspace(NamedTuple):
         Of the solver, and sums.
     border : (columns - 1, columns) array
         System of the border, its right side last.
+    sums : (1, (columns - 1) columns) LaneArray
+        Its entries in the parts of the ring.
     inputs : (INPUTS,) array
         Inputs of the step.
     increments : (1 + 2 modes,) array
@@ -322,6 +324,7 @@ class Workspace(NamedTuple):
     blocks: LaneArray
     scratch: LaneArray
     border: np.ndarray
+    sums: LaneArray
     inputs: np.ndarray
     increments: np.ndarray
     kept: np.ndarray
@@ -412,6 +415,7 @@ def workspace(belt: Belt, nodes: int) -> Workspace:
         blocks=empty_system(nodes, parts, SIZE, columns),
         scratch=empty_scratch(parts, SIZE, columns),
         border=np.zeros((columns - 1, columns)),
+        sums=lanes(1, (columns - 1) * columns),
         inputs=np.zeros(INPUTS),
         increments=np.zeros(columns - 1),
         kept=np.zeros((2, STATE_FIELDS)),

@@ -18,14 +18,14 @@ from cvt_hpc.variator import PULLEYS, STRANDS
 SIDES = ("left", "right")
 SHEAVES = tuple(f"{pulley} {side}" for pulley in PULLEYS for side in SIDES)
 ANGLES = ("roll", "yaw", "pitch")
+EXTREMES = (*ANGLES, "nose_force")  # the largest of any element
 LATERAL = tuple(f"{strand}_lateral" for strand in STRANDS)  # where probes have lateral displacement
 SCALARS = (
     *PLANAR_SCALARS,
     *(f"sheave_force {sheave}" for sheave in SHEAVES),
     *(f"sheave_loss {sheave}" for sheave in SHEAVES),
-    "misalignment",
-    *(f"largest_{angle}" for angle in ANGLES),
-    "largest_nose_force",
+    "axial_offset",
+    *(f"extreme_{what}" for what in EXTREMES),
 )
 _FLANK = "mean line force of the flank"
 PROFILES = {
