@@ -10,15 +10,19 @@ Takes two minutes; the machine ought to be idle.
 """
 
 import argparse
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.step import advance
-from tests.support.pushbelts import THRUST
-from tests.support.spatial_belts import LOAD, inputs, scene, stored
+from support.pushbelts import THRUST
+from support.spatial_belts import LOAD, inputs, scene, stored
 
 FIVE = ((6e8, 3e8, 3e8, 9e8, 9e8),) * 2  # [N/m]
 ROWS = (

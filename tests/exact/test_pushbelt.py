@@ -19,7 +19,7 @@ from cvt_hpc.models.pushbelt.start_up import fingerprint
 from cvt_hpc.models.pushbelt.step import _correct, _evaluate, _prepare, _solve, advance
 from cvt_hpc.solvers.cyclic_blocks import block_size
 from cvt_hpc.solvers.linked_blocks import solve
-from tests.support.pushbelts import NODES, SPEED, THRUST, given
+from support.pushbelts import NODES, SPEED, THRUST, given
 
 STEP = 1e-5  # [s]
 LOAD = 81.0  # [N m]

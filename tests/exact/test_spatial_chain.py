@@ -17,7 +17,7 @@ from cvt_hpc.models.spatial_pushbelt.step import (
     _solve,
     advance,
 )
-from tests.support import spatial_chains as chains
+from support import spatial_chains as chains
 
 NODES, RADIUS, SPIN = 216, 0.1082, 250.0  # [m], [rad/s]
 STEP = 1e-5  # [s]

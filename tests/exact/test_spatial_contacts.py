@@ -12,8 +12,8 @@ from cvt_hpc.models.spatial_pushbelt.flank import flank_directions, frustum, fru
 from cvt_hpc.models.spatial_pushbelt.pin import pin_offset
 from cvt_hpc.models.spatial_pushbelt.step import _assemble, _evaluate, _prepare
 from cvt_hpc.physics.friction_laws import Law
-from tests.support import spatial_chains as chains
-from tests.support.pushbelts import given
+from support import spatial_chains as chains
+from support.pushbelts import given
 
 NODES, STEP, LOAD = 64, 1e-5, 81.0
 RIGHT = b.RIGHT

@@ -13,9 +13,9 @@ from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.flank import flank_forces
 from cvt_hpc.models.spatial_pushbelt.step import _prepare, advance
 from cvt_hpc.physics.friction_laws import Law
-from tests.support import spatial_chains as chains
-from tests.support.pushbelts import THRUST, given
-from tests.support.spatial_belts import LOAD, NODES, RAMP, STEP, TORQUE, inputs, scene, stored
+from support import spatial_chains as chains
+from support.pushbelts import THRUST, given
+from support.spatial_belts import LOAD, NODES, RAMP, STEP, TORQUE, inputs, scene, stored
 
 MODES = ((6e8, 3e8, 3e8), (6e8, 3e8, 3e8))  # [N/m]
 

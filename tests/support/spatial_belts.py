@@ -5,8 +5,8 @@ import numpy as np
 from cvt_hpc.models.pushbelt.start import of_lanes, start
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.step import advance
-from tests.support import spatial_chains as chains
-from tests.support.pushbelts import SPEED, THRUST, given
+from support import spatial_chains as chains
+from support.pushbelts import SPEED, THRUST, given
 
 NODES, STEP, TORQUE = 104, 1e-5, 60.0
 LOAD = 1.35 * TORQUE
