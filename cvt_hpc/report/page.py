@@ -167,7 +167,6 @@ def _interactive(arrangement: Arrangement | None) -> str:
         "displaylogo": False,
         "modeBarButtonsToRemove": ["select2d", "lasso2d"],
         "showSendToCloud": False,  # the library's default is a button that uploads the map
-        "plotlyServerURL": "",
     }
     return map_with_values(sheet).to_html(
         full_html=False, include_plotlyjs=True, div_id="map", config=settings
