@@ -136,14 +136,30 @@ def _last_periods(history: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.
     motion = history["displacement"].transpose("time", "probe").values
     judged = motion[-max(int(_judged_fraction(history) * len(time)), LEAST_SAMPLES) :]
     motion = motion - judged.mean(0)
+    period = 1.0 / (_recorded_frequency(history) or _main_frequency(time, judged))
+    shown = np.linspace(max(time[-1] - PERIODS * period, time[0]), time[-1], PERIODS * FRAMES)
+    return shown, CubicSpline(time, motion)(shown), period
+
+
+def _recorded_frequency(history: xr.Dataset) -> float:
+    """Return the frequency [Hz] that the run's record has of the strongest strand; 0 where it has none."""
+    if "frequency" not in history or "amplitude" not in history:
+        return 0.0
+    found = [
+        (float(amplitude), float(frequency))
+        for amplitude, frequency in zip(history["amplitude"].values, history["frequency"].values, strict=True)
+        if np.isfinite(amplitude) and 0.0 < frequency < np.inf
+    ]
+    return max(found, default=(0.0, 0.0))[1]
+
+
+def _main_frequency(time: NDArray[np.float64], judged: NDArray[np.float64]) -> float:
+    """Return the frequency [Hz] of the highest line of the strongest probe's spectrum."""
     strongest = int(np.abs(judged - judged.mean(0)).max(0).argmax())
     signal = judged[:, strongest] - judged[:, strongest].mean()
     interval = float(np.diff(time).mean())
     spectrum = np.abs(np.fft.rfft(signal * np.hanning(signal.size)))
-    frequency = np.fft.rfftfreq(signal.size, interval)[max(int(spectrum[1:].argmax()) + 1, 1)]
-    period = 1.0 / float(frequency)
-    shown = np.linspace(max(time[-1] - PERIODS * period, time[0]), time[-1], PERIODS * FRAMES)
-    return shown, CubicSpline(time, motion)(shown), period
+    return float(np.fft.rfftfreq(signal.size, interval)[int(spectrum[1:].argmax()) + 1])
 
 
 def _judged_fraction(history: xr.Dataset) -> float:

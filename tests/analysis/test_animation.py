@@ -44,6 +44,17 @@ def test_the_picture_shows_the_last_periods_at_the_probes_and_between():
     np.testing.assert_allclose(along, motion, atol=1e-12)
 
 
+def test_the_frequency_is_that_of_the_record_where_it_has_one():
+    """A slow drift would else be taken for the vibration."""
+    run = history(495.0)
+    run["displacement"] = run["displacement"] + 1e-3 * run["time"] / run["time"][-1]
+    assert 1 / _last_periods(run)[2] < 20.0
+    recorded = run.assign(amplitude=("strand", [20e-6, 1e-6]), frequency=("strand", [495.0, 700.0]))
+    assert 1 / _last_periods(recorded)[2] == pytest.approx(495.0)
+    unknown = run.assign(amplitude=("strand", [np.nan] * 2), frequency=("strand", [np.nan] * 2))
+    assert _last_periods(unknown)[2] == _last_periods(run)[2]
+
+
 @pytest.mark.parametrize("fraction", [0.0, 2.0, "half", np.nan])
 def test_without_a_judged_part_the_last_half_is_taken(fraction):
     expected = _last_periods(history())
