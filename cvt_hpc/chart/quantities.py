@@ -153,6 +153,12 @@ def _speed_loss(history: History, quantity: Quantity) -> Array:
     return np.array([1.0 - history.parameters["ratio"] * driven.mean() / driving.mean()])
 
 
+def _net_axial_force(history: History, quantity: Quantity) -> Array:
+    left, right = (history.channel(name)[history.judged].mean() for name in _DRIVING_SHEAVES)
+    return np.array([right - left])
+
+
+_DRIVING_SHEAVES = ("sheave_force driving left", "sheave_force driving right")
 _TIMES = (1e-6, 1e3)  # [s]
 KINDS: dict[str, Kind] = {
     "trajectory": Kind("m", "trajectory", _trajectory, takes_part=True, needs_part=True),
@@ -163,6 +169,7 @@ KINDS: dict[str, Kind] = {
     "onset": Kind("N m", "onset load", _onset, takes_part=True),
     "push_force": _means("N", "push force", "push_force t1", "push_force t2"),
     "ring_tension": _means("N", "ring tension", "ring_tension t1", "ring_tension t2"),
+    "net_axial_force": Kind("N", "net axial force", _net_axial_force, channels=_DRIVING_SHEAVES),
     "strand_tension": _means("N", "strand tension", "tension t1", "tension t2"),
     "speed_loss": Kind("1", "speed loss", _speed_loss, channels=("driven_speed", "driving_speed")),
     "friction_loss": _means("W", "friction losses", "driving_flank_loss", "driven_flank_loss", "ring_loss"),

@@ -7,18 +7,20 @@ processor; a plain number beside it counts for all lanes. So a run's results do 
 Nor do they depend on W: every operation is rounded once, as IEEE 754 has it, and products are fused with sums
 only where `fma` says so.
 
-The functions take plain numbers too, so that a formula of both stands once.
+The functions take plain numbers too, so that a formula of both stands once. Products of small blocks of lanes
+are in `lanes.blocks`.
 
 A loop over lanes in plain arrays would be left to the compiler's vectoriser, which gives up where it cannot
 rule out that two of many arrays overlap.
 """
 
-from cvt_hpc.lanes import arithmetic, places  # noqa: F401  they teach the compiler what + and [] mean
+from cvt_hpc.lanes import arithmetic, blocks, places  # noqa: F401  they teach the compiler what + and [] mean
 from cvt_hpc.lanes.functions import (
     absolute,
     anywhere,
     decay,
     fma,
+    halving,
     like,
     maximum,
     minimum,
@@ -53,6 +55,7 @@ __all__ = [
     "behind",
     "decay",
     "fma",
+    "halving",
     "from_ahead",
     "from_behind",
     "like",

@@ -100,10 +100,12 @@ def _sweep(lanes: _Lanes, b: int, factors: Any, total: list, k: int, others: ran
 
 
 def _on_columns(starts: bool, divides: bool, *signs: tuple[int, bool]) -> Any:
-    """A function for kernels that replaces columns by (what stands there + products) / factors.
+    """A function for kernels that replaces columns by those that stand there (or zero) and products.
 
-    Its arguments are the size, the number of columns, and places of the columns, of the factors if it
-    divides, and of block and columns of each product: array, row and first field.
+    It may divide them by factors (multiply by the inverse of their product). Of each product it takes a sign
+    and whether the block is transposed. Its arguments are the size, the number of columns and a tuple with
+    array, row and first field of these columns, of the factors if it divides, and of block and columns of
+    each product. Columns that are read must not be those that are written.
     """
 
     @intrinsic
@@ -143,13 +145,14 @@ def _on_columns(starts: bool, divides: bool, *signs: tuple[int, bool]) -> Any:
     return act
 
 
-divide = _on_columns(True, True)
-subtract_products = _on_columns(True, False, (-1, False), (-1, False))
-subtract_transposed_product = _on_columns(True, False, (-1, True))
-add_product = _on_columns(True, False, (1, False))
-set_negative_product = _on_columns(False, False, (-1, False))
-subtract_transposed_product_and_divide = _on_columns(True, True, (-1, True))
-set_negative_transposed_product_and_divide = _on_columns(False, True, (-1, True))
+# Each takes the size, the number of columns, and places as `_on_columns` has them; x are the columns written.
+divide = _on_columns(True, True)  # A^-1 x
+add_product = _on_columns(True, False, (1, False))  # x + M y
+set_negative_product = _on_columns(False, False, (-1, False))  # -M y
+subtract_products = _on_columns(True, False, (-1, False), (-1, False))  # x - M y - N z
+subtract_transposed_product = _on_columns(True, False, (-1, True))  # x - M' y
+subtract_transposed_product_and_divide = _on_columns(True, True, (-1, True))  # A^-1 (x - M' y)
+set_negative_transposed_product_and_divide = _on_columns(False, True, (-1, True))  # -A^-1 M' y
 
 
 @intrinsic
@@ -161,11 +164,11 @@ def factor(context, size, array, row, field, given, given_row, given_field):
 
     def build(context, builder, sig, arguments):
         lanes, b = _Lanes(context, builder, array), size.count
-        row_, field_, given_row_, given_field_ = (
+        row, field, given_row, given_field = (
             context.cast(builder, arguments[k], sig.args[k], types.intp) for k in (2, 3, 5, 6)
         )
-        first = lanes.at(array, arguments[1], row_, field_)
-        scale = lanes.at(given, arguments[4], given_row_, given_field_)
+        first = lanes.at(array, arguments[1], row, field)
+        scale = lanes.at(given, arguments[4], given_row, given_field)
         a = [[lanes.load(first, r + b * c) for r in range(b)] for c in range(b)]
         found = ir.Constant(ir.VectorType(ir.IntType(1), array.count), [1] * array.count)
         for k in range(b):
@@ -174,8 +177,7 @@ def factor(context, size, array, row, field, given, given_row, given_field):
             found = builder.and_(found, builder.fcmp_ordered(">", lanes.call("fabs", pivot), least))
             a[k][k] = per_pivot = builder.fdiv(lanes.constant(1.0), pivot)
             for c in range(k + 1, b):
-                entry = a[c][k]
-                a[c][k] = builder.fmul(per_pivot, entry)
+                a[c][k] = builder.fmul(per_pivot, a[c][k])
                 less = builder.fneg(a[c][k])
                 for r in range(k + 1, b):
                     a[c][r] = lanes.call("fma", a[k][r], less, a[c][r])

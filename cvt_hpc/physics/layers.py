@@ -10,7 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from cvt_hpc.kernels import kernel, merged_kernel
-from cvt_hpc.lanes import absolute, decay, fma, maximum, reciprocals
+from cvt_hpc.lanes import absolute, fma, halving, maximum
+
+PER_LN_2 = 1.4426950408889634
 
 
 @kernel
@@ -48,7 +50,7 @@ def ring_friction(speed, kinetic, falls, static_excess, per_stribeck, per_width,
     speed
         Sliding speed, any sign [m/s]; lanes or a plain number, as all that follow but `falls`.
     kinetic, static_excess
-        mu_k, and mu_s / mu_k - 1.
+        mu_k, or that times a normal force, which then is in the results, and mu_s / mu_k - 1.
     falls : bool
         Whether mu_s is larger than mu_k anywhere.
     per_stribeck, per_width
@@ -64,10 +66,13 @@ def ring_friction(speed, kinetic, falls, static_excess, per_stribeck, per_width,
     size = maximum(absolute(speed), least)
     level = kinetic
     if falls:
-        level = kinetic * fma(static_excess, decay(size * per_stribeck), 1.0)
-    # tanh(x) = (1 - e^-2x) / (1 + e^-2x) and 1 / |v| by one division
-    rest = decay(size * (2.0 * per_width))
-    per_sum, per_size = reciprocals(1.0 + rest, size)
-    factor = (1.0 - rest) * per_sum
-    secant, slope = level * factor * per_size, level * per_width * fma(-factor, factor, 1.0)
+        level = kinetic * fma(static_excess, halving(size * (PER_LN_2 * per_stribeck)), 1.0)
+    # tanh(x) = (1 - e) / (1 + e) and its slope 4 e / (1 + e)^2, with e = e^-2x, and 1 / |v| by one division
+    rest = halving(size * (2.0 * PER_LN_2 * per_width))
+    per_both = 1.0 / ((1.0 + rest) * size)
+    per_sum = size * per_both
+    secant, slope = (
+        level * ((1.0 - rest) * per_both),
+        (level * (4.0 * per_width)) * (rest * per_sum * per_sum),
+    )
     return secant, slope

@@ -18,12 +18,10 @@ LEAST_DISK = 1e9  # [byte]: records and results.nc of a million runs take about 
 PATIENCE = 60.0  # [s] for a program that is tried out
 _RANKS = 2
 # One rank answers for all: lines of two may come mixed
-_COUNT_RANKS = """
-from mpi4py import MPI
-counted = MPI.COMM_WORLD.allreduce(1)
-if MPI.COMM_WORLD.rank == 0:
-    print(f"{counted} {MPI.Get_library_version().split()[0]}")
-"""
+_COUNT_RANKS = (
+    "from mpi4py import MPI; count = MPI.COMM_WORLD.allreduce(1); "
+    "MPI.COMM_WORLD.rank or print(f'{count} {MPI.Get_library_version().split()[0]}')"
+)
 
 
 class Finding(NamedTuple):

@@ -22,6 +22,7 @@ def test_there_are_charts():
         "chart_oscillator",
         "chart_pushbelt",
         "chart_ratios",
+        "chart_spatial_pushbelt",
     ]
 
 

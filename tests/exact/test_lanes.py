@@ -17,6 +17,7 @@ from cvt_hpc.lanes import (
     anywhere,
     decay,
     fma,
+    halving,
     like,
     maximum,
     minimum,
@@ -44,6 +45,7 @@ NAMES = (
         "chosen number",
         "reciprocal",
         "other reciprocal",
+        "halving",
     ),
 )
 PLAIN = 0  # instead of a number of lanes
@@ -88,6 +90,7 @@ def operate(rows: int, a: LaneArray, b: LaneArray, out: LaneArray, number: float
         out[j, 24] = number
         out[j, 25] = select(x < y, x, number)
         out[j, 26], out[j, 27] = reciprocals(x, y)
+        out[j, 28] = halving(x)
 
 
 @kernel
@@ -184,7 +187,7 @@ def test_operations_are_numpys(dtype, lanes):
         "number": np.full_like(a, n),
         "chosen number": np.where(a < b, a, n),
     }
-    assert set(NAMES) - set(expected) == {"fused", "decay", "reciprocal", "other reciprocal"}
+    assert set(NAMES) - set(expected) == {"fused", "decay", "halving", "reciprocal", "other reciprocal"}
     for name, values in expected.items():
         assert same_bits(found[name], values.astype(dtype)), name
 
@@ -216,6 +219,19 @@ def test_two_reciprocals_by_one_division(dtype, lanes):
     for name, x in (("reciprocal", a), ("other reciprocal", b)):
         exact = 1 / x[fit].astype(np.longdouble)
         assert np.max(np.abs(found[name][fit] / exact - 1)) < 2 * np.finfo(dtype).eps
+
+
+@pytest.mark.parametrize(("dtype", "lanes"), TYPES)
+def test_powers_of_one_half_to_two_roundings(dtype, lanes):
+    largest = 125 if dtype is np.float32 else 1021
+    x = np.concatenate([np.linspace(0, largest, 15000), np.linspace(0, 3, 1000)]).astype(dtype)
+    found = results_of(x, x, lanes)["halving"]
+    assert np.max(np.abs(found / np.exp2(-x.astype(np.longdouble)) - 1)) < 2 * np.finfo(dtype).eps
+    assert found[0] == 1
+    if lanes == PLAIN:
+        return
+    a, outside = operands(dtype)[0], results(dtype, lanes)["halving"]
+    assert np.all(outside[(a > 1e4) | np.isnan(a)] == found[14999]) and np.sum(a == np.inf) > 0
 
 
 @pytest.mark.parametrize(("dtype", "lanes"), TYPES)

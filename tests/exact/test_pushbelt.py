@@ -10,64 +10,20 @@ from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.pushbelt import belt as b
 from cvt_hpc.models.pushbelt import start as starting
 from cvt_hpc.models.pushbelt import transient
-from cvt_hpc.models.pushbelt.assembly import RIGHT
-from cvt_hpc.models.pushbelt.cyclic import solve
+from cvt_hpc.models.pushbelt.assembly import RIGHT, assemble
+from cvt_hpc.models.pushbelt.nose import add_nose_blocks
 from cvt_hpc.models.pushbelt.parameters import falling_limit, path_length
 from cvt_hpc.models.pushbelt.readings import Reading
 from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start, workspace
 from cvt_hpc.models.pushbelt.start_up import fingerprint
 from cvt_hpc.models.pushbelt.step import _correct, _evaluate, _prepare, _solve, advance
+from cvt_hpc.solvers.cyclic_blocks import block_size
+from cvt_hpc.solvers.linked_blocks import solve
+from support.pushbelts import NODES, SPEED, THRUST, given
 
-# Assumptions, but for centre distance, belt length, elements and their mass, which are a public data set's.
-ASSUMED = {
-    "ratio": 1.35,  # [1]
-    "centre_distance": 0.155,  # [m]
-    "belt_length": 0.6612,  # of the pitch line, on which the rocking edges lie [m]
-    "elements": 432,  # each of the values below; `given` makes super elements of them
-    "element_mass": 1.858e-3,  # [kg]
-    "element_height": 13e-3,  # [m], of which and of the thickness the inertia is that of a plate
-    "pitch_depth": 1.5e-3,  # [m]
-    "head_height": 4e-3,  # [m]
-    "play": 0.3e-3,  # sum of the gaps between elements [m]
-    "ring_mass": 0.165,  # [kg]
-    "ring_stiffness": 6.0e6,  # EA [N]
-    "ring_strain": 1e-4,  # at the start
-    "half_wedge_angle": np.radians(11.0),  # [rad]
-    "flank_stiffness": 5e7,  # [N/m]
-    "contact_stiffness": 1e9,  # [N/m]
-    "nose_height": 6e-3,  # [m]
-    "nose_clearance": np.inf,  # [m]
-    "nose_stiffness": 1e8,  # [N/m]
-    "angle_stiffness": 5.0,  # [N m/rad]
-    "angle_damping": 5e-5,  # [N m s]
-    "transverse_damping": 500.0,  # [N s/m^2]
-    "friction_law": "coulomb",
-    "kinetic_friction": 0.09,
-    "friction_gradient": 0.0,  # [s/m]
-    "stribeck_velocity": 0.1,  # [m/s]
-    "friction_memory": 0.0,  # [s]
-    "ring_friction": 0.06,
-    "friction_speed": 5e-4,  # [m/s]
-    "ring_friction_speed": 5e-4,  # [m/s]
-    "driven_inertia": 0.01,  # [kg m^2]
-    "driving_rate": 0.0,  # [m/(s N)]: position prescribed
-    "driven_rate": 5e-6,  # [m/(s N)]
-    "modal_stiffness": ((), ()),  # [N/m]
-    "driving_speed": 100.0 * np.pi,  # [rad/s]
-}
-NODES = 104  # of 8 lanes; polygon effects in the power balance are below half a percent
 STEP = 1e-5  # [s]
-SPEED, THRUST, LOAD = ASSUMED["driving_speed"], 20e3, 81.0
+LOAD = 81.0  # [N m]
 U = slice(b.U_Y, b.V + 1)
-
-
-def given(nodes=NODES, **changes):
-    """Values for `start`, of so many super elements."""
-    group = ASSUMED["elements"] / nodes
-    beside = ("element_mass", "flank_stiffness", "angle_stiffness", "angle_damping")
-    values = {key: ASSUMED[key] * group for key in beside}
-    values["contact_stiffness"] = ASSUMED["contact_stiffness"] / group
-    return ASSUMED | values | {"elements": nodes} | changes
 
 
 def fields(array):
@@ -218,30 +174,23 @@ def test_newton_correction_is_that_of_differences(law):
         assert found == pytest.approx(wanted, abs=1e-5 * np.abs(wanted).max())
 
 
-@pytest.mark.parametrize("lanes", [8, 2])
-def test_cyclic_system_against_a_dense_one(lanes, monkeypatch):
-    monkeypatch.setattr(starting, "parts_of", lambda nodes: lanes)
-    rows, columns = 5, 8
-    n, rng = rows * lanes, np.random.default_rng(4)
-    a, u = rng.normal(size=(n, 4, 4)) + 8.0 * np.eye(4), rng.normal(size=(n, 4, 4))
-    right = rng.normal(size=(n, columns, 4))
-    blocks = LaneArray(rows, 48 + 4 * columns, lanes, linked=lanes > 1)
-    values = np.zeros((n, 48 + 4 * columns))
-    values[:, :16] = a.transpose(0, 2, 1).reshape(n, 16)
-    values[:, 16:32] = u.transpose(0, 2, 1).reshape(n, 16)
-    values[:, 48:] = right.reshape(n, -1)
-    write(blocks, values)
-    scratch = LaneArray(1, 48 + 4 * columns, lanes, linked=lanes > 1)
-    solve(blocks, scratch, np.zeros((4 * lanes, 4 * lanes + columns)))
-
-    dense = np.zeros((n, 4, n, 4))
-    for i in range(n):
-        dense[i, :, i] += a[i]
-        dense[i, :, (i + 1) % n] += u[i]
-        dense[(i + 1) % n, :, i] += u[i].T
-    wanted = np.linalg.solve(dense.reshape(4 * n, 4 * n), right.transpose(0, 2, 1).reshape(4 * n, columns))
-    found = of_lanes(blocks)[:, 48:].reshape(n, columns, 4).transpose(0, 2, 1).reshape(4 * n, columns)
-    assert found == pytest.approx(wanted, abs=1e-13)
+def test_the_linear_system_is_solved_to_rounding():
+    belt, state, work, _ = shaken(5)
+    _prepare(belt, state, work, STEP)
+    evaluated(belt, state, work, STEP)
+    assemble(belt, state.elements, work.shapes, work.step, work.iterate, work.blocks)
+    add_nose_blocks(state.elements, work.step, work.iterate, work.blocks)
+    system = fields(work.blocks)
+    a, u, right = (
+        columns.reshape(64, -1, 4).transpose(0, 2, 1)
+        for columns in (system[:, :16], system[:, 16:32], system[:, RIGHT:])
+    )
+    assert solve(work.blocks, work.scratch, block_size(4))
+    x = fields(work.blocks)[:, RIGHT:].reshape(64, -1, 4).transpose(0, 2, 1)
+    terms = np.concatenate([np.roll(u, 1, 0).transpose(0, 2, 1), a, u], 2)
+    unknowns = np.concatenate([np.roll(x, 1, 0), x, np.roll(x, -1, 0)], 1)
+    # 1e-14 of the terms of each equation: some ten roundings, though the matrix has a condition of 1e6
+    assert np.all(abs(terms @ unknowns - right) <= 1e-14 * (abs(terms) @ abs(unknowns)))
 
 
 def test_free_spinning_ring():

@@ -17,7 +17,7 @@ from cvt_hpc.models.spatial_pushbelt.step import (
     _solve,
     advance,
 )
-from tests.support import spatial_chains as chains
+from support import spatial_chains as chains
 
 NODES, RADIUS, SPIN = 216, 0.1082, 250.0  # [m], [rad/s]
 STEP = 1e-5  # [s]
@@ -84,6 +84,39 @@ def test_a_ring_that_moves_out_of_its_plane_keeps_its_energy_and_momentum():
     assert momentum_now == pytest.approx(momentum, abs=1e-12)
     assert moment_now[2] == pytest.approx(moment[2], rel=1e-7)
     assert energy_now == pytest.approx(energy, rel=4e-6)
+
+
+def test_free_elements_turn_as_rigid_bodies():
+    # nothing acts on them, so that R J R' omega of each stays; speeds are half a step early, of first order
+    nodes = 16
+    constants = chains.belt(
+        pitch=0.02,
+        thickness=1.5e-3,
+        ring_mass=1e-12,
+        ring_stiffness=1e-9,
+        contact_stiffness=0.0,
+        ring_shear=0.0,
+    )
+    rng = np.random.default_rng(4)
+    fields = chains.spinning_ring(nodes, 0.02 * nodes / (2.0 * np.pi), 0.0)
+    fields[:, b.LENGTH] = 0.02
+    fields[:, b.OMEGA : b.OMEGA + 3] = rng.normal(0.0, 200.0, (nodes, 3))
+
+    def spin(f):
+        x, o = f[:, 3:6], f[:, 6:9]
+        omega, parts = f[:, b.OMEGA : b.OMEGA + 3], zip((x, o, np.cross(o, x)), inertias, strict=True)
+        return sum(k * d * np.sum(d * omega, 1)[:, None] for d, k in parts)
+
+    inertias = constants.roll_inertia, constants.yaw_inertia, constants.pitch_inertia
+    size, errors = np.linalg.norm(spin(fields), axis=1), []
+    for steps, dt in ((1000, STEP), (2000, 0.5 * STEP)):
+        state, work = chains.state(fields), b.workspace(constants, nodes)
+        assert advance(constants, b.Newton(), state, work, np.zeros((2, b.INPUTS)), steps, dt) == 0
+        found = of_lanes(state.elements)
+        assert np.abs(np.sum(found[:, 3:6] * found[:, 6:9], 1)).max() < 1e-15
+        errors.append((np.linalg.norm(spin(found) - spin(fields), axis=1) / size).max())
+    assert errors[0] < 5e-3
+    assert errors[1] < 0.6 * errors[0]
 
 
 SEGMENTS, LENGTH_OF_STRAND = 100, 0.15411

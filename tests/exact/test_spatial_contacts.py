@@ -12,8 +12,8 @@ from cvt_hpc.models.spatial_pushbelt.flank import flank_directions, frustum, fru
 from cvt_hpc.models.spatial_pushbelt.pin import pin_offset
 from cvt_hpc.models.spatial_pushbelt.step import _assemble, _evaluate, _prepare
 from cvt_hpc.physics.friction_laws import Law
-from tests.exact.test_pushbelt import given
-from tests.support import spatial_chains as chains
+from support import spatial_chains as chains
+from support.pushbelts import given
 
 NODES, STEP, LOAD = 64, 1e-5, 81.0
 RIGHT = b.RIGHT
@@ -228,8 +228,13 @@ def test_internal_forces_have_no_resultant_and_no_moment():
     # every law between neighbours has no rate in a rigid motion, in which the ring's material goes along
     x = np.zeros((NODES, 8))
     x[:, U], x[:, W] = shift + np.cross(spin, f[:, :3]), spin
-    line = step[:, b.RING_LINE : b.RING_LINE + 6]
-    x[:, 6] = np.sum(line * x[:, :6], 1)
+    axial = np.cross(f[:, 6:9], f[:, 3:6])
+    for side in (1.0, -1.0):
+        arm = side * belt.package_distance * axial
+        place = f[:, :3] + arm
+        t = np.roll(place, -1, 0) - np.roll(place, 1, 0)
+        t /= np.linalg.norm(t, axis=1)[:, None]
+        x[:, 6] += 0.5 * np.sum(t * (x[:, U] + np.cross(x[:, W], arm)), 1)
     for field, found in directions(step, f, x).items():
         assert np.abs(found).max() < (1e-9 if field >= b.CHORD_I and field < b.YAW else 1e-12), field
 

@@ -10,48 +10,14 @@ from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start
 from cvt_hpc.models.pushbelt.start import workspace as planar_workspace
 from cvt_hpc.models.pushbelt.step import advance as planar_advance
 from cvt_hpc.models.spatial_pushbelt import belt as b
-from cvt_hpc.models.spatial_pushbelt.step import advance
+from cvt_hpc.models.spatial_pushbelt.flank import flank_forces
+from cvt_hpc.models.spatial_pushbelt.step import _prepare, advance
 from cvt_hpc.physics.friction_laws import Law
-from tests.exact.test_pushbelt import SPEED, THRUST, given
-from tests.support import spatial_chains as chains
+from support import spatial_chains as chains
+from support.pushbelts import THRUST, given
+from support.spatial_belts import LOAD, NODES, RAMP, STEP, TORQUE, inputs, scene, stored
 
-NODES, STEP, TORQUE = 104, 1e-5, 60.0
-LOAD = 1.35 * TORQUE
-RAMP = 1500  # steps
-OFFSET = 0.5e-3  # of the driven pulley along its axis [m]
 MODES = ((6e8, 3e8, 3e8), (6e8, 3e8, 3e8))  # [N/m]
-
-
-def inputs(thrusts, loads, fields=b.INPUTS, drift=0.0):
-    """Inputs of a call: thrust and load at its start and end."""
-    found = np.zeros((2, fields))
-    found[:, b.IN_SPEED] = SPEED
-    found[:, b.IN_DRIVEN_THRUST], found[:, b.IN_LOAD] = thrusts, loads
-    found[:, b.IN_DRIVEN_DRIFT :] = drift
-    return found
-
-
-def scene(offset=OFFSET, modal=(), nodes=NODES, **constants):
-    """Constants, state and work space of a belt under its thrust and load, 45 ms from its start."""
-    planar, planar_state = start(given(nodes, transverse_damping=0.0, modal_stiffness=modal or ((), ())))
-    belt, state = chains.beside_planar(planar, planar_state, **constants)
-    work = b.workspace(belt, nodes)
-    for thrusts, loads, drift, steps in (
-        ((500.0, THRUST), (0.0, 0.0), offset / (RAMP * STEP), RAMP),
-        ((THRUST, THRUST), (0.0, LOAD), 0.0, RAMP),
-        ((THRUST, THRUST), (LOAD, LOAD), 0.0, RAMP),
-    ):
-        assert advance(belt, b.Newton(), state, work, inputs(thrusts, loads, drift=drift), steps, STEP) == 0
-    return belt, state, work
-
-
-def stored(belt, state):
-    """Kinetic energy of belt and driven pulley, and that of rings, flanks and sheaves [J]."""
-    energy, _, _ = chains.energy_and_momentum(belt, of_lanes(state.elements))
-    pressed = of_lanes(state.elements)[:, b.FLANK : b.FLANK + 4]
-    energy += np.sum(pressed**2) / belt.flank_stiffness
-    energy += np.sum(belt.modal_stiffness * (state.openings**2 + state.leans**2))
-    return energy + 0.5 * belt.driven_inertia * state.pulleys[b.DRIVEN_SPEED] ** 2
 
 
 @cache
@@ -185,6 +151,55 @@ def test_contacts_keep_their_laws():
     assert (slip[pressed] > 5e-3).any()
     assert {(no, no, no, no), (yes, no, no, no), (no, yes, no, no), (yes, yes, no, no)} <= fronts
     assert any(pair[2] or pair[3] for pair in fronts)
+
+
+def test_slip_limit():
+    # a belt that slips all along the driving arc carries 2 mu F R / cos d0, whatever its offset
+    belt, state, work = scene(driven_inertia=0.2)
+    overload = inputs((14e3, 14e3), (300.0, 300.0))
+    advance(belt, b.Newton(), state, work, overload, 4500, STEP)
+    f = of_lanes(state.elements)
+    flank, driving = f[:, b.FLANK : b.FLANK + 4], f[:, b.DRIVEN] < 0.5
+    assert (f[driving, b.FLANK_SLIP_T : b.FLANK_SLIP_T + 4][flank[driving] > 10.0] < -1.0).all()
+    radius = np.linalg.norm(f[:, :2] - belt.pitch_depth * f[:, 6:8], axis=1)[:, None]
+    heights = np.array([-1.0, 1.0, -1.0, 1.0]) * belt.flank_reach
+    carried = (flank * (radius + heights))[driving].sum() / flank[driving].sum()
+    thrust = 0.5 * state.loads[: b.DRIVEN_LEFT].sum()
+    limit = 2.0 * belt.flank_kinetic * carried / belt.cosine
+    assert -state.loads[b.DRIVING_TORQUE] / thrust == pytest.approx(limit, rel=1e-3)
+
+
+def test_a_clamped_element_without_friction():
+    # each flank carries N: 2 N sin d0 outwards, N cos d0 along the axis, and no moment where both heights are alike
+    planar, planar_state = start(given(NODES, kinetic_friction=0.0, ring_friction=0.0))
+    belt, state = chains.beside_planar(planar, planar_state)
+    state.pulleys[[b.DRIVING_RADIUS, b.DRIVEN_RADIUS]] += 1e-5
+    work = b.workspace(belt, NODES)
+    f = of_lanes(state.elements)
+    f[:, b.SPEED : b.SPEED + 8] = 0.0
+    state.elements.data[:] = in_lanes(f).data
+    _prepare(belt, state, work, 1e-9)
+    flank_forces(
+        belt,
+        state.elements,
+        state.pulleys,
+        state.increments,
+        state.openings,
+        work.shapes,
+        work.step,
+        work.iterate,
+        1e-9,
+    )
+    found, forces = of_lanes(work.iterate), of_lanes(state.elements)[:, b.FLANK : b.FLANK + 4]
+    normal = forces.sum(1)
+    pressed = normal > 0.0
+    outward = np.hypot(found[:, b.RESIDUAL], found[:, b.RESIDUAL + 1])
+    assert pressed.sum() > 40
+    assert outward[pressed] == pytest.approx(normal[pressed] * belt.sine, rel=1e-4)
+    assert np.abs(found[:, b.RESIDUAL + 2]).max() < 1e-9 * normal.max()
+    # the penetration 1e-5 sin d0 on both points of stiffness c / 2
+    middle = np.argmax(pressed & (np.abs(f[:, 1]) < 1e-3) & (f[:, 0] < 0.0))
+    assert forces[middle] == pytest.approx(0.5 * belt.flank_stiffness * 1e-5 * belt.sine, rel=2e-2)
 
 
 def test_stiff_sheaves_are_rigid_ones():

@@ -70,7 +70,7 @@ def load(package):
 
 
 def place(package):
-    return load(package)._place()
+    return load(package).cache_folder()
 
 
 def content(package, source):
@@ -714,8 +714,8 @@ def aged(folder, days):
 
 def test_a_new_folder_takes_the_place_of_those_that_nobody_asks_for(package, chosen):
     module = load(package)
-    forgotten = [aged(module._place() / f"cvt_hpc.physics.friction-{k}", 31.0) for k in range(2)]
-    used, not_ours = aged(module._place() / "used", 29.0), aged(chosen / "not_ours", 31.0)
+    forgotten = [aged(module.cache_folder() / f"cvt_hpc.physics.friction-{k}", 31.0) for k in range(2)]
+    used, not_ours = aged(module.cache_folder() / "used", 29.0), aged(chosen / "not_ours", 31.0)
     module.kernel(plus_one)(1.0)
     assert used.is_dir()
     assert not_ours.is_dir()

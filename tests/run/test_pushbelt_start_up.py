@@ -95,6 +95,7 @@ def test_a_start_up_follows_from_what_its_key_holds():
         "sheave_stiffness": math.inf,
         "driving_modal_stiffness": (6e8, 3e8, 3e8, 9e8, 8e8),
         "driven_modal_stiffness": (6e8, 3e8, 3e8, 9e8, 8e8),
+        "inner_radius": 0.01,
         "outer_radius": 1.0,
     }
     shared = set()

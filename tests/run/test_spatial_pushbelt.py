@@ -7,12 +7,13 @@ from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.pushbelt.parameters import most_tension, path_length, string_limit
+from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.parameters import roll_limit
 from cvt_hpc.models.spatial_pushbelt.readings import ANGLES, SHEAVES
 from cvt_hpc.models.spatial_pushbelt.record import histories, judge
 from cvt_hpc.models.spatial_pushbelt.transient import Transient, given
 from cvt_hpc.physics.out_of_plane import axial_offset, clamped_force
-from cvt_hpc.simulation import run_point
+from cvt_hpc.simulation import run_point, simulate
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.variator.path import regions
 
@@ -50,9 +51,15 @@ def test_both_pulleys_take_the_lateral_force_of_misaligned_strands(misaligned):
     assert found["status"] == Status.DONE and found["unsolved_share"] == 0.0
     driving, driven = found["net_axial_force"]
     assert driving == pytest.approx(-driven, rel=0.01)
-    net = found["mean_ring_tension"] - found["mean_push_force"] - 1.464 * 14.87**2
-    strand = misaligned.path.strand_length
-    clamped = sum(clamped_force(OFFSET, strand, tension, 47.6, 2.4e6) for tension in net)
+    net = (
+        found["mean_ring_tension"]
+        - found["mean_push_force"]
+        - 1.4635 * (100.0 * np.pi * 0.063896 / 1.35) ** 2
+    )
+    strand, offset = misaligned.path.strand_length, found["final_misalignment"]
+    clamped = sum(clamped_force(offset, strand, tension, 47.6, 2.4e6) for tension in net)
+    assert found["beam_axial_force"] == pytest.approx([clamped, -clamped], rel=1e-3)
+    assert found["string_axial_force"][0] == pytest.approx(net.sum() * offset / strand, rel=1e-3)
     # a belt runs through the arcs' ends, where elements slide and rings turn: not held as a clamped beam is
     assert 0.6 * clamped < driving < clamped
     assert found["sheave_force"].reshape(2, 2).mean(axis=1) == pytest.approx(found["axial_force"])
@@ -94,8 +101,15 @@ def test_profiles_and_histories_agree_with_the_record(misaligned):
     for sheave in SHEAVES:
         assert dataset[f"sheave_force_{sheave.replace(' ', '_')}"].attrs["units"] == "N"
     for angle in ANGLES:
-        assert found[f"largest_{angle}"] == dataset[f"largest_{angle}"].values[misaligned.judged].max()
+        assert found[f"largest_{angle}"] == dataset[f"extreme_{angle}"].values[misaligned.judged].max()
     assert set(found["lateral_amplitude"].shape) == set(found["amplitude"].shape) == {2}
+
+
+def test_a_run_by_itself_has_record_and_history():
+    asked = job(misalignment=OFFSET, duration=0.016, rise_time=0.004, band_low=700.0)
+    dataset = simulate(asked)
+    assert dataset["sheave_force"].shape == (4,) and dataset["contact_force_left"].dims == ("position",)
+    assert float(dataset["axial_offset"][-1]) == pytest.approx(OFFSET, rel=0.2)
 
 
 def test_an_aligned_belt_stays_in_its_plane_and_a_seed_leads_it_out():
@@ -114,6 +128,21 @@ def test_an_aligned_belt_stays_in_its_plane_and_a_seed_leads_it_out():
     seeded.advance(seeded.samples)
     lateral = seeded.displacement[:, len(seeded.probes) // 2 :]
     assert 1e-8 < np.abs(lateral).max() < 1e-3
+
+
+def test_a_sheave_at_its_stop_and_an_element_off_the_grooves_end_a_run():
+    run = Transient(job(inner_radius=0.043, outer_radius=0.07).point(0), "newton")
+    assert run._out_of_place() is None
+    run._state.pulleys[b.DRIVING_RADIUS] = 0.0429  # which no thrust moves
+    assert run.advance(1)[0] == Status.FAILED_NUMERICS
+    assert run.failure[1].startswith(
+        "the driving sheave has run to its stop: a pitch radius of 0.0429 m, of 0.043 to 0.07 m"
+    )
+    run._state.elements.data[3, b.POSITION + 2, 1] = -0.0111
+    assert (
+        run._out_of_place()
+        == f"element {run._state.elements.data.shape[0] + 3} has left the grooves: it is 11.1 mm out of the plane"
+    )
 
 
 def test_the_vibration_of_both_planes_is_judged_together():

@@ -93,6 +93,7 @@ from cvt_hpc.physics.layers import ring_friction
 # elements, below. Before that the sum of inward forces below the layer, after it the flux of content. Behind
 # them, of the station, what gives f, and the force of the ears.
 EPS, PART, COMMON, ELEMENTS, LINK = range(5)
+DRAG, STIFF = COMMON, LINK
 STRIDE = 5
 OWN_SUM, ELEMENT_SUM, PER_COMMON_SUM, ON_EARS = FIELDS_OF_STATION = range(4)
 
@@ -191,6 +192,24 @@ def heavier_by(rings: LaneRings, step: float):
     return maximum(needed, 1.0)
 
 
+@merged_kernel
+def force_along(rings: LaneRings, fields: LaneArray, layers: LaneArray, j: int, k: int, along):
+    """Force per length on layer k at station j beyond what all have in common [N/m], and its inertia [kg/m].
+
+    `along` is, of the station, what `couple_layers` has found.
+    """
+    (per_left, per_cell, even_l, even_r), (stiffness, damping), moving, turn, per_dual = along
+    heavy, carried, belt_speed, acceleration = moving
+    v, v_a = fields[j, FIRST_LAYER + k], behind(fields, j, FIRST_LAYER + k)
+    v_b, first = ahead(fields, j, FIRST_LAYER + k), STRIDE * k
+    stress_l = fma(stiffness, behind(layers, j, first), damping * per_left * (v - v_a)) - even_l
+    stress_r = fma(stiffness, layers[j, first], damping * per_cell * (v_b - v)) - even_r
+    inertia = heavy * fma(rings.constants[0, FIRST_OFFSET + k], turn, 1.0)
+    moved = fma((belt_speed + v) * per_left, v - v_a, acceleration)
+    force = fma(stress_r - stress_l, per_dual, fma(-inertia, moved, carried))
+    return force, inertia
+
+
 @kernel
 def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: RingWork, step: float) -> None:
     """Eliminate the layers: their part of the blocks and right side of elements and rings as one."""
@@ -210,6 +229,10 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
     # reduced masses over the step: of two layers, and of the inner one, with all it takes along, and elements
     between = 0.5 * heavier * mass * per_step
     inner = mass / (1.0 / n + (1.0 - 1.0 / n) / heavier)
+    per_free = zero
+    for _ in range(n):
+        per_free += free
+    per_free = 1.0 / per_free
     element_mass = belt.constants[0, ELEMENT_MASS]
     at_saddle = inner * element_mass / (inner + element_mass) * per_step
     for j in range(fields.rows):
@@ -223,6 +246,14 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
         longer = fma(belt.constants[0, RING_OFFSET], turn, 1.0)
         carried = fma((belt_speed + united) * per_left, united - united_a, acceleration)
         carried = (heavier - 1.0) * mass * longer * carried
+        beside = per_left, per_cell, even_l, even_r
+        along = (
+            beside,
+            (stiffness, damping),
+            (heavier * mass, carried, belt_speed, acceleration),
+            turn,
+            per_dual,
+        )
         on_arc = anywhere(belt.arc_share[j] > 0.0)
         is_driven = belt.on_driven[j] > 0.5
         element = fields[j, V_ELEMENT]
@@ -236,59 +267,65 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
                 inward = fma(left, behind(layers, j, STRIDE * k), fma(right, layers[j, STRIDE * k], -weight))
                 below += inward
                 largest = maximum(below, largest)
-        # of the surface above the present layer: friction, slope, the factor of the layer below it
-        drag_up = stiff_up = factor_up = zero
-        # of the ears: friction on the elements and its slopes
-        ear_drag = ear_stiff = ear_cross = zero
         bearing = largest - below
-        on_ears = on_arc and anywhere(bearing > 0.0)
-        if on_ears:
-            above_factor, below_factor = surface_factors(rings, n, is_driven)
-            outer = fields[j, FIRST_LAYER + n - 1]
-            sliding = fma(below_factor, belt_speed + outer, -above_factor * (belt_speed + element))
-            secant, slope = ring_friction(
-                sliding, c[0, SADDLE_FRICTION_LEVEL], rings.falls, excess, per_stribeck, per_width, least
-            )
-            drag_up = bearing * secant * sliding
-            stiff_up = maximum(bearing * slope, fma(bearing, secant, -at_saddle))
-            factor_up = below_factor
-            ear_drag, ear_stiff = above_factor * drag_up, above_factor * above_factor * stiff_up
-            ear_cross = above_factor * below_factor * stiff_up
-        # of the layer above: its link to this one, inverse pivot and increments
-        link = pivot = part = common = elements = zero
-        own_sum = element_sum = common_sum = own_element = element_element = zero
-        drag = stiff = cross = below_factor = zero
-        for k in range(n - 1, -1, -1):
-            first = STRIDE * k
-            v, v_a = fields[j, FIRST_LAYER + k], behind(fields, j, FIRST_LAYER + k)
-            v_b = ahead(fields, j, FIRST_LAYER + k)
-            stress_l = fma(stiffness, behind(layers, j, first), damping * per_left * (v - v_a)) - even_l
-            stress_r = fma(stiffness, layers[j, first], damping * per_cell * (v_b - v)) - even_r
-            inertia = heavier * mass * fma(c[0, FIRST_OFFSET + k], turn, 1.0)
-            moved = fma((belt_speed + v) * per_left, v - v_a, acceleration)
-            force = fma(stress_r - stress_l, per_dual, fma(-inertia, moved, carried))
-            if not on_arc:
+        own_sum = element_sum = zero
+        per_common = per_free
+        if not on_arc:
+            for k in range(n - 1, -1, -1):
+                force, inertia = force_along(rings, fields, layers, j, k, along)
                 part = free * force
                 own_sum += part
-                common_sum += free
-                layers[j, first + PART] = part
-            else:
-                diagonal = inertia * per_step
-                by_common, by_elements = fma(link, common, 1.0), link * elements
-                pressed = largest - layers[j, first + PART]
+                layers[j, STRIDE * k + PART] = part
+        else:
+            # Friction of all surfaces first: each is a long chain of operations, and a processor works on
+            # several of them at a time only where no elimination is in between.
+            for k in range(n):
+                first = STRIDE * k
                 above_factor, below_factor = surface_factors(rings, k, is_driven)
                 under = fields[j, FIRST_LAYER + k - 1] if k > 0 else element
-                sliding = fma(below_factor, belt_speed + under, -above_factor * (belt_speed + v))
+                over = fields[j, FIRST_LAYER + k]
+                sliding = fma(below_factor, belt_speed + under, -above_factor * (belt_speed + over))
                 level = c[0, LAYER_FRICTION_LEVEL] if k > 0 else c[0, SADDLE_FRICTION_LEVEL]
+                pressed = largest - layers[j, first + PART]
+                secant, slope = ring_friction(
+                    sliding, level * pressed, rings.falls, excess, per_stribeck, per_width, least
+                )
+                layers[j, first + DRAG] = secant * sliding
+                # not less than what keeps friction from turning sliding about within the step
+                enough = secant - (between if k > 0 else at_saddle)
+                layers[j, first + STIFF] = maximum(slope, enough)
+            # of the surface above the present layer: friction, slope, the factor of the layer below it
+            drag_up = stiff_up = factor_up = zero
+            # of the ears: friction on the elements and its slopes
+            ear_drag = ear_stiff = ear_cross = zero
+            on_ears = anywhere(bearing > 0.0)
+            if on_ears:
+                above_factor, below_factor = surface_factors(rings, n, is_driven)
+                outer = fields[j, FIRST_LAYER + n - 1]
+                sliding = fma(below_factor, belt_speed + outer, -above_factor * (belt_speed + element))
+                level = bearing * c[0, SADDLE_FRICTION_LEVEL]
                 secant, slope = ring_friction(
                     sliding, level, rings.falls, excess, per_stribeck, per_width, least
                 )
-                secant *= pressed
-                drag = secant * sliding
-                # not less than what keeps friction from turning sliding about within the step
-                stiff = maximum(pressed * slope, secant - (between if k > 0 else at_saddle))
+                drag_up = secant * sliding
+                stiff_up = maximum(slope, secant - at_saddle)
+                factor_up = below_factor
+                ear_drag, ear_stiff = above_factor * drag_up, above_factor * above_factor * stiff_up
+                ear_cross = above_factor * below_factor * stiff_up
+            # of the layer above: its link to this one, inverse pivot and increments
+            link = pivot = part = common = elements = zero
+            common_sum = own_element = element_element = by_elements = by_common = zero
+            for k in range(n - 1, -1, -1):
+                first = STRIDE * k
+                force, inertia = force_along(rings, fields, layers, j, k, along)
+                drag, stiff = layers[j, first + DRAG], layers[j, first + STIFF]
+                above_factor, below_factor = surface_factors(rings, k, is_driven)
+                by_common = fma(link, common, 1.0)
+                if on_ears:
+                    by_elements = ear_cross if k == n - 1 else link * elements
                 cross = above_factor * below_factor * stiff
                 force += above_factor * drag - factor_up * drag_up
+                diagonal = inertia * per_step
                 diagonal += above_factor * above_factor * stiff + factor_up * factor_up * stiff_up
                 diagonal = fma(-link * link, pivot, diagonal)
                 force = fma(link, part, force)
@@ -298,30 +335,29 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
                 own_sum, common_sum = fma(part, by_common, own_sum), fma(common, by_common, common_sum)
                 layers[j, first + PART], layers[j, first + COMMON] = part, common
                 layers[j, first + LINK] = pivot * cross
-                if on_ears or k == 0:
-                    if k == n - 1:
-                        by_elements += ear_cross
+                if on_ears:
                     elements = pivot * by_elements
-                    if on_ears:
-                        layers[j, first + ELEMENTS] = elements
-                    if k == 0:
-                        by_elements += cross
-                        elements = fma(pivot, cross, elements)
-                    element_sum = fma(elements, by_common, element_sum)
-                    own_element = fma(part, by_elements, own_element)
-                    element_element = fma(elements, by_elements, element_element)
-        per_common = 1.0 / common_sum
-        last = STRIDE * n
-        layers[j, last + OWN_SUM], layers[j, last + ELEMENT_SUM] = own_sum, element_sum
-        layers[j, last + PER_COMMON_SUM], layers[j, last + ON_EARS] = per_common, bearing
-        if on_arc:
-            # the inner surface's friction on the elements
-            taken = below_factor * drag
-            stiff = fma(below_factor * below_factor, stiff, ear_stiff - element_element)
+                    layers[j, first + ELEMENTS] = elements
+                    if k > 0:
+                        element_sum = fma(elements, by_common, element_sum)
+                        own_element = fma(part, by_elements, own_element)
+                        element_element = fma(elements, by_elements, element_element)
+            # the inner layer, on the saddle, takes the elements along by its link
+            by_elements += link
+            elements = fma(pivot, link, elements)
+            element_sum = fma(elements, by_common, element_sum)
+            own_element = fma(part, by_elements, own_element)
+            element_element = fma(elements, by_elements, element_element)
+            per_common = 1.0 / common_sum
+            taken = factor_up * drag_up
+            stiff = fma(factor_up * factor_up, stiff_up, ear_stiff - element_element)
             stiff = fma(element_sum * per_common, element_sum, stiff)
             push = fma(-own_sum * per_common, element_sum, own_element + ear_drag - taken)
             stations[j, D_00] = fma(dual, stiff, stations[j, D_00])
             stations[j, Y_0] = fma(dual, push, stations[j, Y_0])
+        last = STRIDE * n
+        layers[j, last + OWN_SUM], layers[j, last + ELEMENT_SUM] = own_sum, element_sum
+        layers[j, last + PER_COMMON_SUM], layers[j, last + ON_EARS] = per_common, bearing
         # the rings as one neither rub nor turn sliding about
         stations[j, SADDLE] = 0.0
         stations[j, D_01] = -(n * dual) * element_sum * per_common

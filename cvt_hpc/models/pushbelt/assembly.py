@@ -95,8 +95,9 @@ from cvt_hpc.models.pushbelt.belt import (
 )
 from cvt_hpc.physics.contact_laws import coefficient, pressed, remembered
 from cvt_hpc.physics.primal_dual import dual_of, friction
+from cvt_hpc.solvers.linked_blocks import field_of_right
 
-RIGHT = 48  # field of a row of blocks at which its right sides begin (`cyclic`)
+RIGHT = field_of_right(4)
 
 
 @kernel

@@ -226,12 +226,10 @@ class Workspace(NamedTuple):
     shapes : (rows, modes) LaneArray
         psi_k at the elements.
     blocks : (rows, 4 (12 + columns)) LaneArray
-        The system of an iteration (`cyclic`), with a column for the residual and one for each unknown of
-        the border.
-    scratch : (1, 48 + 4 columns) LaneArray
-        Blocks and sums.
-    reduced : (4 lanes, 4 lanes + columns) array
-        System of the parts' last elements.
+        The system of an iteration (`solvers.linked_blocks`), with a column for the residual and one for each
+        unknown of the border.
+    scratch : (3, 4 (12 + columns)) LaneArray
+        Work space of its solution, and sums.
     border : (columns - 1, columns) array
         System of the border, its right side last.
     inputs : (4,) array
@@ -247,7 +245,6 @@ class Workspace(NamedTuple):
     shapes: LaneArray
     blocks: LaneArray
     scratch: LaneArray
-    reduced: np.ndarray
     border: np.ndarray
     inputs: np.ndarray
     increments: np.ndarray

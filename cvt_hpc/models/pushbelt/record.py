@@ -185,5 +185,14 @@ def history(
         told |= {f"{name.replace(' ', '_')} {k}": (f"{name} {k}", "N", comment) for k in STRANDS}
     told |= {f"axial_force {k}": (f"axial force {k}", "N", "") for k in PULLEYS}
     along = {name: (values, *profiles[name]) for name, values in run.profiles.items()}
-    region = np.array(REGIONS)[regions(run.path, run.places)]
-    return dataset(run, {**told, **over_time}, along, run.places, region)
+    where = regions(run.path, run.places)
+    along["wrap_angle"] = _wrap_angles(run, where), "wrap angle", "rad", "from the inlet of the arc"
+    return dataset(run, {**told, **over_time}, along, run.places, np.array(REGIONS)[where])
+
+
+def _wrap_angles(run: ElementRun, region: np.ndarray) -> np.ndarray:
+    """Angles of places from the inlets of their arcs [rad], by their regions; nan on strands."""
+    path = run.path
+    starts = np.concatenate([[0.0], np.cumsum(path.lengths)[:3]])[region]
+    radius = np.array([path.driving_radius, np.nan, path.driven_radius, np.nan])[region]
+    return (run.places - starts) / radius

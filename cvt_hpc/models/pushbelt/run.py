@@ -17,7 +17,7 @@ from cvt_hpc.models.pushbelt.start_up import StartUps, fingerprint
 from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
 from cvt_hpc.physics.geometry import driven_radius
 from cvt_hpc.variables import Status
-from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, STRANDS
+from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, PULLEYS, STRANDS
 from cvt_hpc.variator.course import load_course
 from cvt_hpc.variator.profiles import multiple
 from cvt_hpc.variator.slip import GAINED, LOST
@@ -120,6 +120,9 @@ class ElementRun(SampledRun):
             if (slipped := self._slipped()) is not None:
                 self.failure = self._early_end(slipped)
                 break
+            if (gone := self._out_of_place()) is not None:
+                self.failure = Status.FAILED_NUMERICS, gone
+                break
             if self.done == self._start_up:
                 _start_ups.keep(self._start_up_key, self._reached())
         return self.failure
@@ -203,7 +206,7 @@ class ElementRun(SampledRun):
     def _why(self, outcome: int) -> str:
         if outcome == self.fields.NOT_CONVERGED:
             return f"the equations of a step were not solved, {self._fault()}"
-        return "the state is not a number"
+        return "the state is not a number, or the equations of a step are singular"
 
     def _fault(self) -> str:
         """Where the last step that was not solved was not."""
@@ -218,6 +221,18 @@ class ElementRun(SampledRun):
         if driven < LEAST_SPEED * driving:
             return LOST
         return GAINED if driven > MOST_SPEED * driving else None
+
+    def _out_of_place(self) -> str | None:
+        """Whether a sheave has run to its stop, where the job says how far the sheaves reach."""
+        least, most = self.parameters["inner_radius"], self.parameters["outer_radius"]
+        radii = self._state.pulleys[[self.fields.DRIVING_RADIUS, self.fields.DRIVEN_RADIUS]]
+        for pulley, radius in zip(PULLEYS, radii, strict=True):
+            if not least <= radius <= most:
+                reach = f"{least:g} to {most:g} m"
+                return (
+                    f"the {pulley} sheave has run to its stop: a pitch radius of {radius:.5g} m, of {reach}"
+                )
+        return None
 
     @property
     def time(self) -> float:

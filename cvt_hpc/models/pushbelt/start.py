@@ -32,6 +32,7 @@ from cvt_hpc.models.pushbelt.belt import (
 )
 from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.geometry import Variator, driven_radius, variator
+from cvt_hpc.solvers.linked_blocks import empty_scratch, empty_system
 from cvt_hpc.variator.path import points_at
 
 
@@ -182,9 +183,8 @@ def workspace(belt: Belt, nodes: int) -> Workspace:
         step=lanes(rows, STEP_FIELDS),
         iterate=lanes(rows, ITERATE_FIELDS),
         shapes=lanes(rows, max(modes, 1)),
-        blocks=lanes(rows, 48 + 4 * columns),
-        scratch=lanes(1, 48 + 4 * columns),
-        reduced=np.zeros((4 * parts, 4 * parts + columns)),
+        blocks=empty_system(nodes, parts, 4, columns),
+        scratch=empty_scratch(parts, 4, columns),
         border=np.zeros((columns - 1, columns)),
         inputs=np.zeros(INPUTS),
         increments=np.zeros(columns - 1),

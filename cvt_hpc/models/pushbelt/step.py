@@ -81,11 +81,14 @@ from cvt_hpc.models.pushbelt.belt import (
     Z,
 )
 from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
-from cvt_hpc.models.pushbelt.cyclic import solve
 from cvt_hpc.models.pushbelt.nose import add_nose_blocks, nose_forces, predict_noses
 from cvt_hpc.models.pushbelt.power import book
 from cvt_hpc.physics.contact_laws import remembered
+from cvt_hpc.solvers.cyclic_blocks import block_size
+from cvt_hpc.solvers.linked_blocks import solve
+from cvt_hpc.solvers.small_system import solve_small
 
+_SIZE = block_size(4)  # unknowns of an element: both speeds, rotation, speed of the ring
 _LARGE = 1e100  # more than any speed or power that means something
 
 
@@ -104,21 +107,6 @@ def _shapes(belt, step, shapes):
                 shapes[j, k] = sine
             else:
                 shapes[j, k] = 1.0
-
-
-@kernel
-def _solve_border(border):
-    """Solve the border's equations, by elimination without pivoting."""
-    size = border.shape[0]
-    for p in range(size):
-        per_pivot = 1.0 / border[p, p]
-        for c in range(p, size + 1):
-            border[p, c] *= per_pivot
-        for r in range(size):
-            if r != p:
-                factor = border[r, p]
-                for c in range(p, size + 1):
-                    border[r, c] -= factor * border[p, c]
 
 
 @kernel
@@ -188,14 +176,21 @@ def _evaluate(belt, state, work, load, dt):
 
 @kernel
 def _solve(belt, state, work, dt):
-    """Solve for the correction: of the border in its last column, of elements without its part in blocks."""
+    """Solve for the correction: of the border in its last column, of elements without its part in blocks.
+
+    Returns
+    -------
+    bool
+        Whether the elements' system is regular.
+    """
     elements, step, iterate = state.elements, work.step, work.iterate
     assemble(belt, elements, work.shapes, step, iterate, work.blocks)
     if belt.nose_clearance < np.inf:
         add_nose_blocks(elements, step, iterate, work.blocks)
-    solve(work.blocks, work.scratch, work.reduced)
+    is_regular = solve(work.blocks, work.scratch, _SIZE)
     border_system(belt, elements, work.shapes, step, iterate, work.blocks, work.scratch, work.border, dt)
-    _solve_border(work.border)
+    solve_small(work.border)
+    return is_regular
 
 
 @kernel
@@ -263,7 +258,8 @@ def _newton(belt, newton, state, work, load, dt):
         if iteration == newton.most_iterations:
             _name_fault(state, element, work.kept)
             return iteration, change, power
-        _solve(belt, state, work, dt)
+        if not _solve(belt, state, work, dt):
+            return iteration, np.inf, power
         share = 0.5 if iteration >= newton.first_half_step else 1.0
         change = _correct(
             state.elements,
@@ -363,7 +359,8 @@ def advance(belt, newton, state, work, inputs, steps, dt):
     Returns
     -------
     int
-        CONVERGED; NOT_CONVERGED where `most_failures` steps in a row had not converged; NOT_FINITE. Of the
+        CONVERGED; NOT_CONVERGED where `most_failures` steps in a row had not converged; NOT_FINITE, or where
+        the system of an iteration is singular. Of the
         last step that had not converged the counters name the contact at fault, and its element.
     """
     counters = state.counters

@@ -351,38 +351,50 @@ def assemble_pairs(belt, state, step, iterate, blocks):
 
 
 @kernel
-def border_system(belt, state, shapes, iterate, blocks, scratch, border, dt):
+def border_system(belt, state, shapes, iterate, blocks, sums, border, dt):
     """The border's own equations, less what the solved columns of the elements contribute to them.
 
     The first column of `blocks` holds the solution without border, the others those for its columns.
     """
     modes = belt.modal_stiffness.shape[1]
     unknowns = border.shape[0]
+    width = unknowns + 1
+    for field in range(unknowns * width):
+        sums[0, field] = 0.0
+    for j in range(iterate.rows):
+        driven = state[j, DRIVEN]
+        driving = 1.0 - driven
+        a, b = vector(iterate, j, TORQUE_ROW), vector(iterate, j, TORQUE_ROW + 3)
+        c, d = vector(iterate, j, NORMAL_ROW), vector(iterate, j, NORMAL_ROW + 3)
+        for column in range(width):
+            at = RIGHT + 8 * column
+            u, omega = vector(blocks, j, at), vector(blocks, j, at + 3)
+            sums[0, column] -= dot(a, u) + dot(b, omega)
+            if modes > 0:
+                push = dot(c, u) + dot(d, omega)
+                one, other = driving * push, driven * push
+                for m in range(modes):
+                    shape = shapes[j, m]
+                    sums[0, width * (1 + m) + column] -= one * shape
+                    sums[0, width * (1 + modes + m) + column] -= other * shape
+        sums[0, 1] += iterate[j, TORQUE_OWN]
+        by_opening, give = iterate[j, TORQUE_OPENING], iterate[j, NORMAL_YIELD]
+        for m in range(modes):
+            one, other = driving * shapes[j, m], driven * shapes[j, m]
+            sums[0, 2 + m] += by_opening * one
+            sums[0, 2 + modes + m] += by_opening * other
+            for k in range(modes):
+                sums[0, width * (1 + k) + 2 + m] += give * shapes[j, k] * one
+                sums[0, width * (1 + modes + k) + 2 + modes + m] += give * shapes[j, k] * other
     for row in range(unknowns):
-        for column in range(unknowns + 1):
-            scratch[0, column] = 0.0
+        for column in range(width):
+            sums[0, width * row + column] = around(sums[0, width * row + column])
+            found = sums.data[0, width * row + column, 0]
+            if column == 0:
+                border[row, unknowns] += found
+            else:
+                border[row, column - 1] = found
         pulley, mode = 0, 0
         if row > 0:
             pulley, mode = (row - 1) // modes, (row - 1) % modes
-        for j in range(iterate.rows):
-            driven = state[j, DRIVEN]
-            if row == 0:
-                weight, first = like(1.0, driven), TORQUE_ROW
-                scratch[0, 1] += iterate[j, TORQUE_OWN]
-                by_opening = iterate[j, TORQUE_OPENING]
-            else:
-                weight, first = shapes[j, mode] * (driven if pulley == 1 else 1.0 - driven), NORMAL_ROW
-                by_opening = weight * iterate[j, NORMAL_YIELD]
-            a, b = times(weight, vector(iterate, j, first)), times(weight, vector(iterate, j, first + 3))
-            for m in range(modes):
-                scratch[0, 2 + m] += (1.0 - driven) * by_opening * shapes[j, m]
-                scratch[0, 2 + modes + m] += driven * by_opening * shapes[j, m]
-            for column in range(unknowns + 1):
-                at = RIGHT + 8 * column
-                scratch[0, column] -= dot(a, vector(blocks, j, at)) + dot(b, vector(blocks, j, at + 3))
-        for column in range(unknowns + 1):
-            scratch[0, column] = around(scratch[0, column])
-        border[row, unknowns] += scratch.data[0, 0, 0]
-        for column in range(unknowns):
-            border[row, column] = scratch.data[0, 1 + column, 0]
         border[row, row] += belt.driven_inertia / dt if row == 0 else belt.modal_stiffness[pulley, mode]

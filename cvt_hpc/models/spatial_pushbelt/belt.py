@@ -47,7 +47,6 @@ DRIVEN = 61  # 1 where the nearer pulley is the driven one, else 0
 CHANGE = 62  # 8: of the speeds in the last step, from which the next one starts
 STATE_FIELDS = CHANGE + 8
 POINTS = 4  # contact points of an element at its flanks, and at the front to the next one
-SIDES = (-1.0, -1.0, 1.0, 1.0)  # of the flanks' points
 
 # Entries of the state of the pulleys: speeds [rad/s], radii at which the flanks' pitch line runs without
 # penetration [m], positions of the mid planes between their sheaves along the axes [m]
@@ -249,8 +248,8 @@ class Newton(NamedTuple):
         Failed steps in a row with which a run ends.
     """
 
-    tolerance: float = 1e-3
-    power_tolerance: float = 1.0
+    tolerance: float = 3e-3
+    power_tolerance: float = 5.0
     roll_length: float = 1e-2
     pitch_length: float = 2e-3
     slope_length: float = 1e-3
@@ -309,6 +308,8 @@ class Workspace(NamedTuple):
         Of the solver, and sums.
     border : (columns - 1, columns) array
         System of the border, its right side last.
+    sums : (1, (columns - 1) columns) LaneArray
+        Its entries in the parts of the ring.
     inputs : (INPUTS,) array
         Inputs of the step.
     increments : (1 + 2 modes,) array
@@ -323,6 +324,7 @@ class Workspace(NamedTuple):
     blocks: LaneArray
     scratch: LaneArray
     border: np.ndarray
+    sums: LaneArray
     inputs: np.ndarray
     increments: np.ndarray
     kept: np.ndarray
@@ -413,6 +415,7 @@ def workspace(belt: Belt, nodes: int) -> Workspace:
         blocks=empty_system(nodes, parts, SIZE, columns),
         scratch=empty_scratch(parts, SIZE, columns),
         border=np.zeros((columns - 1, columns)),
+        sums=lanes(1, (columns - 1) * columns),
         inputs=np.zeros(INPUTS),
         increments=np.zeros(columns - 1),
         kept=np.zeros((2, STATE_FIELDS)),

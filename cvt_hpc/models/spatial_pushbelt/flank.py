@@ -68,6 +68,7 @@ from cvt_hpc.models.spatial_pushbelt.rotations import (
     dot,
     moved,
     plus,
+    plus_cross,
     store,
     times,
     unit,
@@ -252,16 +253,38 @@ def filter_slips(belt, state, j, p, dt):
 
 
 @register_jitable
-def _product(a, p, b, q, c, r):
-    """A p + b q + c r."""
-    return moved(moved(times(p, a), q, b), r, c)
+def _add_column(blocks, j, column, low, low_lever, high, high_lever):
+    """Add the forces of two points and their moments to a column of an element's block."""
+    first = 8 * column
+    accumulate(blocks, j, first, plus(low, high))
+    turn = plus_cross(vector(blocks, j, first + 3), low_lever, low)
+    store(blocks, j, first + 3, plus_cross(turn, high_lever, high))
 
 
 @register_jitable
-def _add_column(blocks, j, column, g, lever):
-    """Add the force g and its moment to a column of an element's block."""
-    accumulate(blocks, j, 8 * column, g)
-    accumulate(blocks, j, 8 * column + 3, cross(lever, g))
+def _point_slopes(belt, step, iterate, j, p, axes, dt):
+    """How the force of a point falls, and by what: three forces, and their rows by velocity and by turning.
+
+    The forces are those for each unit of the gap's rate and of both slips; then the lever, and t.
+    """
+    axis, o, a, half_o, half_a = axes
+    side, height, half_width = flank_point(belt, p)
+    lever = lever_of(o, a, side, height, half_width)
+    n, m, t = flank_directions(belt, vector(step, j, RADIAL + 3 * p), axis, side)
+    half = lever_of(half_o, half_a, side, height, half_width)
+    _, half_m, half_t = flank_directions(belt, vector(step, j, MID_RADIAL + 3 * p), axis, side)
+    first = FRICTION_SLOPES + 4 * p
+    by_gap = times(dt * iterate[j, YIELD + p], vector(iterate, j, BY_NORMAL + 3 * p))
+    by_m = moved(times(iterate[j, first], m), iterate[j, first + 2], t)
+    by_t = moved(times(iterate[j, first + 1], m), iterate[j, first + 3], t)
+    turns = cross(lever, n), cross(half, half_m), cross(half, half_t)
+    return (by_gap, by_m, by_t), (n, half_m, half_t), turns, lever, t
+
+
+@register_jitable
+def _column(forces, rows, k):
+    """The forces times entry k of their rows; k is a plain number of the source."""
+    return moved(moved(times(rows[0][k], forces[0]), rows[1][k], forces[1]), rows[2][k], forces[2])
 
 
 @kernel
@@ -270,58 +293,54 @@ def add_flank_blocks(belt, state, shapes, step, iterate, blocks, dt):
     modes = belt.modal_stiffness.shape[1]
     for j in range(step.rows):
         driven = state[j, DRIVEN]
-        axis = pulley_axis(belt, driven)
         o = vector(state, j, OUTWARD)
         a = cross(o, vector(state, j, HEADING))
-        half_o, half_a = vector(step, j, MID_OUTWARD), vector(step, j, MID_AXIAL)
+        axes = pulley_axis(belt, driven), o, a, vector(step, j, MID_OUTWARD), vector(step, j, MID_AXIAL)
         none = like(0.0, driven)
         drive = drive_turn = give = give_turn = none, none, none
         torque = torque_turn = press = press_turn = none, none, none
         own = by_opening = yielding = none
-        for p in range(POINTS):
-            side, height, half_width = flank_point(belt, p)
-            lever = lever_of(o, a, side, height, half_width)
-            n, m, t = flank_directions(belt, vector(step, j, RADIAL + 3 * p), axis, side)
-            half = lever_of(half_o, half_a, side, height, half_width)
-            _, half_m, half_t = flank_directions(belt, vector(step, j, MID_RADIAL + 3 * p), axis, side)
-            first = FRICTION_SLOPES + 4 * p
-            mm, mt = iterate[j, first], iterate[j, first + 1]
-            tm, tt = iterate[j, first + 2], iterate[j, first + 3]
-            # decrease of the force by the gap's rate and by both slips
-            stiff = iterate[j, YIELD + p]
-            by_normal = vector(iterate, j, BY_NORMAL + 3 * p)
-            by_gap = times(dt * stiff, by_normal)
-            by_m, by_t = moved(times(mm, m), tm, t), moved(times(mt, m), tt, t)
-            n_turn, m_turn, t_turn = cross(lever, n), cross(half, half_m), cross(half, half_t)
-            g = _product(by_gap, n[0], by_m, half_m[0], by_t, half_t[0])
-            _add_column(blocks, j, 0, g, lever)
-            g = _product(by_gap, n[1], by_m, half_m[1], by_t, half_t[1])
-            _add_column(blocks, j, 1, g, lever)
-            g = _product(by_gap, n[2], by_m, half_m[2], by_t, half_t[2])
-            _add_column(blocks, j, 2, g, lever)
-            g = _product(by_gap, n_turn[0], by_m, m_turn[0], by_t, t_turn[0])
-            _add_column(blocks, j, 3, g, lever)
-            g = _product(by_gap, n_turn[1], by_m, m_turn[1], by_t, t_turn[1])
-            _add_column(blocks, j, 4, g, lever)
-            g = _product(by_gap, n_turn[2], by_m, m_turn[2], by_t, t_turn[2])
-            _add_column(blocks, j, 5, g, lever)
-            radius = step[j, MID_RADIUS + p]
-            g = times(-radius * driven, by_t)
-            drive, drive_turn = plus(drive, g), plus(drive_turn, cross(lever, g))
-            g = times(belt.cosine * stiff, by_normal)
-            give, give_turn = plus(give, g), plus(give_turn, cross(lever, g))
-            # decrease of the torque and increase of the normal force by the speeds of the element
-            grip_t = -dot(t, by_normal)
-            weight = radius * driven
-            row = moved(times(grip_t * dt * stiff, n), -1.0, moved(times(tm, half_m), tt, half_t))
-            torque = moved(torque, weight, row)
-            row = moved(times(grip_t * dt * stiff, n_turn), -1.0, moved(times(tm, m_turn), tt, t_turn))
-            torque_turn = moved(torque_turn, weight, row)
-            push = 0.5 * belt.cosine * dt * stiff
-            press, press_turn = moved(press, push, n), moved(press_turn, push, n_turn)
-            own += weight * radius * tt
-            by_opening += weight * grip_t * belt.cosine * stiff
-            yielding += 0.5 * belt.cosine * belt.cosine * stiff
+        for p in range(0, POINTS, 2):
+            low, rows, turns, lever, t = _point_slopes(belt, step, iterate, j, p, axes, dt)
+            high, high_rows, high_turns, high_lever, high_t = _point_slopes(
+                belt, step, iterate, j, p + 1, axes, dt
+            )
+            column, other = _column(low, rows, 0), _column(high, high_rows, 0)
+            _add_column(blocks, j, 0, column, lever, other, high_lever)
+            column, other = _column(low, rows, 1), _column(high, high_rows, 1)
+            _add_column(blocks, j, 1, column, lever, other, high_lever)
+            column, other = _column(low, rows, 2), _column(high, high_rows, 2)
+            _add_column(blocks, j, 2, column, lever, other, high_lever)
+            column, other = _column(low, turns, 0), _column(high, high_turns, 0)
+            _add_column(blocks, j, 3, column, lever, other, high_lever)
+            column, other = _column(low, turns, 1), _column(high, high_turns, 1)
+            _add_column(blocks, j, 4, column, lever, other, high_lever)
+            column, other = _column(low, turns, 2), _column(high, high_turns, 2)
+            _add_column(blocks, j, 5, column, lever, other, high_lever)
+            for q in range(2):
+                if q == 1:
+                    low, rows, turns, lever, t = high, high_rows, high_turns, high_lever, high_t
+                first, by_normal = FRICTION_SLOPES + 4 * (p + q), vector(iterate, j, BY_NORMAL + 3 * (p + q))
+                stiff, radius = iterate[j, YIELD + p + q], step[j, MID_RADIUS + p + q]
+                tm, tt = iterate[j, first + 2], iterate[j, first + 3]
+                g = times(-radius * driven, low[2])
+                drive, drive_turn = plus(drive, g), plus_cross(drive_turn, lever, g)
+                if modes > 0:
+                    g = times(belt.cosine * stiff, by_normal)
+                    give, give_turn = plus(give, g), plus_cross(give_turn, lever, g)
+                    push = 0.5 * belt.cosine * dt * stiff
+                    press, press_turn = moved(press, push, rows[0]), moved(press_turn, push, turns[0])
+                    yielding += 0.5 * belt.cosine * belt.cosine * stiff
+                # decrease of the torque by the speeds of the element
+                grip, weight = -dot(t, by_normal), radius * driven
+                held = weight * grip * dt * stiff
+                slide, swing = -weight * tm, -weight * tt
+                torque = moved(moved(moved(torque, held, rows[0]), slide, rows[1]), swing, rows[2])
+                torque_turn = moved(
+                    moved(moved(torque_turn, held, turns[0]), slide, turns[1]), swing, turns[2]
+                )
+                own += weight * radius * tt
+                by_opening += weight * grip * belt.cosine * stiff
         store(iterate, j, TORQUE_ROW, torque)
         store(iterate, j, TORQUE_ROW + 3, torque_turn)
         store(iterate, j, NORMAL_ROW, press)

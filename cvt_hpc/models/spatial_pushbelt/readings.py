@@ -18,15 +18,16 @@ from cvt_hpc.variator import PULLEYS, STRANDS
 SIDES = ("left", "right")
 SHEAVES = tuple(f"{pulley} {side}" for pulley in PULLEYS for side in SIDES)
 ANGLES = ("roll", "yaw", "pitch")
+EXTREMES = (*ANGLES, "nose_force")  # the largest of any element
 LATERAL = tuple(f"{strand}_lateral" for strand in STRANDS)  # where probes have lateral displacement
 SCALARS = (
     *PLANAR_SCALARS,
     *(f"sheave_force {sheave}" for sheave in SHEAVES),
     *(f"sheave_loss {sheave}" for sheave in SHEAVES),
-    "misalignment",
-    *(f"largest_{angle}" for angle in ANGLES),
-    "largest_nose_force",
+    "axial_offset",
+    *(f"extreme_{what}" for what in EXTREMES),
 )
+_LEAST_FORCE = 1e-9  # [N]: what presses less does not press
 _FLANK = "mean line force of the flank"
 PROFILES = {
     **PLANAR_PROFILES,
@@ -44,8 +45,11 @@ PROFILES = {
         for side in SIDES
     },
     **{
-        f"{name}_{side}": (f"sliding of the flank {side}", "m s-1", f"mean of its points, {way}")
-        for name, way in (("radial_slip", "outwards"), ("flank_slip", "forwards over the sheave"))
+        f"{name}_{side}": (f"{words} {side}", "m s-1", f"mean of its points that are pressed, {way}")
+        for name, words, way in (
+            ("radial_slip", "radial sliding of the flank", "outwards; 0 where none is"),
+            ("flank_slip", "sliding of the flank", "forwards over the sheave; 0 where none is"),
+        )
         for side in SIDES
     },
     **{f"push_force_{side}": (f"push force {side}", "N", "mean, at rocking edge and head") for side in SIDES},
@@ -111,9 +115,9 @@ class Reading:
         lost += _points(e, f.FLANK_FRICTION_T) * slip
         loss = both @ lost.reshape(-1, 2, 2).sum(axis=2)  # by pulley and side
         pressed = (both @ normal).sum(axis=1)
-        weights = both * normal.sum(axis=1) / np.maximum(pressed, 1e-9)[:, None]
+        weights = both * normal.sum(axis=1) / np.maximum(pressed, _LEAST_FORCE)[:, None]
         running = np.where(pressed > 0.0, weights @ self._contact_radii(), np.nan)
-        sliding = (both @ (normal * slip)).sum(axis=1) / np.maximum(pressed, 1e-9)
+        sliding = (both @ (normal * slip)).sum(axis=1) / np.maximum(pressed, _LEAST_FORCE)
         middles = self._path.middles()
         speeds = np.linalg.norm(_vectors(e, f.SPEED), axis=1).sum()
         line = np.linalg.norm(np.roll(self._position, -1, axis=0) - self._position, axis=1).sum()
@@ -164,7 +168,12 @@ class Reading:
             *(normal[:, side].sum(axis=1) / pitch for side in pairs),
             *(normal[:, k] / pitch for k in (1, 3)),
             *(grip[:, side].sum(axis=1) / pitch for grip in (grip_m, grip_t) for side in pairs),
-            *(slip[:, side].mean(axis=1) for slip in (slip_m, slip_t) for side in pairs),
+            *(
+                (normal[:, side] * slip[:, side]).sum(axis=1)
+                / np.maximum(normal[:, side].sum(axis=1), _LEAST_FORCE)
+                for slip in (slip_m, slip_t)
+                for side in pairs
+            ),
             *(self._push[:, [k, k + 2]].sum(axis=1) for k in (0, 1)),
             self._push[:, 2:].sum(axis=1),
             self._position[:, 2],

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.models.pushbelt import record as pushbelt
-from cvt_hpc.models.spatial_pushbelt.readings import ANGLES, LATERAL, PROFILES, SHEAVES, SIDES
+from cvt_hpc.models.spatial_pushbelt.readings import ANGLES, EXTREMES, LATERAL, PROFILES, SHEAVES, SIDES
+from cvt_hpc.physics.out_of_plane import clamped_force
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
 from cvt_hpc.variator.judging import each, mean
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
     from cvt_hpc.models.pushbelt.run import ElementRun
 
-_LARGEST = (*(f"largest_{angle}" for angle in ANGLES), "largest_nose_force")
 # Measured on one core of an EPYC (Zen 5): core-seconds per element and step, and per sample
 RIGID_COST, ELASTIC_COST, SAMPLE_COST = 4e-6, 5e-6, 5e-4
 
@@ -45,6 +45,22 @@ VARIABLES = (
     Variable("sheave_loss", ("sheave",), "f8", "W", "mean friction power of the flanks at each sheave"),
     Variable(
         "net_axial_force", ("pulley",), "f8", "N", "mean force of the belt on both sheaves, to the right"
+    ),
+    Variable(
+        "beam_axial_force",
+        ("pulley",),
+        "f8",
+        "N",
+        "the same by both strands as beams under their mean forces, held without slope at the arcs",
+        words="clamped strands",
+    ),
+    Variable(
+        "string_axial_force",
+        ("pulley",),
+        "f8",
+        "N",
+        "the same by both strands as strings under their mean forces",
+        words="strings",
     ),
     Variable(
         "strand_one_sidedness",
@@ -122,7 +138,9 @@ def judge(run: ElementRun) -> dict[str, Any]:
 def _evaluate(run: ElementRun) -> dict[str, Any]:
     """Values of a finished run that the planar pushbelt has not."""
     forces = each(run, "sheave_force", SHEAVES)
-    largest = {name: float(run.channel(name)[run.judged].max()) for name in _LARGEST}
+    largest = {
+        f"largest_{what}": float(run.channel(f"extreme_{what}")[run.judged].max()) for what in EXTREMES
+    }
     left, right = (run.profiles[f"push_force_{side}"] for side in SIDES)
     where = regions(run.path, run.places)
 
@@ -131,14 +149,24 @@ def _evaluate(run: ElementRun) -> dict[str, Any]:
         one, other = np.nansum(left[inside]), np.nansum(right[inside])
         return (other - one) / (other + one) if other + one > 0.0 else np.nan
 
+    p, path, offset = run.parameters, run.path, mean(run, "axial_offset")
+    speed = run.mean_driving_speed(run.judged) * path.driving_radius
+    centrifugal = (p["element_mass"] + p["ring_mass"]) * speed**2
+    net = each(run, "ring_tension", STRANDS) - each(run, "push_force", STRANDS) - centrifugal
+    stiffness = p["lateral_bending_stiffness"], p["lateral_shear_stiffness"]
+    # a strand that is pushed more than it is pulled is no string, and counts as one without tension
+    held = [clamped_force(offset, path.strand_length, max(force, 0.0), *stiffness) for force in net]
+    signs = np.array([1.0, -1.0])  # the driving pulley is pulled to where the driven one is
     return {
+        "beam_axial_force": signs * sum(held),
+        "string_axial_force": signs * offset / path.strand_length * np.maximum(net, 0.0).sum(),
         "sheave_force": forces,
         "sheave_loss": each(run, "sheave_loss", SHEAVES),
         "net_axial_force": forces[1::2] - forces[::2],
         "strand_one_sidedness": np.array([one_sided(strand) for strand in STRANDS]),
         "arc_one_sidedness": np.array([one_sided(pulley) for pulley in PULLEYS]),
         **largest,
-        "final_misalignment": mean(run, "misalignment"),
+        "final_misalignment": mean(run, "axial_offset"),
     }
 
 
@@ -157,10 +185,10 @@ def histories(run: ElementRun) -> xr.Dataset:
     """
     outwards = "of the belt on the sheave, outwards"
     over_time = {f"sheave_force {k}": (f"axial force {k}", "N", outwards) for k in SHEAVES}
-    over_time["misalignment"] = ("misalignment", "m", "axial offset of the pulleys' mid planes")
+    over_time["axial_offset"] = ("axial offset", "m", "of the pulleys' mid planes")
     for angle in ANGLES:
-        over_time[f"largest_{angle}"] = (f"largest {angle}", "rad", "of any element")
-    over_time["largest_nose_force"] = ("largest force of a nose", "N", "of any element")
+        over_time[f"extreme_{angle}"] = (f"largest {angle}", "rad", "of any element")
+    over_time["extreme_nose_force"] = ("largest force of a nose", "N", "of any element")
     found = pushbelt.history(run, PROFILES, over_time)
     found["displacement"].attrs["comment"] = "transverse, outward; of lateral probes axial, to the right"
     return found

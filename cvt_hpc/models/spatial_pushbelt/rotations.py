@@ -84,6 +84,16 @@ def cross(a, b):
 
 
 @register_jitable
+def plus_cross(c, a, b):
+    """C + a x b."""
+    return (
+        fma(a[1], b[2], fma(-a[2], b[1], c[0])),
+        fma(a[2], b[0], fma(-a[0], b[2], c[1])),
+        fma(a[0], b[1], fma(-a[1], b[0], c[2])),
+    )
+
+
+@register_jitable
 def unit(a):
     """Direction and size of a vector."""
     size = sqrt(dot(a, a))

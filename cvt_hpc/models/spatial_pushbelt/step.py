@@ -93,6 +93,7 @@ from cvt_hpc.models.spatial_pushbelt.rotations import (
 from cvt_hpc.models.spatial_pushbelt.saddle import saddle_forces
 from cvt_hpc.solvers.cyclic_blocks import block_size
 from cvt_hpc.solvers.linked_blocks import solve
+from cvt_hpc.solvers.small_system import solve_small
 
 _BLOCK = block_size(SIZE)
 _LARGE = 1e100  # more than any speed or power that means something
@@ -119,21 +120,6 @@ def _shapes(belt, state, leans, step, shapes):
         lean = belt.cosine * lean
         for p in range(POINTS):
             step[j, FLANK_GAP + p] += lean if p >= 2 else -lean
-
-
-@kernel
-def _solve_border(border):
-    """Solve the border's equations, by elimination without pivoting."""
-    size = border.shape[0]
-    for p in range(size):
-        per_pivot = 1.0 / border[p, p]
-        for c in range(p, size + 1):
-            border[p, c] *= per_pivot
-        for r in range(size):
-            if r != p:
-                factor = border[r, p]
-                for c in range(p, size + 1):
-                    border[r, c] -= factor * border[p, c]
 
 
 @kernel
@@ -219,8 +205,8 @@ def _solve(belt, state, work, dt):
     Return whether the system was regular.
     """
     is_regular = solve(work.blocks, work.scratch, _BLOCK)
-    border_system(belt, state.elements, work.shapes, work.iterate, work.blocks, work.scratch, work.border, dt)
-    _solve_border(work.border)
+    border_system(belt, state.elements, work.shapes, work.iterate, work.blocks, work.sums, work.border, dt)
+    solve_small(work.border)
     return is_regular
 
 

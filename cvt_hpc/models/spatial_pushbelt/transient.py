@@ -18,7 +18,7 @@ from cvt_hpc.models.spatial_pushbelt.parameters import LOOSE_SIDES, package_arm
 from cvt_hpc.models.spatial_pushbelt.readings import LATERAL, PROFILES, SCALARS, Reading
 from cvt_hpc.models.spatial_pushbelt.start import start
 from cvt_hpc.models.spatial_pushbelt.step import advance
-from cvt_hpc.variator import STRANDS
+from cvt_hpc.variator import LARGEST_DISPLACEMENT, STRANDS
 
 CHANNELS = (*COURSES, *SCALARS)
 
@@ -55,6 +55,15 @@ class Transient(ElementRun):
 
     def _tilting_inertia(self) -> float:
         return self._belt.pitch_inertia
+
+    def _out_of_place(self) -> str | None:
+        """As in the plane; or whether an element is so far out of it that no groove holds it."""
+        lateral = np.abs(of_lanes(self._state.elements)[:, belt.POSITION + 2])
+        most = LARGEST_DISPLACEMENT + 0.5 * abs(self.parameters["misalignment"])
+        if (largest := lateral.max()) > most:
+            element = int(lateral.argmax())
+            return f"element {element} has left the grooves: it is {largest * 1e3:.3g} mm out of the plane"
+        return super()._out_of_place()
 
     def _stored_energy(self, found: Reading) -> float:
         return found.stored_energy(self._state.openings, self._state.leans)

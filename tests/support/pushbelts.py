@@ -1,0 +1,52 @@
+"""A common pushbelt, as the `start` of its model takes it."""
+
+import numpy as np
+
+# Assumptions, but for centre distance, belt length, elements and their mass, which are a public data set's.
+ASSUMED = {
+    "ratio": 1.35,  # [1]
+    "centre_distance": 0.155,  # [m]
+    "belt_length": 0.6612,  # of the pitch line, on which the rocking edges lie [m]
+    "elements": 432,  # each of the values below; `given` makes super elements of them
+    "element_mass": 1.858e-3,  # [kg]
+    "element_height": 13e-3,  # [m], of which and of the thickness the inertia is that of a plate
+    "pitch_depth": 1.5e-3,  # [m]
+    "head_height": 4e-3,  # [m]
+    "play": 0.3e-3,  # sum of the gaps between elements [m]
+    "ring_mass": 0.165,  # [kg]
+    "ring_stiffness": 6.0e6,  # EA [N]
+    "ring_strain": 1e-4,  # at the start
+    "half_wedge_angle": np.radians(11.0),  # [rad]
+    "flank_stiffness": 5e7,  # [N/m]
+    "contact_stiffness": 1e9,  # [N/m]
+    "nose_height": 6e-3,  # [m]
+    "nose_clearance": np.inf,  # [m]
+    "nose_stiffness": 1e8,  # [N/m]
+    "angle_stiffness": 5.0,  # [N m/rad]
+    "angle_damping": 5e-5,  # [N m s]
+    "transverse_damping": 500.0,  # [N s/m^2]
+    "friction_law": "coulomb",
+    "kinetic_friction": 0.09,
+    "friction_gradient": 0.0,  # [s/m]
+    "stribeck_velocity": 0.1,  # [m/s]
+    "friction_memory": 0.0,  # [s]
+    "ring_friction": 0.06,
+    "friction_speed": 5e-4,  # [m/s]
+    "ring_friction_speed": 5e-4,  # [m/s]
+    "driven_inertia": 0.01,  # [kg m^2]
+    "driving_rate": 0.0,  # [m/(s N)]: position prescribed
+    "driven_rate": 5e-6,  # [m/(s N)]
+    "modal_stiffness": ((), ()),  # [N/m]
+    "driving_speed": 100.0 * np.pi,  # [rad/s]
+}
+NODES = 104  # of 8 lanes; polygon effects in the power balance are below half a percent
+SPEED, THRUST = ASSUMED["driving_speed"], 20e3  # [rad/s], [N]
+
+
+def given(nodes=NODES, **changes):
+    """Values for `start`, of so many super elements."""
+    group = ASSUMED["elements"] / nodes
+    beside = ("element_mass", "flank_stiffness", "angle_stiffness", "angle_damping")
+    values = {key: ASSUMED[key] * group for key in beside}
+    values["contact_stiffness"] = ASSUMED["contact_stiffness"] / group
+    return ASSUMED | values | {"elements": nodes} | changes
