@@ -101,10 +101,17 @@ class Results:
         return map_classes(self._dataset)
 
     def strongest(self, name: str = "amplitude") -> xr.DataArray:
-        """Return a variable at the strand with the largest amplitude, where the run vibrates; else nan."""
+        """Return a variable at the strand with the largest amplitude, where the run vibrates; else nan.
+
+        It has the dimensions of `amplitude`, such as `frequency`.
+        """
         check_results(self._dataset, "results")
         if name not in self._dataset:
             raise unknown("results", "variable", name, map(str, self._dataset.data_vars))
+        dims = set(self._dataset["amplitude"].dims) if "amplitude" in self._dataset else set()
+        if set(self._dataset[name].dims) != dims:
+            found = ", ".join(map(str, self._dataset[name].dims)) or "none"
+            raise mismatch(f"results: {name}", "a variable with the dimensions of amplitude", found)
         values = at_strongest_strand(self._dataset, name)
         values.attrs = dict(self._dataset[name].attrs)
         return values.rename(name).where(self.classes() == OccurrenceClass.VIBRATING)
@@ -116,8 +123,8 @@ class Results:
         -------
         DataArray
             Over the other axes [unit of the axis], midway between a quiet and a vibrating neighbour, so known
-            within half a step; nan where nothing sets in. Undecided, failed and missing runs are passed over,
-            slipping and irregular ones too.
+            within half a step, and inf next to an infinite one; nan where nothing sets in. Undecided, failed
+            and missing runs are passed over, slipping and irregular ones too.
         """
         boundary = self.boundary(along)
         onset = boundary.where(boundary["rising"] == 1.0).min("boundary", keep_attrs=True)

@@ -22,6 +22,7 @@ from cvt_hpc.variator.path import points_at
 
 FORMATS = (".gif", ".mp4")
 PERIODS, FRAMES = 2, 24  # of the vibration, and pictures of each
+LEAST_SAMPLES = 8  # of which a period and splines can be had
 RATE = 12  # pictures a second: a period takes two seconds
 LARGEST = 0.12  # of the distance of the shafts: the largest displacement that is drawn
 PLACES = 400  # along the belt
@@ -59,8 +60,8 @@ def draw_animation(history: xr.Dataset, out: Path, source: str = "history") -> P
     ratio, driven_radius, distance = _geometry(history, source)
     path = variator(ratio, driven_radius, distance)
     time, motion, period = _last_periods(history)
-    size = float(np.abs(motion).max()) or 1.0
-    factor = LARGEST * distance / size
+    size = float(np.abs(motion).max())
+    factor = LARGEST * distance / size if size else 0.0
     places = np.linspace(0.0, path.path_length, PLACES)
     rest, angle, _ = points_at(path, distance, places)
     normal = np.stack([np.sin(angle), -np.cos(angle)], 1)  # outwards
@@ -78,7 +79,7 @@ def draw_animation(history: xr.Dataset, out: Path, source: str = "history") -> P
         margin = 1.3e3 * LARGEST * distance
         axes.set_xlim(1e3 * rest[:, 0].min() - margin, 1e3 * rest[:, 0].max() + margin)
         axes.set_ylim(1e3 * rest[:, 1].min() - margin, 1e3 * rest[:, 1].max() + margin)
-        name = one_line(str(history.attrs.get("job_name", "")))
+        name = one_line(str(history.attrs.get("job_name", ""))).replace("$", r"\$")  # no formula
         told = (
             f"{name}: {1.0 / period:.0f} Hz, at most {1e6 * size:.3g} µm, drawn {factor:.0f} times as large"
         )
@@ -116,12 +117,16 @@ def _geometry(history: xr.Dataset, source: str) -> tuple[float, float, float]:
     try:
         point = json.loads(history.attrs["point"])
         found = tuple(float(point[key]) for key in ("ratio", "driven_radius", "centre_distance"))
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, RecursionError):
         found = ()
-    if len(found) != 3 or "probe_position" not in history:
+    known = {"displacement", "probe_position"} <= {*map(str, history.variables)}
+    if len(found) != 3 or not known or not all(0.0 < value < np.inf for value in found):
         raise mismatch(
             source, "the history of a run of a variator, with displacement at probes", "another one"
         )
+    if history.sizes["time"] < LEAST_SAMPLES or not np.isfinite(history["displacement"]).all():
+        expected = f"finite displacements at {LEAST_SAMPLES} times at least"
+        raise mismatch(source, expected, f"{history.sizes['time']} times, or others")
     return found
 
 
@@ -129,16 +134,41 @@ def _last_periods(history: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.
     """Times [s] of the pictures, the motion at them about its mean (time, probe) [m], and the period [s]."""
     time = history["time"].values
     motion = history["displacement"].transpose("time", "probe").values
-    judged = motion[int((1.0 - float(history.attrs.get("judged_fraction", 0.5))) * len(time)) :]
+    judged = motion[-max(int(_judged_fraction(history) * len(time)), LEAST_SAMPLES) :]
     motion = motion - judged.mean(0)
+    period = 1.0 / (_recorded_frequency(history) or _main_frequency(time, judged))
+    shown = np.linspace(max(time[-1] - PERIODS * period, time[0]), time[-1], PERIODS * FRAMES)
+    return shown, CubicSpline(time, motion)(shown), period
+
+
+def _recorded_frequency(history: xr.Dataset) -> float:
+    """Return the frequency [Hz] that the run's record has of the strongest strand; 0 where it has none."""
+    if "frequency" not in history or "amplitude" not in history:
+        return 0.0
+    found = [
+        (float(amplitude), float(frequency))
+        for amplitude, frequency in zip(history["amplitude"].values, history["frequency"].values, strict=True)
+        if np.isfinite(amplitude) and 0.0 < frequency < np.inf
+    ]
+    return max(found, default=(0.0, 0.0))[1]
+
+
+def _main_frequency(time: NDArray[np.float64], judged: NDArray[np.float64]) -> float:
+    """Return the frequency [Hz] of the highest line of the strongest probe's spectrum."""
     strongest = int(np.abs(judged - judged.mean(0)).max(0).argmax())
     signal = judged[:, strongest] - judged[:, strongest].mean()
     interval = float(np.diff(time).mean())
     spectrum = np.abs(np.fft.rfft(signal * np.hanning(signal.size)))
-    frequency = np.fft.rfftfreq(signal.size, interval)[max(int(spectrum[1:].argmax()) + 1, 1)]
-    period = 1.0 / float(frequency)
-    shown = np.linspace(max(time[-1] - PERIODS * period, time[0]), time[-1], PERIODS * FRAMES)
-    return shown, CubicSpline(time, motion)(shown), period
+    return float(np.fft.rfftfreq(signal.size, interval)[int(spectrum[1:].argmax()) + 1])
+
+
+def _judged_fraction(history: xr.Dataset) -> float:
+    """Return the last part of the run that was judged; a half where the history has no such number."""
+    try:
+        fraction = float(history.attrs.get("judged_fraction", 0.5))
+    except (TypeError, ValueError):
+        return 0.5
+    return fraction if 0.0 < fraction <= 1.0 else 0.5
 
 
 def _along_belt(

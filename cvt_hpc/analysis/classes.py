@@ -24,6 +24,8 @@ def check_results(dataset: xr.Dataset, source: str) -> None:
         if name not in dataset:
             found = few_of(list(map(str, dataset.data_vars)), _MOST_NAMED) or "no variables"
             raise mismatch(source, f"results of a study, with the variable {name}", found)
+    if not dataset["status"].size:
+        raise mismatch(source, "results of a study of one run at least", "none")
 
 
 def occurrence_classes(dataset: xr.Dataset) -> xr.DataArray:

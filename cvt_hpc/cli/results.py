@@ -103,9 +103,9 @@ def _colour_end(text: str | None, dataset: xr.Dataset, shown: str) -> float | No
     from cvt_hpc.job.values import read_value
     from cvt_hpc.parameters import positive
 
-    if text is None:
+    if text is None or shown not in dataset:  # what draws it refuses a quantity that is not known
         return None
-    unit = str(dataset[shown].attrs.get("units", "")) if shown in dataset else ""
+    unit = str(dataset[shown].attrs.get("units", ""))
     return read_value(positive(1.0, "" if unit == "1" else unit, ""), text, "--vmax")
 
 

@@ -52,7 +52,7 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
         axes = [(axis.name, in_short(axis, schema), f"{len(axis.values)} {noun}") for axis in job.axes]
         lines += ["", "[axes]", *columns(axes)]
     if job.rules:
-        lines += ["", "[derived]", *columns(_rules(job, schema))]
+        lines += ["", "[derived]", *columns(rules_in_words(job, schema))]
     if job.design:
         design = [(key, _setting_in_words(value)) for key, value in job.design.items()]
         lines += ["", "[design]", *columns(design)]
@@ -108,7 +108,7 @@ def value_in_words(schema: Schema, key: str, value: Any) -> str:
     return f"{len(value)} values from {schema.in_words(key, value[0])} to {schema.in_words(key, value[-1])}"
 
 
-def _rules(job: Job, schema: Schema) -> list[tuple[str, ...]]:
+def rules_in_words(job: Job, schema: Schema) -> list[tuple[str, ...]]:
     """Return for each parameter that follows from others its values, how it follows, and along which axes.
 
     Of a huge grid the values are those at places all over it.

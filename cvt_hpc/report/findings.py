@@ -8,8 +8,9 @@ from itertools import islice
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
-from cvt_hpc.analysis.arrangement import Arrangement, value_text
+from cvt_hpc.analysis.arrangement import Arrangement, infinity_in_words, value_text
 from cvt_hpc.analysis.classes import (
     OccurrenceClass,
     at_strongest_strand,
@@ -19,7 +20,7 @@ from cvt_hpc.analysis.classes import (
 )
 from cvt_hpc.analysis.figures import coordinate_unit, in_words
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.onsets import Onset, onsets
+from cvt_hpc.vibration.onsets import onsets
 
 MOST_LINES = 12  # lines of the map that are told apart
 _STATUS = {int(status): status.name.lower() for status in Status}
@@ -29,24 +30,42 @@ _LEVEL = {OccurrenceClass.QUIET: -1.0, OccurrenceClass.VIBRATING: 1.0}
 def summary(dataset: xr.Dataset) -> str:
     """Return how many runs there are, of which classes."""
     classes = occurrence_classes(dataset).values
-    return f"{classes.size} runs: {count_classes(classes)}."
+    return f"{counted(classes.size, 'run')}: {count_classes(classes)}."
+
+
+def counted(count: int, noun: str) -> str:
+    """Return a number with its noun: "1 run", "2 runs"."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def window_sentences(arrangement: Arrangement) -> Iterator[str]:
-    """Yield for each line of a map along x, which windows of it vibrate, how far and at which frequency."""
+    """Yield for each line of a map along x, which windows of it vibrate, how far and at which frequency.
+
+    A line is called quiet only if all of its cells are.
+    """
     dataset, x = arrangement.dataset, arrangement.x
     if dataset[x].dtype.kind not in "iuf":
         return
+    decided = np.isin(map_classes(dataset).values, list(_LEVEL))
+    if not decided.any():
+        yield "No run is known to be quiet or to vibrate."
+        return
     others = [name for name in (arrangement.panel, arrangement.y) if name]
     stacked = dataset.stack(line=others) if others else dataset.expand_dims("line")
-    lines = stacked.sizes["line"]
-    told = [_line(stacked.isel(line=k), x, _place(dataset, others, k)) for k in range(lines)]
-    vibrating = [line for line in told if line]
+    lines = [stacked.isel(line=k) for k in range(stacked.sizes["line"])]
+    told = [_line(line, x, _place(dataset, others, k)) for k, line in enumerate(lines)]
+    vibrating = [text for text in told if text]
     yield from islice(vibrating, MOST_LINES)
     if (more := len(vibrating) - MOST_LINES) > 0:
-        yield f"{more} more lines of the map vibrate."
-    if quiet := lines - len(vibrating):
-        yield f"Nothing vibrates {'here' if lines == 1 else f'in {quiet} of {lines} lines along {x}'}."
+        yield f"{counted(more, 'more line')} of the map {'vibrates' if more == 1 else 'vibrate'}."
+    rest = [line for line, text in zip(lines, told, strict=True) if not text]
+    quiet = sum(bool(np.all(map_classes(line) == OccurrenceClass.QUIET)) for line in rest)
+    along = f"of {len(lines)} lines along {in_words(dataset[x])}" if len(lines) > 1 else ""
+    if quiet:
+        yield f"Nothing vibrates in {quiet} {along}." if along else "Nothing vibrates here."
+    if open_ones := len(rest) - quiet:
+        start = f"In {open_ones} {along} no" if along else "No"
+        yield f"{start} run is known to vibrate, but not all are known to be quiet."
 
 
 def _place(dataset: xr.Dataset, names: list[str], index: int) -> str:
@@ -67,12 +86,11 @@ def _line(line: xr.Dataset, x: str, place: str) -> str:
     level = np.full(classes.shape, np.nan)
     for kind, value in _LEVEL.items():
         level[classes == kind] = value
-    factor, unit = coordinate_unit(line[x].attrs)
-    windows = _windows(onsets(line[x].values.astype(float), level), factor, unit)
+    windows = _windows(line[x], level)
     last = level[np.argmax(line[x].values)]
     windows += ", as far as is decided" if windows.endswith(" on") and np.isnan(last) else ""
     start = f"At {place} the belt" if place else "The belt"
-    text = f"{start} vibrates{windows}"
+    text = f"{start} vibrates {windows}"
     amplitude = np.where(vibrating, at_strongest_strand(line, "amplitude").values, np.nan)
     if np.isfinite(amplitude).any():
         largest = int(np.nanargmax(amplitude))
@@ -82,20 +100,32 @@ def _line(line: xr.Dataset, x: str, place: str) -> str:
     return text + "."
 
 
-def _windows(found: list[Onset], factor: float, unit: str) -> str:
+def _windows(axis: xr.DataArray, level: NDArray[np.float64]) -> str:
     """Between which values, by the boundaries midway between neighbours of different class."""
+    values = axis.values.astype(float)
+    factor, unit = coordinate_unit(axis.attrs)
+    behind = f" {unit}" if unit else ""
+    last = np.max(values[np.isfinite(values) & np.isfinite(level)], initial=-np.inf)
+
+    def at(value: float) -> str:
+        if np.isfinite(value):
+            return f"{factor * value:.4g}".replace("-", "−")
+        return f"a value between {factor * last:.4g} and {infinity_in_words(str(axis.name))}"
+
     parts = []
-    start = None
-    for one in found:
-        value = f"{factor * one.load:.4g}"
+    start = ""
+    for one in onsets(values, level):
         if one.rising:
-            start = value
+            start = at(one.load)
         else:
-            parts.append(f"from {start} to {value} {unit}" if start else f"up to {value} {unit}")
-            start = None
+            parts.append(
+                f"from {start} to {at(one.load)}{behind}" if start else f"up to {at(one.load)}{behind}"
+            )
+            start = ""
     if start:
-        parts.append(f"from {start} {unit} on")
-    return f" {' and '.join(parts)}".replace("  ", " ") if parts else " wherever it is decided"
+        parts.append(f"from {start}{behind} on")
+    everywhere = "in all runs" if np.isfinite(level).all() else "in all runs that are decided"
+    return " and ".join(parts) or everywhere
 
 
 def failures(dataset: xr.Dataset) -> list[tuple[str, str, int]]:
@@ -109,12 +139,12 @@ def failures(dataset: xr.Dataset) -> list[tuple[str, str, int]]:
         return []
     reasons = dataset["reason"].values.ravel()[failed] if "reason" in dataset else [""] * failed.size
     alike: dict[tuple[str, str], str] = {}
-    counted: Counter[tuple[str, str]] = Counter()
+    numbers: Counter[tuple[str, str]] = Counter()
     for index, reason in zip(failed, map(str, reasons), strict=True):
         kind = _STATUS.get(int(status[index]), "failed"), _without_numbers(reason)
         alike.setdefault(kind, reason)
-        counted[kind] += 1
-    return [(kind[0], alike[kind], count) for kind, count in counted.most_common()]
+        numbers[kind] += 1
+    return [(kind[0], alike[kind], count) for kind, count in numbers.most_common()]
 
 
 def _without_numbers(reason: str) -> str:

@@ -13,17 +13,18 @@ import jinja2
 import numpy as np
 import xarray as xr
 
-from cvt_hpc.analysis.arrangement import Arrangement, arrange
+from cvt_hpc.analysis.arrangement import Arrangement, arrange, known_values, value_text
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.figures import RESOLUTION
 from cvt_hpc.analysis.maps import map_figure, sheet_of
 from cvt_hpc.analysis.scatter import is_sampled
-from cvt_hpc.errors import InputError, one_line
+from cvt_hpc.errors import InputError, mismatch, one_line
 from cvt_hpc.files import written_aside
 from cvt_hpc.job import Job, rebuild_job
-from cvt_hpc.job.summary import core_time_in_words, value_in_words, values_in_words
+from cvt_hpc.job.summary import core_time_in_words, rules_in_words, value_in_words
 from cvt_hpc.models.contract import load_model
-from cvt_hpc.report.findings import failures, summary, window_sentences
+from cvt_hpc.netcdf import CONTENT, HISTORY
+from cvt_hpc.report.findings import counted, failures, summary, window_sentences
 
 MOST_FAILURES = 30  # kinds of failure in the table
 # What tells how well a run was computed, where its model records it
@@ -63,6 +64,8 @@ def write_report(dataset: xr.Dataset, out: Path, source: str = "results") -> Pat
         If the dataset holds no results of a study, or the system refuses.
     """
     check_results(dataset, source)
+    if (content := str(dataset.attrs.get(CONTENT, ""))) == HISTORY:
+        raise mismatch(source, "results of a study", f"the {content}; `cvt-hpc plot` draws it")
     templates = jinja2.Environment(loader=jinja2.PackageLoader("cvt_hpc.report", "."), autoescape=True)
     page = templates.get_template("page.html").render(_content(dataset, source))
     with written_aside(Path(out), parents=True) as aside:
@@ -75,21 +78,26 @@ def _content(dataset: xr.Dataset, source: str) -> dict[str, Any]:
     job = _job(attributes, source)
     arrangement = _arrangement(dataset, source)
     found = failures(dataset)
+    parameters = _parameters(job) if job else {}
+    sentences = list(window_sentences(arrangement)) if arrangement else []
     return {
         "name": one_line(attributes.get("job_name", source)),
         "description": attributes.get("title", ""),
         "model": f"{job.model}: {load_model(job.model).title}" if job else "",
         "axes": _axes(dataset, job),
         "summary": summary(dataset),
-        "sentences": list(window_sentences(arrangement)) if arrangement else [],
+        "sentences": sentences,
+        "windows": any("vibrates from" in line or "vibrates up to" in line for line in sentences),
         "notes": arrangement.notes if arrangement else (),
         "picture": _picture(dataset, source),
         "interactive": _interactive(arrangement),
         "failures": found[:MOST_FAILURES],
-        "failed": sum(count for *_, count in found),
+        "failed": counted(sum(count for *_, count in found), "run"),
         "cost": _cost(dataset),
         "quality": _quality(dataset),
-        "parameters": _parameters(job) if job else {},
+        "parameters": parameters,
+        "changed": [row for rows in parameters.values() for row in rows if row.changed],
+        "derived": rules_in_words(job, job.schema) if job else [],
         "provenance": _provenance(attributes),
     }
 
@@ -110,15 +118,24 @@ def _arrangement(dataset: xr.Dataset, source: str) -> Arrangement | None:
 
 
 def _axes(dataset: xr.Dataset, job: Job | None) -> list[tuple[str, str, str]]:
-    """Name, meaning and values of each axis."""
+    """Name, meaning and values of each axis, in the units of the job; of an axis that is fixed its value."""
+    dims = set(dataset["status"].dims)
+    names = [str(name) for name in dataset.coords if dims & set(dataset[name].dims)]
     if job is not None:
-        schema = job.schema
-        return [
-            (axis.name, schema.parameters[axis.name].description, values_in_words(axis, schema))
-            for axis in job.axes
-        ]
-    names = map(str, dataset["status"].dims)
-    return [(name, str(dataset[name].attrs.get("long_name", "")), str(dataset.sizes[name])) for name in names]
+        names = [axis.name for axis in job.axes if axis.name in dataset.coords]
+    rows = []
+    for name in names:
+        axis = dataset[name]
+        meaning = job.schema.parameters[name].description if job else str(axis.attrs.get("long_name", ""))
+        if not axis.ndim:
+            values = value_text(axis.expand_dims("run"), 0)
+        elif is_sampled(dataset) and axis.dtype.kind in "iuf":
+            ends = int(np.argmin(axis.values)), int(np.argmax(axis.values))
+            values = " to ".join(value_text(axis, place) for place in ends)
+        else:
+            values = known_values(axis)
+        rows.append((name, meaning, values))
+    return rows
 
 
 def _picture(dataset: xr.Dataset, source: str) -> str:
@@ -145,7 +162,12 @@ def _interactive(arrangement: Arrangement | None) -> str:
     sheet = sheet_of(arrangement)
     if sheet.panels > MOST_PANELS:
         return ""
-    settings = {"responsive": True, "displaylogo": False}
+    settings = {
+        "responsive": True,
+        "displaylogo": False,
+        "modeBarButtonsToRemove": ["select2d", "lasso2d"],
+        "showSendToCloud": False,  # the library's default is a button that uploads the map
+    }
     return map_with_values(sheet).to_html(
         full_html=False, include_plotlyjs=True, div_id="map", config=settings
     )
@@ -181,13 +203,13 @@ def _quality(dataset: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
 
 
 def _parameters(job: Job) -> dict[str, list[Row]]:
-    """Values of all keys by table; the defaults are assumptions of the program."""
-    schema, varied = job.schema, {axis.name for axis in job.axes}
+    """Values of what neither varies nor follows, by table; the defaults are assumptions of the program."""
+    schema, elsewhere = job.schema, {axis.name for axis in job.axes} | {rule.key for rule in job.rules}
     return {
         section: [
             Row(key, value_in_words(schema, key, value), parameter.description, value != parameter.default)
             for key, parameter in table.items()
-            if key not in varied and (value := job.parameters.get(key)) is not None and value != ()
+            if key not in elsewhere and (value := job.parameters.get(key)) is not None and value != ()
         ]
         for section, table in schema.sections.items()
     }

@@ -127,3 +127,17 @@ def test_what_is_no_table_of_a_study_is_refused(text, tmp_path):
     (tmp_path / "x.csv").write_text(text)
     with pytest.raises(InputError, match="x.csv: expected a "):
         cvt_hpc.read_table(tmp_path / "x.csv")
+
+
+@pytest.mark.parametrize(
+    ("results", "name"), [(study(), "status"), (study().drop_vars("amplitude"), "frequency")]
+)
+def test_the_strongest_strand_is_that_of_variables_over_strands(results, name):
+    with pytest.raises(InputError, match=f"results: {name}: expected a variable with the dimensions of amp"):
+        results.cvt.strongest(name)
+
+
+@pytest.mark.parametrize("ask", ["map", "onset", "strongest", "classes"])
+def test_a_part_without_runs_is_refused(ask):
+    with pytest.raises(InputError, match="expected results of a study of one run at least, found none"):
+        getattr(study().isel(load=slice(0)).cvt, ask)()

@@ -5,8 +5,10 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.axes import Axes
 from PIL import Image
 
+from cvt_hpc.analysis import animation
 from cvt_hpc.analysis.animation import FRAMES, PERIODS, _along_belt, _last_periods, draw_animation
 from cvt_hpc.errors import InputError
 from cvt_hpc.physics.geometry import variator
@@ -42,6 +44,44 @@ def test_the_picture_shows_the_last_periods_at_the_probes_and_between():
     np.testing.assert_allclose(along, motion, atol=1e-12)
 
 
+def test_the_frequency_is_that_of_the_record_where_it_has_one():
+    """A slow drift would else be taken for the vibration."""
+    run = history(495.0)
+    run["displacement"] = run["displacement"] + 1e-3 * run["time"] / run["time"][-1]
+    assert 1 / _last_periods(run)[2] < 20.0
+    recorded = run.assign(amplitude=("strand", [20e-6, 1e-6]), frequency=("strand", [495.0, 700.0]))
+    assert 1 / _last_periods(recorded)[2] == pytest.approx(495.0)
+    unknown = run.assign(amplitude=("strand", [np.nan] * 2), frequency=("strand", [np.nan] * 2))
+    assert _last_periods(unknown)[2] == _last_periods(run)[2]
+
+
+@pytest.mark.parametrize("fraction", [0.0, 2.0, "half", np.nan])
+def test_without_a_judged_part_the_last_half_is_taken(fraction):
+    expected = _last_periods(history())
+    found = _last_periods(history().assign_attrs(judged_fraction=fraction))
+    np.testing.assert_array_equal(found[1], expected[1])
+
+
+def test_a_belt_at_rest_is_drawn_at_rest(tmp_path, monkeypatch):
+    monkeypatch.setattr(animation, "FRAMES", 1)
+    titles, at_rest = [], history()
+    at_rest["displacement"][:] = 0.0
+    monkeypatch.setattr(Axes, "set_title", lambda axes, text, **options: titles.append(text))
+    draw_animation(at_rest, tmp_path / "belt.gif")
+    assert "at most 0 µm" in titles[0]
+
+
+def test_a_name_is_no_formula(tmp_path, monkeypatch):
+    monkeypatch.setattr(animation, "FRAMES", 1)
+    draw_animation(history().assign_attrs(job_name=r"$\frac{1$"), tmp_path / "belt.gif")
+
+
+def without_a_number():
+    run = history()
+    run["displacement"][3, 2] = np.nan
+    return run
+
+
 def test_a_moving_picture_is_written(tmp_path):
     with Image.open(draw_animation(history(), tmp_path / "belt.gif")) as picture:
         assert picture.n_frames == PERIODS * FRAMES
@@ -54,6 +94,19 @@ def test_a_moving_picture_is_written(tmp_path):
     [
         (history, "belt.png", "expected a moving picture: .gif, .mp4"),
         (lambda: history().drop_attrs(), "belt.gif", "expected the history of a run of a variator"),
+        (lambda: history().drop_vars("displacement"), "belt.gif", "with displacement at probes"),
+        (
+            lambda: history().assign_attrs(point="[" * 100_000),
+            "belt.gif",
+            "the history of a run of a variator",
+        ),
+        (
+            lambda: history().assign_attrs(point=json.dumps(POINT | {"ratio": -1.0})),
+            "belt.gif",
+            "the history of a run of a variator",
+        ),
+        (lambda: history().isel(time=slice(1)), "belt.gif", "finite displacements at 8 times at least"),
+        (without_a_number, "belt.gif", "finite displacements"),
         (
             lambda: xr.Dataset(attrs={"point": "[]"}),
             "belt.gif",

@@ -1,5 +1,7 @@
 """The page about a study: what it says, and what a browser makes of it."""
 
+import html
+import json
 import os
 import re
 import shutil
@@ -10,10 +12,15 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from cvt_hpc.analysis.arrangement import arrange
+from cvt_hpc.analysis.maps import sheet_of
 from cvt_hpc.errors import InputError
+from cvt_hpc.job import build_job
+from cvt_hpc.netcdf import HISTORY
 from cvt_hpc.report import write_report
-from cvt_hpc.variables import Status
-from support.studies import study, traced
+from cvt_hpc.report.interactive import LONGEST_TITLE, map_with_values
+from cvt_hpc.variables import Status, Vibrates
+from support.studies import sampled, study, traced
 
 SMALL = {"gradients": (-2.4, -0.8), "stiffnesses": (1.0, np.inf)}
 # Moves the pointer to the cell at 100 N m and -2.4 s/m of the first panel, and keeps what stands beside it.
@@ -59,7 +66,109 @@ def test_the_page_says_what_was_found_in_sentences(page):
         f"{place} the belt vibrates from 50 N m on, as far as is decided, most at 120 N m: 21.9 µm at 568 Hz."
         in words
     )
-    assert "Nothing vibrates in 2 of 4 lines along load." in words
+    # between rigid sheaves all is quiet at -2.4 s/m; at -0.8 s/m a run failed and one was not done
+    assert "Nothing vibrates in 1 of 4 lines along load." in words
+    assert (
+        "In 1 of 4 lines along load no run is known to vibrate, but not all are known to be quiet." in words
+    )
+
+
+def page_of(results, tmp_path):
+    return words_of(write_report(results, tmp_path / "report.html"))
+
+
+@pytest.mark.parametrize("status", [Status.FAILED_NUMERICS, Status.NOT_RUN])
+def test_where_nothing_was_computed_nothing_is_called_quiet(status, tmp_path):
+    results = study(**SMALL)
+    results["status"][:], results["vibrates"][:] = status, Vibrates.UNDECIDED
+    words = page_of(results, tmp_path)
+    assert "No run is known to be quiet or to vibrate." in words
+    assert "Nothing vibrates" not in words and "Windows begin" not in words
+
+
+def test_one_run_is_counted_as_one_and_is_no_window(tmp_path):
+    words = page_of(study().isel(friction_gradient=[0], sheave_stiffness=[0], load=[4]), tmp_path)
+    assert "1 run: 1 vibrating." in words and "the belt vibrates in all runs, most at 100 N m" in words
+    assert "Windows begin" not in words and "Cost and quality" not in words
+
+
+def test_a_window_that_ends_before_rigid_sheaves_has_no_number_there(tmp_path):
+    results = study().isel(load=4, friction_gradient=0, drop=True)
+    results["vibrates"][:] = [Vibrates.NO, Vibrates.YES, Vibrates.YES, Vibrates.NO]
+    assert "vibrates from 1.1 to a value between 1.5 and rigid, most" in page_of(results, tmp_path)
+
+
+def test_values_without_a_unit_are_followed_by_no_gap(tmp_path):
+    results = study(**SMALL)
+    results["load"].attrs.clear()
+    assert " to 180, most at 120: " in page_of(results, tmp_path)
+
+
+def test_axes_have_their_values_in_the_units_of_the_job_and_what_is_fixed_is_said(tmp_path):
+    results = xr.concat([study(**SMALL)] * 2, "speed").assign_coords(
+        speed=("speed", [0.01, 0.02], {"units": "m s-1", "job_units": "mm/s"})
+    )
+    words = page_of(results, tmp_path)
+    assert "speed 10, 20 [mm/s]" in words and "sheave_stiffness 1, inf" in words
+    assert "Below, and in the map: speed = 10 mm/s (first of 2)." in words
+    assert "load 20 N m to 200 N m" in page_of(sampled(), tmp_path)
+
+
+def test_what_follows_from_other_parameters_is_no_choice(tmp_path):
+    job = build_job({"name": "a", "model": "elastic_belt", "axes": {"load_share": [0.2, 0.4]}})
+    results = study().isel(friction_gradient=0, sheave_stiffness=0, load=[1, 2], drop=True)
+    results = results.rename(load="load_share").assign_attrs(job=json.dumps(job.resolved()))
+    words = page_of(results, tmp_path)
+    assert "Other than the defaults" not in words and "All that is fixed is at its default." in words
+    derived = words.partition("Derived from others:")[2].partition("At their defaults")[0]
+    assert "by load_share, varies with load_share" in derived and "step 4.6e-06 s" in derived
+
+
+def test_the_history_of_a_run_is_no_study(tmp_path):
+    with pytest.raises(InputError, match="found the history of one run; `cvt-hpc plot` draws it"):
+        write_report(study().assign_attrs(cvt_hpc_content=HISTORY), tmp_path / "report.html")
+
+
+def test_nothing_in_the_map_uploads_it(page):
+    text = page.read_text()
+    assert re.search(r'"showSendToCloud": ?false', text)
+
+
+def figure_of(results):
+    return map_with_values(sheet_of(arrange(results, {}, "results")))
+
+
+def test_a_quantity_is_told_at_the_place_of_its_run():
+    """The middle of a cell is another place where the axis is uneven."""
+    results = study(stiffnesses=(1.5, np.inf), loads=(10.0, 20.0, 100.0)).isel(friction_gradient=0, drop=True)
+    for name in ("slip", "efficiency"):
+        values = results["amplitude"].isel(strand=0, drop=True).copy(data=np.arange(6.0).reshape(2, 3))
+        results[name] = values.assign_attrs(units="1", long_name="of one name")
+    figure = figure_of(results)
+    told = [trace for trace in figure.data if "of one name" in (trace.hovertemplate or "")]
+    assert len(told) == 2
+    assert list(told[0].text[1]) == [f"sheave stiffness: rigid<br>load: {load} N m" for load in (10, 20, 100)]
+    (menu,) = figure.layout.updatemenus
+    assert [button.label for button in menu.buttons] == ["occurrence", "of one name", "of one name"]
+    assert [sum(button.args[0]["visible"]) for button in menu.buttons[1:]] == [1, 1]
+
+
+def test_failed_runs_have_a_mark_and_a_place_in_the_legend():
+    results = study(**SMALL)
+    results["status"][:] = Status.FAILED_NUMERICS
+    crosses = [trace for trace in figure_of(results).data if trace.type == "scatter"]
+    assert sum(len(trace.x) for trace in crosses if not trace.showlegend) == results["status"].size
+    assert [trace.name for trace in crosses if trace.showlegend] == ["failed"]
+
+
+def test_texts_of_an_axis_are_no_tags_for_the_plotting_library():
+    texts = [f'<a href="x{k}">{"y" * 40}</a>' for k in range(2)]
+    results = study().isel(load=slice(0, 2), sheave_stiffness=slice(0, 2), friction_gradient=[0])
+    results = results.assign_coords(load=texts, sheave_stiffness=texts, friction_gradient=texts[:1])
+    layout = figure_of(results).layout
+    titles = [title.text for title in layout.annotations]
+    assert not any("<" in text for text in [*layout.xaxis.ticktext, *layout.yaxis.ticktext, *titles])
+    assert max(len(html.unescape(title)) for title in titles) == LONGEST_TITLE
 
 
 def test_failed_runs_are_counted_by_reason_and_texts_of_datasets_are_escaped(page):
