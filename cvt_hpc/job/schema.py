@@ -188,9 +188,12 @@ def _stepper(model: Model, stepper: Any, source: str) -> str:
     where = f"{source}: stepper"
     if isinstance(stepper, str) and stepper in model.steppers:
         return model.steppers[stepper]
-    places = {name: place for other in MODELS for name, place in load_model(other).steppers.items()}
-    # a step lives with one model, whichever others take it: cvt_hpc.models.<model>.<module>
-    owners = {name: place.split(".")[2] for name, place in places.items() if name not in STEPPERS}
+    # a step lives in the room of one model, whichever others take it
+    places = [(name, place, other) for other in MODELS for name, place in load_model(other).steppers.items()]
+    owners: dict[str, str] = {}
+    for name, _, other in sorted(places, key=lambda found: not found[1].startswith(f"{MODELS[found[2]]}.")):
+        if name not in STEPPERS:
+            owners.setdefault(name, other)
     _known(stepper, STEPPERS | owners, "stepper", source, told=model.steppers)
     if not model.steppers:
         raise mismatch(where, f"none, since {model.name} has no transient", show(stepper))

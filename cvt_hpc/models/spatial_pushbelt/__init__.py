@@ -11,7 +11,7 @@ REFUSED = dict.fromkeys(
     GENERAL,
     "the pushbelt's contacts open, close and stick by the hundred: it is marched by its own step, newton",
 )
-STEPPERS = {"newton": "cvt_hpc.models.pushbelt.newton_settings"}
+STEPPERS = {"newton": "cvt_hpc.models.spatial_pushbelt.newton_settings"}
 COMPARED = ("speed_loss", "efficiency", "loss", "net_axial_force")
 
 __all__ = ["COMPARED", "DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]

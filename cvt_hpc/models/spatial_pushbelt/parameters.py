@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.pushbelt import newton_settings
 from cvt_hpc.models.pushbelt import parameters as pushbelt
 from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
 from cvt_hpc.physics.out_of_plane import SIDES, axial_offset
@@ -164,12 +163,6 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 PARAMETERS["scene"] |= _SCENE
 PARAMETERS["belt"] |= _BELT
 PARAMETERS["sheaves"] |= _SHEAVES
-# Forces and power balance are those with the planar pushbelt's tolerances to four digits, in an eighth less
-# time; of steps of 20 us too many do not come below those.
-PARAMETERS["numerics"] = {
-    key: replace(newton_settings.PARAMETERS["numerics"][key], default=default)
-    for key, default in (("speed_tolerance", 3e-3), ("power_tolerance", 5.0))
-}
 
 
 def package_arm(parameters: Mapping[str, Any]) -> float:
