@@ -243,8 +243,7 @@ def stepped(step, on_ears):
     if on_ears:
         # pressed together along the belt, all bear on the ears, by as much as they do on the saddle
         strain(belt, rings, begun, -strains(belt, rings, begun))
-    still.batch.take_over([SimpleNamespace(state=begun, rows=run.rows, done=run.done, time=run.time)])
-    still.batch.done = 0
+    still.batch.take_over([SimpleNamespace(state=begun, rows=run.rows[:0], done=0, time=run.time)])
     still.batch.step, still.batch.steps_per_sample = step, 1
     still.batch.advance(1)
     return belt, rings, run.time, begun, still
