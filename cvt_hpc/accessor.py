@@ -29,7 +29,7 @@ from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.study import open_results
 from cvt_hpc.variables import Status, Vibrates
-from cvt_hpc.vibration.onsets import onsets
+from cvt_hpc.vibration.onsets import levels, onsets
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,7 +38,6 @@ __all__ = ["Results", "open_results", "read_table"]
 
 _LARGEST_TABLE = 16 << 20  # [byte]
 _LABELS = {"strand": ("t1", "t2"), "pulley": ("driving", "driven")}
-_LEVEL = {OccurrenceClass.QUIET: -1.0, OccurrenceClass.VIBRATING: 1.0}
 
 
 @xr.register_dataset_accessor("cvt")
@@ -145,10 +144,7 @@ class Results:
             numeric = [name for name in map(str, classes.dims) if classes[name].dtype.kind in "iuf"]
             raise mismatch("results: along", f"one of the axes {', '.join(numeric) or '(none)'}", along)
         others = [name for name in classes.dims if name != along]
-        level = np.full(classes.shape, np.nan)
-        for kind, value in _LEVEL.items():
-            level[classes.values == kind] = value
-        rows = np.moveaxis(level, classes.dims.index(along), -1)
+        rows = np.moveaxis(levels(classes.values), classes.dims.index(along), -1)
         axis = np.asarray(classes[along].values, float)
         found = [onsets(axis, row) for row in rows.reshape(-1, axis.size)]
         most = max([1, *map(len, found)])

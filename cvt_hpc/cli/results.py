@@ -20,6 +20,7 @@ from cvt_hpc.cli.parts import (
     say,
     sides_of,
 )
+from cvt_hpc.errors import mismatch
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,13 +101,16 @@ def _map(arguments: argparse.Namespace) -> int:
 
 def _colour_end(text: str | None, dataset: xr.Dataset, shown: str) -> float | None:
     """Return the value at which colours end [SI], in the unit of what is shown."""
+    from cvt_hpc.job.units import unit_in
     from cvt_hpc.job.values import read_value
     from cvt_hpc.parameters import positive
 
     if text is None or shown not in dataset:  # what draws it refuses a quantity that is not known
         return None
-    unit = str(dataset[shown].attrs.get("units", ""))
-    return read_value(positive(1.0, "" if unit == "1" else unit, ""), text, "--vmax")
+    unit = str(dataset[shown].attrs.get("units", "")).removeprefix("1")
+    if unit and not unit_in(text):  # 20 would be 20 m
+        raise mismatch("--vmax", f"a value with its unit, of {unit}", text)
+    return read_value(positive(1.0, unit, ""), text, "--vmax")
 
 
 def _figure(arguments: argparse.Namespace) -> int:

@@ -19,12 +19,10 @@ from cvt_hpc.ladder.audit import FORCES
 from cvt_hpc.ladder.rungs import REFERENCE, Rung
 from cvt_hpc.models.linear_stability.modes import DECAY
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass
-from cvt_hpc.vibration.onsets import onsets, paired_errors
+from cvt_hpc.vibration.classes import DECIDED
+from cvt_hpc.vibration.onsets import levels, onsets, paired_errors
 
 Array = NDArray[np.float64]
-
-LEVELS = {OccurrenceClass.QUIET: -1.0, OccurrenceClass.VIBRATING: 1.0}  # of an onset: the sign decides
 
 
 class Score(NamedTuple):
@@ -144,11 +142,7 @@ def _onset(found: xr.Dataset, true: xr.Dataset) -> Score:
 
 def _levels(dataset: xr.Dataset) -> Array:
     """1 where a run vibrates, -1 where it is quiet, nan elsewhere."""
-    classes = occurrence_classes(dataset).values
-    level = np.full(classes.shape, np.nan)
-    for kind, value in LEVELS.items():
-        level[classes == kind] = value
-    return level
+    return levels(occurrence_classes(dataset).values)
 
 
 def _growth(dataset: xr.Dataset) -> Array:

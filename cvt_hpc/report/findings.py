@@ -20,11 +20,10 @@ from cvt_hpc.analysis.classes import (
 )
 from cvt_hpc.analysis.figures import coordinate_unit, in_words
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.onsets import onsets
+from cvt_hpc.vibration.onsets import levels, onsets
 
 MOST_LINES = 12  # lines of the map that are told apart
 _STATUS = {int(status): status.name.lower() for status in Status}
-_LEVEL = {OccurrenceClass.QUIET: -1.0, OccurrenceClass.VIBRATING: 1.0}
 
 
 def summary(dataset: xr.Dataset) -> str:
@@ -46,7 +45,7 @@ def window_sentences(arrangement: Arrangement) -> Iterator[str]:
     dataset, x = arrangement.dataset, arrangement.x
     if dataset[x].dtype.kind not in "iuf":
         return
-    decided = np.isin(map_classes(dataset).values, list(_LEVEL))
+    decided = np.isfinite(levels(map_classes(dataset).values))
     if not decided.any():
         yield "No run is known to be quiet or to vibrate."
         return
@@ -83,9 +82,7 @@ def _line(line: xr.Dataset, x: str, place: str) -> str:
     vibrating = classes == OccurrenceClass.VIBRATING
     if not vibrating.any():
         return ""
-    level = np.full(classes.shape, np.nan)
-    for kind, value in _LEVEL.items():
-        level[classes == kind] = value
+    level = levels(classes)
     windows = _windows(line[x], level)
     last = level[np.argmax(line[x].values)]
     windows += ", as far as is decided" if windows.endswith(" on") and np.isnan(last) else ""

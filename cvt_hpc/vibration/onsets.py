@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from cvt_hpc.vibration.classes import OccurrenceClass
+
 Array = NDArray[np.float64]
+
+
+def levels(classes: NDArray[np.int8]) -> Array:
+    """Return 1 where a cell vibrates, -1 where it is quiet, nan elsewhere, by its `OccurrenceClass`."""
+    kinds = [classes == OccurrenceClass.VIBRATING, classes == OccurrenceClass.QUIET]
+    return np.select(kinds, [1.0, -1.0], np.nan)
 
 
 class Onset(NamedTuple):

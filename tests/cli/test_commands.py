@@ -4,8 +4,11 @@ import re
 
 import netCDF4
 import pytest
+import xarray as xr
 
 from cvt_hpc.cli.parts import INTERRUPTED
+from cvt_hpc.cli.results import _colour_end
+from cvt_hpc.errors import InputError
 from cvt_hpc.printing import report_lines
 from cvt_hpc.study import FailedRun, RunReport, StudyStatus
 from cvt_hpc.variables import Status
@@ -363,3 +366,11 @@ def test_an_interrupt_ends_with_130(write_job, call, monkeypatch):
     monkeypatch.setattr("cvt_hpc.study.read_status", interrupt)
     assert call("status", "out/x") == (130, [], ["cvt-hpc: interrupted"])
     assert INTERRUPTED == 130
+
+
+def test_the_end_of_the_colours_is_given_with_its_unit():
+    results = xr.Dataset({"amplitude": ((), 1e-5, {"units": "m"}), "share": ((), 0.5, {"units": "1"})})
+    assert _colour_end("20 um", results, "amplitude") == 20e-6
+    assert _colour_end("0.4", results, "share") == 0.4
+    with pytest.raises(InputError, match="--vmax: expected a value with its unit, of m, found 20"):
+        _colour_end("20", results, "amplitude")

@@ -81,6 +81,7 @@ from cvt_hpc.models.pushbelt.belt import (
     Z,
 )
 from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
+from cvt_hpc.models.pushbelt.faults import keep_states, most_corrected
 from cvt_hpc.models.pushbelt.nose import add_nose_blocks, nose_forces, predict_noses
 from cvt_hpc.models.pushbelt.power import book
 from cvt_hpc.physics.contact_laws import remembered
@@ -194,31 +195,6 @@ def _solve(belt, state, work, dt):
 
 
 @kernel
-def _most_corrected(blocks, omega_length):
-    """The element with the largest correction."""
-    corrections = blocks.data
-    rows, parts = corrections.shape[0], corrections.shape[2]
-    largest, element = -1.0, 0
-    for part in range(parts):
-        for j in range(rows):
-            for r in range(4):
-                size = abs(corrections[j, RIGHT + r, part]) * (omega_length if r == 2 else 1.0)
-                if size > largest:
-                    largest, element = size, part * rows + j
-    return element
-
-
-@kernel
-def _keep_states(elements, element, kept):
-    """Keep the state of an element, and of the one behind it."""
-    rows, fields, parts = elements.data.shape
-    for k in range(2):
-        place = (element - k) % (rows * parts)
-        for field in range(fields):
-            kept[k, field] = elements.data[place % rows, field, place // rows]
-
-
-@kernel
 def _name_fault(state, element, kept):
     """Enter the contact of an element whose force has changed most since its state was kept.
 
@@ -271,8 +247,8 @@ def _newton(belt, newton, state, work, load, dt):
             newton.omega_length,
         )
         if iteration == newton.most_iterations - 1:
-            element = _most_corrected(work.blocks, newton.omega_length)
-            _keep_states(state.elements, element, work.kept)
+            element = most_corrected(work.blocks, RIGHT, (1.0, 1.0, newton.omega_length, 1.0))
+            keep_states(state.elements, element, work.kept)
     return newton.most_iterations, change, power
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import absolute, ahead, around, like, maximum
+from cvt_hpc.models.pushbelt.faults import keep_states, most_corrected
 from cvt_hpc.models.spatial_pushbelt.assembly import assemble_pairs, border_system, linear_blocks, residuals
 from cvt_hpc.models.spatial_pushbelt.belt import (
     CHANGE,
@@ -211,32 +212,6 @@ def _solve(belt, state, work, dt):
 
 
 @kernel
-def _most_corrected(newton, blocks):
-    """The element with the largest correction."""
-    corrections = blocks.data
-    rows, parts = corrections.shape[0], corrections.shape[2]
-    weights = _weights(newton)
-    largest, element = -1.0, 0
-    for part in range(parts):
-        for j in range(rows):
-            for r in range(SIZE):
-                size = abs(corrections[j, RIGHT + r, part]) * weights[r]
-                if size > largest:
-                    largest, element = size, part * rows + j
-    return element
-
-
-@kernel
-def _keep_states(elements, element, kept):
-    """Keep the state of an element, and of the one behind it."""
-    rows, fields, parts = elements.data.shape
-    for k in range(2):
-        place = (element - k) % (rows * parts)
-        for field in range(fields):
-            kept[k, field] = elements.data[place % rows, field, place // rows]
-
-
-@kernel
 def _name_fault(state, element, kept):
     """Enter the contact of an element whose force has changed most since its state was kept.
 
@@ -296,8 +271,8 @@ def _newton(belt, newton, state, work, load, dt):
             newton, state.elements, work.blocks, work.border, state.increments, work.scratch, share
         )
         if iteration == newton.most_iterations - 1:
-            element = _most_corrected(newton, work.blocks)
-            _keep_states(state.elements, element, work.kept)
+            element = most_corrected(work.blocks, RIGHT, _weights(newton))
+            keep_states(state.elements, element, work.kept)
     return newton.most_iterations, change, power
 
 
