@@ -94,6 +94,12 @@ class Results:
 
         return waterfall_figure(self._dataset, at, sides=Sides(x))
 
+    def hysteresis(self, **at: Any) -> Figure:
+        """Draw where vibration begins and ends along ramps up and down, and the bands between them."""
+        from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure
+
+        return hysteresis_figure(self._dataset, at)
+
     def classes(self) -> xr.DataArray:
         """Return the class of each run or cell as a flag variable: quiet, vibrating, failed, ..."""
         check_results(self._dataset, "results")

@@ -14,7 +14,7 @@ from matplotlib.patches import Circle
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from cvt_hpc.analysis.figures import STYLE
+from cvt_hpc.analysis.figures import STYLE, as_written
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.files import written_aside
 from cvt_hpc.physics.geometry import variator
@@ -79,7 +79,7 @@ def draw_animation(history: xr.Dataset, out: Path, source: str = "history") -> P
         margin = 1.3e3 * LARGEST * distance
         axes.set_xlim(1e3 * rest[:, 0].min() - margin, 1e3 * rest[:, 0].max() + margin)
         axes.set_ylim(1e3 * rest[:, 1].min() - margin, 1e3 * rest[:, 1].max() + margin)
-        name = one_line(str(history.attrs.get("job_name", ""))).replace("$", r"\$")  # no formula
+        name = one_line(str(history.attrs.get("job_name", "")))
         told = (
             f"{name}: {1.0 / period:.0f} Hz, at most {1e6 * size:.3g} µm, drawn {factor:.0f} times as large"
         )
@@ -91,7 +91,7 @@ def draw_animation(history: xr.Dataset, out: Path, source: str = "history") -> P
             )
         clock = axes.text(0.99, 0.02, "", transform=axes.transAxes, ha="right", fontsize=9)
 
-        figure.draw_without_rendering()
+        as_written(figure).draw_without_rendering()
         figure.set_layout_engine("none")  # laid out once, for all pictures
 
         def draw(frame: int) -> tuple:

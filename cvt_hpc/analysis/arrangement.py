@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from matplotlib.axis import Axis
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words
@@ -15,6 +16,9 @@ from cvt_hpc.errors import InputError, few_of, mismatch, show, unknown
 from cvt_hpc.job.shown import shown_as_read, shown_number, shown_unit
 
 MOST_VALUES_NAMED = 12
+EVEN, EQUAL = 1.5, 1.01  # of steps: largest over smallest, below which they are taken for even
+LEAST_SPAN = 4.0  # last over first value of a logarithmic axis
+FEW_DECADES = 2.5  # on which 1, 2 and 5 have labels, not powers of ten alone
 
 
 @dataclass(frozen=True)
@@ -200,7 +204,7 @@ class Ruler:
     Attributes
     ----------
     centres : array, shape (value,)
-        Positions of the grid points, in display units.
+        Positions of the grid points, in display units; their logarithms to base 10 on a logarithmic axis.
     edges : array, shape (value + 1,)
         Borders of their cells, halfway between.
     ticks : array or None
@@ -209,6 +213,8 @@ class Ruler:
         Their texts.
     label : str
         Name and unit.
+    minor : array
+        Where short ticks without labels are, on a logarithmic axis.
     """
 
     centres: NDArray[np.float64]
@@ -216,10 +222,20 @@ class Ruler:
     ticks: NDArray[np.float64] | None
     tick_labels: tuple[str, ...]
     label: str
+    minor: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+
+    def lay_out(self, axis: Axis) -> None:
+        """Put the ticks on a side of a panel."""
+        if self.ticks is not None:
+            axis.set_ticks(self.ticks, self.tick_labels)
+        if self.minor.size:
+            axis.set_ticks(self.minor, minor=True)
 
 
 def ruler(coordinate: xr.DataArray) -> Ruler:
     """Lay out an axis: numbers at their true place, an infinite one behind them, texts side by side.
+
+    The axis is logarithmic where its finite values are spread so.
 
     Parameters
     ----------
@@ -234,14 +250,44 @@ def ruler(coordinate: xr.DataArray) -> Ruler:
         return Ruler(centres, _edges(centres), centres, tuple(map(str, values)), axis_label(coordinate, ""))
     centres = values * factor
     finite = np.isfinite(centres)
+    is_log = is_logarithmic(centres[finite])
     if np.all(finite):
+        if is_log:
+            return _logarithmic_ruler(centres, axis_label(coordinate, unit))
         return Ruler(centres, _edges(centres), *_exact_ticks(centres), axis_label(coordinate, unit))
     labels = tuple(_number(c) if np.isfinite(c) else infinity_in_words(name) for c in centres)
+    centres = np.log10(centres) if is_log else centres
     known = centres[finite]
     gap = np.diff(known).mean() if known.size > 1 else 1.0
     start = known[-1] if known.size else 0.0
     centres = np.where(finite, centres, start + gap)
     return Ruler(centres, _edges(centres), centres, labels, axis_label(coordinate, unit))
+
+
+def is_logarithmic(values: NDArray[np.float64]) -> bool:
+    """Whether sorted numbers are spread by their logarithms: evenly there, and unevenly as they are."""
+    if values.size < 3 or values[0] <= 0.0 or values[-1] < LEAST_SPAN * values[0]:
+        return False
+    steps, ratios = np.diff(values), np.diff(np.log(values))
+    most = EVEN if values.size > 3 else EQUAL  # of three values a middle that is a little off says nothing
+    return bool(ratios.max() < most * ratios.min() and steps.max() > EVEN * steps.min())
+
+
+def _logarithmic_ruler(values: NDArray[np.float64], label: str) -> Ruler:
+    """A logarithmic axis: ticks at its values where they are few, else at 1, 2 and 5 or at powers of ten."""
+    centres = np.log10(values)
+    edges = _edges(centres)
+    ticks, labels = _exact_ticks(centres)
+    powers = 10.0 ** np.arange(np.floor(edges[0]), np.ceil(edges[-1]) + 1)
+    if ticks is not None:
+        labels = tuple(map(_number, values))
+    else:
+        digits = (1.0, 2.0, 5.0) if np.ptp(edges) < FEW_DECADES else (1.0,)
+        at = np.outer(powers, digits).ravel()
+        at = at[(np.log10(at) >= edges[0]) & (np.log10(at) <= edges[-1])]
+        ticks, labels = np.log10(at), tuple(map(_number, at))
+    minor = np.log10(np.outer(powers, np.arange(1.0, 10.0)).ravel())
+    return Ruler(centres, edges, ticks, labels, label, minor[(minor >= edges[0]) & (minor <= edges[-1])])
 
 
 def _exact_ticks(centres: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -231,10 +231,16 @@ def write_value(
 
 
 def class_legend(
-    figure: FigureBase, styles: Mapping[CellClass, ClassStyle], columns: int, *, with_inferred: bool = False
+    figure: FigureBase,
+    styles: Mapping[CellClass, ClassStyle],
+    columns: int,
+    *,
+    with_inferred: bool = False,
+    further: Sequence[Any] = (),
 ) -> None:
-    """Legend of some classes below the panels: fill, hatching, mark; and of inferred cells."""
-    handles, labels = [], []
+    """Legend of some classes below the panels: fill, hatching, mark; of inferred cells; and of lines."""
+    handles: list[Any] = []
+    labels: list[str] = []
     for kind, style in styles.items():
         outline = style.ink if style.hatch else "#606060"
         cell = Patch(facecolor=style.fill, edgecolor=outline, hatch=style.hatch, linewidth=0.8)
@@ -246,6 +252,8 @@ def class_legend(
         for label, fill in (("inferred", "none"), ("inferred, vibrating", INFERRED_VIBRATION)):
             handles.append(Patch(**{**LINES, "facecolor": fill, "linewidth": 0.8}))
             labels.append(label)
+    handles += further
+    labels += [handle.get_label() for handle in further]
     figure.legend(
         handles,
         labels,

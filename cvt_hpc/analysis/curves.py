@@ -23,6 +23,7 @@ from cvt_hpc.variables import Status
 
 HEIGHT = 3.8  # [inch]
 MOST_PANELS = 3  # side by side
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 BESIDE = ("-", "--", ":", "-.")
 MARKS = tuple(mark for mark in MARKERS if mark not in {STYLES[kind].mark for kind in WITHOUT_RESULT})
 
@@ -80,8 +81,7 @@ def curve_figure(
         _mark_above(axes, x.centres, occurrence_classes(shown).values)
         axes.set_title(title, loc="left", pad=6)
         axes.set(xlabel=x.label, xlim=_with_margins(x))
-        if x.ticks is not None:
-            axes.set_xticks(x.ticks, x.tick_labels)
+        x.lay_out(axes.xaxis)
         axes.grid(linewidth=0.4, alpha=0.5)
     label = _common_words(dataset, quantities)
     all_axes[0].set_ylabel(f"{label} [{unit}]" if unit else label)
@@ -162,7 +162,7 @@ def _scale(dataset: xr.Dataset, quantities: Sequence[str]) -> tuple[float, str]:
     if not (np.isfinite(largest) and largest > 0.0) or 0.1 <= largest < 1e4:
         return 1.0, unit
     power = 3 * int(np.floor(np.log10(largest) / 3.0))
-    return 10.0**-power, f"$10^{{{power}}}$ {unit}".strip()
+    return 10.0**-power, f"10{str(power).translate(_RAISED)} {unit}".strip()
 
 
 def _with_margins(x: Ruler) -> tuple[float, float]:

@@ -50,8 +50,7 @@ def eigenfrequency_figure(
         _draw_strand(axes, along.centres, frequency)
         axes.set_title(f"strand {strand}", loc="left", pad=3)
         axes.set_xlabel(along.label)
-        if along.ticks is not None:
-            axes.set_xticks(along.ticks, along.tick_labels)
+        along.lay_out(axes.xaxis)
     panels[0].set_ylabel(axis_label(dataset["eigenfrequency"], "Hz"))
     panels[0].set_ylim(bottom=0.0)
     headline = f"Eigenfrequencies: {one_line(dataset.attrs.get('job_name', ''))}".rstrip(": ")

@@ -27,6 +27,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.ticker import LogFormatter
 from PIL import Image
 
 from cvt_hpc.errors import mismatch, one_line
@@ -104,7 +106,7 @@ def draw(compose: Callable[[], Figure], out: Path) -> Path:
     with matplotlib.rc_context():  # a user's settings do not change the picture, nor the picture these
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(STYLE)
-        return save_figure(compose(), out)
+        return save_figure(as_written(compose()), out)
 
 
 def styled(compose: Callable[P, Figure]) -> Callable[P, Figure]:
@@ -113,9 +115,28 @@ def styled(compose: Callable[P, Figure]) -> Callable[P, Figure]:
     @wraps(compose)
     def within(*args: P.args, **options: P.kwargs) -> Figure:
         with matplotlib.rc_context(STYLE):
-            return compose(*args, **options)
+            return as_written(compose(*args, **options))
 
     return within
+
+
+def as_written(figure: Figure) -> Figure:
+    """Let all texts of a figure stand as they are: two `$` in a name or label begin no formula.
+
+    The powers of ten on logarithmic axes remain formulas.
+    """
+    powers = {
+        label
+        for axes in figure.axes
+        for axis in (axes.xaxis, axes.yaxis)
+        if isinstance(axis.get_major_formatter(), LogFormatter)
+        for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks())
+        for label in (tick.label1, tick.label2)
+    }
+    for text in figure.findobj(Text):
+        if text not in powers:
+            text.set_parse_math(False)
+    return figure
 
 
 def with_units(line: str) -> str:

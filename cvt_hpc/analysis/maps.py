@@ -33,6 +33,7 @@ from cvt_hpc.analysis.classes import (
 )
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.figures import WIDTH, draw, headline, in_words, styled
+from cvt_hpc.analysis.hysteresis_bands import ALONG, draw_onsets
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 from cvt_hpc.analysis.starts import has_starts, join_starts
 from cvt_hpc.errors import mismatch
@@ -184,14 +185,30 @@ def _grid_figure(arrangement: Arrangement, vmax: float | None) -> Figure:
             cells.FREQUENCY_COLOURS, cells.norm_over(sheet.frequency), "dominant frequency [Hz]"
         )
         draw_block(figure, axes[sheet.rows :], sheet, sheet.frequency, frequency)
+    onset = _draw_onsets(axes, sheet)
     figure.suptitle(_title(sheet))
     figure.supylabel(sheet.y.label, fontsize=10)
     styles, columns = cells.STYLES, cells.LEGEND_COLUMNS
     if "starts" in arrangement.dataset.attrs:
         styles, columns = cells.STYLES | cells.OF_STARTS, 3  # as wide as the page with the longest label
     shown = {kind: style for kind, style in styles.items() if np.any(sheet.classes == kind)}
-    cells.class_legend(figure, shown, columns, with_inferred=bool(sheet.inferred.any()))
+    cells.class_legend(figure, shown, columns, with_inferred=bool(sheet.inferred.any()), further=onset)
     return figure
+
+
+def _draw_onsets(axes: NDArray[Any], sheet: Sheet) -> list[Any]:
+    """Lines of onset along the load, or the axis in its place; return handles for the legend."""
+    arrangement = sheet.arrangement
+    along = next((name for name in ALONG if name in (arrangement.x, arrangement.y)), None)
+    handles: dict[str, Any] = {}
+    if along is None or arrangement.y is None:
+        return []  # of a single row the cells show it
+    for k, ax in enumerate(axes.flat):
+        panel = k % (sheet.rows * sheet.columns)
+        if panel < sheet.panels:
+            for handle in draw_onsets(ax, sheet.x, sheet.y, sheet.classes[panel], along == arrangement.y):
+                handles.setdefault(handle.get_label(), handle)
+    return list(handles.values())
 
 
 def sheet_of(arrangement: Arrangement) -> Sheet:
@@ -251,10 +268,8 @@ def _label_panel(ax: Axes, sheet: Sheet, panel: int) -> None:
         text = value_text(sheet.arrangement.dataset[name], panel)
         heading = f"{in_words(sheet.arrangement.dataset[name])}: " if sheet.columns <= NAMED else ""
         ax.set_title(f"{heading}{text}", loc="left", pad=3)
-    if sheet.x.ticks is not None:
-        ax.set_xticks(sheet.x.ticks, sheet.x.tick_labels)
-    if sheet.y.ticks is not None:
-        ax.set_yticks(sheet.y.ticks, sheet.y.tick_labels)
+    sheet.x.lay_out(ax.xaxis)
+    sheet.y.lay_out(ax.yaxis)
     is_lowest = panel + sheet.columns >= sheet.panels
     ax.tick_params(labelbottom=is_lowest)
     if is_lowest:

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from cvt_hpc.analysis.arrangement import arrange, ruler
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.curves import panels_of
-from cvt_hpc.analysis.figures import WIDTH, balanced, draw, styled
+from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, draw, styled
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.variables import Status
 
@@ -51,7 +51,10 @@ def strand_bars_figure(
     figure = Figure((WIDTH, HEIGHT), layout="constrained")
     row = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     x = ruler(arrangement.dataset[arrangement.x])
-    ticks = x.tick_labels or [f"{value:g}" for value in x.centres]
+    along = arrangement.dataset[arrangement.x]
+    ticks = list(x.tick_labels)
+    if len(ticks) != along.size:
+        ticks = [f"{value:g}" for value in coordinate_unit(along.attrs)[0] * along.values]
     for axes, (title, shown) in zip(row, panels, strict=True):
         _draw_bars(axes, shown.transpose(arrangement.x, ...))
         axes.set_title(title, loc="left", pad=4)

@@ -193,9 +193,8 @@ def _draw_panel(
             "rasterized": True,
         }
         axes.add_patch(PathPatch(cells.area_of(x, y, slips), **dots))
-    for ruled, set_ticks in ((x, axes.set_xticks), (y, axes.set_yticks)):
-        if ruled.ticks is not None:
-            set_ticks(ruled.ticks, ruled.tick_labels)
+    x.lay_out(axes.xaxis)
+    y.lay_out(axes.yaxis)
     if is_known.any():
         cells.colour_bar(figure, scale, values, ax=axes, pad=0.02)
 

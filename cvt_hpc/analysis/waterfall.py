@@ -75,8 +75,7 @@ def waterfall_figure(
             _draw_eigenfrequencies(axes, x, known)
         axes.set_title(f"strand {strand}", loc="left", pad=3)
         axes.set_xlabel(x.label)
-        if x.ticks is not None:
-            axes.set_xticks(x.ticks, x.tick_labels)
+        x.lay_out(axes.xaxis)
     panels[0].set_ylabel("frequency [Hz]")
     panels[0].set_ylim(0.0, y.edges[-1])
     bar = figure.colorbar(ScalarMappable(norm, COLOURS), ax=panels, pad=0.02, extend="min")

@@ -17,6 +17,8 @@ def add(commands: Any) -> None:
     kinds = plot.add_subparsers(metavar="KIND", required=True)
     text = "spectra of the strands over an axis, with eigenfrequencies where they are known"
     waterfall = add_command(kinds, "waterfall", _waterfall, text, "RESULTS")
+    text = "where vibration begins and ends along ramps up and down, and the bands between them"
+    hysteresis = add_command(kinds, "hysteresis", _hysteresis, text, "RESULTS")
     text = "a quantity over an axis as marks, and others of its unit as lines beside it"
     curve = add_command(kinds, "curve", _curve, text, "RESULTS")
     curve.add_argument("quantities", nargs="+", metavar="QUANTITY", help="variable of the results")
@@ -49,6 +51,7 @@ def add(commands: Any) -> None:
     animation.add_argument("--out", type=Path, metavar="GIF", help=text)
     names = {
         strands: "strands",
+        hysteresis: "hysteresis",
         waterfall: "waterfall",
         curve: "curve_QUANTITY",
         wrap: "HISTORY_wrap",
@@ -59,7 +62,7 @@ def add(commands: Any) -> None:
         text = f"default: {name}.png beside the dataset"
         command.add_argument("--out", type=Path, metavar="PNG", help=text)
     waterfall.add_argument("--x", metavar="AXIS", help="axis of the study that runs along x")
-    for command in (waterfall, curve, strands):
+    for command in (waterfall, curve, strands, hysteresis):
         add_assignments(command, "--at", "fix an axis at a value")
 
 
@@ -72,6 +75,17 @@ def _waterfall(arguments: argparse.Namespace) -> int:
     with open_results(arguments.path) as dataset:
         at = _at(arguments, dataset)
         say(f"picture: {draw_waterfall(dataset, out, at, str(arguments.path), Sides(arguments.x))}")
+    return DONE
+
+
+def _hysteresis(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.hysteresis_bands import draw_hysteresis
+    from cvt_hpc.study import open_results
+
+    out = _picture(arguments, "hysteresis", *arguments.at)
+    with open_results(arguments.path) as dataset:
+        at = _at(arguments, dataset)
+        say(f"picture: {draw_hysteresis(dataset, out, at, str(arguments.path))}")
     return DONE
 
 

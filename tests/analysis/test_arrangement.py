@@ -195,3 +195,33 @@ def test_rigid_sheaves_lie_behind_the_stiffest_ones():
     assert np.isfinite(ruler(coordinate("sheave_stiffness", [np.inf])).edges).all()
     texts = ruler(coordinate("load_history", ["constant", "ramp"], ""))
     assert texts.tick_labels == ("constant", "ramp") and texts.centres.tolist() == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("values", "is_log"),
+    [
+        ([1.0, 10.0, 100.0], True),
+        ([1.0, 3.0, 10.0, 30.0], True),
+        (np.geomspace(100.0, 1e4, 7), True),
+        ([10.0, 20.0, 50.0], False),
+        ([10.0, 20.0, 30.0, 40.0], False),
+        ([1.0, 1.2, 1.44, 1.728], False),  # as good as even
+        ([0.0, 1.0, 10.0, 100.0], False),
+    ],
+)
+def test_geometric_values_lie_on_a_logarithmic_axis(values, is_log):
+    laid = ruler(coordinate("damping", list(values), "1"))
+    np.testing.assert_allclose(laid.centres, np.log10(values) if is_log else values)
+    middles = np.sqrt(np.multiply(values[1:], values[:-1])) if is_log else np.add(values[1:], values[:-1]) / 2
+    np.testing.assert_allclose(laid.edges[1:-1], np.log10(middles) if is_log else middles)
+
+
+def test_a_logarithmic_axis_has_ticks_at_round_values():
+    laid = ruler(coordinate("damping", list(np.geomspace(100.0, 1e4, 7)), "1"))
+    assert laid.tick_labels == ("100", "200", "500", "1000", "2000", "5000", "10000")
+    np.testing.assert_allclose(10.0**laid.ticks, [100, 200, 500, 1000, 2000, 5000, 10000])
+    wide = ruler(coordinate("damping", list(np.geomspace(1.0, 1e6, 7)), "1"))
+    assert wide.tick_labels == ("1", "10", "100", "1000", "10000", "100000", "1e+06")
+    rigid = ruler(coordinate("sheave_stiffness", [1.0, 10.0, 100.0, np.inf], "1"))
+    np.testing.assert_allclose(rigid.centres, [0.0, 1.0, 2.0, 3.0])
+    assert rigid.tick_labels == ("1", "10", "100", "rigid")

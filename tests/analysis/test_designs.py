@@ -40,7 +40,7 @@ def test_only_runs_are_marked_and_inferred_cells_have_lines():
     assert inside == set(LOADS) - marked
     assert len(lined.get_path().vertices) == 5 * 3 * len(GRADIENTS)  # a rectangle around two cells each
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert texts[-2:] == ["inferred", "inferred, vibrating"]
+    assert texts[-3:-1] == ["inferred", "inferred, vibrating"]
 
 
 def test_inferred_vibration_has_a_colour_of_its_own():

@@ -105,7 +105,7 @@ def test_a_curve_has_marks_of_runs_and_lines_of_theory(results):
 def test_small_numbers_have_their_power_of_ten_on_the_axis(results):
     results["speed_loss"] = (1e-4 * results["speed_loss"]).assign_attrs(units="1")
     axes = curve_figure(results, ["speed_loss"], {"driving_speed": 20.0}).axes[0]
-    assert axes.get_ylabel() == "speed loss [$10^{-6}$]"
+    assert axes.get_ylabel() == "speed loss [10⁻⁶]"
     np.testing.assert_allclose(axes.lines[0].get_ydata(), 1e6 * results["speed_loss"].sel(driving_speed=20.0))
 
 
@@ -233,3 +233,17 @@ def test_a_quantity_that_does_not_vary_has_one_colour(results):
     results["speed_loss"][0, 0] += 1e-6
     (image,) = value_map_figure(results, ["speed_loss"]).axes[0].images
     assert len({tuple(colour) for colour in image.get_array().reshape(-1, 4)}) == 1
+
+
+def test_two_dollars_in_a_name_begin_no_formula(results):
+    results = results.assign_attrs(job_name=r"5 $ \frac 6 $").rename(load="wear")
+    results["wear"].attrs["long_name"] = r"$\odd$ wear"
+    results = results.assign_coords(driving_speed=[r"$\a$", r"$\b$"])
+    figure = waterfall_figure(results, {"driving_speed": r"$\b$"})
+    figure.draw_without_rendering()
+    assert r"$\frac" in figure.get_suptitle() or r"\frac 6" in figure.get_suptitle()
+    ticks = [text.get_text() for text in figure.axes[-1].get_yticklabels()]
+    assert any("10^{" in text for text in ticks)  # of the colours these remain powers
+    figure = value_map_figure(results, ["speed_loss"])
+    figure.draw_without_rendering()
+    assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == [r"$\a$", r"$\b$"]

@@ -100,7 +100,11 @@ def test_the_map_has_one_panel_for_both_starts_and_counts_cells():
     assert "60 cells: " in title and f"{only} vibrates from a large start only" in title
     assert "disturbance 0.001 mm and 0.3 mm" in title
     (legend,) = figure.legends
-    assert legend.get_texts()[-1].get_text() == "vibrates from a large start only"
+    assert [text.get_text() for text in legend.get_texts()][-3:] == [
+        "vibrates from a large start only",
+        "onset from a small start",
+        "onset from a large start",
+    ]
     assert sum(fills_of(axes)[OF_STARTS[ONLY].fill] for axes in panels) == only
 
 

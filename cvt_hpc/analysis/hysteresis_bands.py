@@ -1,0 +1,262 @@
+"""Where vibration sets in and ends over a map: onset lines, and bands in which the way there decides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.patheffects import Normal, withStroke
+from numpy.typing import NDArray
+
+from cvt_hpc.analysis.arrangement import Ruler, arrange, ruler, value_text
+from cvt_hpc.analysis.cells import OF_STARTS, STYLES
+from cvt_hpc.analysis.classes import OccurrenceClass, check_results
+from cvt_hpc.analysis.figures import (
+    WIDTH,
+    axis_label,
+    balanced,
+    coordinate_unit,
+    draw,
+    in_words,
+    legend_columns,
+    styled,
+)
+from cvt_hpc.errors import mismatch, one_line
+from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.vibration.hysteresis import StartClass
+from cvt_hpc.vibration.onsets import levels, onsets
+from cvt_hpc.vibration.ramped import QUANTITIES
+
+ALONG = ("load", "load_share", "driving_speed")  # axes along which a vibration is said to set in
+INK = "#00695c"  # beside orange, grey and purple cells, and as dark as these are light
+BAND = OF_STARTS[StartClass.LARGE_START_ONLY]
+UP, DOWN = "up", "down"
+LINES = {UP: ("-", ">"), DOWN: ("--", "<")}
+MOST_PANELS = 4
+OUTLINE = [withStroke(linewidth=4.0, foreground="white"), Normal()]
+
+
+def onset_line(along: Ruler, across: Ruler, classes: NDArray[np.int8]) -> NDArray[np.float64]:
+    """The lowest onset of each row, as a line from border to border of the rows.
+
+    Parameters
+    ----------
+    along, across : Ruler
+        Places of the columns, along which vibration sets in, and of the rows.
+    classes : array, shape (row, column)
+        `OccurrenceClass` or `StartClass` of the cells.
+
+    Returns
+    -------
+    array, shape (point, 2)
+        Places along and across; nan in rows without an onset.
+    """
+    found = []
+    for row, edges in zip(classes, np.stack([across.edges[:-1], across.edges[1:]], 1), strict=True):
+        rising = [one.load for one in onsets(along.centres, levels(row)) if one.rising]
+        at = min(rising, default=np.nan)
+        found += [(at, edges[0]), (at, edges[1])]
+    return np.array(found)
+
+
+def draw_onsets(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], along_y: bool) -> list[Line2D]:
+    """Draw the onset line of a panel, and that of the large starts beside it; return handles of a legend.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where to draw.
+    x, y, classes
+        As of `cells.draw_cells`.
+    along_y : bool
+        Whether vibration sets in along y.
+    """
+    only = classes == StartClass.LARGE_START_ONLY
+    starts = [("onset of vibration", "-", np.where(only, OccurrenceClass.QUIET, classes))]
+    if only.any():
+        starts = [("onset from a small start", "-", starts[0][2])]
+        starts.append(("onset from a large start", "--", np.where(only, OccurrenceClass.VIBRATING, classes)))
+    handles = []
+    for label, style, kinds in starts:
+        points = onset_line(y, x, kinds.T)[:, ::-1] if along_y else onset_line(x, y, kinds)
+        if np.isfinite(points).all(axis=1).any():
+            look = {"color": INK, "ls": style, "lw": 2.2, "label": label}
+            axes.add_collection(LineCollection([points], **look, zorder=3, path_effects=OUTLINE))
+            handles.append(Line2D([], [], **look))
+    return handles
+
+
+def vibration_ranges(dataset: xr.Dataset, source: str = "results") -> xr.DataArray:
+    """Return between which values runs vibrate along ramps, up and down.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        Results of ramps of load or speed, up and down along one axis of the study, such as `load_start`:
+        `onset_load`, `end_load` and `ramp_load` [N m], or the same of the speed [rad/s].
+    source : str
+        Where the results are from, for the errors.
+
+    Returns
+    -------
+    DataArray
+        Over the other axes, `ramp` ("up", "down") and `limit` ("lower", "upper"), in the unit of what is
+        ramped; nan where a run does not vibrate. A vibration from a ramp's start on, or to its end, reaches
+        to the middle of the ramp's first or last part.
+
+    Raises
+    ------
+    InputError
+        The dataset holds no results of ramps in both directions.
+    """
+    check_results(dataset, source)
+    expected = "results of ramps of load or speed, up and down along one axis such as load_start"
+    known = (name for name in QUANTITIES if f"onset_{name}" in dataset and f"ramp_{name}" in dataset)
+    name = next((name for name in known if np.isfinite(dataset[f"ramp_{name}"]).any()), None)
+    if name is None:
+        raise mismatch(source, expected, "no onset along a ramp")
+    course = dataset[f"ramp_{name}"]
+    rise = course.diff("ramp_share").mean("ramp_share")
+    dims = [str(dim) for dim in dataset["status"].dims]
+    turning = [dim for dim in dims if bool(((rise.max(dim) > 0) & (rise.min(dim) < 0)).all())]
+    if not turning:
+        raise mismatch(source, expected, "ramps in one direction")
+    vibrates = (dataset["status"] == Status.DONE) & (dataset["vibrates"] == Vibrates.YES)
+    onset, end = dataset[f"onset_{name}"], dataset[f"end_{name}"]
+    lowest, highest = course.min("ramp_share"), course.max("ramp_share")
+    limits = {
+        UP: (onset.fillna(lowest), end.fillna(highest)),
+        DOWN: (end.fillna(lowest), onset.fillna(highest)),
+    }
+    found = []
+    for (lower, upper), sign in zip(limits.values(), (1, -1), strict=True):
+        here = vibrates & (sign * rise > 0.0)
+        found.append(
+            xr.concat([lower.where(here).min(turning[0]), upper.where(here).max(turning[0])], "limit")
+        )
+    ranges = xr.concat(found, "ramp").assign_coords(ramp=[UP, DOWN], limit=["lower", "upper"])
+    units = {"units": QUANTITIES[name].cf_units, "long_name": name}
+    return ranges.rename("driving_speed" if name == "speed" else name).assign_attrs(units)
+
+
+def draw_bands(axes: Axes, y: Ruler, ranges: NDArray[np.float64]) -> list[Any]:
+    """Draw the limits of vibration along both ramps and hatch what lies between; return handles of a legend.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where to draw.
+    y : Ruler
+        Places of the rows.
+    ranges : array, shape (ramp, limit, row)
+        Places along x, as `vibration_ranges` has them.
+    """
+    bands = []
+    borders = np.stack([y.edges[:-1], y.edges[1:]], 1)
+    for between in np.moveaxis(ranges, 0, -1):  # (row, ramp) of each limit
+        for (a, b), (low, high) in zip(between, borders, strict=True):
+            if np.isfinite([a, b]).all():
+                bands.append([(a, low), (b, low), (b, high), (a, high)])
+    handles: list[Any] = []
+    look: dict[str, Any] = {"facecolor": "none", "edgecolor": BAND.ink, "hatch": BAND.hatch, "linewidth": 0}
+    if bands:
+        axes.add_collection(PolyCollection(bands, **look, zorder=2.5))
+        handles.append(Patch(**look, label="hysteresis: the way there decides"))
+    for (name, (style, mark)), limits in zip(LINES.items(), ranges, strict=True):
+        line = {"color": INK, "ls": style, "marker": mark, "ms": 5, "lw": 1.8}
+        for values in limits:
+            axes.plot(np.repeat(values, 2), borders.ravel(), color=INK, ls=style, lw=1.8, zorder=3)
+            axes.plot(values, y.centres, color=INK, marker=mark, ls="", ms=5, zorder=3.1)
+        if np.isfinite(limits).any():
+            handles.append(Line2D([], [], **line, label=f"vibration begins and ends, ramp {name}"))
+    return handles
+
+
+def draw_hysteresis(
+    dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None, source: str = "results"
+) -> Path:
+    """Write the figure of `hysteresis_figure`."""
+    return draw(lambda: hysteresis_figure(dataset, at, source), out)
+
+
+@styled
+def hysteresis_figure(
+    dataset: xr.Dataset, at: Mapping[str, Any] | None = None, source: str = "results"
+) -> Figure:
+    """Draw between which loads or speeds runs vibrate along ramps up and down, and where the two differ.
+
+    Arguments and errors as of `vibration_ranges`, and `at` as of all pictures of results (`figures.py`): the
+    first axis that is left runs along y, the next one over the panels.
+    """
+    ranges = vibration_ranges(dataset, source)
+    axes_left = ranges.isel(ramp=0, limit=0, drop=True)
+    notes: tuple[str, ...] = ()
+    y_name = panel = None
+    if axes_left.dims:
+        shown = arrange(xr.Dataset({"status": axes_left}), at or {}, source)
+        names = [name for name in (shown.x, shown.y) if name]
+        # what runs along x of a map runs along y here, because x is what is ramped
+        y_name, panel = names[0], names[1] if len(names) > 1 else None
+        notes = shown.notes
+        for name in filter(None, (shown.panel,)):
+            notes += (f"{in_words(shown.dataset[name])} = {value_text(shown.dataset[name], 0)} (first)",)
+        kept = {name: shown.dataset[name] for name in names}
+        fixed = {name: shown.dataset[name] for name in axes_left.dims if name not in names}
+        ranges = ranges.sel({**kept, **{k: (v if v.ndim == 0 else v[0]) for k, v in fixed.items()}})
+    count = ranges.sizes[panel] if panel else 1
+    if count > MOST_PANELS:
+        raise mismatch(
+            f"{source}: {panel}", f"at most {MOST_PANELS} values, or one that --at fixes", str(count)
+        )
+    factor, unit = coordinate_unit(ranges.attrs)
+    y = ruler(ranges[y_name]) if y_name else Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
+    height = float(np.clip(0.35 * y.centres.size, 0.6, 2.2)) + 0.35
+    figure = Figure((WIDTH, count * height + 1.8), layout="constrained")
+    panels = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
+    legend: dict[str, Any] = {}
+    both = STYLES[OccurrenceClass.VIBRATING].fill
+    for k, axes in enumerate(panels):
+        part = ranges.isel({panel: k}) if panel else ranges
+        values = part.transpose("ramp", "limit", *([y_name] if y_name else [])).values
+        values = factor * values.reshape(2, 2, -1)
+        start, stop = values[:, 0].max(axis=0), values[:, 1].min(axis=0)
+        lasting = np.isfinite(start) & np.isfinite(stop)
+        if lasting.any():
+            bars = axes.barh(
+                y.centres[lasting],
+                (stop - start)[lasting],
+                np.diff(y.edges)[lasting],
+                start[lasting],
+                color=both,
+                alpha=0.55,
+                lw=0,
+            )
+            legend["vibrates either way"] = bars
+        for handle in draw_bands(axes, y, values):
+            legend.setdefault(handle.get_label(), handle)
+        axes.set_ylim(*y.edges[[0, -1]])
+        axes.set_ylabel(y.label)
+        y.lay_out(axes.yaxis)
+        axes.grid(axis="x", lw=0.4, alpha=0.5)
+        if panel:
+            axes.set_title(f"{in_words(ranges[panel])}: {value_text(ranges[panel], k)}", loc="left", pad=3)
+    panels[-1].set_xlabel(axis_label(ranges, unit))
+    job = one_line(dataset.attrs.get("job_name", ""))
+    lines = [f"Vibration along ramps up and down: {job}".removesuffix(": "), *notes]
+    figure.suptitle("\n".join(balanced(line, 72) for line in lines))
+    figure.legend(
+        legend.values(),
+        legend.keys(),
+        loc="outside lower center",
+        frameon=False,
+        ncols=legend_columns(list(legend)),
+    )
+    return figure
