@@ -94,6 +94,18 @@ class Results:
 
         return waterfall_figure(self._dataset, at, sides=Sides(x))
 
+    def campbell(self, *, orders: Sequence[float] = (1.0, 2.0, 4.0, 8.0, 16.0), **at: Any) -> Figure:
+        """Draw the spectra over the driving speed, with eigenfrequencies and orders of that speed."""
+        from cvt_hpc.analysis.waterfall import campbell_figure
+
+        return campbell_figure(self._dataset, at, orders=orders)
+
+    def spectrogram(self) -> Figure:
+        """Draw the spectra of the strands of one run along its ramp, or over time; of a history."""
+        from cvt_hpc.analysis.ramps import spectrogram_figure
+
+        return spectrogram_figure([self._dataset])
+
     def hysteresis(self, **at: Any) -> Figure:
         """Draw where vibration begins and ends along ramps up and down, and the bands between them."""
         from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from textwrap import fill
 from typing import Any
 
+import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,9 +15,88 @@ from matplotlib.figure import Figure
 from cvt_hpc.analysis.arrangement import CHOSEN, Sides, along_x, arrange, ruler
 from cvt_hpc.analysis.figures import WIDTH, axis_label
 from cvt_hpc.errors import one_line
+from cvt_hpc.physics.geometry import variator
+from cvt_hpc.variator import STRANDS
 
 COLOUR = "#1f4e8c"
 HEIGHT = 3.6  # [inch]
+MODES = 5  # of a strand, that are drawn
+FUNCTIONS = 24  # sines of the Ritz model, which five lines of a picture need
+
+
+def strand_frequencies(
+    parameters: Mapping[str, Any], forces: tuple[float, float] | None = None
+) -> np.ndarray:
+    """Eigenfrequencies of both strands as running beams, by the model `strand`.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Of a run of a variator by name [SI].
+    forces : (float, float), optional
+        Ring tension less push force of t1 and t2 [N]; else by belt formulas from thrust and load.
+
+    Returns
+    -------
+    array, shape (strand, MODES)
+        [Hz]; nan where a strand holds no shape, where the belt slips, or where a parameter is missing.
+    """
+    # long to load, and maps do not ask for it
+    from cvt_hpc.models.strand.forces import net_forces
+    from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies
+
+    unknown = np.full((len(STRANDS), MODES), np.nan)
+    p = {"strand_forces": "formulas", **parameters}
+    try:
+        path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
+        speed, mass = p["driving_speed"] * path.driving_radius, p["element_mass"] + p["ring_mass"]
+        held = net_forces(p) if forces is None else forces
+        strands = [Strand(path.strand_length, mass, speed, float(f), p["bending_stiffness"]) for f in held]
+    except (KeyError, TypeError, ValueError):
+        return unknown
+    if not all(np.isfinite([*strand, strand.critical_speed]).all() for strand in strands):
+        return unknown
+    return np.array([eigenfrequencies(strand, FUNCTIONS)[:MODES] for strand in strands])
+
+
+def along_axis(shown: xr.Dataset, x: str) -> xr.DataArray | None:
+    """Eigenfrequencies over an axis: those of the results, or of their strands' mean forces.
+
+    Parameters
+    ----------
+    shown : Dataset
+        Results over `x` alone: `eigenfrequency` [Hz], or `mean_ring_tension` and `mean_push_force` [N].
+    x : str
+        The axis.
+
+    Returns
+    -------
+    DataArray or None
+        Over `strand`, `half_waves` and x [Hz]; None where nothing is known of them.
+    """
+    if "eigenfrequency" in shown:
+        return shown["eigenfrequency"].transpose("strand", "half_waves", x)
+    if not {"mean_ring_tension", "mean_push_force"} <= {*map(str, shown.data_vars)}:
+        return None
+    try:
+        job = json.loads(shown.attrs.get("job", "{}"))
+    except ValueError:
+        return None
+    tables = (table for table in job.values() if isinstance(table, dict))
+    fixed = {key: value for table in tables for key, value in table.items()}
+    fixed |= {str(key): value.item() for key, value in shown.coords.items() if value.ndim == 0}
+    force = (shown["mean_ring_tension"] - shown["mean_push_force"]).transpose(x, "strand")
+    if force.sizes["strand"] != len(STRANDS):
+        return None
+    along = [str(key) for key, values in shown.coords.items() if values.dims == (x,)]
+    found = [
+        strand_frequencies(fixed | {key: shown[key].values[k] for key in along}, tuple(pair))
+        for k, pair in enumerate(force.values)
+    ]
+    if not np.isfinite(found).any():
+        return None
+    coordinates = {x: shown[x], "strand": shown["strand"], "half_waves": np.arange(1, MODES + 1)}
+    return xr.DataArray(found, coordinates, (x, "strand", "half_waves")).transpose("strand", "half_waves", x)
 
 
 def eigenfrequency_figure(

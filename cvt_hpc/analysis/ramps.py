@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -13,9 +14,12 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.cells import colours_of
+from cvt_hpc.analysis.eigenfrequencies import strand_frequencies
 from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, draw, in_words, styled
 from cvt_hpc.analysis.telling_apart import on_axes, titles
+from cvt_hpc.analysis.waterfall import ORDERS, draw_eigenfrequencies, draw_orders
 from cvt_hpc.errors import mismatch
+from cvt_hpc.variator import STRANDS
 from cvt_hpc.vibration.signals import window_amplitudes
 
 COLOURS = colours_of("inferno_r", 0.0, 0.95)
@@ -24,6 +28,7 @@ WINDOW = 0.04  # [s]: lines of the spectrogram 50 Hz wide
 HIGHEST = 1500.0  # [Hz]
 BAND, NOISE = (300.0, 1500.0), (400.0, 800.0)  # [Hz] of strands' vibration, and of the noise
 ROW = 1.5  # [inch]
+LINE_POINTS = 21  # of lines over a spectrogram
 
 
 class Ramp(NamedTuple):
@@ -106,6 +111,102 @@ def ramp_figure(histories: Sequence[xr.Dataset], of: str = "t1", sources: Sequen
     return figure
 
 
+def draw_spectrogram(histories: Sequence[xr.Dataset], out: Path, sources: Sequence[str] = ()) -> Path:
+    """Write the figure of `spectrogram_figure`."""
+    return draw(lambda: spectrogram_figure(histories, sources), out)
+
+
+@styled
+def spectrogram_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) -> Figure:
+    """Draw spectrograms of the strands side by side, over the ramp of a run or else over time.
+
+    Eigenfrequencies by belt formulas are drawn where the run's parameters tell them, and orders of the
+    driving pulley along a ramp of speed.
+
+    Parameters
+    ----------
+    histories : sequence of Dataset
+        As `simulate` returns them: `displacement` [m] over `time` [s] and `probe`; each has a row.
+    sources : sequence of str, optional
+        Where the runs are from, for errors, and for titles where their axes do not tell them apart.
+
+    Raises
+    ------
+    InputError
+        A history has no motion of strands, or is too short.
+    """
+    names = list(sources) or [f"history {k + 1}" for k in range(len(histories))]
+    for history, name in zip(histories, names, strict=True):
+        if "displacement" not in history or "probe" not in history["displacement"].dims:
+            raise mismatch(name, "the history of a run with the displacement of strands", "none")
+        if float(np.ptp(history["time"].values)) < _start_up(history) + 2.0 * WINDOW:
+            raise mismatch(name, f"a run of {2.0 * WINDOW:g} s or more after its start-up", "a shorter one")
+    probes = (str(probe) for history in histories for probe in history["probe"].values)
+    strands = [name for name in dict.fromkeys(probe.split()[0] for probe in probes) if name in STRANDS]
+    if not strands:
+        raise mismatch(names[0], "probes on the strands t1 and t2", "none")
+    common, labels = on_axes(histories, names)
+    ramps = [
+        [read_ramp(history, strand, name, is_ramp=False) for strand in strands]
+        for history, name in zip(histories, names, strict=True)
+    ]
+    spectra = [[spectrogram(ramp) for ramp in row] for row in ramps]
+    largest = max(float(amplitude.max()) for row in spectra for _, _, amplitude in row) or 1.0
+    norm = LogNorm(DEEPEST * largest, largest)
+    figure = Figure((WIDTH, 2.2 * len(ramps) + 1.4), layout="constrained")
+    panels = figure.subplots(len(ramps), len(strands), sharex="row", sharey=True, squeeze=False)
+    told = set()
+    for history, row, of_row, row_of_axes, label in zip(
+        histories, ramps, spectra, panels, labels, strict=True
+    ):
+        turns, known = _lines_along(history, row[0])
+        for strand, ramp, (values, frequency, amplitude), axes in zip(
+            strands, row, of_row, row_of_axes, strict=True
+        ):
+            cells = np.maximum(amplitude, norm.vmin).T
+            axes.pcolormesh(values, frequency, cells, norm=norm, cmap=COLOURS, rasterized=True)
+            k = STRANDS.index(strand)
+            if known is not None:
+                places, waves = known
+                draw_eigenfrequencies(axes, places, waves[k], np.arange(1, len(waves[k]) + 1))
+                told.add("dashed: eigenfrequencies by belt formulas, with their half waves")
+            if turns is not None:
+                draw_orders(axes, *turns, ORDERS, HIGHEST)
+                told.add("dotted: orders of the driving pulley's turns")
+            axes.set_title(", ".join([f"strand {strand}", *label.values()]), loc="left", pad=3)
+            axes.set_xlabel(ramp.label)
+            axes.set(xlim=np.sort(values[[0, -1]]), ylim=(0.0, HIGHEST))
+        row_of_axes[0].set_ylabel("frequency [Hz]")
+    bar = figure.colorbar(ScalarMappable(norm, COLOURS), ax=panels, pad=0.02, extend="min")
+    bar.set_label("amplitude [µm]")
+    lines = [*titles(histories, "Spectrogram", common), *sorted(told)]
+    figure.suptitle("\n".join(balanced(line, 72) for line in lines))
+    return figure
+
+
+_Lines = tuple[np.ndarray, np.ndarray]
+
+
+def _lines_along(history: xr.Dataset, ramp: Ramp) -> tuple[_Lines | None, _Lines | None]:
+    """Turns (n,) [Hz] along a ramp of speed, and eigenfrequencies (strand, half waves, n) [Hz], at places."""
+    half = int(0.5 * WINDOW * ramp.rate)  # the panel reaches from the middle of the first window on
+    at = np.linspace(half, ramp.values.size - 1 - half, LINE_POINTS).astype(int)
+    changing = _changing(history)
+    point = json.loads(history.attrs.get("point", "{}"))
+    courses = {}
+    if changing is not None:
+        courses[changing] = history[changing].values[-ramp.values.size :][at]
+    turns = None
+    if changing == "driving_speed":
+        turns = ramp.values[at], courses["driving_speed"] / (2.0 * np.pi)
+    found = [
+        strand_frequencies(point | {key: float(values[k]) for key, values in courses.items()})
+        for k in range(LINE_POINTS)
+    ]
+    known = np.stack(found, -1)
+    return turns, (ramp.values[at], known) if np.isfinite(known).any() else None
+
+
 @styled
 def course_figure(history: xr.Dataset, of: str) -> Figure:
     """Draw a quantity over the time of a ramp, and below how far it swings, beside strand t1.
@@ -162,16 +263,24 @@ def _limits(values: np.ndarray) -> tuple[float, float]:
 
 
 def read_ramp(
-    history: xr.Dataset, of: str, source: str = "history", band: tuple[float, float] = BAND
+    history: xr.Dataset,
+    of: str,
+    source: str = "history",
+    band: tuple[float, float] = BAND,
+    *,
+    is_ramp: bool = True,
 ) -> Ramp:
-    """What a run does along its ramp, without the start-up before it; arguments as of `ramp_figure`."""
-    courses = [name for name in ("load", "driving_speed") if name in history]
-    changing = next((name for name in courses if _is_ramp(history[name].values)), None)
-    if changing is None:
+    """What a run does along its ramp, without the start-up before it; arguments as of `ramp_figure`.
+
+    Unless it has to be a ramp, a run at constant load and speed has its time [s] in the place of that.
+    """
+    changing = _changing(history)
+    if changing is None and is_ramp:
         raise mismatch(source, "a run along a ramp of load or speed", "constant ones")
-    course, time = history[changing], history["time"].values
+    time = history["time"].values
+    course = history["time"] if changing is None else history[changing]
     first = int(np.searchsorted(time, _start_up(history)))
-    factor, unit = coordinate_unit(course.attrs)
+    factor, unit = coordinate_unit(course.attrs) if changing else (1.0, "s")
     rate = 1.0 / (time[1] - time[0])
     if of in ("t1", "t2"):
         probes = [str(name).split()[0] == of for name in history["probe"].values]
@@ -187,6 +296,12 @@ def read_ramp(
     )
 
 
+def _changing(history: xr.Dataset) -> str | None:
+    """The quantity that a run ramps."""
+    courses = [name for name in ("load", "driving_speed") if name in history]
+    return next((name for name in courses if _is_ramp(history[name].values)), None)
+
+
 def _is_ramp(values: np.ndarray) -> bool:
     """Whether a quantity still changes in the last half of a run."""
     half = values[values.size // 2 :]
@@ -195,8 +310,6 @@ def _is_ramp(values: np.ndarray) -> bool:
 
 def _start_up(history: xr.Dataset) -> float:
     """When the ramp begins [s]."""
-    import json
-
     return float(json.loads(history.attrs.get("point", "{}")).get("rise_time", 0.0))
 
 

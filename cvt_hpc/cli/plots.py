@@ -17,6 +17,10 @@ def add(commands: Any) -> None:
     kinds = plot.add_subparsers(metavar="KIND", required=True)
     text = "spectra of the strands over an axis, with eigenfrequencies where they are known"
     waterfall = add_command(kinds, "waterfall", _waterfall, text, "RESULTS")
+    text = "Campbell diagram: spectra over the driving speed, with eigenfrequencies and orders"
+    campbell = add_command(kinds, "campbell", _campbell, text, "RESULTS")
+    text = "multiples of the driving pulley's turns (default: 1 2 4 8 16)"
+    campbell.add_argument("--orders", nargs="+", type=float, metavar="ORDER", help=text)
     text = "where vibration begins and ends along ramps up and down, and the bands between them"
     hysteresis = add_command(kinds, "hysteresis", _hysteresis, text, "RESULTS")
     text = "a quantity over an axis as marks, and others of its unit as lines beside it"
@@ -38,6 +42,9 @@ def add(commands: Any) -> None:
     ramp.add_argument(
         "--of", default="t1", metavar="WHAT", help="t1, t2 or a variable over time (default: t1)"
     )
+    text = "spectra of the strands side by side along a ramp or over time, with eigenfrequencies"
+    spectrogram = add_command(kinds, "spectrogram", _spectrogram, text, "HISTORIES")
+    spectrogram.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
     text = "sliding of one element on the sheaves over time, along its path"
     element = add_command(kinds, "element", _element, text, "HISTORY")
     element.add_argument("--region", choices=("driving", "driven"), help="one passage of that arc alone")
@@ -52,6 +59,8 @@ def add(commands: Any) -> None:
     names = {
         strands: "strands",
         hysteresis: "hysteresis",
+        campbell: "campbell",
+        spectrogram: "spectrogram",
         waterfall: "waterfall",
         curve: "curve_QUANTITY",
         wrap: "HISTORY_wrap",
@@ -62,7 +71,7 @@ def add(commands: Any) -> None:
         text = f"default: {name}.png beside the dataset"
         command.add_argument("--out", type=Path, metavar="PNG", help=text)
     waterfall.add_argument("--x", metavar="AXIS", help="axis of the study that runs along x")
-    for command in (waterfall, curve, strands, hysteresis):
+    for command in (waterfall, curve, strands, hysteresis, campbell):
         add_assignments(command, "--at", "fix an axis at a value")
 
 
@@ -75,6 +84,19 @@ def _waterfall(arguments: argparse.Namespace) -> int:
     with open_results(arguments.path) as dataset:
         at = _at(arguments, dataset)
         say(f"picture: {draw_waterfall(dataset, out, at, str(arguments.path), Sides(arguments.x))}")
+    return DONE
+
+
+def _campbell(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.figures import draw
+    from cvt_hpc.analysis.waterfall import ORDERS, campbell_figure
+    from cvt_hpc.study import open_results
+
+    out, orders = _picture(arguments, "campbell", *arguments.at), arguments.orders or ORDERS
+    with open_results(arguments.path) as dataset:
+        at = _at(arguments, dataset)
+        picture = draw(lambda: campbell_figure(dataset, at, str(arguments.path), orders), out)
+        say(f"picture: {picture}")
     return DONE
 
 
@@ -155,6 +177,17 @@ def _ramp(arguments: argparse.Namespace) -> int:
     files = history_files([arguments.path, *arguments.others])
     with _opened(files) as histories:
         say(f"picture: {draw_ramp(histories, out, arguments.of, [file.stem for file in files])}")
+    return DONE
+
+
+def _spectrogram(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.ramps import draw_spectrogram
+    from cvt_hpc.analysis.telling_apart import history_files
+
+    out = _picture(arguments, "spectrogram")
+    files = history_files([arguments.path, *arguments.others])
+    with _opened(files) as histories:
+        say(f"picture: {draw_spectrogram(histories, out, [file.stem for file in files])}")
     return DONE
 
 

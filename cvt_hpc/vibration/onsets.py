@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from cvt_hpc.vibration.classes import OccurrenceClass
 
@@ -66,6 +65,8 @@ def paired_errors(
     missed, additional : int
         True ones without a partner, and found ones between the known loads.
     """
+    from scipy.optimize import linear_sum_assignment  # long to load, and maps ask for onsets alone
+
     errors: list[float] = []
     additional = 0
     for rising in (False, True):
