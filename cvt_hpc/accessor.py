@@ -106,6 +106,30 @@ class Results:
 
         return spectrogram_figure([self._dataset])
 
+    def phase(self) -> Figure:
+        """Draw the phase portraits of the strands of one run; of a history."""
+        from cvt_hpc.analysis.histories import phase_figure
+
+        return phase_figure(self._dataset)
+
+    def energy(self) -> Figure:
+        """Draw what friction takes on the arcs of one run, and what feeds its vibration; of a history."""
+        from cvt_hpc.analysis.on_variator import energy_figure
+
+        return energy_figure(self._dataset)
+
+    def variator(self, *quantities: str) -> Figure:
+        """Draw quantities along the belt on the variator, the push force by default; of a history."""
+        from cvt_hpc.analysis.on_variator import variator_figure
+
+        return variator_figure(self._dataset, quantities or ("push_force",))
+
+    def history(self) -> Figure:
+        """Draw one run: motion, spectrum, load and forces; of a history."""
+        from cvt_hpc.analysis.histories import history_figure
+
+        return history_figure(self._dataset)
+
     def hysteresis(self, **at: Any) -> Figure:
         """Draw where vibration begins and ends along ramps up and down, and the bands between them."""
         from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import matplotlib
@@ -10,14 +9,14 @@ import numpy as np
 import xarray as xr
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from cvt_hpc.analysis.figures import STYLE, as_written
+from cvt_hpc.analysis.on_variator import draw_pulleys, run_geometry
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.files import written_aside
-from cvt_hpc.physics.geometry import variator
+from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.variator.path import points_at
 
 FORMATS = (".gif", ".mp4")
@@ -26,7 +25,7 @@ LEAST_SAMPLES = 8  # of which a period and splines can be had
 RATE = 12  # pictures a second: a period takes two seconds
 LARGEST = 0.12  # of the distance of the shafts: the largest displacement that is drawn
 PLACES = 400  # along the belt
-BELT, REST, PULLEY = "#d55e00", "#8a8a8a", "#e4e8ec"
+BELT, REST = "#d55e00", "#8a8a8a"
 
 
 def check_animation(out: Path) -> None:
@@ -57,8 +56,7 @@ def draw_animation(history: xr.Dataset, out: Path, source: str = "history") -> P
     """
     out = Path(out)
     check_animation(out)
-    ratio, driven_radius, distance = _geometry(history, source)
-    path = variator(ratio, driven_radius, distance)
+    path, distance = _geometry(history, source)
     time, motion, period = _last_periods(history)
     size = float(np.abs(motion).max())
     factor = LARGEST * distance / size if size else 0.0
@@ -69,13 +67,9 @@ def draw_animation(history: xr.Dataset, out: Path, source: str = "history") -> P
     with matplotlib.rc_context(STYLE):
         figure = Figure((6.4, 3.9), layout="constrained")
         axes = figure.subplots()
-        pulleys = ((0.0, path.driving_radius, "driving"), (distance, path.driven_radius, "driven"))
-        for centre, radius, name in pulleys:
-            axes.add_patch(Circle((1e3 * centre, 0.0), 1e3 * radius, color=PULLEY, zorder=0))
-            axes.text(1e3 * centre, 0.0, name, ha="center", va="center", fontsize=9)
+        draw_pulleys(axes, path, distance)
         axes.plot(*(1e3 * rest.T), color=REST, lw=0.8, ls="--")
         (belt,) = axes.plot(*(1e3 * rest.T), color=BELT, lw=2.0)
-        axes.set(aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
         margin = 1.3e3 * LARGEST * distance
         axes.set_xlim(1e3 * rest[:, 0].min() - margin, 1e3 * rest[:, 0].max() + margin)
         axes.set_ylim(1e3 * rest[:, 1].min() - margin, 1e3 * rest[:, 1].max() + margin)
@@ -84,11 +78,6 @@ def draw_animation(history: xr.Dataset, out: Path, source: str = "history") -> P
             f"{name}: {1.0 / period:.0f} Hz, at most {1e6 * size:.3g} µm, drawn {factor:.0f} times as large"
         )
         axes.set_title(told.removeprefix(": "), fontsize=10)
-        for strand, height in (("t1", -1.0), ("t2", 1.0)):
-            place = 0.35 * distance, height * 0.5 * (path.driving_radius + path.driven_radius)
-            axes.text(
-                1e3 * place[0], 1e3 * place[1] + 14.0 * height, strand, ha="center", va="center", fontsize=9
-            )
         clock = axes.text(0.99, 0.02, "", transform=axes.transAxes, ha="right", fontsize=9)
 
         as_written(figure).draw_without_rendering()
@@ -112,15 +101,10 @@ def draw_animation(history: xr.Dataset, out: Path, source: str = "history") -> P
     return out
 
 
-def _geometry(history: xr.Dataset, source: str) -> tuple[float, float, float]:
-    """Ratio, driven radius and distance of the shafts [m] of a run."""
-    try:
-        point = json.loads(history.attrs["point"])
-        found = tuple(float(point[key]) for key in ("ratio", "driven_radius", "centre_distance"))
-    except (KeyError, TypeError, ValueError, RecursionError):
-        found = ()
-    known = {"displacement", "probe_position"} <= {*map(str, history.variables)}
-    if len(found) != 3 or not known or not all(0.0 < value < np.inf for value in found):
+def _geometry(history: xr.Dataset, source: str) -> tuple[Variator, float]:
+    """Path of a run's belt, and distance of the shafts [m]."""
+    found = run_geometry(history)
+    if found is None or not {"displacement", "probe_position"} <= {*map(str, history.variables)}:
         raise mismatch(
             source, "the history of a run of a variator, with displacement at probes", "another one"
         )

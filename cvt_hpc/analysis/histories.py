@@ -14,14 +14,16 @@ from matplotlib.ticker import MaxNLocator
 
 from cvt_hpc.analysis import history_panels as panels
 from cvt_hpc.analysis.figures import WIDTH, balanced, draw, styled
-from cvt_hpc.errors import InputError, one_line
+from cvt_hpc.errors import InputError, mismatch, one_line
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.shown import JOB_UNITS, POINT_UNITS, shown
 from cvt_hpc.variables import Status, Vibrates, flag_in_words, shortened
 from cvt_hpc.vibration.settings import PARAMETERS
+from cvt_hpc.vibration.signals import dominant_frequency
 
 LONGEST_REASON = 120  # letters, in the title: one or two strands
 
+SHOWN_PERIODS, INK = 3, "#111111"
 LEFT, RIGHT, WHOLE = slice(0, 2), 2, slice(0, 3)  # columns of a panel
 
 
@@ -91,6 +93,65 @@ def history_figure(dataset: xr.Dataset) -> Figure:
             if columns == RIGHT:
                 axes.xaxis.set_major_locator(MaxNLocator(2))
     return figure
+
+
+def draw_phase(dataset: xr.Dataset, out: Path, source: str = "history") -> Path:
+    """Write the figure of `phase_figure`."""
+    return draw(lambda: phase_figure(dataset, source), out)
+
+
+@styled
+def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
+    """Draw the phase portrait of each strand: velocity over displacement where it moves most.
+
+    The whole judged part is drawn thin, or the last half where none was judged, and its last SHOWN_PERIODS
+    periods bold.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        As of `history_figure`, with `displacement` (time, probe) [m].
+    source : str
+        Where the history is from, for the errors.
+
+    Raises
+    ------
+    InputError
+        No motion of strands was recorded, or too little of it.
+    """
+    settings = _vibration_settings(dataset)
+    band = (settings["band_low"], settings["band_high"])
+    judged = settings["judged_fraction"] if _is_judged(dataset) else 0.5
+    strands = [one for one in panels.read_strands(dataset, judged, band) if one.has_spectrum]
+    if not strands:
+        raise mismatch(source, "the history of a run with the motion of strands in its last part", "none")
+    figure = Figure((WIDTH, 3.7), layout="constrained")
+    for axes, strand in zip(figure.subplots(1, len(strands), squeeze=False)[0], strands, strict=True):
+        moved = strand.judged[:, strand.strongest]
+        frequency = float(dominant_frequency(moved, strand.rate, band))
+        period = max(int(strand.rate / frequency), 1)
+        moved = _above(moved, strand.rate, band[0])[period:-period]  # the filter spoils a period at the ends
+        speed = 1e-3 * np.gradient(moved, 1.0 / strand.rate)  # [mm/s]
+        last = SHOWN_PERIODS * period + 1
+        axes.plot(moved, speed, color=strand.colour, lw=0.4, alpha=0.5, rasterized=True)
+        axes.plot(moved[-last:], speed[-last:], color=INK, lw=1.3)
+        axes.plot(moved[-1:], speed[-1:], "o", color=INK, ms=4)
+        axes.set_title(f"{strand.probes[strand.strongest]}, {frequency:.0f} Hz", loc="left", pad=3)
+        axes.set(xlabel="displacement [µm]", ylabel="velocity [mm/s]")
+        axes.grid(lw=0.4, alpha=0.5)
+    name = one_line(dataset.attrs.get("job_name", ""))
+    lines = [f"Phase portraits: {name}".removesuffix(": "), ", ".join(place_of(dataset.attrs))]
+    lines.append(f"motion above {band[0]:.0f} Hz; bold: last {SHOWN_PERIODS} periods, dot: their end")
+    figure.suptitle("\n".join(balanced(line, 76) for line in lines if line))
+    return figure
+
+
+def _above(motion: np.ndarray, rate: float, lowest: float) -> np.ndarray:
+    """Motion (time,) without what is slower than a frequency [Hz], such as turns of the pulleys."""
+    time = np.arange(motion.size)
+    spectrum = np.fft.rfft(motion - np.polyval(np.polyfit(time, motion, 1), time))
+    spectrum[np.fft.rfftfreq(motion.size, 1.0 / rate) < lowest] = 0.0
+    return np.fft.irfft(spectrum, motion.size)
 
 
 def _changes(dataset: xr.Dataset, name: str) -> bool:

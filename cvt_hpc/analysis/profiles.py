@@ -95,7 +95,7 @@ def profile_figure(
         column[0].set_title(title, loc="left", pad=16 if region is None else 4)
         column[-1].set_xlabel("position along the path [mm]" if region is None else "wrap angle [°]")
     for row, name in zip(panels, quantities, strict=True):
-        _, unit = _scale(histories[0][name])
+        _, unit = shown_unit(histories[0][name])
         row[0].set_ylabel(f"{in_words(histories[0][name])}\n[{unit}]")
     handles, told = max(
         (axes.get_legend_handles_labels() for axes in panels[0]), key=lambda pair: len(pair[1])
@@ -145,13 +145,14 @@ def inside(dataset: xr.Dataset, region: str) -> np.ndarray:
     return (here | np.roll(here, 1)) & np.isfinite(angle)
 
 
-def _scale(array: xr.DataArray) -> tuple[float, str]:
+def shown_unit(array: xr.DataArray) -> tuple[float, str]:
+    """Factor and unit in which a quantity along the belt is shown."""
     unit = str(array.attrs.get("units", ""))
     return _UNITS.get(unit) or display_unit(unit)
 
 
 def _draw(axes: Axes, dataset: xr.Dataset, name: str, region: str | None, **style: object) -> None:
-    factor, _ = _scale(dataset[name])
+    factor, _ = shown_unit(dataset[name])
     values = factor * dataset[name].values
     if region is None:
         axes.plot(1e3 * dataset["position"].values, values, **style)  # type: ignore[arg-type]  # of a line

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from cvt_hpc.cli.parts import DONE, PICTURES, add_assignments, add_command, check_output, picture_beside, say
+from cvt_hpc.errors import mismatch
 
 
 def add(commands: Any) -> None:
@@ -52,6 +53,19 @@ def add(commands: Any) -> None:
     element.add_argument("--data", type=Path, metavar="FILE.nc", help=text)
     text = "tension and push force of the strands over an axis, as bars"
     strands = add_command(kinds, "strands", _strands, text, "RESULTS")
+    of_one = {
+        "history": "a kept run: displacement, spectrum, load, forces and feeds around the belt",
+        "phase": "phase portraits: velocity of each strand over its displacement",
+        "energy": "powers around the belt: what friction takes on the arcs, what feeds the vibration",
+        "variator": "quantities along the belt drawn on the variator, such as forces, speeds and slip",
+    }
+    for kind, text in of_one.items():
+        command = add_command(kinds, kind, _of_one, text, "HISTORY")
+        command.set_defaults(kind=kind)
+        text = f"default: HISTORY_{kind}.png beside the dataset"
+        command.add_argument("--out", type=Path, metavar="PNG", help=text)
+    text = "variable over position; may be repeated (default: push_force)"
+    command.add_argument("--of", action="append", default=[], metavar="QUANTITY", help=text)
     text = "the belt in the last periods of a run, magnified, as a moving picture"
     animation = add_command(kinds, "animation", _animation, text, "HISTORY")
     text = "FILE.gif, or FILE.mp4 where there is ffmpeg (default: HISTORY.gif beside it)"
@@ -142,6 +156,27 @@ def _animation(arguments: argparse.Namespace) -> int:
     check_animation(out)
     with _opened([file]) as (history,):
         say(f"animation: {draw_animation(history, out, str(file))}")
+    return DONE
+
+
+def _of_one(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis import histories, on_variator
+    from cvt_hpc.analysis.telling_apart import history_files
+
+    (file, *others), quantities = history_files([arguments.path]), getattr(arguments, "of", [])
+    if others:
+        raise mismatch(str(arguments.path), "one history", f"{len(others) + 1}: {file.name}, ...")
+    out = _picture(arguments, file.stem, arguments.kind, *quantities)
+    with _opened([file]) as (history,):
+        if arguments.kind == "history":
+            picture = histories.draw_history(history, out)
+        elif arguments.kind == "phase":
+            picture = histories.draw_phase(history, out, str(file))
+        elif arguments.kind == "energy":
+            picture = on_variator.draw_energy(history, out, str(file))
+        else:
+            picture = on_variator.draw_variator(history, out, quantities or ["push_force"], str(file))
+        say(f"picture: {picture}")
     return DONE
 
 

@@ -1,0 +1,225 @@
+"""Quantities along the belt drawn on the variator, and the powers in and out around it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize, TwoSlopeNorm
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from cvt_hpc.analysis.cells import colours_of
+from cvt_hpc.analysis.figures import WIDTH, axis_label, balanced, draw, styled
+from cvt_hpc.analysis.history_panels import FEEDS
+from cvt_hpc.analysis.profiles import regions, shown_unit
+from cvt_hpc.analysis.telling_apart import on_axes, titles
+from cvt_hpc.errors import mismatch, unknown
+from cvt_hpc.physics.geometry import Variator, variator
+from cvt_hpc.variator.path import points_at
+
+PULLEY, INK = "#e4e8ec", "#333333"
+LARGEST = 0.16  # of the distance of the shafts: the longest bar
+ONE_SIGN, TWO_SIGNS = colours_of("viridis_r", 0.05, 0.95), colours_of("PuOr", 0.02, 0.98)
+HATCHES = ("", "///", "...")
+NAMED_AT, INSIDE = 0.35, 0.07  # of a strand, and of the distance of the shafts: where its name stands
+HEIGHT = 3.1  # [inch] of a variator
+WATTS = 0.01  # of the largest bar: what is smaller has no number
+
+
+def run_geometry(history: xr.Dataset) -> tuple[Variator, float] | None:
+    """Path of the belt of a run and distance of the shafts [m]; None where the run is none of a variator."""
+    try:
+        point = json.loads(history.attrs["point"])
+        ratio, driven, distance = (float(point[key]) for key in ("ratio", "driven_radius", "centre_distance"))
+        known = all(0.0 < value < np.inf for value in (ratio, driven, distance))
+        return (variator(ratio, driven, distance), distance) if known else None
+    except (KeyError, TypeError, ValueError, RecursionError):
+        return None
+
+
+def draw_pulleys(axes: Axes, path: Variator, distance: float) -> None:
+    """Draw both pulleys and the names of all parts [mm]."""
+    pulleys = ((0.0, path.driving_radius, "driving"), (distance, path.driven_radius, "driven"))
+    for centre, radius, name in pulleys:
+        axes.add_patch(Circle((1e3 * centre, 0.0), 1e3 * radius, color=PULLEY, zorder=0))
+        axes.text(1e3 * centre, 0.0, name, ha="center", va="center", fontsize=9)
+    starts = path.lengths[0], path.path_length
+    for strand, start, way in zip(("t1", "t2"), starts, (1.0, -1.0), strict=True):
+        at = start + way * NAMED_AT * path.strand_length
+        place, angle, _ = points_at(path, distance, np.array([at]))
+        inwards = INSIDE * distance * np.array([-np.sin(angle[0]), np.cos(angle[0])])
+        axes.text(*(1e3 * (place[0] + inwards)), strand, ha="center", va="center", fontsize=9)
+    axes.set(aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
+
+
+def draw_variator(
+    history: xr.Dataset, out: Path, quantities: Sequence[str] = ("push_force",), source: str = "history"
+) -> Path:
+    """Write the figure of `variator_figure`."""
+    return draw(lambda: variator_figure(history, quantities, source), out)
+
+
+@styled
+def variator_figure(
+    history: xr.Dataset, quantities: Sequence[str] = ("push_force",), source: str = "history"
+) -> Figure:
+    """Draw quantities along the belt on the variator: the belt by colour, and bars outwards from it.
+
+    Parameters
+    ----------
+    history : Dataset
+        Of a run of a variator, as `simulate` returns it.
+    quantities : sequence of str
+        Variables over `position` [m], such as forces, sliding and power; each has a panel. Negative values
+        point inwards.
+    source : str
+        Where the history is from, for the errors.
+
+    Raises
+    ------
+    InputError
+        The history is none of a variator, or has no such quantity along the belt.
+    """
+    found = run_geometry(history)
+    if found is None or "position" not in history.coords:
+        raise mismatch(source, "the history of a run of a variator, with quantities over position", "another")
+    path, distance = found
+    known = [str(key) for key, array in history.data_vars.items() if array.dims == ("position",)]
+    for name in quantities:
+        if name not in known:
+            raise unknown(f"{source}: {name}", "quantity along the belt", name, known)
+    figure = Figure((WIDTH, HEIGHT * len(quantities) + 0.7), layout="constrained")
+    for axes, name in zip(figure.subplots(len(quantities), 1, squeeze=False)[:, 0], quantities, strict=True):
+        _draw_belt(figure, axes, history[name], path, distance)
+    common, _ = on_axes([history], [source])
+    lines = titles([history], "On the variator", common)
+    figure.suptitle("\n".join(balanced(line, 72) for line in lines))
+    return figure
+
+
+def _draw_belt(figure: Figure, axes: Axes, array: xr.DataArray, path: Variator, distance: float) -> None:
+    """The belt in colours, with a bar at each station; of what is not known there is a thin line."""
+    draw_pulleys(axes, path, distance)
+    factor, unit = shown_unit(array)
+    values = factor * array.values
+    position = array["position"].values
+    points, angle, _ = points_at(path, distance, position)
+    points = 1e3 * points
+    outwards = np.stack([np.sin(angle), -np.cos(angle)], 1)
+    closed = np.vstack([points, points[:1]])
+    axes.plot(*closed.T, color="#8a8a8a", lw=0.8, zorder=1)
+    is_known = np.isfinite(values)
+    largest = float(np.abs(values[is_known]).max(initial=0.0)) or 1.0
+    both = bool((values[is_known] < 0.0).any())
+    norm = TwoSlopeNorm(0.0, -largest, largest) if both else Normalize(0.0, largest)
+    ends = points + (1e3 * LARGEST * distance / largest * np.where(is_known, values, 0.0))[:, None] * outwards
+    colours = TWO_SIGNS if both else ONE_SIGN
+    style = {"cmap": colours, "norm": norm, "array": values[is_known]}
+    bars = np.stack([points, ends], 1)[is_known]
+    axes.add_collection(LineCollection(list(bars), linewidths=2.0, **style, zorder=2))
+    belt = np.stack([closed[:-1], closed[1:]], 1)[is_known]
+    drawn = axes.add_collection(LineCollection(list(belt), linewidths=4.0, **style, zorder=3))
+    axes.plot(*np.vstack([ends, ends[:1]]).T, color=INK, lw=0.7, zorder=4)  # readable in grey
+    margin = 1.15e3 * LARGEST * distance
+    for column, set_limits in enumerate((axes.set_xlim, axes.set_ylim)):
+        set_limits(points[:, column].min() - margin, points[:, column].max() + margin)
+    figure.colorbar(drawn, ax=axes, label=axis_label(array, unit), pad=0.02)
+
+
+def region_powers(history: xr.Dataset) -> xr.DataArray:
+    """Return the power fed into the fluctuations by cause and region of the belt.
+
+    Parameters
+    ----------
+    history : Dataset
+        With some of `flank_feed`, `stress_feed`, `damping_feed` [W/m] over `position`, with `region`.
+
+    Returns
+    -------
+    DataArray
+        Over `cause` and `region` [W], sums over the stations; negative: taken. Causes without a finite value
+        are left out.
+    """
+    position, region = history["position"].values, history["region"].values.astype(str)
+    cell = float(np.diff(position).mean())
+    names = [name for _, _, name in regions(history)]
+    causes = [name for name in FEEDS if name in history and np.isfinite(history[name]).all()]
+    powers = [[cell * float(history[c].values[region == name].sum()) for name in names] for c in causes]
+    shape = np.reshape(powers, (len(causes), len(names)))
+    return xr.DataArray(shape, {"cause": causes, "region": names}, ("cause", "region"), attrs={"units": "W"})
+
+
+def draw_energy(history: xr.Dataset, out: Path, source: str = "history") -> Path:
+    """Write the figure of `energy_figure`."""
+    return draw(lambda: energy_figure(history, source), out)
+
+
+@styled
+def energy_figure(history: xr.Dataset, source: str = "history") -> Figure:
+    """Draw what friction takes on the arcs, and what feeds the vibration around the belt, in and out [W].
+
+    Parameters
+    ----------
+    history : Dataset
+        As `simulate` returns it: `part_flank_loss` [W] over `pulley` and `arc_part`, or what
+        `region_powers` takes, or both.
+    source : str
+        Where the history is from, for the errors.
+
+    Raises
+    ------
+    InputError
+        The history has neither.
+    """
+    powers = region_powers(history) if {"position", "region"} <= {*map(str, history.coords)} else None
+    has_feeds = powers is not None and powers.sizes["cause"] > 0
+    has_loss = "part_flank_loss" in history and bool(np.isfinite(history["part_flank_loss"]).any())
+    if not has_feeds and not has_loss:
+        expected = "a history with flank_feed or part_flank_loss, known at constant load and speed"
+        raise mismatch(source, expected, "none that is known")
+    figure = Figure((WIDTH, 2.2 * (has_feeds + has_loss) + 0.9), layout="constrained")
+    panels = list(figure.subplots(has_feeds + has_loss, 1, squeeze=False)[:, 0])
+    if has_loss:
+        axes, loss = panels.pop(0), history["part_flank_loss"].transpose("pulley", "arc_part")
+        count = loss.sizes["arc_part"]
+        labels = [f"{pulley}\n{k + 1}/{count}" for pulley in loss["pulley"].values for k in range(count)]
+        colours = np.repeat(["#0072b2", "#d55e00"], count)[: loss.size]
+        bars = axes.bar(labels, loss.values.ravel(), 0.7, color=colours, edgecolor=INK, lw=0.6)
+        axes.bar_label(bars, fmt="{:.3g}", fontsize=8, padding=1)
+        axes.set_title("out: friction of the flanks, by quarter of the arc from its inlet", loc="left", pad=4)
+        axes.margins(y=0.15)
+        axes.set_ylabel("power [W]")
+    if has_feeds and powers is not None:
+        _draw_feeds(panels[0], powers)
+    common, _ = on_axes([history], [source])
+    lines = titles([history], "Energy around the belt", common)
+    figure.suptitle("\n".join(balanced(line, 72) for line in lines))
+    return figure
+
+
+def _draw_feeds(axes: Axes, powers: xr.DataArray) -> None:
+    """Bars of each cause in each region, into the vibration above zero and out of it below."""
+    names, causes = powers["region"].values, powers["cause"].values
+    places, width = np.arange(names.size), 0.8 / max(causes.size, 1)
+    largest = float(np.abs(powers.values).max()) or 1.0
+    for k, cause in enumerate(causes):
+        label, colour, _ = FEEDS[str(cause)]
+        at = places + (k - 0.5 * (causes.size - 1)) * width
+        style = {"color": colour, "edgecolor": "#ffffff", "hatch": HATCHES[k % len(HATCHES)], "lw": 0.6}
+        bars = axes.bar(at, powers.values[k], 0.9 * width, label=label, **style)
+        texts = [f"{p:+.2g}".replace("-", "−") if abs(p) > WATTS * largest else "" for p in powers.values[k]]
+        axes.bar_label(bars, texts, fontsize=8, padding=1)
+    axes.axhline(0.0, color=INK, lw=0.8)
+    total = float(powers.sum())
+    title = f"into (+) and out of (−) the vibration, sum {total:+.2g} W".replace("-", "−")
+    axes.set_title(title, loc="left", pad=4)
+    axes.set_xticks(places, names)
+    axes.set_ylabel("power [W]")
+    axes.margins(y=0.2)
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.14), ncols=3, frameon=False)

@@ -1,0 +1,141 @@
+"""Pictures of one run: quantities on the variator, powers around the belt, phase portraits."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from cvt_hpc.analysis.histories import SHOWN_PERIODS, phase_figure
+from cvt_hpc.analysis.on_variator import LARGEST, energy_figure, region_powers, variator_figure
+from cvt_hpc.errors import InputError
+from cvt_hpc.physics.geometry import variator
+
+POINT = {"ratio": 1.0, "driven_radius": 0.05, "centre_distance": 0.155}
+PATH = variator(**POINT)
+STATIONS, RATE = 400, 20e3
+
+
+def history():
+    """A belt at ratio 1 with a push of 2 kN, sliding that changes its sign, and known powers."""
+    position = np.arange(STATIONS) * PATH.path_length / STATIONS
+    borders = np.cumsum(PATH.lengths)[:3]
+    region = np.array(["driving arc", "t1", "driven arc", "t2"])[np.searchsorted(borders, position, "right")]
+    time = np.arange(8000) / RATE
+    motion = np.stack([20e-6 * np.sin(2 * np.pi * 500 * time), 5e-6 * np.sin(2 * np.pi * 500 * time)], 1)
+    slow = 40e-6 * np.sin(2 * np.pi * 50 * time)[:, None]  # as turns of a pulley give
+    return xr.Dataset(
+        {
+            "displacement": (("time", "probe"), motion + slow, {"units": "m"}),
+            "push_force": ("position", np.full(STATIONS, 2000.0), {"units": "N"}),
+            "sliding": ("position", np.sin(2 * np.pi * position / PATH.path_length), {"units": "m s-1"}),
+            "flank_feed": ("position", np.where(region == "driven arc", 10.0, 0.0), {"units": "W m-1"}),
+            "damping_feed": ("position", np.where(region == "t1", -4.0, 0.0), {"units": "W m-1"}),
+            "part_flank_loss": (("pulley", "arc_part"), np.arange(8.0).reshape(2, 4), {"units": "W"}),
+        },
+        {
+            "position": ("position", position, {"units": "m"}),
+            "region": ("position", region),
+            "pulley": ["driving", "driven"],
+            "time": time,
+            "probe": ["t1 1/2", "t2 1/2"],
+        },
+        {"point": json.dumps(POINT), "job_name": "one $run$"},
+    )
+
+
+def test_bars_stand_outwards_on_the_belt_and_their_length_is_the_quantity():
+    axes, bar = variator_figure(history()).axes
+    assert (axes.get_xlabel(), axes.get_ylabel(), bar.get_ylabel()) == ("y [mm]", "z [mm]", "push force [kN]")
+    bars = np.array(axes.collections[0].get_segments())
+    assert bars.shape == (STATIONS, 2, 2)
+    np.testing.assert_allclose(axes.collections[0].get_array(), 2.0)
+    np.testing.assert_allclose(np.hypot(*(bars[:, 1] - bars[:, 0]).T), 1e3 * LARGEST * 0.155)
+    # of two pulleys alike the belt is 50 mm off the line of their centres, or round about one of them
+    feet, ends = bars[:, 0], bars[:, 1]
+    nearest = np.clip(feet[:, 0], 0.0, 155.0)
+    np.testing.assert_allclose(np.hypot(feet[:, 0] - nearest, feet[:, 1]), 50.0)
+    np.testing.assert_allclose(
+        np.hypot(ends[:, 0] - np.clip(ends[:, 0], 0.0, 155.0), ends[:, 1]), 50.0 + 1e3 * LARGEST * 0.155
+    )
+
+
+def test_negative_values_point_inwards_and_unknown_ones_have_no_bar():
+    run = history()
+    run["sliding"][:10] = np.nan
+    axes, bar = variator_figure(run, ["sliding"]).axes
+    bars, values = np.array(axes.collections[0].get_segments()), axes.collections[0].get_array()
+    assert len(bars) == STATIONS - 10 and bar.get_ylabel() == "sliding [mm/s]"
+    end = bars[:, 1]
+    off = np.hypot(end[:, 0] - np.clip(end[:, 0], 0.0, 155.0), end[:, 1]) - 50.0
+    assert (np.sign(off[np.abs(values) > 1.0]) == np.sign(values[np.abs(values) > 1.0])).all()
+    low, high = axes.collections[0].get_clim()
+    assert low == -high  # zero is the middle of the colours
+
+
+def test_powers_of_regions_are_feeds_times_their_lengths():
+    powers = region_powers(history())
+    cell = PATH.path_length / STATIONS  # a border lies within a cell
+    assert float(powers.sel(cause="flank_feed", region="driven arc")) == pytest.approx(
+        10.0 * PATH.lengths[2], abs=10.0 * cell
+    )
+    assert float(powers.sel(cause="damping_feed", region="t1")) == pytest.approx(
+        -4.0 * PATH.lengths[1], abs=4.0 * cell
+    )
+    assert float(np.abs(powers).sum()) == pytest.approx(
+        float(powers.sel(cause="flank_feed").sum() - powers.sel(cause="damping_feed").sum())
+    )
+
+
+def test_energy_has_losses_of_arc_parts_and_feeds_of_regions():
+    figure = energy_figure(history())
+    above, below = figure.axes
+    assert [bar.get_height() for bar in above.patches] == list(range(8))
+    powers = region_powers(history())
+    np.testing.assert_allclose([bar.get_height() for bar in below.patches], powers.values.ravel())
+    texts = [text.get_text() for text in below.get_legend().get_texts()]
+    assert texts == ["friction of the flanks", "damping, rings' friction"]
+    ramp = history()
+    ramp["flank_feed"][:] = ramp["damping_feed"][:] = np.nan
+    assert len(energy_figure(ramp).axes) == 1
+
+
+def test_a_phase_portrait_is_an_ellipse_of_the_vibration_alone():
+    figure = phase_figure(history())
+    figure.draw_without_rendering()
+    for axes, size in zip(figure.axes, (20.0, 5.0), strict=True):
+        whole, last, end = axes.lines
+        x, v = whole.get_data()
+        speed = 1e-3 * size * 2 * np.pi * 500  # [mm/s]
+        # central differences of 40 samples a period give 0.4 % less speed, and the cut slow motion of twice the
+        # size leaves some 2 % at the ends
+        np.testing.assert_allclose(np.hypot(x / size, v / speed), 1.0, atol=0.03)
+        assert last.get_xdata().size == SHOWN_PERIODS * 40 + 1
+        assert end.get_xdata()[0] == x[-1]
+        assert axes.get_title(loc="left").endswith(", 500 Hz")
+        assert (axes.get_xlabel(), axes.get_ylabel()) == ("displacement [µm]", "velocity [mm/s]")
+
+
+@pytest.mark.parametrize(
+    ("compose", "lacks", "found"),
+    [
+        (variator_figure, {"drop": ["push_force"]}, "push_force: unknown quantity along the belt"),
+        (variator_figure, {"point": "{}"}, "expected the history of a run of a variator"),
+        (
+            energy_figure,
+            {"drop": ["part_flank_loss", "flank_feed", "damping_feed"]},
+            "expected a history with",
+        ),
+        (
+            phase_figure,
+            {"drop": ["displacement"]},
+            "expected the history of a run with the motion of strands",
+        ),
+    ],
+)
+def test_what_is_missing_is_told_in_one_line(compose, lacks, found):
+    run = history().drop_vars(lacks.get("drop", []))
+    run = run.assign_attrs(point=lacks.get("point", run.attrs["point"]))
+    with pytest.raises(InputError, match=f"x.nc: {found}") as told:
+        compose(run, source="x.nc")
+    assert "\n" not in str(told.value)
