@@ -129,7 +129,7 @@ def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
     for axes, strand in zip(figure.subplots(1, len(strands), squeeze=False)[0], strands, strict=True):
         moved = strand.judged[:, strand.strongest]
         frequency = float(dominant_frequency(moved, strand.rate, band))
-        period = max(int(strand.rate / frequency), 1)
+        period = max(round(strand.rate / frequency), 1)
         moved = _above(moved, strand.rate, band[0])[period:-period]  # the filter spoils a period at the ends
         speed = 1e-3 * np.gradient(moved, 1.0 / strand.rate)  # [mm/s]
         last = SHOWN_PERIODS * period + 1
