@@ -130,8 +130,10 @@ def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
         moved = strand.judged[:, strand.strongest]
         frequency = float(dominant_frequency(moved, strand.rate, band))
         period = max(round(strand.rate / frequency), 1)
-        moved = _above(moved, strand.rate, band[0])[period:-period]  # the filter spoils a period at the ends
+        moved = _above(moved, strand.rate, band[0])
         speed = 1e-3 * np.gradient(moved, 1.0 / strand.rate)  # [mm/s]
+        cut = min(round(2 * strand.rate / band[0]), moved.size // 4)  # the ends, that the filter spoils
+        moved, speed = moved[cut:-cut], speed[cut:-cut]
         last = SHOWN_PERIODS * period + 1
         axes.plot(moved, speed, color=strand.colour, lw=0.4, alpha=0.5, rasterized=True)
         axes.plot(moved[-last:], speed[-last:], color=INK, lw=1.3)
@@ -148,10 +150,9 @@ def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
 
 def _above(motion: np.ndarray, rate: float, lowest: float) -> np.ndarray:
     """Motion (time,) without what is slower than a frequency [Hz], such as turns of the pulleys."""
-    time = np.arange(motion.size)
-    spectrum = np.fft.rfft(motion - np.polyval(np.polyfit(time, motion, 1), time))
-    spectrum[np.fft.rfftfreq(motion.size, 1.0 / rate) < lowest] = 0.0
-    return np.fft.irfft(spectrum, motion.size)
+    from scipy.signal import butter, sosfiltfilt  # scipy.signal takes long to load
+
+    return sosfiltfilt(butter(4, lowest, "highpass", fs=rate, output="sos"), motion)
 
 
 def _changes(dataset: xr.Dataset, name: str) -> bool:

@@ -107,8 +107,8 @@ def test_a_phase_portrait_is_an_ellipse_of_the_vibration_alone():
         whole, last, end = axes.lines
         x, v = whole.get_data()
         speed = 1e-3 * size * 2 * np.pi * 500  # [mm/s]
-        # central differences of 40 samples a period give 0.4 % less speed, and the cut slow motion of twice the
-        # size leaves some 2 % at the ends
+        # central differences of 40 samples a period give 0.4 % less speed, and the slow motion of eight times the
+        # size in t2 leaves some 1 % at the ends
         np.testing.assert_allclose(np.hypot(x / size, v / speed), 1.0, atol=0.03)
         assert last.get_xdata().size == SHOWN_PERIODS * 40 + 1
         assert end.get_xdata()[0] == x[-1]
