@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from scipy.interpolate import CubicSpline
 
 from cvt_hpc.analysis import history_panels as panels
 from cvt_hpc.analysis.figures import WIDTH, balanced, draw, styled
@@ -24,6 +25,7 @@ from cvt_hpc.vibration.signals import dominant_frequency
 LONGEST_REASON = 120  # letters, in the title: one or two strands
 
 SHOWN_PERIODS, INK = 3, "#111111"
+SAMPLES = 200  # drawn in a period: harmonics have corners otherwise
 LEFT, RIGHT, WHOLE = slice(0, 2), 2, slice(0, 3)  # columns of a panel
 
 
@@ -129,14 +131,13 @@ def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
     for axes, strand in zip(figure.subplots(1, len(strands), squeeze=False)[0], strands, strict=True):
         moved = strand.judged[:, strand.strongest]
         frequency = float(dominant_frequency(moved, strand.rate, band))
-        period = max(round(strand.rate / frequency), 1)
-        moved = _above(moved, strand.rate, band[0])
-        speed = 1e-3 * np.gradient(moved, 1.0 / strand.rate)  # [mm/s]
-        cut = min(round(2 * strand.rate / band[0]), moved.size // 4)  # the ends, that the filter spoils
-        moved, speed = moved[cut:-cut], speed[cut:-cut]
-        last = SHOWN_PERIODS * period + 1
+        course = CubicSpline(*_above(moved, strand.rate, band[0]))
+        start, end = course.x[[0, -1]]
+        times = start + np.arange(int((end - start) * frequency * SAMPLES) + 1) / (frequency * SAMPLES)
+        moved, speed = course(times), 1e-3 * course(times, 1)  # [mm/s]
+        last = SHOWN_PERIODS * SAMPLES + 1
         axes.plot(moved, speed, color=strand.colour, lw=0.4, alpha=0.5, rasterized=True)
-        axes.plot(moved[-last:], speed[-last:], color=INK, lw=1.3)
+        axes.plot(moved[-last:], speed[-last:], color=INK, lw=1.0)
         axes.plot(moved[-1:], speed[-1:], "o", color=INK, ms=4)
         axes.set_title(f"{strand.probes[strand.strongest]}, {frequency:.0f} Hz", loc="left", pad=3)
         axes.set(xlabel="displacement [µm]", ylabel="velocity [mm/s]")
@@ -148,11 +149,16 @@ def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
     return figure
 
 
-def _above(motion: np.ndarray, rate: float, lowest: float) -> np.ndarray:
-    """Motion (time,) without what is slower than a frequency [Hz], such as turns of the pulleys."""
+def _above(motion: np.ndarray, rate: float, lowest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and motion (time,) above a frequency [Hz], so without turns of the pulleys.
+
+    The ends that the filter spoils are cut.
+    """
     from scipy.signal import butter, sosfiltfilt  # scipy.signal takes long to load
 
-    return sosfiltfilt(butter(4, lowest, "highpass", fs=rate, output="sos"), motion)
+    faster = sosfiltfilt(butter(4, lowest, "highpass", fs=rate, output="sos"), motion)
+    cut = min(round(2 * rate / lowest), motion.size // 4)
+    return np.arange(cut, motion.size - cut) / rate, faster[cut:-cut]
 
 
 def _changes(dataset: xr.Dataset, name: str) -> bool:
