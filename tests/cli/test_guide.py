@@ -5,6 +5,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from html import escape
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,8 @@ from cvt_hpc.cli import _parser
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.job.document import read_document
+from cvt_hpc.models import MODELS
+from cvt_hpc.models.contract import load_model
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs" / "guide").glob("*.md"))]
@@ -86,6 +89,13 @@ def test_the_guide_is_built_and_names_all_its_pages(tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert "Ten minutes" in (tmp_path / "site" / "tutorial.html").read_text()
+    meant = (tmp_path / "site" / "variables.html").read_text()
+    for model in map(load_model, MODELS):
+        for variable in model.variables if model.is_recorded else ():
+            assert (
+                f"<td><code>{variable.name}</code></td>" in meant
+                and escape(variable.comment, quote=False) in meant
+            )
 
 
 def test_a_command_that_is_none_is_seen():

@@ -44,3 +44,45 @@ def stored(belt, state):
     energy += np.sum(pressed**2) / belt.flank_stiffness
     energy += np.sum(belt.modal_stiffness * (state.openings**2 + state.leans**2))
     return energy + 0.5 * belt.driven_inertia * state.pulleys[b.DRIVEN_SPEED] ** 2
+
+
+def gaps(belt, state):
+    """Gaps by the geometry of a state, of the contacts `CONTACTS[:9]`, (nodes, 9) [m]."""
+    f = of_lanes(state.elements)
+    r, x, o = f[:, 0:3], f[:, 3:6], f[:, 6:9]
+    a = np.cross(o, x)
+    rj, xj, oj = (np.roll(v, -1, axis=0) for v in (r, x, o))
+    found = []
+    for height, width in ((-belt.pitch_depth, belt.edge_width), (belt.head_height, belt.head_width)):
+        for side in (-1.0, 1.0):
+            front = r + 0.5 * belt.thickness * x + height * o + side * width * a
+            found.append(np.sum((rj - front) * xj, axis=1) - 0.5 * belt.thickness)
+    offset = r - rj + 0.5 * belt.thickness * (x + xj) + belt.pin_height * (o - oj)
+    offset -= np.sum(offset * xj, axis=1)[:, None] * xj
+    found.append(belt.pin_clearance - np.linalg.norm(offset, axis=1))
+    driven = f[:, b.DRIVEN].astype(int)
+    axis, centre = belt.axes[driven], driven[:, None] * [belt.centre_distance, 0.0, 0.0]
+    groove, middle = (state.pulleys[first:][driven] for first in (b.DRIVING_RADIUS, b.DRIVING_MIDDLE))
+    opening, lean = (sheaves_opening(belt, state, modes) for modes in (state.openings, state.leans))
+    for side in (-1.0, 1.0):
+        for reach in (-belt.flank_reach, belt.flank_reach):
+            width = belt.half_width + reach * belt.sine / belt.cosine
+            q = r - centre + (reach - belt.pitch_depth) * o + side * width * a
+            along = np.sum(q * axis, axis=1)
+            radius = np.linalg.norm(q - along[:, None] * axis, axis=1)
+            apart = belt.half_width - side * (along - middle) + opening + side * lean
+            found.append(belt.cosine * apart + belt.sine * (radius - groove))
+    return np.stack(found, axis=1)
+
+
+def sheaves_opening(belt, state, modes):
+    """How far a sheave gives way where each element is, by a_k of both pulleys (2, modes), (nodes,) [m]."""
+    f = of_lanes(state.elements)
+    driven = f[:, b.DRIVEN].astype(int)
+    pitch = f[:, :2] - belt.pitch_depth * f[:, 6:8] - driven[:, None] * [belt.centre_distance, 0.0]
+    angle = np.arctan2(pitch[:, 1], pitch[:, 0])
+    waves = [
+        np.cos((k + 1) // 2 * angle) if k % 2 else np.sin(k // 2 * angle) for k in range(1, modes.shape[1])
+    ]
+    shapes = [np.ones_like(angle), *waves][: modes.shape[1]]
+    return sum((modes[driven, k] * shape for k, shape in enumerate(shapes)), np.zeros_like(angle))

@@ -1,0 +1,190 @@
+"""A revolution of misaligned spatial pushbelts: laws of all contacts at all outputs, balances, states of contacts."""
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from cvt_hpc.models.pushbelt.start import of_lanes
+from cvt_hpc.models.spatial_pushbelt import belt as b
+from cvt_hpc.models.spatial_pushbelt.step import advance
+from cvt_hpc.physics.friction_laws import Law
+from support.pushbelts import THRUST
+from support.spatial_belts import LOAD, STEP, TORQUE, gaps, inputs, scene, sheaves_opening, stored
+
+OUTPUTS = 450  # of ten steps each: a revolution
+SCENES = {
+    "coulomb": {},
+    "falling": {"flank_law": int(Law.STRIBECK), "flank_gradient": -0.3, "friction_memory": 3e-4},
+    "elastic": {"modal": ((6e8, 3e8, 3e8), (6e8, 3e8, 3e8))},  # [N/m]
+    # elements that nothing turns with the rings yaw until their pins hold them
+    "pins": {"yaw_stiffness": 0.0, "pin_clearance": 5e-5},
+}
+CONTACTS = slice(b.PUSH, b.FLANK + b.POINTS)  # fields of their normal forces, in the order of b.CONTACTS
+FLANKS = slice(5, 9)
+
+
+class Revolution(NamedTuple):
+    """`rate` of all totals [W], in place of the time that of the stored energy; all but loads of every other output."""
+
+    belt: b.Belt
+    state: b.BeltState
+    rate: np.ndarray
+    loads: np.ndarray  # (OUTPUTS, LOADS)
+    elements: np.ndarray  # (outputs, nodes, STATE_FIELDS)
+    saddle_before: np.ndarray  # normal forces of rings one step earlier, (outputs, nodes)
+    gaps: np.ndarray  # (outputs, nodes, 9)
+    openings: np.ndarray  # of the sheaves at the elements, (outputs, nodes)
+
+
+@cache
+def revolution(name):
+    belt, state, work = scene(**SCENES[name])
+    before, energy = state.totals.copy(), stored(belt, state)
+    hold = inputs((THRUST, THRUST), (LOAD, LOAD))
+    loads, found = [], []
+    for k in range(OUTPUTS):
+        assert advance(belt, b.NEWTON, state, work, hold, 9, STEP) == 0
+        saddle = of_lanes(state.elements)[:, b.SADDLE].copy()
+        assert advance(belt, b.NEWTON, state, work, hold, 1, STEP) == 0
+        loads.append(state.loads.copy())
+        if k % 2 == 1:
+            opening = sheaves_opening(belt, state, state.openings)
+            found.append((of_lanes(state.elements).copy(), saddle, gaps(belt, state), opening))
+    spent = state.totals - before
+    rate = spent / spent[b.TIME]
+    rate[b.TIME] = (stored(belt, state) - energy) / spent[b.TIME]
+    return Revolution(belt, state, rate, np.array(loads), *map(np.array, zip(*found, strict=True)))
+
+
+def slips(f):
+    """Sliding speeds of flanks and rings, (..., 5) [m/s]."""
+    m, t = (f[..., k : k + 4] for k in (b.FLANK_SLIP_M, b.FLANK_SLIP_T))
+    return np.concatenate([np.hypot(m, t), np.abs(f[..., b.RING_SLIP, None])], axis=-1)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_power_is_balanced_and_both_pulleys_take_the_same_axial_force(name):
+    found = revolution(name)
+    rate, loads = found.rate, found.loads.mean(axis=0)
+    lost = rate[b.FLANK_LOSS : b.POWER_RESIDUAL]
+    assert (lost >= 0.0).all()
+    left = rate[b.WORK_IN] - rate[b.WORK_OUT] - rate[b.THRUST_WORK] - lost.sum() - rate[b.TIME]
+    assert abs(left) < 3e-4 * rate[b.WORK_IN]
+    assert found.state.counters[b.FAILED_STEPS] <= 2
+    # what the belt does to one pulley along the axis it takes from the other
+    net = loads[b.DRIVING_RIGHT] - loads[b.DRIVING_LEFT], loads[b.DRIVEN_RIGHT] - loads[b.DRIVEN_LEFT]
+    assert net[0] > 80.0
+    assert net[0] + net[1] == pytest.approx(0.0, abs=0.01 * net[0])
+    assert -loads[b.DRIVING_TORQUE] == pytest.approx(TORQUE, rel=0.03)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_contacts_press_by_their_gaps_at_every_output(name):
+    """Forces are one-sided and those of the accepted state's gaps, which a step predicts along directions of q_k."""
+    found = revolution(name)
+    normal = found.elements[..., CONTACTS]
+    assert normal.min() >= 0.0
+    belt, pressed = found.belt, normal > 0.0
+    stiffness = 0.5 * belt.contact_stiffness, belt.pin_stiffness, 0.5 * belt.flank_stiffness
+    deformed = normal / np.repeat(stiffness, [4, 1, 4])
+    error = np.abs(np.maximum(-found.gaps, 0.0) - deformed)
+    deformed[..., FLANKS] += belt.cosine * found.openings[..., None]
+    for part in (slice(0, 4), slice(4, 5), FLANKS):
+        of_part = pressed[..., part]
+        if part.start != 4 or name == "pins":
+            assert error[..., part][of_part].mean() < 0.01 * deformed[..., part][of_part].mean(), part
+    # what is not pressed is open
+    assert error[~pressed].max() < 0.01 * deformed.max()
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_friction_keeps_its_law_and_its_cone_at_every_output(name):
+    found = revolution(name)
+    f, belt = found.elements, found.belt
+    sliding, size = [f[..., k : k + 4] for k in (b.FLANK_SLIP_M, b.FLANK_SLIP_T)], slips(f)
+    force = [f[..., k : k + 4] for k in (b.FLANK_FRICTION_M, b.FLANK_FRICTION_T)]
+    mu = np.full(size.shape[:-1], 0.09)[..., None]
+    if name == "falling":  # mu_k - g v_s exp(-v / v_s)
+        mu = 0.09 + 0.3 * 0.1 * np.exp(-f[..., b.V_FILTERED : b.V_FILTERED + 4] / 0.1)
+        assert mu.max() > 1.2 * mu.min()
+    most = mu * f[..., CONTACTS][..., FLANKS]
+    least = 1e-9 * most.max()  # friction is linear to 3e-7 below 1e-3 of the regularisation's speed
+    law = most * np.tanh(size[..., :4] / belt.friction_speed)
+    assert np.abs(np.hypot(*force) - law).max() < least
+    assert (np.hypot(*force) - most).max() < least
+    assert np.abs(force[0] * sliding[1] - force[1] * sliding[0]).max() < least
+    assert min((one * way).min() for one, way in zip(force, sliding, strict=True)) >= 0.0
+    # rings: by the normal force of the step before
+    most, slip = belt.ring_friction * found.saddle_before, f[..., b.RING_SLIP]
+    law = most * np.tanh(slip / belt.ring_friction_speed)
+    assert np.abs(f[..., b.RING_FRICTION] - law).max() < 1e-9 * most.max()
+
+
+def changes(name):
+    """Contacts that open, close, begin to stick and to slide from one output to the next, by their names."""
+    f = revolution(name).elements
+    touching, sliding = f[..., CONTACTS] > 0.0, slips(f) > 5e-4
+    held = np.concatenate([touching[..., FLANKS], np.ones_like(touching[..., :1])], axis=-1)
+    held = held[1:] & held[:-1]
+    found = {
+        "opens": touching[:-1] & ~touching[1:],
+        "closes": ~touching[:-1] & touching[1:],
+        "sticks": held & sliding[:-1] & ~sliding[1:],
+        "slips": held & ~sliding[:-1] & sliding[1:],
+    }
+    names = {
+        "opens": b.CONTACTS[:9],
+        "closes": b.CONTACTS[:9],
+        "sticks": b.CONTACTS[5:],
+        "slips": b.CONTACTS[5:],
+    }
+    return {
+        verb: {what for what, seen in zip(names[verb], found[verb].any(axis=(0, 1)), strict=True) if seen}
+        for verb in found
+    }
+
+
+FRONTS = {"edge left", "edge right", "head left", "head right", "pin"}  # without friction
+SIDES = {"flank left low", "flank left high", "flank right low", "flank right high"}
+
+
+@pytest.mark.parametrize(
+    ("verb", "contacts"),
+    [
+        ("opens", FRONTS | SIDES),
+        ("closes", FRONTS | SIDES),
+        ("sticks", SIDES | {"ring"}),  # saddle and pillar hold the rings from both sides
+        ("slips", SIDES | {"ring"}),
+    ],
+)
+def test_every_kind_of_contact_opens_closes_sticks_and_slips(verb, contacts):
+    assert changes("pins")[verb] == contacts
+
+
+@pytest.mark.parametrize(
+    ("where", "points"),  # left low, left high, right low, right high
+    [
+        ("nowhere", "...."),
+        ("left only", "lt.."),
+        ("right only", "..lt"),
+        ("both", "ltlt"),
+        ("top of the left only", ".t.."),
+        ("top of the right only", "...t"),
+        ("bottom of the left only", "l..."),
+        ("bottom of the right only", "..l."),
+    ],
+)
+def test_flanks_touch_on_either_side_and_at_either_height(where, points):
+    touching = revolution("pins").elements[..., CONTACTS][..., FLANKS] > 0.0
+    assert (touching == [point != "." for point in points]).all(axis=-1).any(), where
+
+
+def test_sheaves_lean_by_the_difference_of_their_loads():
+    found = revolution("elastic")
+    loads, state = found.loads.mean(axis=0), found.state
+    # the first mode opens a sheave evenly by force over stiffness; it follows within a millisecond
+    difference = 0.5 * (loads[b.DRIVING_RIGHT] - loads[b.DRIVING_LEFT])
+    assert state.leans[0, 0] * 6e8 == pytest.approx(difference, rel=0.3)
+    assert state.openings[0, 0] * 6e8 == pytest.approx(loads[: b.DRIVEN_LEFT].mean(), rel=0.05)
