@@ -15,7 +15,13 @@ from numba.extending import register_jitable
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import absolute, ahead, around, like
 from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
-from cvt_hpc.models.spatial_pushbelt.assembly import assemble_pairs, border_system, linear_blocks, residuals
+from cvt_hpc.models.spatial_pushbelt.assembly import (
+    assemble_pairs,
+    border_system,
+    linear_blocks,
+    residuals,
+    side_torque,
+)
 from cvt_hpc.models.spatial_pushbelt.belt import (
     CHANGE,
     DRIVEN,
@@ -39,7 +45,6 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     IN_LOAD,
     ITERATE_TENSION,
     LENGTH,
-    MID_RADIUS,
     OMEGA,
     OUTWARD,
     PIN,
@@ -218,14 +223,15 @@ def _add_loads(belt, state, work):
         for p in range(POINTS):
             side = p // 2
             axial = elements[j, FLANK + p] * belt.cosine + elements[j, FLANK_FRICTION_M + p] * belt.sine
-            torque = step[j, MID_RADIUS + p] * elements[j, FLANK_FRICTION_T + p]
             scratch[0, side] += driving * axial
             scratch[0, 2 + side] += driven * axial
-            scratch[0, DRIVING_TORQUE] += driving * torque
-            scratch[0, DRIVING_TORQUE + 1] += driven * torque
+        torque = side_torque(elements, step, j, 0) + side_torque(elements, step, j, 2)
+        scratch[0, DRIVING_TORQUE] += driving * torque
+        scratch[0, DRIVING_TORQUE + 1] += driven * torque
         if modes > 0:
+            left = elements[j, FLANK] + elements[j, FLANK + 1]
             right = elements[j, FLANK + 2] + elements[j, FLANK + 3]
-            lean = 0.5 * belt.cosine * (right - elements[j, FLANK] - elements[j, FLANK + 1])
+            lean = 0.5 * belt.cosine * (right - left)
             for k in range(modes):
                 scratch[0, loads.size + k] += driving * lean * work.shapes[j, k]
                 scratch[0, loads.size + modes + k] += driven * lean * work.shapes[j, k]
