@@ -112,6 +112,12 @@ class Results:
 
         return phase_figure(self._dataset)
 
+    def flanks(self) -> Figure:
+        """Draw left and right flank along the belt; of a history of a spatial pushbelt."""
+        from cvt_hpc.analysis.flanks import flanks_figure
+
+        return flanks_figure(self._dataset)
+
     def energy(self) -> Figure:
         """Draw what friction takes on the arcs of one run, and what feeds its vibration; of a history."""
         from cvt_hpc.analysis.on_variator import energy_figure

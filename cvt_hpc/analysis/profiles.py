@@ -31,7 +31,8 @@ ARC = "#ececec"
 MOST_COLUMNS = 3
 HEIGHT = 1.75  # [inch] of a panel
 _UNITS = {"N m-1": (1e-3, "kN/m"), "m s-1": (1e3, "mm/s")}
-_REFERENCES = {"rad": 90.0}  # where sliding turns from one hand to the other
+_REFERENCES = {"sliding_angle": 90.0}  # [°]: where sliding turns from one hand to the other
+SMALL_ANGLE = 0.1  # [rad]: what stays below is shown in mrad
 
 
 def draw_profile(
@@ -65,7 +66,8 @@ def profile_figure(
     region : str, optional
         "driving" or "driven": that arc alone, over the wrap angle; else the whole belt.
     columns : str, optional
-        An axis of the runs' job that has a column of panels for each value; else all are drawn together.
+        An axis of the runs' job that has a column of panels for each value, or a panel where there is one
+        quantity; else all are drawn together.
     sources : sequence of str, optional
         Where the runs are from, for errors, and for the legend where their axes do not tell them apart.
 
@@ -79,26 +81,35 @@ def profile_figure(
     names = list(sources) or [f"history {k + 1}" for k in range(len(histories))]
     _check(histories, names, quantities, region)
     common, labels = on_axes(histories, names)
-    groups = _groups(labels, columns)
-    width = WIDTH * (1.0 + 0.25 * (len(groups) - 1))
-    figure = Figure((width, HEIGHT * len(quantities) + 1.2), layout="constrained")
-    panels = figure.subplots(len(quantities), len(groups), sharex="col", sharey="row", squeeze=False)
-    for column, (title, members) in zip(panels.T, groups.items(), strict=True):
+    groups = _groups(labels, columns, MOST_COLUMNS * (2 if len(quantities) == 1 else 1))
+    beside = min(len(groups), MOST_COLUMNS)
+    rows = max(len(quantities), -(-len(groups) // beside))
+    figure = Figure((WIDTH * (1.0 + 0.25 * (beside - 1)), HEIGHT * rows + 1.2), layout="constrained")
+    share = "all" if len(quantities) == 1 else "row"
+    panels = figure.subplots(rows, beside, sharex="col", sharey=share, squeeze=False)
+    # one quantity has its panels row by row
+    stacks = panels.reshape(-1, 1) if len(quantities) == 1 else panels.T
+    for unused in stacks[len(groups) :].flat:
+        unused.set_visible(False)
+    for column, (title, members) in zip(stacks, groups.items(), strict=False):
         for axes, name in zip(column, quantities, strict=True):
             for k, run in enumerate(members):
                 told = ", ".join(text for key, text in labels[run].items() if key != columns)
                 style = {"color": COLOURS[k % len(COLOURS)], "ls": LINES[k % len(LINES)], "lw": 1.3}
-                _draw(axes, histories[run], name, region, label=told or None, **style)
+                factor, _ = shown_unit(histories[0][name])
+                _draw(axes, histories[run], name, factor, region, label=told or None, **style)
             _finish(axes, histories[members[0]], name, region)
         if region is None:
             _name_regions(column[0], histories[members[0]])
         column[0].set_title(title, loc="left", pad=16 if region is None else 4)
-        column[-1].set_xlabel("position along the path [mm]" if region is None else "wrap angle [°]")
-    for row, name in zip(panels, quantities, strict=True):
+    for axes in stacks[: len(groups), -1][-beside:]:
+        axes.set_xlabel("position along the path [mm]" if region is None else "wrap angle [°]")
+        axes.tick_params(labelbottom=True)
+    for row, name in zip(panels, np.resize(quantities, rows), strict=True):
         _, unit = shown_unit(histories[0][name])
         row[0].set_ylabel(f"{in_words(histories[0][name])}\n[{unit}]")
     handles, told = max(
-        (axes.get_legend_handles_labels() for axes in panels[0]), key=lambda pair: len(pair[1])
+        (axes.get_legend_handles_labels() for axes in stacks[: len(groups), 0]), key=lambda pair: len(pair[1])
     )
     if told:
         figure.legend(handles, told, loc="outside lower center", frameon=False, ncols=legend_columns(told))
@@ -121,7 +132,7 @@ def _check(
             raise mismatch(f"{name}: --region", "a pulley of the belt's path", f"{region}; it has {found}")
 
 
-def _groups(labels: Sequence[dict[str, str]], columns: str | None) -> dict[str, list[int]]:
+def _groups(labels: Sequence[dict[str, str]], columns: str | None, most: int) -> dict[str, list[int]]:
     """Places of the runs by the title of their column."""
     if columns is None:
         return {"": list(range(len(labels)))}
@@ -130,10 +141,8 @@ def _groups(labels: Sequence[dict[str, str]], columns: str | None) -> dict[str, 
         if columns not in label:
             raise mismatch("--columns", f"an axis in which the runs differ ({', '.join(labels[0])})", columns)
         groups.setdefault(label[columns], []).append(run)
-    if len(groups) > MOST_COLUMNS:
-        raise mismatch(
-            "--columns", f"an axis with at most {MOST_COLUMNS} values", f"{len(groups)} of {columns}"
-        )
+    if len(groups) > most:
+        raise mismatch("--columns", f"an axis with at most {most} values", f"{len(groups)} of {columns}")
     return groups
 
 
@@ -148,11 +157,17 @@ def inside(dataset: xr.Dataset, region: str) -> np.ndarray:
 def shown_unit(array: xr.DataArray) -> tuple[float, str]:
     """Factor and unit in which a quantity along the belt is shown."""
     unit = str(array.attrs.get("units", ""))
+    if (
+        unit == "rad"
+        and float(np.abs(array.values).max(initial=0.0, where=np.isfinite(array.values))) < SMALL_ANGLE
+    ):
+        return 1e3, "mrad"
     return _UNITS.get(unit) or display_unit(unit)
 
 
-def _draw(axes: Axes, dataset: xr.Dataset, name: str, region: str | None, **style: object) -> None:
-    factor, _ = shown_unit(dataset[name])
+def _draw(
+    axes: Axes, dataset: xr.Dataset, name: str, factor: float, region: str | None, **style: object
+) -> None:
     values = factor * dataset[name].values
     if region is None:
         axes.plot(1e3 * dataset["position"].values, values, **style)  # type: ignore[arg-type]  # of a line
@@ -164,11 +179,10 @@ def _draw(axes: Axes, dataset: xr.Dataset, name: str, region: str | None, **styl
 def _finish(axes: Axes, dataset: xr.Dataset, name: str, region: str | None) -> None:
     """Grid, zero line, and arcs shaded where the whole path is drawn."""
     axes.grid(linewidth=0.4, alpha=0.5)
-    unit = str(dataset[name].attrs.get("units", ""))
-    axes.axhline(_REFERENCES.get(unit, 0.0), color="#333333", linewidth=0.7, zorder=1)
+    axes.axhline(_REFERENCES.get(name, 0.0), color="#333333", linewidth=0.7, zorder=1)
     if region is None:
         for start, stop, label in regions(dataset):
-            if label.endswith("arc"):
+            if label.split()[0] in ("driving", "driven"):
                 axes.axvspan(1e3 * start, 1e3 * stop, color=ARC, linewidth=0, zorder=0)
         axes.set_xlim(0.0, 1e3 * dataset["position"].values[-1])
 

@@ -26,7 +26,7 @@ def told_apart(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[s
 
 
 def on_axes(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[list[str], list[dict[str, str]]]:
-    """As `told_apart`, by the axes of the runs' jobs alone: common parts, and for each run text by axis.
+    """As `told_apart`, by models and axes of the jobs alone: common parts, and for each run text by axis.
 
     Runs that do not differ there are told apart by their names, under the axis "".
     """
@@ -35,15 +35,16 @@ def on_axes(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[list
     labels = [{key: text for key, text in part.items() if key not in common} for part in parts]
     if len(histories) > 1 and len({tuple(label.items()) for label in labels}) < len(labels):
         labels = [{"": name} for name in names]
-    return [parts[0][key] for key in parts[0] if key in common], labels
+    return [parts[0][key] for key in parts[0] if key in common and key != "model"], labels
 
 
 def _axes_of(dataset: xr.Dataset) -> dict[str, str]:
-    """By axis of the run's job its value with its name, such as "load 120 N m"."""
-    axes = json.loads(dataset.attrs.get("job", "{}")).get("axes", {})
+    """By axis of the run's job its value with its name, such as "load 120 N m"; its model by "model"."""
+    job = json.loads(dataset.attrs.get("job", "{}"))
+    axes, model = job.get("axes", {}), {"model": str(job.get("model", "")).replace("_", " ")}
     told = dict(text.split(" ", 1) for text in place_of(dataset.attrs))
     texts = {key: text if text != "inf" else infinity_in_words(key) for key, text in told.items()}
-    return {key: f"{key} {texts[key]}".replace("_", " ") for key in axes if key in texts}
+    return model | {key: f"{key} {texts[key]}".replace("_", " ") for key in axes if key in texts}
 
 
 def titles(histories: Sequence[xr.Dataset], subject: str, common: Sequence[str]) -> list[str]:

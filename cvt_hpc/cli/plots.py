@@ -56,6 +56,7 @@ def add(commands: Any) -> None:
     of_one = {
         "history": "a kept run: displacement, spectrum, load, forces and feeds around the belt",
         "phase": "phase portraits: velocity of each strand over its displacement",
+        "flanks": "left and right flank of a spatial pushbelt, with the ends of the arcs enlarged",
         "energy": "powers around the belt: what friction takes on the arcs, what feeds the vibration",
         "variator": "quantities along the belt drawn on the variator, such as forces, speeds and slip",
     }
@@ -160,7 +161,7 @@ def _animation(arguments: argparse.Namespace) -> int:
 
 
 def _of_one(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis import histories, on_variator
+    from cvt_hpc.analysis import flanks, histories, on_variator
     from cvt_hpc.analysis.telling_apart import history_files
 
     (file, *others), quantities = history_files([arguments.path]), getattr(arguments, "of", [])
@@ -172,6 +173,8 @@ def _of_one(arguments: argparse.Namespace) -> int:
             picture = histories.draw_history(history, out)
         elif arguments.kind == "phase":
             picture = histories.draw_phase(history, out, str(file))
+        elif arguments.kind == "flanks":
+            picture = flanks.draw_flanks(history, out, str(file))
         elif arguments.kind == "energy":
             picture = on_variator.draw_energy(history, out, str(file))
         else:

@@ -14,7 +14,7 @@ from cvt_hpc.analysis.strand_bars import strand_bars_figure
 from cvt_hpc.errors import InputError
 
 NAMES = np.repeat(["driving arc", "t1", "driven arc", "t2"], [10, 3, 10, 3])
-AXES = json.dumps({"name": "two", "axes": {"load": [8, 16]}})
+AXES = json.dumps({"name": "two", "model": "pushbelt", "axes": {"load": [8, 16]}})
 
 
 def belt(load, front=3, **values):
@@ -62,6 +62,30 @@ def test_an_axis_has_a_column_for_each_value(runs):
     figure = profile_figure(runs, ("push_force",), columns="load")
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["load 8 N m", "load 16 N m"]
     assert all(len(axes.lines) == 2 for axes in figure.axes)  # with the line of zero
+
+
+def test_one_quantity_has_its_panels_row_by_row_and_models_are_told_apart(runs):
+    each = [belt(load) for load in (2, 4, 6, 8)]
+    other = belt(2)
+    other.attrs["job"] = json.dumps({"model": "spatial_pushbelt", "axes": {"load": [2]}})
+    figure = profile_figure([*each, other], ("push_force",), columns="load")
+    shown = [axes for axes in figure.axes if axes.get_visible()]
+    assert [axes.get_title(loc="left") for axes in shown] == [f"load {load} N m" for load in (2, 4, 6, 8)]
+    assert [len(axes.lines) for axes in shown] == [3, 2, 2, 2]  # with the line of zero
+    assert [bool(axes.get_xlabel()) for axes in shown] == [False, True, True, True]
+    assert shown[-1].get_ylabel() == "push force\n[kN]"
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["pushbelt", "spatial pushbelt"]
+
+
+def test_small_angles_are_shown_in_mrad_alike_for_all_runs(runs):
+    small, large = belt(8), belt(16)
+    for dataset, size in ((small, 5e-3), (large, 0.2)):
+        dataset["yaw"] = ("position", np.full(NAMES.size, size), {"units": "rad"})
+    (axes,) = profile_figure([small, large], ("yaw",)).axes
+    assert axes.get_ylabel() == "yaw\n[mrad]"
+    np.testing.assert_allclose([line.get_ydata()[0] for line in axes.lines], [5.0, 200.0, 0.0])
+    (axes,) = profile_figure([large], ("yaw",)).axes
+    assert axes.get_ylabel() == "yaw\n[°]"
 
 
 @pytest.mark.parametrize(

@@ -207,6 +207,15 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "kinetic_friction": replace(FRICTION["kinetic_friction"], default=0.09),
         "friction_speed": replace(FRICTION["friction_speed"], default=5e-4),
     },
+    "record": {
+        "profile_places": Parameter(
+            220,
+            "",
+            "places along the path at which histories have forces and sliding",
+            minimum=20,
+            maximum=2000,
+        ),
+    },
 }
 
 

@@ -54,7 +54,6 @@ PROFILES = {
     "tilt": ("tilt of elements", "rad", "mean, against the rings"),
     "mean_displacement": ALONG["mean_displacement"],
 }
-PLACES = 220  # along the path, at which profiles are recorded: 3 mm of a common belt
 
 
 class Readings:
@@ -79,7 +78,7 @@ class Readings:
         Path coordinates on both strands [m].
     middles : (2,) array
         Path coordinates of the middles of the strands [m].
-    places : (PLACES,) array
+    places : (place,) array
         Path coordinates of profiles [m].
     """
 
@@ -94,7 +93,8 @@ class Readings:
         shares = np.arange(1, p["strand_probes"] + 1) / (p["strand_probes"] + 1.0)
         self.probes = starts[:, None] + strand * shares
         self.middles = starts + 0.5 * strand
-        self.places = (np.arange(PLACES) + 0.5) * (self.path.path_length / PLACES)
+        places = p["profile_places"]
+        self.places = (np.arange(places) + 0.5) * (self.path.path_length / places)
 
 
 class OnPath:
@@ -117,6 +117,7 @@ class OnPath:
 
     def __init__(self, where: Readings, saddles: np.ndarray) -> None:
         self._path, self._probes, self._middles = where.path, where.probes, where.middles
+        self._places = where.places.size
         self.position, offset = along(where.path, where.centre_distance, saddles)
         self.offset = offset - where.belt.pitch_depth  # the path is that of the pitch line
 
@@ -134,8 +135,8 @@ class OnPath:
     def sums(self, rows: Sequence[np.ndarray]) -> np.ndarray:
         """Sums of values (n,) over the elements at each place, and their number, (rows + 1, place)."""
         share = self.position / self._path.path_length
-        place = np.minimum((share * PLACES).astype(int), PLACES - 1)
-        return np.array([np.bincount(place, row, PLACES) for row in (*rows, np.ones(place.size))])
+        place = np.minimum((share * self._places).astype(int), self._places - 1)
+        return np.array([np.bincount(place, row, self._places) for row in (*rows, np.ones(place.size))])
 
 
 class Reading:
