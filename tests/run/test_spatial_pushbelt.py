@@ -123,7 +123,7 @@ def test_an_aligned_belt_stays_in_its_plane_and_a_seed_leads_it_out():
     still = Transient(job(disturbance=0.0, **values).point(0), "newton")
     still.advance(still.samples)
     lateral = still.displacement[:, len(still.probes) // 2 :]
-    assert np.abs(lateral).max() < 1e-12 and still.failure is None
+    assert not lateral.any() and still.failure is None
     seeded = Transient(job(disturbance=1e-6, **values).point(0), "newton")
     seeded.advance(seeded.samples)
     lateral = seeded.displacement[:, len(seeded.probes) // 2 :]

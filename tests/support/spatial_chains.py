@@ -94,6 +94,17 @@ def spinning_ring(nodes, radius, speed):
     return fields
 
 
+def mirrored(f):
+    """Fields (n, STATE_FIELDS) of the mirror image, left against right."""
+    odd = (2, 5, 8, b.SLOPE, b.SPEED + 2, b.OMEGA, b.OMEGA + 1, b.SLOPE_RATE)
+    g = f.copy()
+    g[:, [*odd, b.CHANGE + 2, b.CHANGE + 3, b.CHANGE + 4, b.CHANGE + 7]] *= -1.0
+    g[:, b.PUSH : b.PUSH + 4] = f[:, b.PUSH + np.array([1, 0, 3, 2])]
+    for first in range(b.FLANK, b.RING_SLIP, b.POINTS):
+        g[:, first : first + 4] = f[:, first + np.array([2, 3, 0, 1])]
+    return g
+
+
 def energy_and_momentum(constants, fields):
     """Kinetic energy, with that of lateral bending and stretching [J], momentum and its moment about 0."""
     r, x, o = fields[:, 0:3], fields[:, 3:6], fields[:, 6:9]
@@ -124,7 +135,7 @@ def energy_and_momentum(constants, fields):
     return energy, momentum.sum(0), moment.sum(0)
 
 
-__all__ = ["belt", "energy_and_momentum", "of_lanes", "spinning_ring", "state"]
+__all__ = ["belt", "energy_and_momentum", "mirrored", "of_lanes", "spinning_ring", "state"]
 
 
 def beside_planar(planar, planar_state, **given):

@@ -34,7 +34,6 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     PIN_LEVER_J,
     PIN_NORMAL,
     PIN_SLOPE,
-    POINTS,
     PREDICTED_YAW,
     RESIDUAL,
     RIGHT,
@@ -200,6 +199,13 @@ def linear_blocks(belt, step, dt):
         _store_upper(step, j, DIAGONAL, uu, uw, ww, uv, wv, vv, up, wp, pp)
 
 
+@register_jitable
+def side_torque(state, step, j, p):
+    """Torque of the two points of a side from p on, about the axis of their pulley [N m]."""
+    low = step[j, MID_RADIUS + p] * state[j, FLANK_FRICTION_T + p]
+    return fma(step[j, MID_RADIUS + p + 1], state[j, FLANK_FRICTION_T + p + 1], low)
+
+
 @kernel
 def residuals(belt, state, increments, openings, shapes, load, step, iterate, scratch, border, dt):
     """Residuals of all equations: of elements in `iterate`, of the border in the last column of `border`.
@@ -248,8 +254,7 @@ def residuals(belt, state, increments, openings, shapes, load, step, iterate, sc
 
         power += dot(u, f) + dot(omega, g) + (state[j, SPEED + 6] + dv) * h + (state[j, SPEED + 7] + dp) * s
         driven = state[j, DRIVEN]
-        for p in range(POINTS):
-            torque += driven * step[j, MID_RADIUS + p] * state[j, FLANK_FRICTION_T + p]
+        torque += driven * (side_torque(state, step, j, 0) + side_torque(state, step, j, 2))
         if modes > 0:
             axial = 0.5 * belt.cosine * (state[j, FLANK] + state[j, FLANK + 1])
             axial = axial + 0.5 * belt.cosine * (state[j, FLANK + 2] + state[j, FLANK + 3])

@@ -58,6 +58,7 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
 from cvt_hpc.models.spatial_pushbelt.rotations import (
     cross,
     dot,
+    matrix_sum,
     minus,
     moved,
     of_symmetric,
@@ -67,6 +68,7 @@ from cvt_hpc.models.spatial_pushbelt.rotations import (
     store,
     store_matrix,
     store_symmetric,
+    symmetric_sum,
     times,
     turned,
     turning,
@@ -112,8 +114,7 @@ def predict(belt, state, pulleys, step, dt):
         back = cross(vector_behind(state, j, OUTWARD), vector_behind(state, j, HEADING))
         d = minus(vector_ahead(state, j, POSITION), vector_behind(state, j, POSITION))
         right, left, _, _ = package_lines(d, minus(front, back), b)
-        lever = times(b, a)
-        right_lever, left_lever = cross(lever, right), cross(left, lever)
+        right_lever, left_lever = cross(times(b, a), right), cross(times(-b, a), left)
         line = times(0.5, plus(right, left))
         line_lever = times(0.5, plus(right_lever, left_lever))
         store(step, j, RING_LINE, line)
@@ -124,19 +125,24 @@ def predict(belt, state, pulleys, step, dt):
         none = like(0.0, r[0])
         total = like(mass + 2.0 * half, none)
         uu = total, none, total, none, none, total
-        uu = plus_square(plus_square(uu, -half, right), -half, left)
-        uw = none, none, none, none, none, none, none, none, none
-        uw = plus_product(plus_product(uw, -half, right, right_lever), -half, left, left_lever)
+        zero = none, none, none, none, none, none
+        both = symmetric_sum(plus_square(zero, -half, right), plus_square(zero, -half, left))
+        uu = symmetric_sum(uu, both)
+        empty = none, none, none, none, none, none, none, none, none
+        one, other = (
+            plus_product(empty, -half, right, right_lever),
+            plus_product(empty, -half, left, left_lever),
+        )
+        uw = matrix_sum(one, other)
         swing = like(2.0 * half * b * b, none)
         ww = swing, none, swing, none, none, swing
         ww = plus_square(ww, -2.0 * half * b * b, a)
-        ww = plus_square(plus_square(ww, -half, right_lever), -half, left_lever)
-        own = none, none, none, none, none, none
-        own = plus_square(plus_square(plus_square(own, roll, x), yaw, o), pitch, a)
+        both = symmetric_sum(plus_square(zero, -half, right_lever), plus_square(zero, -half, left_lever))
+        own = plus_square(plus_square(plus_square(zero, roll, x), yaw, o), pitch, a)
         # at the middle between the last two speeds and the next one
         spin = moved(omega, 0.5, vector(state, j, CHANGE + 3))
         store(step, j, GYROSCOPIC, times(-dt, cross(spin, of_symmetric(own, spin))))
-        ww = ww[0] + own[0], ww[1] + own[1], ww[2] + own[2], ww[3] + own[3], ww[4] + own[4], ww[5] + own[5]
+        ww = symmetric_sum(symmetric_sum(ww, both), own)
         store_symmetric(step, j, INERTIA, uu)
         store_matrix(step, j, INERTIA + 6, uw)
         store_symmetric(step, j, INERTIA + 15, ww)

@@ -37,13 +37,16 @@ from cvt_hpc.models.spatial_pushbelt.rotations import (
     accumulate,
     cross,
     dot,
+    matrix_sum,
     minus,
     moved,
+    plus,
     plus_product,
     plus_square,
     store,
     store_matrix,
     store_symmetric,
+    symmetric_sum,
     times,
     vector,
     vector_ahead,
@@ -87,6 +90,22 @@ def predict_faces(belt, state, step):
             step[j, PUSH_GAP + p] = gap
 
 
+@register_jitable
+def _pressed_point(state, step, iterate, j, p, motion, stiffness, dt):
+    """Force and slope of a point, those times its levers, and the slope times products of levers."""
+    closing, wi, wj = motion
+    a, b = vector(step, j, PUSH_LEVER_I + 3 * p), vector(step, j, PUSH_LEVER_J + 3 * p)
+    gap = fma(dt, closing + dot(a, wi) + dot(b, wj), step[j, PUSH_GAP + p])
+    push, k = pressed(gap, stiffness)
+    state[j, PUSH + p], iterate[j, PUSH_REACHED + p] = push, gap
+    k = dt * k
+    none = like(0.0, k)
+    zero = none, none, none, none, none, none
+    empty = none, none, none, none, none, none, none, none, none
+    products = plus_square(zero, k, a), plus_square(zero, k, b), plus_product(empty, k, a, b)
+    return (push, k), (times(push, a), times(push, b), times(k, a), times(k, b)), products
+
+
 @kernel
 def face_forces(belt, state, step, iterate, dt):
     """Forces and sums of their slopes of an iterate; adds to the pairs' forces."""
@@ -94,22 +113,23 @@ def face_forces(belt, state, step, iterate, dt):
     for j in range(step.rows):
         x = vector_ahead(state, j, HEADING)
         closing = dot(x, minus(vector_ahead(state, j, CHANGE), vector(state, j, CHANGE)))
-        wi, wj = vector(state, j, CHANGE + 3), vector_ahead(state, j, CHANGE + 3)
+        motion = closing, vector(state, j, CHANGE + 3), vector_ahead(state, j, CHANGE + 3)
         none = like(0.0, closing)
         force = slope = none
         turn_i = turn_j = slope_i = slope_j = none, none, none
         ii = jj = none, none, none, none, none, none
         ij = none, none, none, none, none, none, none, none, none
-        for p in range(POINTS):
-            a, b = vector(step, j, PUSH_LEVER_I + 3 * p), vector(step, j, PUSH_LEVER_J + 3 * p)
-            gap = fma(dt, closing + dot(a, wi) + dot(b, wj), step[j, PUSH_GAP + p])
-            push, k = pressed(gap, stiffness)
-            state[j, PUSH + p], iterate[j, PUSH_REACHED + p] = push, gap
-            k = dt * k
-            force, slope = force + push, slope + k
-            turn_i, turn_j = moved(turn_i, push, a), moved(turn_j, push, b)
-            slope_i, slope_j = moved(slope_i, k, a), moved(slope_j, k, b)
-            ii, jj, ij = plus_square(ii, k, a), plus_square(jj, k, b), plus_product(ij, k, a, b)
+        for p in range(0, POINTS, 2):
+            left, levers, products = _pressed_point(state, step, iterate, j, p, motion, stiffness, dt)
+            right, others, more = _pressed_point(state, step, iterate, j, p + 1, motion, stiffness, dt)
+            force, slope = force + (left[0] + right[0]), slope + (left[1] + right[1])
+            turn_i = plus(turn_i, plus(levers[0], others[0]))
+            turn_j = plus(turn_j, plus(levers[1], others[1]))
+            slope_i = plus(slope_i, plus(levers[2], others[2]))
+            slope_j = plus(slope_j, plus(levers[3], others[3]))
+            ii = symmetric_sum(ii, symmetric_sum(products[0], more[0]))
+            jj = symmetric_sum(jj, symmetric_sum(products[1], more[1]))
+            ij = matrix_sum(ij, matrix_sum(products[2], more[2]))
         iterate[j, STIFF] = slope
         store(iterate, j, STIFF_I, slope_i)
         store(iterate, j, STIFF_J, slope_j)

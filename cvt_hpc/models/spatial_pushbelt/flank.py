@@ -195,8 +195,11 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
         a = cross(o, vector(state, j, HEADING))
         half_o, half_a = vector(step, j, MID_OUTWARD), vector(step, j, MID_AXIAL)
         none = like(0.0, driven)
-        force = turn = none, none, none
+        force = turn = left = left_turn = none, none, none
         for p in range(POINTS):
+            if p == 2:
+                left, left_turn = force, turn
+                force = turn = none, none, none
             side, height, half_width = flank_point(belt, p)
             lever = lever_of(o, a, side, height, half_width)
             n, m, t = flank_directions(belt, vector(step, j, RADIAL + 3 * p), axis, side)
@@ -237,8 +240,8 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
             store(iterate, j, BY_NORMAL + 3 * p, by_normal)
             force = moved(force, normal, by_normal)
             turn = moved(turn, normal, cross(lever, by_normal))
-        store(iterate, j, RESIDUAL, force)
-        store(iterate, j, RESIDUAL + 3, turn)
+        store(iterate, j, RESIDUAL, plus(left, force))
+        store(iterate, j, RESIDUAL + 3, plus(left_turn, turn))
         iterate[j, RESIDUAL + 6] = 0.0
         iterate[j, RESIDUAL + 7] = 0.0
 
@@ -250,15 +253,6 @@ def filter_slips(belt, state, j, p, dt):
     size = sqrt(along * along + around_it * around_it)
     filtered, _ = remembered(state[j, V_FILTERED + p], size, belt.friction_memory, dt)
     state[j, V_FILTERED + p] = select(state[j, FLANK + p] > 0.0, filtered, size)
-
-
-@register_jitable
-def _add_column(blocks, j, column, low, low_lever, high, high_lever):
-    """Add the forces of two points and their moments to a column of an element's block."""
-    first = 8 * column
-    accumulate(blocks, j, first, plus(low, high))
-    turn = plus_cross(vector(blocks, j, first + 3), low_lever, low)
-    store(blocks, j, first + 3, plus_cross(turn, high_lever, high))
 
 
 @register_jitable
@@ -282,9 +276,69 @@ def _point_slopes(belt, step, iterate, j, p, axes, dt):
 
 
 @register_jitable
-def _column(forces, rows, k):
+def _by(forces, rows, k):
     """The forces times entry k of their rows; k is a plain number of the source."""
     return moved(moved(times(rows[0][k], forces[0]), rows[1][k], forces[1]), rows[2][k], forces[2])
+
+
+@register_jitable
+def _columns(points, k):
+    """Forces of the two points of a side and their moments, by entry k of the velocity and of turning."""
+    (forces, rows, turns, lever, _), (more, more_rows, more_turns, more_lever, _) = points
+    low, high = _by(forces, rows, k), _by(more, more_rows, k)
+    moving = plus(low, high), plus_cross(cross(lever, low), more_lever, high)
+    low, high = _by(forces, turns, k), _by(more, more_turns, k)
+    return moving, (plus(low, high), plus_cross(cross(lever, low), more_lever, high))
+
+
+@register_jitable
+def _add_columns(blocks, j, k, left, right):
+    """Add what both sides have by entry k of the velocity and of turning to an element's block."""
+    (left, left_turning), (right, right_turning) = _columns(left, k), _columns(right, k)
+    first = 8 * k
+    accumulate(blocks, j, first, plus(left[0], right[0]))
+    accumulate(blocks, j, first + 3, plus(left[1], right[1]))
+    accumulate(blocks, j, first + 24, plus(left_turning[0], right_turning[0]))
+    accumulate(blocks, j, first + 27, plus(left_turning[1], right_turning[1]))
+
+
+@register_jitable
+def _border_of_side(belt, step, iterate, j, p, points, driven, dt):
+    """What the two points from p on have for the border.
+
+    First their forces and moments by the driven pulley's speed and by an opening. Then the decrease of their
+    axial force, and of the driven torque, by velocity and by turning. Last that of the torque by the pulley's
+    own speed and by an opening, and of the axial force by an opening.
+    """
+    none = like(0.0, driven)
+    drive = drive_turn = give = give_turn = none, none, none
+    torque = torque_turn = press = press_turn = none, none, none
+    own = by_opening = yielding = none
+    (forces, rows, turns, lever, t), high = points
+    for q in range(2):
+        if q == 1:
+            forces, rows, turns, lever, t = high
+        first, by_normal = FRICTION_SLOPES + 4 * (p + q), vector(iterate, j, BY_NORMAL + 3 * (p + q))
+        stiff, radius = iterate[j, YIELD + p + q], step[j, MID_RADIUS + p + q]
+        tm, tt = iterate[j, first + 2], iterate[j, first + 3]
+        g = times(-radius * driven, forces[2])
+        drive, drive_turn = plus(drive, g), plus_cross(drive_turn, lever, g)
+        if belt.modal_stiffness.shape[1] > 0:
+            g = times(belt.cosine * stiff, by_normal)
+            give, give_turn = plus(give, g), plus_cross(give_turn, lever, g)
+            push = 0.5 * belt.cosine * dt * stiff
+            press, press_turn = moved(press, push, rows[0]), moved(press_turn, push, turns[0])
+            yielding += 0.5 * belt.cosine * belt.cosine * stiff
+        # decrease of the torque by the speeds of the element
+        grip, weight = -dot(t, by_normal), radius * driven
+        held = weight * grip * dt * stiff
+        slide, swing = -weight * tm, -weight * tt
+        torque = moved(moved(moved(torque, held, rows[0]), slide, rows[1]), swing, rows[2])
+        torque_turn = moved(moved(moved(torque_turn, held, turns[0]), slide, turns[1]), swing, turns[2])
+        own += weight * radius * tt
+        by_opening += weight * grip * belt.cosine * stiff
+    by_border = drive, drive_turn, give, give_turn
+    return by_border, (press, press_turn, torque, torque_turn), (own, by_opening, yielding)
 
 
 @kernel
@@ -296,57 +350,27 @@ def add_flank_blocks(belt, state, shapes, step, iterate, blocks, dt):
         o = vector(state, j, OUTWARD)
         a = cross(o, vector(state, j, HEADING))
         axes = pulley_axis(belt, driven), o, a, vector(step, j, MID_OUTWARD), vector(step, j, MID_AXIAL)
-        none = like(0.0, driven)
-        drive = drive_turn = give = give_turn = none, none, none
-        torque = torque_turn = press = press_turn = none, none, none
-        own = by_opening = yielding = none
-        for p in range(0, POINTS, 2):
-            low, rows, turns, lever, t = _point_slopes(belt, step, iterate, j, p, axes, dt)
-            high, high_rows, high_turns, high_lever, high_t = _point_slopes(
-                belt, step, iterate, j, p + 1, axes, dt
-            )
-            column, other = _column(low, rows, 0), _column(high, high_rows, 0)
-            _add_column(blocks, j, 0, column, lever, other, high_lever)
-            column, other = _column(low, rows, 1), _column(high, high_rows, 1)
-            _add_column(blocks, j, 1, column, lever, other, high_lever)
-            column, other = _column(low, rows, 2), _column(high, high_rows, 2)
-            _add_column(blocks, j, 2, column, lever, other, high_lever)
-            column, other = _column(low, turns, 0), _column(high, high_turns, 0)
-            _add_column(blocks, j, 3, column, lever, other, high_lever)
-            column, other = _column(low, turns, 1), _column(high, high_turns, 1)
-            _add_column(blocks, j, 4, column, lever, other, high_lever)
-            column, other = _column(low, turns, 2), _column(high, high_turns, 2)
-            _add_column(blocks, j, 5, column, lever, other, high_lever)
-            for q in range(2):
-                if q == 1:
-                    low, rows, turns, lever, t = high, high_rows, high_turns, high_lever, high_t
-                first, by_normal = FRICTION_SLOPES + 4 * (p + q), vector(iterate, j, BY_NORMAL + 3 * (p + q))
-                stiff, radius = iterate[j, YIELD + p + q], step[j, MID_RADIUS + p + q]
-                tm, tt = iterate[j, first + 2], iterate[j, first + 3]
-                g = times(-radius * driven, low[2])
-                drive, drive_turn = plus(drive, g), plus_cross(drive_turn, lever, g)
-                if modes > 0:
-                    g = times(belt.cosine * stiff, by_normal)
-                    give, give_turn = plus(give, g), plus_cross(give_turn, lever, g)
-                    push = 0.5 * belt.cosine * dt * stiff
-                    press, press_turn = moved(press, push, rows[0]), moved(press_turn, push, turns[0])
-                    yielding += 0.5 * belt.cosine * belt.cosine * stiff
-                # decrease of the torque by the speeds of the element
-                grip, weight = -dot(t, by_normal), radius * driven
-                held = weight * grip * dt * stiff
-                slide, swing = -weight * tm, -weight * tt
-                torque = moved(moved(moved(torque, held, rows[0]), slide, rows[1]), swing, rows[2])
-                torque_turn = moved(
-                    moved(moved(torque_turn, held, turns[0]), slide, turns[1]), swing, turns[2]
-                )
-                own += weight * radius * tt
-                by_opening += weight * grip * belt.cosine * stiff
-        store(iterate, j, TORQUE_ROW, torque)
-        store(iterate, j, TORQUE_ROW + 3, torque_turn)
-        store(iterate, j, NORMAL_ROW, press)
-        store(iterate, j, NORMAL_ROW + 3, press_turn)
-        iterate[j, TORQUE_OWN], iterate[j, TORQUE_OPENING] = own, by_opening
-        iterate[j, NORMAL_YIELD] = yielding
+        left = (
+            _point_slopes(belt, step, iterate, j, 0, axes, dt),
+            _point_slopes(belt, step, iterate, j, 1, axes, dt),
+        )
+        right = (
+            _point_slopes(belt, step, iterate, j, 2, axes, dt),
+            _point_slopes(belt, step, iterate, j, 3, axes, dt),
+        )
+        _add_columns(blocks, j, 0, left, right)
+        _add_columns(blocks, j, 1, left, right)
+        _add_columns(blocks, j, 2, left, right)
+        by_border, rows, own = _border_of_side(belt, step, iterate, j, 0, left, driven, dt)
+        more, more_rows, more_own = _border_of_side(belt, step, iterate, j, 2, right, driven, dt)
+        drive, drive_turn = plus(by_border[0], more[0]), plus(by_border[1], more[1])
+        give, give_turn = plus(by_border[2], more[2]), plus(by_border[3], more[3])
+        store(iterate, j, NORMAL_ROW, plus(rows[0], more_rows[0]))
+        store(iterate, j, NORMAL_ROW + 3, plus(rows[1], more_rows[1]))
+        store(iterate, j, TORQUE_ROW, plus(rows[2], more_rows[2]))
+        store(iterate, j, TORQUE_ROW + 3, plus(rows[3], more_rows[3]))
+        iterate[j, TORQUE_OWN], iterate[j, TORQUE_OPENING] = own[0] + more_own[0], own[1] + more_own[1]
+        iterate[j, NORMAL_YIELD] = own[2] + more_own[2]
         store(blocks, j, RIGHT + 8, drive)
         store(blocks, j, RIGHT + 11, drive_turn)
         blocks[j, RIGHT + 14] = 0.0

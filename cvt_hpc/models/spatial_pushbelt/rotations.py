@@ -2,6 +2,9 @@
 
 The directions x (running), o (outward) and a = o x x (axial) of an element are columns of its orientation.
 In that order they are left-handed; a rotation turns each alike.
+
+What acts left and right is summed for either side first, and then both: a belt that is its own mirror image
+stays so to the last bit, and a mirrored one moves as the mirror image.
 """
 
 from __future__ import annotations
@@ -174,6 +177,16 @@ def three(a, b, c):
 def symmetric_sum(m, n):
     """M + N, symmetric."""
     return m[0] + n[0], m[1] + n[1], m[2] + n[2], m[3] + n[3], m[4] + n[4], m[5] + n[5]
+
+
+@register_jitable
+def matrix_sum(m, n):
+    """M + N."""
+    return three(
+        plus((m[0], m[1], m[2]), (n[0], n[1], n[2])),
+        plus((m[3], m[4], m[5]), (n[3], n[4], n[5])),
+        plus((m[6], m[7], m[8]), (n[6], n[7], n[8])),
+    )
 
 
 @register_jitable
