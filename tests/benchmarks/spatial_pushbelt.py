@@ -42,11 +42,11 @@ def size(array):
 def measured(state, belt, work, step, turns):
     """Core-seconds per simulated second, iterations a step, unsolved steps, power left open [W]."""
     steps, hold = round(2e-3 / step), inputs((THRUST, THRUST), (LOAD, LOAD))
-    advance(belt, b.Newton(), state, work, hold, steps, step)
+    advance(belt, b.NEWTON, state, work, hold, steps, step)
     counters, before, energy, least = state.counters.copy(), state.totals.copy(), stored(belt, state), np.inf
     for _ in range(turns):
         start = time.process_time()
-        advance(belt, b.Newton(), state, work, hold, steps, step)
+        advance(belt, b.NEWTON, state, work, hold, steps, step)
         least = min(least, time.process_time() - start)
     done, spent = state.counters - counters, state.totals - before
     left = spent[b.WORK_IN] - spent[b.WORK_OUT] - spent[b.THRUST_WORK]

@@ -10,13 +10,13 @@ from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.pushbelt import belt as b
 from cvt_hpc.models.pushbelt import start as starting
 from cvt_hpc.models.pushbelt import transient
-from cvt_hpc.models.pushbelt.assembly import RIGHT, assemble
-from cvt_hpc.models.pushbelt.nose import add_nose_blocks
+from cvt_hpc.models.pushbelt.assembly import RIGHT
 from cvt_hpc.models.pushbelt.parameters import falling_limit, path_length
 from cvt_hpc.models.pushbelt.readings import Reading
 from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start, workspace
 from cvt_hpc.models.pushbelt.start_up import fingerprint
-from cvt_hpc.models.pushbelt.step import _correct, _evaluate, _prepare, _solve, advance
+from cvt_hpc.models.pushbelt.step import EQUATIONS, _assemble, _evaluate, _prepare, advance
+from cvt_hpc.models.pushbelt.stepping import correct, solve_bordered
 from cvt_hpc.solvers.cyclic_blocks import block_size
 from cvt_hpc.solvers.linked_blocks import solve
 from support.pushbelts import NODES, SPEED, THRUST, given
@@ -165,8 +165,9 @@ def test_newton_correction_is_that_of_differences(law):
     write(state.elements, f)
     state.increments[:] = 0.0
     evaluated(belt, state, work, STEP)
-    _solve(belt, state, work, STEP)
-    _correct(state.elements, work.blocks, work.border, state.increments, work.scratch, 1.0, 1.0)
+    _assemble(belt, state, work, STEP)
+    solve_bordered(EQUATIONS, belt, state, work, b.NEWTON.weights, STEP)
+    correct(state, work, b.NEWTON.weights, 1.0)
     change = fields(work.blocks)[:, RIGHT : RIGHT + 4].ravel()
     assert border == 7
     for found, wanted in ((change, expected[:256]), (state.increments, expected[256:])):
@@ -178,8 +179,7 @@ def test_the_linear_system_is_solved_to_rounding():
     belt, state, work, _ = shaken(5)
     _prepare(belt, state, work, STEP)
     evaluated(belt, state, work, STEP)
-    assemble(belt, state.elements, work.shapes, work.step, work.iterate, work.blocks)
-    add_nose_blocks(state.elements, work.step, work.iterate, work.blocks)
+    _assemble(belt, state, work, STEP)
     system = fields(work.blocks)
     a, u, right = (
         columns.reshape(64, -1, 4).transpose(0, 2, 1)
@@ -211,7 +211,7 @@ def test_free_spinning_ring():
     f[:, b.LENGTH] = chord / (1.0 + tension / belt.ring_stiffness)
     write(state.elements, f)
     work = workspace(belt, NODES)
-    assert advance(belt, b.Newton(), state, work, np.zeros((2, b.INPUTS)), 1000, STEP) == b.CONVERGED
+    assert advance(belt, b.NEWTON, state, work, np.zeros((2, b.INPUTS)), 1000, STEP) == b.CONVERGED
     f = fields(state.elements)
     # 1e-4: speeds are those half a step before, whose start is not on the discrete orbit
     assert f[:, b.TENSION] == pytest.approx(tension, rel=1e-4)
@@ -235,7 +235,7 @@ def test_a_strand_decays_by_the_transverse_damping():
     def march(f, damping, steps):
         write(state.elements, f)
         damped = belt._replace(transverse_damping=damping * pitch)
-        assert advance(damped, b.Newton(), state, work, np.zeros((2, b.INPUTS)), steps, STEP) == b.CONVERGED
+        assert advance(damped, b.NEWTON, state, work, np.zeros((2, b.INPUTS)), steps, STEP) == b.CONVERGED
         return fields(state.elements)
 
     f = fields(state.elements)
@@ -288,7 +288,7 @@ def test_friction_is_read_at_a_speed_that_follows_with_memory():
     belt = belt._replace(mass=1e6, inertia=1e6)
     inputs = np.array([[state.pulleys[b.DRIVING_SPEED], 0.0, 0.0, 0.0, 0.0]] * 2)
     for k in range(1, 11):
-        assert advance(belt, b.Newton(), state, work, inputs, 10, STEP) == b.CONVERGED
+        assert advance(belt, b.NEWTON, state, work, inputs, 10, STEP) == b.CONVERGED
         f = fields(state.elements)
         # implicit Euler: n (dt / tau)^2 / 2 exp(-n dt / tau) is at most dt / (2 e tau), 0.6 %
         expected = sliding * (1.0 - np.exp(-10 * k * STEP / memory))
@@ -298,7 +298,7 @@ def test_friction_is_read_at_a_speed_that_follows_with_memory():
     assert f[:, b.FLANK] == pytest.approx(force, rel=1e-3)
     state.pulleys[b.DRIVING_RADIUS] -= 1e-4  # out of contact it has no memory
     inputs[:, 0] *= 0.5
-    advance(belt, b.Newton(), state, work, inputs, 1, STEP)
+    advance(belt, b.NEWTON, state, work, inputs, 1, STEP)
     assert fields(state.elements)[:, b.V_FILTERED] == pytest.approx(0.5 * sliding, rel=1e-6)
 
 
@@ -340,7 +340,7 @@ def test_the_longest_step_of_falling_friction(memory):
 def driven_in(dt, **changes):
     """A belt under load, run in from the start: belt, state, work."""
     belt, state = start(given(**changes))
-    work, newton = workspace(belt, NODES), b.Newton()
+    work, newton = workspace(belt, NODES), b.NEWTON
     small, full = constant(500.0, 0.0)[0], constant(THRUST, LOAD)[0]
     clamped = constant(THRUST, 0.0)[0]
     for begin, end, duration in ((small, clamped, 0.02), (clamped, full, 0.02), (full, full, 0.04)):
@@ -360,7 +360,7 @@ def observed(belt, state, work, dt, duration=0.0448):
     before, samples, sheaves = np.append(state.totals, stored(belt, state)), [], []
     for _ in range(64):
         steps = round(duration / 64 / dt)
-        assert advance(belt, b.Newton(), state, work, constant(THRUST, LOAD), steps, dt) == b.CONVERGED
+        assert advance(belt, b.NEWTON, state, work, constant(THRUST, LOAD), steps, dt) == b.CONVERGED
         samples.append(fields(state.elements))
         sheaves.append((state.pulleys.copy(), state.openings.copy()))
     total = np.append(state.totals, stored(belt, state)) - before
@@ -479,9 +479,9 @@ def test_a_step_loses_what_its_contacts_take(run):
     """
     belt, state, work, *_ = run
     early = fields(state.elements)
-    assert advance(belt, b.Newton(), state, work, constant(THRUST, LOAD), 1, STEP) == b.CONVERGED
+    assert advance(belt, b.NEWTON, state, work, constant(THRUST, LOAD), 1, STEP) == b.CONVERGED
     start_, totals, turning = fields(state.elements), state.totals.copy(), [state.pulleys.copy()]
-    assert advance(belt, b.Newton(), state, work, constant(THRUST, LOAD), 1, STEP) == b.CONVERGED
+    assert advance(belt, b.NEWTON, state, work, constant(THRUST, LOAD), 1, STEP) == b.CONVERGED
     turning.append(state.pulleys.copy())
     end, found = fields(state.elements), (state.totals - totals) / STEP
     driven = start_[:, b.DRIVEN].astype(int)
@@ -551,7 +551,7 @@ def test_heads_touch_in_a_belt_bent_inside_out():
     belt = belt._replace(thickness=thickness)
     write(state.elements, f)
     work = workspace(belt, NODES)
-    assert advance(belt, b.Newton(), state, work, np.zeros((2, b.INPUTS)), 1000, STEP) == b.CONVERGED
+    assert advance(belt, b.NEWTON, state, work, np.zeros((2, b.INPUTS)), 1000, STEP) == b.CONVERGED
     f = fields(state.elements)
     # 1e-4 as of the ring without push; the push itself sets with the elements' tilt
     assert f[:, b.TENSION] - f[:, b.HEAD] == pytest.approx(centrifugal, rel=1e-4)
@@ -589,9 +589,9 @@ def test_push_force_at_half_the_step(run):
 def test_slip_limit():
     belt, state, work = driven_in(STEP, driven_inertia=0.2)
     overload = constant(14e3, 300.0)
-    advance(belt, b.Newton(), state, work, overload, 4500, STEP)
+    advance(belt, b.NEWTON, state, work, overload, 4500, STEP)
     before = state.totals.copy()
-    assert advance(belt, b.Newton(), state, work, overload, 1, STEP) == b.CONVERGED
+    assert advance(belt, b.NEWTON, state, work, overload, 1, STEP) == b.CONVERGED
     torque = (state.totals - before)[b.WORK_IN] / (STEP * SPEED)
     f = fields(state.elements)
     driving = (f[:, b.DRIVEN] < 0.5) & (f[:, b.FLANK] > 10.0)
@@ -612,12 +612,12 @@ def test_a_run_goes_on_from_its_state_alone(beside):
     other = start(given(**falling, **beside))[1]
     inputs = constant(THRUST, 0.0)
     work = workspace(belt, NODES)
-    advance(belt, b.Newton(), state, work, inputs, 60, STEP)
+    advance(belt, b.NEWTON, state, work, inputs, 60, STEP)
     for _ in range(2):
         fresh = workspace(belt, NODES)
         for array in fresh:  # what it holds has no effect
             (array.data if isinstance(array, LaneArray) else array)[:] = 7.0
-        advance(belt, b.Newton(), other, fresh, inputs, 30, STEP)
+        advance(belt, b.NEWTON, other, fresh, inputs, 30, STEP)
     assert fingerprint(state) == fingerprint(other)
 
 
@@ -626,7 +626,7 @@ def test_a_march_is_the_same_in_lanes_and_without(monkeypatch):
     for lanes in (8, 1):
         monkeypatch.setattr(starting, "parts_of", lambda nodes, lanes=lanes: lanes)
         belt, state = start(given(modal_stiffness=((6e8, 3e8),) * 2))
-        assert advance(belt, b.Newton(), state, workspace(belt, NODES), inputs, 200, STEP) == b.CONVERGED
+        assert advance(belt, b.NEWTON, state, workspace(belt, NODES), inputs, 200, STEP) == b.CONVERGED
         assert state.elements.data.shape[2] == lanes
         found.append(fields(state.elements)[:, : b.CHANGE])
     scale = np.abs(found[0]).max(axis=0)
@@ -637,7 +637,7 @@ def test_a_march_is_the_same_in_lanes_and_without(monkeypatch):
 
 def test_steps_that_do_not_converge_are_named():
     belt, state = start(given())
-    newton = b.Newton(tolerance=1e-12, power_tolerance=1e-12, most_iterations=2, most_failures=3)
+    newton = b.NEWTON._replace(tolerance=1e-12, power_tolerance=1e-12, most_iterations=2, most_failures=3)
     status = advance(belt, newton, state, workspace(belt, NODES), constant(THRUST, 0.0), 100, STEP)
     assert status == state.counters[b.STATUS] == b.NOT_CONVERGED
     assert state.counters[b.STEPS] == state.counters[b.FAILED_STEPS] == 3
@@ -651,11 +651,13 @@ def test_the_fault_is_the_contact_that_the_last_iteration_has_changed_most():
         ends = []
         for most in (3, 4):  # the last correction is halved
             belt, state, work, _ = shaken(seed)
-            newton = b.Newton(tolerance=0.0, most_iterations=most, first_half_step=3, most_failures=1)
+            newton = b.NEWTON._replace(
+                tolerance=0.0, most_iterations=most, first_half_step=3, most_failures=1
+            )
             assert advance(belt, newton, state, work, constant(THRUST, LOAD), 1, STEP) == b.NOT_CONVERGED
             ends.append(fields(state.elements))
         change = np.abs(ends[1] - ends[0])
-        corrections = change[:, b.CHANGE : b.CHANGE + 4] * [1.0, 1.0, newton.omega_length, 1.0]
+        corrections = change[:, b.CHANGE : b.CHANGE + 4] * newton.weights
         i = int(corrections.max(axis=1).argmax())
         flank = [b.FLANK, b.FLANK_FRICTION_M, b.FLANK_FRICTION_T]
         sizes = {("flank", i): np.linalg.norm(change[i, flank]), ("ring", i): change[i, b.RING_FRICTION]}
@@ -677,9 +679,7 @@ def test_a_correction_that_is_not_finite_is_not_passed_over():
             right = work.blocks.data[:, RIGHT : RIGHT + 4]
             right[:] = rng.normal(size=right.shape)
             right[place] = wrong
-            found = _correct(
-                state.elements, work.blocks, work.border, state.increments, work.scratch, 1.0, 1.0
-            )
+            found = correct(state, work, b.NEWTON.weights, 1.0)
             assert not np.isfinite(found)
 
 
@@ -690,7 +690,7 @@ def test_what_is_not_a_number_ends_a_march_or_has_no_effect():
     def march(spoil=lambda state: None):
         belt, state, work, _ = shaken(5)
         spoil(state)
-        return advance(belt, b.Newton(), state, work, inputs, 3, STEP), state
+        return advance(belt, b.NEWTON, state, work, inputs, 3, STEP), state
 
     clean = march()[1]
     sizes = [b.STATE_FIELDS, *(part.size for part in clean[1:4])]

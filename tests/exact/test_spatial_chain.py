@@ -7,14 +7,14 @@ import pytest
 from scipy.linalg import eigh
 
 from cvt_hpc.models.pushbelt.start import of_lanes
+from cvt_hpc.models.pushbelt.stepping import correct, solve_bordered
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.step import (
+    EQUATIONS,
     _accept,
     _assemble,
-    _correct,
     _evaluate,
     _prepare,
-    _solve,
     advance,
 )
 from support import spatial_chains as chains
@@ -47,9 +47,7 @@ def marched(constants, fields, steps, dt):
     """Fields after so many steps, and counters."""
     state = chains.state(fields)
     assert (
-        advance(
-            constants, b.Newton(), state, b.workspace(constants, NODES), np.zeros((2, b.INPUTS)), steps, dt
-        )
+        advance(constants, b.NEWTON, state, b.workspace(constants, NODES), np.zeros((2, b.INPUTS)), steps, dt)
         == 0
     )
     return of_lanes(state.elements).copy(), state.counters
@@ -111,7 +109,7 @@ def test_free_elements_turn_as_rigid_bodies():
     size, errors = np.linalg.norm(spin(fields), axis=1), []
     for steps, dt in ((1000, STEP), (2000, 0.5 * STEP)):
         state, work = chains.state(fields), b.workspace(constants, nodes)
-        assert advance(constants, b.Newton(), state, work, np.zeros((2, b.INPUTS)), steps, dt) == 0
+        assert advance(constants, b.NEWTON, state, work, np.zeros((2, b.INPUTS)), steps, dt) == 0
         found = of_lanes(state.elements)
         assert np.abs(np.sum(found[:, 3:6] * found[:, 6:9], 1)).max() < 1e-15
         errors.append((np.linalg.norm(spin(found) - spin(fields), axis=1) / size).max())
@@ -158,10 +156,8 @@ def held_steps(constants, fields, steps, seen, dt=STEP):
             work.blocks.data[:, 9 * held] += 1e15
             for element in (0, *range(SEGMENTS, len(fields))):
                 work.blocks.data[element % rows, : 9 * b.SIZE : 9, element // rows] += 1e15
-            _solve(constants, state, work, dt)
-            _correct(
-                b.Newton(), state.elements, work.blocks, work.border, state.increments, work.scratch, 1.0
-            )
+            solve_bordered(EQUATIONS, constants, state, work, b.NEWTON.weights, dt)
+            correct(state, work, b.NEWTON.weights, 1.0)
         _evaluate(constants, state, work, 0.0, dt)
         _accept(constants, state, work, inputs, dt)
         readings.append(seen(of_lanes(state.elements)))
@@ -252,7 +248,7 @@ def lateral_wave_frequency(waves, tension):
     state, work = chains.state(fields), b.workspace(constants, nodes)
     amplitudes = []
     for _ in range(40):
-        assert advance(constants, b.Newton(), state, work, np.zeros((2, b.INPUTS)), 10, STEP) == 0
+        assert advance(constants, b.NEWTON, state, work, np.zeros((2, b.INPUTS)), 10, STEP) == 0
         amplitudes.append(shape @ of_lanes(state.elements)[:, 2])
     return np.sqrt(frequency_squared(np.array(amplitudes), 1) / 100.0) / (2.0 * np.pi)
 

@@ -28,9 +28,9 @@ def test_in_its_plane_it_is_the_planar_belt(modal):
         ((THRUST, THRUST), (0.0, LOAD), RAMP),
         ((THRUST, THRUST), (LOAD, LOAD), 4 * RAMP),
     ):
-        assert advance(belt, b.Newton(), state, work, inputs(thrusts, loads), steps, STEP) == 0
+        assert advance(belt, b.NEWTON, state, work, inputs(thrusts, loads), steps, STEP) == 0
         flat = inputs(thrusts, loads, 5)
-        assert planar_advance(planar, p.Newton(), planar_state, planar_work, flat, steps, STEP) == 0
+        assert planar_advance(planar, p.NEWTON, planar_state, planar_work, flat, steps, STEP) == 0
     f, g = of_lanes(state.elements), of_lanes(planar_state.elements)
     assert not f[:, [2, 5, 8]].any()
     side = np.where(f[:, 1] < 0.0, 0, 1)
@@ -79,7 +79,7 @@ def test_the_mirror_image_moves_as_the_mirror_image(modal):
     hold = inputs((THRUST, THRUST), (LOAD, LOAD))
     looking_glass = belt._replace(loose_side=-belt.loose_side, axes=belt.axes * [-1.0, -1.0, 1.0])
     for of_one, moved in ((belt, state), (looking_glass, image)):
-        assert advance(of_one, b.Newton(), moved, work, hold, 200, STEP) == 0
+        assert advance(of_one, b.NEWTON, moved, work, hold, 200, STEP) == 0
     f = of_lanes(state.elements)
     assert np.abs(f[:, 2]).max() > 1e-4
     assert np.array_equal(f, chains.mirrored(of_lanes(image.elements)))
@@ -92,7 +92,7 @@ def test_slip_limit():
     # a belt that slips all along the driving arc carries 2 mu F R / cos d0, whatever its offset
     belt, state, work = scene(driven_inertia=0.2)
     overload = inputs((14e3, 14e3), (300.0, 300.0))
-    advance(belt, b.Newton(), state, work, overload, 4500, STEP)
+    advance(belt, b.NEWTON, state, work, overload, 4500, STEP)
     f = of_lanes(state.elements)
     flank, driving = f[:, b.FLANK : b.FLANK + 4], f[:, b.DRIVEN] < 0.5
     assert (f[driving, b.FLANK_SLIP_T : b.FLANK_SLIP_T + 4][flank[driving] > 10.0] < -1.0).all()
@@ -157,7 +157,9 @@ def test_pins_push_back_beyond_their_clearance():
     fields[3, 1] += 1.2 * clearance
     fields[3, 2] = 1.6 * clearance
     state, work = chains.state(fields), b.workspace(belt, nodes)
-    assert advance(belt, b.Newton(tolerance=1e-12), state, work, np.zeros((2, b.INPUTS)), 1, 1e-9) == 0
+    assert (
+        advance(belt, b.NEWTON._replace(tolerance=1e-12), state, work, np.zeros((2, b.INPUTS)), 1, 1e-9) == 0
+    )
     f = of_lanes(state.elements)
     # of both pairs of element 3: stiffness times what is beyond the clearance, along the offset
     assert f[[2, 3], b.PIN] == pytest.approx(1e6 * clearance, rel=1e-3)
@@ -171,7 +173,7 @@ def test_pins_push_back_beyond_their_clearance():
 def test_a_step_that_is_not_solved_names_its_contact():
     belt, state, work = scene()
     hold = inputs((THRUST, THRUST), (LOAD, 1.5 * LOAD))
-    strict = b.Newton(tolerance=1e-14, most_iterations=3, most_failures=2)
+    strict = b.NEWTON._replace(tolerance=1e-14, most_iterations=3, most_failures=2)
     assert advance(belt, strict, state, work, hold, 10, STEP) == b.NOT_CONVERGED
     assert state.counters[b.IN_A_ROW] == 2
     assert 0 <= state.counters[b.FAILED_ELEMENT] < NODES
@@ -179,4 +181,4 @@ def test_a_step_that_is_not_solved_names_its_contact():
     broken = of_lanes(state.elements).copy()
     broken[5, b.SPEED] = np.nan
     state.elements.data[:] = in_lanes(broken).data
-    assert advance(belt, b.Newton(), state, work, hold, 10, STEP) == b.NOT_FINITE
+    assert advance(belt, b.NEWTON, state, work, hold, 10, STEP) == b.NOT_FINITE

@@ -45,9 +45,9 @@ def revolution(name):
     hold = inputs((THRUST, THRUST), (LOAD, LOAD))
     loads, found = [], []
     for k in range(OUTPUTS):
-        assert advance(belt, b.Newton(), state, work, hold, 9, STEP) == 0
+        assert advance(belt, b.NEWTON, state, work, hold, 9, STEP) == 0
         saddle = of_lanes(state.elements)[:, b.SADDLE].copy()
-        assert advance(belt, b.Newton(), state, work, hold, 1, STEP) == 0
+        assert advance(belt, b.NEWTON, state, work, hold, 1, STEP) == 0
         loads.append(state.loads.copy())
         if k % 2 == 1:
             opening = sheaves_opening(belt, state, state.openings)

@@ -33,7 +33,7 @@ def scene(offset=OFFSET, modal=(), nodes=NODES, **constants):
         ((THRUST, THRUST), (0.0, LOAD), 0.0, RAMP),
         ((THRUST, THRUST), (LOAD, LOAD), 0.0, RAMP),
     ):
-        assert advance(belt, b.Newton(), state, work, inputs(thrusts, loads, drift=drift), steps, STEP) == 0
+        assert advance(belt, b.NEWTON, state, work, inputs(thrusts, loads, drift=drift), steps, STEP) == 0
     return belt, state, work
 
 

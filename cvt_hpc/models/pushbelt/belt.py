@@ -168,23 +168,26 @@ class Newton(NamedTuple):
     Attributes
     ----------
     tolerance : float
-        Largest correction of a speed [m/s]; angular velocities count with `omega_length`.
+        Largest correction of a speed [m/s].
     power_tolerance : float
         Largest power residual of the whole belt [W].
-    omega_length : float
-        [m]
+    weights : tuple of float
+        What the corrections of an element's speeds count with: lengths of angular velocities [m], else 1.
     most_iterations, first_half_step : int
         Iterations a step, and the first one whose correction is halved.
     most_failures : int
         Failed steps in a row with which a run ends.
     """
 
-    tolerance: float = 1e-3
-    power_tolerance: float = 1.0
-    omega_length: float = 2e-3
+    tolerance: float
+    power_tolerance: float
+    weights: tuple[float, ...]
     most_iterations: int = 20
     first_half_step: int = 16
     most_failures: int = 20
+
+
+NEWTON = Newton(tolerance=1e-3, power_tolerance=1.0, weights=(1.0, 1.0, 2e-3, 1.0))
 
 
 class BeltState(NamedTuple):

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
+from cvt_hpc.models.pushbelt.belt import FAILED_CONTACT, FAILED_ELEMENT
 
 
 @kernel
-def most_corrected(blocks, right, weights):
+def most_corrected(blocks, weights):
     """The element with the largest correction.
 
-    Corrections of its speeds stand in `blocks` from field `right` on, and count with `weights`, the lengths
-    that make angular velocities speeds.
+    Corrections of its speeds stand in the right side of `blocks`, and count with `weights`, the lengths that
+    make angular velocities speeds.
     """
     corrections = blocks.data
-    rows, parts = corrections.shape[0], corrections.shape[2]
+    rows, parts, right = corrections.shape[0], corrections.shape[2], 3 * len(weights) ** 2
     largest, element = -1.0, 0
     for part in range(parts):
         for j in range(rows):
@@ -32,3 +33,25 @@ def keep_states(elements, element, kept):
         place = (element - k) % (rows * parts)
         for field in range(fields):
             kept[k, field] = elements.data[place % rows, field, place // rows]
+
+
+@kernel
+def name_fault(changes, state, element, kept):
+    """Enter the contact of an element whose force has changed most since its state was kept.
+
+    Contacts with the next element and with the one behind count, the latter as those of that element:
+    `changes(kept, k)` tells by how much forces of the element (k = 0) and of the one behind it (k = 1) have
+    changed, in the order of `CONTACTS`, and 0 for those of the latter that the element has no part in.
+    """
+    rows, fields, parts = state.elements.data.shape
+    largest, contact, behind_it = -1.0, 0, 0
+    for k in range(2):
+        place = (element - k) % (rows * parts)
+        for field in range(fields):
+            kept[k, field] = abs(state.elements.data[place % rows, field, place // rows] - kept[k, field])
+        sizes = changes(kept, k)
+        for entry in range(len(sizes)):
+            if sizes[entry] > largest:
+                largest, contact, behind_it = sizes[entry], entry, k
+    state.counters[FAILED_ELEMENT] = (element - behind_it) % (rows * parts)
+    state.counters[FAILED_CONTACT] = contact

@@ -7,12 +7,13 @@ for what is slow.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import absolute, ahead, around, behind, like, maximum, select, sqrt
+from cvt_hpc.lanes import absolute, ahead, around, behind, like, select, sqrt
 from cvt_hpc.models.pushbelt.assembly import (
-    RIGHT,
     assemble,
     border_system,
     element_forces,
@@ -21,16 +22,12 @@ from cvt_hpc.models.pushbelt.assembly import (
 )
 from cvt_hpc.models.pushbelt.belt import (
     CHANGE,
-    CONVERGED,
     DRIVEN,
     DRIVEN_RADIUS,
     DRIVEN_SPEED,
     DRIVING_RADIUS,
     DRIVING_SPEED,
     EDGE,
-    FAILED_CONTACT,
-    FAILED_ELEMENT,
-    FAILED_STEPS,
     FLANK,
     FLANK_FRICTION_M,
     FLANK_FRICTION_T,
@@ -40,28 +37,20 @@ from cvt_hpc.models.pushbelt.belt import (
     HEAD,
     HEADING_Y,
     HEADING_Z,
-    IN_A_ROW,
     IN_DRIVEN_THRUST,
     IN_DRIVING_SHIFT,
     IN_DRIVING_THRUST,
     IN_LOAD,
-    IN_SPEED,
     ITERATE_TENSION,
-    ITERATIONS,
     LENGTH,
     MID_RADIUS,
     NOSE,
-    NOT_CONVERGED,
-    NOT_FINITE,
     OMEGA,
-    POWER_RESIDUAL,
     R_Y,
     R_Z,
     RING_FRICTION,
     RING_SLIP,
     SADDLE,
-    STATUS,
-    STEPS,
     T_Y,
     T_Z,
     TENSION,
@@ -81,16 +70,10 @@ from cvt_hpc.models.pushbelt.belt import (
     Z,
 )
 from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
-from cvt_hpc.models.pushbelt.faults import keep_states, most_corrected
 from cvt_hpc.models.pushbelt.nose import add_nose_blocks, nose_forces, predict_noses
 from cvt_hpc.models.pushbelt.power import book
+from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
 from cvt_hpc.physics.contact_laws import remembered
-from cvt_hpc.solvers.cyclic_blocks import block_size
-from cvt_hpc.solvers.linked_blocks import solve
-from cvt_hpc.solvers.small_system import solve_small
-
-_SIZE = block_size(4)  # unknowns of an element: both speeds, rotation, speed of the ring
-_LARGE = 1e100  # more than any speed or power that means something
 
 
 @kernel
@@ -108,35 +91,6 @@ def _shapes(belt, step, shapes):
                 shapes[j, k] = sine
             else:
                 shapes[j, k] = 1.0
-
-
-@kernel
-def _correct(elements, blocks, border, increments, scratch, share, omega_length):
-    """Take the iterate to the solution, or a share of the way; return the largest correction [m/s].
-
-    Where any correction is not finite, nor is what is returned.
-    """
-    size = border.shape[0]
-    largest = total = like(0.0, blocks[0, RIGHT])
-    for j in range(blocks.rows):
-        for r in range(4):
-            change = blocks[j, RIGHT + r]
-            for k in range(size):
-                change -= blocks[j, RIGHT + 4 * (1 + k) + r] * border[k, size]
-            blocks[j, RIGHT + r] = change
-            elements[j, CHANGE + r] += share * change
-            change = absolute(change * omega_length) if r == 2 else absolute(change)
-            largest = maximum(change, largest)
-            total += change
-    for k in range(size):
-        increments[k] += share * border[k, size]
-    scratch[0, 0], scratch[0, 1] = largest, total
-    found, total_found = 0.0, 0.0
-    for part in range(scratch.data.shape[2]):
-        found = max(found, scratch.data[0, 0, part])
-        total_found += scratch.data[0, 1, part]
-    # a maximum passes over what is not a number, a sum does not
-    return found if total_found < np.inf else total_found
 
 
 @kernel
@@ -176,80 +130,33 @@ def _evaluate(belt, state, work, load, dt):
 
 
 @kernel
-def _solve(belt, state, work, dt):
-    """Solve for the correction: of the border in its last column, of elements without its part in blocks.
-
-    Returns
-    -------
-    bool
-        Whether the elements' system is regular.
-    """
-    elements, step, iterate = state.elements, work.step, work.iterate
-    assemble(belt, elements, work.shapes, step, iterate, work.blocks)
+def _assemble(belt, state, work, dt):
+    """The linear system of the elements."""
+    assemble(belt, state.elements, work.shapes, work.step, work.iterate, work.blocks)
     if belt.nose_clearance < np.inf:
-        add_nose_blocks(elements, step, iterate, work.blocks)
-    is_regular = solve(work.blocks, work.scratch, _SIZE)
-    border_system(belt, elements, work.shapes, step, iterate, work.blocks, work.scratch, work.border, dt)
-    solve_small(work.border)
-    return is_regular
+        add_nose_blocks(state.elements, work.step, work.iterate, work.blocks)
 
 
 @kernel
-def _name_fault(state, element, kept):
-    """Enter the contact of an element whose force has changed most since its state was kept.
-
-    Contacts with the next element and with the one behind count, the latter as those of that element.
-    """
-    rows, fields, parts = state.elements.data.shape
-    for k in range(2):
-        place = (element - k) % (rows * parts)
-        for field in range(fields):
-            kept[k, field] = abs(state.elements.data[place % rows, field, place // rows] - kept[k, field])
-    flank = kept[0, FLANK] ** 2 + kept[0, FLANK_FRICTION_M] ** 2 + kept[0, FLANK_FRICTION_T] ** 2
-    of_itself = kept[0, EDGE], kept[0, HEAD], np.sqrt(flank), kept[0, RING_FRICTION], kept[0, NOSE]
-    changes = (*of_itself, kept[1, EDGE], kept[1, HEAD], 0.0, 0.0, kept[1, NOSE])  # as in CONTACTS
-    largest = 0
-    for k in range(len(changes)):
-        if changes[k] > changes[largest]:
-            largest = k
-    contacts = len(of_itself)
-    state.counters[FAILED_ELEMENT] = (element - largest // contacts) % (rows * parts)
-    state.counters[FAILED_CONTACT] = largest % contacts
+def _close(belt, state, work, dt):
+    """That of the border."""
+    border_system(
+        belt, state.elements, work.shapes, work.step, work.iterate, work.blocks, work.scratch, work.border, dt
+    )
 
 
 @kernel
-def _newton(belt, newton, state, work, load, dt):
-    """Find the speeds of a step; iterations, the last correction [m/s] and the power residual [W].
-
-    A step that is not solved leaves its fault in the counters.
-    """
-    change, power = 0.0, 0.0
-    element = 0
-    for iteration in range(newton.most_iterations + 1):
-        power = _evaluate(belt, state, work, load, dt)
-        is_finite = abs(power) < _LARGE and change < _LARGE
-        enough = iteration > 0 and change < newton.tolerance and abs(power) < newton.power_tolerance
-        if enough or not is_finite:
-            return iteration, change, power
-        if iteration == newton.most_iterations:
-            _name_fault(state, element, work.kept)
-            return iteration, change, power
-        if not _solve(belt, state, work, dt):
-            return iteration, np.inf, power
-        share = 0.5 if iteration >= newton.first_half_step else 1.0
-        change = _correct(
-            state.elements,
-            work.blocks,
-            work.border,
-            state.increments,
-            work.scratch,
-            share,
-            newton.omega_length,
-        )
-        if iteration == newton.most_iterations - 1:
-            element = most_corrected(work.blocks, RIGHT, (1.0, 1.0, newton.omega_length, 1.0))
-            keep_states(state.elements, element, work.kept)
-    return newton.most_iterations, change, power
+def _changes(kept, k):
+    """Changes of contact forces, of the element behind (k = 1) only of those to the next one."""
+    own = 1.0 - k
+    flank = kept[k, FLANK] ** 2 + kept[k, FLANK_FRICTION_M] ** 2 + kept[k, FLANK_FRICTION_T] ** 2
+    return (
+        kept[k, EDGE],
+        kept[k, HEAD],
+        own * np.sqrt(flank),
+        own * kept[k, RING_FRICTION],
+        kept[k, NOSE],
+    )
 
 
 @kernel
@@ -309,57 +216,5 @@ def _accept(belt, state, work, inputs, dt):
     totals[THRUST_WORK] -= closing * (driving_thrust * driving + driven_thrust * driven)
 
 
-@kernel
-def advance(belt, newton, state, work, inputs, steps, dt):
-    """Advance a pushbelt by a number of steps, in place.
-
-    Parameters
-    ----------
-    belt : Belt
-        Constants.
-    newton : Newton
-        How steps are solved.
-    state : BeltState
-        The state at the start; at the end, of its last step.
-    work : Workspace
-        Work space.
-    inputs : (2, INPUTS) array
-        Speed of the driving pulley [rad/s], thrust on a sheave of both pulleys [N], torque of the load [N m],
-        and speed of the driving radius by what moves the driving sheave [m/s], at the start and at the end:
-        between, they change linearly.
-    steps : int
-        Number of steps.
-    dt : float
-        Step [s].
-
-    Returns
-    -------
-    int
-        CONVERGED; NOT_CONVERGED where `most_failures` steps in a row had not converged; NOT_FINITE, or where
-        the system of an iteration is singular. Of the
-        last step that had not converged the counters name the contact at fault, and its element.
-    """
-    counters = state.counters
-    for k in range(steps):
-        share = (k + 1.0) / steps
-        for entry in range(work.inputs.size):
-            work.inputs[entry] = inputs[0, entry] + share * (inputs[1, entry] - inputs[0, entry])
-        state.pulleys[DRIVING_SPEED] = work.inputs[IN_SPEED]
-        for entry in range(work.increments.size):
-            work.increments[entry] = state.increments[entry]
-        _prepare(belt, state, work, dt)
-        iterations, change, power = _newton(belt, newton, state, work, work.inputs[IN_LOAD], dt)
-        counters[STEPS] += 1
-        counters[ITERATIONS] += iterations
-        finite = abs(power) < _LARGE and change < _LARGE
-        failed = not (finite and change < newton.tolerance and abs(power) < newton.power_tolerance)
-        counters[IN_A_ROW] = counters[IN_A_ROW] + 1 if failed else 0
-        if failed:
-            counters[FAILED_STEPS] += 1
-        if not finite or counters[IN_A_ROW] == newton.most_failures:
-            counters[STATUS] = NOT_CONVERGED if finite else NOT_FINITE
-            return counters[STATUS]
-        state.totals[POWER_RESIDUAL] += dt * power
-        _accept(belt, state, work, work.inputs, dt)
-    counters[STATUS] = CONVERGED
-    return counters[STATUS]
+EQUATIONS = Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes)
+advance = partial(advance_by, EQUATIONS)

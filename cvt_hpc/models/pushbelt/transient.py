@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,12 @@ import numpy as np
 from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import run
-from cvt_hpc.models.pushbelt.belt import Newton
+from cvt_hpc.models.pushbelt.belt import NEWTON
 from cvt_hpc.models.pushbelt.readings import SCALARS, Reading
 from cvt_hpc.models.pushbelt.run import COURSES, ElementRun, given
 from cvt_hpc.models.pushbelt.start import of_lanes, start, workspace
-from cvt_hpc.models.pushbelt.step import advance
+from cvt_hpc.models.pushbelt.step import EQUATIONS
+from cvt_hpc.models.pushbelt.stepping import advance_by
 
 CHANNELS = (*COURSES, *SCALARS)
 
@@ -23,10 +25,10 @@ class Transient(ElementRun):
     """One run of the planar pushbelt; parameters as of `ElementRun`."""
 
     def _begin(self, p: Mapping[str, Any]) -> None:
-        self._advance = called_alike(advance)
+        self._advance = partial(called_alike(advance_by), EQUATIONS)
         self._belt, self._state = start(given(p))
         self._work = workspace(self._belt, p["elements"])
-        self._method = Newton(
+        self._method = NEWTON._replace(
             tolerance=p["speed_tolerance"],
             power_tolerance=p["power_tolerance"],
             most_iterations=p["most_iterations"],

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.pushbelt.belt import Newton
 from cvt_hpc.models.pushbelt.start import parts_of
 from cvt_hpc.solvers.linked_blocks import empty_scratch, empty_system, field_of_right
 
@@ -231,31 +232,8 @@ class Belt(NamedTuple):
     lean_lag: float
 
 
-class Newton(NamedTuple):
-    """How a step is solved.
-
-    Attributes
-    ----------
-    tolerance : float
-        Largest correction of a speed [m/s]; angular velocities count with the lengths below.
-    power_tolerance : float
-        Largest power residual of the whole belt [W].
-    roll_length, pitch_length, slope_length : float
-        Of angular velocities in the plane, out of it, and of the rate of the ring's slope [m].
-    most_iterations, first_half_step : int
-        Iterations a step, and the first one whose correction is halved.
-    most_failures : int
-        Failed steps in a row with which a run ends.
-    """
-
-    tolerance: float = 3e-3
-    power_tolerance: float = 5.0
-    roll_length: float = 1e-2
-    pitch_length: float = 2e-3
-    slope_length: float = 1e-3
-    most_iterations: int = 20
-    first_half_step: int = 16
-    most_failures: int = 20
+# How a step is solved: velocity, angular velocity in the plane and out of it, V, rate of the slope
+NEWTON = Newton(tolerance=3e-3, power_tolerance=5.0, weights=(1.0, 1.0, 1.0, 1e-2, 1e-2, 2e-3, 1.0, 1e-3))
 
 
 class BeltState(NamedTuple):

@@ -7,11 +7,14 @@ for what is slow. Lateral bending of the rings has a law of its own that damps n
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
+from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import absolute, ahead, around, like, maximum
-from cvt_hpc.models.pushbelt.faults import keep_states, most_corrected
+from cvt_hpc.lanes import absolute, ahead, around, like
+from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
 from cvt_hpc.models.spatial_pushbelt.assembly import (
     assemble_pairs,
     border_system,
@@ -21,7 +24,6 @@ from cvt_hpc.models.spatial_pushbelt.assembly import (
 )
 from cvt_hpc.models.spatial_pushbelt.belt import (
     CHANGE,
-    CONVERGED,
     DRIVEN,
     DRIVEN_MIDDLE,
     DRIVEN_RADIUS,
@@ -30,35 +32,25 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     DRIVING_RADIUS,
     DRIVING_SPEED,
     DRIVING_TORQUE,
-    FAILED_CONTACT,
-    FAILED_ELEMENT,
-    FAILED_STEPS,
     FLANK,
     FLANK_FRICTION_M,
     FLANK_FRICTION_T,
     FLANK_GAP,
     HEADING,
-    IN_A_ROW,
     IN_DRIVEN_DRIFT,
     IN_DRIVEN_THRUST,
     IN_DRIVING_DRIFT,
     IN_DRIVING_SHIFT,
     IN_DRIVING_THRUST,
     IN_LOAD,
-    IN_SPEED,
     ITERATE_TENSION,
-    ITERATIONS,
     LENGTH,
-    NOT_CONVERGED,
-    NOT_FINITE,
     OMEGA,
     OUTWARD,
     PIN,
     POINTS,
     POSITION,
-    POWER_RESIDUAL,
     PUSH,
-    RIGHT,
     RING_FRICTION,
     RING_LINE,
     RING_SLIP,
@@ -66,8 +58,6 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     SIZE,
     SLOPE,
     SPEED,
-    STATUS,
-    STEPS,
     TENSION,
     THRUST_WORK,
     TIME,
@@ -97,12 +87,6 @@ from cvt_hpc.models.spatial_pushbelt.rotations import (
     vector,
 )
 from cvt_hpc.models.spatial_pushbelt.saddle import saddle_forces
-from cvt_hpc.solvers.cyclic_blocks import block_size
-from cvt_hpc.solvers.linked_blocks import solve
-from cvt_hpc.solvers.small_system import solve_small
-
-_BLOCK = block_size(SIZE)
-_LARGE = 1e100  # more than any speed or power that means something
 
 
 @kernel
@@ -126,43 +110,6 @@ def _shapes(belt, state, leans, step, shapes):
         lean = belt.cosine * lean
         for p in range(POINTS):
             step[j, FLANK_GAP + p] += lean if p >= 2 else -lean
-
-
-@kernel
-def _weights(newton):
-    """Lengths with which corrections of an element's speeds count."""
-    roll = newton.roll_length
-    return 1.0, 1.0, 1.0, roll, roll, newton.pitch_length, 1.0, newton.slope_length
-
-
-@kernel
-def _correct(newton, elements, blocks, border, increments, scratch, share):
-    """Take the iterate to the solution, or a share of the way; return the largest correction [m/s].
-
-    Where any correction is not finite, nor is what is returned.
-    """
-    size = border.shape[0]
-    weights = _weights(newton)
-    largest = total = like(0.0, blocks[0, RIGHT])
-    for j in range(blocks.rows):
-        for r in range(SIZE):
-            change = blocks[j, RIGHT + r]
-            for k in range(size):
-                change -= blocks[j, RIGHT + SIZE * (1 + k) + r] * border[k, size]
-            blocks[j, RIGHT + r] = change
-            elements[j, CHANGE + r] += share * change
-            change = absolute(change * weights[r])
-            largest = maximum(change, largest)
-            total += change
-    for k in range(size):
-        increments[k] += share * border[k, size]
-    scratch[0, 0], scratch[0, 1] = largest, total
-    found, total_found = 0.0, 0.0
-    for part in range(scratch.data.shape[2]):
-        found = max(found, scratch.data[0, 0, part])
-        total_found += scratch.data[0, 1, part]
-    # a maximum passes over what is not a number, a sum does not
-    return found if total_found < np.inf else total_found
 
 
 @kernel
@@ -205,80 +152,35 @@ def _assemble(belt, state, work, dt):
 
 
 @kernel
-def _solve(belt, state, work, dt):
-    """Solve for the correction: of the border in its last column, of elements without its part in blocks.
-
-    Return whether the system was regular.
-    """
-    is_regular = solve(work.blocks, work.scratch, _BLOCK)
+def _close(belt, state, work, dt):
+    """That of the border."""
     border_system(belt, state.elements, work.shapes, work.iterate, work.blocks, work.sums, work.border, dt)
-    solve_small(work.border)
-    return is_regular
+
+
+@register_jitable
+def _flank_change(kept, k, p):
+    """Change of the force at a point of the flanks."""
+    return np.sqrt(
+        kept[k, FLANK + p] ** 2 + kept[k, FLANK_FRICTION_M + p] ** 2 + kept[k, FLANK_FRICTION_T + p] ** 2
+    )
 
 
 @kernel
-def _name_fault(state, element, kept):
-    """Enter the contact of an element whose force has changed most since its state was kept.
-
-    Contacts with the next element and with the one behind count, the latter as those of that element.
-    """
-    rows, fields, parts = state.elements.data.shape
-    for k in range(2):
-        place = (element - k) % (rows * parts)
-        for field in range(fields):
-            kept[k, field] = abs(state.elements.data[place % rows, field, place // rows] - kept[k, field])
-    largest, contact, behind_it = -1.0, 0, 0
-    for k in range(2):
-        for entry in range(10):
-            if entry < 4:
-                size = kept[k, PUSH + entry]
-            elif entry == 4:
-                size = kept[k, PIN]
-            elif k == 1:
-                size = 0.0
-            elif entry < 9:
-                p = entry - 5
-                size = np.sqrt(
-                    kept[0, FLANK + p] ** 2
-                    + kept[0, FLANK_FRICTION_M + p] ** 2
-                    + kept[0, FLANK_FRICTION_T + p] ** 2
-                )
-            else:
-                size = kept[0, RING_FRICTION]
-            if size > largest:
-                largest, contact, behind_it = size, entry, k
-    state.counters[FAILED_ELEMENT] = (element - behind_it) % (rows * parts)
-    state.counters[FAILED_CONTACT] = contact
-
-
-@kernel
-def _newton(belt, newton, state, work, load, dt):
-    """Find the speeds of a step; iterations, the last correction [m/s] and the power residual [W].
-
-    A step that is not solved leaves its fault in the counters.
-    """
-    change, power = 0.0, 0.0
-    element = 0
-    for iteration in range(newton.most_iterations + 1):
-        power = _evaluate(belt, state, work, load, dt)
-        is_finite = abs(power) < _LARGE and change < _LARGE
-        enough = iteration > 0 and change < newton.tolerance and abs(power) < newton.power_tolerance
-        if enough or not is_finite:
-            return iteration, change, power
-        if iteration == newton.most_iterations:
-            _name_fault(state, element, work.kept)
-            return iteration, change, power
-        _assemble(belt, state, work, dt)
-        if not _solve(belt, state, work, dt):
-            return iteration, np.inf, power
-        share = 0.5 if iteration >= newton.first_half_step else 1.0
-        change = _correct(
-            newton, state.elements, work.blocks, work.border, state.increments, work.scratch, share
-        )
-        if iteration == newton.most_iterations - 1:
-            element = most_corrected(work.blocks, RIGHT, _weights(newton))
-            keep_states(state.elements, element, work.kept)
-    return newton.most_iterations, change, power
+def _changes(kept, k):
+    """Changes of contact forces, of the element behind (k = 1) only of those to the next one."""
+    own = 1.0 - k
+    return (
+        kept[k, PUSH],
+        kept[k, PUSH + 1],
+        kept[k, PUSH + 2],
+        kept[k, PUSH + 3],
+        kept[k, PIN],
+        own * _flank_change(kept, k, 0),
+        own * _flank_change(kept, k, 1),
+        own * _flank_change(kept, k, 2),
+        own * _flank_change(kept, k, 3),
+        own * kept[k, RING_FRICTION],
+    )
 
 
 @kernel
@@ -379,56 +281,5 @@ def _accept(belt, state, work, inputs, dt):
         totals[THRUST_WORK] += (right - left) * drift - 2.0 * tangent * pressed * closing
 
 
-@kernel
-def advance(belt, newton, state, work, inputs, steps, dt):
-    """Advance a pushbelt by a number of steps, in place.
-
-    Parameters
-    ----------
-    belt : Belt
-        Constants.
-    newton : Newton
-        How steps are solved.
-    state : BeltState
-        The state at the start; at the end, of its last step.
-    work : Workspace
-        Work space.
-    inputs : (2, INPUTS) array
-        Speed of the driving pulley, thrusts on the loose sheaves, torque of the load, speed of the driving
-        radius by what moves the driving sheave, and axial speeds of both mid planes, at the start and at
-        the end (`belt.IN_SPEED` and so on): between, they change linearly.
-    steps : int
-        Number of steps.
-    dt : float
-        Step [s].
-
-    Returns
-    -------
-    int
-        CONVERGED; NOT_CONVERGED where `most_failures` steps in a row had not converged; NOT_FINITE. Of the
-        last step that had not converged the counters name the contact at fault, and its element.
-    """
-    counters = state.counters
-    for k in range(steps):
-        share = (k + 1.0) / steps
-        for entry in range(work.inputs.size):
-            work.inputs[entry] = inputs[0, entry] + share * (inputs[1, entry] - inputs[0, entry])
-        state.pulleys[DRIVING_SPEED] = work.inputs[IN_SPEED]
-        for entry in range(work.increments.size):
-            work.increments[entry] = state.increments[entry]
-        _prepare(belt, state, work, dt)
-        iterations, change, power = _newton(belt, newton, state, work, work.inputs[IN_LOAD], dt)
-        counters[STEPS] += 1
-        counters[ITERATIONS] += iterations
-        finite = abs(power) < _LARGE and change < _LARGE
-        failed = not (finite and change < newton.tolerance and abs(power) < newton.power_tolerance)
-        counters[IN_A_ROW] = counters[IN_A_ROW] + 1 if failed else 0
-        if failed:
-            counters[FAILED_STEPS] += 1
-        if not finite or counters[IN_A_ROW] == newton.most_failures:
-            counters[STATUS] = NOT_CONVERGED if finite else NOT_FINITE
-            return counters[STATUS]
-        state.totals[POWER_RESIDUAL] += dt * power
-        _accept(belt, state, work, work.inputs, dt)
-    counters[STATUS] = CONVERGED
-    return counters[STATUS]
+EQUATIONS = Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes)
+advance = partial(advance_by, EQUATIONS)

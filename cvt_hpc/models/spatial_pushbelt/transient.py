@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,13 @@ from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import run
 from cvt_hpc.models.pushbelt.run import COURSES, ElementRun
 from cvt_hpc.models.pushbelt.start import of_lanes
+from cvt_hpc.models.pushbelt.stepping import advance_by
 from cvt_hpc.models.spatial_pushbelt import belt
-from cvt_hpc.models.spatial_pushbelt.belt import Newton, workspace
+from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, workspace
 from cvt_hpc.models.spatial_pushbelt.parameters import LOOSE_SIDES, package_arm
 from cvt_hpc.models.spatial_pushbelt.readings import LATERAL, PROFILES, SCALARS, Reading
 from cvt_hpc.models.spatial_pushbelt.start import start
-from cvt_hpc.models.spatial_pushbelt.step import advance
+from cvt_hpc.models.spatial_pushbelt.step import EQUATIONS
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, STRANDS
 
 CHANNELS = (*COURSES, *SCALARS)
@@ -36,10 +38,10 @@ class Transient(ElementRun):
     _directions = (*STRANDS, *LATERAL)
 
     def _begin(self, p: Mapping[str, Any]) -> None:
-        self._advance = called_alike(advance)
+        self._advance = partial(called_alike(advance_by), EQUATIONS)
         self._belt, self._state = start(given(p))
         self._work = workspace(self._belt, p["elements"])
-        self._method = Newton(
+        self._method = NEWTON._replace(
             tolerance=p["speed_tolerance"],
             power_tolerance=p["power_tolerance"],
             most_iterations=p["most_iterations"],

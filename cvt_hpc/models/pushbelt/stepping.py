@@ -1,0 +1,194 @@
+"""Steps in time of a belt of rigid elements in linked lanes, whatever its equations.
+
+A step finds the speeds at its end by Newton's method, for the elements and for a border of unknowns that all
+elements act on. A model gives its equations, and has the last fields of an element be the changes of its
+speeds, as many as an element has unknowns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from cvt_hpc.kernels import kernel
+from cvt_hpc.lanes import absolute, like, maximum
+from cvt_hpc.models.pushbelt.belt import (
+    CONVERGED,
+    DRIVING_SPEED,
+    FAILED_STEPS,
+    IN_A_ROW,
+    IN_LOAD,
+    IN_SPEED,
+    ITERATIONS,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    POWER_RESIDUAL,
+    STATUS,
+    STEPS,
+)
+from cvt_hpc.models.pushbelt.faults import keep_states, most_corrected, name_fault
+from cvt_hpc.solvers.linked_blocks import solve
+from cvt_hpc.solvers.small_system import solve_small
+
+_LARGE = 1e100  # more than any speed or power that means something
+
+
+class Equations(NamedTuple):
+    """What a model writes of its steps: kernels, which take `belt, state, work` first and `dt` last.
+
+    Attributes
+    ----------
+    prepare : kernel
+        What all iterates of a step have in common: geometry, directions, linear laws.
+    evaluate : kernel
+        Forces of the iterate, and the residuals that they leave, that of the border in its last column. Takes
+        the load [N m] before `dt`, and returns the power residual [W].
+    assemble : kernel
+        The linear system of the elements, with a column for the residual and one for each unknown of the
+        border.
+    close : kernel
+        That of the border, once the elements' is solved (`solvers.linked_blocks`).
+    accept : kernel
+        Takes the state to the end of the step, and adds up what it has done. Takes the inputs before `dt`.
+    changes : kernel
+        By how much contact forces have changed, in the order of `CONTACTS` (`faults.name_fault`).
+    """
+
+    prepare: Callable[..., None]
+    evaluate: Callable[..., float]
+    assemble: Callable[..., None]
+    close: Callable[..., None]
+    accept: Callable[..., None]
+    changes: Callable[..., tuple[float, ...]]
+
+
+@kernel
+def solve_bordered(equations, belt, state, work, size, dt):
+    """Solve for the correction: of the border in its last column, of elements without its part in blocks.
+
+    Returns
+    -------
+    bool
+        Whether the elements' system is regular.
+    """
+    is_regular = solve(work.blocks, work.scratch, size)
+    equations.close(belt, state, work, dt)
+    solve_small(work.border)
+    return is_regular
+
+
+@kernel
+def correct(state, work, weights, share):
+    """Take the iterate to the solution, or a share of the way; return the largest correction [m/s].
+
+    Where any correction is not finite, nor is what is returned.
+    """
+    elements, blocks, border, scratch = state.elements, work.blocks, work.border, work.scratch
+    b, unknowns = len(weights), border.shape[0]
+    right, changes = 3 * b * b, elements.data.shape[1] - b
+    largest = total = like(0.0, blocks[0, right])
+    for j in range(blocks.rows):
+        for r in range(b):
+            change = blocks[j, right + r]
+            for k in range(unknowns):
+                change -= blocks[j, right + b * (1 + k) + r] * border[k, unknowns]
+            blocks[j, right + r] = change
+            elements[j, changes + r] += share * change
+            change = absolute(change * weights[r])
+            largest = maximum(change, largest)
+            total += change
+    for k in range(unknowns):
+        state.increments[k] += share * border[k, unknowns]
+    scratch[0, 0], scratch[0, 1] = largest, total
+    found, total_found = 0.0, 0.0
+    for part in range(scratch.data.shape[2]):
+        found = max(found, scratch.data[0, 0, part])
+        total_found += scratch.data[0, 1, part]
+    # a maximum passes over what is not a number, a sum does not
+    return found if total_found < np.inf else total_found
+
+
+@kernel
+def _newton(equations, belt, newton, state, work, load, dt):
+    """Find the speeds of a step; iterations, the last correction [m/s] and the power residual [W].
+
+    A step that is not solved leaves its fault in the counters.
+    """
+    change, power = 0.0, 0.0
+    element, weights = 0, newton.weights
+    for iteration in range(newton.most_iterations + 1):
+        power = equations.evaluate(belt, state, work, load, dt)
+        is_finite = abs(power) < _LARGE and change < _LARGE
+        enough = iteration > 0 and change < newton.tolerance and abs(power) < newton.power_tolerance
+        if enough or not is_finite:
+            return iteration, change, power
+        if iteration == newton.most_iterations:
+            name_fault(equations.changes, state, element, work.kept)
+            return iteration, change, power
+        equations.assemble(belt, state, work, dt)
+        if not solve_bordered(equations, belt, state, work, weights, dt):
+            return iteration, np.inf, power
+        change = correct(state, work, weights, 0.5 if iteration >= newton.first_half_step else 1.0)
+        if iteration == newton.most_iterations - 1:
+            element = most_corrected(work.blocks, weights)
+            keep_states(state.elements, element, work.kept)
+    return newton.most_iterations, change, power
+
+
+@kernel
+def advance_by(equations, belt, newton, state, work, inputs, steps, dt):
+    """Advance a belt by a number of steps, in place.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the model.
+    belt : Belt
+        Its constants.
+    newton : Newton
+        How steps are solved.
+    state : BeltState
+        The state at the start; at the end, of its last step.
+    work : Workspace
+        Work space.
+    inputs : (2, INPUTS) array
+        Inputs of the model at the start and at the end (`belt.IN_SPEED` and so on): between, they change
+        linearly.
+    steps : int
+        Number of steps.
+    dt : float
+        Step [s].
+
+    Returns
+    -------
+    int
+        CONVERGED; NOT_CONVERGED where `most_failures` steps in a row had not converged; NOT_FINITE, or where
+        the system of an iteration is singular. Of the last step that had not converged the counters name the
+        contact at fault, and its element.
+    """
+    counters = state.counters
+    for k in range(steps):
+        share = (k + 1.0) / steps
+        for entry in range(work.inputs.size):
+            work.inputs[entry] = inputs[0, entry] + share * (inputs[1, entry] - inputs[0, entry])
+        state.pulleys[DRIVING_SPEED] = work.inputs[IN_SPEED]
+        for entry in range(work.increments.size):
+            work.increments[entry] = state.increments[entry]
+        equations.prepare(belt, state, work, dt)
+        iterations, change, power = _newton(equations, belt, newton, state, work, work.inputs[IN_LOAD], dt)
+        counters[STEPS] += 1
+        counters[ITERATIONS] += iterations
+        finite = abs(power) < _LARGE and change < _LARGE
+        failed = not (finite and change < newton.tolerance and abs(power) < newton.power_tolerance)
+        counters[IN_A_ROW] = counters[IN_A_ROW] + 1 if failed else 0
+        if failed:
+            counters[FAILED_STEPS] += 1
+        if not finite or counters[IN_A_ROW] == newton.most_failures:
+            counters[STATUS] = NOT_CONVERGED if finite else NOT_FINITE
+            return counters[STATUS]
+        state.totals[POWER_RESIDUAL] += dt * power
+        equations.accept(belt, state, work, work.inputs, dt)
+    counters[STATUS] = CONVERGED
+    return counters[STATUS]
