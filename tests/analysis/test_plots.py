@@ -6,6 +6,7 @@ import pytest
 import xarray as xr
 from matplotlib.text import Text
 
+from cvt_hpc.analysis.arrangement import Sides
 from cvt_hpc.analysis.curves import curve_figure
 from cvt_hpc.analysis.figures import STYLE
 from cvt_hpc.analysis.value_maps import value_map_figure
@@ -226,6 +227,20 @@ def test_a_map_of_quantities_has_a_panel_for_each_and_tells_their_numbers(result
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["slipping", "failed"]
     with pytest.raises(InputError, match="speed_los: "):
         value_map_figure(results, ["speed_los"])
+
+
+def test_a_third_axis_has_panels_with_one_scale_of_colours(results):
+    sizes = [[[2e-6, 6e-6]], [[20e-6, 50e-6]]] * np.ones((1, len(LOADS), 1))  # by speed and strand
+    results["motion"] = results["strand_tension"].dims, sizes, {"units": "m"}
+    both = xr.concat([results, results], xr.Variable("wear", [1, 2])).transpose("wear", ...)
+    both["motion"][1] *= 1.5
+    both["vibrates"].attrs = results["vibrates"].attrs
+    figure = value_map_figure(both, ["motion"], sides=Sides("load", "driving_speed", "wear"))
+    panels = [axes for axes in figure.axes if axes.get_label() != "<colorbar>" and axes.axison]
+    titles = [f"motion [µm], {strand}, wear {wear}" for strand in ("t1", "t2") for wear in (1, 2)]
+    assert [axes.get_title(loc="left") for axes in panels] == titles
+    bars = [axes.get_ylim() for axes in figure.axes if axes.get_label() == "<colorbar>"]
+    assert bars[0] == bars[1] and bars[2] == bars[3] != bars[0]
 
 
 def test_a_quantity_that_does_not_vary_has_one_colour(results):
