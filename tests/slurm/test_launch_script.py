@@ -85,5 +85,7 @@ def test_the_ranks_run_in_the_container_that_is_named(launch, tmp_path, containe
     srun.write_text('#!/bin/bash\necho "$MPIR_CVAR_CH4_NETMOD" >> netmods\n"${@:3}"\n')
     assert launch("bash -c 'exit 3'", CVT_HPC_CONTAINER=container) == 3
     called = (tmp_path / "called").read_text() if container else ""
-    assert called.splitlines() == [f"exec {container} {c}" for c in ("mpichversion", "bash -c exit 3") if container]
+    assert called.splitlines() == [
+        f"exec {container} {c}" for c in ("mpichversion", "bash -c exit 3") if container
+    ]
     assert (tmp_path / "netmods").read_text() == "ofi\n"
