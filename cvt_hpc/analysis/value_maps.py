@@ -222,8 +222,8 @@ def _draw_panel(
         for row, column in np.argwhere(is_known):
             place, value = (x.centres[column], y.centres[row]), values[row, column]
             fill_colour = np.asarray(scale.colours(scale.norm(value)))
-            text = f"{value:.3g}" if abs(value) >= 0.1 else f"{value:.2g}"
-            cells.write_value(axes, place, text, fill_colour, size=7.5)
+            digits = ".0f" if 1e3 <= abs(value) < 1e5 else ".3g" if abs(value) >= 0.1 else ".2g"
+            cells.write_value(axes, place, f"{value:{digits}}", fill_colour, size=7.5)
     cells.draw_marks(axes, x, y, kinds, np.isin(kinds, OTHERS) & ~is_known, 3.5)
     if (slips := is_known & (kinds == OccurrenceClass.SLIPPING)).any():
         dots = {
