@@ -173,20 +173,30 @@ def of_lanes(array: LaneArray) -> np.ndarray:
 
 def workspace(belt: Belt, nodes: int) -> Workspace:
     """Work space for a belt of so many nodes."""
-    parts, modes = parts_of(nodes), belt.modal_stiffness.shape[1]
-    rows, columns = nodes // parts, 2 + 2 * modes
+    return empty_workspace(
+        nodes, belt.modal_stiffness.shape[1], 4, STEP_FIELDS, ITERATE_FIELDS, STATE_FIELDS, INPUTS
+    )
+
+
+def empty_workspace(
+    nodes: int, modes: int, size: int, step: int, iterate: int, state: int, inputs: int
+) -> Workspace:
+    """Work space for elements with `size` unknowns and so many fields, and for sheaves with so many modes."""
+    parts, columns = parts_of(nodes), 2 + 2 * modes
+    rows = nodes // parts
 
     def lanes(count: int, fields: int) -> LaneArray:
         return LaneArray(count, fields, parts, linked=parts > 1)
 
     return Workspace(
-        step=lanes(rows, STEP_FIELDS),
-        iterate=lanes(rows, ITERATE_FIELDS),
+        step=lanes(rows, step),
+        iterate=lanes(rows, iterate),
         shapes=lanes(rows, max(modes, 1)),
-        blocks=empty_system(nodes, parts, 4, columns),
-        scratch=empty_scratch(parts, 4, columns),
+        blocks=empty_system(nodes, parts, size, columns),
+        scratch=empty_scratch(parts, size, columns),
         border=np.zeros((columns - 1, columns)),
-        inputs=np.zeros(INPUTS),
+        sums=lanes(1, (columns - 1) * columns),
+        inputs=np.zeros(inputs),
         increments=np.zeros(columns - 1),
-        kept=np.zeros((2, STATE_FIELDS)),
+        kept=np.zeros((2, state)),
     )
