@@ -70,6 +70,19 @@ def test_both_pulleys_take_the_lateral_force_of_misaligned_strands(misaligned):
     assert 0.5 * 1.5 * OFFSET / strand < found["largest_yaw"] < 3.0 * 1.5 * OFFSET / strand
 
 
+@pytest.mark.parametrize(
+    "values",
+    [{"load": 0.0}, {"friction_gradient": -0.3, "friction_memory": 3e-4}, {"sheave_stiffness": 1.0}],
+    ids=["no load", "falling friction", "elastic sheaves"],
+)
+def test_power_and_axial_forces_are_balanced_at_any_point(values):
+    found = record(misalignment=OFFSET, **values)
+    assert found["status"] == Status.DONE
+    driving, driven = found["net_axial_force"]
+    assert driving > 80.0 and driving == pytest.approx(-driven, rel=0.01)
+    assert abs(found["power_residual"]) < 3e-3
+
+
 def test_the_loose_sheave_has_the_thrust(misaligned):
     """On the driven pulley the left sheave moves until it carries the thrust; the other one has the net force more."""
     left, right = (
