@@ -69,10 +69,24 @@ _DISPLAY_UNITS = {
 }
 
 
+# largest value below which a smaller unit is shown [SI], with its factor
+_SMALL = {"m": (1e-4, (1e6, "µm")), "rad": (0.1, (1e3, "mrad")), "N": (500.0, (1.0, "N"))}
+
+
 def display_unit(unit: str) -> tuple[float, str]:
     """Factor and unit in which a quantity with this SI unit is shown: ("N") -> (1e-3, "kN")."""
     known = _DISPLAY_UNITS.get(unit.replace("rad/s", "rad s-1"))
     return known if known is not None else (1.0, unit.replace("s m-1", "s/m").replace("N m-1", "N/m"))
+
+
+def value_unit(array: xr.DataArray) -> tuple[float, str]:
+    """Factor and unit in which the values of a variable are shown: `display_unit`, or a smaller one."""
+    unit = str(array.attrs.get("units", ""))
+    if unit in _SMALL:
+        values, (least, smaller) = np.abs(array.values), _SMALL[unit]
+        if 0.0 < values.max(initial=0.0, where=np.isfinite(values)) < least:
+            return smaller
+    return display_unit(unit)
 
 
 def coordinate_unit(attributes: Mapping[str, Any]) -> tuple[float, str]:

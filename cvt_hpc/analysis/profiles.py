@@ -16,11 +16,11 @@ from cvt_hpc.analysis.figures import (
     STYLE,
     WIDTH,
     balanced,
-    display_unit,
     draw,
     in_words,
     legend_columns,
     styled,
+    value_unit,
 )
 from cvt_hpc.analysis.telling_apart import on_axes, titles
 from cvt_hpc.errors import InputError, mismatch, unknown
@@ -32,7 +32,6 @@ MOST_COLUMNS = 3
 HEIGHT = 1.75  # [inch] of a panel
 _UNITS = {"N m-1": (1e-3, "kN/m"), "m s-1": (1e3, "mm/s")}
 _REFERENCES = {"sliding_angle": 90.0}  # [°]: where sliding turns from one hand to the other
-SMALL_ANGLE = 0.1  # [rad]: what stays below is shown in mrad
 
 
 def draw_profile(
@@ -156,13 +155,7 @@ def inside(dataset: xr.Dataset, region: str) -> np.ndarray:
 
 def shown_unit(array: xr.DataArray) -> tuple[float, str]:
     """Factor and unit in which a quantity along the belt is shown."""
-    unit = str(array.attrs.get("units", ""))
-    if (
-        unit == "rad"
-        and float(np.abs(array.values).max(initial=0.0, where=np.isfinite(array.values))) < SMALL_ANGLE
-    ):
-        return 1e3, "mrad"
-    return _UNITS.get(unit) or display_unit(unit)
+    return _UNITS.get(str(array.attrs.get("units", ""))) or value_unit(array)
 
 
 def _draw(

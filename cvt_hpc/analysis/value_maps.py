@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -20,12 +21,14 @@ from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.arrangement import CHOSEN, Arrangement, Ruler, Sides, arrange, ruler, value_text
 from cvt_hpc.analysis.classes import OccurrenceClass, check_results, count_classes, occurrence_classes
 from cvt_hpc.analysis.curves import check_quantities
-from cvt_hpc.analysis.figures import WIDTH, axis_label, display_unit, draw, in_words, styled
+from cvt_hpc.analysis.figures import WIDTH, axis_label, draw, in_words, styled, value_unit
 from cvt_hpc.analysis.maps import ONE_ROW
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import mismatch, one_line
 
 COLOURS = cells.colours_of("viridis_r", 0.05, 0.85)
+OTHER_SIGN = 0.05  # of the largest size: values of the other sign from here on have colours of their own
+TWO_SIGNS = cells.colours_of("PuOr", 0.08, 0.92)
 MOST_PANELS = 8
 ROW, FRAME = 0.25, 0.9  # [inch], of a row of cells, and of title and labels
 HIGHEST = 3.6  # [inch], of a panel's cells
@@ -37,6 +40,28 @@ OTHERS = (
     OccurrenceClass.FAILED,
     OccurrenceClass.NOT_RUN,
 )  # which runs are marked
+
+
+class Panel(NamedTuple):
+    """A quantity over a grid.
+
+    Attributes
+    ----------
+    title, unit : str
+    factor : float
+        From SI to the unit.
+    values, kinds : (row, column) array
+        In the unit, and how the runs ended.
+    alike : array
+        Values of all panels that share the scale of colours, in the unit.
+    """
+
+    title: str
+    unit: str
+    factor: float
+    values: NDArray[np.float64]
+    kinds: NDArray[np.int8]
+    alike: NDArray[np.float64]
 
 
 def draw_value_map(
@@ -61,17 +86,18 @@ def value_map_figure(
     sides: Sides = CHOSEN,
     vmax: float | None = None,
 ) -> Figure:
-    """Draw quantities over two axes of a study, a panel for each, and for each label of further dimensions.
+    """Draw quantities over two axes of a study: panels for each, its further dimensions and a third axis.
 
     Parameters
     ----------
     dataset, at, source
-        As of all pictures of results (`figures.py`). x and y are those of `map_figure`; the axis of
-        its panels is fixed at its first value.
+        As of all pictures of results (`figures.py`). x, y and the axis of panels are those of `map_figure`;
+        where there would be more than MOST_PANELS panels and nobody chose it, that axis is fixed at its first
+        value.
     quantities : sequence of str
         Numeric variables of the results.
     sides : Sides
-        Which axis runs along x, along y, and which one is fixed instead of the panels of `map_figure`.
+        Which axis runs along x, along y, and over the panels.
     vmax : float
         Value at which the colours end, in the unit of the quantity [SI].
 
@@ -88,10 +114,13 @@ def value_map_figure(
     if vmax is not None and len(quantities) > 1:
         raise mismatch(f"{source}: vmax", "one quantity", ", ".join(quantities))
     arrangement = arrange(dataset, at or {}, source, sides)
-    shown, notes = _one_panel(arrangement)
-    panels = [panel for name in quantities for panel in _panels(shown[name], arrangement)]
+    panels = _panels(arrangement, quantities)
+    if len(panels) > MOST_PANELS and not sides.panel:
+        arrangement = _first_panel(arrangement)
+        panels = _panels(arrangement, quantities)
     if len(panels) > MOST_PANELS:
         raise mismatch(source, f"at most {MOST_PANELS} panels", f"{len(panels)} of {', '.join(quantities)}")
+    shown = arrangement.dataset
     x, y = ruler(shown[arrangement.x]), ruler(shown[arrangement.y]) if arrangement.y else ONE_ROW
     columns = 1 if len(panels) == 1 else 2
     rows = -(-len(panels) // columns)
@@ -100,11 +129,9 @@ def value_map_figure(
         (WIDTH * (1.0 + 0.6 * (columns - 1)), rows * (height + FRAME) + 0.9), layout="constrained"
     )
     all_axes = figure.subplots(rows, columns, squeeze=False)
-    kinds = _of_grid(occurrence_classes(shown), arrangement).astype(np.int8)
-    for axes, (title, unit, values) in zip(all_axes.flat, panels, strict=False):
-        factor, _ = display_unit(str(shown[quantities[0]].attrs.get("units", "")))
-        _draw_panel(figure, axes, (x, y), kinds, values, unit, None if vmax is None else factor * vmax)
-        axes.set_title(title, loc="left", pad=3)
+    for axes, panel in zip(all_axes.flat, panels, strict=False):
+        _draw_panel(figure, axes, (x, y), panel, vmax)
+        axes.set_title(panel.title, loc="left", pad=3)
     for axes in list(all_axes.flat)[len(panels) :]:
         axes.set_axis_off()
     for axes in all_axes[:, 0]:
@@ -112,7 +139,8 @@ def value_map_figure(
     for axes in list(all_axes.flat)[: len(panels)][-columns:]:
         axes.set_xlabel(x.label)
     job = one_line(dataset.attrs.get("job_name", ""))
-    lines = [f"{job}: {_counted(kinds)}".removeprefix(": "), *notes]
+    kinds = occurrence_classes(shown)
+    lines = [f"{job}: {_counted(kinds)}".removeprefix(": "), *arrangement.notes]
     figure.suptitle("\n".join(fill(line, 72 * columns) for line in lines))
     marked: dict[cells.CellClass, cells.ClassStyle] = {
         kind: cells.STYLES[kind] for kind in OTHERS if (kinds == kind).any()
@@ -122,20 +150,20 @@ def value_map_figure(
     return figure
 
 
-def _counted(kinds: NDArray[np.int8]) -> str:
+def _counted(kinds: xr.DataArray) -> str:
     """How many runs there are, and how many of the marked classes."""
-    others = kinds[np.isin(kinds, OTHERS)]
+    others = kinds.values[np.isin(kinds, OTHERS)]
     return f"{kinds.size} runs" + (f", of them {count_classes(others)}" if others.size else "")
 
 
-def _one_panel(arrangement: Arrangement) -> tuple[xr.Dataset, list[str]]:
-    """The first panel of an arrangement, and what is fixed, in words."""
-    dataset, notes = arrangement.dataset, list(arrangement.notes)
-    if arrangement.panel:
-        axis = dataset[arrangement.panel]
-        notes.append(f"{in_words(axis)} = {value_text(axis, 0)} (first of {axis.size})")
-        dataset = dataset.isel({arrangement.panel: 0})
-    return dataset, notes
+def _first_panel(arrangement: Arrangement) -> Arrangement:
+    """The arrangement with the axis of its panels fixed at its first value."""
+    if not arrangement.panel:
+        return arrangement
+    axis = arrangement.dataset[arrangement.panel]
+    note = f"{in_words(axis)} = {value_text(axis, 0)} (first of {axis.size})"
+    fixed = arrangement.dataset.isel({arrangement.panel: 0})
+    return replace(arrangement, dataset=fixed, panel=None, notes=(*arrangement.notes, note))
 
 
 def _of_grid(array: xr.DataArray, arrangement: Arrangement) -> NDArray[Any]:
@@ -144,31 +172,50 @@ def _of_grid(array: xr.DataArray, arrangement: Arrangement) -> NDArray[Any]:
     return np.atleast_2d(array.transpose(*names).values)
 
 
-def _panels(array: xr.DataArray, arrangement: Arrangement) -> list[tuple[str, str, NDArray[np.float64]]]:
-    """Title, unit and values in it of each panel that a variable takes."""
-    factor, unit = display_unit(str(array.attrs.get("units", "")))
-    extra = [str(dim) for dim in array.dims if dim not in (arrangement.x, arrangement.y)]
-    found = []
-    for place in product(*(range(array.sizes[dim]) for dim in extra)):
-        at = dict(zip(extra, place, strict=True))
-        labels = [str(array[dim].values[k]) for dim, k in at.items()]
-        title = ", ".join([axis_label(array, unit), *labels])
-        found.append((title, unit, factor * _of_grid(array.isel(at), arrangement)))
+def _panels(arrangement: Arrangement, quantities: Sequence[str]) -> list[Panel]:
+    """Panels of all quantities, by the axis of panels and by labels of further dimensions."""
+    dataset = arrangement.dataset
+    kinds, found = occurrence_classes(dataset), []
+    for name in quantities:
+        array = dataset[name]
+        factor, unit = value_unit(array)
+        over = [arrangement.panel] if arrangement.panel else []
+        labelled = [str(dim) for dim in array.dims if dim not in (arrangement.x, arrangement.y, *over)]
+        each = [factor * array.isel(at) for at in _places(array, labelled)]
+        for values, labels in zip(each, _places(array, labelled), strict=True):
+            told = [str(array[dim].values[k]) for dim, k in labels.items()]
+            for at in _places(dataset, over):
+                here = [f"{in_words(dataset[dim])} {value_text(dataset[dim], k)}" for dim, k in at.items()]
+                found.append(
+                    Panel(
+                        ", ".join([axis_label(array, unit), *told, *here]),
+                        unit,
+                        factor,
+                        _of_grid(values.isel(at), arrangement),
+                        _of_grid(kinds.isel(at), arrangement).astype(np.int8),
+                        values.values,
+                    )
+                )
     return found
 
 
+def _places(array: xr.DataArray | xr.Dataset, dims: Sequence[str]) -> list[dict[str, int]]:
+    """Indices along dimensions, of all their combinations."""
+    sizes = (range(array.sizes[dim]) for dim in dims)
+    return [dict(zip(dims, place, strict=True)) for place in product(*sizes)]
+
+
 def _draw_panel(
-    figure: Figure,
-    axes: Axes,
-    rulers: tuple[Ruler, Ruler],
-    kinds: NDArray[np.int8],
-    values: NDArray[np.float64],
-    unit: str,
-    vmax: float | None,
+    figure: Figure, axes: Axes, rulers: tuple[Ruler, Ruler], panel: Panel, vmax: float | None
 ) -> None:
     """Cells coloured by a quantity, with its numbers where they have room, and marks of the other runs."""
-    x, y = rulers
-    scale = cells.Scale(COLOURS, _norm(values, vmax), unit)
+    (x, y), kinds, values = rulers, panel.kinds, panel.values
+    norm = _norm(panel.alike, None if vmax is None else panel.factor * vmax)
+    ends = sorted((-float(norm.vmin), float(norm.vmax)))
+    both = ends[0] > OTHER_SIGN * ends[1]
+    if both:  # white is none
+        norm = Normalize(-ends[1], ends[1])
+    scale = cells.Scale(TWO_SIGNS if both else COLOURS, norm, panel.unit)
     is_known = np.isfinite(values) & ~np.isin(kinds, (OccurrenceClass.FAILED, OccurrenceClass.NOT_RUN))
     # what has a value is coloured by it, as vibrating cells of other maps by their amplitude
     drawn = np.where(is_known, OccurrenceClass.VIBRATING, kinds).astype(np.int8)
@@ -181,8 +228,8 @@ def _draw_panel(
         for row, column in np.argwhere(is_known):
             place, value = (x.centres[column], y.centres[row]), values[row, column]
             fill_colour = np.asarray(scale.colours(scale.norm(value)))
-            text = f"{value:.3g}" if abs(value) >= 0.1 else f"{value:.2g}"
-            cells.write_value(axes, place, text, fill_colour, size=7.5)
+            digits = ".0f" if 1e3 <= abs(value) < 1e5 else ".3g" if abs(value) >= 0.1 else ".2g"
+            cells.write_value(axes, place, f"{value:{digits}}", fill_colour, size=7.5)
     cells.draw_marks(axes, x, y, kinds, np.isin(kinds, OTHERS) & ~is_known, 3.5)
     if (slips := is_known & (kinds == OccurrenceClass.SLIPPING)).any():
         dots = {

@@ -14,6 +14,8 @@ from cvt_hpc.cli import _parser
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.job.document import read_document
+from cvt_hpc.job.schema import load_schema
+from cvt_hpc.job.values import read_value
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
 
@@ -73,6 +75,30 @@ def test_code_in_blocks_is_readable():
 def test_links_lead_somewhere(page):
     for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
         assert (page.parent / target).exists(), target
+
+
+def assumed():
+    """Model, key and default of each row of the page of assumptions."""
+    text = (ROOT / "docs" / "guide" / "assumptions.md").read_text()
+    for section in text.split("\n## ")[1:]:
+        model = re.match("`(\\w+)`", section)
+        for key, default in re.findall(r"^\| `(\w+)` \| (.*?) ?\|", section, re.MULTILINE):
+            yield model[1] if model else "elastic_belt", key, default
+
+
+@pytest.mark.parametrize(("model", "key", "default"), list(assumed()))
+def test_assumptions_are_keys_of_the_model_and_have_its_defaults(model, key, default):
+    parameter = load_schema(model, None, "guide").parameters[key]
+    if default:
+        assert read_value(parameter, default, key) == pytest.approx(parameter.default)
+
+
+def test_paths_of_tests_and_jobs_in_the_table_of_validation_exist():
+    text = (ROOT / "docs" / "guide" / "validation.md").read_text()
+    paths = re.findall(r"`((?:\w+/)*(?:\w+\.(?:py|toml)|order|edges))`", text)
+    assert len(paths) > 60
+    for path in paths:
+        assert (ROOT / path if path.startswith("jobs/") else ROOT / "tests" / path).exists(), path
 
 
 def test_the_readme_is_short():

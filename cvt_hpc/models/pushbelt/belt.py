@@ -56,7 +56,7 @@ INPUTS = IN_DRIVING_SHIFT + 1
     TIME,  # [s]
     WORK_IN,  # of the driving shaft [J]
     WORK_OUT,  # against the load [J]
-    THRUST_WORK,  # that the thrusts take up as the sheaves open [J]
+    THRUST_WORK,  # that what holds the sheaves takes up as they move [J]
     FLANK_LOSS,  # [J]
     RING_LOSS,  # [J]
     DAMPING_LOSS,  # of the rotation of elements against the ring [J]

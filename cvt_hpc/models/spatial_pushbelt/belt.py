@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray
-from cvt_hpc.models.pushbelt.belt import Newton
+from cvt_hpc.models.pushbelt.belt import DRIVEN_RADIUS, Newton
+from cvt_hpc.models.pushbelt.belt import INPUTS as IN_THE_PLANE
 from cvt_hpc.models.pushbelt.start import parts_of
 from cvt_hpc.solvers.linked_blocks import empty_scratch, empty_system, field_of_right
 
@@ -49,9 +50,9 @@ CHANGE = 62  # 8: of the speeds in the last step, from which the next one starts
 STATE_FIELDS = CHANGE + 8
 POINTS = 4  # contact points of an element at its flanks, and at the front to the next one
 
-# Entries of the state of the pulleys: speeds [rad/s], radii at which the flanks' pitch line runs without
-# penetration [m], positions of the mid planes between their sheaves along the axes [m]
-DRIVING_SPEED, DRIVEN_SPEED, DRIVING_RADIUS, DRIVEN_RADIUS, DRIVING_MIDDLE, DRIVEN_MIDDLE = range(6)
+# Entries of the state of the pulleys beside those of `pushbelt.belt`: positions of the mid planes between
+# their sheaves along the axes [m]
+DRIVING_MIDDLE, DRIVEN_MIDDLE = range(DRIVEN_RADIUS + 1, DRIVEN_RADIUS + 3)
 PULLEY_FIELDS = DRIVEN_MIDDLE + 1
 
 # Entries of the loads of the last step: axial forces that press each sheave outwards [N], and torques of the
@@ -59,47 +60,11 @@ PULLEY_FIELDS = DRIVEN_MIDDLE + 1
 DRIVING_LEFT, DRIVING_RIGHT, DRIVEN_LEFT, DRIVEN_RIGHT, DRIVING_TORQUE, DRIVEN_TORQUE = range(6)
 LOADS = DRIVEN_TORQUE + 1
 
-# Entries of the inputs, at the start and at the end of a call
-(
-    IN_SPEED,  # of the driving pulley [rad/s]
-    IN_DRIVING_THRUST,  # on the loose sheaves [N]
-    IN_DRIVEN_THRUST,
-    IN_LOAD,  # torque [N m]
-    IN_DRIVING_SHIFT,  # speed of the driving radius by what moves the driving sheave [m/s]
-    IN_DRIVING_DRIFT,  # axial speeds of the pulleys' mid planes, beside what the loose sheaves do [m/s]
-    IN_DRIVEN_DRIFT,
-) = range(7)
+# Entries of the inputs beside those of `pushbelt.belt`, of which thrusts are those on the loose sheaves:
+# axial speeds of the pulleys' mid planes, beside what the loose sheaves do [m/s]
+IN_DRIVING_DRIFT, IN_DRIVEN_DRIFT = range(IN_THE_PLANE, IN_THE_PLANE + 2)
 INPUTS = IN_DRIVEN_DRIFT + 1
 
-# Entries of the totals: time, and what adds up over it
-(
-    TIME,  # [s]
-    WORK_IN,  # of the driving shaft [J]
-    WORK_OUT,  # against the load [J]
-    THRUST_WORK,  # that what holds the sheaves takes up as they move [J]
-    FLANK_LOSS,  # [J]
-    RING_LOSS,  # [J]
-    DAMPING_LOSS,  # of the rotation of elements against the rings, pitch and yaw [J]
-    BELT_LOSS,  # of the transverse damping [J]
-    ELEMENT_DAMPED,  # by the step itself, at contacts and pins between elements (`power`) [J]
-    FLANK_DAMPED,  # at flanks and modes of the sheaves [J]
-    RING_DAMPED,  # by the stretching of the ring [J]
-    TILT_DAMPED,  # by the springs of the elements' pitch [J]
-    POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
-) = range(13)
-TOTALS = 13
-DAMPED = {  # what the step damps by itself, by the springs and contacts at which it does
-    "elements": ELEMENT_DAMPED,
-    "flanks": FLANK_DAMPED,
-    "ring": RING_DAMPED,
-    "tilt": TILT_DAMPED,
-}
-
-# Entries of the counters
-STEPS, ITERATIONS, FAILED_STEPS, STATUS, FAILED_ELEMENT, FAILED_CONTACT, IN_A_ROW = range(7)
-COUNTERS = 7
-# values of STATUS
-CONVERGED, NOT_CONVERGED, NOT_FINITE = range(3)
 # values of FAILED_CONTACT
 CONTACTS = (
     "edge left",

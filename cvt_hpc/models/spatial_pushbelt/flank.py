@@ -18,16 +18,18 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import fma, like, select, sqrt
+from cvt_hpc.models.pushbelt.belt import (
+    DRIVEN_RADIUS,
+    DRIVEN_SPEED,
+    DRIVING_RADIUS,
+    DRIVING_SPEED,
+)
 from cvt_hpc.models.spatial_pushbelt.belt import (
     BY_NORMAL,
     CHANGE,
     DRIVEN,
     DRIVEN_MIDDLE,
-    DRIVEN_RADIUS,
-    DRIVEN_SPEED,
     DRIVING_MIDDLE,
-    DRIVING_RADIUS,
-    DRIVING_SPEED,
     FLANK,
     FLANK_DUAL_M,
     FLANK_DUAL_T,

@@ -10,21 +10,26 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, around, like
-from cvt_hpc.models.spatial_pushbelt.belt import (
+from cvt_hpc.models.pushbelt.belt import (
     BELT_LOSS,
-    CHANGE,
-    CHORD_I,
-    CHORD_J,
     DAMPING_LOSS,
-    DRIVEN,
     DRIVEN_SPEED,
     DRIVING_SPEED,
     ELEMENT_DAMPED,
-    FLANK,
     FLANK_DAMPED,
+    FLANK_LOSS,
+    RING_DAMPED,
+    RING_LOSS,
+    TILT_DAMPED,
+)
+from cvt_hpc.models.spatial_pushbelt.belt import (
+    CHANGE,
+    CHORD_I,
+    CHORD_J,
+    DRIVEN,
+    FLANK,
     FLANK_FRICTION_M,
     FLANK_FRICTION_T,
-    FLANK_LOSS,
     FLANK_REACHED,
     HEADING,
     MID_RADIUS,
@@ -39,14 +44,11 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     PUSH_LEVER_J,
     PUSH_REACHED,
     RADIAL,
-    RING_DAMPED,
     RING_FRICTION,
-    RING_LOSS,
     SPEED,
     TENSION_I,
     TENSION_J,
     TENSION_SLOPE,
-    TILT_DAMPED,
     TURN_I,
     TURN_J,
     YAW,

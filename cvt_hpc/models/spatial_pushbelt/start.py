@@ -7,9 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.models.pushbelt.belt import (
+    COUNTERS,
+    TOTALS,
+)
 from cvt_hpc.models.pushbelt.start import equal_chords, in_lanes, path_of
 from cvt_hpc.models.spatial_pushbelt.belt import (
-    COUNTERS,
     DRIVEN,
     HEADING,
     LENGTH,
@@ -22,7 +25,6 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     SPEED,
     STATE_FIELDS,
     TENSION,
-    TOTALS,
     Belt,
     BeltState,
     V,

@@ -14,6 +14,20 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import absolute, ahead, around, like
+from cvt_hpc.models.pushbelt.belt import (
+    DRIVEN_RADIUS,
+    DRIVEN_SPEED,
+    DRIVING_RADIUS,
+    DRIVING_SPEED,
+    IN_DRIVEN_THRUST,
+    IN_DRIVING_SHIFT,
+    IN_DRIVING_THRUST,
+    IN_LOAD,
+    THRUST_WORK,
+    TIME,
+    WORK_IN,
+    WORK_OUT,
+)
 from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
 from cvt_hpc.models.spatial_pushbelt.assembly import (
     assemble_pairs,
@@ -26,11 +40,7 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     CHANGE,
     DRIVEN,
     DRIVEN_MIDDLE,
-    DRIVEN_RADIUS,
-    DRIVEN_SPEED,
     DRIVING_MIDDLE,
-    DRIVING_RADIUS,
-    DRIVING_SPEED,
     DRIVING_TORQUE,
     FLANK,
     FLANK_FRICTION_M,
@@ -38,11 +48,7 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     FLANK_GAP,
     HEADING,
     IN_DRIVEN_DRIFT,
-    IN_DRIVEN_THRUST,
     IN_DRIVING_DRIFT,
-    IN_DRIVING_SHIFT,
-    IN_DRIVING_THRUST,
-    IN_LOAD,
     ITERATE_TENSION,
     LENGTH,
     OMEGA,
@@ -59,10 +65,6 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     SLOPE,
     SPEED,
     TENSION,
-    THRUST_WORK,
-    TIME,
-    WORK_IN,
-    WORK_OUT,
 )
 from cvt_hpc.models.spatial_pushbelt.bending import bending_forces, predict_bending
 from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across
