@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray
-from cvt_hpc.models.pushbelt.belt import DRIVEN_RADIUS, Newton
+from cvt_hpc.models.pushbelt.belt import DRIVEN_RADIUS, Newton, Workspace
 from cvt_hpc.models.pushbelt.belt import INPUTS as IN_THE_PLANE
-from cvt_hpc.models.pushbelt.start import parts_of
-from cvt_hpc.solvers.linked_blocks import empty_scratch, empty_system, field_of_right
+from cvt_hpc.models.pushbelt.start import empty_workspace
+from cvt_hpc.solvers.linked_blocks import field_of_right
 
 # Fields of the state of an element. Speeds are those at the middle of the last step.
 POSITION = 0  # 3: middle of the saddle line, which is the ring line and the assumed centre of gravity [m]
@@ -233,46 +233,6 @@ class BeltState(NamedTuple):
     counters: np.ndarray
 
 
-class Workspace(NamedTuple):
-    """What `step.advance` writes to and needs no longer afterwards; `workspace` makes one.
-
-    Attributes
-    ----------
-    step : (rows, STEP_FIELDS) LaneArray
-        Geometry, directions and the linear laws of a step.
-    iterate : (rows, ITERATE_FIELDS) LaneArray
-        Forces, slopes and residuals of an iterate.
-    shapes : (rows, modes) LaneArray
-        psi_k at the elements.
-    blocks : (rows, 192 + 8 columns) LaneArray
-        The system of an iteration (`solvers.linked_blocks`), with a column for the residual and one for each
-        unknown of the border.
-    scratch : (3, 192 + 8 columns) LaneArray
-        Of the solver, and sums.
-    border : (columns - 1, columns) array
-        System of the border, its right side last.
-    sums : (1, (columns - 1) columns) LaneArray
-        Its entries in the parts of the ring.
-    inputs : (INPUTS,) array
-        Inputs of the step.
-    increments : (1 + 2 modes,) array
-        `BeltState.increments` at its start.
-    kept : (2, STATE_FIELDS) array
-        States of two elements before the last correction.
-    """
-
-    step: LaneArray
-    iterate: LaneArray
-    shapes: LaneArray
-    blocks: LaneArray
-    scratch: LaneArray
-    border: np.ndarray
-    sums: LaneArray
-    inputs: np.ndarray
-    increments: np.ndarray
-    kept: np.ndarray
-
-
 SIZE = 8  # unknowns of an element
 RIGHT = field_of_right(SIZE)  # field of a row of blocks at which its right sides begin
 
@@ -345,21 +305,6 @@ ITERATE_FIELDS = 111
 
 def workspace(belt: Belt, nodes: int) -> Workspace:
     """Work space for a belt of so many nodes."""
-    parts, modes = parts_of(nodes), belt.modal_stiffness.shape[1]
-    rows, columns = nodes // parts, 2 + 2 * modes
-
-    def lanes(count: int, fields: int) -> LaneArray:
-        return LaneArray(count, fields, parts, linked=parts > 1)
-
-    return Workspace(
-        step=lanes(rows, STEP_FIELDS),
-        iterate=lanes(rows, ITERATE_FIELDS),
-        shapes=lanes(rows, max(modes, 1)),
-        blocks=empty_system(nodes, parts, SIZE, columns),
-        scratch=empty_scratch(parts, SIZE, columns),
-        border=np.zeros((columns - 1, columns)),
-        sums=lanes(1, (columns - 1) * columns),
-        inputs=np.zeros(INPUTS),
-        increments=np.zeros(columns - 1),
-        kept=np.zeros((2, STATE_FIELDS)),
+    return empty_workspace(
+        nodes, belt.modal_stiffness.shape[1], SIZE, STEP_FIELDS, ITERATE_FIELDS, STATE_FIELDS, INPUTS
     )

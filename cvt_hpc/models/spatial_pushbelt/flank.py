@@ -24,6 +24,7 @@ from cvt_hpc.models.pushbelt.belt import (
     DRIVING_RADIUS,
     DRIVING_SPEED,
 )
+from cvt_hpc.models.pushbelt.border import of_pulley
 from cvt_hpc.models.spatial_pushbelt.belt import (
     BY_NORMAL,
     CHANGE,
@@ -118,12 +119,6 @@ def pulley_axis(belt, driven):
         axes[0, 1] + driven * (axes[1, 1] - axes[0, 1]),
         axes[0, 2] + driven * (axes[1, 2] - axes[0, 2]),
     )
-
-
-@register_jitable
-def of_pulley(driving, driven_one, driven):
-    """What belongs to the pulley of an element, of two numbers."""
-    return driving + driven * (driven_one - driving)
 
 
 @register_jitable
