@@ -211,18 +211,32 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
 
 
 def _off_the_cone(p: Mapping[str, Any], ratio: float) -> list[tuple[str, str, str]]:
-    """Whether an element that enters out of line would miss the sheaves' faces at a ratio."""
+    """Whether an element that enters out of line would miss the sheaves' faces at a ratio.
+
+    A flank out of line by e meets its sheave e / tan d0 further out, or in. Where the job does not say how
+    far the faces reach, they are taken to do so by an element's height beyond the radii of the belt.
+    """
     driven = pushbelt.driven_radius(ratio, pushbelt.path_length(p), p["centre_distance"])
-    radii = driven / ratio, driven
-    # a flank out of line by e meets its sheave e / tan d0 further out, or in
-    room = min(min(radii) - p["inner_radius"], p["outer_radius"] - max(radii))
-    most = np.tan(p["half_wedge_angle"]) * (room - p["flank_reach"])
+    radii, height = (driven / ratio, driven), p["element_height"]
+    inside = min(radii) - p["inner_radius"] if p["inner_radius"] > 0.0 else height
+    outside = p["outer_radius"] - max(radii) if np.isfinite(p["outer_radius"]) else height
+    tangent = np.tan(p["half_wedge_angle"])
+    most = tangent * (min(inside, outside) - p["flank_reach"])
+    # loose sheaves take the mid planes along where the ratio changes in a run
+    moved = axial_offset({**p, "ratio": ratio, "driven_radius": driven}, p["ratio"])
+    offset = abs(p["misalignment"] + (moved if ratio != p["ratio"] else 0.0))
     reach = 0.5 * p["centre_distance"] * np.hypot(p["axis_tilt"], p["axis_skew"])
-    for key, found in (("misalignment", abs(p["misalignment"])), ("axis_tilt", reach)):
+    given = "misalignment" if p.get("aligned_ratio") is None else "aligned_ratio"
+    for key, found, what in ((given, offset, ""), ("axis_tilt", reach, " by tilt and skew")):
         if found > most:
-            what = "" if key == "misalignment" else " of offset by tilt and skew"
-            expected = f"at most {max(most, 0.0):.3g} m{what}, so that flanks meet the sheaves' faces"
-            return [(key, expected, f"{found:.3g} m")]
+            known = ""
+            if height in (inside, outside):
+                known = ", an element's height beyond the belt unless inner_radius and outer_radius are given"
+            expected = (
+                f"at most {max(most, 0.0):.3g} m of offset{what}, so that flanks meet the sheaves' faces"
+            )
+            at = "" if ratio == p["ratio"] else f" at a ratio of {ratio:g}"
+            return [(key, expected + known, f"{found:.3g} m{at}")]
     return []
 
 
