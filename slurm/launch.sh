@@ -7,6 +7,8 @@
 #                                     --mpi=list` shows what there is. A wrong one is refused before anything is
 #                                     computed. Ranks that print "mpi/pmi2: request not begin with" have an MPICH that
 #                                     cannot go over libfabric, see short_addresses: take mpirun
+#     CVT_HPC_CONTAINER=IMAGE.sif     run the ranks in this image (slurm/cvt_hpc.def) by `apptainer exec`; folders
+#                                     other than the home, /tmp and the present one: APPTAINER_BIND
 #
 # Exit statuses of `cvt-hpc run`, and what becomes of the job:
 #     0  all runs done             1  some runs failed, their reasons are in the output             2  bad input
@@ -22,6 +24,10 @@ set -u
 # module load python mpich
 
 export PATH="$PWD/.venv/bin:$PATH"
+image=()
+if [ -n "${CVT_HPC_CONTAINER:-}" ]; then
+    image=(apptainer exec "$CVT_HPC_CONTAINER")
+fi
 # One rank a core: threads of numerical libraries would only get in each other's way.
 export OMP_NUM_THREADS=1
 # Machine code is kept on a disk of each node, in a folder of this job alone, which is removed at its end: caches on
@@ -37,7 +43,7 @@ fi
 # Slurm reads 1024 bytes of a request by PMI and takes the rest for another one; ranks then wait for each other for ever
 # or die. MPICH writes addresses for UCX in up to 1060 bytes, now and then, and those for libfabric (ofi) in a tenth.
 short_addresses() {
-    if [ -z "${MPIR_CVAR_CH4_NETMOD:-}" ] && mpichversion 2> /dev/null | grep -q '^MPICH Device:.*ch4.*\<ofi\>'; then
+    if [ -z "${MPIR_CVAR_CH4_NETMOD:-}" ] && "${image[@]}" mpichversion 2> /dev/null | grep -q '^MPICH Device:.*ch4.*\<ofi\>'; then
         export MPIR_CVAR_CH4_NETMOD=ofi
     fi
 }
@@ -49,9 +55,9 @@ launch() {
         # waiting.
         srun)
             short_addresses
-            srun --mpi="${CVT_HPC_SRUN_MPI:-pmi2}" --wait=60 "$@" &
+            srun --mpi="${CVT_HPC_SRUN_MPI:-pmi2}" --wait=60 "${image[@]}" "$@" &
             ;;
-        mpirun) mpirun -n "$SLURM_NTASKS" "$@" & ;;
+        mpirun) mpirun -n "$SLURM_NTASKS" "${image[@]}" "$@" & ;;
         *)
             echo "CVT_HPC_LAUNCHER: expected srun or mpirun, found $CVT_HPC_LAUNCHER" >&2
             exit 2

@@ -69,10 +69,8 @@ _DISPLAY_UNITS = {
 }
 _POWER = re.compile(r"([A-Za-z]+)(-?)(\d?)")
 _RAISED = str.maketrans("23456789", "²³⁴⁵⁶⁷⁸⁹")
-_SMALL = {
-    "m": (1e-4, (1e6, "µm")),
-    "rad": (0.1, (1e3, "mrad")),
-}  # below which [SI], and what it is shown in then
+# largest value below which a smaller unit is shown [SI], with its factor
+_SMALL = {"m": (1e-4, (1e6, "µm")), "rad": (0.1, (1e3, "mrad")), "N": (500.0, (1.0, "N"))}
 
 
 def display_unit(unit: str) -> tuple[float, str]:

@@ -27,6 +27,8 @@ from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import mismatch, one_line
 
 COLOURS = cells.colours_of("viridis_r", 0.05, 0.85)
+OTHER_SIGN = 0.05  # of the largest size: values of the other sign from here on have colours of their own
+TWO_SIGNS = cells.colours_of("PuOr", 0.08, 0.92)
 MOST_PANELS = 8
 ROW, FRAME = 0.25, 0.9  # [inch], of a row of cells, and of title and labels
 HIGHEST = 3.6  # [inch], of a panel's cells
@@ -209,7 +211,11 @@ def _draw_panel(
     """Cells coloured by a quantity, with its numbers where they have room, and marks of the other runs."""
     (x, y), kinds, values = rulers, panel.kinds, panel.values
     norm = _norm(panel.alike, None if vmax is None else panel.factor * vmax)
-    scale = cells.Scale(COLOURS, norm, panel.unit)
+    ends = sorted((-float(norm.vmin), float(norm.vmax)))
+    both = ends[0] > OTHER_SIGN * ends[1]
+    if both:  # white is none
+        norm = Normalize(-ends[1], ends[1])
+    scale = cells.Scale(TWO_SIGNS if both else COLOURS, norm, panel.unit)
     is_known = np.isfinite(values) & ~np.isin(kinds, (OccurrenceClass.FAILED, OccurrenceClass.NOT_RUN))
     # what has a value is coloured by it, as vibrating cells of other maps by their amplitude
     drawn = np.where(is_known, OccurrenceClass.VIBRATING, kinds).astype(np.int8)
@@ -222,8 +228,8 @@ def _draw_panel(
         for row, column in np.argwhere(is_known):
             place, value = (x.centres[column], y.centres[row]), values[row, column]
             fill_colour = np.asarray(scale.colours(scale.norm(value)))
-            text = f"{value:.3g}" if abs(value) >= 0.1 else f"{value:.2g}"
-            cells.write_value(axes, place, text, fill_colour, size=7.5)
+            digits = ".0f" if 1e3 <= abs(value) < 1e5 else ".3g" if abs(value) >= 0.1 else ".2g"
+            cells.write_value(axes, place, f"{value:{digits}}", fill_colour, size=7.5)
     cells.draw_marks(axes, x, y, kinds, np.isin(kinds, OTHERS) & ~is_known, 3.5)
     if (slips := is_known & (kinds == OccurrenceClass.SLIPPING)).any():
         dots = {

@@ -218,7 +218,7 @@ def test_a_map_of_quantities_has_a_panel_for_each_and_tells_their_numbers(result
     figure = value_map_figure(results, ["speed_loss", "strand_tension"])
     panels = [axes for axes in figure.axes if axes.get_label() != "<colorbar>" and axes.axison]
     titles = [axes.get_title(loc="left") for axes in panels]
-    assert titles == ["speed loss", "strand tension [kN], t1", "strand tension [kN], t2"]
+    assert titles == ["speed loss", "strand tension [N], t1", "strand tension [N], t2"]  # of 1 N at most
     assert (panels[0].get_ylabel(), panels[-1].get_xlabel()) == ("driving speed [rpm]", "load [N m]")
     texts = [text.get_text() for text in panels[0].texts]
     shown = results["speed_loss"].values.ravel()[1:]
@@ -227,6 +227,17 @@ def test_a_map_of_quantities_has_a_panel_for_each_and_tells_their_numbers(result
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["slipping", "failed"]
     with pytest.raises(InputError, match="speed_los: "):
         value_map_figure(results, ["speed_los"])
+
+
+def test_values_of_both_signs_have_colours_about_zero(results):
+    results["force"] = results["speed_loss"].dims, [[-2.0, 0.0, 8.0], [-8.0, 1.0, 3.0]], {"units": "W"}
+    axes, bar = value_map_figure(results, ["force"]).axes
+    low, high = bar.get_ylim()
+    assert low == -high
+    shown = axes.images[0].get_array()
+    assert np.ptp(shown[0, 1, :3]) < 10  # none is white or grey
+    results["force"] = np.abs(results["force"])
+    assert value_map_figure(results, ["force"]).axes[1].get_ylim()[0] >= 0.0
 
 
 def test_a_third_axis_has_panels_with_one_scale_of_colours(results):

@@ -19,6 +19,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.pushbelt import belt as p
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.step import advance
 from support.pushbelts import THRUST
@@ -49,13 +50,13 @@ def measured(state, belt, work, step, turns):
         advance(belt, b.NEWTON, state, work, hold, steps, step)
         least = min(least, time.process_time() - start)
     done, spent = state.counters - counters, state.totals - before
-    left = spent[b.WORK_IN] - spent[b.WORK_OUT] - spent[b.THRUST_WORK]
-    left -= spent[b.FLANK_LOSS : b.POWER_RESIDUAL].sum() + stored(belt, state) - energy
+    left = spent[p.WORK_IN] - spent[p.WORK_OUT] - spent[p.THRUST_WORK]
+    left -= spent[p.FLANK_LOSS : p.POWER_RESIDUAL].sum() + stored(belt, state) - energy
     return (
         least / (steps * step),
-        done[b.ITERATIONS] / done[b.STEPS],
-        done[b.FAILED_STEPS],
-        left / spent[b.TIME],
+        done[p.ITERATIONS] / done[p.STEPS],
+        done[p.FAILED_STEPS],
+        left / spent[p.TIME],
     )
 
 

@@ -5,6 +5,7 @@ import pytest
 from numba import njit
 from scipy.optimize import brentq
 
+from cvt_hpc.models.pushbelt.belt import DRIVEN_RADIUS, DRIVING_RADIUS
 from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.faces import face_gap
@@ -145,7 +146,7 @@ def shaken(seed, **changes):
     state.elements.data[:] = in_lanes(f).data
     state.openings[:] = rng.normal(0.0, 1e-6, state.openings.shape)
     state.leans[:] = rng.normal(0.0, 1e-6, state.openings.shape)
-    state.pulleys[[b.DRIVING_RADIUS, b.DRIVEN_RADIUS]] += 1e-4
+    state.pulleys[[DRIVING_RADIUS, DRIVEN_RADIUS]] += 1e-4
     state.pulleys[[b.DRIVING_MIDDLE, b.DRIVEN_MIDDLE]] = 3e-5, -2e-5
     return belt, state, b.workspace(belt, NODES), rng
 

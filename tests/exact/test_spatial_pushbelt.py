@@ -46,9 +46,9 @@ def test_in_its_plane_it_is_the_planar_belt(modal):
     assert state.loads[b.DRIVING_LEFT] == pytest.approx(driving, rel=6e-3)
     assert state.loads[b.DRIVING_RIGHT] == state.loads[b.DRIVING_LEFT]
     for spatial, flat in (
-        (b.FLANK_LOSS, p.FLANK_LOSS),
-        (b.RING_LOSS, p.RING_LOSS),
-        (b.DAMPING_LOSS, p.DAMPING_LOSS),
+        (p.FLANK_LOSS, p.FLANK_LOSS),
+        (p.RING_LOSS, p.RING_LOSS),
+        (p.DAMPING_LOSS, p.DAMPING_LOSS),
     ):
         assert state.totals[spatial] == pytest.approx(planar_state.totals[flat], rel=1e-2)
 
@@ -108,7 +108,7 @@ def test_a_clamped_element_without_friction():
     # each flank carries N: 2 N sin d0 outwards, N cos d0 along the axis, and no moment where both heights are alike
     planar, planar_state = start(given(NODES, kinetic_friction=0.0, ring_friction=0.0))
     belt, state = chains.beside_planar(planar, planar_state)
-    state.pulleys[[b.DRIVING_RADIUS, b.DRIVEN_RADIUS]] += 1e-5
+    state.pulleys[[p.DRIVING_RADIUS, p.DRIVEN_RADIUS]] += 1e-5
     work = b.workspace(belt, NODES)
     f = of_lanes(state.elements)
     f[:, b.SPEED : b.SPEED + 8] = 0.0
@@ -174,11 +174,11 @@ def test_a_step_that_is_not_solved_names_its_contact():
     belt, state, work = scene()
     hold = inputs((THRUST, THRUST), (LOAD, 1.5 * LOAD))
     strict = b.NEWTON._replace(tolerance=1e-14, most_iterations=3, most_failures=2)
-    assert advance(belt, strict, state, work, hold, 10, STEP) == b.NOT_CONVERGED
-    assert state.counters[b.IN_A_ROW] == 2
-    assert 0 <= state.counters[b.FAILED_ELEMENT] < NODES
-    assert 0 <= state.counters[b.FAILED_CONTACT] < len(b.CONTACTS)
+    assert advance(belt, strict, state, work, hold, 10, STEP) == p.NOT_CONVERGED
+    assert state.counters[p.IN_A_ROW] == 2
+    assert 0 <= state.counters[p.FAILED_ELEMENT] < NODES
+    assert 0 <= state.counters[p.FAILED_CONTACT] < len(b.CONTACTS)
     broken = of_lanes(state.elements).copy()
     broken[5, b.SPEED] = np.nan
     state.elements.data[:] = in_lanes(broken).data
-    assert advance(belt, b.NEWTON, state, work, hold, 10, STEP) == b.NOT_FINITE
+    assert advance(belt, b.NEWTON, state, work, hold, 10, STEP) == p.NOT_FINITE

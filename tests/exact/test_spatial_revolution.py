@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from cvt_hpc.models.pushbelt import belt as p
 from cvt_hpc.models.pushbelt.start import of_lanes
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.step import advance
@@ -53,8 +54,8 @@ def revolution(name):
             opening = sheaves_opening(belt, state, state.openings)
             found.append((of_lanes(state.elements).copy(), saddle, gaps(belt, state), opening))
     spent = state.totals - before
-    rate = spent / spent[b.TIME]
-    rate[b.TIME] = (stored(belt, state) - energy) / spent[b.TIME]
+    rate = spent / spent[p.TIME]
+    rate[p.TIME] = (stored(belt, state) - energy) / spent[p.TIME]
     return Revolution(belt, state, rate, np.array(loads), *map(np.array, zip(*found, strict=True)))
 
 
@@ -68,11 +69,11 @@ def slips(f):
 def test_power_is_balanced_and_both_pulleys_take_the_same_axial_force(name):
     found = revolution(name)
     rate, loads = found.rate, found.loads.mean(axis=0)
-    lost = rate[b.FLANK_LOSS : b.POWER_RESIDUAL]
+    lost = rate[p.FLANK_LOSS : p.POWER_RESIDUAL]
     assert (lost >= 0.0).all()
-    left = rate[b.WORK_IN] - rate[b.WORK_OUT] - rate[b.THRUST_WORK] - lost.sum() - rate[b.TIME]
-    assert abs(left) < 3e-4 * rate[b.WORK_IN]
-    assert found.state.counters[b.FAILED_STEPS] <= 2
+    left = rate[p.WORK_IN] - rate[p.WORK_OUT] - rate[p.THRUST_WORK] - lost.sum() - rate[p.TIME]
+    assert abs(left) < 3e-4 * rate[p.WORK_IN]
+    assert found.state.counters[p.FAILED_STEPS] <= 2
     # what the belt does to one pulley along the axis it takes from the other
     net = loads[b.DRIVING_RIGHT] - loads[b.DRIVING_LEFT], loads[b.DRIVEN_RIGHT] - loads[b.DRIVEN_LEFT]
     assert net[0] > 80.0

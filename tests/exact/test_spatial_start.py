@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cvt_hpc.models.pushbelt import belt as p
 from cvt_hpc.models.pushbelt.start import equal_chords, of_lanes, path_of
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.start import start
@@ -94,7 +95,7 @@ def test_an_aligned_belt_starts_in_its_plane():
     assert not e[:, [b.OMEGA, b.OMEGA + 1, b.HEADING + 2, b.OUTWARD + 2]].any()
     # pitch points of the arcs lie on the radii of the pulleys
     pitch = vectors(e, b.POSITION) - belt.pitch_depth * vectors(e, b.OUTWARD)
-    for k, radius in ((0, pulleys[b.DRIVING_RADIUS]), (2, pulleys[b.DRIVEN_RADIUS])):
+    for k, radius in ((0, pulleys[p.DRIVING_RADIUS]), (2, pulleys[p.DRIVEN_RADIUS])):
         found = np.hypot(pitch[region == k, 0] - 0.5 * k * 0.155, pitch[region == k, 1])
         assert found == pytest.approx(radius, rel=1e-12)
     tension = belt.ring_stiffness * (

@@ -71,3 +71,21 @@ def test_mpich_goes_over_libfabric_where_it_can(launch, tmp_path, device, chosen
     told.chmod(0o755)
     assert launch(0, MPIR_CVAR_CH4_NETMOD=chosen) == 0
     assert (tmp_path / "netmods").read_text().split() == [netmod]
+
+
+@pytest.mark.parametrize("container", ["", "cvt_hpc.sif"])
+def test_the_ranks_run_in_the_container_that_is_named(launch, tmp_path, container):
+    told = tmp_path / "bin" / "apptainer"
+    told.write_text('#!/bin/sh\necho "$@" >> called\nshift 2\nexec "$@"\n')
+    told.chmod(0o755)
+    asked = tmp_path / "bin" / "mpichversion"
+    asked.write_text("#!/bin/sh\necho 'MPICH Device:       ch4:ofi'\n")
+    asked.chmod(0o755)
+    srun = tmp_path / "bin" / "srun"
+    srun.write_text('#!/bin/bash\necho "$MPIR_CVAR_CH4_NETMOD" >> netmods\n"${@:3}"\n')
+    assert launch("bash -c 'exit 3'", CVT_HPC_CONTAINER=container) == 3
+    called = (tmp_path / "called").read_text() if container else ""
+    assert called.splitlines() == [
+        f"exec {container} {c}" for c in ("mpichversion", "bash -c exit 3") if container
+    ]
+    assert (tmp_path / "netmods").read_text() == "ofi\n"

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from cvt_hpc.models.pushbelt import belt as p
 from cvt_hpc.models.pushbelt.start import of_lanes, start
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.step import advance
@@ -17,8 +18,8 @@ OFFSET = 0.5e-3  # of the driven pulley along its axis [m]
 def inputs(thrusts, loads, fields=b.INPUTS, drift=0.0):
     """Inputs of a call: thrust and load at its start and end."""
     found = np.zeros((2, fields))
-    found[:, b.IN_SPEED] = SPEED
-    found[:, b.IN_DRIVEN_THRUST], found[:, b.IN_LOAD] = thrusts, loads
+    found[:, p.IN_SPEED] = SPEED
+    found[:, p.IN_DRIVEN_THRUST], found[:, p.IN_LOAD] = thrusts, loads
     found[:, b.IN_DRIVEN_DRIFT :] = drift
     return found
 
@@ -43,7 +44,7 @@ def stored(belt, state):
     pressed = of_lanes(state.elements)[:, b.FLANK : b.FLANK + 4]
     energy += np.sum(pressed**2) / belt.flank_stiffness
     energy += np.sum(belt.modal_stiffness * (state.openings**2 + state.leans**2))
-    return energy + 0.5 * belt.driven_inertia * state.pulleys[b.DRIVEN_SPEED] ** 2
+    return energy + 0.5 * belt.driven_inertia * state.pulleys[p.DRIVEN_SPEED] ** 2
 
 
 def gaps(belt, state):
@@ -62,7 +63,7 @@ def gaps(belt, state):
     found.append(belt.pin_clearance - np.linalg.norm(offset, axis=1))
     driven = f[:, b.DRIVEN].astype(int)
     axis, centre = belt.axes[driven], driven[:, None] * [belt.centre_distance, 0.0, 0.0]
-    groove, middle = (state.pulleys[first:][driven] for first in (b.DRIVING_RADIUS, b.DRIVING_MIDDLE))
+    groove, middle = (state.pulleys[first:][driven] for first in (p.DRIVING_RADIUS, b.DRIVING_MIDDLE))
     opening, lean = (sheaves_opening(belt, state, modes) for modes in (state.openings, state.leans))
     for side in (-1.0, 1.0):
         for reach in (-belt.flank_reach, belt.flank_reach):

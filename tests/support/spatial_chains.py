@@ -75,8 +75,8 @@ def state(fields, pulleys=(0.0, 0.0, 1e-6, 1e-6, 0.0, 0.0), modes=0):
         np.zeros((2, modes)),
         np.zeros(1 + 2 * modes),
         np.zeros(b.LOADS),
-        np.zeros(b.TOTALS),
-        np.zeros(b.COUNTERS, np.int64),
+        np.zeros(p.TOTALS),
+        np.zeros(p.COUNTERS, np.int64),
     )
 
 

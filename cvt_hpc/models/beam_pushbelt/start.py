@@ -31,7 +31,7 @@ from cvt_hpc.models.pushbelt.belt import (
     Y,
     Z,
 )
-from cvt_hpc.models.pushbelt.start import belt_of, equal_chords, path_of
+from cvt_hpc.models.pushbelt.start import belt_of, equal_chords, pitch_line
 from cvt_hpc.multibody.rcm_beam import RcmBeam, line_point, mean_strain
 from cvt_hpc.multibody.rcm_chain import PER_ELEMENT, Chain, close, relaxed_ring
 from cvt_hpc.physics.geometry import Variator
@@ -122,11 +122,9 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     Belt, BeltState
         Elements with equal chords; the ring has the strain `ring_strain`, and without load it is a circle.
     """
-    g = given
-    n, path = g["elements"], path_of(g)
-    _, chord = equal_chords(lambda s: points_at(path, g["centre_distance"], s)[0], path.path_length, n)
-    belt = belt_of(g, chord)
-    depth, speed = belt.pitch_depth, g["driving_speed"] * path.driving_radius
+    g, pitch = given, pitch_line(given)
+    belt, path, speed = belt_of(g, pitch.chord), pitch.path, pitch.speed
+    depth = belt.pitch_depth
     line = Variator(
         path.driving_radius + depth,
         path.driven_radius + depth,
@@ -145,11 +143,8 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     )
     running = speed * around / path.path_length
     ring = ring_on_path(line, belt.centre_distance, beam, g["ring_beams"], g["ring_strain"], running)
-    pulleys = np.array(
-        [g["driving_speed"], speed / path.driven_radius, path.driving_radius, path.driven_radius]
-    )
-    elements = _elements(belt, ring, n, speed)
-    return belt, BeltState(ring, elements, pulleys, np.zeros(TOTALS), np.zeros(COUNTERS, np.int64))
+    elements = _elements(belt, ring, g["elements"], speed)
+    return belt, BeltState(ring, elements, pitch.pulleys, np.zeros(TOTALS), np.zeros(COUNTERS, np.int64))
 
 
 def _elements(belt: Belt, ring: Chain, n: int, speed: float) -> np.ndarray:

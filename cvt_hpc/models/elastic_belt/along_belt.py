@@ -4,7 +4,7 @@ They follow from what every sample holds of each station (`moments.py`), of a si
 
 The flank carries the normal force N = f_P,n and, along its meridian, the friction m N outward, with m =
 -mu v_m/|v|. The axial force is f_ax = N cos d - m N sin d, the radial force of both flanks p_r = 2 (N sin d +
-m N cos d) (`elastic_belt/README.md`). Times cos d and sin d / 2 they add up to
+m N cos d) (`docs/guide/theory_belt.md`). Times cos d and sin d / 2 they add up to
 
     f_P,n = f_ax cos d + (p_r / 2) sin d,
 

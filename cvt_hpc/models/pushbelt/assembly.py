@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from numba.extending import register_jitable
+
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import absolute, ahead, around, behind, like, sqrt
+from cvt_hpc.lanes import absolute, ahead, behind, like, sqrt
 from cvt_hpc.models.pushbelt.belt import (
     ANGLE_I,
     ANGLE_J,
@@ -93,6 +95,7 @@ from cvt_hpc.models.pushbelt.belt import (
     V_FILTERED,
     V,
 )
+from cvt_hpc.models.pushbelt.border import border_residuals, of_pulley
 from cvt_hpc.physics.contact_laws import coefficient, pressed, remembered
 from cvt_hpc.physics.primal_dual import dual_of, friction
 from cvt_hpc.solvers.linked_blocks import field_of_right
@@ -172,15 +175,14 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
                 openings[0, k] + increments[1 + k],
                 openings[1, k] + increments[1 + modes + k],
             )
-            opening = driving + driven * (driven_one - driving)
-            deep = deep - belt.cosine * opening * shapes[j, k]
+            deep = deep - belt.cosine * of_pulley(driving, driven_one, driven) * shapes[j, k]
         normal, stiff = pressed(-deep, belt.flank_stiffness)
         iterate[j, DEPTH_REACHED] = deep
         m_y, m_z = step[j, MID_R_Y], step[j, MID_R_Z]
         mr_lever, mt_lever = step[j, MID_R_LEVER], step[j, MID_T_LEVER]
         radius = step[j, MID_RADIUS]
         along = (m_y * u_y + m_z * u_z + mr_lever * omega) * wide
-        rotation = driving_speed + driven * (driven_speed - driving_speed)
+        rotation = of_pulley(driving_speed, driven_speed, driven)
         around_it = m_y * u_z - m_z * u_y + mt_lever * omega - radius * rotation
         width = belt.friction_speed
         dual_m, dual_t = dual_of(
@@ -235,7 +237,6 @@ def residuals(belt, state, pulleys, increments, openings, shapes, load, step, it
         Power residual of the belt [W].
     """
     modes = belt.modal_stiffness.shape[1]
-    last = border.shape[1] - 1
     per_dt = 1.0 / dt
     power = torque = like(0.0, state[0, FLANK])
     for k in range(2 * modes):
@@ -299,14 +300,7 @@ def residuals(belt, state, pulleys, increments, openings, shapes, load, step, it
             axial = belt.cosine * state[j, FLANK] * shapes[j, k]
             scratch[0, modes + k] += state[j, DRIVEN] * axial
             scratch[0, k] += (1.0 - state[j, DRIVEN]) * axial
-    for k in range(2 * modes):
-        scratch[0, k] = around(scratch[0, k])
-        pulley, mode = k // modes, k % modes
-        opening = openings[pulley, mode] + increments[1 + k]
-        border[1 + k, last] = scratch.data[0, k, 0] - belt.modal_stiffness[pulley, mode] * opening
-    scratch[0, 0], scratch[0, 1] = around(torque), around(power)
-    border[0, last] = scratch.data[0, 0, 0] - load - belt.driven_inertia * increments[0] / dt
-    return scratch.data[0, 1, 0]
+    return border_residuals(belt, increments, openings, load, torque, power, scratch, border, dt)
 
 
 @kernel
@@ -381,46 +375,43 @@ def assemble(belt, state, shapes, step, iterate, blocks):
             blocks[j, second + 2], blocks[j, second + 3] = f_w * other, 0.0
 
 
-@kernel
-def border_system(belt, state, shapes, step, iterate, blocks, scratch, border, dt):
-    """The border's own equations, less what the solved columns of the elements contribute to them.
+@register_jitable
+def _add_to_border(belt, sums, row, slopes, by_opening, driven, shapes, blocks, j):
+    """Add an element's part to a row: by openings, less by its speeds in all solutions."""
+    modes = belt.modal_stiffness.shape[1]
+    width = 2 + 2 * modes
+    first = width * row
+    a, b, c = slopes
+    for m in range(modes):
+        sums[0, first + 2 + m] += (1.0 - driven) * by_opening * shapes[j, m]
+        sums[0, first + 2 + modes + m] += driven * by_opening * shapes[j, m]
+    for column in range(width):
+        at = RIGHT + 4 * column
+        sums[0, first + column] -= a * blocks[j, at] + b * blocks[j, at + 1] + c * blocks[j, at + 2]
 
-    The first column of `blocks` holds the solution without border, the others those for its columns.
+
+@kernel
+def border_sums(belt, state, shapes, step, iterate, blocks, sums, dt):
+    """Slopes of the border's equations by its unknowns, less what the elements contribute to them.
+
+    As `border.close_border` takes them. The right sides of `blocks` hold the solution without border, then
+    those for its columns.
     """
     modes = belt.modal_stiffness.shape[1]
-    unknowns = border.shape[0]
+    width = 2 + 2 * modes
     pressing = dt * belt.sine
-    for row in range(unknowns):
-        for column in range(unknowns + 1):
-            scratch[0, column] = 0.0
-        pulley, mode = 0, 0
-        if row > 0:
-            pulley, mode = (row - 1) // modes, (row - 1) % modes
-        for j in range(step.rows):
-            driven = state[j, DRIVEN]
-            if row == 0:
-                weight = -driven * step[j, MID_RADIUS]
-                a, b, c = iterate[j, SLOPE_T], iterate[j, SLOPE_T + 1], iterate[j, SLOPE_T + 2]
-                own = step[j, MID_RADIUS] * iterate[j, DRIVEN_T]
-                by_opening = weight * iterate[j, OPENING_T]
-            else:
-                weight = shapes[j, mode] * (driven if pulley == 1 else 1.0 - driven) * iterate[j, OPENING_N]
-                a, b, c = pressing * step[j, R_Y], pressing * step[j, R_Z], pressing * step[j, R_LEVER]
-                own = like(0.0, driven)
-                by_opening = belt.cosine * weight
-            a, b, c = weight * a, weight * b, weight * c
-            scratch[0, 1] += own
-            for m in range(modes):
-                scratch[0, 2 + m] += (1.0 - driven) * by_opening * shapes[j, m]
-                scratch[0, 2 + modes + m] += driven * by_opening * shapes[j, m]
-            for column in range(unknowns + 1):
-                first = RIGHT + 4 * column
-                scratch[0, column] -= (
-                    a * blocks[j, first] + b * blocks[j, first + 1] + c * blocks[j, first + 2]
-                )
-        for column in range(unknowns + 1):
-            scratch[0, column] = around(scratch[0, column])
-        border[row, unknowns] += scratch.data[0, 0, 0]
-        for column in range(unknowns):
-            border[row, column] = scratch.data[0, 1 + column, 0]
-        border[row, row] += belt.driven_inertia / dt if row == 0 else belt.modal_stiffness[pulley, mode]
+    for field in range((width - 1) * width):
+        sums[0, field] = 0.0
+    for j in range(step.rows):
+        driven = state[j, DRIVEN]
+        weight = -driven * step[j, MID_RADIUS]
+        a, b, c = iterate[j, SLOPE_T], iterate[j, SLOPE_T + 1], iterate[j, SLOPE_T + 2]
+        sums[0, 1] += step[j, MID_RADIUS] * iterate[j, DRIVEN_T]
+        by_opening = weight * iterate[j, OPENING_T]
+        slopes = weight * a, weight * b, weight * c
+        _add_to_border(belt, sums, 0, slopes, by_opening, driven, shapes, blocks, j)
+        a, b, c = pressing * step[j, R_Y], pressing * step[j, R_Z], pressing * step[j, R_LEVER]
+        for k in range(2 * modes):
+            weight = shapes[j, k % modes] * (driven if k >= modes else 1.0 - driven) * iterate[j, OPENING_N]
+            slopes = weight * a, weight * b, weight * c
+            _add_to_border(belt, sums, 1 + k, slopes, belt.cosine * weight, driven, shapes, blocks, j)

@@ -56,7 +56,7 @@ INPUTS = IN_DRIVING_SHIFT + 1
     TIME,  # [s]
     WORK_IN,  # of the driving shaft [J]
     WORK_OUT,  # against the load [J]
-    THRUST_WORK,  # that the thrusts take up as the sheaves open [J]
+    THRUST_WORK,  # that what holds the sheaves takes up as they move [J]
     FLANK_LOSS,  # [J]
     RING_LOSS,  # [J]
     DAMPING_LOSS,  # of the rotation of elements against the ring [J]
@@ -218,7 +218,7 @@ class BeltState(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """What `step.advance` writes to and needs no longer afterwards.
+    """What a step writes to and needs no longer afterwards; of elements with b unknowns.
 
     Attributes
     ----------
@@ -228,14 +228,16 @@ class Workspace(NamedTuple):
         Forces, slopes and residuals of an iterate.
     shapes : (rows, modes) LaneArray
         psi_k at the elements.
-    blocks : (rows, 4 (12 + columns)) LaneArray
+    blocks : (rows, b (3 b + columns)) LaneArray
         The system of an iteration (`solvers.linked_blocks`), with a column for the residual and one for each
         unknown of the border.
-    scratch : (3, 4 (12 + columns)) LaneArray
+    scratch : (3, b (3 b + columns)) LaneArray
         Work space of its solution, and sums.
     border : (columns - 1, columns) array
         System of the border, its right side last.
-    inputs : (4,) array
+    sums : (1, (columns - 1) columns) LaneArray
+        Its entries in the parts of the ring (`border.close_border`).
+    inputs : (INPUTS,) array
         Inputs of the step.
     increments : (1 + 2 modes,) array
         `BeltState.increments` at its start.
@@ -249,6 +251,7 @@ class Workspace(NamedTuple):
     blocks: LaneArray
     scratch: LaneArray
     border: np.ndarray
+    sums: LaneArray
     inputs: np.ndarray
     increments: np.ndarray
     kept: np.ndarray

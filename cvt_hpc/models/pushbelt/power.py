@@ -68,6 +68,7 @@ from cvt_hpc.models.pushbelt.belt import (
     U_Z,
     V,
 )
+from cvt_hpc.models.pushbelt.border import book_openings, groove_of, of_pulley
 from cvt_hpc.physics.contact_laws import damped
 
 _FIRST, _COUNT = FLANK_LOSS, TILT_DAMPED + 1 - FLANK_LOSS  # totals that are added up here
@@ -77,7 +78,6 @@ _FIRST, _COUNT = FLANK_LOSS, TILT_DAMPED + 1 - FLANK_LOSS  # totals that are add
 def book(belt, state, work, dt):
     """Add to the totals what a solved step takes, before it is accepted."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
-    modes = belt.modal_stiffness.shape[1]
     driving_speed = state.pulleys[DRIVING_SPEED]
     driven_speed = state.pulleys[DRIVEN_SPEED] + 0.5 * state.increments[0]
     flank = ring = tilt = drag = between = sheaves = stretching = turning = like(0.0, elements[0, U_Y])
@@ -122,27 +122,13 @@ def book(belt, state, work, dt):
 
         r_y, r_z, driven = step[j, R_Y], step[j, R_Z], elements[j, DRIVEN]
         radial = r_y * y + r_z * z + step[j, R_LEVER] * w
-        rotation = driving_speed + driven * (driven_speed - driving_speed)
+        rotation = of_pulley(driving_speed, driven_speed, driven)
         around_it = r_y * z - r_z * y + step[j, T_LEVER] * w
         sliding = around_it - step[j, MID_RADIUS] * rotation
         grip_m, grip_t = elements[j, FLANK_FRICTION_M], elements[j, FLANK_FRICTION_T]
         flank += 2.0 * (belt.cosine * grip_m * radial + grip_t * sliding)
         # the groove opens where an element is, and is another where it gets to
-        opening, lean, bend = like(0.0, radial), like(0.0, radial), like(0.0, radial)
-        cosine, sine = like(1.0, radial), like(0.0, radial)
-        for k in range(modes):
-            order = 0.5 * (k + k % 2)
-            if k % 2 == 1:
-                cosine, sine = cosine * r_y - sine * r_z, sine * r_y + cosine * r_z
-                slope = -order * sine
-            else:
-                slope = order * cosine
-            driving, other = state.openings[0, k], state.openings[1, k]
-            open_ = driving + driven * (other - driving)
-            lean, bend = lean + open_ * slope, bend + open_ * order * order * work.shapes[j, k]
-            driving = 0.5 * (state.increments[1 + k] + work.increments[1 + k])
-            other = 0.5 * (state.increments[1 + modes + k] + work.increments[1 + modes + k])
-            opening = opening + (driving + driven * (other - driving)) * work.shapes[j, k]
+        opening, lean, bend = groove_of(belt, state, work, j, r_y, r_z, driven)
         angle = dt * around_it / step[j, MID_RADIUS]
         opening = opening + angle * lean
         change = dt * belt.sine * radial + belt.cosine * opening
@@ -162,6 +148,4 @@ def book(belt, state, work, dt):
     for k in range(_COUNT):
         scratch[0, k] = around(scratch[0, k])
         state.totals[_FIRST + k] += scratch.data[0, k, 0]
-    for k in range(2 * modes):
-        change = 0.5 * (state.increments[1 + k] + work.increments[1 + k])
-        state.totals[FLANK_DAMPED] += 2.0 * belt.modal_stiffness[k // modes, k % modes] * change * change
+    book_openings(belt, state, work)

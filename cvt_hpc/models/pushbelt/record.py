@@ -116,7 +116,7 @@ def judge(run: ElementRun) -> dict[str, Any]:
 
 def evaluate(run: ElementRun, strongest_probe: np.ndarray) -> dict[str, Any]:
     """Values of a finished run of VARIABLES beyond the verdict; as `judging.evaluate`, which has a part."""
-    judged, fields = run.judged, run.fields
+    judged = run.judged
     driving, load = run.mean_rate(fields.WORK_IN), run.mean_rate(fields.WORK_OUT)
     ring = run.mean_rate(fields.RING_LOSS)
     belt, tilt = run.mean_rate(fields.BELT_LOSS), run.mean_rate(fields.DAMPING_LOSS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,42 +47,51 @@ def path_of(given: Mapping[str, Any]) -> Variator:
     return variator(given["ratio"], radius, given["centre_distance"])
 
 
+def shared_constants(given: Mapping[str, Any], chord: float) -> dict[str, Any]:
+    """Constants by name that a belt has in its plane and out of it; as `belt_of`."""
+    g, angle = given, given["half_wedge_angle"]
+    same = (
+        "centre_distance",
+        "pitch_depth",
+        "head_height",
+        "ring_stiffness",
+        "flank_stiffness",
+        "contact_stiffness",
+        "angle_stiffness",
+        "angle_damping",
+        "friction_memory",
+        "ring_friction",
+        "friction_speed",
+        "ring_friction_speed",
+        "driven_inertia",
+        "driving_rate",
+        "driven_rate",
+    )
+    return {
+        **{key: float(g[key]) for key in same},
+        "sine": float(np.sin(angle)),
+        "cosine": float(np.cos(angle)),
+        "thickness": float(chord - g["play"] / g["elements"]),
+        "mass": float(g["element_mass"]),
+        "ring_mass": float(g["ring_mass"] / g["elements"]),
+        "transverse_damping": float(g["transverse_damping"] * chord),
+        "flank_law": int(Law[g["friction_law"].upper()]),
+        "flank_kinetic": float(g["kinetic_friction"]),
+        "flank_gradient": float(g["friction_gradient"]),
+        "flank_speed": float(g["stribeck_velocity"]),
+        "modal_stiffness": np.array(g["modal_stiffness"], dtype=np.float64).reshape(2, -1),
+    }
+
+
 def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
     """Constants from values as `start` takes them, and the distance of neighbours [m]."""
-    g = given
-    mass, angle = g["element_mass"], g["half_wedge_angle"]
-    thickness = chord - g["play"] / g["elements"]
+    g, shared = given, shared_constants(given, chord)
     return Belt(
-        centre_distance=float(g["centre_distance"]),
-        sine=float(np.sin(angle)),
-        cosine=float(np.cos(angle)),
-        thickness=float(thickness),
-        pitch_depth=float(g["pitch_depth"]),
-        head_height=float(g["head_height"]),
-        mass=float(mass),
-        inertia=float(mass * (g["element_height"] ** 2 + thickness**2) / 12.0),
-        ring_mass=float(g["ring_mass"] / g["elements"]),
-        ring_stiffness=float(g["ring_stiffness"]),
-        flank_stiffness=float(g["flank_stiffness"]),
-        contact_stiffness=float(g["contact_stiffness"]),
+        **shared,
+        inertia=float(shared["mass"] * (g["element_height"] ** 2 + shared["thickness"] ** 2) / 12.0),
         nose_height=float(g["nose_height"]),
         nose_clearance=float(g["nose_clearance"]),
         nose_stiffness=float(g["nose_stiffness"]),
-        angle_stiffness=float(g["angle_stiffness"]),
-        angle_damping=float(g["angle_damping"]),
-        transverse_damping=float(g["transverse_damping"] * chord),
-        flank_law=int(Law[g["friction_law"].upper()]),
-        flank_kinetic=float(g["kinetic_friction"]),
-        flank_gradient=float(g["friction_gradient"]),
-        flank_speed=float(g["stribeck_velocity"]),
-        friction_memory=float(g["friction_memory"]),
-        ring_friction=float(g["ring_friction"]),
-        friction_speed=float(g["friction_speed"]),
-        ring_friction_speed=float(g["ring_friction_speed"]),
-        driven_inertia=float(g["driven_inertia"]),
-        driving_rate=float(g["driving_rate"]),
-        driven_rate=float(g["driven_rate"]),
-        modal_stiffness=np.array(g["modal_stiffness"], dtype=np.float64).reshape(2, -1),
     )
 
 
@@ -106,6 +115,44 @@ def equal_chords(
     return s, float(chords.mean())
 
 
+class PitchLine(NamedTuple):
+    """Where the rocking edges of a belt lie at the start, and how fast it runs.
+
+    Attributes
+    ----------
+    path : Variator
+        [m]
+    places, points, along, curvature : (n,), (n, 2), (n, 2), (n,) array
+        Of the elements, with equal chords: path coordinate [m], position [m], running direction and curvature
+        of the path [1/m].
+    chord, speed : float
+        Distance of neighbours [m], and speed along the path [m/s].
+    pulleys : (4,) array
+        Speeds [rad/s] and radii [m].
+    """
+
+    path: Variator
+    places: np.ndarray
+    points: np.ndarray
+    along: np.ndarray
+    curvature: np.ndarray
+    chord: float
+    speed: float
+    pulleys: np.ndarray
+
+
+def pitch_line(given: Mapping[str, Any]) -> PitchLine:
+    """The pitch line at the start, from values as `start` takes them."""
+    path, distance = path_of(given), given["centre_distance"]
+    s, chord = equal_chords(lambda s: points_at(path, distance, s)[0], path.path_length, given["elements"])
+    points, _, curvature = points_at(path, distance, s)
+    along = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    speed = given["driving_speed"] * path.driving_radius
+    pulleys = [given["driving_speed"], speed / path.driven_radius, path.driving_radius, path.driven_radius]
+    return PitchLine(path, s, points, along, curvature, chord, speed, np.array(pulleys))
+
+
 def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     """Constants and a state from which a belt can run in: equal chords along the ideal path, at its speed.
 
@@ -119,36 +166,22 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     Belt, BeltState
         The flanks just touch; the ring has the strain `ring_strain`.
     """
-    g = given
-    nodes, path = g["elements"], path_of(g)
-    s, chord = equal_chords(lambda s: points_at(path, g["centre_distance"], s)[0], path.path_length, nodes)
-    belt = belt_of(g, chord)
-    pitch, _, curvature = points_at(path, belt.centre_distance, s)
-    along = np.roll(pitch, -1, axis=0) - np.roll(pitch, 1, axis=0)
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    points = pitch + belt.pitch_depth * np.stack([along[:, 1], -along[:, 0]], 1)
+    g, line = given, pitch_line(given)
+    belt, nodes, along, speed = belt_of(g, line.chord), g["elements"], line.along, line.speed
+    points = line.points + belt.pitch_depth * np.stack([along[:, 1], -along[:, 0]], 1)
     distances = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
-    speed = g["driving_speed"] * path.driving_radius
     fields = np.zeros((nodes, STATE_FIELDS))
     fields[:, [Y, Z]], fields[:, [HEADING_Y, HEADING_Z]] = points, along
-    fields[:, OMEGA] = speed * curvature
+    fields[:, OMEGA] = speed * line.curvature
     fields[:, [U_Y, U_Z]] = (speed + belt.pitch_depth * fields[:, OMEGA])[:, None] * along
-    fields[:, V] = speed * distances.sum() / (nodes * chord)
+    fields[:, V] = speed * distances.sum() / (nodes * line.chord)
     fields[:, LENGTH] = distances / (1.0 + g["ring_strain"])
     fields[:, TENSION] = belt.ring_stiffness * g["ring_strain"]
     fields[:, DRIVEN] = points[:, 0] > 0.5 * belt.centre_distance
-    pulleys = np.array(
-        [
-            g["driving_speed"],
-            speed / path.driven_radius,
-            path.driving_radius,
-            path.driven_radius,
-        ]
-    )
     modes = belt.modal_stiffness.shape[1]
     state = BeltState(
         in_lanes(fields),
-        pulleys,
+        line.pulleys,
         np.zeros((2, modes)),
         np.zeros(1 + 2 * modes),
         np.zeros(TOTALS),
@@ -173,20 +206,30 @@ def of_lanes(array: LaneArray) -> np.ndarray:
 
 def workspace(belt: Belt, nodes: int) -> Workspace:
     """Work space for a belt of so many nodes."""
-    parts, modes = parts_of(nodes), belt.modal_stiffness.shape[1]
-    rows, columns = nodes // parts, 2 + 2 * modes
+    return empty_workspace(
+        nodes, belt.modal_stiffness.shape[1], 4, STEP_FIELDS, ITERATE_FIELDS, STATE_FIELDS, INPUTS
+    )
+
+
+def empty_workspace(
+    nodes: int, modes: int, size: int, step: int, iterate: int, state: int, inputs: int
+) -> Workspace:
+    """Work space for elements with `size` unknowns and so many fields, and for sheaves with so many modes."""
+    parts, columns = parts_of(nodes), 2 + 2 * modes
+    rows = nodes // parts
 
     def lanes(count: int, fields: int) -> LaneArray:
         return LaneArray(count, fields, parts, linked=parts > 1)
 
     return Workspace(
-        step=lanes(rows, STEP_FIELDS),
-        iterate=lanes(rows, ITERATE_FIELDS),
+        step=lanes(rows, step),
+        iterate=lanes(rows, iterate),
         shapes=lanes(rows, max(modes, 1)),
-        blocks=empty_system(nodes, parts, 4, columns),
-        scratch=empty_scratch(parts, 4, columns),
+        blocks=empty_system(nodes, parts, size, columns),
+        scratch=empty_scratch(parts, size, columns),
         border=np.zeros((columns - 1, columns)),
-        inputs=np.zeros(INPUTS),
+        sums=lanes(1, (columns - 1) * columns),
+        inputs=np.zeros(inputs),
         increments=np.zeros(columns - 1),
-        kept=np.zeros((2, STATE_FIELDS)),
+        kept=np.zeros((2, state)),
     )

@@ -12,10 +12,10 @@ from functools import partial
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import absolute, ahead, around, behind, like, select, sqrt
+from cvt_hpc.lanes import absolute, ahead, around, behind, select, sqrt
 from cvt_hpc.models.pushbelt.assembly import (
     assemble,
-    border_system,
+    border_sums,
     element_forces,
     pair_forces,
     residuals,
@@ -24,7 +24,6 @@ from cvt_hpc.models.pushbelt.belt import (
     CHANGE,
     DRIVEN,
     DRIVEN_RADIUS,
-    DRIVEN_SPEED,
     DRIVING_RADIUS,
     DRIVING_SPEED,
     EDGE,
@@ -40,7 +39,6 @@ from cvt_hpc.models.pushbelt.belt import (
     IN_DRIVEN_THRUST,
     IN_DRIVING_SHIFT,
     IN_DRIVING_THRUST,
-    IN_LOAD,
     ITERATE_TENSION,
     LENGTH,
     MID_RADIUS,
@@ -59,38 +57,20 @@ from cvt_hpc.models.pushbelt.belt import (
     TENSION_J_Y,
     TENSION_J_Z,
     THRUST_WORK,
-    TIME,
     U_Y,
     U_Z,
     V_FILTERED,
     WORK_IN,
-    WORK_OUT,
     V,
     Y,
     Z,
 )
+from cvt_hpc.models.pushbelt.border import accept_border, close_border, set_shapes
 from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
 from cvt_hpc.models.pushbelt.nose import add_nose_blocks, nose_forces, predict_noses
 from cvt_hpc.models.pushbelt.power import book
 from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
 from cvt_hpc.physics.contact_laws import remembered
-
-
-@kernel
-def _shapes(belt, step, shapes):
-    """psi_k at the elements: 1, cos, sin, cos 2, sin 2, ..."""
-    modes = shapes.data.shape[1] if belt.modal_stiffness.shape[1] > 0 else 0
-    for j in range(step.rows):
-        c, s = step[j, R_Y], step[j, R_Z]
-        cosine, sine = like(1.0, c), like(0.0, c)
-        for k in range(modes):
-            if k % 2 == 1:
-                cosine, sine = cosine * c - sine * s, sine * c + cosine * s
-                shapes[j, k] = cosine
-            elif k > 0:
-                shapes[j, k] = sine
-            else:
-                shapes[j, k] = 1.0
 
 
 @kernel
@@ -101,7 +81,8 @@ def _prepare(belt, state, work, dt):
     if belt.nose_clearance < np.inf:
         predict_noses(belt, state.elements, work.step)
     linear_blocks(belt, work.step, dt)
-    _shapes(belt, work.step, work.shapes)
+    for j in range(work.step.rows):
+        set_shapes(belt, work.step[j, R_Y], work.step[j, R_Z], work.shapes, j)
 
 
 @kernel
@@ -140,9 +121,8 @@ def _assemble(belt, state, work, dt):
 @kernel
 def _close(belt, state, work, dt):
     """That of the border."""
-    border_system(
-        belt, state.elements, work.shapes, work.step, work.iterate, work.blocks, work.scratch, work.border, dt
-    )
+    border_sums(belt, state.elements, work.shapes, work.step, work.iterate, work.blocks, work.sums, dt)
+    close_border(belt, work.sums, work.border, dt)
 
 
 @kernel
@@ -199,18 +179,13 @@ def _accept(belt, state, work, inputs, dt):
     for k in range(3):
         scratch[0, k] = around(scratch[0, k])
     driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]
-    pulleys[DRIVEN_SPEED] += state.increments[0]
-    modes = belt.modal_stiffness.shape[1]
-    for k in range(2 * modes):
-        state.openings[k // modes, k % modes] += state.increments[1 + k]
     driving = dt * belt.driving_rate * (inputs[IN_DRIVING_THRUST] - driving_thrust)
     driving += dt * inputs[IN_DRIVING_SHIFT]
     driven = dt * belt.driven_rate * (inputs[IN_DRIVEN_THRUST] - driven_thrust)
     pulleys[DRIVING_RADIUS] += driving
     pulleys[DRIVEN_RADIUS] += driven
-    totals[TIME] += dt
     totals[WORK_IN] += dt * scratch.data[0, 2, 0] * pulleys[DRIVING_SPEED]
-    totals[WORK_OUT] += dt * inputs[IN_LOAD] * (pulleys[DRIVEN_SPEED] - 0.5 * state.increments[0])
+    accept_border(belt, state, inputs, dt)
     # both sheaves of a pulley close by the tangent of the wedge angle
     closing = 2.0 * belt.sine / belt.cosine
     totals[THRUST_WORK] -= closing * (driving_thrust * driving + driven_thrust * driven)

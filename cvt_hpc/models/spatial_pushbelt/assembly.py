@@ -10,7 +10,8 @@ import numpy as np
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import around, behind, fma, like
+from cvt_hpc.lanes import behind, fma, like
+from cvt_hpc.models.pushbelt.border import border_residuals
 from cvt_hpc.models.spatial_pushbelt.belt import (
     CHANGE,
     CHORD_I,
@@ -218,7 +219,6 @@ def residuals(belt, state, increments, openings, shapes, load, step, iterate, sc
         Power residual of the belt [W].
     """
     modes = belt.modal_stiffness.shape[1]
-    last = border.shape[1] - 1
     ring, rotary = belt.ring_mass / dt, belt.ring_rotary_inertia / dt
     yawing = BETA * dt * belt.yaw_stiffness + belt.yaw_damping
     power = torque = like(0.0, state[0, FLANK])
@@ -261,14 +261,7 @@ def residuals(belt, state, increments, openings, shapes, load, step, iterate, sc
             for k in range(modes):
                 scratch[0, modes + k] += driven * axial * shapes[j, k]
                 scratch[0, k] += (1.0 - driven) * axial * shapes[j, k]
-    for k in range(2 * modes):
-        scratch[0, k] = around(scratch[0, k])
-        pulley, mode = k // modes, k % modes
-        opening = openings[pulley, mode] + increments[1 + k]
-        border[1 + k, last] = scratch.data[0, k, 0] - belt.modal_stiffness[pulley, mode] * opening
-    scratch[0, 0], scratch[0, 1] = around(torque), around(power)
-    border[0, last] = scratch.data[0, 0, 0] - load - belt.driven_inertia * increments[0] / dt
-    return scratch.data[0, 1, 0]
+    return border_residuals(belt, increments, openings, load, torque, power, scratch, border, dt)
 
 
 @kernel
@@ -356,15 +349,15 @@ def assemble_pairs(belt, state, step, iterate, blocks):
 
 
 @kernel
-def border_system(belt, state, shapes, iterate, blocks, sums, border, dt):
-    """The border's own equations, less what the solved columns of the elements contribute to them.
+def border_sums(belt, state, shapes, iterate, blocks, sums):
+    """Slopes of the border's equations by its unknowns, less what the elements contribute to them.
 
-    The first column of `blocks` holds the solution without border, the others those for its columns.
+    As `border.close_border` takes them. The right sides of `blocks` hold the solution without border, then
+    those for its columns.
     """
     modes = belt.modal_stiffness.shape[1]
-    unknowns = border.shape[0]
-    width = unknowns + 1
-    for field in range(unknowns * width):
+    width = 2 + 2 * modes
+    for field in range((width - 1) * width):
         sums[0, field] = 0.0
     for j in range(iterate.rows):
         driven = state[j, DRIVEN]
@@ -391,15 +384,3 @@ def border_system(belt, state, shapes, iterate, blocks, sums, border, dt):
             for k in range(modes):
                 sums[0, width * (1 + k) + 2 + m] += give * shapes[j, k] * one
                 sums[0, width * (1 + modes + k) + 2 + modes + m] += give * shapes[j, k] * other
-    for row in range(unknowns):
-        for column in range(width):
-            sums[0, width * row + column] = around(sums[0, width * row + column])
-            found = sums.data[0, width * row + column, 0]
-            if column == 0:
-                border[row, unknowns] += found
-            else:
-                border[row, column - 1] = found
-        pulley, mode = 0, 0
-        if row > 0:
-            pulley, mode = (row - 1) // modes, (row - 1) % modes
-        border[row, row] += belt.driven_inertia / dt if row == 0 else belt.modal_stiffness[pulley, mode]

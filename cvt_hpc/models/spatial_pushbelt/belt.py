@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray
-from cvt_hpc.models.pushbelt.belt import Newton
-from cvt_hpc.models.pushbelt.start import parts_of
-from cvt_hpc.solvers.linked_blocks import empty_scratch, empty_system, field_of_right
+from cvt_hpc.models.pushbelt.belt import DRIVEN_RADIUS, Newton, Workspace
+from cvt_hpc.models.pushbelt.belt import INPUTS as IN_THE_PLANE
+from cvt_hpc.models.pushbelt.start import empty_workspace
+from cvt_hpc.solvers.linked_blocks import field_of_right
 
 # Fields of the state of an element. Speeds are those at the middle of the last step.
 POSITION = 0  # 3: middle of the saddle line, which is the ring line and the assumed centre of gravity [m]
@@ -49,9 +50,9 @@ CHANGE = 62  # 8: of the speeds in the last step, from which the next one starts
 STATE_FIELDS = CHANGE + 8
 POINTS = 4  # contact points of an element at its flanks, and at the front to the next one
 
-# Entries of the state of the pulleys: speeds [rad/s], radii at which the flanks' pitch line runs without
-# penetration [m], positions of the mid planes between their sheaves along the axes [m]
-DRIVING_SPEED, DRIVEN_SPEED, DRIVING_RADIUS, DRIVEN_RADIUS, DRIVING_MIDDLE, DRIVEN_MIDDLE = range(6)
+# Entries of the state of the pulleys beside those of `pushbelt.belt`: positions of the mid planes between
+# their sheaves along the axes [m]
+DRIVING_MIDDLE, DRIVEN_MIDDLE = range(DRIVEN_RADIUS + 1, DRIVEN_RADIUS + 3)
 PULLEY_FIELDS = DRIVEN_MIDDLE + 1
 
 # Entries of the loads of the last step: axial forces that press each sheave outwards [N], and torques of the
@@ -59,47 +60,11 @@ PULLEY_FIELDS = DRIVEN_MIDDLE + 1
 DRIVING_LEFT, DRIVING_RIGHT, DRIVEN_LEFT, DRIVEN_RIGHT, DRIVING_TORQUE, DRIVEN_TORQUE = range(6)
 LOADS = DRIVEN_TORQUE + 1
 
-# Entries of the inputs, at the start and at the end of a call
-(
-    IN_SPEED,  # of the driving pulley [rad/s]
-    IN_DRIVING_THRUST,  # on the loose sheaves [N]
-    IN_DRIVEN_THRUST,
-    IN_LOAD,  # torque [N m]
-    IN_DRIVING_SHIFT,  # speed of the driving radius by what moves the driving sheave [m/s]
-    IN_DRIVING_DRIFT,  # axial speeds of the pulleys' mid planes, beside what the loose sheaves do [m/s]
-    IN_DRIVEN_DRIFT,
-) = range(7)
+# Entries of the inputs beside those of `pushbelt.belt`, of which thrusts are those on the loose sheaves:
+# axial speeds of the pulleys' mid planes, beside what the loose sheaves do [m/s]
+IN_DRIVING_DRIFT, IN_DRIVEN_DRIFT = range(IN_THE_PLANE, IN_THE_PLANE + 2)
 INPUTS = IN_DRIVEN_DRIFT + 1
 
-# Entries of the totals: time, and what adds up over it
-(
-    TIME,  # [s]
-    WORK_IN,  # of the driving shaft [J]
-    WORK_OUT,  # against the load [J]
-    THRUST_WORK,  # that what holds the sheaves takes up as they move [J]
-    FLANK_LOSS,  # [J]
-    RING_LOSS,  # [J]
-    DAMPING_LOSS,  # of the rotation of elements against the rings, pitch and yaw [J]
-    BELT_LOSS,  # of the transverse damping [J]
-    ELEMENT_DAMPED,  # by the step itself, at contacts and pins between elements (`power`) [J]
-    FLANK_DAMPED,  # at flanks and modes of the sheaves [J]
-    RING_DAMPED,  # by the stretching of the ring [J]
-    TILT_DAMPED,  # by the springs of the elements' pitch [J]
-    POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
-) = range(13)
-TOTALS = 13
-DAMPED = {  # what the step damps by itself, by the springs and contacts at which it does
-    "elements": ELEMENT_DAMPED,
-    "flanks": FLANK_DAMPED,
-    "ring": RING_DAMPED,
-    "tilt": TILT_DAMPED,
-}
-
-# Entries of the counters
-STEPS, ITERATIONS, FAILED_STEPS, STATUS, FAILED_ELEMENT, FAILED_CONTACT, IN_A_ROW = range(7)
-COUNTERS = 7
-# values of STATUS
-CONVERGED, NOT_CONVERGED, NOT_FINITE = range(3)
 # values of FAILED_CONTACT
 CONTACTS = (
     "edge left",
@@ -268,46 +233,6 @@ class BeltState(NamedTuple):
     counters: np.ndarray
 
 
-class Workspace(NamedTuple):
-    """What `step.advance` writes to and needs no longer afterwards; `workspace` makes one.
-
-    Attributes
-    ----------
-    step : (rows, STEP_FIELDS) LaneArray
-        Geometry, directions and the linear laws of a step.
-    iterate : (rows, ITERATE_FIELDS) LaneArray
-        Forces, slopes and residuals of an iterate.
-    shapes : (rows, modes) LaneArray
-        psi_k at the elements.
-    blocks : (rows, 192 + 8 columns) LaneArray
-        The system of an iteration (`solvers.linked_blocks`), with a column for the residual and one for each
-        unknown of the border.
-    scratch : (3, 192 + 8 columns) LaneArray
-        Of the solver, and sums.
-    border : (columns - 1, columns) array
-        System of the border, its right side last.
-    sums : (1, (columns - 1) columns) LaneArray
-        Its entries in the parts of the ring.
-    inputs : (INPUTS,) array
-        Inputs of the step.
-    increments : (1 + 2 modes,) array
-        `BeltState.increments` at its start.
-    kept : (2, STATE_FIELDS) array
-        States of two elements before the last correction.
-    """
-
-    step: LaneArray
-    iterate: LaneArray
-    shapes: LaneArray
-    blocks: LaneArray
-    scratch: LaneArray
-    border: np.ndarray
-    sums: LaneArray
-    inputs: np.ndarray
-    increments: np.ndarray
-    kept: np.ndarray
-
-
 SIZE = 8  # unknowns of an element
 RIGHT = field_of_right(SIZE)  # field of a row of blocks at which its right sides begin
 
@@ -380,21 +305,6 @@ ITERATE_FIELDS = 111
 
 def workspace(belt: Belt, nodes: int) -> Workspace:
     """Work space for a belt of so many nodes."""
-    parts, modes = parts_of(nodes), belt.modal_stiffness.shape[1]
-    rows, columns = nodes // parts, 2 + 2 * modes
-
-    def lanes(count: int, fields: int) -> LaneArray:
-        return LaneArray(count, fields, parts, linked=parts > 1)
-
-    return Workspace(
-        step=lanes(rows, STEP_FIELDS),
-        iterate=lanes(rows, ITERATE_FIELDS),
-        shapes=lanes(rows, max(modes, 1)),
-        blocks=empty_system(nodes, parts, SIZE, columns),
-        scratch=empty_scratch(parts, SIZE, columns),
-        border=np.zeros((columns - 1, columns)),
-        sums=lanes(1, (columns - 1) * columns),
-        inputs=np.zeros(INPUTS),
-        increments=np.zeros(columns - 1),
-        kept=np.zeros((2, STATE_FIELDS)),
+    return empty_workspace(
+        nodes, belt.modal_stiffness.shape[1], SIZE, STEP_FIELDS, ITERATE_FIELDS, STATE_FIELDS, INPUTS
     )

@@ -15,13 +15,15 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, behind, fma, like, select
+from cvt_hpc.models.pushbelt.belt import (
+    DRIVEN_RADIUS,
+    DRIVING_RADIUS,
+)
 from cvt_hpc.models.spatial_pushbelt.belt import (
     CHANGE,
     CHORD_I,
     CHORD_J,
     DRIVEN,
-    DRIVEN_RADIUS,
-    DRIVING_RADIUS,
     GYROSCOPIC,
     HEADING,
     INERTIA,

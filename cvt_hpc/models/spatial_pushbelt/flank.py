@@ -18,16 +18,19 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import fma, like, select, sqrt
+from cvt_hpc.models.pushbelt.belt import (
+    DRIVEN_RADIUS,
+    DRIVEN_SPEED,
+    DRIVING_RADIUS,
+    DRIVING_SPEED,
+)
+from cvt_hpc.models.pushbelt.border import of_pulley
 from cvt_hpc.models.spatial_pushbelt.belt import (
     BY_NORMAL,
     CHANGE,
     DRIVEN,
     DRIVEN_MIDDLE,
-    DRIVEN_RADIUS,
-    DRIVEN_SPEED,
     DRIVING_MIDDLE,
-    DRIVING_RADIUS,
-    DRIVING_SPEED,
     FLANK,
     FLANK_DUAL_M,
     FLANK_DUAL_T,
@@ -116,12 +119,6 @@ def pulley_axis(belt, driven):
         axes[0, 1] + driven * (axes[1, 1] - axes[0, 1]),
         axes[0, 2] + driven * (axes[1, 2] - axes[0, 2]),
     )
-
-
-@register_jitable
-def of_pulley(driving, driven_one, driven):
-    """What belongs to the pulley of an element, of two numbers."""
-    return driving + driven * (driven_one - driving)
 
 
 @register_jitable

@@ -10,21 +10,27 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, around, like
-from cvt_hpc.models.spatial_pushbelt.belt import (
+from cvt_hpc.models.pushbelt.belt import (
     BELT_LOSS,
-    CHANGE,
-    CHORD_I,
-    CHORD_J,
     DAMPING_LOSS,
-    DRIVEN,
     DRIVEN_SPEED,
     DRIVING_SPEED,
     ELEMENT_DAMPED,
-    FLANK,
     FLANK_DAMPED,
+    FLANK_LOSS,
+    RING_DAMPED,
+    RING_LOSS,
+    TILT_DAMPED,
+)
+from cvt_hpc.models.pushbelt.border import book_openings, groove_of, of_pulley
+from cvt_hpc.models.spatial_pushbelt.belt import (
+    CHANGE,
+    CHORD_I,
+    CHORD_J,
+    DRIVEN,
+    FLANK,
     FLANK_FRICTION_M,
     FLANK_FRICTION_T,
-    FLANK_LOSS,
     FLANK_REACHED,
     HEADING,
     MID_RADIUS,
@@ -39,14 +45,11 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     PUSH_LEVER_J,
     PUSH_REACHED,
     RADIAL,
-    RING_DAMPED,
     RING_FRICTION,
-    RING_LOSS,
     SPEED,
     TENSION_I,
     TENSION_J,
     TENSION_SLOPE,
-    TILT_DAMPED,
     TURN_I,
     TURN_J,
     YAW,
@@ -56,7 +59,6 @@ from cvt_hpc.models.spatial_pushbelt.flank import (
     flank_directions,
     flank_point,
     lever_of,
-    of_pulley,
     pulley_axis,
 )
 from cvt_hpc.models.spatial_pushbelt.rotations import (
@@ -138,7 +140,6 @@ def book_pairs(belt, state, work, dt):
 def book_flanks(belt, state, work, dt):
     """Add to the totals what a solved step takes at the flanks, before it is accepted."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
-    modes = belt.modal_stiffness.shape[1]
     driving_speed = state.pulleys[DRIVING_SPEED]
     driven_speed = state.pulleys[DRIVEN_SPEED] + 0.5 * state.increments[0]
     flank = sheaves = like(0.0, elements[0, FLANK])
@@ -151,21 +152,8 @@ def book_flanks(belt, state, work, dt):
         o = vector(elements, j, OUTWARD)
         a = cross(o, vector(elements, j, HEADING))
         # the groove opens where an element is, and is another where it gets to
-        opening, lean, bend = like(0.0, driven), like(0.0, driven), like(0.0, driven)
         c, s = along_arc(belt, elements, j)
-        cosine, sine = like(1.0, c), like(0.0, c)
-        for k in range(modes):
-            order = 0.5 * (k + k % 2)
-            if k % 2 == 1:
-                cosine, sine = cosine * c - sine * s, sine * c + cosine * s
-                slope = -order * sine
-            else:
-                slope = order * cosine
-            open_ = of_pulley(state.openings[0, k], state.openings[1, k], driven)
-            lean, bend = lean + open_ * slope, bend + open_ * order * order * work.shapes[j, k]
-            driving = 0.5 * (state.increments[1 + k] + work.increments[1 + k])
-            driven_one = 0.5 * (state.increments[1 + modes + k] + work.increments[1 + modes + k])
-            opening = opening + of_pulley(driving, driven_one, driven) * work.shapes[j, k]
+        opening, lean, bend = groove_of(belt, state, work, j, c, s, driven)
         for p in range(POINTS):
             side, height, width = flank_point(belt, p)
             lever = lever_of(o, a, side, height, width)
@@ -182,6 +170,4 @@ def book_flanks(belt, state, work, dt):
     scratch[0, 0], scratch[0, 1] = around(dt * flank), around(sheaves)
     state.totals[FLANK_LOSS] += scratch.data[0, 0, 0]
     state.totals[FLANK_DAMPED] += scratch.data[0, 1, 0]
-    for k in range(2 * modes):
-        change = 0.5 * (state.increments[1 + k] + work.increments[1 + k])
-        state.totals[FLANK_DAMPED] += 2.0 * belt.modal_stiffness[k // modes, k % modes] * change * change
+    book_openings(belt, state, work)

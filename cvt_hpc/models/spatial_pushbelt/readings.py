@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cvt_hpc.models.pushbelt.belt import DRIVEN_RADIUS, DRIVEN_SPEED, DRIVING_RADIUS, DRIVING_SPEED
 from cvt_hpc.models.pushbelt.readings import PROFILES as PLANAR_PROFILES
 from cvt_hpc.models.pushbelt.readings import SCALARS as PLANAR_SCALARS
 from cvt_hpc.models.pushbelt.readings import OnPath, Readings
@@ -123,12 +124,12 @@ class Reading:
         line = np.linalg.norm(np.roll(self._position, -1, axis=0) - self._position, axis=1).sum()
         sheaves = loads[[f.DRIVING_LEFT, f.DRIVING_RIGHT, f.DRIVEN_LEFT, f.DRIVEN_RIGHT]]
         groups = (
-            pulleys[[f.DRIVEN_SPEED, f.DRIVING_RADIUS, f.DRIVEN_RADIUS]],
+            pulleys[[DRIVEN_SPEED, DRIVING_RADIUS, DRIVEN_RADIUS]],
             middles @ self._push.sum(axis=1),
             middles @ e[:, f.TENSION],
             sheaves.reshape(2, 2).mean(axis=1),
             running,
-            sliding / (pulleys[f.DRIVING_SPEED] * path.driving_radius),
+            sliding / (pulleys[DRIVING_SPEED] * path.driving_radius),
             loss.sum(axis=1),
             [e[:, f.RING_FRICTION] @ e[:, f.RING_SLIP], speeds / line],
             sheaves,
@@ -195,7 +196,7 @@ class Reading:
         x, o = self._x, self._o
         a = np.cross(o, x)
         u, omega = _vectors(e, f.SPEED), _vectors(e, f.OMEGA)
-        kinetic = belt.mass * (u**2).sum() + belt.driven_inertia * self._pulleys[f.DRIVEN_SPEED] ** 2
+        kinetic = belt.mass * (u**2).sum() + belt.driven_inertia * self._pulleys[DRIVEN_SPEED] ** 2
         for inertia, axis in ((belt.roll_inertia, x), (belt.yaw_inertia, o), (belt.pitch_inertia, a)):
             kinetic += inertia * (_dot(omega, axis) ** 2).sum()
         kinetic += belt.ring_mass * (e[:, f.V] ** 2).sum()

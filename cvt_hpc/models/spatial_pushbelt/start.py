@@ -7,9 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.pushbelt.start import equal_chords, in_lanes, path_of
-from cvt_hpc.models.spatial_pushbelt.belt import (
+from cvt_hpc.models.pushbelt.belt import (
     COUNTERS,
+    TOTALS,
+)
+from cvt_hpc.models.pushbelt.start import in_lanes, pitch_line, shared_constants
+from cvt_hpc.models.spatial_pushbelt.belt import (
     DRIVEN,
     HEADING,
     LENGTH,
@@ -22,12 +25,10 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     SPEED,
     STATE_FIELDS,
     TENSION,
-    TOTALS,
     Belt,
     BeltState,
     V,
 )
-from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.physics.out_of_plane import SIDES
 from cvt_hpc.variator.path import points_at, regions
@@ -37,58 +38,32 @@ SEED_MODES = 5  # half waves of a strand that the disturbance at the start is ma
 
 def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
     """Constants from values as `start` takes them, and the distance of neighbours [m]."""
-    g = given
-    mass, angle = g["element_mass"], g["half_wedge_angle"]
-    thickness = chord - g["play"] / g["elements"]
+    g, shared = given, shared_constants(given, chord)
+    mass, thickness, ring_mass = shared["mass"], shared["thickness"], shared["ring_mass"]
     height, width = g["element_height"], g["element_width"]
     turned = np.array([[0.0, 0.0, 1.0], [np.tan(g["axis_tilt"]), np.tan(g["axis_skew"]), 1.0]])
     return Belt(
-        centre_distance=float(g["centre_distance"]),
+        **shared,
         axes=turned / np.linalg.norm(turned, axis=1)[:, None],
         loose_side=np.array([float(SIDES[side]) for side in g["loose_sides"]]),
-        sine=float(np.sin(angle)),
-        cosine=float(np.cos(angle)),
         half_width=float(0.5 * width),
         flank_reach=float(g["flank_reach"]),
-        thickness=float(thickness),
         pitch=float(chord),
-        pitch_depth=float(g["pitch_depth"]),
-        head_height=float(g["head_height"]),
         edge_width=float(g["edge_half_width"]),
         head_width=float(g["head_half_width"]),
         package_distance=float(g["package_arm"]),
         pin_height=float(g["nose_height"]),
         pin_clearance=float(g["nose_clearance"]),
         pin_stiffness=float(g["nose_stiffness"]),
-        mass=float(mass),
         roll_inertia=float(mass * (height**2 + width**2) / 12.0),
         yaw_inertia=float(mass * (width**2 + thickness**2) / 12.0),
         pitch_inertia=float(mass * (height**2 + thickness**2) / 12.0),
-        ring_mass=float(g["ring_mass"] / g["elements"]),
-        ring_rotary_inertia=float(g["ring_mass"] / g["elements"] * g["strip_width"] ** 2 / 12.0),
-        ring_stiffness=float(g["ring_stiffness"]),
+        ring_rotary_inertia=float(ring_mass * g["strip_width"] ** 2 / 12.0),
         ring_bending=float(g["ring_bending"]),
         ring_shear=float(g["ring_shear"]),
-        flank_stiffness=float(g["flank_stiffness"]),
-        contact_stiffness=float(g["contact_stiffness"]),
-        angle_stiffness=float(g["angle_stiffness"]),
-        angle_damping=float(g["angle_damping"]),
         yaw_stiffness=float(g["yaw_stiffness"]),
         yaw_damping=float(g["yaw_damping"]),
-        transverse_damping=float(g["transverse_damping"] * chord),
         lateral_damping=float(g["lateral_damping"] * chord),
-        flank_law=int(Law[g["friction_law"].upper()]),
-        flank_kinetic=float(g["kinetic_friction"]),
-        flank_gradient=float(g["friction_gradient"]),
-        flank_speed=float(g["stribeck_velocity"]),
-        friction_memory=float(g["friction_memory"]),
-        ring_friction=float(g["ring_friction"]),
-        friction_speed=float(g["friction_speed"]),
-        ring_friction_speed=float(g["ring_friction_speed"]),
-        driven_inertia=float(g["driven_inertia"]),
-        driving_rate=float(g["driving_rate"]),
-        driven_rate=float(g["driven_rate"]),
-        modal_stiffness=np.array(g["modal_stiffness"], dtype=np.float64).reshape(2, -1),
         lean_lag=float(g["lean_lag"]),
     )
 
@@ -183,55 +158,40 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
         The flanks just touch, but for the disturbance; the rings have the strain `ring_strain`. Half of the
         misalignment is the driving pulley's.
     """
-    g = given
-    nodes, path = g["elements"], path_of(g)
-    s, chord = equal_chords(lambda s: points_at(path, g["centre_distance"], s)[0], path.path_length, nodes)
-    belt = belt_of(g, chord)
-    pitch, _, curvature = points_at(path, belt.centre_distance, s)
+    g, line = given, pitch_line(given)
+    belt, nodes, along, speed = belt_of(g, line.chord), g["elements"], line.along, line.speed
     middles = -0.5 * g["misalignment"], 0.5 * g["misalignment"]
-    height, slope, axial = SideLine(path, belt, middles, g["disturbance"], g["seed"]).at(s)
-    along = np.roll(pitch, -1, axis=0) - np.roll(pitch, 1, axis=0)
-    along /= np.linalg.norm(along, axis=1)[:, None]
+    height, slope, axial = SideLine(line.path, belt, middles, g["disturbance"], g["seed"]).at(line.places)
     heading = np.column_stack([along, slope])
     heading /= np.linalg.norm(heading, axis=1)[:, None]
     outward = np.cross(heading, axial)
     outward /= np.linalg.norm(outward, axis=1)[:, None]
     axial = np.cross(outward, heading)
-    points = np.column_stack([pitch, height]) + belt.pitch_depth * outward
+    points = np.column_stack([line.points, height]) + belt.pitch_depth * outward
 
     ahead = np.roll(points, -1, axis=0) - points
     arms = belt.package_distance * (np.roll(axial, -1, axis=0) - axial)
     lines = 0.5 * (np.linalg.norm(ahead + arms, axis=1) + np.linalg.norm(ahead - arms, axis=1))
-    speed = g["driving_speed"] * path.driving_radius
     # elements that run along the path turn as the path does, in the plane and out of it
-    slope_rate = speed * (np.roll(slope, -1) - np.roll(slope, 1)) / (2.0 * chord)
+    slope_rate = speed * (np.roll(slope, -1) - np.roll(slope, 1)) / (2.0 * line.chord)
     plane_outward = np.column_stack([along[:, 1], -along[:, 0], np.zeros(nodes)])
-    omega = speed * curvature[:, None] * np.array([0.0, 0.0, 1.0]) + slope_rate[:, None] * plane_outward
+    omega = speed * line.curvature[:, None] * np.array([0.0, 0.0, 1.0]) + slope_rate[:, None] * plane_outward
     fields = np.zeros((nodes, STATE_FIELDS))
     fields[:, POSITION : POSITION + 3] = points
     fields[:, HEADING : HEADING + 3], fields[:, OUTWARD : OUTWARD + 3] = heading, outward
     fields[:, SLOPE], fields[:, SLOPE_RATE] = slope, slope_rate
-    running = speed + belt.pitch_depth * speed * curvature
+    running = speed + belt.pitch_depth * speed * line.curvature
     fields[:, SPEED : SPEED + 2] = running[:, None] * along
     fields[:, SPEED + 2] = speed * slope
     fields[:, OMEGA : OMEGA + 3] = omega
-    fields[:, V] = speed * lines.sum() / (nodes * chord)
+    fields[:, V] = speed * lines.sum() / (nodes * line.chord)
     fields[:, LENGTH] = lines / (1.0 + g["ring_strain"])
     fields[:, TENSION] = belt.ring_stiffness * g["ring_strain"]
     fields[:, DRIVEN] = points[:, 0] > 0.5 * belt.centre_distance
-    pulleys = np.array(
-        [
-            g["driving_speed"],
-            speed / path.driven_radius,
-            path.driving_radius,
-            path.driven_radius,
-            *middles,
-        ]
-    )
     modes = belt.modal_stiffness.shape[1]
     state = BeltState(
         in_lanes(fields),
-        pulleys,
+        np.append(line.pulleys, middles),
         np.zeros((2, modes)),
         np.zeros((2, modes)),
         np.zeros(1 + 2 * modes),

@@ -14,10 +14,21 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import absolute, ahead, around, like
+from cvt_hpc.models.pushbelt.belt import (
+    DRIVEN_RADIUS,
+    DRIVING_RADIUS,
+    DRIVING_SPEED,
+    IN_DRIVEN_THRUST,
+    IN_DRIVING_SHIFT,
+    IN_DRIVING_THRUST,
+    THRUST_WORK,
+    WORK_IN,
+)
+from cvt_hpc.models.pushbelt.border import accept_border, close_border, of_pulley, set_shapes
 from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
 from cvt_hpc.models.spatial_pushbelt.assembly import (
     assemble_pairs,
-    border_system,
+    border_sums,
     linear_blocks,
     residuals,
     side_torque,
@@ -26,11 +37,7 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     CHANGE,
     DRIVEN,
     DRIVEN_MIDDLE,
-    DRIVEN_RADIUS,
-    DRIVEN_SPEED,
     DRIVING_MIDDLE,
-    DRIVING_RADIUS,
-    DRIVING_SPEED,
     DRIVING_TORQUE,
     FLANK,
     FLANK_FRICTION_M,
@@ -38,11 +45,7 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     FLANK_GAP,
     HEADING,
     IN_DRIVEN_DRIFT,
-    IN_DRIVEN_THRUST,
     IN_DRIVING_DRIFT,
-    IN_DRIVING_SHIFT,
-    IN_DRIVING_THRUST,
-    IN_LOAD,
     ITERATE_TENSION,
     LENGTH,
     OMEGA,
@@ -59,10 +62,6 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     SLOPE,
     SPEED,
     TENSION,
-    THRUST_WORK,
-    TIME,
-    WORK_IN,
-    WORK_OUT,
 )
 from cvt_hpc.models.spatial_pushbelt.bending import bending_forces, predict_bending
 from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across
@@ -90,23 +89,16 @@ from cvt_hpc.models.spatial_pushbelt.saddle import saddle_forces
 
 
 @kernel
-def _shapes(belt, state, leans, step, shapes):
-    """psi_k at the elements, 1, cos, sin, cos 2, sin 2, ...; the sheaves' leans go into the gaps."""
+def _open_sheaves(belt, state, leans, step, shapes):
+    """psi_k at the elements; the sheaves' leans go into the gaps."""
     modes = belt.modal_stiffness.shape[1]
     for j in range(step.rows):
         driven = state[j, DRIVEN]
         c, s = along_arc(belt, state, j)
-        cosine, sine = like(1.0, c), like(0.0, c)
+        set_shapes(belt, c, s, shapes, j)
         lean = like(0.0, c)
         for k in range(modes):
-            if k % 2 == 1:
-                cosine, sine = cosine * c - sine * s, sine * c + cosine * s
-                shapes[j, k] = cosine
-            elif k > 0:
-                shapes[j, k] = sine
-            else:
-                shapes[j, k] = 1.0
-            lean = lean + (leans[0, k] + driven * (leans[1, k] - leans[0, k])) * shapes[j, k]
+            lean = lean + of_pulley(leans[0, k], leans[1, k], driven) * shapes[j, k]
         lean = belt.cosine * lean
         for p in range(POINTS):
             step[j, FLANK_GAP + p] += lean if p >= 2 else -lean
@@ -123,7 +115,7 @@ def _prepare(belt, state, work, dt):
     if belt.pin_clearance < np.inf:
         predict_pins(belt, elements, step)
     predict_flanks(belt, elements, state.pulleys, step, dt)
-    _shapes(belt, elements, state.leans, step, work.shapes)
+    _open_sheaves(belt, elements, state.leans, step, work.shapes)
     linear_blocks(belt, step, dt)
 
 
@@ -154,7 +146,8 @@ def _assemble(belt, state, work, dt):
 @kernel
 def _close(belt, state, work, dt):
     """That of the border."""
-    border_system(belt, state.elements, work.shapes, work.iterate, work.blocks, work.sums, work.border, dt)
+    border_sums(belt, state.elements, work.shapes, work.iterate, work.blocks, work.sums)
+    close_border(belt, work.sums, work.border, dt)
 
 
 @register_jitable
@@ -253,14 +246,11 @@ def _accept(belt, state, work, inputs, dt):
     follow = dt / belt.lean_lag
     for k in range(2 * modes):
         pulley, mode = k // modes, k % modes
-        state.openings[pulley, mode] += state.increments[1 + k]
         target = work.scratch.data[0, loads.size + k, 0] / belt.modal_stiffness[pulley, mode]
         state.leans[pulley, mode] += follow * (target - state.leans[pulley, mode])
 
-    pulleys[DRIVEN_SPEED] += state.increments[0]
-    totals[TIME] += dt
     totals[WORK_IN] -= dt * loads[DRIVING_TORQUE] * pulleys[DRIVING_SPEED]
-    totals[WORK_OUT] += dt * inputs[IN_LOAD] * (pulleys[DRIVEN_SPEED] - 0.5 * state.increments[0])
+    accept_border(belt, state, inputs, dt)
     tangent = belt.sine / belt.cosine
     for pulley in range(2):
         left, right = loads[2 * pulley], loads[2 * pulley + 1]

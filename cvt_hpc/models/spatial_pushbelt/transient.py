@@ -32,7 +32,7 @@ class Transient(ElementRun):
     to the right.
     """
 
-    fields = belt
+    _contacts = belt.CONTACTS
     _channels = CHANNELS
     _profiles = tuple(PROFILES)
     _directions = (*STRANDS, *LATERAL)
