@@ -237,27 +237,28 @@ def test_how_far_out_of_line_the_faces_allow():
 
 
 def test_what_ends_a_run_is_recorded_and_the_sweep_goes_on(tmp_path):
-    """Slip of a whole pulley, a sheave at its stop, steps that are not solved: with time, contact and element."""
+    """Slip, a sheave at its stop, steps that are not solved, elements out of the rings: when, at what and which."""
     points = {
-        "load": [20.0, 300.0, 20.0, 20.0],
-        "thrust": [20e3, 20e3, 80e3, 20e3],
-        "power_tolerance": [5.0, 5.0, 5.0, 1e-9],  # [W]: the last is less than rounding leaves
+        "load": [20.0, 300.0, 20.0, 20.0, 20.0],
+        "thrust": [20e3, 20e3, 80e3, 20e3, 20e3],
+        "power_tolerance": [5.0, 5.0, 5.0, 1e-9, 5.0],  # [W]: one is less than rounding leaves
+        "disturbance": [1e-9, 1e-9, 1e-9, 1e-9, 0.01],  # [m]: one turns elements by half a radian
     }
     document = {
         "name": "ends",
         "model": "spatial_pushbelt",
-        "design": {"kind": "listed", "runs": 4},
+        "design": {"kind": "listed", "runs": 5},
         "axes": points,
     }
     loose = {"driving_thrust": 20e3, "sheave_rate": 2e-5, "flank_reach": 1e-3}
     faces = {"inner_radius": 0.045, "outer_radius": 0.065}
     short = {"most_refinements": 0, "longest_duration": 0.04}
     report = run(build_job(document, "ends.toml", BELT | loose | faces | short), tmp_path, progress=False)
-    assert report.done == 2 and len(report.failed) == 2
+    assert report.done == 2 and len(report.failed) == 3
     with open_results(report.results) as results:
         statuses, verdicts, reasons = (results[name].values for name in ("status", "vibrates", "reason"))
     failed = Status.FAILED_NUMERICS
-    assert statuses.tolist() == [Status.DONE, Status.DONE, failed, failed]
+    assert statuses.tolist() == [Status.DONE, Status.DONE, failed, failed, failed]
     assert verdicts[0] != Vibrates.SLIPS == verdicts[1]
     for reason, expected in zip(
         reasons[1:],
@@ -265,6 +266,7 @@ def test_what_ends_a_run_is_recorded_and_the_sweep_goes_on(tmp_path):
             "the belt slips through: the driven pulley has lost 50% of its speed",
             "the driven sheave has run to its stop: a pitch radius of 0.065",
             r"[\d.]+% of the steps were not solved, the last at the (flank|edge|head|ring|pin).* contact of element \d+$",
+            r"element \d+ has left the rings: its (roll|yaw) is 0\.\d+ rad$",
         ),
         strict=True,
     ):
