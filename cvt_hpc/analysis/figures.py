@@ -67,8 +67,8 @@ _DISPLAY_UNITS = {
     "rad": (180 / 3.141592653589793, "°"),
     "1": (1.0, ""),
 }
-
-
+_POWER = re.compile(r"([A-Za-z]+)(-?)(\d?)")
+_RAISED = str.maketrans("23456789", "²³⁴⁵⁶⁷⁸⁹")
 # largest value below which a smaller unit is shown [SI], with its factor
 _SMALL = {"m": (1e-4, (1e6, "µm")), "rad": (0.1, (1e3, "mrad")), "N": (500.0, (1.0, "N"))}
 
@@ -76,7 +76,20 @@ _SMALL = {"m": (1e-4, (1e6, "µm")), "rad": (0.1, (1e3, "mrad")), "N": (500.0, (
 def display_unit(unit: str) -> tuple[float, str]:
     """Factor and unit in which a quantity with this SI unit is shown: ("N") -> (1e-3, "kN")."""
     known = _DISPLAY_UNITS.get(unit.replace("rad/s", "rad s-1"))
-    return known if known is not None else (1.0, unit.replace("s m-1", "s/m").replace("N m-1", "N/m"))
+    return known if known is not None else (1.0, _as_fraction(unit))
+
+
+def _as_fraction(unit: str) -> str:
+    """A product of powers as a fraction: "N s m-2" as "N s/m²"; what is none, or has no power, as it is."""
+    factors = [_POWER.fullmatch(factor) for factor in unit.split()]
+    if None in factors or "-" not in unit:
+        return unit
+    above: list[str] = []
+    below: list[str] = []
+    for symbol, sign, power in (factor.groups() for factor in factors if factor):
+        (below if sign else above).append(symbol + power.replace("1", "").translate(_RAISED))
+    divisor = f"({' '.join(below)})" if len(below) > 1 else "".join(below)
+    return f"{' '.join(above) or '1'}/{divisor}"
 
 
 def value_unit(array: xr.DataArray) -> tuple[float, str]:
@@ -93,7 +106,8 @@ def coordinate_unit(attributes: Mapping[str, Any]) -> tuple[float, str]:
     """Factor and unit in which a coordinate is shown: those of the job where it names one."""
     if JOB_UNITS not in attributes:
         return display_unit(str(attributes.get("units", "")))
-    return shown_number(1.0, attributes), shown_unit(attributes)
+    unit = shown_unit(attributes)
+    return shown_number(1.0, attributes), f"µ{unit[1:]}" if unit in ("um", "us") else unit
 
 
 def in_words(array: xr.DataArray) -> str:

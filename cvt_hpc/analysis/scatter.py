@@ -66,7 +66,7 @@ def scatter_figure(
     if np.isfinite(amplitude).any():
         cells.colour_bar(figure, scale, amplitude, ax=panels, pad=0.02)
     title = [headline(dataset.attrs), f"{classes.size} samples: {count_classes(classes)}"]
-    names = _axes(dataset)
+    names = sample_axes(dataset)
     if len(names) > MOST_AXES:
         title.append(f"the first {MOST_AXES} of {len(names)} axes")
     figure.suptitle("\n".join(fill(line, 72) for line in title))
@@ -117,14 +117,15 @@ def draw_samples(
     return panels
 
 
-def _axes(dataset: xr.Dataset) -> list[str]:
+def sample_axes(dataset: xr.Dataset) -> list[str]:
+    """Names of the axes of a sampled study, those that lie along x and y first."""
     along = {str(name): array for name, array in dataset.coords.items() if array.dims == ("run",)}
     names = [name for name, array in along.items() if "derived" not in array.attrs]
     return sorted(names, key=lambda name: _FIRST.index(name) if name in _FIRST else len(_FIRST))
 
 
 def _pairs(dataset: xr.Dataset) -> list[tuple[str, str | None]]:
-    names = _axes(dataset)[:MOST_AXES]
+    names = sample_axes(dataset)[:MOST_AXES]
     return list(combinations(names, 2)) or [(names[0], None)]
 
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.arrangement import Arrangement, infinity_in_words, value_text
+from cvt_hpc.analysis.arrangement import infinity_in_words, value_text
 from cvt_hpc.analysis.classes import (
     OccurrenceClass,
     at_strongest_strand,
@@ -19,17 +20,72 @@ from cvt_hpc.analysis.classes import (
     occurrence_classes,
 )
 from cvt_hpc.analysis.figures import coordinate_unit, in_words
+from cvt_hpc.analysis.scatter import is_sampled
+from cvt_hpc.report.quantities import OF_COMPUTATION, length_unit, quantities
 from cvt_hpc.variables import Status
+from cvt_hpc.vibration.classes import DECIDED
 from cvt_hpc.vibration.onsets import levels, onsets
 
 MOST_LINES = 12  # lines of the map that are told apart
-_STATUS = {int(status): status.name.lower() for status in Status}
+MOST_RANGES = 6  # quantities
+NARROW = 1.05  # largest over least frequency of a line that are told apart
+STATUS = {int(status): status.name.lower() for status in Status}
 
 
 def summary(dataset: xr.Dataset) -> str:
-    """Return how many runs there are, of which classes."""
-    classes = occurrence_classes(dataset).values
-    return f"{counted(classes.size, 'run')}: {count_classes(classes)}."
+    """Return how many runs there are, of which classes; of a trace also how many cells are inferred."""
+    runs = occurrence_classes(dataset).values
+    if not is_judged(dataset):
+        return (
+            f"{counted(runs.size, 'run')}: {count_classes(runs)}. No run is known to be quiet or to vibrate."
+        )
+    if "inferred_class" not in dataset:
+        return f"{counted(runs.size, 'run')}: {count_classes(runs)}."
+    inferred = map_classes(dataset).values[runs != map_classes(dataset).values]
+    known = runs[runs != OccurrenceClass.NOT_RUN]
+    text = f"{counted(known.size, 'run')}: {count_classes(known)}."
+    return (
+        f"{text} {counted(inferred.size, 'cell')} inferred: {count_classes(inferred)}."
+        if inferred.size
+        else text
+    )
+
+
+def is_judged(dataset: xr.Dataset) -> bool:
+    """Return whether any run was judged: is quiet, vibrates, slips or moves irregularly."""
+    return bool(np.isin(map_classes(dataset).values, DECIDED).any())
+
+
+def range_sentences(dataset: xr.Dataset) -> Iterator[str]:
+    """Yield for the first quantities of a study that judges no vibration, how far they range."""
+    dims = list(map(str, dataset["status"].dims))
+    told = (one for one in quantities(dataset) if one.key not in OF_COMPUTATION)
+    for one in islice(told, MOST_RANGES):
+        known = np.where(np.isfinite(one.values) & (dataset["status"] == Status.DONE), one.values, np.nan)
+        if np.isnan(known).all():
+            continue
+        ends = [_number(value) for value in (np.nanmin(known), np.nanmax(known))]
+        unit = f" {one.unit}" if one.unit else ""
+        place = ""
+        if not is_sampled(dataset):
+            place = f", largest at {_place(dataset, dims, int(np.nanargmax(known)))}"
+        yield f"{one.name[:1].upper()}{one.name[1:]}: from {ends[0]} to {ends[1]}{unit}{place}."
+
+
+def slip_sentence(dataset: xr.Dataset, x: str) -> str:
+    """Return how many runs slip, and from where on x on; "" where none does."""
+    slipping = map_classes(dataset) == OccurrenceClass.SLIPPING
+    count = int(slipping.sum())
+    if not count:
+        return ""
+    other = [dim for dim in slipping.dims if dim != x]
+    lowest = int(np.argmax(slipping.any(other).values))
+    least = (
+        f", the first at {in_words(dataset[x])} {value_text(dataset[x], lowest)}"
+        if _is_number(dataset[x])
+        else ""
+    )
+    return f"The belt slips or lifts off in {counted(count, 'run')}{least}."
 
 
 def counted(count: int, noun: str) -> str:
@@ -37,26 +93,25 @@ def counted(count: int, noun: str) -> str:
     return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
-def window_sentences(arrangement: Arrangement) -> Iterator[str]:
-    """Yield for each line of a map along x, which windows of it vibrate, how far and at which frequency.
+def window_sentences(dataset: xr.Dataset, x: str, others: Sequence[str]) -> Iterator[str]:
+    """Yield for each line of a study along x, which windows of it vibrate, how far and at which frequency.
 
-    A line is called quiet only if all of its cells are.
+    A line is called quiet only if all of its cells are. `others` are all other axes of the study.
     """
-    dataset, x = arrangement.dataset, arrangement.x
-    if dataset[x].dtype.kind not in "iuf":
+    if not _is_number(dataset[x]):
         return
     decided = np.isfinite(levels(map_classes(dataset).values))
     if not decided.any():
-        yield "No run is known to be quiet or to vibrate."
         return
-    others = [name for name in (arrangement.panel, arrangement.y) if name]
+    dataset = dataset.sortby([name for name in (x, *others) if _is_number(dataset[name])])
     stacked = dataset.stack(line=others) if others else dataset.expand_dims("line")
     lines = [stacked.isel(line=k) for k in range(stacked.sizes["line"])]
     told = [_line(line, x, _place(dataset, others, k)) for k, line in enumerate(lines)]
     vibrating = [text for text in told if text]
     yield from islice(vibrating, MOST_LINES)
     if (more := len(vibrating) - MOST_LINES) > 0:
-        yield f"{counted(more, 'more line')} of the map {'vibrates' if more == 1 else 'vibrate'}."
+        verb = "vibrates" if more == 1 else "vibrate"
+        yield f"{counted(more, 'more line')} along {in_words(dataset[x])} {verb}."
     rest = [line for line, text in zip(lines, told, strict=True) if not text]
     quiet = sum(bool(np.all(map_classes(line) == OccurrenceClass.QUIET)) for line in rest)
     along = f"of {len(lines)} lines along {in_words(dataset[x])}" if len(lines) > 1 else ""
@@ -67,13 +122,13 @@ def window_sentences(arrangement: Arrangement) -> Iterator[str]:
         yield f"{start} run is known to vibrate, but not all are known to be quiet."
 
 
-def _place(dataset: xr.Dataset, names: list[str], index: int) -> str:
+def _place(dataset: xr.Dataset, names: Sequence[str], index: int) -> str:
     places = np.unravel_index(index, [dataset.sizes[name] for name in names]) if names else ()
-    at = (
+    at = [
         f"{in_words(dataset[name])} {value_text(dataset[name], int(place))}"
         for name, place in zip(names, places, strict=True)
-    )
-    return " and ".join(at)
+    ]
+    return " and ".join(filter(None, (", ".join(at[:-1]), *at[-1:])))
 
 
 def _line(line: xr.Dataset, x: str, place: str) -> str:
@@ -86,14 +141,18 @@ def _line(line: xr.Dataset, x: str, place: str) -> str:
     windows = _windows(line[x], level)
     last = level[np.argmax(line[x].values)]
     windows += ", as far as is decided" if windows.endswith(" on") and np.isnan(last) else ""
-    start = f"At {place} the belt" if place else "The belt"
-    text = f"{start} vibrates {windows}"
+    start = f"At {place} there is" if place else "There is"
+    text = f"{start} vibration {windows}"
     amplitude = np.where(vibrating, at_strongest_strand(line, "amplitude").values, np.nan)
     if np.isfinite(amplitude).any():
         largest = int(np.nanargmax(amplitude))
-        frequency = at_strongest_strand(line, "frequency").values[largest]
-        text += f", most at {value_text(line[x], largest)}: {1e6 * amplitude[largest]:.3g} µm"
-        text += f" at {frequency:.0f} Hz" if np.isfinite(frequency) else ""
+        factor, unit = length_unit(amplitude[largest])
+        frequencies = np.where(vibrating, at_strongest_strand(line, "frequency").values, np.nan)
+        text += f", most at {value_text(line[x], largest)}: {factor * amplitude[largest]:.3g} {unit}"
+        if np.isfinite(frequencies[largest]):
+            text += f" at {frequencies[largest]:.0f} Hz"
+        if np.nanmax(frequencies, initial=0.0) > NARROW * np.nanmin(frequencies, initial=np.inf):
+            text += f"; frequencies from {np.nanmin(frequencies):.0f} to {np.nanmax(frequencies):.0f} Hz"
     return text + "."
 
 
@@ -106,7 +165,7 @@ def _windows(axis: xr.DataArray, level: NDArray[np.float64]) -> str:
 
     def at(value: float) -> str:
         if np.isfinite(value):
-            return f"{factor * value:.4g}".replace("-", "−")
+            return _number(factor * value)
         return f"a value between {factor * last:.4g} and {infinity_in_words(str(axis.name))}"
 
     parts = []
@@ -121,28 +180,53 @@ def _windows(axis: xr.DataArray, level: NDArray[np.float64]) -> str:
             start = ""
     if start:
         parts.append(f"from {start}{behind} on")
+    if len(parts) > 1 and np.isfinite(level).all():
+        return f"{' and '.join(parts)}, quiet between"
     everywhere = "in all runs" if np.isfinite(level).all() else "in all runs that are decided"
     return " and ".join(parts) or everywhere
 
 
-def failures(dataset: xr.Dataset) -> list[tuple[str, str, int]]:
-    """Return status, reason and number of the runs that failed, the most frequent first.
+class Failure(NamedTuple):
+    """Runs that failed alike: status, how many, reason and place of the first."""
+
+    status: str
+    runs: int
+    reason: str
+    place: str
+
+
+def failures(dataset: xr.Dataset) -> list[Failure]:
+    """Return how the runs failed, the most frequent first.
 
     Numbers within reasons are passed over, so that runs that failed alike count together.
     """
+    dims = list(map(str, dataset["status"].dims))
     status = dataset["status"].values.ravel()
     failed = np.flatnonzero((status != Status.DONE) & (status != Status.NOT_RUN) & np.isfinite(status))
     if not failed.size:
         return []
     reasons = dataset["reason"].values.ravel()[failed] if "reason" in dataset else [""] * failed.size
-    alike: dict[tuple[str, str], str] = {}
+    alike: dict[tuple[str, str], tuple[str, int]] = {}
     numbers: Counter[tuple[str, str]] = Counter()
     for index, reason in zip(failed, map(str, reasons), strict=True):
-        kind = _STATUS.get(int(status[index]), "failed"), _without_numbers(reason)
-        alike.setdefault(kind, reason)
+        kind = STATUS.get(int(status[index]), "failed"), _without_numbers(reason)
+        alike.setdefault(kind, (reason, int(index)))
         numbers[kind] += 1
-    return [(kind[0], alike[kind], count) for kind, count in numbers.most_common()]
+    found = []
+    for kind, count in numbers.most_common():
+        reason, first = alike[kind]
+        place = f"run {first}" if is_sampled(dataset) else _place(dataset, dims, first)
+        found.append(Failure(kind[0], count, reason, place))
+    return found
 
 
 def _without_numbers(reason: str) -> str:
     return "".join(letter for letter in reason if not letter.isdigit())
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}".replace("-", "−")
+
+
+def _is_number(axis: xr.DataArray) -> bool:
+    return axis.dtype.kind in "iuf"

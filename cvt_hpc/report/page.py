@@ -5,30 +5,56 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Mapping
+from importlib import resources
 from io import BytesIO
+from itertools import islice, product
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import jinja2
 import numpy as np
 import xarray as xr
+from markupsafe import Markup
 
-from cvt_hpc.analysis.arrangement import Arrangement, arrange, known_values, value_text
+from cvt_hpc.analysis.arrangement import Arrangement, Sides, arrange, known_values, value_text
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.figures import RESOLUTION
-from cvt_hpc.analysis.maps import map_figure, sheet_of
+from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.analysis.scatter import is_sampled
+from cvt_hpc.analysis.starts import AXIS, has_starts
+from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import InputError, mismatch, one_line
 from cvt_hpc.files import written_aside
 from cvt_hpc.job import Job, rebuild_job
 from cvt_hpc.job.summary import core_time_in_words, rules_in_words, value_in_words
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.netcdf import CONTENT, HISTORY
-from cvt_hpc.report.findings import counted, failures, summary, window_sentences
+from cvt_hpc.report.advice import next_steps
+from cvt_hpc.report.findings import (
+    counted,
+    failures,
+    is_judged,
+    range_sentences,
+    slip_sentence,
+    summary,
+    window_sentences,
+)
+from cvt_hpc.report.interactive import as_script, map_data
+from cvt_hpc.report.quantities import quantities
 
 MOST_FAILURES = 30  # kinds of failure in the table
+MOST_MAPS = 12  # of combinations of the axes that no map has room for
+MOST_VALUE_MAPS = 2  # quantities in a picture, of a study that judges no vibration
 # What tells how well a run was computed, where its model records it
 _QUALITY = ("power_residual", "step_ripple", "refinements", "time_step", "simulated_seconds", "core_seconds")
+
+
+class Picture(NamedTuple):
+    """A printed map: what is fixed and what came out there, and the PNG in base64."""
+
+    heading: str
+    summary: str
+    picture: str
 
 
 class Row(NamedTuple):
@@ -56,7 +82,7 @@ def write_report(dataset: xr.Dataset, out: Path, source: str = "results") -> Pat
     -------
     Path
         `out`. The page needs no network: the plotting library, which draws the map with the values of its
-        cells, is in it, and the printed map for browsers without scripts.
+        cells, is in it, and pictures of the maps for paper and for browsers without scripts.
 
     Raises
     ------
@@ -79,7 +105,19 @@ def _content(dataset: xr.Dataset, source: str) -> dict[str, Any]:
     arrangement = _arrangement(dataset, source)
     found = failures(dataset)
     parameters = _parameters(job) if job else {}
-    sentences = list(window_sentences(arrangement)) if arrangement else []
+    sentences: list[str] = []
+    beyond: list[str] = []
+    judged, x = is_judged(dataset), None
+    if arrangement:
+        axes = [name for name in (arrangement.panel, arrangement.y) if name]
+        beyond = [name for name in map(str, dataset["status"].dims) if name not in (arrangement.x, *axes)]
+        x = arrangement.x if dataset[arrangement.x].dtype.kind in "iuf" else None
+        if judged:
+            sentences = list(window_sentences(dataset, arrangement.x, [*beyond, *axes]))
+            sentences += filter(None, [slip_sentence(dataset, arrangement.x)])
+    if not judged:
+        sentences = list(range_sentences(dataset))
+    combinations = int(np.prod([dataset.sizes[name] for name in beyond]))
     return {
         "name": one_line(attributes.get("job_name", source)),
         "description": attributes.get("title", ""),
@@ -87,12 +125,15 @@ def _content(dataset: xr.Dataset, source: str) -> dict[str, Any]:
         "axes": _axes(dataset, job),
         "summary": summary(dataset),
         "sentences": sentences,
-        "windows": any("vibrates from" in line or "vibrates up to" in line for line in sentences),
-        "notes": arrangement.notes if arrangement else (),
-        "picture": _picture(dataset, source),
-        "interactive": _interactive(arrangement),
+        "windows": any("vibration from" in line or "vibration up to" in line for line in sentences),
+        "next_steps": list(map(_with_code, next_steps(dataset, job, x))),
+        "has_lines": "eigenfrequency" in dataset and "amplitude" not in dataset,
+        "map": _map(dataset, source),
+        "pictures": _pictures(dataset, arrangement, beyond, source),
+        "not_drawn": max(0, combinations - MOST_MAPS),
+        "beyond": " and ".join(beyond),
         "failures": found[:MOST_FAILURES],
-        "failed": counted(sum(count for *_, count in found), "run"),
+        "failed": counted(sum(one.runs for one in found), "run"),
         "cost": _cost(dataset),
         "quality": _quality(dataset),
         "parameters": parameters,
@@ -117,6 +158,26 @@ def _arrangement(dataset: xr.Dataset, source: str) -> Arrangement | None:
     return arrange(dataset, {}, source)
 
 
+def _pictures(
+    dataset: xr.Dataset, arrangement: Arrangement | None, beyond: list[str], source: str
+) -> list[Picture]:
+    """One printed map, or one for each of the first combinations of the axes beyond x, y and panels."""
+    if arrangement is None or not beyond:
+        pictures = [Picture("", "", _picture(dataset, {}, source))]
+    else:
+        pictures = []
+        if beyond == [AXIS] and has_starts(dataset, {}):
+            heading = "Smallest and largest disturbance in one"
+            pictures.append(Picture(heading, "", _picture(dataset, {}, source)))
+        sides = Sides(arrangement.x, arrangement.y, arrangement.panel)
+        for place in islice(product(*(dataset[name].values.tolist() for name in beyond)), MOST_MAPS):
+            at = dict(zip(beyond, place, strict=True))
+            part = arrange(dataset, at, source, sides)
+            found = summary(part.dataset)
+            pictures.append(Picture("; ".join(part.notes), found, _picture(dataset, at, source)))
+    return [one for one in pictures if one.picture]
+
+
 def _axes(dataset: xr.Dataset, job: Job | None) -> list[tuple[str, str, str]]:
     """Name, meaning and values of each axis, in the units of the job; of an axis that is fixed its value."""
     dims = set(dataset["status"].dims)
@@ -138,10 +199,15 @@ def _axes(dataset: xr.Dataset, job: Job | None) -> list[tuple[str, str, str]]:
     return rows
 
 
-def _picture(dataset: xr.Dataset, source: str) -> str:
-    """The printed map as a PNG in base64; "" where there is nothing to draw."""
+def _picture(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> str:
+    """The printed map as a PNG in base64; "" where there is nothing to draw.
+
+    It shows quantities where nothing was judged.
+    """
+    shown = () if is_judged(dataset) else dict.fromkeys(one.key for one in quantities(dataset))
+    drawn = [key for key in shown if dataset[key].dtype.kind in "iuf"][:MOST_VALUE_MAPS]
     try:
-        figure = map_figure(dataset, {}, source)
+        figure = value_map_figure(dataset, drawn, at, source) if drawn else map_figure(dataset, at, source)
     except InputError:
         return ""
     buffer = BytesIO()
@@ -149,28 +215,22 @@ def _picture(dataset: xr.Dataset, source: str) -> str:
     return base64.b64encode(buffer.getvalue()).decode()
 
 
-def _interactive(arrangement: Arrangement | None) -> str:
-    """The map with values, as HTML with the plotting library; "" where it has too many panels, or none."""
-    from cvt_hpc.report.interactive import MOST_PANELS, map_with_values
+def _with_code(text: str) -> Markup:
+    """A text as HTML, with what stands between backticks as code."""
+    parts = [
+        Markup("<code>{}</code>" if k % 2 else "{}").format(part) for k, part in enumerate(text.split("`"))
+    ]
+    return Markup("").join(parts)
 
-    if (
-        arrangement is None
-        or "eigenfrequency" in arrangement.dataset
-        and "amplitude" not in arrangement.dataset
-    ):
-        return ""
-    sheet = sheet_of(arrangement)
-    if sheet.panels > MOST_PANELS:
-        return ""
-    settings = {
-        "responsive": True,
-        "displaylogo": False,
-        "modeBarButtonsToRemove": ["select2d", "lasso2d"],
-        "showSendToCloud": False,  # the library's default is a button that uploads the map
-    }
-    return map_with_values(sheet).to_html(
-        full_html=False, include_plotlyjs=True, div_id="map", config=settings
-    )
+
+def _map(dataset: xr.Dataset, source: str) -> dict[str, str] | None:
+    """What a browser draws the map of: plotting library, numbers and program; None of single runs."""
+    if not dataset["status"].dims:
+        return None
+    from plotly.offline import get_plotlyjs  # long to load
+
+    program = resources.files("cvt_hpc.report").joinpath("map.js").read_text(encoding="utf-8")
+    return {"library": get_plotlyjs(), "numbers": as_script(map_data(dataset, source)), "program": program}
 
 
 def _cost(dataset: xr.Dataset) -> str:

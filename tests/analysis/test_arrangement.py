@@ -129,7 +129,9 @@ def test_of_many_values_the_error_names_a_few():
         ("m", 0.155, "155 mm"),
         ("s", 3e-4, "0.3 ms"),
         ("1", 1.5, "1.5"),
-        ("N m rad-1", 4e5, "400000 N m rad-1"),
+        ("N m rad-1", 4e5, "400000 N m/rad"),
+        ("N s m-2", 5.0, "5 N s/m²"),
+        ("s-1", 2.0, "2 1/s"),
     ],
 )
 def test_values_are_shown_in_units_for_people(unit, value, shown):

@@ -1,5 +1,7 @@
 """Runs of the spatial pushbelt, as a job asks for them."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ from cvt_hpc.models.spatial_pushbelt.record import histories, judge
 from cvt_hpc.models.spatial_pushbelt.transient import Transient, given
 from cvt_hpc.physics.out_of_plane import axial_offset, clamped_force
 from cvt_hpc.simulation import run_point, simulate
+from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.variator.path import regions
 
@@ -69,6 +72,19 @@ def test_both_pulleys_take_the_lateral_force_of_misaligned_strands(misaligned):
     assert abs(found["power_residual"]) < 1e-3
     # the slopes of the strand are those of the elements, which yaw with it
     assert 0.5 * 1.5 * OFFSET / strand < found["largest_yaw"] < 3.0 * 1.5 * OFFSET / strand
+
+
+@pytest.mark.parametrize(
+    "values",
+    [{"load": 0.0}, {"friction_gradient": -0.3, "friction_memory": 3e-4}, {"sheave_stiffness": 1.0}],
+    ids=["no load", "falling friction", "elastic sheaves"],
+)
+def test_power_and_axial_forces_are_balanced_at_any_point(values):
+    found = record(misalignment=OFFSET, **values)
+    assert found["status"] == Status.DONE
+    driving, driven = found["net_axial_force"]
+    assert driving > 80.0 and driving == pytest.approx(-driven, rel=0.01)
+    assert abs(found["power_residual"]) < 3e-3
 
 
 def test_the_loose_sheave_has_the_thrust(misaligned):
@@ -201,6 +217,62 @@ def test_the_longest_step_is_that_of_the_strand_or_of_roll():
     )
 
 
+def test_how_far_out_of_line_the_faces_allow():
+    """A flank out of line by e meets its sheave e / tan d0 further out; faces not given reach an element's height."""
+    tangent, loose = np.tan(np.radians(11.0)), {"elements": 216, "band_high": 600.0, "belt_length": 0.6612}
+    faces = {"inner_radius": 0.03, "outer_radius": 0.063896 + 3e-3 + 1e-3 / tangent}
+    for most, given_faces in ((tangent * 10e-3, {}), (1e-3, faces)):
+        job(misalignment=0.999 * most, **given_faces)
+        with pytest.raises(InputError, match=r"misalignment: expected at most .* found 0.00"):
+            job(misalignment=-1.001 * most, **given_faces)
+    # what follows from the ratio at which pulleys are aligned, and from ratios that a run comes to
+    with pytest.raises(
+        InputError, match="aligned_ratio: expected at most 0.000603 m of offset.* found 0.000852 m"
+    ):
+        job(ratio=2.5, aligned_ratio=1.0, element_height=6.1e-3, **loose)
+    turned = {"profile_time": [0.01, 0.02], "ratio_profile": [1.0, 2.5], "element_height": 6.1e-3, **loose}
+    with pytest.raises(InputError, match=r"misalignment: expected at most 0.000603 m.* at a ratio of 2.5"):
+        job(ratio=1.0, **turned)
+    job(ratio=1.0, misalignment=4e-4, **turned)
+
+
+def test_what_ends_a_run_is_recorded_and_the_sweep_goes_on(tmp_path):
+    """Slip, a sheave at its stop, steps that are not solved, elements out of the rings: when, at what and which."""
+    points = {
+        "load": [20.0, 300.0, 20.0, 20.0, 20.0],
+        "thrust": [20e3, 20e3, 80e3, 20e3, 20e3],
+        "power_tolerance": [5.0, 5.0, 5.0, 1e-9, 5.0],  # [W]: one is less than rounding leaves
+        "disturbance": [1e-9, 1e-9, 1e-9, 1e-9, 0.01],  # [m]: one turns elements by half a radian
+    }
+    document = {
+        "name": "ends",
+        "model": "spatial_pushbelt",
+        "design": {"kind": "listed", "runs": 5},
+        "axes": points,
+    }
+    loose = {"driving_thrust": 20e3, "sheave_rate": 2e-5, "flank_reach": 1e-3}
+    faces = {"inner_radius": 0.045, "outer_radius": 0.065}
+    short = {"most_refinements": 0, "longest_duration": 0.04}
+    report = run(build_job(document, "ends.toml", BELT | loose | faces | short), tmp_path, progress=False)
+    assert report.done == 2 and len(report.failed) == 3
+    with open_results(report.results) as results:
+        statuses, verdicts, reasons = (results[name].values for name in ("status", "vibrates", "reason"))
+    failed = Status.FAILED_NUMERICS
+    assert statuses.tolist() == [Status.DONE, Status.DONE, failed, failed, failed]
+    assert verdicts[0] != Vibrates.SLIPS == verdicts[1]
+    for reason, expected in zip(
+        reasons[1:],
+        (
+            "the belt slips through: the driven pulley has lost 50% of its speed",
+            "the driven sheave has run to its stop: a pitch radius of 0.065",
+            r"[\d.]+% of the steps were not solved, the last at the (flank|edge|head|ring|pin).* contact of element \d+$",
+            r"element \d+ has left the rings: its (roll|yaw) is 0\.\d+ rad$",
+        ),
+        strict=True,
+    ):
+        assert re.match(rf"at [\d.]+ ms: {expected}", reason), reason
+
+
 @pytest.mark.parametrize(
     ("values", "complaint"),
     [
@@ -209,7 +281,14 @@ def test_the_longest_step_is_that_of_the_strand_or_of_roll():
         ("scene.belt_length=300 mm", "[scene] belt_length: expected more than 0.31 m, twice the centre distance"),
         ("scene.ratio=0.3", "[scene] ratio: expected pulleys that do not overlap"),
         ("sheaves.outer_radius=60 mm", "[scene] ratio: expected radii within the sheaves, 0 to 0.06 m, found 1.35"),
-        ("scene.misalignment=8.7 mm", "[scene] misalignment: expected at most 0.00862 m, so that flanks meet the sheaves"),
+        ("belt.thickness=7 mm", "[belt] thickness: expected 0.00629714 to 0.00635769 m, so that the elements fit"),
+        ("belt.thickness=6.2 mm", "[belt] thickness: expected 0.00629714 to 0.00635769 m, so that the elements fit"),
+        ("scene.misalignment=5 mm", "[scene] misalignment: expected at most 0.00194 m of offset, so that flanks meet the sheaves' faces, an element's"),
+        ("scene.misalignment=-2 mm", "[scene] misalignment: expected at most 0.00194 m of offset"),
+        ("belt.flank_reach=7 mm", "[belt] flank_reach: expected at most half of element_height, 0.0065 m, found 0.007 m"),
+        ("sheaves.outer_radius=65 mm", "[belt] flank_reach: expected at most 0.0011 m, so that flanks meet the sheaves' faces, found"),
+        ("sheaves.half_wedge_angle=11", '[sheaves] half_wedge_angle: expected >= 0.0872665 and <= 0.349066 rad, found 11; did you mean "11 deg"?'),
+        ("scene.misalignment=11 mm", "[scene] misalignment: expected >= -10 and <= 10 mm, found"),
         ("scene.axis_tilt=25 mrad", "[scene] axis_tilt: expected >= -20 and <= 20 mrad, found"),
         ("scene.misalinment=1 mm", "[scene] misalinment: unknown key; did you mean misalignment?"),
         ("belt.nose_clearance=-0.1 mm", "[belt] nose_clearance: expected >= 0 mm, found"),
@@ -219,11 +298,18 @@ def test_the_longest_step_is_that_of_the_strand_or_of_roll():
         ("belt.edge_half_width=13 mm", "[belt] edge_half_width: expected at most half of element_width, 0.012 m, found"),
         ("sheaves.half_wedge_angle=4 deg", "[sheaves] half_wedge_angle: expected >= 5 and <= 20 deg, found"),
         ("sheaves.half_wedge_angle=21 deg", "[sheaves] half_wedge_angle: expected >= 5 and <= 20 deg, found"),
+        ("sheaves.driven_loose_side=lef", '[sheaves] driven_loose_side: expected one of left, right, both, found "lef"; did you mean left?'),
+        ("sheaves.driven_lose_side=left", "[sheaves] driven_lose_side: unknown key; did you mean driven_loose_side?"),
         ("sheaves.driving_loose_side=top", '[sheaves] driving_loose_side: expected one of left, right, both, found "top"'),
         ("belt.elements=60", "[belt] elements: expected 100 or more, or coarse = true, found 60"),
         ("numerics.step=1 ms", "[numerics] step: expected at most 0.000122 s, pitch over the speed of transverse"),
         ("numerics.step=0.121 ms", "[numerics] step: expected at most 0.000121 s, pitch over the speed of torsional"),
-        ("friction.friction_gradient=-80 s/m", "[numerics] step: expected at most"),
+        ("friction.friction_gradient=-80 s/m", "[numerics] step: expected at most 3.96e-06 s, beyond which friction that falls so steeply has several"),
+        ("friction.stribeck_velocity=0 m/s", "[friction] stribeck_velocity: expected > 0 m/s, found"),
+        ("friction.kinetic_friction=-0.1", "[friction] kinetic_friction: expected > 0, found -0.1"),
+        ("sheaves.flank_stiffness=-1 N/m^2", "[sheaves] flank_stiffness: expected > 0 N/m^2, found"),
+        ("belt.nose_stiffness=-1 N/m", "[belt] nose_stiffness: expected > 0 N/m, found"),
+        ("belt.ring_mass=-1 kg/m", "[belt] ring_mass: expected > 0 kg/m, found"),
     ],
 )  # fmt: skip
 def test_bad_input_is_told_in_a_line_and_nothing_is_computed(
@@ -233,7 +319,7 @@ def test_bad_input_is_told_in_a_line_and_nothing_is_computed(
     table, assignment = values.split(".", 1)
     key, value = assignment.split("=")
     text = {"belt": {"elements": 104}, "vibration": {"band_high": 1000}}
-    number = value.replace(".", "").isdigit()
+    number = value.lstrip("-").replace(".", "").isdigit()
     text.setdefault(table, {})[key] = value if not number else float(value) if "." in value else int(value)
     lines = ['name = "x"', 'model = "spatial_pushbelt"']
     for name, entries in text.items():

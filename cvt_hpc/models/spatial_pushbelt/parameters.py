@@ -194,11 +194,10 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     """
     p = parameters
     problems = pushbelt.check(p)
-    half = 0.5 * p["element_width"]
-    for key in ("edge_half_width", "head_half_width", "package_offset"):
-        if p[key] > half:
-            expected = f"at most half of element_width, {half:g} m"
-            problems.append((key, expected, f"{p[key]:g} m"))
+    widths = dict.fromkeys(("edge_half_width", "head_half_width", "package_offset"), "element_width")
+    for key, of in (*widths.items(), ("flank_reach", "element_height")):
+        if p[key] > 0.5 * p[of]:
+            problems.append((key, f"at most half of {of}, {0.5 * p[of]:g} m", f"{p[key]:g} m"))
     if problems:
         return problems
     step, limit = p.get("step", 0.0), roll_limit(p)
@@ -211,19 +210,40 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
 
 
 def _off_the_cone(p: Mapping[str, Any], ratio: float) -> list[tuple[str, str, str]]:
-    """Whether an element that enters out of line would miss the sheaves' faces at a ratio."""
+    """Whether an element that enters out of line would miss the sheaves' faces at a ratio.
+
+    A flank out of line by e meets its sheave e / tan d0 further out, or in. Where the job does not say how
+    far the faces reach, they are taken to do so by an element's height beyond the radii of the belt.
+    """
     driven = pushbelt.driven_radius(ratio, pushbelt.path_length(p), p["centre_distance"])
-    radii = driven / ratio, driven
-    # a flank out of line by e meets its sheave e / tan d0 further out, or in
-    room = min(min(radii) - p["inner_radius"], p["outer_radius"] - max(radii))
+    radii, height = (driven / ratio, driven), p["element_height"]
+    inside = min(radii) - p["inner_radius"] if p["inner_radius"] > 0.0 else height
+    outside = p["outer_radius"] - max(radii) if np.isfinite(p["outer_radius"]) else height
+    room = min(inside, outside)
     most = np.tan(p["half_wedge_angle"]) * (room - p["flank_reach"])
-    reach = 0.5 * p["centre_distance"] * np.hypot(p["axis_tilt"], p["axis_skew"])
-    for key, found in (("misalignment", abs(p["misalignment"])), ("axis_tilt", reach)):
-        if found > most:
-            what = "" if key == "misalignment" else " of offset by tilt and skew"
-            expected = f"at most {max(most, 0.0):.3g} m{what}, so that flanks meet the sheaves' faces"
-            return [(key, expected, f"{found:.3g} m")]
-    return []
+    # loose sheaves take the mid planes along where the ratio changes in a run
+    moved = axial_offset({**p, "ratio": ratio, "driven_radius": driven}, p["ratio"])
+    offset = abs(p["misalignment"] + (moved if ratio != p["ratio"] else 0.0))
+    tilted = 0.5 * p["centre_distance"] * np.hypot(p["axis_tilt"], p["axis_skew"])
+    of_offset = "misalignment" if p.get("aligned_ratio") is None else "aligned_ratio"
+    found = {
+        "flank_reach": (p["flank_reach"], room, ""),
+        of_offset: (offset, most, " of offset"),
+        "axis_tilt": (tilted, most, " of offset by tilt and skew"),
+    }
+    at = "" if ratio == p["ratio"] else f" at a ratio of {ratio:g}"
+    known = ""
+    if room == height:
+        known = ", an element's height beyond the belt unless inner_radius and outer_radius are given"
+    return [
+        (
+            key,
+            f"at most {limit:.3g} m{what}, so that flanks meet the sheaves' faces{known}",
+            f"{size:.3g} m{at}",
+        )
+        for key, (size, limit, what) in found.items()
+        if size > limit
+    ][:1]
 
 
 def inert(parameters: dict[str, Any]) -> dict[str, str]:

@@ -78,6 +78,19 @@ def _unit(a: np.ndarray) -> np.ndarray:
     return a / np.linalg.norm(a, axis=1)[:, None]
 
 
+def angles(elements: np.ndarray) -> np.ndarray:
+    """Sines of ANGLES: lateral lean, yaw out of the plane and tilt against the rings, (3, n).
+
+    Parameters
+    ----------
+    elements : (n, fields) array
+        In the order of the belt.
+    """
+    position, o = _vectors(elements, f.POSITION), _vectors(elements, f.OUTWARD)
+    chord = np.roll(position, -1, axis=0) - np.roll(position, 1, axis=0)
+    return np.array([o[:, 2], elements[:, f.HEADING + 2], -_dot(_unit(chord), o)])
+
+
 class Reading:
     """What is read at one sample.
 
@@ -99,8 +112,7 @@ class Reading:
         self._position, self._x, self._o = (_vectors(e, k) for k in (f.POSITION, f.HEADING, f.OUTWARD))
         self._path = OnPath(where, self._position[:, :2])
         self._push = _points(e, f.PUSH)
-        chord = np.roll(self._position, -1, axis=0) - np.roll(self._position, 1, axis=0)
-        self._tilt = -_dot(_unit(chord), self._o)  # of an element against the rings
+        self._angles = angles(e)
 
     def displacement(self) -> np.ndarray:
         """Displacement at the probes, outwards and to the right, (4 p,) [m]."""
@@ -135,7 +147,7 @@ class Reading:
             sheaves,
             loss.ravel(),
             [pulleys[f.DRIVEN_MIDDLE] - pulleys[f.DRIVING_MIDDLE]],
-            [np.abs(angle).max() for angle in (self._o[:, 2], self._x[:, 2], self._tilt)],
+            np.abs(self._angles).max(axis=1),
             [e[:, f.PIN].max()],
         )
         return [float(value) for group in groups for value in group]
@@ -164,7 +176,7 @@ class Reading:
             slip_t.mean(axis=1),
             e[:, f.PIN],
             _edge_gap(e, self._where.belt),
-            self._tilt,
+            self._angles[2],
             self._path.offset,
             *(normal[:, side].sum(axis=1) / pitch for side in pairs),
             *(normal[:, k] / pitch for k in (1, 3)),

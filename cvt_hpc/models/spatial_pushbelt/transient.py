@@ -17,12 +17,15 @@ from cvt_hpc.models.pushbelt.stepping import advance_by
 from cvt_hpc.models.spatial_pushbelt import belt
 from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, workspace
 from cvt_hpc.models.spatial_pushbelt.parameters import LOOSE_SIDES, package_arm
-from cvt_hpc.models.spatial_pushbelt.readings import LATERAL, PROFILES, SCALARS, Reading
+from cvt_hpc.models.spatial_pushbelt.readings import ANGLES, LATERAL, PROFILES, SCALARS, Reading, angles
 from cvt_hpc.models.spatial_pushbelt.start import start
 from cvt_hpc.models.spatial_pushbelt.step import EQUATIONS
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, STRANDS
 
 CHANNELS = (*COURSES, *SCALARS)
+# Turned by this, the flanks of an element have moved by a quarter of its half width, and no saddle holds the
+# rings. Elements of sound runs turn by 0.05 at most, also where the belt slips through.
+LARGEST_TURN = 0.25  # [1], sine
 
 
 class Transient(ElementRun):
@@ -59,12 +62,18 @@ class Transient(ElementRun):
         return self._belt.pitch_inertia
 
     def _out_of_place(self) -> str | None:
-        """As in the plane; or whether an element is so far out of it that no groove holds it."""
-        lateral = np.abs(of_lanes(self._state.elements)[:, belt.POSITION + 2])
+        """As in the plane; or whether an element is so far out of it that no groove and no ring holds it."""
+        elements = of_lanes(self._state.elements)
+        lateral = np.abs(elements[:, belt.POSITION + 2])
         most = LARGEST_DISPLACEMENT + 0.5 * abs(self.parameters["misalignment"])
         if (largest := lateral.max()) > most:
             element = int(lateral.argmax())
             return f"element {element} has left the grooves: it is {largest * 1e3:.3g} mm out of the plane"
+        turned = np.abs(angles(elements))
+        if (largest := turned.max()) > LARGEST_TURN:
+            angle, element = np.unravel_index(turned.argmax(), turned.shape)
+            found = np.arcsin(min(largest, 1.0))
+            return f"element {element} has left the rings: its {ANGLES[angle]} is {found:.3g} rad"
         return super()._out_of_place()
 
     def _stored_energy(self, found: Reading) -> float:
