@@ -1,6 +1,7 @@
 """The planar pushbelt: directions, the linear system, closed forms, and the laws of all contacts in a run."""
 
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from cvt_hpc.job import build_job
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.pushbelt import belt as b
 from cvt_hpc.models.pushbelt import start as starting
-from cvt_hpc.models.pushbelt import transient
+from cvt_hpc.models.pushbelt import stepping, transient
 from cvt_hpc.models.pushbelt.assembly import RIGHT
 from cvt_hpc.models.pushbelt.parameters import falling_limit, path_length
 from cvt_hpc.models.pushbelt.readings import Reading
@@ -635,6 +636,28 @@ def test_a_march_is_the_same_in_lanes_and_without(monkeypatch):
     assert (off <= 1e-7 * scale).all() and (off[U] <= 1e-10 * scale[U]).all()
 
 
+@pytest.mark.parametrize(
+    ("changes", "halved"),
+    [
+        ([2.0 * 0.9**k for k in range(12)], []),  # contacts that close one after the other
+        ([3.0, 2.0, 1.0, 4.0] * 3, [6, 7, 8, 9, 10, 11]),  # sets of contacts that take turns
+        ([3.0, 1.0, 0.9, 2.0, 0.8, 0.7] * 2, [7, 8, 9, 10, 11]),
+    ],
+)
+def test_corrections_are_halved_once_they_no_longer_fall(monkeypatch, changes, halved):
+    shares, left = [], list(changes)
+    fake = stepping.Equations(*6 * [lambda *_: 1.0])
+    monkeypatch.setattr(stepping, "solve_bordered", lambda *_: True)
+    monkeypatch.setattr(stepping, "correct", lambda _, __, ___, share: shares.append(share) or left.pop(0))
+    monkeypatch.setattr(stepping, "most_corrected", lambda *_: 0)
+    monkeypatch.setattr(stepping, "keep_states", lambda *_: None)
+    monkeypatch.setattr(stepping, "name_fault", lambda *_: None)
+    newton = b.NEWTON._replace(first_half_step=6, most_iterations=len(changes))
+    stepping._newton.py_func(fake, None, newton, SimpleNamespace(elements=None), MagicMock(), 0.0, STEP)
+    assert [k for k, share in enumerate(shares) if share == 0.5] == halved
+    assert set(shares) <= {0.5, 1.0}
+
+
 def test_steps_that_do_not_converge_are_named():
     belt, state = start(given())
     newton = b.NEWTON._replace(tolerance=1e-12, power_tolerance=1e-12, most_iterations=2, most_failures=3)
@@ -649,11 +672,9 @@ def test_the_fault_is_the_contact_that_the_last_iteration_has_changed_most():
     names = set()
     for seed in range(40):
         ends = []
-        for most in (3, 4):  # the last correction is halved
+        for most in (3, 4):
             belt, state, work, _ = shaken(seed)
-            newton = b.NEWTON._replace(
-                tolerance=0.0, most_iterations=most, first_half_step=3, most_failures=1
-            )
+            newton = b.NEWTON._replace(tolerance=0.0, most_iterations=most, most_failures=1)
             assert advance(belt, newton, state, work, constant(THRUST, LOAD), 1, STEP) == b.NOT_CONVERGED
             ends.append(fields(state.elements))
         change = np.abs(ends[1] - ends[0])

@@ -174,7 +174,7 @@ class Newton(NamedTuple):
     weights : tuple of float
         What the corrections of an element's speeds count with: lengths of angular velocities [m], else 1.
     most_iterations, first_half_step : int
-        Iterations a step, and the first one whose correction is halved.
+        Iterations a step, and the first one whose correction is halved where corrections do not fall.
     most_failures : int
         Failed steps in a row with which a run ends.
     """
@@ -183,7 +183,7 @@ class Newton(NamedTuple):
     power_tolerance: float
     weights: tuple[float, ...]
     most_iterations: int = 20
-    first_half_step: int = 16
+    first_half_step: int = 10
     most_failures: int = 20
 
 

@@ -32,6 +32,7 @@ from cvt_hpc.models.pushbelt.faults import keep_states, most_corrected, name_fau
 from cvt_hpc.solvers.linked_blocks import solve
 from cvt_hpc.solvers.small_system import solve_small
 
+FALLS = 0.95  # of the smallest correction so far: one that is larger does not fall
 _LARGE = 1e100  # more than any speed or power that means something
 
 
@@ -117,6 +118,7 @@ def _newton(equations, belt, newton, state, work, load, dt):
     A step that is not solved leaves its fault in the counters.
     """
     change, power = 0.0, 0.0
+    least, share = np.inf, 1.0
     element, weights = 0, newton.weights
     for iteration in range(newton.most_iterations + 1):
         power = equations.evaluate(belt, state, work, load, dt)
@@ -130,7 +132,11 @@ def _newton(equations, belt, newton, state, work, load, dt):
         equations.assemble(belt, state, work, dt)
         if not solve_bordered(equations, belt, state, work, weights, dt):
             return iteration, np.inf, power
-        change = correct(state, work, weights, 0.5 if iteration >= newton.first_half_step else 1.0)
+        change = correct(state, work, weights, share)
+        # Contacts that close one after the other along the belt take an iteration each, with corrections that
+        # fall. Sets of contacts that take turns do not let them fall.
+        share = 0.5 if iteration + 1 >= newton.first_half_step and change > FALLS * least else 1.0
+        least = min(least, change)
         if iteration == newton.most_iterations - 1:
             element = most_corrected(work.blocks, weights)
             keep_states(state.elements, element, work.kept)
