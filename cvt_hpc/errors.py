@@ -33,7 +33,7 @@ class UnitWarning(JobWarning):
     """A number without a unit that is far from usual: it may be meant in another unit."""
 
 
-def mismatch(where: str, expected: str, found: str) -> InputError:
+def mismatch(where: str, expected: str, found: str, then: str = "") -> InputError:
     """Return the error for a value that is not what was expected.
 
     Parameters
@@ -42,16 +42,18 @@ def mismatch(where: str, expected: str, found: str) -> InputError:
         File and key, e.g. "jobs/x.toml: [scene] thrust".
     expected, found : str
         What should stand there, and what stands there.
+    then : str
+        What to do next, such as a command, where the place does not say it.
 
     Returns
     -------
     InputError
         To be raised by the caller.
     """
-    return InputError(f"{where}: expected {expected}, found {found}")
+    return InputError("; ".join(filter(None, (f"{where}: expected {expected}, found {found}", then))))
 
 
-def unknown(where: str, what: str, word: str, known: Iterable[str]) -> InputError:
+def unknown(where: str, what: str, word: str, known: Iterable[str], then: str = "") -> InputError:
     """Return the error for a name that is not known: with the nearest known one, else with all of them.
 
     Parameters
@@ -64,6 +66,8 @@ def unknown(where: str, what: str, word: str, known: Iterable[str]) -> InputErro
         The name that was found.
     known : iterable of str
         The names that exist.
+    then : str
+        What to do next, such as a command, where no known name is near.
 
     Returns
     -------
@@ -71,7 +75,7 @@ def unknown(where: str, what: str, word: str, known: Iterable[str]) -> InputErro
         To be raised by the caller.
     """
     names = list(known)
-    hint = did_you_mean(word, names) or f"; known: {', '.join(names)}"
+    hint = did_you_mean(word, names) or "; ".join(filter(None, (f"; known: {', '.join(names)}", then)))
     return InputError(f"{where}: unknown {what}{hint}")
 
 

@@ -37,6 +37,10 @@ _KNOWN_OF_FAILURES = (
     "steps",
     "contact_solves",
 )
+_AGAIN = {
+    "failed_numerics": "does them again, at half the step where they take steps",
+    "timed_out": "and a longer --run-limit does them again",
+}
 _FLAGS_FIRST = ("status", "vibrates", "reason")
 _ALWAYS_SHOWN = {"strand", "pulley"}
 _LARGEST_LINE = 4  # values along other dimensions: no spectrum and no history
@@ -51,6 +55,12 @@ def report_lines(report: RunReport) -> Iterator[str]:
         cells = report.total + report.unneeded
         yield f"{report.unneeded} of {cells} cells of the grid not run: their class is inferred"
     yield f"results: {report.results or 'gathered by the part that ends last'}"
+
+
+def next_lines(report: RunReport) -> Iterator[str]:
+    """Yield the line that says what to do with a sweep that has ended, if it has results."""
+    if report.results and report.done and not report.remaining:
+        yield f"next: cvt-hpc map {report.out}; cvt-hpc report {report.out}"
 
 
 def _special_in_words(counted: RunReport | StudyStatus) -> str:
@@ -172,6 +182,10 @@ def trouble_lines(report: RunReport) -> Iterator[str]:
     unnamed = len(report.failed) - MOST_FAILURES_NAMED
     if unnamed > 0:
         yield f"{unnamed} more runs failed; `status` and `reason` in the results tell which"
+    failed = {run.status for run in report.failed}
+    yield from (
+        f"the same command with --retry {status} {how}" for status, how in _AGAIN.items() if status in failed
+    )
     if report.remaining:
         if report.gained:
             yield f"stopped early ({report.stopped}); the same command goes on from here"
@@ -199,6 +213,8 @@ def status_lines(status: StudyStatus) -> Iterator[str]:
         rows.append(("rate", f"{status.rate:.3g} runs/s"))
     if status.left and status.time_to_go is not None:
         rows.append(("to go", show_duration(status.time_to_go)))
+    if status.left and not status.running:
+        rows.append(("next", "the same `cvt-hpc run` goes on with what is left"))
     yield from columns(rows, indent="")
 
 

@@ -83,6 +83,9 @@ def history_files(paths: Sequence[Path]) -> list[Path]:
                 str(path),
                 "a history written by `cvt-hpc simulate --out`",
                 "no history" if path.is_dir() else "another file, or none",
+                "a sweep keeps those of the runs that `history` in [record] of its job names"
+                if path.is_dir()
+                else "",
             )
         found += files
     return found

@@ -54,7 +54,8 @@ def campbell_figure(
     check_results(dataset, source)
     if "driving_speed" not in dataset["status"].dims:
         found = ", ".join(map(str, dataset["status"].dims)) or "a single run"
-        raise mismatch(source, "results over the axis driving_speed", found)
+        then = "`cvt-hpc plot waterfall` draws spectra over any axis"
+        raise mismatch(source, "results over the axis driving_speed", found, then)
     return waterfall_figure(dataset, at, source, Sides("driving_speed"), orders)
 
 

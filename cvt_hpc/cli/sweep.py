@@ -71,7 +71,7 @@ def add(commands: Any) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from cvt_hpc.job import load_job
     from cvt_hpc.job.durations import read_duration
-    from cvt_hpc.printing import repeat_line, report_lines, trouble_lines
+    from cvt_hpc.printing import next_lines, repeat_line, report_lines, trouble_lines
     from cvt_hpc.study import check_start, run
     from cvt_hpc.study.ranks.launch import end_process
     from cvt_hpc.study.time_steps import check_refinement
@@ -105,6 +105,8 @@ def _run(arguments: argparse.Namespace) -> int:
     for repeat, show in repeats:
         if not report.remaining:
             statuses.append(_repeat(repeat, show, options, started))
+    if speaks():
+        say(*next_lines(report))
     return end_process(max(statuses))
 
 

@@ -24,9 +24,8 @@ def read_document(path: Path) -> dict[str, Any]:
         text = path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
         beside = sorted(str(file) for file in path.parent.glob("*.toml"))
-        raise InputError(
-            f"{path}: expected a job file, found nothing{did_you_mean(str(path), beside)}"
-        ) from None
+        hint = did_you_mean(str(path), beside) or "; `cvt-hpc init NAME` writes one to begin with"
+        raise InputError(f"{path}: expected a job file, found nothing{hint}") from None
     except IsADirectoryError:
         raise mismatch(str(path), "a job file", "a folder") from None
     except OSError as error:

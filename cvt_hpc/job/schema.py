@@ -209,5 +209,6 @@ def _known(
     if not isinstance(name, str) or name not in registry:
         expected = f"one of {', '.join(registry if told is None else told) or 'none'}"
         hint = did_you_mean(name, registry) if isinstance(name, str) else ""
-        raise mismatch(f"{source}: {what}", expected, show(name) + hint)
+        then = "`cvt-hpc models` says what each is" if registry is MODELS and not hint else ""
+        raise mismatch(f"{source}: {what}", expected, show(name) + hint, then)
     return name

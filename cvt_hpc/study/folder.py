@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.errors import InputError
+from cvt_hpc.errors import InputError, mismatch, nearest
 from cvt_hpc.files import kind_of, make_own_folder, naming_refusals
 from cvt_hpc.job.definition import fingerprint_of
 from cvt_hpc.locks import is_locked, locked
@@ -22,6 +22,16 @@ from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.study.stored import check_stored
 
 _PART_LOCKS = ".part-*.lock"
+
+
+def study_instead(path: Path) -> str:
+    """Return what to do where no study is found: take that of the nearest name beside it, or make one."""
+    if path.suffix == ".toml":
+        return f"`cvt-hpc run {path}` computes its results, in out/NAME unless --out says otherwise"
+    beside = [str(folder.parent) for folder in path.parent.glob("*/job.json")]
+    if near := nearest(str(path), beside):
+        return f"did you mean {near}?"
+    return "`cvt-hpc run JOB.toml` makes one"
 
 
 class StudyFolder(OutputFolder[Study]):
@@ -64,7 +74,7 @@ class StudyFolder(OutputFolder[Study]):
         with naming_refusals(self.path, "a folder that can be read"):
             if not self.path.is_dir():
                 found = "a file" if self.path.exists() else "nothing"
-                raise InputError(f"{self.path}: expected the output folder of a run, found {found}")
+                raise mismatch(str(self.path), "the output folder of a run", found, study_instead(self.path))
             advice = "; `cvt-hpc run` of its job goes on and writes it anew"
             try:
                 study = self.read_job()

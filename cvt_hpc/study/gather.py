@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.errors import InputError
+from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.files import discard, kind_of, naming_refusals, written_aside
 from cvt_hpc.locks import locked
 from cvt_hpc.netcdf import global_attributes, variable_attributes
@@ -17,7 +17,7 @@ from cvt_hpc.provenance import history_line
 from cvt_hpc.study.chunks import chunk_shape, fill
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.dimensions import Dimension
-from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.folder import StudyFolder, study_instead
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.record.log import KEPT
 from cvt_hpc.study.record.recovery import read_records
@@ -126,8 +126,13 @@ def open_results(path: str | Path) -> xr.Dataset:
                 raise InputError(
                     f"{found}: expected a dataset, found nothing; `cvt-hpc gather {path}` writes it"
                 )
-        if found.exists() and not found.is_file():
+        if not found.exists():
+            raise mismatch(str(found), "a netCDF dataset", "nothing", study_instead(found))
+        if not found.is_file():
             raise InputError(f"{found}: expected a netCDF dataset, found {kind_of(found)}")
+        if found.suffix == ".toml":
+            expected = "the output folder of a run, or a dataset"
+            raise mismatch(str(found), expected, "a job file", study_instead(found))
         try:
             # Quantities in seconds are numbers, not dates.
             return xr.open_dataset(found, engine="netcdf4", decode_times=False, chunks={})

@@ -20,7 +20,8 @@ pytestmark = pytest.mark.usefixtures("mechanics")
 def test_run_status_gather_and_map_of_one_study(write_job, call, tmp_path):
     write_job(GRID)
     status, out, err = call("run", "x.toml")
-    assert (status, out) == (0, ["10 runs: 10 done, 0 failed, 0 left", "results: out/x/results.nc"])
+    then = "next: cvt-hpc map out/x; cvt-hpc report out/x"
+    assert (status, out) == (0, ["10 runs: 10 done, 0 failed, 0 left", "results: out/x/results.nc", then])
     assert not [line for line in err if line.startswith("cvt-hpc:")]
     status, out, err = call("status", "out/x")
     assert (status, err) == (0, [])
@@ -75,6 +76,9 @@ def test_run_goes_on_unless_fresh(write_job, call, tmp_path, monkeypatch):
     assert not logs & set((tmp_path / "here/records").iterdir())
 
 
+AGAIN = "cvt-hpc: the same command with --retry failed_numerics does them again, at half the step where they take steps"
+
+
 def test_run_names_failed_runs_and_ends_with_1(write_job, call):
     write_job(GRID)
     status, out, err = call("run", "x.toml", "--set", "sheave_stiffness=inf", "--set", "thrust=0.03 MN")
@@ -84,13 +88,13 @@ def test_run_names_failed_runs_and_ends_with_1(write_job, call):
     assert named == [
         f"cvt-hpc: run {i} (load = {load} N m): failed_numerics: step 3: too stiff"
         for i, load in enumerate((0, 25, 50, 75, 100))
-    ]
+    ] + [AGAIN]
 
 
 def test_failed_runs_are_named_in_the_units_of_the_job(write_job, call):
     write_job('[scene]\nthrust = 2e4\n[belt]\nsheave_stiffness = inf\n[axes]\ndriving_speed = ["3000 rpm"]\n')
     named = [line for line in call("run", "x.toml")[2] if line.startswith("cvt-hpc:")]
-    assert named == ["cvt-hpc: run 0 (driving_speed = 3000 rpm): failed_numerics: step 3: too stiff"]
+    assert named == ["cvt-hpc: run 0 (driving_speed = 3000 rpm): failed_numerics: step 3: too stiff", AGAIN]
     # and so they are by a start that finds the folder
     assert [line for line in call("run", "x.toml")[2] if line.startswith("cvt-hpc:")] == named
 
@@ -100,7 +104,8 @@ def test_ten_failed_runs_are_named_and_the_rest_counted(write_job, call):
               "[axes]\nload = {from = 0, to = 11, step = 1}\n")  # fmt: skip
     named = [line for line in call("run", "x.toml")[2] if line.startswith("cvt-hpc:")]
     assert [line.split()[2] for line in named[:10]] == [str(i) for i in range(10)]
-    assert named[10:] == ["cvt-hpc: 2 more runs failed; `status` and `reason` in the results tell which"]
+    more = "cvt-hpc: 2 more runs failed; `status` and `reason` in the results tell which"
+    assert named[10:] == [more, AGAIN]
 
 
 def test_a_stopped_sweep_ends_with_99(write_job, call, monkeypatch, tmp_path):
@@ -274,8 +279,20 @@ def test_simulate_of_a_run_that_fails_ends_with_1(write_job, call):
             ["simulate", "x.toml", "--out", "notes.nc"],
             "notes.nc: expected a new file, or a history written by cvt_hpc, found another file",
         ),
-        (["status", "out/x"], "out/x: expected the output folder of a run, found nothing"),
-        (["gather", "x.toml"], "x.toml: expected the output folder of a run, found a file"),
+        (
+            ["status", "out/x"],
+            "out/x: expected the output folder of a run, found nothing; `cvt-hpc run JOB.toml` makes one",
+        ),
+        (
+            ["gather", "x.toml"],
+            "x.toml: expected the output folder of a run, found a file; `cvt-hpc run x.toml` computes its results, "
+            "in out/NAME unless --out says otherwise",
+        ),
+        (
+            ["map", "x.toml"],
+            "x.toml: expected the output folder of a run, or a dataset, found a job file; `cvt-hpc run x.toml` "
+            "computes its results, in out/NAME unless --out says otherwise",
+        ),
         (["map", "out/x"], None),
         (
             ["plot", "wrap", "notes.nc"],

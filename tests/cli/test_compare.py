@@ -89,7 +89,7 @@ def test_bad_input_is_one_line(write_job, call):
     assert call("compare", "out/x", "out/y") == (
         2,
         [],
-        ["cvt-hpc: out/y: expected a netCDF dataset, found: No such file or directory"],
+        ["cvt-hpc: out/y: expected a netCDF dataset, found nothing; did you mean out/x?"],
     )
     status, _, err = call("compare", "out/x")
     assert status == 2 and "the following arguments are required" in err[0]

@@ -89,7 +89,7 @@ def test_tables(write_job, text, message):
         ('name = 5\nmodel = "toy"', f"name: {A_WORD} 5"),
         (
             'name = "x"',
-            f"model: expected one of {', '.join(MODELS)}, toy, found nothing",
+            f"model: expected one of {', '.join(MODELS)}, toy, found nothing; `cvt-hpc models` says what each is",
         ),
         (
             'name = "x"\nmodel = "toi"',
@@ -97,7 +97,7 @@ def test_tables(write_job, text, message):
         ),
         (
             'name = "x"\nmodel = 5',
-            f"model: expected one of {', '.join(MODELS)}, toy, found 5",
+            f"model: expected one of {', '.join(MODELS)}, toy, found 5; `cvt-hpc models` says what each is",
         ),
         (f'{HEAD}stepper = "hopp"', 'stepper: expected one of hop, found "hopp"; did you mean hop?'),
         (f"{HEAD}description = 5", "description: expected a text, found 5"),
@@ -141,7 +141,8 @@ def test_numbers_of_too_many_digits(write_job):
 def test_missing_file(write_job, tmp_path):
     write_job()
     assert complaint("y.toml") == "y.toml: expected a job file, found nothing; did you mean x.toml?"
-    assert complaint("quick/zzz") == "quick/zzz: expected a job file, found nothing"
+    then = "`cvt-hpc init NAME` writes one to begin with"
+    assert complaint("quick/zzz") == f"quick/zzz: expected a job file, found nothing; {then}"
 
 
 def test_folder_instead_of_a_file(tmp_path):

@@ -88,6 +88,7 @@ def serial(tmp_path_factory):
         "8 runs: 8 done, 0 failed, 0 left",
         "of those done 2 slip",  # at 450 N m, on both sheaves
         "results: out/small/results.nc",
+        "next: cvt-hpc map out/small; cvt-hpc report out/small",
     ]
     return folder / "out" / "small"
 
@@ -221,7 +222,7 @@ def test_runs_with_a_step_too_long_are_failed_on_the_map_not_quiet(folder, capsy
     )
     (folder / "steps.toml").write_text(job)
     assert main(["run", "steps.toml", "--set", "most_refinements=0", "--out", "steps"]) == 1
-    named = [line for line in capsys.readouterr().err.splitlines() if "failed_numerics" in line]
+    named = [line for line in capsys.readouterr().err.splitlines() if ": failed_numerics:" in line]
     assert len(named) == 3
     assert named[0].startswith("cvt-hpc: run 3 (step = 50 us, load = 0 N m): failed_numerics: at ")
     dataset = load_results(folder / "steps")
