@@ -17,6 +17,7 @@ from cvt_hpc.models.contract import load_model
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.onsets import levels, onsets
 
+COARSE = 0.02  # of an axis: a step beyond is worth a smaller one
 _RETRIES = {
     Status.FAILED_NUMERICS: "with a smaller step",
     Status.FAILED_ERROR: "once the cause is removed",
@@ -78,7 +79,7 @@ def _along(axis: xr.DataArray, classes: xr.DataArray) -> Iterator[str]:
             yield f"Vibration reaches the {side} {name}, {value}, in {lines}: go further there."
     ends = sorted({one.load for row in rows for one in onsets(values, row) if np.isfinite(one.load)})
     steps = np.diff(values[np.isfinite(values)])
-    if ends:
+    if ends and steps.max() > COARSE * steps.sum():
         factor, unit = coordinate_unit(axis.attrs)
         behind = f" {unit}" if unit else ""
         low, high, step = (

@@ -108,7 +108,8 @@ def window_sentences(dataset: xr.Dataset, x: str, others: Sequence[str]) -> Iter
     lines = [stacked.isel(line=k) for k in range(stacked.sizes["line"])]
     told = [_line(line, x, _place(dataset, others, k)) for k, line in enumerate(lines)]
     vibrating = [text for text in told if text]
-    yield from islice(vibrating, MOST_LINES)
+    shown = np.unique(np.linspace(0, len(vibrating) - 1, min(len(vibrating), MOST_LINES)).round().astype(int))
+    yield from (vibrating[k] for k in shown)
     if (more := len(vibrating) - MOST_LINES) > 0:
         verb = "vibrates" if more == 1 else "vibrate"
         yield f"{counted(more, 'more line')} along {in_words(dataset[x])} {verb}."

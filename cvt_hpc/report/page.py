@@ -18,7 +18,7 @@ from markupsafe import Markup
 
 from cvt_hpc.analysis.arrangement import Arrangement, Sides, arrange, known_values, value_text
 from cvt_hpc.analysis.classes import check_results
-from cvt_hpc.analysis.figures import RESOLUTION
+from cvt_hpc.analysis.figures import RESOLUTION, with_units
 from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.analysis.starts import AXIS, has_starts
@@ -124,7 +124,7 @@ def _content(dataset: xr.Dataset, source: str) -> dict[str, Any]:
         "model": f"{job.model}: {load_model(job.model).title}" if job else "",
         "axes": _axes(dataset, job),
         "summary": summary(dataset),
-        "sentences": sentences,
+        "sentences": list(map(_with_code, sentences)),
         "windows": any("vibration from" in line or "vibration up to" in line for line in sentences),
         "next_steps": list(map(_with_code, next_steps(dataset, job, x))),
         "has_lines": "eigenfrequency" in dataset and "amplitude" not in dataset,
@@ -216,7 +216,8 @@ def _picture(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> str:
 
 
 def _with_code(text: str) -> Markup:
-    """A text as HTML, with what stands between backticks as code."""
+    """A text as HTML: what stands between backticks as code, numbers never parted from their units."""
+    text = with_units(text).replace("N m", "N\u00a0m")
     parts = [
         Markup("<code>{}</code>" if k % 2 else "{}").format(part) for k, part in enumerate(text.split("`"))
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import absolute, ahead, behind, like, sqrt
+from cvt_hpc.lanes import ahead, behind, like
 from cvt_hpc.models.pushbelt.belt import (
     ANGLE_I,
     ANGLE_J,
@@ -96,8 +96,8 @@ from cvt_hpc.models.pushbelt.belt import (
     V,
 )
 from cvt_hpc.models.pushbelt.border import border_residuals, of_pulley
-from cvt_hpc.physics.contact_laws import coefficient, pressed, remembered
-from cvt_hpc.physics.primal_dual import dual_of, friction
+from cvt_hpc.models.pushbelt.friction import flank_friction, ring_friction
+from cvt_hpc.physics.contact_laws import pressed
 from cvt_hpc.solvers.linked_blocks import field_of_right
 
 RIGHT = field_of_right(4)
@@ -159,10 +159,7 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
         driven = state[j, DRIVEN]
 
         slip = state[j, V] + dv - step[j, T_Y] * u_y - step[j, T_Z] * u_z
-        width, none = belt.ring_friction_speed, like(0.0, slip)
-        dual, _ = dual_of(slip, none, state[j, RING_SLIP], none, state[j, RING_DUAL], none, width)
-        mu = like(belt.ring_friction, slip)
-        grip, _, slope, _, _, _ = friction(slip, none, absolute(slip), dual, none, mu, none, width)
+        grip, slope, dual = ring_friction(belt, slip, state[j, RING_SLIP], state[j, RING_DUAL])
         normal = state[j, SADDLE]
         iterate[j, RING_SLOPE] = normal * slope
         state[j, RING_SLIP], state[j, RING_FRICTION], state[j, RING_DUAL] = slip, normal * grip, dual
@@ -184,26 +181,12 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
         along = (m_y * u_y + m_z * u_z + mr_lever * omega) * wide
         rotation = of_pulley(driving_speed, driven_speed, driven)
         around_it = m_y * u_z - m_z * u_y + mt_lever * omega - radius * rotation
-        width = belt.friction_speed
-        dual_m, dual_t = dual_of(
-            along,
-            around_it,
-            state[j, FLANK_SLIP_M],
-            state[j, FLANK_SLIP_T],
-            state[j, FLANK_DUAL_M],
-            state[j, FLANK_DUAL_T],
-            width,
-        )
-        state[j, FLANK_DUAL_M], state[j, FLANK_DUAL_T] = dual_m, dual_t
+        earlier = state[j, FLANK_SLIP_M], state[j, FLANK_SLIP_T]
+        dual = state[j, FLANK_DUAL_M], state[j, FLANK_DUAL_T]
+        dual, forces = flank_friction(belt, (along, around_it), earlier, dual, state[j, V_FILTERED], dt)
+        state[j, FLANK_DUAL_M], state[j, FLANK_DUAL_T] = dual
         state[j, FLANK_SLIP_M], state[j, FLANK_SLIP_T] = along, around_it
-        size = sqrt(along * along + around_it * around_it)
-        filtered, share = remembered(state[j, V_FILTERED], size, belt.friction_memory, dt)
-        mu, fall = coefficient(
-            belt.flank_law, belt.flank_kinetic, belt.flank_gradient, belt.flank_speed, filtered
-        )
-        grip_m, grip_t, mm, mt, tm, tt = friction(
-            along, around_it, size, dual_m, dual_t, mu, share * fall, width
-        )
+        grip_m, grip_t, mm, mt, tm, tt = forces
         state[j, FLANK] = normal
         state[j, FLANK_FRICTION_M], state[j, FLANK_FRICTION_T] = normal * grip_m, normal * grip_t
         # both flanks together; the meridian leans by the half wedge angle against the radius

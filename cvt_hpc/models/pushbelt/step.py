@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import absolute, ahead, around, behind, select, sqrt
+from cvt_hpc.lanes import absolute, ahead, around, behind
 from cvt_hpc.models.pushbelt.assembly import (
     assemble,
     border_sums,
@@ -67,10 +67,10 @@ from cvt_hpc.models.pushbelt.belt import (
 )
 from cvt_hpc.models.pushbelt.border import accept_border, close_border, set_shapes
 from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
+from cvt_hpc.models.pushbelt.friction import filtered_slip
 from cvt_hpc.models.pushbelt.nose import add_nose_blocks, nose_forces, predict_noses
 from cvt_hpc.models.pushbelt.power import book
 from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
-from cvt_hpc.physics.contact_laws import remembered
 
 
 @kernel
@@ -173,9 +173,8 @@ def _accept(belt, state, work, inputs, dt):
         scratch[0, 1] += driven * thrust
         scratch[0, 2] += (1.0 - driven) * step[j, MID_RADIUS] * iterate[j, FORCE_T]
         slip_m, slip_t = elements[j, FLANK_SLIP_M], elements[j, FLANK_SLIP_T]
-        size = sqrt(slip_m * slip_m + slip_t * slip_t)
-        filtered, _ = remembered(elements[j, V_FILTERED], size, belt.friction_memory, dt)
-        elements[j, V_FILTERED] = select(elements[j, FLANK] > 0.0, filtered, size)
+        filtered = filtered_slip(belt, slip_m, slip_t, elements[j, FLANK], elements[j, V_FILTERED], dt)
+        elements[j, V_FILTERED] = filtered
     for k in range(3):
         scratch[0, k] = around(scratch[0, k])
     driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]

@@ -17,7 +17,7 @@ from __future__ import annotations
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import fma, like, select, sqrt
+from cvt_hpc.lanes import fma, like, sqrt
 from cvt_hpc.models.pushbelt.belt import (
     DRIVEN_RADIUS,
     DRIVEN_SPEED,
@@ -25,6 +25,7 @@ from cvt_hpc.models.pushbelt.belt import (
     DRIVING_SPEED,
 )
 from cvt_hpc.models.pushbelt.border import of_pulley
+from cvt_hpc.models.pushbelt.friction import flank_friction
 from cvt_hpc.models.spatial_pushbelt.belt import (
     BY_NORMAL,
     CHANGE,
@@ -77,8 +78,7 @@ from cvt_hpc.models.spatial_pushbelt.rotations import (
     unit,
     vector,
 )
-from cvt_hpc.physics.contact_laws import coefficient, pressed, remembered
-from cvt_hpc.physics.primal_dual import dual_of, friction
+from cvt_hpc.physics.contact_laws import pressed
 
 
 @register_jitable
@@ -174,7 +174,7 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
     and of the openings of the driving and the driven sheaves.
     """
     modes = belt.modal_stiffness.shape[1]
-    stiffness, width = 0.5 * belt.flank_stiffness, belt.friction_speed
+    stiffness = 0.5 * belt.flank_stiffness
     driving_speed, driven_speed = pulleys[DRIVING_SPEED], pulleys[DRIVEN_SPEED] + increments[0]
     for j in range(step.rows):
         driven = state[j, DRIVEN]
@@ -208,25 +208,13 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
             _, half_m, half_t = flank_directions(belt, vector(step, j, MID_RADIAL + 3 * p), axis, side)
             q = plus(u, cross(omega, half))
             along, around_it = dot(half_m, q), fma(-step[j, MID_RADIUS + p], rotation, dot(half_t, q))
-            dual_m, dual_t = dual_of(
-                along,
-                around_it,
-                state[j, FLANK_SLIP_M + p],
-                state[j, FLANK_SLIP_T + p],
-                state[j, FLANK_DUAL_M + p],
-                state[j, FLANK_DUAL_T + p],
-                width,
-            )
-            state[j, FLANK_DUAL_M + p], state[j, FLANK_DUAL_T + p] = dual_m, dual_t
-            state[j, FLANK_SLIP_M + p], state[j, FLANK_SLIP_T + p] = along, around_it
-            size = sqrt(along * along + around_it * around_it)
-            filtered, share = remembered(state[j, V_FILTERED + p], size, belt.friction_memory, dt)
-            mu, fall = coefficient(
-                belt.flank_law, belt.flank_kinetic, belt.flank_gradient, belt.flank_speed, filtered
-            )
-            grip_m, grip_t, mm, mt, tm, tt = friction(
-                along, around_it, size, dual_m, dual_t, mu, share * fall, width
-            )
+            earlier = state[j, FLANK_SLIP_M + p], state[j, FLANK_SLIP_T + p]
+            dual = state[j, FLANK_DUAL_M + p], state[j, FLANK_DUAL_T + p]
+            slip = along, around_it
+            dual, forces = flank_friction(belt, slip, earlier, dual, state[j, V_FILTERED + p], dt)
+            state[j, FLANK_DUAL_M + p], state[j, FLANK_DUAL_T + p] = dual
+            state[j, FLANK_SLIP_M + p], state[j, FLANK_SLIP_T + p] = slip
+            grip_m, grip_t, mm, mt, tm, tt = forces
             state[j, FLANK + p] = normal
             state[j, FLANK_FRICTION_M + p] = normal * grip_m
             state[j, FLANK_FRICTION_T + p] = normal * grip_t
@@ -241,15 +229,6 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
         store(iterate, j, RESIDUAL + 3, plus(left_turn, turn))
         iterate[j, RESIDUAL + 6] = 0.0
         iterate[j, RESIDUAL + 7] = 0.0
-
-
-@register_jitable
-def filter_slips(belt, state, j, p, dt):
-    """Take the sliding speed at which the friction law is read to the end of the step."""
-    along, around_it = state[j, FLANK_SLIP_M + p], state[j, FLANK_SLIP_T + p]
-    size = sqrt(along * along + around_it * around_it)
-    filtered, _ = remembered(state[j, V_FILTERED + p], size, belt.friction_memory, dt)
-    state[j, V_FILTERED + p] = select(state[j, FLANK + p] > 0.0, filtered, size)
 
 
 @register_jitable

@@ -9,7 +9,7 @@ from __future__ import annotations
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import absolute, like
+from cvt_hpc.models.pushbelt.friction import ring_friction
 from cvt_hpc.models.spatial_pushbelt.belt import (
     CHANGE,
     RESIDUAL,
@@ -22,7 +22,6 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     SPEED,
 )
 from cvt_hpc.models.spatial_pushbelt.rotations import accumulate, dot, moved, times, vector
-from cvt_hpc.physics.primal_dual import dual_of, friction
 
 
 @register_jitable
@@ -37,13 +36,9 @@ def ring_slip(state, step, j, share):
 @kernel
 def saddle_forces(belt, state, step, iterate):
     """Friction of an iterate, by the normal force of the last step; adds to the residuals."""
-    width = belt.ring_friction_speed
     for j in range(step.rows):
         slip = ring_slip(state, step, j, 1.0)
-        none = like(0.0, slip)
-        dual, _ = dual_of(slip, none, state[j, RING_SLIP], none, state[j, RING_DUAL], none, width)
-        mu = like(belt.ring_friction, slip)
-        grip, _, slope, _, _, _ = friction(slip, none, absolute(slip), dual, none, mu, none, width)
+        grip, slope, dual = ring_friction(belt, slip, state[j, RING_SLIP], state[j, RING_DUAL])
         normal = state[j, SADDLE]
         force = normal * grip
         iterate[j, RING_SLOPE] = normal * slope

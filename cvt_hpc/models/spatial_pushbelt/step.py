@@ -25,6 +25,7 @@ from cvt_hpc.models.pushbelt.belt import (
     WORK_IN,
 )
 from cvt_hpc.models.pushbelt.border import accept_border, close_border, of_pulley, set_shapes
+from cvt_hpc.models.pushbelt.friction import filtered_slip
 from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
 from cvt_hpc.models.spatial_pushbelt.assembly import (
     assemble_pairs,
@@ -43,6 +44,8 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     FLANK_FRICTION_M,
     FLANK_FRICTION_T,
     FLANK_GAP,
+    FLANK_SLIP_M,
+    FLANK_SLIP_T,
     HEADING,
     IN_DRIVEN_DRIFT,
     IN_DRIVING_DRIFT,
@@ -62,6 +65,7 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     SLOPE,
     SPEED,
     TENSION,
+    V_FILTERED,
 )
 from cvt_hpc.models.spatial_pushbelt.bending import bending_forces, predict_bending
 from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across
@@ -69,7 +73,6 @@ from cvt_hpc.models.spatial_pushbelt.faces import face_forces, predict_faces
 from cvt_hpc.models.spatial_pushbelt.flank import (
     add_flank_blocks,
     along_arc,
-    filter_slips,
     flank_forces,
     predict_flanks,
 )
@@ -199,7 +202,10 @@ def _accept_elements(belt, state, work, dt):
         store(elements, j, OUTWARD, o)
         elements[j, SLOPE] += dt * elements[j, SPEED + 7]
         for p in range(POINTS):
-            filter_slips(belt, elements, j, p, dt)
+            along, around_it = elements[j, FLANK_SLIP_M + p], elements[j, FLANK_SLIP_T + p]
+            filtered = elements[j, V_FILTERED + p]
+            filtered = filtered_slip(belt, along, around_it, elements[j, FLANK + p], filtered, dt)
+            elements[j, V_FILTERED + p] = filtered
 
 
 @kernel
