@@ -115,12 +115,13 @@ def flanks_figure(history: xr.Dataset, source: str = "history") -> Figure:
             axes.axvspan(*sorted((0.0, 1e3 * end.inwards * AROUND)), color=ARC, lw=0, zorder=0)
             axes.set_xlim(-1e3 * AROUND, 1e3 * AROUND)
             axes.tick_params(labelleft=column == 0, labelbottom=row == len(QUANTITIES))
+            if row == len(QUANTITIES):
+                axes.set_xlabel("from its end [mm]")
             if row == 1:
                 side, length = alone(history, end)
                 told = f"{side} alone: {1e3 * length:.2g} mm" if length else "both alike"
                 axes.set_title(f"{end.name}\n{told}", loc="left", pad=4)
     handles, told = whole.get_legend_handles_labels()
-    figure.supxlabel("distance from the arc's end along the path [mm]", fontsize="medium")
     figure.legend(handles, told, loc="outside lower center", frameon=False, ncols=2)
     common, _ = on_axes([history], [source])
     lines = titles([history], "Left and right flank", common)

@@ -11,9 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import LogFormatter
 
 from cvt_hpc.analysis.error_axes import LEGEND, MARGIN, line_style, set_error_axis
-from cvt_hpc.analysis.figures import WIDTH, display_unit, draw
+from cvt_hpc.analysis.figures import WIDTH, balanced, display_unit, draw
 from cvt_hpc.chart.captions import LARGEST_ERROR, notes
 from cvt_hpc.chart.comparing import Comparison, Result
 from cvt_hpc.chart.plan import Quantity
@@ -49,7 +50,7 @@ def scene_figure(comparison: Comparison) -> Figure:
     text_height = _LINE_HEIGHT * (len(lines) + 0.5)
     height = 0.5 + _PANEL_HEIGHT * rows + 0.19 * legend_rows + text_height
     figure = Figure((WIDTH, height), layout="constrained")
-    figure.suptitle(f"{comparison.scene.title}: error against cost, lower left is better")
+    figure.suptitle(balanced(comparison.scene.title, 64) + "\nerror against cost, lower left is better")
     ratios = [_PANEL_HEIGHT] * rows + [text_height]
     grid = figure.add_gridspec(rows + 1, columns, height_ratios=ratios)
     first: Axes | None = None
@@ -73,6 +74,8 @@ def _draw_panel(
 ) -> None:
     own = comparison.reference.errors[quantity.name]
     axes.set(xscale="log", yscale="log")
+    axes.yaxis.set_major_formatter(LogFormatter(labelOnlyBase=False))
+    axes.yaxis.set_minor_formatter(LogFormatter(labelOnlyBase=False))
     floor = _floor(quantity, comparison)
     for name, results in series.items():
         k = comparison.series.index(name)

@@ -68,7 +68,7 @@ def test_each_quantity_has_a_panel_with_both_axes_logarithmic(figure):
         assert axes.get_xlabel() == "relative error"
         assert axes.get_ylim() == figure.axes[0].get_ylim()  # costs are compared across panels
     assert figure.axes[0].get_ylabel() == "core-seconds per\nsimulated second"
-    assert figure.get_suptitle() == "Ringing: error against cost, lower left is better"
+    assert figure.get_suptitle() == "Ringing\nerror against cost, lower left is better"
 
 
 def test_each_method_is_a_line_over_its_settings(figure):

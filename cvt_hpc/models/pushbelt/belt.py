@@ -182,7 +182,7 @@ class Newton(NamedTuple):
     tolerance: float
     power_tolerance: float
     weights: tuple[float, ...]
-    most_iterations: int = 20
+    most_iterations: int = 40
     first_half_step: int = 10
     most_failures: int = 20
 

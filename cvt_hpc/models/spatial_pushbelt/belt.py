@@ -198,12 +198,7 @@ class Belt(NamedTuple):
 
 
 # How a step is solved: velocity, angular velocity in the plane and out of it, V, rate of the slope
-NEWTON = Newton(
-    tolerance=3e-3,
-    power_tolerance=5.0,
-    weights=(1.0, 1.0, 1.0, 1e-2, 1e-2, 2e-3, 1.0, 1e-3),
-    most_iterations=40,
-)
+NEWTON = Newton(tolerance=3e-3, power_tolerance=5.0, weights=(1.0, 1.0, 1.0, 1e-2, 1e-2, 2e-3, 1.0, 1e-3))
 
 
 class BeltState(NamedTuple):

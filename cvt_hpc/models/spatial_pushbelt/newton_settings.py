@@ -1,7 +1,7 @@
 """Semi-implicit: the step of the planar pushbelt, with tolerances of its own.
 
 Forces and power balance are those with the planar pushbelt's tolerances to four digits, in an eighth less
-time. Heads that close one after the other along a strand take an iteration each, so that a step may need 25.
+time.
 """
 
 from dataclasses import replace
@@ -9,7 +9,7 @@ from dataclasses import replace
 from cvt_hpc.models.pushbelt import newton_settings as planar
 
 FACTS = planar.FACTS
-_DEFAULTS = {"speed_tolerance": 3e-3, "power_tolerance": 5.0, "most_iterations": 40}
+_DEFAULTS = {"speed_tolerance": 3e-3, "power_tolerance": 5.0}
 PARAMETERS = {
     "numerics": {
         key: replace(entry, default=_DEFAULTS.get(key, entry.default))
