@@ -23,7 +23,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
         job = build_job({"name": "guide", "model": name}, "guide")
         declared = {v.name: v for v in (*record_variables(job), *load_model(name).variables)}
         for v in declared.values():
-            meaning = f"{v.long_name}: {v.comment}" if v.comment.lower() != v.long_name.lower() else v.comment
+            meaning = f"{v.words}: {v.comment}" if v.words else v.comment
             if v.flags is not None:
                 meaning += f" ({', '.join(f'{flag.value} {flag.name.lower()}' for flag in v.flags)})"
             row = (f"`{v.name}`", ", ".join(v.dims), v.units, meaning)
@@ -38,6 +38,8 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 def _table(head: tuple[str, ...], rows: dict[tuple[str, ...], list[str]], recorded: list[str]) -> str:
     lines = [head, ("---",) * len(head)]
-    for row, models in sorted(rows.items()):
-        lines.append((*row, "all" if models == recorded else ", ".join(models)))
+    for row, models in sorted(rows.items(), key=lambda item: (item[0][0].strip("`"), item[1])):
+        others = [name for name in recorded if name not in models]
+        few = f"all but {', '.join(others)}" if others else "all"
+        lines.append((*row, ", ".join(models) if len(models) <= len(others) else few))
     return "\n".join(f"| {' | '.join(cell.replace('|', '&#124;') for cell in line)} |" for line in lines)
