@@ -32,6 +32,7 @@ MOST, FAR, MANY = (
     1.5,
     20,
 )  # share of values on a scale, where the others reach so far beyond; of so many
+MOST_BORDERS = 20_000  # sides between cells of different class: more would hide the cells
 Mask = NDArray[np.bool_]
 CellClass = OccurrenceClass | StartClass | PairClass
 
@@ -162,9 +163,11 @@ def draw_cells(
     shades = (255 * fills).round().astype(np.uint8)
     # the axes have the same place with and without it
     axes.add_image(PcolorImage(axes, x.edges, y.edges, shades, rasterized=True, in_layout=False))
-    for inside, lines in hatched.values():
-        axes.add_patch(PathPatch(area_of(x, y, inside), rasterized=True, **lines))
-    axes.add_collection(LineCollection(_borders(x, y, classes), colors="#202020", linewidths=1.0))
+    for inside, lines in hatched.values():  # as an artist: the limits are set below, and long to find
+        axes.add_artist(PathPatch(area_of(x, y, inside), rasterized=True, **lines))
+    if len(borders := _borders(x, y, classes)) <= MOST_BORDERS:
+        lines_between = LineCollection(borders, colors="#202020", linewidths=1.0)
+        axes.add_collection(lines_between, autolim=False)
     axes.set(xlim=x.edges[[0, -1]], ylim=y.edges[[0, -1]])
 
 
@@ -173,7 +176,7 @@ def draw_grid(axes: Axes, x: Ruler, y: Ruler) -> None:
     upright = _segments(x.edges, x.edges, y.edges[0], y.edges[-1])
     level = _segments(x.edges[0], x.edges[-1], y.edges, y.edges)
     lines = {"colors": "white", "linewidths": 0.3, "zorder": 0.5}  # below borders and hatching
-    axes.add_collection(LineCollection([*upright, *level], rasterized=True, **lines))
+    axes.add_collection(LineCollection([*upright, *level], rasterized=True, **lines), autolim=False)
 
 
 def draw_marks(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], marked: Mask, size: float) -> None:

@@ -37,9 +37,11 @@ def add(commands: Any) -> None:
     add_command(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
     text = "draw where vibration occurs, or quantities over two axes"
     picture = add_command(commands, "map", _map, text, "RESULTS")
+    text = "further studies over the same axes: a panel for each, on one scale of colours"
+    picture.add_argument("others", type=Path, nargs="*", metavar="RESULTS", help=text)
     text = "variable of the results, such as efficiency, instead of where vibration occurs; may be repeated"
     picture.add_argument("--show", action="append", default=[], metavar="QUANTITY", help=text)
-    text = "default: map.png, or map_QUANTITY.png, beside the dataset"
+    text = "default: map.png, map_QUANTITY.png or, of several studies, maps.png beside the (first) dataset"
     picture.add_argument("--out", type=Path, metavar="PNG", help=text)
     add_assignments(picture, "--at", "fix an axis at a value")
     add_sides(picture)
@@ -75,25 +77,35 @@ def _gather(arguments: argparse.Namespace) -> int:
 
 
 def _map(arguments: argparse.Namespace) -> int:
+    from contextlib import ExitStack
+
     from cvt_hpc.job.assignments import read_coordinates
     from cvt_hpc.study import open_results
 
-    with open_results(arguments.path) as dataset:
+    paths = [arguments.path, *arguments.others]
+    source, kind = ", ".join(map(str, paths)), "maps" if arguments.others else "map"
+    with ExitStack() as opened:
+        datasets = [opened.enter_context(open_results(path)) for path in paths]
+        dataset, sides = datasets[0], sides_of(arguments)
+        if arguments.others:
+            from cvt_hpc.analysis.studies import AXIS, join_studies
+
+            dataset = join_studies(datasets, list(map(str, paths)), arguments.show)
+            if AXIS not in sides:
+                sides = sides._replace(panel=sides.panel or AXIS)
         units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
-        at = read_coordinates(arguments.at, units, str(arguments.path), "--at")
+        at = read_coordinates(arguments.at, units, source, "--at")
         from cvt_hpc.analysis.maps import draw_map
         from cvt_hpc.analysis.starts import has_starts, start_line
         from cvt_hpc.analysis.value_maps import draw_value_map
 
-        source = str(arguments.path)
-        out = arguments.out or picture_beside(arguments.path, "map", *arguments.show)
-        sides = sides_of(arguments)
+        out = arguments.out or picture_beside(arguments.path, kind, *arguments.show)
         vmax = _colour_end(arguments.vmax, dataset, arguments.show[0] if arguments.show else "amplitude")
         if arguments.show:
             say(f"map: {draw_value_map(dataset, arguments.show, out, at, source, sides, vmax)}")
             return DONE
         picture = draw_map(dataset, out, at, source, sides, vmax)
-        if has_starts(dataset, at):
+        if has_starts(dataset, at) and not arguments.others:
             say(start_line(dataset, at, source))
         say(f"map: {picture}")
     return DONE

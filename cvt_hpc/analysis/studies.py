@@ -1,0 +1,75 @@
+"""Several studies as one dataset with the axis `study`, for pictures on one scale of colours."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+import xarray as xr
+
+from cvt_hpc.analysis.alignment import COMPARED, axes_of
+from cvt_hpc.analysis.classes import check_results
+from cvt_hpc.analysis.scatter import is_sampled
+from cvt_hpc.errors import mismatch, one_line
+from cvt_hpc.variables import Status
+from cvt_hpc.vibration.classes import OccurrenceClass
+
+AXIS = "study"
+_ALIKE = 1e-9  # relative: by so much values of an axis differ that are the same
+
+
+def join_studies(
+    datasets: Sequence[xr.Dataset], sources: Sequence[str], names: Collection[str] = ()
+) -> xr.Dataset:
+    """Join studies over the same axes.
+
+    Parameters
+    ----------
+    datasets : sequence of Dataset
+        Results of studies over grids. Their values on the axes may differ: what a study does not have was
+        not run.
+    sources : sequence of str
+        Where they are from, for the errors; these also name studies of jobs of one name.
+    names : collection of str
+        Variables to be kept beside verdict, amplitude and frequency.
+
+    Returns
+    -------
+    Dataset
+        With `study` as first axis.
+
+    Raises
+    ------
+    InputError
+        If one of them holds no results, or samples, or is over other axes than the first.
+    """
+    for dataset, source in zip(datasets, sources, strict=True):
+        check_results(dataset, source)
+        if is_sampled(dataset):
+            raise mismatch(source, "results over a grid, to be drawn beside others", "samples")
+        if {*axes_of(dataset)} != {*axes_of(datasets[0])}:
+            expected = f"the axes of {sources[0]}: {', '.join(axes_of(datasets[0]))}"
+            raise mismatch(source, expected, ", ".join(axes_of(dataset)) or "none")
+    titles = [one_line(dataset.attrs.get("job_name", "")) for dataset in datasets]
+    labels = titles if len({*titles}) == len(titles) and all(titles) else list(map(str, sources))
+    kept = (*COMPARED, "inferred_class", *names)
+    parts = [_with_values_of(datasets[0], one[[name for name in kept if name in one]]) for one in datasets]
+    joined = xr.concat(parts, AXIS, join="outer", data_vars="all", coords="minimal", compat="override")
+    joined = joined.assign_coords({AXIS: (AXIS, labels, {"long_name": AXIS})})
+    blank = {"status": Status.NOT_RUN, "inferred_class": OccurrenceClass.NOT_RUN, "vibrates": 0}
+    filled = {
+        name: joined[name].fillna(value).astype(np.int8) for name, value in blank.items() if name in joined
+    }
+    return joined.assign(filled).drop_attrs(deep=False).assign_attrs(job_name=", ".join(labels))
+
+
+def _with_values_of(first: xr.Dataset, dataset: xr.Dataset) -> xr.Dataset:
+    """A dataset whose axes have the values of another one to the last digit, where they are the same."""
+    for name in axes_of(dataset):
+        if dataset[name].dtype.kind not in "iuf":
+            continue
+        own, others = dataset[name].values.astype(float), first[name].values.astype(float)
+        near = np.isclose(own[:, np.newaxis], others, rtol=_ALIKE, atol=0.0)
+        values = np.where(near.any(axis=1), others[near.argmax(axis=1)], own)
+        dataset = dataset.assign_coords({name: (name, values, dataset[name].attrs)})
+    return dataset
