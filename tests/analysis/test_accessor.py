@@ -56,6 +56,21 @@ def test_boundaries_lie_midway_and_onset_is_where_a_window_begins():
     np.testing.assert_allclose(along.dropna("boundary"), [-0.3, -0.1])
 
 
+def test_verbs_take_chunked_datasets_and_read_what_they_need_alone():
+    whole = study(gradients=GRADIENTS, stiffnesses=STIFFNESSES, loads=LOADS)
+
+    def untouched(block):
+        raise AssertionError("spectra are read for a verdict")
+
+    spectra = xr.zeros_like(whole["amplitude"]).chunk()
+    lazy = whole.chunk({"load": 2}).assign(spectrum=spectra.map_blocks(untouched, template=spectra))
+    for verb in ("classes", "onset", "boundary", "strongest"):
+        xr.testing.assert_identical(getattr(lazy.cvt, verb)(), getattr(whole.cvt, verb)())
+    assert [image.get_array().tolist() for axes in lazy.cvt.map().axes for image in axes.images] == [
+        image.get_array().tolist() for axes in whole.cvt.map().axes for image in axes.images
+    ]
+
+
 def test_a_failed_run_is_no_boundary():
     study = results([[NO, NO, YES, YES, YES]])
     study["status"][0, 1] = Status.FAILED_NUMERICS
