@@ -41,6 +41,7 @@ def test_run_status_gather_and_map_of_one_study(write_job, call, tmp_path):
         assert results["vibrates"][:].tolist() == [[0, 0]] * 2 + [[1, 1]] * 3
     assert call("map", "out/x", "--at", "sheave_stiffness=3") == (0, ["map: out/x/map.png"], [])
     assert call("map", "out/x/results.nc", "--out", "y.png") == (0, ["map: y.png"], [])
+    assert call("map", "out/x", "out/x/results.nc") == (0, ["map: out/x/maps.png"], [])
     status, _, told = call("map", "out/x", "--show", "vibrate", "--vmax", "20 um")
     assert status == 2 and "unknown numeric variable of the results; did you mean vibrates?" in told[0]
     curve = "plot", "curve", "out/x", "vibrates", "--at", "sheave_stiffness=3"
