@@ -12,6 +12,7 @@ from matplotlib.axis import Axis
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words
+from cvt_hpc.analysis.ticks import number, put_ticks, short_numbers
 from cvt_hpc.errors import InputError, few_of, mismatch, show, unknown
 from cvt_hpc.job.shown import shown_as_read, shown_number, shown_unit
 
@@ -185,11 +186,7 @@ def value_text(coordinate: xr.DataArray, index: int) -> str:
     if np.isinf(value):
         return infinity_in_words(str(coordinate.name))
     factor, unit = coordinate_unit(coordinate.attrs)
-    return f"{_number(value * factor)} {unit}".strip()
-
-
-def _number(value: float) -> str:
-    return f"{value:.6g}".replace("-", "−")
+    return f"{number(value * factor)} {unit}".strip()
 
 
 def infinity_in_words(name: str) -> str:
@@ -204,7 +201,8 @@ class Ruler:
     Attributes
     ----------
     centres : array, shape (value,)
-        Positions of the grid points, in display units; their logarithms to base 10 on a logarithmic axis.
+        Positions of the grid points, in display units; their logarithms to base 10 on a logarithmic axis, of
+        negative values with the sign turned.
     edges : array, shape (value + 1,)
         Borders of their cells, halfway between.
     ticks : array or None
@@ -227,7 +225,7 @@ class Ruler:
     def lay_out(self, axis: Axis) -> None:
         """Put the ticks on a side of a panel."""
         if self.ticks is not None:
-            axis.set_ticks(self.ticks, self.tick_labels)
+            put_ticks(axis, self.ticks, self.tick_labels)
         if self.minor.size:
             axis.set_ticks(self.minor, minor=True)
 
@@ -235,7 +233,7 @@ class Ruler:
 def ruler(coordinate: xr.DataArray) -> Ruler:
     """Lay out an axis: numbers at their true place, an infinite one behind them, texts side by side.
 
-    The axis is logarithmic where its finite values are spread so.
+    The axis is logarithmic where its finite values are spread so; negative ones are mirrored.
 
     Parameters
     ----------
@@ -255,47 +253,62 @@ def ruler(coordinate: xr.DataArray) -> Ruler:
         if is_log:
             return _logarithmic_ruler(centres, axis_label(coordinate, unit))
         return Ruler(centres, _edges(centres), *_exact_ticks(centres), axis_label(coordinate, unit))
-    labels = tuple(_number(c) if np.isfinite(c) else infinity_in_words(name) for c in centres)
-    centres = np.log10(centres) if is_log else centres
     known = centres[finite]
+    texts = iter(short_numbers(known, is_log=is_log))
+    labels = tuple(next(texts) if is_known else infinity_in_words(name) for is_known in finite)
+    known = _on_decades(known) if is_log else known
     gap = np.diff(known).mean() if known.size > 1 else 1.0
-    start = known[-1] if known.size else 0.0
-    centres = np.where(finite, centres, start + gap)
+    centres[finite], centres[~finite] = known, (known[-1] if known.size else 0.0) + gap
     return Ruler(centres, _edges(centres), centres, labels, axis_label(coordinate, unit))
 
 
 def is_logarithmic(values: NDArray[np.float64]) -> bool:
-    """Whether sorted numbers are spread by their logarithms: evenly there, and unevenly as they are."""
-    if values.size < 3 or values[0] <= 0.0 or values[-1] < LEAST_SPAN * values[0]:
+    """Whether sorted numbers are of one sign and evenly spread by their logarithms alone."""
+    if values.size < 3 or values[0] * values[-1] <= 0.0:
         return False
-    steps, ratios = np.diff(values), np.diff(np.log(values))
+    sizes = np.sort(np.abs(values))
+    if sizes[-1] < LEAST_SPAN * sizes[0]:
+        return False
+    steps, ratios = np.diff(sizes), np.diff(np.log(sizes))
     most = EVEN if values.size > 3 else EQUAL  # of three values a middle that is a little off says nothing
     return bool(ratios.max() < most * ratios.min() and steps.max() > EVEN * steps.min())
 
 
+def _on_decades(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places of numbers of one sign on a logarithmic axis; negative ones are mirrored."""
+    return np.sign(values) * np.log10(np.abs(values))
+
+
 def _logarithmic_ruler(values: NDArray[np.float64], label: str) -> Ruler:
     """A logarithmic axis: ticks at its values where they are few, else at 1, 2 and 5 or at powers of ten."""
-    centres = np.log10(values)
+    centres, sign = _on_decades(values), np.sign(values[0])
     edges = _edges(centres)
-    ticks, labels = _exact_ticks(centres)
-    powers = 10.0 ** np.arange(np.floor(edges[0]), np.ceil(edges[-1]) + 1)
-    if ticks is not None:
-        labels = tuple(map(_number, values))
-    else:
-        digits = (1.0, 2.0, 5.0) if np.ptp(edges) < FEW_DECADES else (1.0,)
+    low, high = np.sort(sign * edges[[0, -1]])
+    powers = 10.0 ** np.arange(np.floor(low), np.ceil(high) + 1)
+
+    def inside(digits: NDArray[np.float64]) -> NDArray[np.float64]:
         at = np.outer(powers, digits).ravel()
-        at = at[(np.log10(at) >= edges[0]) & (np.log10(at) <= edges[-1])]
-        ticks, labels = np.log10(at), tuple(map(_number, at))
-    minor = np.log10(np.outer(powers, np.arange(1.0, 10.0)).ravel())
-    return Ruler(centres, edges, ticks, labels, label, minor[(minor >= edges[0]) & (minor <= edges[-1])])
+        return np.sort(sign * at[(np.log10(at) >= low) & (np.log10(at) <= high)])
+
+    ticks = (
+        values
+        if _are_few(centres)
+        else inside(np.array([1.0, 2.0, 5.0] if high - low < FEW_DECADES else [1.0]))
+    )
+    minor = _on_decades(inside(np.arange(1.0, 10.0)))
+    return Ruler(centres, edges, _on_decades(ticks), short_numbers(ticks, is_log=True), label, minor)
 
 
 def _exact_ticks(centres: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
     """Ticks at the grid points where these are few and far enough apart to be labelled."""
-    few = centres.size <= 6
-    if few and (centres.size == 1 or np.diff(centres).min() > 0.5 * np.ptp(centres) / (centres.size - 1)):
-        return centres, tuple(map(_number, centres))
-    return None, ()
+    return (centres, short_numbers(centres)) if _are_few(centres) else (None, ())
+
+
+def _are_few(centres: NDArray[np.float64]) -> bool:
+    """Whether each grid point can have a labelled tick."""
+    if centres.size < 2:
+        return True
+    return centres.size <= 6 and bool(np.diff(centres).min() > 0.5 * np.ptp(centres) / (centres.size - 1))
 
 
 def _edges(centres: NDArray[np.float64]) -> NDArray[np.float64]:

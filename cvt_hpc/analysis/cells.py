@@ -106,17 +106,19 @@ class Scale:
 def norm_over(values: Array, lowest: float | None = None, highest: float | None = None) -> Normalize:
     """Scale over the finite values, from `lowest` and to `highest` if given.
 
-    Else a few values far above the others do not flatten these: the scale then ends at the MOST share.
+    Else a few values far above or below the others do not flatten these: the scale ends at the MOST share.
     """
     known = values[np.isfinite(values)]
     if known.size == 0:
         return Normalize(0.0, 1.0) if highest is None else Normalize(lowest or 0.0, highest)
-    low, high = known.min() if lowest is None else lowest, known.max()
-    most = low + FAR * (np.quantile(known, MOST) - low)
-    if highest is not None:
-        high = highest
-    elif known.size >= MANY and high > most > low:
-        high = np.quantile(known, MOST)
+    low, high = known.min() if lowest is None else lowest, known.max() if highest is None else highest
+    if known.size >= MANY:
+        least, most = np.quantile(known, (1.0 - MOST, MOST))
+        base = least if lowest is None else lowest
+        if highest is None and most > base and high > base + FAR * (most - base):
+            high = most
+        if lowest is None and least < high and low < high - FAR * (high - least):
+            low = least
     return Normalize(low, high) if high > low else Normalize(low - 0.5, high + 0.5)
 
 
@@ -261,7 +263,7 @@ def class_legend(
         handles,
         labels,
         loc="outside lower center",
-        ncols=columns,
+        ncols=-(-len(labels) // -(-len(labels) // columns)),  # rows of like length
         frameon=False,
         handler_map={tuple: HandlerTuple(ndivide=1, pad=0)},
         handlelength=2.2,
