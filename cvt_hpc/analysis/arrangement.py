@@ -81,7 +81,7 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Side
         left to draw.
     """
     axes = list(map(str, dataset["status"].dims))
-    _check_sides(sides, axes, at, source)
+    check_sides(sides, axes, at, source)
     notes = []
     for name, value in at.items():
         if name not in axes:
@@ -111,7 +111,8 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Side
     return Arrangement(dataset, x, y, panel, tuple(notes))
 
 
-def _check_sides(sides: Sides, axes: list[str], at: Mapping[str, Any], source: str) -> None:
+def check_sides(sides: Sides, axes: list[str], at: Mapping[str, Any], source: str) -> None:
+    """Raise InputError where sides name no axis of the results, one that `at` fixes, or one twice."""
     for side, name in sides._asdict().items():
         if name is None:
             continue

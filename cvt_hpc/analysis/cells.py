@@ -195,6 +195,7 @@ def draw_marks(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], marked
             markeredgecolor=style.rim,
             markeredgewidth=0.2 * size,
             rasterized=True,
+            zorder=2.2,  # above lines of onset
         )
 
 

@@ -316,8 +316,8 @@ def draw_feed(axes: Axes, dataset: xr.Dataset) -> None:
         axes.fill_between(position, feed, color=colour, alpha=0.25, linewidth=0)
         axes.plot(position, feed, line, color=colour, linewidth=1.2, label=label)
     axes.axhline(0.0, color=_OTHER_COLOUR, linewidth=0.6)
-    decades = 10.0 ** (np.floor(np.log10(largest)) + np.array([-1.0, 0.0]))
-    axes.set(ylabel="fed [W/m]", ylim=(-3.0 * largest, 80.0 * largest), yticks=[*-decades, 0.0, *decades])
+    decade = 10.0 ** np.floor(np.log10(largest))
+    axes.set(ylabel="fed [W/m]", ylim=(-3.0 * largest, 80.0 * largest), yticks=[-decade, 0.0, decade])
     axes.legend(loc="upper right", ncols=len(FEEDS), frameon=False)
     _lay_out_positions(axes, dataset)
 

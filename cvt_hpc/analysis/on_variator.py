@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from cvt_hpc.analysis.cells import colours_of
-from cvt_hpc.analysis.figures import WIDTH, axis_label, balanced, draw, styled
+from cvt_hpc.analysis.figures import WIDTH, axis_label, balanced, draw, on_a_page, styled
 from cvt_hpc.analysis.history_panels import FEEDS
 from cvt_hpc.analysis.profiles import regions, shown_unit
 from cvt_hpc.analysis.telling_apart import on_axes, titles
@@ -28,7 +28,8 @@ LARGEST = 0.16  # of the distance of the shafts: the longest bar
 ONE_SIGN, TWO_SIGNS = colours_of("viridis_r", 0.05, 0.95), colours_of("PuOr", 0.02, 0.98)
 HATCHES = ("", "///", "...")
 NAMED_AT, INSIDE = 0.35, 0.07  # of a strand, and of the distance of the shafts: where its name stands
-HEIGHT = 3.1  # [inch] of a variator
+PAPER = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0}  # under names on bars
+LEAST, HEIGHT, FRAME = 1.6, 3.1, 0.7  # [inch]: a variator, and what stands above all
 WATTS = 0.01  # of the largest bar: what is smaller has no number
 
 
@@ -43,18 +44,19 @@ def run_geometry(history: xr.Dataset) -> tuple[Variator, float] | None:
         return None
 
 
-def draw_pulleys(axes: Axes, path: Variator, distance: float) -> None:
-    """Draw both pulleys and the names of all parts [mm]."""
+def draw_pulleys(axes: Axes, path: Variator, distance: float, inside: float = INSIDE) -> None:
+    """Draw both pulleys and the names of all parts [mm], those of strands so far inside [distance]."""
+    named = {"ha": "center", "va": "center", "fontsize": 9, "zorder": 5}
     pulleys = ((0.0, path.driving_radius, "driving"), (distance, path.driven_radius, "driven"))
     for centre, radius, name in pulleys:
         axes.add_patch(Circle((1e3 * centre, 0.0), 1e3 * radius, color=PULLEY, zorder=0))
-        axes.text(1e3 * centre, 0.0, name, ha="center", va="center", fontsize=9)
+        axes.text(1e3 * centre, 0.0, name, **named, bbox=PAPER | {"facecolor": PULLEY})
     starts = path.lengths[0], path.path_length
     for strand, start, way in zip(("t1", "t2"), starts, (1.0, -1.0), strict=True):
         at = start + way * NAMED_AT * path.strand_length
         place, angle, _ = points_at(path, distance, np.array([at]))
-        inwards = INSIDE * distance * np.array([-np.sin(angle[0]), np.cos(angle[0])])
-        axes.text(*(1e3 * (place[0] + inwards)), strand, ha="center", va="center", fontsize=9)
+        inwards = inside * distance * np.array([-np.sin(angle[0]), np.cos(angle[0])])
+        axes.text(*(1e3 * (place[0] + inwards)), strand, **named, bbox=PAPER)
     axes.set(aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
 
 
@@ -94,9 +96,15 @@ def variator_figure(
     for name in quantities:
         if name not in known:
             raise unknown(f"{source}: {name}", "quantity along the belt", name, known)
-    figure = Figure((WIDTH, HEIGHT * len(quantities) + 0.7), layout="constrained")
-    for axes, name in zip(figure.subplots(len(quantities), 1, squeeze=False)[:, 0], quantities, strict=True):
+    then = "name fewer quantities"
+    grid = on_a_page(len(quantities), (1, 2), (LEAST, HEIGHT), FRAME, source, then)
+    rows = -(-len(quantities) // grid.columns)
+    figure = Figure((WIDTH, grid.height * rows + FRAME), layout="constrained")
+    panels = figure.subplots(rows, grid.columns, squeeze=False)
+    for axes, name in zip(panels.flat, quantities, strict=False):
         _draw_belt(figure, axes, history[name], path, distance)
+    for axes in panels.flat[len(quantities) :]:
+        axes.set_axis_off()
     common, _ = on_axes([history], [source])
     lines = titles([history], "On the variator", common)
     figure.suptitle("\n".join(balanced(line, 72) for line in lines))
@@ -105,7 +113,6 @@ def variator_figure(
 
 def _draw_belt(figure: Figure, axes: Axes, array: xr.DataArray, path: Variator, distance: float) -> None:
     """The belt in colours, with a bar at each station; of what is not known there is a thin line."""
-    draw_pulleys(axes, path, distance)
     factor, unit = shown_unit(array)
     values = factor * array.values
     position = array["position"].values
@@ -117,6 +124,7 @@ def _draw_belt(figure: Figure, axes: Axes, array: xr.DataArray, path: Variator, 
     is_known = np.isfinite(values)
     largest = float(np.abs(values[is_known]).max(initial=0.0)) or 1.0
     both = bool((values[is_known] < 0.0).any())
+    draw_pulleys(axes, path, distance, LARGEST + INSIDE if both else INSIDE)  # clear of bars inwards
     norm = TwoSlopeNorm(0.0, -largest, largest) if both else Normalize(0.0, largest)
     ends = points + (1e3 * LARGEST * distance / largest * np.where(is_known, values, 0.0))[:, None] * outwards
     colours = TWO_SIGNS if both else ONE_SIGN

@@ -8,7 +8,19 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.cli.parts import DONE, PICTURES, add_assignments, add_command, check_output, picture_beside, say
+from cvt_hpc.cli.parts import (
+    DONE,
+    PICTURES,
+    add_assignments,
+    add_colour_end,
+    add_command,
+    add_sides,
+    check_output,
+    colour_end,
+    picture_beside,
+    say,
+    sides_of,
+)
 from cvt_hpc.errors import mismatch
 
 
@@ -85,20 +97,29 @@ def add(commands: Any) -> None:
     for command, name in names.items():
         text = f"default: {name}.png beside the dataset"
         command.add_argument("--out", type=Path, metavar="PNG", help=text)
-    waterfall.add_argument("--x", metavar="AXIS", help="axis of the study that runs along x")
-    for command in (waterfall, curve, strands, hysteresis, campbell):
+    sides = {waterfall: ("x", "panel"), campbell: ("panel",), strands: ("x", "panel")}
+    sides |= {hysteresis: ("y", "panel"), curve: ()}
+    for command, names_of_sides in sides.items():
         add_assignments(command, "--at", "fix an axis at a value")
+        add_sides(command, *names_of_sides)
+    for command, runs in (
+        (waterfall, "runs"),
+        (campbell, "runs"),
+        (ramp, "moments"),
+        (spectrogram, "moments"),
+    ):
+        add_colour_end(command, runs)
 
 
 def _waterfall(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.arrangement import Sides
     from cvt_hpc.analysis.waterfall import draw_waterfall
     from cvt_hpc.study import open_results
 
-    out = _picture(arguments, "waterfall", *arguments.at)
+    out, vmax = _picture(arguments, "waterfall", *arguments.at), colour_end(arguments.vmax, "m")
     with open_results(arguments.path) as dataset:
-        at = _at(arguments, dataset)
-        say(f"picture: {draw_waterfall(dataset, out, at, str(arguments.path), Sides(arguments.x))}")
+        at, sides = _at(arguments, dataset), sides_of(arguments)
+        picture = draw_waterfall(dataset, out, at, str(arguments.path), sides, vmax=vmax)
+        say(f"picture: {picture}")
     return DONE
 
 
@@ -108,9 +129,10 @@ def _campbell(arguments: argparse.Namespace) -> int:
     from cvt_hpc.study import open_results
 
     out, orders = _picture(arguments, "campbell", *arguments.at), arguments.orders or ORDERS
+    chosen = orders, arguments.panel, colour_end(arguments.vmax, "m")
     with open_results(arguments.path) as dataset:
         at = _at(arguments, dataset)
-        picture = draw(lambda: campbell_figure(dataset, at, str(arguments.path), orders), out)
+        picture = draw(lambda: campbell_figure(dataset, at, str(arguments.path), *chosen), out)
         say(f"picture: {picture}")
     return DONE
 
@@ -121,8 +143,8 @@ def _hysteresis(arguments: argparse.Namespace) -> int:
 
     out = _picture(arguments, "hysteresis", *arguments.at)
     with open_results(arguments.path) as dataset:
-        at = _at(arguments, dataset)
-        say(f"picture: {draw_hysteresis(dataset, out, at, str(arguments.path))}")
+        at, sides = _at(arguments, dataset), sides_of(arguments)
+        say(f"picture: {draw_hysteresis(dataset, out, at, str(arguments.path), sides)}")
     return DONE
 
 
@@ -143,8 +165,8 @@ def _strands(arguments: argparse.Namespace) -> int:
 
     out = _picture(arguments, "strands", *arguments.at)
     with open_results(arguments.path) as dataset:
-        at = _at(arguments, dataset)
-        say(f"picture: {draw_strand_bars(dataset, out, at, str(arguments.path))}")
+        at, sides = _at(arguments, dataset), sides_of(arguments)
+        say(f"picture: {draw_strand_bars(dataset, out, at, str(arguments.path), sides)}")
     return DONE
 
 
@@ -214,7 +236,10 @@ def _ramp(arguments: argparse.Namespace) -> int:
     out = _picture(arguments, "ramp", arguments.of)
     files = history_files([arguments.path, *arguments.others])
     with _opened(files) as histories:
-        say(f"picture: {draw_ramp(histories, out, arguments.of, [file.stem for file in files])}")
+        shown = histories[0].get(arguments.of)
+        vmax = colour_end(arguments.vmax, "m" if shown is None else str(shown.attrs.get("units", "")))
+        picture = draw_ramp(histories, out, arguments.of, [file.stem for file in files], vmax)
+        say(f"picture: {picture}")
     return DONE
 
 
@@ -222,10 +247,10 @@ def _spectrogram(arguments: argparse.Namespace) -> int:
     from cvt_hpc.analysis.ramps import draw_spectrogram
     from cvt_hpc.analysis.telling_apart import history_files
 
-    out = _picture(arguments, "spectrogram")
+    out, vmax = _picture(arguments, "spectrogram"), colour_end(arguments.vmax, "m")
     files = history_files([arguments.path, *arguments.others])
     with _opened(files) as histories:
-        say(f"picture: {draw_spectrogram(histories, out, [file.stem for file in files])}")
+        say(f"picture: {draw_spectrogram(histories, out, [file.stem for file in files], vmax)}")
     return DONE
 
 

@@ -1,0 +1,80 @@
+"""Every kind of picture by the command line: it is one page at most, and no text lies on another or is cut."""
+
+import pytest
+
+from cvt_hpc.analysis.figures import LONG, NARROW
+from cvt_hpc.cli import main
+from cvt_hpc.netcdf import write_history
+from support import pictured
+
+MARGIN = 0.01  # [inch]
+KINDS = {
+    "map": "map R",
+    "map of one ratio": "map R --at ratio=1 --x driving_speed --y load",
+    "maps": "map R R2",
+    "map of values": "map R --show efficiency --show amplitude --panel ratio",
+    "map of a value": "map R --show efficiency --at ratio=1 --vmax 0.92",
+    "waterfall": "plot waterfall R",
+    "waterfall of panels": "plot waterfall R --x driving_speed --panel ratio --vmax 5um",
+    "campbell": "plot campbell R",
+    "campbell of panels": "plot campbell R --panel ratio --orders 1 2 3 8 16 24 --vmax 5um",
+    "hysteresis": "plot hysteresis S",
+    "curve": "plot curve R efficiency --at ratio=1 --at driving_speed=100rad/s",
+    "strands": "plot strands R --at driving_speed=100rad/s",
+    "strands of panels": "plot strands R --at driving_speed=100rad/s --x load --panel ratio",
+    "wrap": "plot wrap H H2",
+    "profile": "plot profile H H2",
+    "profile of a wrap": "plot profile H H2 --of sliding --region driven --columns load",
+    "ramp": "plot ramp L --vmax 5um",
+    "spectrogram": "plot spectrogram V",
+    "spectrograms": "plot spectrogram H L V --vmax 5um",
+    "element": "plot element H",
+    "element of an arc": "plot element H --region driven",
+    "history": "plot history H",
+    "phase": "plot phase H",
+    "flanks": "plot flanks H",
+    "energy": "plot energy H",
+    "variator": "plot variator H",
+    "variator of both signs": "plot variator H --of sliding --of push_force",
+}
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    """Files by the letter that stands for them in KINDS."""
+    folder = tmp_path_factory.mktemp("stored")
+    files = {"R": folder / "results.nc", "R2": folder / "other.nc", "S": folder / "ramps.nc"}
+    pictured.results().to_netcdf(files["R"])
+    pictured.results().assign_attrs(job_name="other pictures").to_netcdf(files["R2"])
+    pictured.ramps().to_netcdf(files["S"])
+    histories = {"H": {}, "H2": {"load": 80.0}, "L": {"ramped": "load"}, "V": {"ramped": "driving_speed"}}
+    for letter, options in histories.items():
+        files[letter] = write_history(pictured.history(**options), folder / f"run_{letter}.nc")
+    return files
+
+
+@pytest.fixture
+def drawn(stored, monkeypatch, capsys):
+    """Return a function that draws a picture by a command line with such letters, and returns its figure."""
+    figures = []
+    keep = lambda figure, out: figures.append(figure) or out  # noqa: E731
+    monkeypatch.setattr("cvt_hpc.analysis.figures.save_figure", keep)
+
+    def draw(line):
+        words = [str(stored.get(word, word)) for word in line.split()]
+        assert main(words) == 0, capsys.readouterr().err
+        return figures[-1]
+
+    return draw
+
+
+def assert_on_a_page(figure):
+    size = sorted(figure.get_size_inches())
+    assert size[0] <= NARROW + MARGIN and size[1] <= LONG + MARGIN, size
+
+
+@pytest.mark.parametrize("line", KINDS.values(), ids=KINDS)
+def test_a_picture_is_one_page_with_texts_that_are_whole_and_apart(line, drawn, monkeypatch):
+    figure = drawn(line)
+    assert_on_a_page(figure)
+    assert pictured.faults_of(figure, monkeypatch) == []
