@@ -19,6 +19,7 @@ from cvt_hpc.job.shown import shown_as_read, shown_number, shown_unit
 MOST_VALUES_NAMED = 12
 EVEN, EQUAL = 1.5, 1.01  # of steps: largest over smallest, below which they are taken for even
 LEAST_SPAN = 4.0  # last over first value of a logarithmic axis
+FEW, FEW_ON_DECADES = 12, 6  # values of an axis that have ticks of their own
 FEW_DECADES = 2.5  # on which 1, 2 and 5 have labels, not powers of ten alone
 
 
@@ -291,25 +292,22 @@ def _logarithmic_ruler(values: NDArray[np.float64], label: str) -> Ruler:
         at = np.outer(powers, digits).ravel()
         return np.sort(sign * at[(np.log10(at) >= low) & (np.log10(at) <= high)])
 
-    ticks = (
-        values
-        if _are_few(centres)
-        else inside(np.array([1.0, 2.0, 5.0] if high - low < FEW_DECADES else [1.0]))
-    )
+    digits = np.array([1.0, 2.0, 5.0] if high - low < FEW_DECADES else [1.0])
+    ticks = values if _are_few(centres, FEW_ON_DECADES) else inside(digits)
     minor = _on_decades(inside(np.arange(1.0, 10.0)))
     return Ruler(centres, edges, _on_decades(ticks), short_numbers(ticks, is_log=True), label, minor)
 
 
 def _exact_ticks(centres: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
     """Ticks at the grid points where these are few and far enough apart to be labelled."""
-    return (centres, short_numbers(centres)) if _are_few(centres) else (None, ())
+    return (centres, short_numbers(centres)) if _are_few(centres, FEW) else (None, ())
 
 
-def _are_few(centres: NDArray[np.float64]) -> bool:
-    """Whether each grid point can have a labelled tick."""
+def _are_few(centres: NDArray[np.float64], few: int) -> bool:
+    """Whether grid points can have labelled ticks: few, and about evenly spread."""
     if centres.size < 2:
         return True
-    return centres.size <= 6 and bool(np.diff(centres).min() > 0.5 * np.ptp(centres) / (centres.size - 1))
+    return centres.size <= few and bool(np.diff(centres).min() > 0.5 * np.ptp(centres) / (centres.size - 1))
 
 
 def _edges(centres: NDArray[np.float64]) -> NDArray[np.float64]:

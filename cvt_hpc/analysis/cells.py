@@ -12,13 +12,14 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colorbar import Colorbar
-from matplotlib.colors import Colormap, ListedColormap, Normalize, to_rgba
+from matplotlib.colors import Colormap, ListedColormap, Normalize, to_hex, to_rgba
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.image import PcolorImage
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
+from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.arrangement import Ruler
@@ -221,9 +222,20 @@ def write_values(
 
 
 def write_value(
-    axes: Axes, place: tuple[float, float], text: str, fill: Array, *, above: float = 0.0, size: float = 8.5
+    axes: Axes,
+    place: tuple[float, float],
+    text: str,
+    fill: Array,
+    *,
+    above: float = 0.0,
+    size: float = 8.5,
+    outlined: bool = False,
 ) -> None:
-    """Write a number at a place in data coordinates [or above it, point] on a cell of a colour (rgba)."""
+    """Write a number at a place in data coordinates [or above it, point] on a cell of a colour (rgba).
+
+    An outline in that colour keeps it apart from hatching.
+    """
+    effects = [withStroke(linewidth=2.5, foreground=to_hex(fill)), Normal()] if outlined else None
     axes.annotate(
         text,
         place,
@@ -233,6 +245,7 @@ def write_value(
         va="bottom" if above else "center",
         fontsize=size,
         color=_ink_on(fill, "#000000"),
+        path_effects=effects,
     )
 
 

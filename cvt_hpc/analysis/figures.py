@@ -236,8 +236,8 @@ def balanced(line: str, width: int) -> str:
 
 
 def headlines(lines: Sequence[str], width: int = 72) -> str:
-    """Text above a picture: each line broken as by `balanced`."""
-    return "\n".join(balanced(line, width) for line in lines).replace("\u00a0", " ")
+    """Text above a picture: lines that are not empty, each broken as by `balanced`."""
+    return "\n".join(balanced(line, width) for line in lines if line).replace("\u00a0", " ")
 
 
 def legend_columns(labels: Sequence[str]) -> int:

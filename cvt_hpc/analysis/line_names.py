@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
-LINE, LETTER = 9.5, 5.6  # [point]: height of a name, and width of a letter
+LINE, LETTER, TITLE = 9.5, 5.6, 3.0  # [point]: height of a name, width of a letter, distance of a title
 OUTLINE = [withStroke(linewidth=2.2, foreground="white"), Normal()]
 
 
@@ -30,8 +30,8 @@ class Named(NamedTuple):
     y: NDArray[np.float64]
 
 
-def name_lines(axes: Axes, lines: Sequence[Named], size: tuple[float, float]) -> bool:
-    """Write the names of lines beside a panel whose limits are set, and return whether one stands above it.
+def name_lines(axes: Axes, lines: Sequence[Named], size: tuple[float, float]) -> float:
+    """Write the names of lines beside a panel whose limits are set; return how high its title has to stand.
 
     Parameters
     ----------
@@ -41,6 +41,11 @@ def name_lines(axes: Axes, lines: Sequence[Named], size: tuple[float, float]) ->
         What leaves the panel at its upper side is named there, other lines where they end.
     size : (float, float)
         About the width and height of the panel [inch].
+
+    Returns
+    -------
+    float
+        Distance of the title [point].
     """
     right: list[tuple[float, Named]] = []
     above: list[tuple[float, Named]] = []
@@ -66,7 +71,7 @@ def name_lines(axes: Axes, lines: Sequence[Named], size: tuple[float, float]) ->
         _write(axes, line, (1.0, place), axes.get_yaxis_transform(), (3, 0), ha="left", va="center")
     for (_, line), place in zip(sorted(above, key=_place), _apart(above, gaps[1], (left, end)), strict=True):
         _write(axes, line, (place, 1.0), axes.get_xaxis_transform(), (0, 1), ha="center", va="bottom")
-    return bool(above)
+    return TITLE + LINE if above else TITLE
 
 
 def _place(placed: tuple[float, Named]) -> float:

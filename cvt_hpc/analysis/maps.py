@@ -324,7 +324,7 @@ def _title(sheet: Sheet) -> str:
         lines.append(f"each from a small and a large start: disturbance {attributes['starts']}")
     if inferred.size:
         lines.append(f"{inferred.size} cells inferred: {count_classes(inferred)}")
-    lines.extend(sheet.arrangement.notes)
+    lines.append(", ".join(sheet.arrangement.notes))
     if sheet.arrangement.panel and sheet.columns > NAMED:
         lines.append(f"panels: {in_words(sheet.arrangement.dataset[sheet.arrangement.panel])}")
     if sheet.writes_frequency:

@@ -28,6 +28,7 @@ LARGEST = 0.16  # of the distance of the shafts: the longest bar
 ONE_SIGN, TWO_SIGNS = colours_of("viridis_r", 0.05, 0.95), colours_of("PuOr", 0.02, 0.98)
 HATCHES = ("", "///", "...")
 NAMED_AT, INSIDE = 0.35, 0.07  # of a strand, and of the distance of the shafts: where its name stands
+NEAREST, NEAR = 0.75, 0.05  # of the way to the line of centres; of the path, bars beside a name
 PAPER = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0}  # under names on bars
 LEAST, HEIGHT, FRAME = 1.6, 3.1, 0.7  # [inch]: a variator, and what stands above all
 WATTS = 0.01  # of the largest bar: what is smaller has no number
@@ -44,20 +45,28 @@ def run_geometry(history: xr.Dataset) -> tuple[Variator, float] | None:
         return None
 
 
-def draw_pulleys(axes: Axes, path: Variator, distance: float, inside: float = INSIDE) -> None:
+def draw_pulleys(
+    axes: Axes, path: Variator, distance: float, inside: tuple[float, float] = (INSIDE, INSIDE)
+) -> None:
     """Draw both pulleys and the names of all parts [mm], those of strands so far inside [distance]."""
     named = {"ha": "center", "va": "center", "fontsize": 9, "zorder": 5}
     pulleys = ((0.0, path.driving_radius, "driving"), (distance, path.driven_radius, "driven"))
     for centre, radius, name in pulleys:
         axes.add_patch(Circle((1e3 * centre, 0.0), 1e3 * radius, color=PULLEY, zorder=0))
         axes.text(1e3 * centre, 0.0, name, **named, bbox=PAPER | {"facecolor": PULLEY})
-    starts = path.lengths[0], path.path_length
-    for strand, start, way in zip(("t1", "t2"), starts, (1.0, -1.0), strict=True):
-        at = start + way * NAMED_AT * path.strand_length
+    for strand, at, depth in zip(("t1", "t2"), _named_at(path), inside, strict=True):
         place, angle, _ = points_at(path, distance, np.array([at]))
-        inwards = inside * distance * np.array([-np.sin(angle[0]), np.cos(angle[0])])
+        inwards = min(depth * distance, NEAREST * abs(place[0, 1])) * np.array(
+            [-np.sin(angle[0]), np.cos(angle[0])]
+        )
         axes.text(*(1e3 * (place[0] + inwards)), strand, **named, bbox=PAPER)
     axes.set(aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
+
+
+def _named_at(path: Variator) -> tuple[float, float]:
+    """Path coordinates [m] at which the names of the strands stand."""
+    along = NAMED_AT * path.strand_length
+    return path.lengths[0] + along, path.path_length - along
 
 
 def draw_variator(
@@ -124,7 +133,9 @@ def _draw_belt(figure: Figure, axes: Axes, array: xr.DataArray, path: Variator, 
     is_known = np.isfinite(values)
     largest = float(np.abs(values[is_known]).max(initial=0.0)) or 1.0
     both = bool((values[is_known] < 0.0).any())
-    draw_pulleys(axes, path, distance, LARGEST + INSIDE if both else INSIDE)  # clear of bars inwards
+    near = [is_known & (np.abs(position - at) < NEAR * path.path_length) for at in _named_at(path)]
+    inwards = [LARGEST / largest * float(np.max(-values[here], initial=0.0)) for here in near]
+    draw_pulleys(axes, path, distance, (INSIDE + inwards[0], INSIDE + inwards[1]))
     norm = TwoSlopeNorm(0.0, -largest, largest) if both else Normalize(0.0, largest)
     ends = points + (1e3 * LARGEST * distance / largest * np.where(is_known, values, 0.0))[:, None] * outwards
     colours = TWO_SIGNS if both else ONE_SIGN

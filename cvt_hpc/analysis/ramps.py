@@ -127,7 +127,7 @@ def ramp_figure(
         axes.set_xlabel(ramps[0].label)
     bar = cells.Scale(COLOURS, norm, f"amplitude [{unit}]")
     drawn = np.concatenate([amplitude.ravel() for *_, amplitude in spectra])
-    cells.colour_bar(figure, bar, drawn, ax=list(panels[:, 1]), pad=0.02)
+    cells.colour_bar(figure, bar, drawn, ax=list(panels[:, 1]), aspect=15 * len(ramps), pad=0.02)
     lines = [*titles(histories, f"Along the ramp, {name}", common), "dashed: 500 and 700 Hz"]
     figure.suptitle(headlines(lines, 80))
     return figure
@@ -186,6 +186,7 @@ def spectrogram_figure(
     figure = Figure((WIDTH, grid.height * count + 1.4), layout="constrained")
     panels = figure.subplots(count, beside, sharey=True, squeeze=False)
     size, told, each = (0.8 * WIDTH / beside, grid.height - 0.5), set(), iter(panels.flat)
+    pads = np.full(panels.shape, 0.0)
     for axes in panels.flat[len(ramps) * len(strands) :]:
         axes.set_axis_off()
     for history, row, of_row, label in zip(histories, ramps, spectra, labels, strict=True):
@@ -203,14 +204,16 @@ def spectrogram_figure(
             if turns is not None:
                 lines += draw_orders(axes, *turns, ORDERS)
                 told.add("dotted: orders of the driving pulley's turns")
-            has_above = name_lines(axes, lines, size)
-            title = ", ".join([f"strand {strand}", *label.values()])
-            axes.set_title(fill(title, 72 // beside), loc="left", pad=13 if has_above else 3)
+            pads[panels == axes] = name_lines(axes, lines, size)
+            axes.set_title(fill(", ".join([f"strand {strand}", *label.values()]), 72 // beside), loc="left")
             axes.set_xlabel(ramp.label)
+    for axes, pad in zip(panels.flat, np.repeat(pads.max(axis=1), beside), strict=True):
+        axes.set_title(axes.get_title(loc="left"), loc="left", pad=pad)  # alike in a row
     for axes in panels[:, 0]:
         axes.set_ylabel("frequency [Hz]")
     scale = cells.Scale(COLOURS, norm, "amplitude [µm]")
-    cells.colour_bar(figure, scale, np.concatenate([each.ravel() for each in drawn]), ax=panels, pad=0.02)
+    values = np.concatenate([each.ravel() for each in drawn])
+    cells.colour_bar(figure, scale, values, ax=panels, aspect=20 * count, pad=0.02)
     figure.suptitle(headlines([*titles(histories, "Spectrogram", common), *sorted(told)]))
     return figure
 

@@ -134,7 +134,7 @@ def value_map_figure(
         panels = _panels(arrangement, quantities)
     shown = arrangement.dataset
     x, y = ruler(shown[arrangement.x]), ruler(shown[arrangement.y]) if arrangement.y else ONE_ROW
-    size, (columns, height) = _on_paper(len(panels), y.centres.size, source, arrangement.panel)
+    size, (columns, height) = _on_paper(len(panels), y.centres.size, source, arrangement)
     figure = Figure(size, layout="constrained")
     all_axes = figure.subplots(-(-len(panels) // columns), columns, squeeze=False)
     room = 72 * np.array([size[0] / columns - AROUND, height - FRAME])  # [point]
@@ -149,7 +149,7 @@ def value_map_figure(
         axes.set_xlabel(x.label)
     job = one_line(dataset.attrs.get("job_name", ""))
     kinds = occurrence_classes(shown)
-    lines = [f"{job}: {_counted(kinds)}".removeprefix(": "), *arrangement.notes]
+    lines = [f"{job}: {_counted(kinds)}".removeprefix(": "), ", ".join(arrangement.notes)]
     figure.suptitle(headlines(lines, int(72 * size[0] / WIDTH)))
     marked: dict[cells.CellClass, cells.ClassStyle] = {
         kind: cells.STYLES[kind] for kind in OTHERS if (kinds == kind).any()
@@ -159,17 +159,24 @@ def value_map_figure(
     return figure
 
 
-def _on_paper(count: int, rows: int, source: str, panel: str | None) -> tuple[tuple[float, float], Grid]:
-    """Size of the picture [inch] and its panels: in two columns across a page, else on one upright."""
+def _on_paper(
+    count: int, rows: int, source: str, arrangement: Arrangement
+) -> tuple[tuple[float, float], Grid]:
+    """Size of the picture [inch] and its panels: on a page on its side, else on one upright.
+
+    The panels of an axis of three values stand side by side.
+    """
     wanted = min(ROW * rows + 0.3, HIGHEST) + FRAME
     if count == 1:
         return (WIDTH, wanted + FRAME), Grid(1, wanted)
     sizes, then = (LEAST + FRAME, wanted), "show fewer quantities, or fix an axis by `--at`"
-    if panel:
+    if panel := arrangement.panel:
         then = f"fix an axis, as by `--at {panel}=VALUE`, or choose another one by `--panel AXIS`"
-    width, grid = 1.6 * WIDTH, fitting(count, (2,), (wanted, wanted), NARROW - FRAME)
+    is_row = arrangement.dataset.sizes.get(panel) == BESIDE
+    width, least = 1.6 * WIDTH, sizes[0] if is_row else wanted
+    grid = fitting(count, (BESIDE if is_row else 2,), (least, wanted), NARROW - FRAME)
     if grid is None:
-        width, grid = NARROW, on_a_page(count, range(2, BESIDE + 1), sizes, FRAME, source, then)
+        width, grid = NARROW, on_a_page(count, (2, BESIDE), sizes, FRAME, source, then)
     return (width, grid.height * -(-count // grid.columns) + FRAME), grid
 
 
@@ -256,7 +263,8 @@ def _draw_panel(
             place, value = (x.centres[column], y.centres[row]), values[row, column]
             fill_colour = np.asarray(scale.colours(scale.norm(value)))
             digits = ".0f" if 1e3 <= abs(value) < 1e5 else ".3g" if abs(value) >= 0.1 else ".2g"
-            cells.write_value(axes, place, f"{value:{digits}}", fill_colour, size=7.5)
+            is_dotted = kinds[row, column] == OccurrenceClass.SLIPPING
+            cells.write_value(axes, place, f"{value:{digits}}", fill_colour, size=7.5, outlined=is_dotted)
     cells.draw_marks(axes, x, y, kinds, np.isin(kinds, OTHERS) & ~is_known, 3.5)
     if (slips := is_known & (kinds == OccurrenceClass.SLIPPING)).any():
         dots = {

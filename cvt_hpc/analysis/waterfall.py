@@ -32,7 +32,7 @@ from cvt_hpc.analysis.line_names import OUTLINE, Named, name_lines
 from cvt_hpc.errors import few_of, mismatch, one_line
 
 LEAST, HEIGHT, FRAME = 1.3, 2.8, 1.2  # [inch]: a row of panels, and title and labels
-COLOURS = cells.colours_of("inferno_r", 0.0, 0.95)
+COLOURS = cells.colours_of("magma_r", 0.0, 0.97)
 SHALLOWEST, DEEPEST = 1e-2, 1e-4  # of the end of the colours: between them lies their beginning
 LIGHT = 0.9  # share of all amplitudes that may have the lightest colour
 UNKNOWN = "#d0d4d8"  # of runs without a spectrum
@@ -109,7 +109,7 @@ def waterfall_figure(
     size = 0.8 * WIDTH / panels.shape[1], grid.height - 0.3
     for ax in panels.flat[len(rows) * len(strands) :]:
         ax.set_axis_off()
-    each = iter(panels.flat)
+    each, pad = iter(panels.flat), 3
     for (title, shown), of_row, modes in zip(rows, amplitude, known, strict=True):
         for strand, values in zip(strands, of_row, strict=True):
             axes, lines = next(each), []
@@ -120,27 +120,26 @@ def waterfall_figure(
                 lines += draw_eigenfrequencies(axes, x.centres, of_strand, modes["half_waves"].values)
             if arrangement.x == "driving_speed":
                 lines += draw_orders(axes, x.centres, shown["driving_speed"].values / (2.0 * np.pi), orders)
-            has_above = name_lines(axes, lines, size)
+            pad = max(pad, name_lines(axes, lines, size))
             words = ", ".join(filter(None, (f"strand {strand}", title)))
-            axes.set_title(words, loc="left", pad=13 if has_above else 3)
+            axes.set_title(words, loc="left", pad=pad)
             x.lay_out(axes.xaxis)
     for axes in panels.flat[: len(rows) * len(strands)][-panels.shape[1] :]:
         axes.set_xlabel(x.label)
         axes.tick_params(labelbottom=True)
     for axes in panels[:, 0]:
         axes.set_ylabel("frequency [Hz]")
-    cells.colour_bar(
-        figure, cells.Scale(COLOURS, norm, "amplitude [µm]"), np.stack(amplitude), ax=panels, pad=0.02
-    )
+    scale = cells.Scale(COLOURS, norm, "amplitude [µm]")
+    cells.colour_bar(figure, scale, np.stack(amplitude), ax=panels, aspect=20 * count, pad=0.02)
     job = one_line(dataset.attrs.get("job_name", ""))
     subject = "Campbell diagram" if orders else "Spectra of the strands"
-    told = [f"{subject}: {job}".rstrip(": "), *notes]
+    told = []
     if arrangement.x == "driving_speed" and orders:
         told.append("dotted: orders of the driving pulley's turns")
     if any(modes is not None for modes in known):
         told.append("dashed: eigenfrequencies, with their half waves along the strand")
     told += _without_spectrum(rows, amplitude)
-    figure.suptitle(headlines(told))
+    figure.suptitle(headlines([f"{subject}: {job}".rstrip(": "), ", ".join(notes), *told]))
     return figure
 
 
