@@ -20,6 +20,7 @@ from cvt_hpc.analysis.arrangement import CHOSEN, Ruler, Sides, arrange, check_si
 from cvt_hpc.analysis.cells import OF_STARTS, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, check_results
 from cvt_hpc.analysis.figures import (
+    STYLE,
     WIDTH,
     axis_label,
     balanced,
@@ -255,7 +256,8 @@ def hysteresis_figure(
         for handle in draw_bands(axes, y, values):
             legend.setdefault(handle.get_label(), handle)
         axes.set_ylim(*y.edges[[0, -1]])
-        axes.set_ylabel(y.label)
+        if count == 1:
+            axes.set_ylabel(y.label)
         y.lay_out(axes.yaxis)
         axes.grid(axis="x", lw=0.4, alpha=0.5)
         if panel:
@@ -263,6 +265,8 @@ def hysteresis_figure(
     for axes in panels.flat[:count][-grid.columns :]:
         axes.set_xlabel(axis_label(ranges, unit))
         axes.tick_params(labelbottom=True)
+    if count > 1:
+        figure.supylabel(y.label, fontsize=STYLE["axes.labelsize"])
     job = one_line(dataset.attrs.get("job_name", ""))
     lines = [f"Vibration along ramps up and down: {job}".removesuffix(": "), *notes]
     figure.suptitle("\n".join(balanced(line, 72) for line in lines))

@@ -67,7 +67,9 @@ def name_lines(axes: Axes, lines: Sequence[Named], size: tuple[float, float]) ->
             _write(axes, line, (x[last], y[last]), "data", (3, 0), ha="left", va="center", bbox=paper)
     letters = max((len(line.name) for _, line in above), default=1)
     gaps = LINE / (72.0 * size[1]) * top, (LETTER * letters + 3.0) / (72.0 * size[0]) * (end - left)
-    for (_, line), place in zip(sorted(right, key=_place), _apart(right, gaps[0], (0.0, top)), strict=True):
+    for (_, line), place in zip(
+        sorted(right, key=_place), _apart(right, gaps[0], (0.0, top - 0.5 * gaps[0])), strict=True
+    ):
         _write(axes, line, (1.0, place), axes.get_yaxis_transform(), (3, 0), ha="left", va="center")
     for (_, line), place in zip(sorted(above, key=_place), _apart(above, gaps[1], (left, end)), strict=True):
         _write(axes, line, (place, 1.0), axes.get_xaxis_transform(), (0, 1), ha="center", va="bottom")

@@ -16,6 +16,7 @@ from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.eigenfrequencies import strand_frequencies
 from cvt_hpc.analysis.figures import (
     NARROW,
+    STYLE,
     WIDTH,
     balanced,
     coordinate_unit,
@@ -35,7 +36,9 @@ from cvt_hpc.vibration.signals import window_amplitudes
 WINDOW = 0.04  # [s]: lines of the spectrogram 50 Hz wide
 HIGHEST = 1500.0  # [Hz]
 BAND, NOISE = (300.0, 1500.0), (400.0, 800.0)  # [Hz] of strands' vibration, and of the noise
-LEAST, ROW, HEIGHT = 0.9, 1.5, 2.2  # [inch]: a row of panels at least, of a ramp, and of spectrograms
+LEAST, ROW = 1.1, 1.5  # [inch]: a row of panels of a ramp, at least and else
+LEAST_HEIGHT, HEIGHT = 1.5, 2.2  # [inch]: the same of spectrograms
+LETTERS = 14  # of a label beside a row
 THEN = "name fewer histories"  # of more than a page holds
 LINE_POINTS = 21  # of lines over a spectrogram
 
@@ -117,12 +120,12 @@ def ramp_figure(
         for edge in (500.0, 700.0):
             right.axhline(edge, color="#123a6b", linewidth=0.8, linestyle=(0, (4, 4)))
         left.set_title(", ".join(label.values()), loc="left", pad=3)
-        right.set_ylabel("frequency [Hz]")
+        right.set_ylabel(fill("frequency [Hz]", LETTERS - 1))
         left.set_xlim(np.sort(ramp.values[[0, -1]]))
     unit = "µm" if of in STRANDS else str(histories[0][of].attrs.get("units", ""))
     name = f"strand {of}" if of in STRANDS else in_words(histories[0][of])
     for left, _ in panels:
-        left.set_ylabel(f"{name} [{unit}]")
+        left.set_ylabel(fill(f"{name} [{unit}]", LETTERS))
     for axes in panels[-1]:
         axes.set_xlabel(ramps[0].label)
     bar = cells.Scale(COLOURS, norm, f"amplitude [{unit}]")
@@ -181,11 +184,11 @@ def spectrogram_figure(
     spectra = [[spectrogram(ramp) for ramp in row] for row in ramps]
     drawn = [amplitude.T for row in spectra for *_, amplitude in row]
     norm = spectra_norm(drawn, None if vmax is None else 1e6 * vmax)
-    grid = on_a_page(len(ramps), (1, 2), (1.2, HEIGHT), 1.4, names[0], THEN)
+    grid = on_a_page(len(ramps), (1, 2), (LEAST_HEIGHT, HEIGHT), 1.4, names[0], THEN)
     count, beside = -(-len(ramps) // grid.columns), grid.columns * len(strands)
     figure = Figure((WIDTH, grid.height * count + 1.4), layout="constrained")
     panels = figure.subplots(count, beside, sharey=True, squeeze=False)
-    size, told, each = (0.8 * WIDTH / beside, grid.height - 0.5), set(), iter(panels.flat)
+    size, told, each = (0.8 * WIDTH / beside, grid.height - 0.7), set(), iter(panels.flat)
     pads = np.full(panels.shape, 0.0)
     for axes in panels.flat[len(ramps) * len(strands) :]:
         axes.set_axis_off()
@@ -209,8 +212,10 @@ def spectrogram_figure(
             axes.set_xlabel(ramp.label)
     for axes, pad in zip(panels.flat, np.repeat(pads.max(axis=1), beside), strict=True):
         axes.set_title(axes.get_title(loc="left"), loc="left", pad=pad)  # alike in a row
-    for axes in panels[:, 0]:
-        axes.set_ylabel("frequency [Hz]")
+    if count == 1:
+        panels[0, 0].set_ylabel("frequency [Hz]")
+    else:
+        figure.supylabel("frequency [Hz]", fontsize=STYLE["axes.labelsize"])
     scale = cells.Scale(COLOURS, norm, "amplitude [µm]")
     values = np.concatenate([each.ravel() for each in drawn])
     cells.colour_bar(figure, scale, values, ax=panels, aspect=20 * count, pad=0.02)

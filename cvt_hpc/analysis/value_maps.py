@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from textwrap import fill
@@ -18,7 +17,16 @@ from matplotlib.patches import PathPatch
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
-from cvt_hpc.analysis.arrangement import CHOSEN, Arrangement, Ruler, Sides, arrange, ruler, value_text
+from cvt_hpc.analysis.arrangement import (
+    CHOSEN,
+    Arrangement,
+    Ruler,
+    Sides,
+    arrange,
+    first_panel,
+    ruler,
+    value_text,
+)
 from cvt_hpc.analysis.classes import OccurrenceClass, check_results, count_classes, occurrence_classes
 from cvt_hpc.analysis.curves import check_quantities
 from cvt_hpc.analysis.figures import (
@@ -130,7 +138,7 @@ def value_map_figure(
     arrangement = arrange(dataset, at or {}, source, sides)
     panels = _panels(arrangement, quantities)
     if len(panels) > MOST_PANELS and not sides.panel:
-        arrangement = _first_panel(arrangement)
+        arrangement = first_panel(arrangement)
         panels = _panels(arrangement, quantities)
     shown = arrangement.dataset
     x, y = ruler(shown[arrangement.x]), ruler(shown[arrangement.y]) if arrangement.y else ONE_ROW
@@ -184,16 +192,6 @@ def _counted(kinds: xr.DataArray) -> str:
     """How many runs there are, and how many of the marked classes."""
     others = kinds.values[np.isin(kinds, OTHERS)]
     return f"{kinds.size} runs" + (f", of them {count_classes(others)}" if others.size else "")
-
-
-def _first_panel(arrangement: Arrangement) -> Arrangement:
-    """The arrangement with the axis of its panels fixed at its first value."""
-    if not arrangement.panel:
-        return arrangement
-    axis = arrangement.dataset[arrangement.panel]
-    note = f"{in_words(axis)} = {value_text(axis, 0)} (first of {axis.size})"
-    fixed = arrangement.dataset.isel({arrangement.panel: 0})
-    return replace(arrangement, dataset=fixed, panel=None, notes=(*arrangement.notes, note))
 
 
 def _of_grid(array: xr.DataArray, arrangement: Arrangement) -> NDArray[Any]:

@@ -45,6 +45,8 @@ def add(commands: Any) -> None:
     add_assignments(picture, "--at", "fix an axis at a value")
     add_sides(picture, "x", "y", "panel")
     add_colour_end(picture, "cells")
+    text = "draw an axis log or linear (default: log where its values are spread so); may be repeated"
+    picture.add_argument("--spacing", action="append", default=[], metavar="AXIS=SPACING", help=text)
     text = "draw the figure of a paper that a study repeats, and measure what the paper says of it"
     add_command(commands, "figure", _figure, text, "DIR")
     text = "write a page about a study: what was found, a map with values, failed runs, cost, assumptions"
@@ -77,7 +79,7 @@ def _gather(arguments: argparse.Namespace) -> int:
 def _map(arguments: argparse.Namespace) -> int:
     from contextlib import ExitStack
 
-    from cvt_hpc.job.assignments import read_coordinates
+    from cvt_hpc.job.assignments import read_coordinates, split_assignments
     from cvt_hpc.study import open_results
 
     paths = [arguments.path, *arguments.others]
@@ -91,6 +93,9 @@ def _map(arguments: argparse.Namespace) -> int:
             dataset = join_studies(datasets, list(map(str, paths)), arguments.show)
             if AXIS not in sides:
                 sides = sides._replace(panel=sides.panel or AXIS)
+        from cvt_hpc.analysis.arrangement import with_spacings
+
+        dataset = with_spacings(dataset, split_assignments(arguments.spacing, source, "--spacing"), source)
         units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
         at = read_coordinates(arguments.at, units, source, "--at")
         from cvt_hpc.analysis.maps import draw_map
