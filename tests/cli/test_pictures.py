@@ -1,13 +1,18 @@
-"""Every kind of picture by the command line: it is one page at most, and no text lies on another or is cut."""
+"""Every kind of picture by the command line: on one page, no text on another or cut, lines told apart by all."""
 
+from itertools import combinations
+
+import numpy as np
 import pytest
 
 from cvt_hpc.analysis.figures import LONG, NARROW
 from cvt_hpc.cli import main
 from cvt_hpc.netcdf import write_history
 from support import pictured
+from support.eyes import EYES, lightness, seen
 
 MARGIN = 0.01  # [inch]
+IN_GREY, IN_COLOUR = 15.0, 10.0  # differences that an eye sees without looking twice
 KINDS = {
     "map": "map R",
     "map of one ratio": "map R --at ratio=1 --x driving_speed --y load",
@@ -78,3 +83,17 @@ def test_a_picture_is_one_page_with_texts_that_are_whole_and_apart(line, drawn, 
     figure = drawn(line)
     assert_on_a_page(figure)
     assert pictured.faults_of(figure, monkeypatch) == []
+    for axes in figure.axes:
+        assert_lines_apart([line for line in axes.lines if not line.get_label().startswith("_")])
+
+
+def assert_lines_apart(lines):
+    """Lines with labels of their own differ in more than a colour that not all see, or that a copier drops."""
+    for one, other in combinations(lines, 2):
+        looks = [(line.get_linestyle(), line.get_marker(), line.get_fillstyle()) for line in (one, other)]
+        if one.get_label() == other.get_label() or looks[0] != looks[1]:
+            continue
+        colours = [line.get_color() for line in (one, other)]
+        assert abs(np.subtract(*lightness(colours))) > IN_GREY, (one, other)
+        for eyes in EYES:
+            assert np.linalg.norm(np.subtract(*seen(colours, eyes))) > IN_COLOUR, (one, other, eyes)
