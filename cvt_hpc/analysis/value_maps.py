@@ -13,7 +13,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.patches import PathPatch
+from matplotlib.patches import Patch, PathPatch
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
@@ -54,6 +54,7 @@ BESIDE, LETTERS = 3, 14.0  # panels side by side at most; letters of a title to 
 ROW, FRAME = 0.25, 0.9  # [inch], of a row of cells, and of title and labels
 HIGHEST, LEAST = 3.6, 0.8  # [inch], of a panel's cells
 AROUND = 1.5  # [inch]: labels beside a panel's cells
+NEGATIVE, INK = "---", "#5a5a5a"  # lines over cells below zero that hold no numbers
 HATCH = cells.STYLES[OccurrenceClass.SLIPPING].hatch
 EQUAL = 1e-6  # of a quantity: what differs less is the same
 NARROWEST, LOWEST = 24.0, 11.0  # [point]: cells into which numbers are written
@@ -162,8 +163,13 @@ def value_map_figure(
     marked: dict[cells.CellClass, cells.ClassStyle] = {
         kind: cells.STYLES[kind] for kind in OTHERS if (kinds == kind).any()
     }
-    if marked:
-        cells.class_legend(figure, marked, len(marked))
+    negative = [
+        Patch(facecolor="none", edgecolor=INK, hatch=NEGATIVE, linewidth=0.8, label="below zero")
+        for axes in all_axes.flat
+        if any(patch.get_hatch() == NEGATIVE for patch in axes.patches)
+    ][:1]
+    if marked or negative:
+        cells.class_legend(figure, marked, len(marked) + len(negative), further=negative)
     return figure
 
 
@@ -263,20 +269,21 @@ def _draw_panel(
             digits = ".0f" if 1e3 <= abs(value) < 1e5 else ".3g" if abs(value) >= 0.1 else ".2g"
             is_dotted = kinds[row, column] == OccurrenceClass.SLIPPING
             cells.write_value(axes, place, f"{value:{digits}}", fill_colour, size=7.5, outlined=is_dotted)
+    elif both:  # in grey the colours of both signs are alike
+        _hatch(axes, x, y, is_known & (values < 0.0), NEGATIVE, INK)
     cells.draw_marks(axes, x, y, kinds, np.isin(kinds, OTHERS) & ~is_known, 3.5)
-    if (slips := is_known & (kinds == OccurrenceClass.SLIPPING)).any():
-        dots = {
-            "facecolor": "none",
-            "edgecolor": "#ffffff",
-            "linewidth": 0,
-            "hatch": HATCH,
-            "rasterized": True,
-        }
-        axes.add_patch(PathPatch(cells.area_of(x, y, slips), **dots))
+    _hatch(axes, x, y, is_known & (kinds == OccurrenceClass.SLIPPING), HATCH, "#ffffff")
     x.lay_out(axes.xaxis)
     y.lay_out(axes.yaxis)
     if is_known.any():
         cells.colour_bar(figure, scale, values, ax=axes, pad=0.02)
+
+
+def _hatch(axes: Axes, x: Ruler, y: Ruler, inside: NDArray[np.bool_], hatch: str, ink: str) -> None:
+    """Hatch some cells over their colours."""
+    lines = {"facecolor": "none", "edgecolor": ink, "linewidth": 0, "hatch": hatch, "rasterized": True}
+    if inside.any():
+        axes.add_patch(PathPatch(cells.area_of(x, y, inside), **lines))
 
 
 def _norm(values: NDArray[np.float64], vmax: float | None) -> Normalize:
