@@ -16,7 +16,7 @@ else a picture refuses its docstring says.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
 from textwrap import wrap
@@ -26,6 +26,7 @@ from weakref import WeakSet
 import matplotlib
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -167,10 +168,19 @@ def as_written(figure: Figure) -> Figure:
         for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks())
         for label in (tick.label1, tick.label2)
     }
-    for text in figure.findobj(Text):
+    for text in _texts_within(figure):
         if text not in powers:
             text.set_parse_math(False)
     return figure
+
+
+def _texts_within(artist: Artist) -> Iterator[Text]:
+    """All texts of an artist that are drawn: those of hidden axes would be made first, which takes long."""
+    if isinstance(artist, Text):
+        yield artist
+    elif artist.get_visible():
+        for child in artist.get_children():
+            yield from _texts_within(child)
 
 
 class Grid(NamedTuple):

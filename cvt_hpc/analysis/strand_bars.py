@@ -68,7 +68,7 @@ def strand_bars_figure(
     for axes, (title, shown) in zip(row, panels, strict=True):
         _draw_bars(axes, shown.transpose(arrangement.x, ...))
         axes.set_title(title, loc="left", pad=4)
-        put_ticks(axes.xaxis, np.arange(len(ticks)), ticks)
+        put_ticks(axes.xaxis, np.arange(float(len(ticks))), ticks)
         axes.set_xlabel(x.label)
     row[0].set_ylabel("push force | ring tension [kN]")
     handles, labels = row[0].get_legend_handles_labels()

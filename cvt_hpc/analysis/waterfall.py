@@ -109,7 +109,7 @@ def waterfall_figure(
     size = 0.8 * WIDTH / panels.shape[1], grid.height - 0.3
     for ax in panels.flat[len(rows) * len(strands) :]:
         ax.set_axis_off()
-    each, pad = iter(panels.flat), 3
+    each, pad = iter(panels.flat), 0.0
     for (title, shown), of_row, modes in zip(rows, amplitude, known, strict=True):
         for strand, values in zip(strands, of_row, strict=True):
             axes, lines = next(each), []
