@@ -77,7 +77,7 @@ def kind_text(diagram: Diagram, kind: Criticality) -> str:
 
 
 def gap_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
-    """Yield the lines that say where states were not found, and where stability changes unseen."""
+    """Yield the lines that state where states were not found, and where stability changes unseen."""
     missed = sorted(followed.branch.missed)
     if missed:
         yield f"no steady state found at {load_text(diagram, *missed, most=len(missed))}"
@@ -98,7 +98,7 @@ def load_text(diagram: Diagram, *loads: float, most: int = MOST_NAMED) -> str:
 
 
 def left_out_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
-    """Yield the line that says where there is no run from the steady state, because none is found."""
+    """Yield the line that states where there is no run from the steady state, because none is found."""
     begun = {run.value for run in followed.runs if run.start == 0}
     loads = [run.value for run in followed.runs if run.start == 1 and run.value not in begun]
     if loads:

@@ -53,7 +53,7 @@ def measure(point: Point, scene: Scene, repeats: int, time_limit: float) -> Meas
     Parameters
     ----------
     point : Point
-        What to run.
+        The job to run.
     scene : Scene
         What is judged.
     repeats : int

@@ -72,7 +72,7 @@ def look_around(fit: Fit, evaluation: Evaluation, confirmed: Sequence[Confirmed]
     Parameters
     ----------
     fit : Fit
-        What is fitted.
+        The requested fit.
     evaluation : Evaluation
         Does the runs.
     confirmed : sequence of Confirmed

@@ -71,7 +71,7 @@ def confirm(fit: Fit, evaluation: Evaluation, found: Found) -> list[Confirmed]:
     Parameters
     ----------
     fit : Fit
-        What is fitted.
+        The requested fit.
     evaluation : Evaluation
         Does the runs.
     found : Found

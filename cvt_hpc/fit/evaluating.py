@@ -65,7 +65,7 @@ class Evaluation:
     Parameters
     ----------
     fit : Fit
-        What is fitted.
+        The requested fit.
     out : Path
         Their folder.
     fresh : bool

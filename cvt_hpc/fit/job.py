@@ -69,7 +69,7 @@ class Fit:
     job : Job
         The scene of all runs, without axes.
     free : tuple of Free
-        What is fitted.
+        The requested fit.
     along : str
         The swept parameter.
     values : (runs,) array

@@ -50,7 +50,7 @@ def search(fit: Fit, evaluate: Evaluate, tell: Callable[[str], None] = lambda li
     Parameters
     ----------
     fit : Fit
-        What is fitted.
+        The requested fit.
     evaluate : callable
         Given the name of a study and the scenes of its candidates, shape (candidates, free) [SI].
     tell : callable

@@ -26,7 +26,7 @@ def read_csv(file: FromFile, name: str, source: str, where: str) -> dict[str, An
     Parameters
     ----------
     file : FromFile
-        What the key declares.
+        Declaration of the key.
     name : str
         Path of the file; a relative one starts at the folder of the job file.
     source : str

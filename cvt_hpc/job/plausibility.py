@@ -59,7 +59,7 @@ def warn_of_bare_numbers(parameter: Parameter, raw: Any, where: str) -> None:
     Parameters
     ----------
     parameter : Parameter
-        What the key declares.
+        Declaration of the key.
     raw : Any
         The value, list, array or range found.
     where : str

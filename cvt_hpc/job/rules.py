@@ -29,7 +29,7 @@ class Rule:
     where : str
         File and key, for errors.
     parameter : Parameter
-        What the key declares.
+        Declaration of the key.
     """
 
     key: str

@@ -22,7 +22,7 @@ def read_table(
     declared : mapping
         What the table may hold.
     raw : Any
-        What stands in the file.
+        Content of the file.
     where : str
         File and table, for the errors.
     tables : tuple of str

@@ -20,7 +20,7 @@ def read_value(parameter: Parameter, raw: Any, where: str) -> Any:
     Parameters
     ----------
     parameter : Parameter
-        What the key declares.
+        Declaration of the key.
     raw : Any
         The value found: a number, a text with or without a unit, a bool, or a (nested) list.
     where : str

@@ -34,7 +34,7 @@ def cost_left(rung: Rung, out: Path | None) -> tuple[int, float]:
 
 
 def plan_lines(asked: Ladder, out: Path) -> Iterator[str]:
-    """Yield the lines that say which runs a ladder does on each rung, and what they are expected to cost."""
+    """Yield the lines that state the runs of a ladder on each model, and their expected cost."""
     job, rungs = asked.job, asked.rungs
     yield f"ladder {job.name} ({job.source}): {job.size} runs on {len(rungs)} rungs"
     if job.description:

@@ -38,7 +38,7 @@ def draw_ladder(job: Job, findings: Sequence[Finding], out: Path) -> Path:
     Parameters
     ----------
     job : Job
-        Whose ladder it is.
+        The job of the ladder.
     findings : sequence of Finding
         Its results.
     out : Path

@@ -108,7 +108,7 @@ def report_ladder(job: Job, rungs: Sequence[Rung], out: Path) -> LadderReport:
     Parameters
     ----------
     job : Job
-        Whose ladder it is.
+        The job of the ladder.
     rungs, out
         As of `run_ladder`, which has come to its end.
 

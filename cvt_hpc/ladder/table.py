@@ -83,7 +83,7 @@ def ladder_dataset(job: Job, rungs: Sequence[Rung], findings: Sequence[Finding])
     Parameters
     ----------
     job : Job
-        Whose ladder it is.
+        The job of the ladder.
     rungs : sequence of Rung
         Its rungs.
     findings : sequence of Finding

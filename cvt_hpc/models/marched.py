@@ -64,7 +64,7 @@ class Marched:
         return self.marching.counters()
 
     def paused(self) -> Marched:
-        """What a batch of the same point over a longer time goes on from: the run itself."""
+        """The state from which a batch of the same point over a longer time continues: the run itself."""
         return self
 
     def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
@@ -131,7 +131,7 @@ class MarchedRun(Marched):
         Parameters
         ----------
         parameters : mapping
-            Those of the run but for `duration` and `judged_fraction`.
+            Parameters of the run but for `duration` and `judged_fraction`.
         """
         self.parameters = parameters
         self.samples = sample_count(parameters)
@@ -159,7 +159,7 @@ class MarchedRun(Marched):
         Returns
         -------
         (Status, str) or None
-            What has gone wrong, where the run cannot go on.
+            The failure, where the run cannot continue.
         """
         first, last = self.done, min(self.done + samples, self.samples)
         outcome = self.marching.advance(self.rows[first:last])

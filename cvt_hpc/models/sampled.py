@@ -80,7 +80,7 @@ class SampledRun:
         Parameters
         ----------
         parameters : mapping
-            Those of the run but for `duration` and `judged_fraction`.
+            Parameters of the run but for `duration` and `judged_fraction`.
         """
         self.parameters = parameters
         self.samples, self.risen = sample_count(parameters), start_up_samples(parameters)
@@ -156,5 +156,5 @@ class SampledRun:
         return slice(self.first_judged, self.samples)
 
     def paused(self) -> Any:
-        """What a batch of the same point over a longer time goes on from: the run itself."""
+        """The state from which a batch of the same point over a longer time continues: the run itself."""
         return self

@@ -44,7 +44,7 @@ def step_check(job: Job, out: Path, fraction: float, way: str = "half") -> Repea
     Parameters
     ----------
     job : Job
-        What was run, by a stepper with a fixed step.
+        The job, with a stepper of a fixed step.
     out : Path
         Its folder.
     fraction : float

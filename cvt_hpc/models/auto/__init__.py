@@ -1,4 +1,4 @@
-"""The cheapest rung of the elastic belt's ladder that answers the question asked, run by run.
+"""The cheapest model of the elastic belt's ladder that answers the question, run by run.
 
 `rules.py` has the rules and their grounds, README.md what they cost and how often they err. Importing this
 package is cheap.

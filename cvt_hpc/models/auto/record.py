@@ -1,4 +1,4 @@
-"""What the record of a run holds: as of the elastic belt, and which rung it is of."""
+"""The record of a run: as of the elastic belt, and which rung it is of."""
 
 from __future__ import annotations
 

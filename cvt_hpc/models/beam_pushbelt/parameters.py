@@ -1,4 +1,4 @@
-"""What a job may set of the pushbelt on a ring of beams: of the names of `pushbelt`, and of the ring."""
+"""Parameters of the pushbelt on a ring of beams: those of `pushbelt`, and those of the ring."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the record of a run holds: that of a run of `pushbelt`, by the same judge."""
+"""The record of a run: that of a run of `pushbelt`, by the same judge."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ def add_contacts(
     chain : Chain
         The belt.
     pulleys, wheels : Pulleys, Wheels
-        What it runs around.
+        The pulleys that it runs around.
     tau : float
         [s]
     is_known : bool

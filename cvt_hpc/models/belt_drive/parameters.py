@@ -1,4 +1,4 @@
-"""What a job may set of the belt drive, with units, bounds and defaults.
+"""Parameters of the belt drive that a job may set, with units, bounds and defaults.
 
 Radii, centre distance, line mass, stiffness and damping of the belt (five ribs) and the inertia of the
 pulleys are those of Cepon and Boltezar 2011, table 1; elements, contact points and the scatter of lengths are

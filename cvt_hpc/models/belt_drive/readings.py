@@ -94,7 +94,7 @@ class Reading:
     where : Readings
         Where it is read.
     drive, state : Drive, State
-        What moves, and its motion.
+        The moving parts, and their motion.
     sums : (6, PLACES) array, optional
         To which profiles are added: length, tension and offset by it, forces, and samples at each place.
 

@@ -1,4 +1,4 @@
-"""What the record of a run of the belt drive holds, what a run costs, and how it is judged."""
+"""The record of a run of the belt drive: its variables, the cost of a run, and the verdict."""
 
 from __future__ import annotations
 

@@ -296,7 +296,7 @@ class LaneRun(RecordedRun):
 
     @property
     def failure(self) -> tuple[Status, str] | None:
-        """What has gone wrong, where the run cannot go on."""
+        """The failure, where the run cannot continue."""
         outcome = int(self._ended(OUTCOME))
         return FAILURES[Outcome(outcome)] if outcome else None
 
@@ -315,7 +315,7 @@ class LaneRun(RecordedRun):
 
     @property
     def momentary(self) -> np.ndarray | None:
-        """What `Momentary` has kept of the run."""
+        """Samples of the run that `Momentary` has kept."""
         return self.batch.momentary.of(self._lane)
 
     @property
@@ -329,7 +329,7 @@ class LaneRun(RecordedRun):
         return take_lane(self.batch.state, self._lane, self.batch.belts[self._lane])
 
     def paused(self) -> Paused:
-        """What a batch of the same point over a longer time goes on from."""
+        """The state from which a batch of the same point over a longer time continues."""
         kept = lane_arrays(self.batch.state, self.batch.work, self.batch.ended)
         lane = tuple(array.data[:, :, self._lane].copy() for array in kept)
         return Paused(float(self.batch.state.time[0]), lane, self.rows.copy(order="K"))

@@ -1,4 +1,4 @@
-"""What a job may set of the belt's bending: curvature terms, and the moment of the pressed elements."""
+"""Parameters of the belt's bending: curvature terms, and the moment of the pressed elements."""
 
 from __future__ import annotations
 

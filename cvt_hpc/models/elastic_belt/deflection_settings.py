@@ -1,4 +1,4 @@
-"""What a job may set of the deflection of the sheaves' discs, and the flexibilities that follow."""
+"""Parameters of the deflection of the sheaves' discs, and the flexibilities that result."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ class GeneralTransient(Marched, OneLaneRun):
         return 2 * self.counters()["rates"]
 
     def take_over(self, runs: Sequence[Any]) -> None:
-        """Go on from where a run by another stepper stands, its history included, but for means begun before.
+        """Continue a run by another stepper, its history included, except for means that began before.
 
         Parameters
         ----------
@@ -137,7 +137,7 @@ class GeneralTransient(Marched, OneLaneRun):
         Returns
         -------
         (Status, str) or None
-            What has gone wrong, where the run cannot go on.
+            The failure, where the run cannot continue.
         """
         last = min(self.done + samples, self.samples)
         found = self._march(0) if samples == 0 else None

@@ -34,7 +34,7 @@ class OneLaneRun(RecordedRun):
         Parameters
         ----------
         parameters : dict
-            Those of the run but for `duration` and `judged_fraction`.
+            Parameters of the run but for `duration` and `judged_fraction`.
         """
         plan = recording(parameters, np.float64)
         self._profiles = [LaneArray(rows, len(PROFILES), 1) for rows in (0, plan.mesh.cell.size)]
@@ -66,7 +66,7 @@ class OneLaneRun(RecordedRun):
 
     @property
     def momentary(self) -> np.ndarray | None:
-        """What `Momentary` has kept of the run."""
+        """Samples of the run that `Momentary` has kept."""
         return self._momentary.of(0)
 
     @property

@@ -1,4 +1,4 @@
-"""What a job may set of the pulleys' freedom and of their shafts; by default they are as they always were.
+"""Parameters of free pulleys and of their shafts that a job may set; by default they are as they always were.
 
 No paper gives numbers of these: every default is an assumption, plausible and not measured.
 """

@@ -1,4 +1,4 @@
-"""What the record of a run holds of the elastic belt: names, units, and how each follows from the samples."""
+"""Variables of the record of the elastic belt: names, units, and how each follows from the samples."""
 
 from __future__ import annotations
 

@@ -128,7 +128,7 @@ class RecordedRun:
 
         @property
         def momentary(self) -> np.ndarray | None:
-            """What `Momentary` has kept of the run."""
+            """Samples of the run that `Momentary` has kept."""
 
     def __init__(self, parameters: Mapping[str, Any], plan: Recording, sums: np.ndarray) -> None:
         self.parameters = parameters

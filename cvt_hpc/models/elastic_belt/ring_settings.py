@@ -1,4 +1,4 @@
-"""What a job may set of the rings as a stack of layers, what does not fit together, and what has no effect.
+"""Parameters of the rings as a stack of layers: those that a job may set, conflicts, and keys without effect.
 
 No paper gives numbers: thickness and friction are assumptions, those of common belts.
 """

@@ -1,4 +1,4 @@
-"""What a job may set of linear stability: the steady belt's parameters, and what decides."""
+"""Parameters of linear stability that a job may set: the steady belt's parameters, and what decides."""
 
 from __future__ import annotations
 

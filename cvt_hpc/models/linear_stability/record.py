@@ -1,4 +1,4 @@
-"""What the record of linear stability holds: the verdict, and the mode that grows fastest."""
+"""The record of linear stability: the verdict, and the mode that grows fastest."""
 
 from __future__ import annotations
 

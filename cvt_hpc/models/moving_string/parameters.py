@@ -1,4 +1,4 @@
-"""What a job may set of the moving string; the defaults are near those of a belt's strand."""
+"""Parameters of the moving string that a job may set; the defaults are near those of a belt's strand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the record of a run holds of the oscillator: its vibration, whether it sticks, the work of a cycle."""
+"""Variables of the oscillator in a record: its vibration, whether it sticks, the work of a cycle."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class Transient(MarchedRun):
     parameters : mapping
         Resolved parameters of the run [SI].
     stepper : str
-        One that the model takes.
+        A stepper that the model takes.
 
     Attributes
     ----------

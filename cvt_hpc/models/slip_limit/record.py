@@ -1,4 +1,4 @@
-"""What the record of a limit of slip holds, and how it is found."""
+"""The record of a limit of slip, and the search for it."""
 
 from __future__ import annotations
 

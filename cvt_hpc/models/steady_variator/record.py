@@ -1,4 +1,4 @@
-"""What the record of a steady state holds; names are those of the elastic belt's transient."""
+"""Variables in the record of a steady state; names are those of the elastic belt's transient."""
 
 from __future__ import annotations
 
