@@ -20,7 +20,7 @@ from cvt_hpc.vibration import assessment, ramp
 from cvt_hpc.vibration.ramped import ramped
 from cvt_hpc.vibration.signals import amplitude_spectrum
 
-RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by what a ramp changes
+RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by the ramped quantity
 
 
 def assess(
@@ -44,7 +44,7 @@ def assess(
 
 
 def _assess_ramp(run: Any) -> ramp.RampOccurrence | None:
-    """Whether and how a run vibrates along a ramp; None if it ended too soon to tell."""
+    """Whether and how a run vibrates along a ramp; None if it ended too soon."""
     p, first, quantity = run.parameters, run.risen, ramped(run.parameters)
     columns, strands = _on_strands(run)
     rate, moved = p["sampling_rate"], run.displacement[first:, columns]
@@ -54,7 +54,7 @@ def _assess_ramp(run: Any) -> ramp.RampOccurrence | None:
 
 
 def _on_strands(run: Any, names: Sequence[str] = STRANDS) -> tuple[np.ndarray, list[str]]:
-    """Columns of the displacement whose probes lie on strands, and on which."""
+    """Columns of the displacement whose probes lie on strands, and the strand of each."""
     regions = [probe.label.split()[0] for probe in run.probes]
     columns = [k for k, region in enumerate(regions) if region in names]
     return np.array(columns), [regions[k] for k in columns]
@@ -67,7 +67,7 @@ def slipped_through(run: Any) -> dict[str, Any]:
 
 
 def slipped(run: Any) -> dict[str, Any]:
-    """The record of a run that has slipped through before its end: what is known until then."""
+    """The record of a run that has slipped through before its end: the values known until then."""
     found = slipped_through(run)
     before = _assess_ramp(run) if ramped(run.parameters) else None
     if before is not None:
@@ -122,9 +122,9 @@ def evaluate(run: Any, strongest_probe: np.ndarray) -> dict[str, Any]:
 def power_balance(
     driving: float, load: float, loss: float, storing: float, thrust: float = 0.0, damped: float = 0.0
 ) -> dict[str, float]:
-    """Powers of a run as its record names them [W], but that of a thrust, and what their balance leaves open.
+    """Powers of a run as its record names them [W], but that of a thrust, and the open balance.
 
-    `damped` is what the time step takes by itself.
+    `damped` is the numerical damping of the time step.
     """
     open_power = driving - load - thrust - loss - storing - damped
     return {
@@ -137,12 +137,12 @@ def power_balance(
 
 
 def efficiency(driving: float, load: float, loss: float) -> float:
-    """What losses leave of the power put in [1]: 0 without load; not a number where nothing is put in.
+    """Share of the power put in that is not lost [1]: 0 without load; not a number where nothing is put in.
 
     Parameters
     ----------
     driving, load : float
-        Power of the driving pulley, and what the load takes [W]; negative where power flows backwards.
+        Power of the driving pulley, and power of the load [W]; negative where power flows backwards.
     loss : float
         [W]
     """

@@ -1,4 +1,4 @@
-"""What records of a variator have in common, whichever model wrote them."""
+"""Variables that records of all models of a variator have in common."""
 
 from __future__ import annotations
 

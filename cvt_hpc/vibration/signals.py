@@ -60,8 +60,8 @@ def window_amplitudes(
 ) -> tuple[Array, Array]:
     """Band-limited amplitude in successive windows, each overlapping the one before by half.
 
-    The last window ends with the record; what does not fill a window at the record's start is left out.
-    Hann windows that overlap by half use every sample and are almost uncorrelated.
+    The last window ends with the record; samples at the record's start that do not fill a window are left
+    out. Hann windows that overlap by half use every sample and are almost uncorrelated.
 
     Parameters
     ----------
