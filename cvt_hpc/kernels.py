@@ -296,7 +296,7 @@ def _source(path: str) -> _Source:
 
 
 def _stamp(path: str) -> tuple[int, int]:
-    """Detects that a file was changed before it is imported again, as in a notebook."""
+    """Time and size of a file, which show that it was changed and is imported again, as in a notebook."""
     found = os.stat(path)
     return found.st_mtime_ns, found.st_size
 

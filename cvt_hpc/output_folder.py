@@ -126,7 +126,7 @@ class OutputFolder(ABC, Generic[Content]):
 
     @abstractmethod
     def results_tell(self) -> Callable[[Content], bool] | None:
-        """Return the origin of results if they belong to a content; None if there are no results."""
+        """Return a function that decides whether the results are of a content; None if there are none."""
 
     @abstractmethod
     def written(self, found: Any) -> Iterator[Path]:

@@ -20,7 +20,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "longest_duration": not_negative(
             0.0,
             "s",
-            "up to which a run goes on while it is undecided; 0: four times the duration",
+            "up to which an undecided run is prolonged; 0: four times the duration",
             sensible=(0.001, 1000.0),
         ),
     },

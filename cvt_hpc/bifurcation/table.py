@@ -1,4 +1,4 @@
-"""What a branch says in words: its Hopf points, and where there is no steady state."""
+"""The results of a branch in words: its Hopf points, and loads without a steady state."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST_NAMED = 12  # loads in a row
 
 
 def branch_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
-    """Yield the lines that tell of one branch."""
+    """Yield the lines that describe one branch."""
     yield f"{place_text(diagram, followed.asked)}:"
     yield from onset_lines(diagram, followed)
     if not followed.onsets:
@@ -36,7 +36,7 @@ def branch_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
 
 
 def place_text(diagram: Diagram, asked: Asked) -> str:
-    """Values of the axes other than the load, and of what a branch depends on most."""
+    """Values of the axes other than the load, and of the parameters on which a branch depends most."""
     schema = diagram.job.schema
     values = {name: asked.parameters[name] for name in NAMED} | asked.place
     return ", ".join(

@@ -1,4 +1,4 @@
-"""What a chart needs of the models, asked for before anything is computed."""
+"""Requirements of a chart on its models, checked before anything is computed."""
 
 from __future__ import annotations
 

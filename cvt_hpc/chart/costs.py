@@ -1,4 +1,4 @@
-"""What a chart is expected to cost, by the cost models of its models."""
+"""Expected cost of a chart, by the cost models of its models."""
 
 from __future__ import annotations
 

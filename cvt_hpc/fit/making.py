@@ -19,12 +19,12 @@ from cvt_hpc.tables import columns
 
 
 class FitReport(NamedTuple):
-    """What a fit left.
+    """Results of a fit.
 
     Attributes
     ----------
     lines : tuple of str
-        What people are told of the best set.
+        Text on the best set for people.
     tables : tuple of Path
         The files that hold the results; none on other ranks than the first.
     """
@@ -36,9 +36,9 @@ class FitReport(NamedTuple):
 def make_fit(
     fit: Fit, out: Path, *, fresh: bool = False, tell: Callable[[str], None] = lambda line: None
 ) -> FitReport:
-    """Look for the set of parameters that meets the targets best, and for what is to be known of it.
+    """Search for the set of parameters that meets the targets best, and examine it.
 
-    On all ranks, by studies that go on where an earlier start has stopped.
+    On all ranks, by studies that continue where an earlier start has stopped.
 
     Parameters
     ----------

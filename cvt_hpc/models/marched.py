@@ -26,14 +26,14 @@ class Probe(NamedTuple):
 
 
 class Marched:
-    """What a run says of its march: how far it has come, and by what work.
+    """State of a run's march: its progress, and its work.
 
     Attributes
     ----------
     marching : Marching
         The stepper at work on the model's equations.
     failure : (Status, str) or None
-        Why the run does not go on.
+        Why the run cannot continue.
     """
 
     marching: Marching
@@ -68,7 +68,7 @@ class Marched:
         return self
 
     def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
-        """Why a run that reached its end is not to be trusted: its marching has told all."""
+        """Why a run that reached its end fails the checks: its march has checked everything."""
         return None
 
 
@@ -90,7 +90,7 @@ class MarchedRun(Marched):
     displacements : sequence of int
         The unknown that is the displacement [m] at each probe.
     frequency : float
-        The model's fastest undamped vibration [rad/s]: what an explicit step must resolve.
+        The model's fastest undamped vibration [rad/s], which an explicit step must resolve.
 
     Attributes
     ----------
@@ -227,7 +227,7 @@ class BatchOfOne:
         self.runs[0].advance(samples)
 
     def take_over(self, runs: Sequence[Any]) -> None:
-        """Go on from where a run by another stepper stands; of models with TAKES_OVER.
+        """Continue a run by another stepper; for models with TAKES_OVER.
 
         Parameters
         ----------

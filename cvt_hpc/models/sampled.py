@@ -1,4 +1,4 @@
-"""A run that a kernel of the model's own marches from sample to sample, and what it has recorded so far."""
+"""A run that a kernel of the model's own marches from sample to sample, and its record so far."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class SampledRun:
     first_judged : int
         The sample at which the judged part begins.
     failure : (Status, str) or None
-        Why the run does not go on: what has gone wrong, or that the belt slips through, with the status done.
+        Why the run cannot continue: the failure, or that the belt slips through, with the status done.
     """
 
     _state: Any  # what is marched, with `counters`

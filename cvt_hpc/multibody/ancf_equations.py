@@ -34,7 +34,7 @@ FIRST, SECOND = (-2.0 - np.sqrt(3.0), -2.0 + np.sqrt(3.0)), (2.0 - np.sqrt(3.0),
 
 
 def empty_work() -> LaneArray:
-    """Room for what is computed of some elements."""
+    """Work space for the forces of some elements."""
     return LaneArray(1, LOST + 1, SIDE_BY_SIDE)
 
 

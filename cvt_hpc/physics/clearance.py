@@ -1,4 +1,4 @@
-"""A sheave whose collar tilts freely before it bears: what a clearance adds to the contact of a wrap.
+"""A sheave whose collar tilts freely before it bears: the effect of a clearance on the contact of a wrap.
 
 With the clearance c, as opening of the groove [m], collar and shaft open it by q = (q_1, q_2), in the
 notation of `compliance.py` and with the collar's compliance kappa = a r^2 / c_tilt,

@@ -54,7 +54,7 @@ _DIRECTION_ERROR = {np.dtype(np.float64): 1e-13, np.dtype(np.float32): 1e-6}  # 
 
 
 class Contact(NamedTuple):
-    """The contact of one wrap of m stations, and what its solver keeps between calls.
+    """The contact of one wrap of m stations, and the data that its solver keeps between calls.
 
     Attributes
     ----------

@@ -117,18 +117,18 @@ def given_law(parameters: Mapping[str, Any]) -> FrictionLaw:
 
 
 def softened(law: FrictionLaw, share: float) -> FrictionLaw:
-    """Law that falls by a share of what a law does; 0: constant, for a table its least coefficient."""
+    """Law whose fall is a share of a given law's; 0: constant, for a table its least coefficient."""
     least = law.table_mu.min() if law.table_mu.size else 0.0
     return law._replace(gradient=share * law.gradient, table_mu=least + share * (law.table_mu - least))
 
 
-FORMULAS: dict[Law, Callable[..., Any]] = {}  # asked for in this order
+FORMULAS: dict[Law, Callable[..., Any]] = {}  # checked in this order
 
 
 def _formula_of(law: Law) -> Callable[..., Any]:
-    """Note a function as the formula of a law: mu and its slope, from what `law_numbers` prepares and v.
+    """Register a function as the formula of a law: mu and its slope, from the numbers of `law_numbers` and v.
 
-    Kernels that take mu alone do not compute the slope: the compiler drops what nobody reads.
+    Kernels that take mu alone do not compute the slope: the compiler drops unused results.
     """
 
     def note(formula: Callable[..., Any]) -> Callable[..., Any]:
@@ -187,7 +187,7 @@ def _unknown(kind, numbers, speed):
 
 
 def _by_kind(formulas: list[tuple[Law, Any]]) -> Any:
-    """What takes a kind and a formula's numbers: the formula of that kind, for others `_unknown`."""
+    """Function of a kind and a formula's numbers: the formula of that kind, for others `_unknown`."""
     # merged, as a call from an inner loop costs more than the formula
     if not formulas:
         return register_jitable(forceinline=True)(_unknown)
@@ -223,7 +223,7 @@ def formula_coefficient(kind: int, numbers, speed):
     kind : int
         One of `Law`, the same in all lanes; not a number comes of any other.
     numbers
-        What `law_numbers` made of the law's.
+        The numbers of the law by `law_numbers`.
     speed
         Sliding speed, >= 0 [m/s]; lanes or a plain number.
 

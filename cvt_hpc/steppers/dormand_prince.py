@@ -87,7 +87,7 @@ def _stages(system: System, t: float, step: float, y: np.ndarray, work: Work, co
 
 @kernel
 def _error(system: System, step: float, tolerance: float, y: np.ndarray, work: Work) -> float:
-    """Root mean square of the step's error against what is allowed, [1]."""
+    """Root mean square of the step's error over the allowed error, [1]."""
     total = 0.0
     for i in range(y.size):
         error = 0.0

@@ -1,4 +1,4 @@
-"""What a stepper is given: rates of change with their constants, and what it has to know of the unknowns."""
+"""The input of a stepper: rates of change with their constants, and facts on the unknowns."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class System(NamedTuple):
         rates(constants, t, y, out) -> bool: writes f(t, y) into `out` (n,); False where there is no value,
         such as that of a contact without a solution.
     constants : NamedTuple
-        What `rates` reads.
+        Input of `rates`.
     velocities : (n,) bool array
         Unknowns that partitioned methods advance first.
     position_of : (n,) int array

@@ -1,12 +1,12 @@
 """The runs that are done together, and their order: full lanes, but no rank without work.
 
 Runs that advance together take little longer than one of them alone, so full lanes cost the least processor
-time. A batch fills the lanes several times, one turn after the other, and then again with its runs
-that need more than one transient: the more turns, the fuller. But each batch is done by one rank. So batches
-have no more turns than leave `PER_RANK` of them for each rank. Where even batches of one turn are fewer than
-ranks they are cut, as evenly and as far as all can still be done at once: the sweep ends sooner, or at worst
-at the same time, since few lanes take no longer than all; the price is processor time of ranks that would
-have waited.
+time. A batch fills the lanes several times. Each filling is a turn. Runs that need more than one transient
+then fill the lanes again; with more turns these lanes are fuller. But each batch is done by one rank. The
+number of turns is therefore limited, so that each rank has `PER_RANK` batches. Where even batches of one turn
+are fewer than ranks they are cut, as evenly and as far as all can still be done at once. The sweep then ends
+sooner, or at worst at the same time, since few lanes take no longer than all. The price is processor time of
+ranks that would have waited.
 """
 
 from __future__ import annotations

@@ -137,7 +137,7 @@ class StudyFolder(OutputFolder[Study]):
         return None
 
     def results_tell(self) -> Callable[[Study], bool] | None:
-        """Return the origin of logs if they belong to a study; None if there are none, of any job."""
+        """Return a function that decides whether the logs are of a study; None if there are none."""
         if not self._has_logs():
             return None
         return lambda study: bool(read_records(self.records, study).recorded.any())

@@ -112,8 +112,8 @@ class Task:
         """Do the runs of a batch, and yield their records as they come; none of runs that are broken off.
 
         All come at once, unless an exception or the time limit ends the batch. Then its runs are done one by
-        one, so that only those fail that do so alone, and each record comes when its run ends. `begin` is
-        told beforehand what is done.
+        one, so that only runs that fail alone count as failed, and each record comes when its run ends.
+        `begin` is called before with the runs.
         """
         try:
             result, trouble = self._attempt(batch, interrupt, begin)

@@ -45,7 +45,7 @@ VARIABLES = (
         (),
         "f8",
         "N m",
-        "at the driving pulley, what friction carries at nominal radii under these axial forces",
+        "at the driving pulley, torque that friction carries at nominal radii under these axial forces",
     ),
     Variable("torque_ratio", (), "f8", "1", "load over carried_torque, with the load's sign"),
     Variable("slip_margin", (), "f8", "1", "size of torque_ratio, less 1; slips from about 0"),

@@ -50,14 +50,14 @@ _SHARED = (
         (),
         "f8",
         "1",
-        "what losses leave of the power put in, by the driving pulley or by a load that drives",
+        "share of the power put in that is not lost, by the driving pulley or by a load that drives",
     ),
     Variable(
         "power_residual",
         (),
         "f8",
         "1",
-        "what the power balance leaves open, over the larger of drive and losses",
+        "power that the balance leaves open, over the larger of drive and losses",
     ),
 )
 

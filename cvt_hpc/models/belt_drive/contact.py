@@ -47,7 +47,7 @@ class Contact(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """What the contacts of P pulleys and k elements remember, and their forces.
+    """State of the contacts of P pulleys and k elements, and their forces.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ def add_contacts(
     Parameters
     ----------
     contact, touch : Contact, Touch
-        What the contacts are, and what they remember.
+        The contacts, with their state.
     lengths : (k,) array
         Of the elements [m].
     chain : Chain

@@ -1,4 +1,4 @@
-"""The belt on its pulleys: what moves, and the step in time."""
+"""The belt on its pulleys: the moving parts, and the step in time."""
 
 from __future__ import annotations
 

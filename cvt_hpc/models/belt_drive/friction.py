@@ -81,7 +81,7 @@ class Friction(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What friction remembers of the contacts of P pulleys with k elements of C points.
+    """State of the friction in the contacts of P pulleys with k elements of C points.
 
     Attributes
     ----------
@@ -169,7 +169,7 @@ def rub(
     Parameters
     ----------
     friction, memory : Friction, Memory
-        The treatment, and what it remembers.
+        The treatment, and its state.
     p, i, c : int
         Pulley, element and point.
     slip : float

@@ -54,7 +54,9 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "kick": not_negative(
             0.0, "N s", "impulse across each strand when the judged part begins", sensible=(1e-6, 10.0)
         ),
-        "crossed": Parameter(False, "", "the belt crosses itself: the driven pulley turns the other way"),
+        "crossed": Parameter(
+            False, "", "the belt crosses itself: the driven pulley rotates in the opposite direction"
+        ),
     },
     "layout": LAYOUT,
     "tensioner": TENSIONER,

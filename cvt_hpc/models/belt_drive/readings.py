@@ -1,4 +1,4 @@
-"""What is read off a belt drive at a sample: displacement, tensions, sliding, forces along the path."""
+"""Readings of a belt drive at a sample: displacement, tensions, sliding, forces along the path."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PLACES = 240  # along the path, at which profiles are recorded: 5 mm of a belt o
 
 
 def scalars_of(drawn: Layout, arms: int) -> tuple[str, ...]:
-    """Names of what is read at a sample beside displacement."""
+    """Names of the readings of a sample beside displacement."""
     names = ["driven_speed", *(f"tension {span}" for span in drawn.spans)]
     names += [f"slip {pulley}" for pulley in drawn.pulleys]
     if len(drawn.pulleys) > 2:
@@ -87,7 +87,7 @@ class Readings:
 
 
 class Reading:
-    """What is read at one sample, until the next one is.
+    """Readings of one sample, until the next one.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ class Reading:
         self.lifted = found.largest <= 0.0
 
     def scalars(self) -> list[float]:
-        """What `scalars_of` names."""
+        """Values of the names in `scalars_of`."""
         wheels, drawn = self._state.wheels, self._where.drawn
         speeds = drawn.path.turn * wheels.speed[0, : len(drawn.pulleys)]
         slip = drawn.path.turn * self._slip / self._where.belt_speed

@@ -31,7 +31,7 @@ PARAMETERS = {
         "spectral_radius": Parameter(
             0.6,
             "",
-            "what a step leaves of a vibration that it does not resolve; 1: the midpoint rule",
+            "share that a step leaves of a vibration that it does not resolve; 1: the midpoint rule",
             minimum=0.0,
             maximum=1.0,
         ),

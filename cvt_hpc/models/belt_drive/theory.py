@@ -1,4 +1,4 @@
-"""What theory says of a drive: speed loss, tension where the belt slides, frequencies of the strands."""
+"""Theory of a drive: speed loss, tension where the belt slides, frequencies of the strands."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What feeds a vibration and what takes from it: the audit of the fluctuations about the mean motion.
+"""Energy that enters and leaves a vibration: the audit of the fluctuations about the mean motion.
 
 A force f that works at the speed v has the mean power <f v> = <f> <v> + <f' v'>: what the mean force does in
 the mean motion, and what it feeds into the fluctuation. Friction of the flanks takes power on the whole, and
@@ -84,7 +84,7 @@ VARIABLES = (
         (),
         "f8",
         "W",
-        "power that is fed into the fluctuation less what is taken and carried",
+        "power that is fed into the fluctuation less the power taken and carried",
     ),
 )
 

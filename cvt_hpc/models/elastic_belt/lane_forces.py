@@ -1,4 +1,4 @@
-"""Forces of the elastic belt in lanes: what steps, recording and audit find of one state.
+"""Forces of the elastic belt in lanes, as steps, recording and audit need them for one state.
 
 Steps keep it in a LaneArray of N stations, their work space: its first fields are those named here, further
 ones each step's own.

@@ -1,4 +1,4 @@
-"""Ring layers in lanes: constants, strains, friction of their surfaces, and what a sample takes of them.
+"""Ring layers in lanes: constants, strains, friction of their surfaces, and their part of a sample.
 
 The equations are those of `rings.py`. Surfaces and layers are counted from 0: layer k lies between surface k
 and surface k + 1; surface 0 is the saddle, surface n that of the ears.

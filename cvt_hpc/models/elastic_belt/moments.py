@@ -1,4 +1,4 @@
-"""Sums of forces, speeds and their products at each station: of what the fluctuations' audit is made."""
+"""Sums of forces, speeds and their products at each station, for the fluctuations' audit."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ _sample, _audit_layers = called_alike(sample_state), called_alike(audit_layers)
 
 
 class OneLaneRun(RecordedRun):
-    """What such runs have in common; attributes as of `RecordedRun`."""
+    """Common parts of such runs; attributes as of `RecordedRun`."""
 
     done: int
 

@@ -100,8 +100,8 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "stiffness_of": Parameter(
             "disc",
             "",
-            "what sheave_stiffness scales: the discs alone, as in Lebrecht et al. 2004, or the whole sheave, "
-            "disc and tilt of its collar",
+            "stiffness that sheave_stiffness scales: the discs alone, as in Lebrecht et al. 2004, or the "
+            "whole sheave, disc and tilt of its collar",
             choices=STIFFNESS_OF,
         ),
         "tilt_stiffness": _stiffness(

@@ -1,4 +1,4 @@
-"""Where power enters and leaves the belt drive, and what it stores: the audit of a run.
+"""Where power enters and leaves the belt drive, and where it is stored: the audit of a run.
 
 The driving pulley's speed is prescribed, and its power is its moment times its momentary speed. In a steady
 state, on average over a vibration,

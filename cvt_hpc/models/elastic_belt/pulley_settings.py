@@ -119,7 +119,7 @@ PULLEYS: dict[str, Parameter] = {
     "held_torque_ratio": Parameter(
         0.6,
         "",
-        "torque ratio to be held: load over what friction carries at the lesser axial force",
+        "torque ratio to be held: load over the load that friction carries at the lesser axial force",
         minimum=-1.0,
         maximum=1.0,
         exclusive=True,

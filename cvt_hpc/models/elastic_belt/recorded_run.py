@@ -1,4 +1,4 @@
-"""What every run of the elastic belt records, however it is marched: plan of recording and its reading."""
+"""Recording of every run of the elastic belt, with any stepper: plan of recording and its reading."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cvt_hpc.vibration.ramped import ramped
 
 
 class Recording(NamedTuple):
-    """What is recorded, where, and when.
+    """The recorded quantities, with places and times.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class RecordedRun:
 
         @property
         def failure(self) -> tuple[Status, str] | None:
-            """Why the run does not go on."""
+            """Why the run cannot continue."""
 
         @property
         def time(self) -> float:
@@ -184,7 +184,7 @@ class RecordedRun:
 
     @property
     def fluctuation(self) -> Fluctuation:
-        """What feeds the fluctuations of the judged part, and what takes from them."""
+        """Energy that enters and leaves the fluctuations of the judged part."""
         return fluctuation(self.means, self.mesh, self.parameters)
 
     @property

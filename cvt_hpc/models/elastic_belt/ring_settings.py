@@ -30,7 +30,7 @@ RINGS: dict[str, Parameter] = {
     "layer_tolerance": Parameter(
         (),
         "",
-        "length of each layer over the one that fits, k_i, inner layer first; none: all fit",
+        "length of each layer over the length that fits, k_i, inner layer first; none: all fit",
         minimum=0.99,
         maximum=1.01,
     ),

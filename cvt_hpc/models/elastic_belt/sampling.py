@@ -1,4 +1,4 @@
-"""What is recorded of the belt at each sampling instant, and when a run has to be stopped."""
+"""The recorded quantities of the belt at each sampling instant, and when a run has to be stopped."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ends a run, and whether one that reached its end left the ground on which its numbers stand."""
+"""Conditions that end a run, and checks of the numbers of a run that reached its end."""
 
 from __future__ import annotations
 

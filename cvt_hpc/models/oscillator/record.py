@@ -43,7 +43,7 @@ VARIABLES = (
         (),
         "f8",
         "1",
-        "what the balance of these cycles leaves open, over the work turned over",
+        "work that the balance of these cycles leaves open, over the work converted",
     ),
     Variable("steady_displacement", (), "f8", "m", "displacement in steady sliding"),
     Variable(

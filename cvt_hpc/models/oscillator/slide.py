@@ -1,4 +1,4 @@
-"""Whether a method silences what friction drives: small swings about steady sliding, by its own steps.
+"""Whether a method silences a vibration that friction drives: small swings about steady sliding.
 
 At the belt's speed v the mass can slide steadily. There a friction that falls by (N mu)' < 0 drives small
 swings at the rate s = -(c + (N mu)') / (2 m). A method whose damping is stronger turns their growth into

@@ -118,7 +118,7 @@ class Equations:
         return self._flat.state.copy()
 
     def residual(self, x: np.ndarray) -> np.ndarray | None:
-        """What the equations leave, (n,); None where the contact has no solution.
+        """Residual of the equations, (n,); None where the contact has no solution.
 
         Rates are in [m/s^2], [rad/s^2] and [m/s], contents in [m].
         """

@@ -23,7 +23,7 @@ class Solvable(Protocol):
     sizes: np.ndarray
 
     def residual(self, x: np.ndarray) -> np.ndarray | None:
-        """What the equations leave; None where they have no value."""
+        """Residual of the equations; None where they have no value."""
 
     def jacobian(self, x: np.ndarray) -> csc_array:
         """Slopes of the residual, about the unknowns of its last call."""

@@ -52,7 +52,7 @@ class Found(NamedTuple):
 
 
 def solve(parameters: Mapping[str, Any]) -> Found | ValueError:
-    """Steady state of the parameters of a run [SI] with what it means; or why none was found."""
+    """Steady state of the parameters of a run [SI] with its results; or the reason why none was found."""
     from cvt_hpc.models.elastic_belt.belt import mesh
     from cvt_hpc.models.steady_variator.forces import quantities
     from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
