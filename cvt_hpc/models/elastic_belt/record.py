@@ -78,7 +78,7 @@ VARIABLES = (
         ("pulley",),
         "f8",
         "N",
-        "mean force of a piston's pressure, or the force required: axial force less spring and centrifugal oil",
+        "mean force of a piston's pressure, or force required: axial force less spring and centrifugal oil",
         words="piston force",
     ),
     Variable(
