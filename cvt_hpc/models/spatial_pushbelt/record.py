@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.models.pushbelt import record as pushbelt
-from cvt_hpc.models.spatial_pushbelt.readings import ANGLES, EXTREMES, LATERAL, PROFILES, SHEAVES, SIDES
+from cvt_hpc.models.spatial_pushbelt.readings import (
+    ANGLES,
+    EXTREMES,
+    LATERAL,
+    OF_TWO_FLOWS,
+    PROFILES,
+    SHEAVES,
+    SIDES,
+)
 from cvt_hpc.physics.out_of_plane import clamped_force
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
@@ -85,6 +93,13 @@ VARIABLES = (
         )
     ),
     Variable("largest_nose_force", (), "f8", "N", "largest force of a nose over the judged part"),
+    Variable(
+        "mean_tension_difference",
+        ("strand",),
+        "f8",
+        "N",
+        "ring tension of the right package less the left one's; not a number with one flow for both",
+    ),
     Variable(
         "final_misalignment", (), "f8", "m", "mean axial offset of the pulleys' mid planes as sheaves stand"
     ),
@@ -166,6 +181,7 @@ def _evaluate(run: ElementRun) -> dict[str, Any]:
         "strand_one_sidedness": np.array([one_sided(strand) for strand in STRANDS]),
         "arc_one_sidedness": np.array([one_sided(pulley) for pulley in PULLEYS]),
         **largest,
+        "mean_tension_difference": each(run, "tension_difference", STRANDS),
         "final_misalignment": mean(run, "axial_offset"),
     }
 
@@ -189,6 +205,6 @@ def histories(run: ElementRun) -> xr.Dataset:
     for angle in ANGLES:
         over_time[f"extreme_{angle}"] = (f"largest {angle}", "rad", "of any element")
     over_time["extreme_nose_force"] = ("largest force of a nose", "N", "of any element")
-    found = pushbelt.history(run, PROFILES, over_time)
+    found = pushbelt.history(run, {**PROFILES, **OF_TWO_FLOWS}, over_time)
     found["displacement"].attrs["comment"] = "transverse, outward; of lateral probes axial, to the right"
     return found
