@@ -44,7 +44,7 @@ def assess(
 
 
 def _assess_ramp(run: Any) -> ramp.RampOccurrence | None:
-    """Whether and how a run vibrates along a ramp; None if it ended too soon."""
+    """Whether and how a run vibrates along a ramp; None if it ended too soon to tell."""
     p, first, quantity = run.parameters, run.risen, ramped(run.parameters)
     columns, strands = _on_strands(run)
     rate, moved = p["sampling_rate"], run.displacement[first:, columns]
@@ -54,7 +54,7 @@ def _assess_ramp(run: Any) -> ramp.RampOccurrence | None:
 
 
 def _on_strands(run: Any, names: Sequence[str] = STRANDS) -> tuple[np.ndarray, list[str]]:
-    """Columns of the displacement whose probes lie on strands, and the strand of each."""
+    """Columns of the displacement whose probes lie on strands, and on which."""
     regions = [probe.label.split()[0] for probe in run.probes]
     columns = [k for k, region in enumerate(regions) if region in names]
     return np.array(columns), [regions[k] for k in columns]
@@ -67,7 +67,7 @@ def slipped_through(run: Any) -> dict[str, Any]:
 
 
 def slipped(run: Any) -> dict[str, Any]:
-    """The record of a run that has slipped through before its end: the values known until then."""
+    """The record of a run that has slipped through before its end: what is known until then."""
     found = slipped_through(run)
     before = _assess_ramp(run) if ramped(run.parameters) else None
     if before is not None:
