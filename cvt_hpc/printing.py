@@ -1,4 +1,4 @@
-"""Text output of the command line: reports, states and outcomes."""
+"""What the command line prints: reports, states and outcomes in words."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _LARGEST_LINE = 4  # values along other dimensions: no spectrum and no history
 
 
 def report_lines(report: RunReport) -> Iterator[str]:
-    """Yield the lines that state how a sweep ended."""
+    """Yield the lines that say how a sweep ended."""
     yield f"{report.total} runs: {report.done} done, {len(report.failed)} failed, {report.remaining} left"
     if words := _special_in_words(report):
         yield f"of those done {words}"
@@ -58,7 +58,7 @@ def report_lines(report: RunReport) -> Iterator[str]:
 
 
 def next_lines(report: RunReport) -> Iterator[str]:
-    """Yield the line that states what to do with a sweep that has ended, if it has results."""
+    """Yield the line that says what to do with a sweep that has ended, if it has results."""
     if report.results and report.done and not report.remaining:
         yield f"next: cvt-hpc map {report.out}; cvt-hpc report {report.out}"
 
@@ -70,7 +70,7 @@ def _special_in_words(counted: RunReport | StudyStatus) -> str:
 
 
 def repeat_line(repeat: Repeat) -> str:
-    """Return the expected cost of repeating a sample of the runs."""
+    """Return what doing a sample of the runs again is expected to cost."""
     runs = max(round(repeat.fraction * repeat.first.size), 1)
     at_most = "at most" if repeat.first.design else "about"
     cost = cost_in_words(repeat.core_seconds(), runs)
@@ -78,7 +78,7 @@ def repeat_line(repeat: Repeat) -> str:
 
 
 def audit_lines(report: AuditReport) -> Iterator[str]:
-    """Yield the lines that state how often the lower rungs of a study erred."""
+    """Yield the lines that say how often the lower rungs of a study erred."""
     runs = sum(rung.runs + rung.failed for rung in report.rungs)
     yield f"audit: {runs} of {report.answered} runs that lower rungs answered done again in full"
     for rung in report.rungs:
@@ -94,7 +94,7 @@ def audit_lines(report: AuditReport) -> Iterator[str]:
 
 
 def step_check_lines(check: Repeat, found: Comparison) -> Iterator[str]:
-    """Yield the lines that state how far a sample of runs depends on the time step."""
+    """Yield the lines that say how far a sample of runs depends on the time step."""
     from cvt_hpc.study.repeats import interval
 
     drawn, eligible = int(check.sample.sum()), int(check.may_be_drawn.sum())
@@ -117,7 +117,7 @@ def step_check_lines(check: Repeat, found: Comparison) -> Iterator[str]:
 
 
 def comparison_lines(found: Comparison, sources: tuple[str, str]) -> Iterator[str]:
-    """Yield the lines that state in what two studies agree: A, B, their jobs, classes, and amplitudes."""
+    """Yield the lines that say in what two studies agree: A, B, their jobs, classes, and amplitudes."""
     for label, source, left_out in zip("AB", sources, found.left_out, strict=True):
         yield f"{label}: {source}" + (f"; {left_out} of its runs left out, unknown there" if left_out else "")
     yield from found.notes
@@ -175,7 +175,7 @@ def _deviation_lines(found: Comparison) -> Iterator[str]:
 
 
 def trouble_lines(report: RunReport) -> Iterator[str]:
-    """Yield the lines that name the failed runs of a sweep, ten at most, and the reason for an early stop."""
+    """Yield the lines that name the failed runs of a sweep, ten at most, and say why it stopped early."""
     for run in report.failed[:MOST_FAILURES_NAMED]:
         place = f" ({run.place})" if run.place else ""
         yield f"run {run.index}{place}: {run.status}: {run.reason}"
@@ -194,7 +194,7 @@ def trouble_lines(report: RunReport) -> Iterator[str]:
 
 
 def status_lines(status: StudyStatus) -> Iterator[str]:
-    """Yield the lines that state how far a study is."""
+    """Yield the lines that say how far a study is."""
     from cvt_hpc.study.ranks.progress import show_duration
 
     state = "running" if status.running else "not running"
@@ -219,7 +219,7 @@ def status_lines(status: StudyStatus) -> Iterator[str]:
 
 
 def forecast_lines(forecasts: Sequence[Forecast], job: Job, basis: str) -> Iterator[str]:
-    """Yield the lines that state what a sweep will take on several numbers of ranks, a row each."""
+    """Yield the lines that say what a sweep will take on several numbers of ranks, a row each."""
     from cvt_hpc.study.forecast.resources import slurm_time, suggested_time
     from cvt_hpc.study.ranks.progress import show_duration
 
@@ -235,7 +235,7 @@ def forecast_lines(forecasts: Sequence[Forecast], job: Job, basis: str) -> Itera
 
 
 def needs_line(needed: Needs, histories: int) -> str:
-    """Return the line that states what memory and disk a sweep needs."""
+    """Return the line that says what memory and disk a sweep needs."""
     from cvt_hpc.study.forecast.needs import size_in_words
 
     line = (
@@ -249,7 +249,7 @@ def needs_line(needed: Needs, histories: int) -> str:
 
 
 def disk_line(disk: Disk, histories: int) -> str:
-    """Return the line that states what space a study takes on the disk."""
+    """Return the line that says what space a study takes on the disk."""
     from cvt_hpc.study.forecast.needs import size_in_words
 
     line = (
@@ -266,9 +266,9 @@ def disk_line(disk: Disk, histories: int) -> str:
 
 
 def point_lines(job: Job, at: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the line that states where on the axes of its job a run stands."""
+    """Yield the line that says where on the axes of its job a run stands."""
     point = job.point_at(at)
-    # a load that is given has no share from which it would follow
+    # a load that is given leaves no share of which it would follow
     keys = dict.fromkeys([*(axis.name for axis in job.axes), *(value.name for value in job.derived), *at])
     schema = job.schema
     words = [f"{key} {schema.in_words(key, point[key])}" for key in keys if key in point]
@@ -277,9 +277,9 @@ def point_lines(job: Job, at: Mapping[str, Any]) -> Iterator[str]:
 
 
 def outcome_lines(dataset: xr.Dataset) -> Iterator[str]:
-    """Yield the lines that state what one run gave: its scalars, and what is per strand or pulley.
+    """Yield the lines that say what one run gave: its scalars, and what is per strand or pulley.
 
-    Values that are not numbers are left out; a failed run shows only known values, without a verdict.
+    No number that is none; of a run that failed only what is known, without a verdict.
     """
     names = [
         str(name)

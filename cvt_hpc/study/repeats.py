@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
 CONFIDENCE = 0.95
-AUDITED, FULL_MODEL = "auto", "elastic_belt"  # some runs answered cheaply; all in full
+AUDITED, FULL_MODEL = "auto", "elastic_belt"  # what answers some runs cheaply, and what does all in full
 
 
 def _of_the_job(records: Records, runs: NDArray[np.intp]) -> Mapping[int, float]:
