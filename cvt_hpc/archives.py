@@ -1,7 +1,7 @@
 """Parts of a long work that are done, each kept in an archive of its own until all are.
 
-An archive holds arrays, and a head in JSON types: of which job the part is, by what it was computed, and what
-is no array. It may come from somebody else: nothing in it is executed, and unreadable content is damage.
+An archive holds arrays, and a head in JSON types: the job of the part, its origin, and all values that are
+no arrays. It may come from somebody else: nothing in it is executed, and unreadable content is damage.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cvt_hpc.files import StorageError, kind_of, read_regular, written_aside
 from cvt_hpc.provenance import git_revision, machine, versions
 
 _SUFFIX = ".npz"
-# what an archive raises depends on the byte that is damaged
+# the exception from an archive depends on the damaged byte
 _DAMAGE = (
     *(ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError),
     *(struct.error, SyntaxError, TypeError, ValueError, zipfile.BadZipFile, zlib.error),
@@ -94,7 +94,7 @@ class Archives:
         name : str
             Of the part.
         unpack : callable
-            Makes the part of what `save` was given; it raises what it will of the usual errors, such as
+            Makes the part from the input of `save`; it raises any of the usual errors, such as
             ValueError and KeyError, where that is none.
 
         Returns

@@ -3,8 +3,8 @@
 Each shortcut takes the place of a function of numba for as long as a kernel is compiled, and calls it where
 that has something to do. They are in force for the whole process: threads must not compile at the same time.
 
-Kernels are long, as others are merged into them: what the compiler does for each statement and each variable
-takes longer than the rest.
+Kernels are long, as others are merged into them: the work of the compiler for each statement and each
+variable takes longer than the rest.
 
 `typeof` is no such replacement: it finds the types of a call's arguments.
 """

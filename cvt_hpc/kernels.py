@@ -7,14 +7,14 @@ again whatever the dates of files are, and a change compiles only the kernels ag
 folder that no process has used for a month is removed when another is made.
 
 A kernel may be handed to another as an argument, as a right-hand side to a stepper, whose machine code then
-holds that of the kernel. The compiler tells kernels apart by an identity drawn at random, so that it would
+holds that of the kernel. The compiler identifies kernels by an identity drawn at random, so that it would
 never find such code again: here it is the name, and the content that names the kernel's own folder. The
 compiler cannot read an index that names a type of a script that is not at hand: here it skips that entry.
 
 A kernel that only other kernels call gets no entry from Python, which for tuples of arrays takes long to
 compile, and no machine code: each caller takes in its LLVM code and optimises it with its own. That holds for
-all functions that kernels call, also those of numpy. A kernel that is called with lanes does not count who
-uses an array: it makes none, and the arrays that it is given outlast it.
+all functions that kernels call, also those of numpy. A kernel that is called with lanes does not count the
+users of an array: it makes none, and the arrays that it is given outlast it.
 
 Of processes that need the same code at a time one compiles it, and the others wait for it.
 

@@ -52,7 +52,7 @@ def predicted_cost(diagram: Diagram, asked: Asked) -> Cost:
 
 
 def plan_lines(diagram: Diagram) -> Iterator[str]:
-    """Yield the lines that state what a diagram consists of, and what that is expected to cost."""
+    """Yield the lines that describe a diagram and its expected cost."""
     job, loads = diagram.job, diagram.loads
     costs = [predicted_cost(diagram, asked) for asked in diagram.branches]
     yield f"diagram {job.name} ({job.source}): {len(costs)} branches of {len(loads)} loads"

@@ -28,7 +28,7 @@ class Result:
     measurement : Measurement
         Its result.
     errors : dict
-        Error by quantity; nan where it was not measured or has no meaning, inf where the run lacks what the
+        Error by quantity; nan where it was not measured or has no meaning, inf where the run lacks the
         reference has (a frequency, an onset). That of a reference is its own estimated error.
     values : dict
         Pooled value by quantity [SI], that of the stronger strand where there are two; none of a trajectory.
@@ -121,7 +121,7 @@ def _judge(
     point: Point, measurement: Measurement, reference: Measurement, scene: Scene, own: Mapping[str, float]
 ) -> Result:
     errors = {q.name: error(q, measurement, reference) for q in scene.quantities}
-    # what the reference knows exactly, as a rule whether it vibrates, is below nothing
+    # quantities that the reference knows exactly, as a rule whether it vibrates, are below nothing
     below = frozenset(name for name, value in errors.items() if 0.0 < own.get(name, 0.0) >= value)
     return Result(point, measurement, errors, _pooled_values(scene, measurement, reference), below)
 
@@ -133,7 +133,8 @@ def _own_errors(
 
     For an error in proportion to the step the distance is that of the steps, so many times the error; no
     higher order is assumed, and none for a tolerance. The scatter is the standard error of the difference,
-    start by start: nothing where the two stay together, and in a chaotic scene what so few starts leave open.
+    start by start: nothing where the two stay together, and in a chaotic scene the uncertainty of so few
+    starts.
     """
     if scene.exact:
         return {quantity.name: 0.0 for quantity in scene.quantities}

@@ -44,7 +44,7 @@ class Stage:
 
     @property
     def until(self) -> float:
-        """How far its runs are marched [s]: where methods take over, to the end of what is judged."""
+        """End of the march of its runs [s]: where methods take over, or the end of the judged part."""
         return max(q.until for q in self.scene.quantities) if self.scene.lead else math.inf
 
     def job(self, where: str, model: str = "", **values: Any) -> Job:

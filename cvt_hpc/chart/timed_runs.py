@@ -77,7 +77,7 @@ def march(
         Core-seconds after which a group is given up and counts as failed [s]; without one nothing but the
         runs is in their time.
     led : sequence of Transient
-        What the runs take over from, one for each; none: they start by themselves.
+        Runs from which the runs take over, one for each; none: they start by themselves.
     """
     runs: list[Run] = []
     failures: list[Failure | None] = []

@@ -187,7 +187,7 @@ def study_of(
     for place in np.ndindex(shape):
         legal[place] = _is_legal(scene, {key: float(column[place]) for key, column in axes.items()})
     if not legal.any():
-        legal[:] = True  # the study says why
+        legal[:] = True  # the study states the reason
     document |= {
         "name": f"{fit.job.name}_{name}",
         "axes": {key: column[legal].tolist() for key, column in axes.items()},

@@ -79,7 +79,7 @@ def make_fit(
 
 
 def plan_lines(fit: Fit) -> Iterator[str]:
-    """Yield the lines that state what a fit consists of, and what that is expected to cost."""
+    """Yield the lines that describe a fit and its expected cost."""
     job, schema, full, thin = fit.job, fit.job.schema, len(fit.values), len(fit.thinned)
     yield f"fit {job.name} ({job.source}): {len(fit.free)} free parameters, {len(fit.targets)} targets"
     if job.description:

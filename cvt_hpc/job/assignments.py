@@ -14,7 +14,7 @@ from cvt_hpc.job.values import kind_of, read_value
 from cvt_hpc.parameters import Parameter
 
 Assignments = Mapping[str, Any] | Sequence[str]
-AxisEntry = tuple[Parameter, Any, str]  # what declares an axis, its list or range, and file and key
+AxisEntry = tuple[Parameter, Any, str]  # declaration of an axis, its list or range, and file and key
 
 
 def split_assignments(assignments: Assignments, source: str, label: str) -> dict[str, Any]:

@@ -16,7 +16,7 @@ def answering_model(job: Job) -> tuple[str, str] | None:
     Raises
     ------
     InputError
-        If the runs ask different questions.
+        If the runs have different questions.
     """
     answered_by = load_model(job.model).answered_by
     if any(axis.name == "question" for axis in job.axes):

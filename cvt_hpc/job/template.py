@@ -18,7 +18,8 @@ from cvt_hpc.models.contract import load_model
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.tables import columns
 
-# What a study varies first, where the model knows it: load as a share of what friction carries, its gradient
+# Axes that a study varies first, where the model knows them: load as a share of the load that friction
+# carries, its gradient
 _FIRST_AXES = {"load_share": (0.2, 0.4, 0.6), "friction_gradient": None}
 _SHARES = (0.5, 1.0, 1.5)  # of the default, else
 _LONGEST = 120  # letters of a line

@@ -42,7 +42,7 @@ def draw_ladder(job: Job, findings: Sequence[Finding], out: Path) -> Path:
     findings : sequence of Finding
         Its results.
     out : Path
-        As for `save_figure`, with what it returns and raises.
+        Result and errors are those of `save_figure`.
     """
     return draw(lambda: ladder_figure(job, findings), out)
 

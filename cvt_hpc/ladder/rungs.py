@@ -22,7 +22,7 @@ REFERENCE = "reference"
 # In the reference mesh, step and transient shrink together: by 1.5 each error of first order falls by a third
 # and of second order by more than half, while a run costs 4.5 times as much, which keeps it below a second.
 FINER = 1.5
-LONGER = 2.0  # times as long: what grows slowly has its time, and the judged half begins a whole run later
+LONGER = 2.0  # times as long: slow growth has its time, and the judged half begins a whole run later
 
 
 class Rung(NamedTuple):
@@ -43,7 +43,7 @@ class Rung(NamedTuple):
     job: Job
 
 
-# By rung its model, what a table of that name says, and the questions that it answers. Of auto, question
+# By name its model, the content of a table of that name, and the questions that it answers. Of auto, question
 # forces without a margin takes every answer of the coarse transient as it is.
 _LOWER: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
     "criterion": ("criterion", {}, ("occurrence",)),

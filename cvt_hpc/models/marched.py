@@ -179,7 +179,7 @@ class MarchedRun(Marched):
         return f"the step is beyond {self._longest:.3g} s, from where the fastest vibration grows by itself"
 
     def _doubt(self, first: int) -> str | None:
-        """Why the samples from `first` on are none of the model's motion, by what the model knows of it."""
+        """Why the samples from `first` on are none of the model's motion, by the model's own laws."""
         return None
 
 

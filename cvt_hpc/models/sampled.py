@@ -18,7 +18,7 @@ LATEST = 0.01  # [s] before a run ends early in which its steps have to be solve
 class SampledRun:
     """One run, advanced sample by sample.
 
-    A model's run prepares its march, says by `_record` what it records, and fills `_rows`, `_totals` and
+    A model's run prepares its march, gives its record by `_record`, and fills `_rows`, `_totals` and
     `_sums`. The first three counters of its state are steps, iterations, and steps that were not solved.
 
     Parameters
@@ -44,7 +44,7 @@ class SampledRun:
         Why the run cannot continue: the failure, or that the belt slips through, with the status done.
     """
 
-    _state: Any  # what is marched, with `counters`
+    _state: Any  # the marched state, with `counters`
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         self.interval = 1.0 / parameters["sampling_rate"]

@@ -6,9 +6,9 @@ notation of `compliance.py` and with the collar's compliance kappa = a r^2 / c_t
     q = (kappa + c / |s|) s,   s = sum_k U_k h_k f_k;   |q| <= c where s = 0.
 
 For a given set of closed stations the forces are linear in an opening c p that is added, p = s / |s|, and
-so is what tilts the sheave: s = s_0 - L p, with s_0 that without clearance, L = c M (I + kappa M)^-1 and M
-the stiffness of the closed stations against tilting [N/m]. With sigma = |s| that is one equation in one
-number,
+so is the tilting force of the sheave: s = s_0 - L p, with s_0 that without clearance, L = c M (I + kappa
+M)^-1 and M the stiffness of the closed stations against tilting [N/m]. With sigma = |s| that is one equation
+in one number,
 
     (sigma I + L) p = s_0,   |p| = 1.
 

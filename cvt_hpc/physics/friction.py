@@ -178,7 +178,7 @@ if missing := set(Law) - {Law.TABLE} - set(FORMULAS):
     raise NotImplementedError(f"friction laws without a formula: {missing}")
 
 
-# `friction_law` refuses what is no law. Should a kernel meet one, the run ends, since its state is not a
+# `friction_law` refuses unknown laws. Should a kernel meet one, the run ends, since its state is not a
 # number: an exception would cost each station a test for it.
 
 
@@ -242,7 +242,7 @@ def table_coefficient(table: tuple[np.ndarray, np.ndarray, np.ndarray], speed, f
 
     `table` holds forces (nf,) [N/m], speeds (nv,) [m/s] and coefficients (nf, nv). Kernels of lanes choose
     between it and `formula_coefficient` themselves: handing over the table in an inner loop counts references
-    to its arrays, which costs a fifth of all that is done of sliding. Written as a sum over its intervals, of
+    to its arrays, which costs a fifth of all work on sliding. Written as a sum over its intervals, of
     which each lane fills those below its place. At a knot the slope is that of the interval above.
     """
     table_force, table_speed, table_mu = table

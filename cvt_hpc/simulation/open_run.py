@@ -118,7 +118,7 @@ class OpenRun:
     def _longer(self, run: Any) -> dict[str, Any] | None:
         """The parameters of a run over twice its time; None where that is too long, or a ramp would end.
 
-        The judged part keeps its share, but begins no sooner than the run was prolonged: what is summed over
+        The judged part keeps its share, but begins no sooner than the run was prolonged: sums over
         the judged part is not known of less than that.
         """
         p = run.parameters

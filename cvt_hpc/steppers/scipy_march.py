@@ -125,7 +125,7 @@ def march_by(
                     return int(outcome)
                 clock[0] += interval
                 rows[k] = y
-        except (ValueError, np.linalg.LinAlgError):  # matrices that hold what is no number
+        except (ValueError, np.linalg.LinAlgError):  # matrices with entries that are not numbers
             return int(Result.NOT_FINITE if work.known else Result.NO_VALUE)
         finally:
             if work.solver is not None:

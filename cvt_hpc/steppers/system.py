@@ -40,8 +40,8 @@ class System(NamedTuple):
 class SetValuedSystem(NamedTuple):
     """A `System` with c forces that are known by bounds only: dry friction, contact of rigid bodies.
 
-    Each acts on a relative speed s = directions y + (what does not depend on y) and stays between its bounds:
-    it is whatever makes s = -restitution s_before where it can, else at the bound that comes nearest.
+    Each acts on a relative speed s = directions y + (terms that do not depend on y) and stays between its
+    bounds: it is whatever makes s = -restitution s_before where it can, else at the bound that comes nearest.
 
     Attributes
     ----------

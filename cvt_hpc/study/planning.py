@@ -40,7 +40,7 @@ class Plan(NamedTuple):
     """The findings of rank 0 that all ranks need."""
 
     assignments: list[Assignment]
-    attempts: dict[int, int]  # of runs that were begun again
+    attempts: dict[int, int]  # of runs that began again
     steps: dict[int, float]  # [s], of runs that do not take the time step of the job
     costs: np.ndarray  # shape (runs,), as they are predicted
     fit: Fit

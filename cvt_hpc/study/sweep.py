@@ -66,7 +66,7 @@ def run(
     """Do all runs of a job that are not yet recorded, and gather the dataset.
 
     Serial, or on all ranks when started under mpirun or srun. A run that raises is recorded as failed, and
-    the sweep goes on; so do the other ranks when one dies, where MPI lets them. SIGINT, SIGTERM and SIGUSR1
+    the sweep continues; so do the other ranks when one dies, where MPI lets them. SIGINT, SIGTERM and SIGUSR1
     end the sweep early and orderly: the runs at work are broken off, and the same call does them later.
 
     Parameters

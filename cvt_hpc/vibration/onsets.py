@@ -1,4 +1,4 @@
-"""Loads at which vibration sets in and ends, and the distances between those that two studies have found."""
+"""Loads at which vibration sets in and ends, and the distances between the results of two studies."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 All functions take `signal` with time along the first axis and any number of channels behind it, and share
 one estimator: a segment is multiplied by a Hann window, freed of its mean and slow drift, and
-transformed. How, why, and with what error: `tapering.py`.
+transformed. Reasons and errors: `tapering.py`.
 
 A signal that is constant, or a cubic in time, up to rounding has no vibration: amplitude 0, frequency and
 growth rate nan. A signal with a value that is not finite yields nan in its channel.

@@ -1,4 +1,4 @@
-"""The record of a run: as of the elastic belt, and which rung it is of."""
+"""The record of a run: as of the elastic belt, and the model of the ladder that gave it."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ MOST_TURN = np.pi / 3.0  # [rad] of a beam along an arc
 
 
 def as_pushbelt(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters with those that `pushbelt` has beside them."""
+    """Parameters, completed by the further ones of `pushbelt`."""
     return {**_WITHOUT, **parameters}
 
 

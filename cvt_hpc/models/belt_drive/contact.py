@@ -265,7 +265,7 @@ def _add_to_border(
     column: tuple[float, float],
     row: tuple[float, float],
 ) -> None:
-    """Add to column and row k of the border what an unknown there and a point between i and j share."""
+    """Add to column and row k of the border the coupling of an unknown there and a point between i and j."""
     for node in range(2):
         at = i if node == 0 else j
         for kind in range(2):

@@ -28,11 +28,11 @@ TWO = (
     "centre_distance",
     "driven_inertia",
     "crossed",
-)  # what lists take the place of
+)  # values that lists replace
 
 
 def _arranged(columns: Mapping[str, Column]) -> dict[str, Any]:
-    """Lists of the columns of a file; what is wrong with them is told by its row, or of all of them."""
+    """Lists of the columns of a file; an error in them names its row, or all of them."""
     lists = {f"pulley_{name}": list(column.values) for name, column in columns.items()}
     for row, key, expected, found in _pulley_faults(lists):
         raise RowError(row, f"{key.removeprefix('pulley_')}: {expected}", found)

@@ -128,7 +128,7 @@ class Reading:
 
 
 def stored_energy(drive: Drive, state: State) -> float:
-    """Kinetic and elastic energy of belt, driven pulleys and arms [J], without what contacts store."""
+    """Kinetic and elastic energy of belt, driven pulleys and arms [J], without that stored in contacts."""
     kinetic, elastic, _ = energies(drive.beam, state.chain.q, state.chain.v)
     pulleys, wheels = drive.pulleys, state.wheels
     count = len(pulleys.radius)

@@ -2,7 +2,7 @@
 
 Needs of a model: a step kernel with Newton's method and dual slopes of friction.
 
-Order 2 between contacts' events, 1 at these. It resolves what the step resolves and damps the rest.
+Order 2 between contacts' events, 1 at these. It resolves motion slower than the step and damps the rest.
 """
 
 from cvt_hpc.parameters import Parameter

@@ -126,7 +126,7 @@ class Transient(SampledRun):
         return courses.driving_speed(self.parameters, time)
 
     def load(self, time: float) -> float:
-        """Torque at the driving pulley without losses, or what `pulley_load` counts in [N m]."""
+        """Torque at the driving pulley without losses, or the unit of `pulley_load` [N m]."""
         return courses.load(self.parameters, time)
 
     def _take_sample(self) -> None:

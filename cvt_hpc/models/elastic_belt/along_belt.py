@@ -28,7 +28,7 @@ from cvt_hpc.models.elastic_belt.belt import Mesh
 from cvt_hpc.models.elastic_belt.fluctuation import at_stations
 from cvt_hpc.variator.history import ALONG
 
-# of a sample, what the quantities below follow from
+# quantities of a sample from which the quantities below follow
 NEEDED = (
     "radial_friction",
     "tangential_friction",

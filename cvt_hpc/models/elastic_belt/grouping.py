@@ -18,7 +18,7 @@ ALONE_SHARE = {"imex": 0.3, "explicit": 0.6}
 
 COST_PER_LAYER = 0.3  # of a ring layer, beside the rings as one
 
-LANES = {"double": 8, "single": 16}  # what registers of 64 bytes hold
+LANES = {"double": 8, "single": 16}  # capacity of registers of 64 bytes
 # Values that the runs of a batch have in common: the mesh, the law's kind, and the course of time.
 SHARED = (
     "ratio",

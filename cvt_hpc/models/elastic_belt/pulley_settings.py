@@ -202,7 +202,7 @@ PULLEY_DEFAULTS = {
 def are_free(parameters: Mapping[str, Any]) -> bool:
     """Whether pulleys do more than turn by a given speed, or be pressed by a constant thrust.
 
-    Reads no parameter that does not count: those that it reads tell which runs can share a batch.
+    Reads no parameter that does not count: the parameters read decide which runs can share a batch.
     """
 
     def of(key: str) -> Any:
@@ -220,7 +220,7 @@ def are_free(parameters: Mapping[str, Any]) -> bool:
 
 
 def shaft_deflection(parameters: Mapping[str, Any], pulley: str, radius: float) -> tuple[float, float]:
-    """What the shaft of a pulley adds to its groove: compliance [m/N], free opening by its bearings [m].
+    """Effect of a pulley's shaft on its groove: compliance [m/N], free opening by its bearings [m].
 
     Parameters
     ----------

@@ -82,7 +82,7 @@ class RecordedRun:
     parameters : dict
         Resolved parameters of the run [SI].
     plan : Recording
-        What is recorded.
+        The recorded quantities.
     sums : (N, 21) array
         PROFILES, summed over the judged part's samples; it may be filled later.
 
@@ -93,18 +93,18 @@ class RecordedRun:
     mesh, probes, interval, samples, kick
         Of the plan.
     rows : (done, S + C) array
-        The sensors' displacement [m], the strands' modes [m], and CHANNELS; of who marches the run.
+        The sensors' displacement [m], the strands' modes [m], and CHANNELS; set by the marching class.
     done : int
-        Samples recorded so far, up to the one at which the run failed; of who marches it.
+        Samples recorded so far, up to the one at which the run failed; set by the marching class.
     failure : (Status, str) or None
-        Why the run does not go on: what has gone wrong, or a result, with the status done; of who marches it.
+        Why the run cannot continue: a failure, or a result, with the status done; set by the marching class.
     time : float
-        Simulated time [s]; of who marches it.
+        Simulated time [s]; set by the marching class.
     momentary : (sample, quantity, N) array or None
-        What `Momentary` has kept of the last samples; of who marches it.
+        Last samples that `Momentary` has kept; set by the marching class.
     """
 
-    if TYPE_CHECKING:  # of who marches the run
+    if TYPE_CHECKING:  # set by the marching class
 
         @property
         def rows(self) -> np.ndarray:
@@ -203,6 +203,6 @@ class RecordedRun:
         Returns
         -------
         (Status, str) or None
-            What is wrong.
+            The reason.
         """
         return doubt(record, self.parameters["bending_stiffness"], self.mesh)

@@ -13,7 +13,7 @@ from cvt_hpc.variables import Status
 
 __all__ = ["CHANNELS", "TAKES_OVER", "Transient", "batch"]
 
-TAKES_OVER = True  # runs go on from where others stand
+TAKES_OVER = True  # runs continue from the state of others
 
 
 def batch(
@@ -28,7 +28,7 @@ def batch(
     stepper : str
         A stepper that the model takes.
     paused : sequence, optional
-        What `paused()` of shorter runs has returned, one for each point, to go on from.
+        Results of `paused()` of shorter runs, one for each point, to continue from.
 
     Returns
     -------

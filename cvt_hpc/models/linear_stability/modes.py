@@ -83,7 +83,7 @@ def modes(
         raise ValueError("the contact of this state has no solution")
     linearise = Linearisation(flat)
     whole = linearise(flat)
-    # the same without flanks and saddles: the difference is what their friction, and their contact, does
+    # the same without flanks and saddles: the difference is the effect of their friction and contact
     free = linearise(flat._replace(belt=belt._replace(arc_share=np.zeros_like(belt.arc_share))))
     values, vectors = eigenpairs(whole, 2.0 * np.pi * band[0], 2.0 * np.pi * band[1], decay, GROWTH)
     n = belt.cell.size

@@ -23,7 +23,7 @@ from cvt_hpc.models.oscillator.slide import silenced
 from cvt_hpc.physics.friction import friction_coefficients
 
 CHANNELS = ("speed",)
-REST = 1e-9  # of the mass' largest speed: what rounding may leave of sliding while friction holds
+REST = 1e-9  # of the mass' largest speed: sliding that rounding may leave while friction holds
 
 
 class Transient(MarchedRun):

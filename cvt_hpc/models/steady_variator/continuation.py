@@ -133,7 +133,7 @@ class Continuation:
         tolerance : float
             Of each solution.
         equations : Solvable, optional
-            Those that are changed; by default the belt's.
+            The changed parameters; by default the belt's.
 
         Raises
         ------

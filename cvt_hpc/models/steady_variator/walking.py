@@ -146,8 +146,8 @@ class SteadyBelt:
     def braked(self, near: Steady, sign: float) -> Iterator[Steady]:
         """States from one on as the driven pulley is held at lower (sign -1) or higher (1) speeds.
 
-        As far as they are found; in the direction in which the load's size grows they go on past the largest
-        torque that friction carries.
+        As far as they are found; in the direction in which the load's size grows they continue past the
+        largest torque that friction carries.
         """
         return self._braked(self._own, near.unknowns, sign)
 

@@ -111,7 +111,7 @@ def forecast(
         How many times so many runs fill the lanes.
     """
     planned = np.array([batch_cost(batch, costs, turns) for batch in share_out(groups, costs, ranks, turns)])
-    # What it costs that lanes stay empty, so that no rank does.
+    # Cost of empty lanes, which keep all ranks at work.
     use_of_lanes = sum(batch_cost(batch, costs, turns) for batch in groups) / planned.sum()
     generator = np.random.default_rng(seed)
     repeats = min(max(_EVENTS // (ranks + planned.size), _FEWEST_REPEATS), _MOST_REPEATS)

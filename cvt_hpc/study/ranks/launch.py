@@ -257,6 +257,6 @@ def _abort(world: MPI.Intracomm, text: str, crash_log: Path) -> None:
             append_text(crash_log, f"{time.strftime('%Y-%m-%dT%H:%M:%S%z')} {message}")
         sys.stdout.flush()
         print(message, end="", file=sys.stderr, flush=True)
-        time.sleep(0.5)  # mpirun, once told to abort, drops output that it has not yet passed on
+        time.sleep(0.5)  # mpirun, after an abort, drops output that it has not yet passed on
     finally:  # whatever became of the message: without this the other ranks wait for ever
         world.Abort(CRASHED)

@@ -132,8 +132,8 @@ class Steps:
     Parameters
     ----------
     costs : sequence of float
-        Predicted durations of what is left to do, in any unit and in the order in which it is done; those
-        that are not known (nan) count as the mean of the others.
+        Predicted durations of the things left to do, in any unit and in the order in which they are done;
+        those that are not known (nan) count as the mean of the others.
     done : int
         Number of things that were done before.
     unit : str

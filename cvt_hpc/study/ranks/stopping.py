@@ -64,7 +64,7 @@ class Stop:
     signals : SignalWatch
         The signals that this process was sent.
     limit : TimeLimit
-        How much time there is from here on. No batch is begun that is not expected to end in it, and those at
+        Time from here on. No batch begins that is not expected to end in it, and batches at
         work when it is over are broken off.
     meanwhile : callable
         Called about twice a second while a run computes: shows the progress.
