@@ -84,7 +84,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "element_mass": positive(1.214, "kg/m", "mass per length of the elements", sensible=(0.05, 20.0)),
         "element_height": positive(
-            0.013, "m", "height of an element, which gives its inertia as that of a plate", sensible=(1e-3, 0.1)
+            0.013, "m", "height of an element, whose inertia is that of a plate", sensible=(1e-3, 0.1)
         ),
         "play": not_negative(
             0.3e-3, "m", "sum of the gaps between elements on the path", sensible=(1e-07, 0.05)
