@@ -37,7 +37,7 @@ _LINEAR = 0.01  # of the largest feed: below it the axis is linear
 _FLAT = 0.1  # of the largest spectrum: where another one stays below it the axis is logarithmic
 _DEEPEST = 1e-3  # of the largest spectrum, on a logarithmic axis
 _APART = (0.15, 0.13)  # of the panel's width and height, between labels of peaks
-_HEADROOM = 1.45  # for a legend of one line
+_HEADROOM = 1.6  # for a legend of one line
 
 
 @dataclass(frozen=True)
