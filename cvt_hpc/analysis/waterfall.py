@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
+from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -32,7 +32,8 @@ from cvt_hpc.analysis.line_names import OUTLINE, Named, name_lines
 from cvt_hpc.errors import few_of, mismatch, one_line
 
 LEAST, HEIGHT, FRAME = 1.3, 2.8, 1.2  # [inch]: a row of panels, and title and labels
-COLOURS = cells.colours_of("magma_r", 0.0, 0.97)
+# white ground, on which weak ridges are seen
+COLOURS = ListedColormap(["white", *cells.colours_of("magma_r", 0.04, 0.97).colors], "spectra")
 SHALLOWEST, DEEPEST = 1e-2, 1e-4  # of the end of the colours: between them lies their beginning
 LIGHT = 0.9  # share of all amplitudes that may have the lightest colour
 UNKNOWN = "#d0d4d8"  # of runs without a spectrum
