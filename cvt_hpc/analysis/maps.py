@@ -34,6 +34,7 @@ from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.figures import (
     LONG,
     WIDTH,
+    as_written,
     draw,
     fitting,
     headline,
@@ -207,7 +208,22 @@ def _grid_figure(arrangement: Arrangement, vmax: float | None, source: str) -> F
         styles, columns = cells.STYLES | cells.OF_STARTS, 3  # as wide as the page with the longest label
     shown = {kind: style for kind, style in styles.items() if np.any(sheet.classes == kind)}
     cells.class_legend(figure, shown, columns, with_inferred=bool(sheet.inferred.any()), further=onset)
+    if sheet.columns > NAMED:
+        _lay_out(figure, [ax for ax in axes.flat if not (ax.xaxis.get_visible() or ax.yaxis.get_visible())])
     return figure
+
+
+def _lay_out(figure: Figure, inner: list[Axes]) -> None:
+    """Find the places of all panels by the outer ones, once: to ask each takes as long as to draw it."""
+    as_written(figure)
+    for ax in inner:
+        ax.set_visible(False)
+    engine = figure.get_layout_engine()
+    assert engine is not None
+    engine.execute(figure)
+    figure.set_layout_engine("none")
+    for ax in inner:
+        ax.set_visible(True)
 
 
 def _draw_onsets(axes: NDArray[Any], sheet: Sheet) -> list[Any]:
