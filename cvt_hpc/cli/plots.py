@@ -26,7 +26,10 @@ def add(commands: Any) -> None:
     hysteresis = add_command(kinds, "hysteresis", _hysteresis, text, "RESULTS")
     text = "a quantity over an axis as marks, and others of its unit as lines beside it"
     curve = add_command(kinds, "curve", _curve, text, "RESULTS")
-    curve.add_argument("quantities", nargs="+", metavar="QUANTITY", help="variable of the results")
+    text = "variable of the results; with --lines, A+B share a panel"
+    curve.add_argument("quantities", nargs="+", metavar="QUANTITY", help=text)
+    text = "a curve for each value of that axis, and a panel for each quantity"
+    curve.add_argument("--lines", metavar="AXIS", help=text)
     text = "forces between belt and pulleys over the wrap, of one run or of several"
     wrap = add_command(kinds, "wrap", _wrap, text, "HISTORY")
     wrap.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
@@ -127,13 +130,19 @@ def _hysteresis(arguments: argparse.Namespace) -> int:
 
 
 def _curve(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.curve_panels import draw_curve_panels
     from cvt_hpc.analysis.curves import draw_curve
     from cvt_hpc.study import open_results
 
     out = _picture(arguments, "curve", *arguments.quantities, *arguments.at)
     with open_results(arguments.path) as dataset:
-        at = _at(arguments, dataset)
-        say(f"picture: {draw_curve(dataset, arguments.quantities, out, at, str(arguments.path))}")
+        at, source, asked = _at(arguments, dataset), str(arguments.path), arguments.quantities
+        if arguments.lines is None:
+            picture = draw_curve(dataset, asked, out, at, source)
+        else:
+            groups = [quantity.split("+") for quantity in asked]
+            picture = draw_curve_panels(dataset, groups, arguments.lines, out, at, source)
+        say(f"picture: {picture}")
     return DONE
 
 
