@@ -81,7 +81,7 @@ def test_a_ring_that_moves_out_of_its_plane_keeps_its_energy_and_momentum():
     energy_now, momentum_now, moment_now = chains.energy_and_momentum(constants, found)
     assert np.abs(found[:, 2]).max() > 1e-5
     assert momentum_now == pytest.approx(momentum, abs=1e-12)
-    assert moment_now[2] == pytest.approx(moment[2], rel=1e-7)
+    assert moment_now[2] == pytest.approx(moment[2], rel=1e-8)
     assert energy_now == pytest.approx(energy, rel=4e-6)
 
 
@@ -194,12 +194,12 @@ def clamped_motion(tension, bending=47.6):
     return held_steps(constants, fields, 400, lambda f: shape @ f[: SEGMENTS + 1, 2]) / (shape @ shape)
 
 
-def frequency_squared(amplitudes, stride):
+def frequency_squared(amplitudes, stride, dt=STEP):
     """(2 pi f)^2 of amplitudes of one mode, of either sign, by q+ + q- = 2 q cos(omega dt) of every so many."""
     middle, outer = amplitudes[stride:-stride], amplitudes[2 * stride :] + amplitudes[: -2 * stride]
     cosine = 0.5 * (middle @ outer) / (middle @ middle)
     angle = np.arccos(cosine) ** 2 if cosine < 1.0 else -(np.arccosh(cosine) ** 2)
-    return angle / (stride * STEP) ** 2
+    return angle / (stride * dt) ** 2
 
 
 def test_frequency_of_a_clamped_strand():
@@ -229,38 +229,43 @@ def test_a_pressed_strand_buckles_at_its_load():
     assert 0.95 + 0.1 * below / (below - above) == pytest.approx(1.0, abs=0.01)
 
 
-def lateral_wave_frequency(waves, tension):
-    """Of waves around a ring that spins as fast as that tension asks, with 50 elements a half wave [Hz]."""
-    nodes, circumference = 100 * waves, 2 * waves * LENGTH_OF_STRAND
+def lateral_wave_frequency(half_wave, tension, dt):
+    """Of eight half waves [m] around a ring that spins as fast as that tension asks, of 50 elements [Hz]."""
+    nodes, circumference = 400, 8 * half_wave
     h, radius = circumference / nodes, circumference / (2.0 * np.pi)
     mass = PER_LENGTH * h
     spin = np.sqrt(tension / PER_LENGTH) / radius
     constants = chains.belt(
-        pitch=h, thickness=0.5 * h, mass=0.8 * mass, ring_mass=0.2 * mass, ring_rotary_inertia=1e-9
+        pitch=h, thickness=0.5 * h, mass=0.8 * mass, ring_mass=0.2 * mass, ring_rotary_inertia=1e-12
     )
     fields = chains.spinning_ring(nodes, radius, spin)
     chord = 2.0 * radius * np.sin(np.pi / nodes)
     fields[:, b.LENGTH] = chord / (1.0 + mass * spin**2 * radius / (2.0 * np.sin(np.pi / nodes)) / 6.0e6)
     place = h * np.arange(nodes)
-    wave = np.pi / LENGTH_OF_STRAND
+    wave = np.pi / half_wave
     shape = np.sin(wave * place)
     fields[:, 2] = 1e-5 * shape
     fields[:, b.SLOPE] = 1e-5 * wave / (1.0 + 47.6 * wave**2 / 2.4e6) * np.cos(wave * place)
     state, work = chains.state(fields), b.workspace(constants, nodes)
     amplitudes = []
     for _ in range(40):
-        assert advance(constants, b.NEWTON, state, work, np.zeros((2, b.INPUTS)), 10, STEP) == 0
+        assert advance(constants, b.NEWTON, state, work, np.zeros((2, b.INPUTS)), 10, dt) == 0
         amplitudes.append(shape @ of_lanes(state.elements)[:, 2])
-    return np.sqrt(frequency_squared(np.array(amplitudes), 1) / 100.0) / (2.0 * np.pi)
+    return np.sqrt(frequency_squared(np.array(amplitudes), 1, 10.0 * dt)) / (2.0 * np.pi)
 
 
-def test_frequency_of_a_pinned_strand():
+@pytest.mark.parametrize(("mode", "golden"), [(1, 412.10), (2, 1522.50), (3, 3314.13)])
+def test_frequency_of_a_pinned_strand(mode, golden):
     # half a wave of a large ring is a pinned strand: f = 1 / (2 l) sqrt((T + EI_s (pi / l)^2) / m')
-    wave = np.pi / LENGTH_OF_STRAND
+    wave = mode * np.pi / LENGTH_OF_STRAND
     stiff = 47.6 / (1.0 + 47.6 * wave**2 / 2.4e6)
     exact = wave / (2.0 * np.pi) * np.sqrt((4000.0 + stiff * wave**2) / PER_LENGTH)
-    assert exact == pytest.approx(412.10, rel=1e-4)
-    assert lateral_wave_frequency(4, 4000.0) == pytest.approx(exact, rel=1e-3)
+    assert exact == pytest.approx(golden, rel=1e-4)
+    # The step errs by -(2 pi f dt)^2 / 12: by 6e-5 of the first mode, 5e-5 and 4e-5 of the others in steps that
+    # fall with the square of the mode. So few elements err by 1e-4. Rotary inertia of the rings, which the formula
+    # has not, would lower the third mode by 2e-3.
+    found = lateral_wave_frequency(LENGTH_OF_STRAND / mode, 4000.0, STEP / mode**2)
+    assert found == pytest.approx(exact, rel=3e-4)
 
 
 @pytest.mark.parametrize(("tension", "force"), [(0.0, 78.025), (4000.0, 93.562)])
