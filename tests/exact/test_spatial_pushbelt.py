@@ -163,7 +163,9 @@ def test_a_sheave_leans_with_its_lag_under_a_load_that_stays():
         reached = 1.0 - (1.0 - STEP / belt.lean_lag) ** done
         assert state.leans == pytest.approx(reached * target, rel=1e-12)
         # which is 1 - exp(-t / lag) but for at most dt / (2 e lag)
-        assert reached == pytest.approx(-np.expm1(-done * STEP / belt.lean_lag), abs=0.19 * STEP / belt.lean_lag)
+        assert reached == pytest.approx(
+            -np.expm1(-done * STEP / belt.lean_lag), abs=0.19 * STEP / belt.lean_lag
+        )
 
 
 def test_pins_push_back_beyond_their_clearance():
