@@ -6,7 +6,10 @@ from numba import njit
 from scipy.optimize import brentq
 
 from cvt_hpc.models.spatial_pushbelt import belt as b
-from cvt_hpc.models.spatial_pushbelt.faces import face_gap
+from cvt_hpc.models.pushbelt.start import of_lanes
+from cvt_hpc.models.spatial_pushbelt import belt as b
+from cvt_hpc.models.spatial_pushbelt.chain import predict
+from cvt_hpc.models.spatial_pushbelt.faces import face_forces, face_gap, predict_faces
 from cvt_hpc.models.spatial_pushbelt.flank import flank_directions, frustum, frustum_gap
 from cvt_hpc.models.spatial_pushbelt.pin import pin_offset
 from support import spatial_chains as chains
@@ -79,6 +82,49 @@ def test_front_points_at_the_rear_plane(pitch, edge, head):
             2e-3,
         )
         assert 1e6 * gap == pytest.approx(expected, abs=1e-6)
+
+
+def pressed_edges(belt, push, curvature):
+    """Forces at the edges, left and right, and moments (16 - 1,) of elements pressed along an arc out of their plane.
+
+    Each is so close to the one behind as the push at the middle of the edge asks, and tilted, heads apart.
+    """
+    nodes, yaw, tilt, apart = 16, curvature * belt.pitch, 1e-3, push / belt.contact_stiffness
+    fields = np.zeros((nodes, b.STATE_FIELDS))
+    r, x, o = np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])
+    for element in fields:
+        element[:9] = *r, *x, *o
+        edge = r + 0.5 * belt.thickness * x - belt.pitch_depth * o
+        x = np.cos(tilt) * (np.cos(yaw) * x + np.sin(yaw) * np.cross(o, x)) - np.sin(tilt) * o
+        o = o - (o @ x) * x
+        o /= np.linalg.norm(o)
+        r = edge + (0.5 * belt.thickness - apart) * x + belt.pitch_depth * o
+    state, work = chains.state(fields), b.workspace(belt, nodes)
+    predict(belt, state.elements, state.pulleys, work.step, 1e-9)
+    predict_faces(belt, state.elements, work.step)
+    work.iterate.data[:] = 0.0
+    face_forces(belt, state.elements, work.step, work.iterate, 1e-9)
+    forces, turns = (
+        of_lanes(of)[:-1, k : k + n]
+        for of, k, n in ((state.elements, b.PUSH, 4), (work.iterate, b.PAIR_J + 3, 3))
+    )
+    assert not forces[:, 2:].any()
+    return forces[:, :2], -np.sum(turns * fields[1:, 6:9], axis=1)
+
+
+def test_pressed_edges_bend_as_a_beam_until_one_opens():
+    belt, push = chains.belt(), 500.0
+    stiff = belt.contact_stiffness * belt.edge_width**2 * belt.pitch  # EI of 2 (c / 2) b^2 h
+    assert stiff == pytest.approx(153.0, rel=1e-3)
+    opens = push * belt.edge_width / stiff
+    for share in (-0.999, -0.5, 0.0, 0.5, 0.999, 1.001):
+        edges, moment = pressed_edges(belt, push, share * opens)
+        # each edge has half of the push, and of the moment what its width asks, until one has none; tilt takes 5e-7
+        expected = 0.5 * push * (1.0 + share)
+        assert edges[:, 1] == pytest.approx(expected, abs=1e-6 * push)
+        expected = min(share * push, expected) * belt.edge_width
+        assert moment == pytest.approx(expected, abs=1e-6 * push * belt.edge_width)
+        assert (edges[:, 0] > 0.0).all() == (share < 1.0)
 
 
 def circle_and_ellipse(circle, centre, first, second):
