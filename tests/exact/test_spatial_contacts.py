@@ -1,11 +1,10 @@
-"""Contacts of the spatial pushbelt: golden digits of frustum, plane, pin and hole."""
+"""Contacts of the spatial pushbelt: golden digits of frustum, plane, pin and hole, pressed edges."""
 
 import numpy as np
 import pytest
 from numba import njit
 from scipy.optimize import brentq
 
-from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.pushbelt.start import of_lanes
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.chain import predict
@@ -13,9 +12,6 @@ from cvt_hpc.models.spatial_pushbelt.faces import face_forces, face_gap, predict
 from cvt_hpc.models.spatial_pushbelt.flank import flank_directions, frustum, frustum_gap
 from cvt_hpc.models.spatial_pushbelt.pin import pin_offset
 from support import spatial_chains as chains
-
-NODES, STEP, LOAD = 64, 1e-5, 81.0
-RIGHT = b.RIGHT
 
 
 @njit
