@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from cvt_hpc.job import build_job
 from cvt_hpc.models.pushbelt import belt as p
 from cvt_hpc.models.pushbelt.start import of_lanes, start
 from cvt_hpc.models.spatial_pushbelt import belt as b
@@ -13,6 +14,20 @@ NODES, STEP, TORQUE = 104, 1e-5, 60.0
 LOAD = 1.35 * TORQUE
 RAMP = 1500  # steps
 OFFSET = 0.5e-3  # of the driven pulley along its axis [m]
+# A belt of few elements between rigid sheaves, clamped and loaded within a quarter of a revolution
+COARSE = {
+    "elements": NODES,
+    "band_high": 1000.0,
+    "sheave_stiffness": np.inf,
+    "rise_time": 0.01,
+    "duration": 0.04,
+}
+
+
+def job(**values):
+    """A job of a coarse belt under 60 N m, with other values."""
+    short = {"most_refinements": 0, "longest_duration": values.get("duration", 0.04), "load": TORQUE}
+    return build_job({"name": "spatial", "model": "spatial_pushbelt"}, "spatial", COARSE | short | values)
 
 
 def inputs(thrusts, loads, fields=b.INPUTS, drift=0.0):
