@@ -43,6 +43,7 @@ def _room(count):
 
 
 def test_steps_allocate_nothing(run):
+    # kernels of lanes are compiled without an allocator, so that one that asks for room does not compile either
     counting.memsys_enable_stats()
     try:
         allocated = [rtsys.get_allocation_stats().alloc]
