@@ -77,7 +77,7 @@ def test_models_tells_each_model_and_its_keys(call):
 def test_doctor_names_what_is_wrong_and_what_to_do(call, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(
-        doctor, "_said", lambda command: ["1 MPICH", "1 MPICH"]
+        doctor, "_said", lambda command: (0, ["1 MPICH", "1 MPICH"])
     )  # ranks that do not see each other
     monkeypatch.setattr(doctor, "versions", lambda: {"python": "3", "mpi4py": "4"})
     monkeypatch.setattr(doctor, "LEAST_DISK", 1e30)
@@ -87,6 +87,32 @@ def test_doctor_names_what_is_wrong_and_what_to_do(call, tmp_path, monkeypatch):
     assert {"ok       versions", "ok       machine", "trouble  disk", "trouble  MPI"} <= told
     advice = out[out.index(next(line for line in out if "trouble  MPI" in line)) + 1]
     assert "does not fit the MPI library" in advice
+
+
+@pytest.mark.parametrize(
+    ("script", "told"),
+    [
+        (
+            "echo 'srun: error: resolve_ctls: no configuration' >&2; exit 1",
+            "trouble  Slurm: sbatch is there, but srun fails: srun: error: resolve_ctls: no configuration",
+        ),
+        (
+            "echo 'MPI plugin types are...'; echo pmi2",
+            "ok       Slurm: sbatch is there; srun knows MPI plugin types are... pmi2",
+        ),
+    ],
+)
+def test_doctor_asks_srun_whether_slurm_answers(call, tmp_path, monkeypatch, script, told):
+    for name in ("sbatch", "srun"):
+        (tmp_path / name).write_text(f"#!/bin/sh\n{script}\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(doctor, "_mpi", lambda installed: doctor.Finding(True, "MPI", ""))
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    status, out, _ = call("doctor")
+    assert told in out and status == (1 if told.startswith("trouble") else 0)
+    if status:
+        assert out[-1].startswith("         `sinfo` has to list partitions first")
 
 
 @pytest.mark.slow
