@@ -31,7 +31,22 @@ def test_a_template_is_a_job_and_so_is_all_that_is_commented_out_in_it(model):
         key for key, parameter in job.schema.parameters.items() if parameter.default is None
     }
     follow = {parameter.gives.key for parameter in job.schema.parameters.values() if parameter.gives}
+    assert max(map(len, text.splitlines())) <= 120
     assert set(job.parameters) - in_the_place_of_others - follow - {"load"} <= filled.given
+
+
+def test_a_template_has_the_units_of_engineers():
+    lines = job_template("first", "elastic_belt", "init").splitlines()
+    for line in (
+        '# driven_radius = "75 mm"',
+        '# thrust = "50 kN"',
+        '# driving_speed = "3000 rpm"',
+        '# disturbance = "1 um"',
+        '# rise_time = "30 ms"',
+        '# flank_stiffness = "30 kN/mm^2"',
+        '# element_mass = "1 kg/m"',
+    ):
+        assert line in lines
 
 
 def test_init_writes_a_job_that_check_takes_and_overwrites_nothing(call, tmp_path, monkeypatch):
