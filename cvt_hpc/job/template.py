@@ -168,7 +168,7 @@ def _as_toml(parameter: Parameter) -> str:
 
 
 def _in_customary(value: float, unit: str) -> str:
-    """Return a number [unit] in the unit in which engineers give it, rounded for people; "" of no such unit."""
+    """Return a number [unit] as engineers give it, rounded for people; "" where that is the SI unit."""
     wanted = next((other for least, other in _CUSTOMARY.get(unit, ()) if least <= abs(value)), "")
     if not wanted:
         return angle_in_words(value, unit)

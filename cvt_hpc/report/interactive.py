@@ -125,7 +125,7 @@ def _sampled_axis(axis: xr.DataArray) -> dict[str, Any]:
 
 
 def _from_both_starts(dataset: xr.Dataset, names: list[str]) -> NDArray[np.int8] | None:
-    """Classes from the smallest and the largest disturbance, as over the whole grid; None without that axis."""
+    """Classes from the smallest and the largest disturbance, over the whole grid; None without that axis."""
     if not has_starts(dataset, {}):
         return None
     joined = map_classes(join_starts(dataset)).expand_dims({AXIS: dataset.sizes[AXIS]})

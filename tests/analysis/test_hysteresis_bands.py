@@ -9,7 +9,7 @@ from cvt_hpc.analysis.arrangement import ruler
 from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure, onset_line, vibration_ranges
 from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.errors import InputError
-from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.variables import Vibrates
 from cvt_hpc.vibration.classes import OccurrenceClass
 from support.studies import ramps, study
 

@@ -12,7 +12,6 @@ import time
 import numpy as np
 import pytest
 import xarray as xr
-from pypdf import PdfReader
 
 from cvt_hpc.analysis.classes import map_classes, occurrence_classes
 from cvt_hpc.analysis.hysteresis_bands import lowest_onsets
@@ -425,6 +424,8 @@ def test_sides_values_and_quantities_are_chosen_in_the_browser(tmp_path):
 
 @pytest.mark.slow
 def test_it_prints_on_paper(page):
+    from pypdf import PdfReader
+
     printed = page.with_name("printed.pdf")
     browse(page, "--virtual-time-budget=5000", f"--print-to-pdf={printed}")
     pages = PdfReader(printed).pages
