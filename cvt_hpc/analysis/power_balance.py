@@ -85,14 +85,14 @@ def draw_balance(whole: Axes, parts: Axes, balance: Balance) -> None:
     lost, rest = sum(balance.losses.values()), sum(balance.rest.values())
     is_large = max(abs(balance.put_in), abs(balance.taken_out)) >= KILOWATTS
     factor, unit = (1e-3, "kW") if is_large else (1.0, "W")
-    powers = {"in:\ndriving": balance.put_in, "out:\nload": balance.taken_out, "losses": lost}
+    powers = {"in": balance.put_in, "out": balance.taken_out, "lost": lost}
     heights = [factor * power for power in powers.values()]
     bars = whole.bar(list(powers), heights, 0.7, color=[IN, OUT, LOST], edgecolor=INK, lw=0.6)
     whole.bar_label(bars, list(map(_number, heights)), fontsize=8, padding=1)
     whole.axhline(0.0, color=INK, lw=0.8)
     whole.margins(y=0.18)
     whole.set_ylabel(f"power [{unit}]")
-    told = f"in {_number(heights[0])} {unit} = out {_number(heights[1])} {unit}"
+    told = f"driving pulley in {_number(heights[0])} {unit} = load out {_number(heights[1])} {unit}"
     told += f" + losses {_number(lost)} W + rest {_number(rest)} W"
     whole.set_title(told, loc="left", pad=4)
     drawn = balance.losses | balance.rest

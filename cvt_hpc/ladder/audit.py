@@ -101,8 +101,10 @@ def audit_of(job: Job, out: Path, fraction: float) -> Repeat:
         If the job has no rungs.
     """
     if job.model != AUDITED:
-        raise mismatch("--audit", f"a job of model {AUDITED}, whose rungs can err", f"model {job.model}")
-    full = built(job, handed_to(job, FULL_MODEL, "done in full, to audit the rungs below"))
+        raise mismatch(
+            "--audit", f"a job of model {AUDITED}, whose cheaper models can err", f"model {job.model}"
+        )
+    full = built(job, handed_to(job, FULL_MODEL, "done in full, to audit the cheaper models"))
     return Repeat(
         "audit",
         "in full",

@@ -182,7 +182,9 @@ def test_what_goes_in_comes_out_or_is_lost_up_to_what_the_record_leaves_open():
         20.0
     )
     assert named["left open"] == pytest.approx(still_open)
-    assert whole.get_title(loc="left") == "in 40 kW = out 37 kW + losses 2900 W + rest 100 W"
+    assert (
+        whole.get_title(loc="left") == "driving pulley in 40 kW = load out 37 kW + losses 2900 W + rest 100 W"
+    )
     run["driving_power"] = ((), np.nan)
     assert len(energy_figure(run).axes) == 2  # of a run that failed nothing is told
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -136,11 +137,35 @@ def test_doctor_starts_two_ranks():
     assert found.fine and found.found.startswith("2 ranks by ")
 
 
-def test_completion_names_all_commands():
-    script = subprocess.run(
-        [sys.executable, "-m", "cvt_hpc", "completion", "bash"], capture_output=True, text=True, check=True
-    ).stdout
-    assert subprocess.run(["bash", "-n"], input=script, text=True).returncode == 0
+@pytest.fixture(scope="module")
+def completion():
+    """Return a function that gives the script of a shell."""
+
+    def script(shell):
+        command = [sys.executable, "-m", "cvt_hpc", "completion", shell]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+    return script
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "tcsh"])
+def test_a_shell_takes_its_completion(completion, shell):
+    if shutil.which(shell) is None:
+        pytest.skip(f"no {shell} here")
+    # without a user's settings; tcsh has no syntax check that reads standard input, its script only defines
+    command = {"bash": ["bash", "-n"], "zsh": ["zsh", "-f", "-n"], "tcsh": ["tcsh", "-f"]}[shell]
+    done = subprocess.run(command, input=completion(shell), capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "tcsh"])
+def test_completion_names_the_commands_in_each_shell(completion, shell):
+    words = set(re.findall(r"[\w-]+", completion(shell)))
+    assert {"run", "map", "init", "doctor", "cvt-hpc"} <= words
+
+
+def test_completion_names_all_commands(completion):
+    script = completion("bash")
     commands = re.search(r"(?m)^_shtab_cvt_hpc_subparsers=\((.*)\)$", script)[1]
     assert {"run", "map", "init", "doctor"} <= set(commands.split())
 
