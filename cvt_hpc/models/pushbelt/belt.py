@@ -231,6 +231,9 @@ class Workspace(NamedTuple):
     blocks : (rows, b (3 b + columns)) LaneArray
         The system of an iteration (`solvers.linked_blocks`), with a column for the residual and one for each
         unknown of the border.
+    narrow : LaneArray
+        That of an element's first unknowns, where a model assembles it before the others come in; else
+        `blocks` itself.
     scratch : (3, b (3 b + columns)) LaneArray
         Work space of its solution, and sums.
     border : (columns - 1, columns) array
@@ -249,6 +252,7 @@ class Workspace(NamedTuple):
     iterate: LaneArray
     shapes: LaneArray
     blocks: LaneArray
+    narrow: LaneArray
     scratch: LaneArray
     border: np.ndarray
     sums: LaneArray

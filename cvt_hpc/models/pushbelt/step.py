@@ -190,5 +190,5 @@ def _accept(belt, state, work, inputs, dt):
     totals[THRUST_WORK] -= closing * (driving_thrust * driving + driven_thrust * driven)
 
 
-EQUATIONS = Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes)
+EQUATIONS = Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, CHANGE)
 advance = partial(advance_by, EQUATIONS)
