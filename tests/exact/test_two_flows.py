@@ -51,6 +51,15 @@ def shaken(seed):
     return belt, state, b.workspace(belt, NODES, 2), rng
 
 
+def stretches(step, x):
+    """Rates along x (nodes, 9) at which both packages are shortened together, and half of their difference."""
+    ahead = np.roll(x, -1, 0)
+    of_both = np.sum(step[:, b.MEAN_I : b.MEAN_I + 7] * x[:, :7], 1)
+    of_both -= np.sum(step[:, b.MEAN_J : b.MEAN_J + 7] * ahead[:, :7], 1)
+    apart = np.sum(step[:, b.DIFFERENCE_I : b.DIFFERENCE_I + 7] * x[:, FIRST], 1)
+    return of_both, apart - np.sum(step[:, b.DIFFERENCE_J : b.DIFFERENCE_J + 7] * ahead[:, FIRST], 1)
+
+
 def test_tensions_of_both_packages_change_by_their_directions():
     belt, state, work, rng = shaken(1)
     f = of_lanes(state.elements).copy()
@@ -69,11 +78,8 @@ def test_tensions_of_both_packages_change_by_their_directions():
         state.elements.data[:] = in_lanes(g).data
         TWO.prepare(belt, state, work, 1.0)
         measured[sign] = of_lanes(work.step).copy()
-    step, ahead = measured[0.0], np.roll(x, -1, 0)
-    of_both = np.sum(step[:, b.MEAN_I : b.MEAN_I + 7] * x[:, :7], 1)
-    of_both -= np.sum(step[:, b.MEAN_J : b.MEAN_J + 7] * ahead[:, :7], 1)
-    apart = np.sum(step[:, b.DIFFERENCE_I : b.DIFFERENCE_I + 7] * x[:, FIRST], 1)
-    apart -= np.sum(step[:, b.DIFFERENCE_J : b.DIFFERENCE_J + 7] * ahead[:, FIRST], 1)
+    step = measured[0.0]
+    of_both, apart = stretches(step, x)
     own, cross = step[:, b.TENSION_SLOPE], step[:, b.CROSS_SLOPE]
     assert np.abs(cross).max() > 1e-4 * own.max()
     for field, expected in (
@@ -131,6 +137,16 @@ def test_the_linear_system_is_the_slope_of_the_residuals():
     TWO.assemble(belt, state, work, STEP)
     blocks, right = of_lanes(work.blocks), field_of_right(9)
     assert blocks[:, right : right + 9] == pytest.approx(residual)
+    # tensions of the iterate, of which the recorded ones are those of the last
+    step, found = of_lanes(work.step), of_lanes(work.iterate)
+    change = f[:, b.CHANGE : b.CHANGE + 9]
+    of_both, apart = stretches(step, change)
+    own, cross = step[:, b.TENSION_SLOPE], step[:, b.CROSS_SLOPE]
+    for predicted, at, expected in (
+        (b.PREDICTED_TENSION, b.ITERATE_TENSION, own * of_both + cross * apart),
+        (b.PREDICTED_DIFFERENCE, b.ITERATE_DIFFERENCE, own * apart + cross * of_both),
+    ):
+        assert step[:, predicted] - found[:, at] == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
     direction = rng.normal(0.0, 1.0, (NODES, 9))
     diagonal, link = (blocks[:, k : k + 81].reshape(-1, 9, 9).transpose(0, 2, 1) for k in (0, 81))
     expected = np.einsum("ijk,ik->ij", diagonal, direction)
@@ -208,6 +224,22 @@ def test_packages_that_run_apart_are_braked_by_what_is_booked_as_loss():
     assert g[:, b.SADDLE_RIGHT] - g[:, b.SADDLE_LEFT] == pytest.approx(pressed, rel=1e-2)
     assert energy - energy_now == pytest.approx(lost_now - lost, rel=1e-3)
     assert at_rings_now - at_rings == pytest.approx(lost_now - lost, rel=1e-2)
+
+
+def test_what_a_step_damps_of_waves_in_the_packages_is_booked():
+    nodes = 216
+    constants, _, fields = chains.free_ring(nodes, 0.1082, 250.0)
+    state = with_two_flows(constants, chains.state(fields))
+    f = of_lanes(state.elements).copy()
+    f[:, b.HALF_SPEED] = 5.0 * np.cos(6.0 * np.pi * np.arange(nodes) / nodes)
+    before, _, _ = chains.energy_and_momentum(constants, f)
+    state.elements.data[:] = in_lanes(f).data
+    work, rest = b.workspace(constants, nodes, 2), np.zeros((2, b.INPUTS))
+    assert advance_two(constants, b.NEWTON_OF_TWO_FLOWS, state, work, rest, 60, 1e-6) == 0
+    after, _, _ = chains.energy_and_momentum(constants, of_lanes(state.elements))
+    assert before - after > 0.2  # of 1 J: waves of 22 kHz
+    # the formula is that of waves slow against the step: (2 pi f dt)^2 is 2 %
+    assert state.totals[p.RING_DAMPED] == pytest.approx(before - after, rel=0.04)
 
 
 def test_one_flow_is_two_flows_of_equal_packages_in_the_plane():

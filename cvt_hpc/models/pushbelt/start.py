@@ -108,7 +108,7 @@ def equal_chords(
         chords = np.linalg.norm(np.roll(found, -1, axis=0) - found, axis=1)
         if np.ptp(chords) < 1e-13:
             break
-        # arc lengths in proportion to what the chords leave; it contracts, as both differ by their curvature
+        # arc lengths scaled by the mean chord over their own; it contracts, as both differ by their curvature
         gaps = np.diff(np.append(s, length)) * (chords.mean() / chords)
         gaps *= length / gaps.sum()
         s = np.concatenate([[0.0], np.cumsum(gaps[:-1])])

@@ -36,12 +36,12 @@ _LARGE = 1e100  # more than any speed or power that means something
 
 
 class Equations(NamedTuple):
-    """What a model writes of its steps: kernels, which take `belt, state, work` first and `dt` last.
+    """A model's equations of a step: kernels, which take `belt, state, work` first and `dt` last.
 
     Attributes
     ----------
     prepare : kernel
-        What all iterates of a step have in common: geometry, directions, linear laws.
+        Values that all iterates of a step have in common: geometry, directions, linear laws.
     evaluate : kernel
         Forces of the iterate, and the residuals that they leave, that of the border in its last column. Takes
         the load [N m] before `dt`, and returns the power residual [W].
@@ -51,7 +51,7 @@ class Equations(NamedTuple):
     close : kernel
         That of the border, once the elements' is solved (`solvers.linked_blocks`).
     accept : kernel
-        Takes the state to the end of the step, and adds up what it has done. Takes the inputs before `dt`.
+        Advances the state to the end of the step, and adds up the works. Takes the inputs before `dt`.
     changes : kernel
         By how much contact forces have changed, in the order of `CONTACTS` (`faults.name_fault`).
     first_change : int
@@ -86,7 +86,7 @@ def solve_bordered(equations, belt, state, work, size, dt):
 def correct(state, work, weights, first_change, share):
     """Take the iterate to the solution, or a share of the way; return the largest correction [m/s].
 
-    Where any correction is not finite, nor is what is returned.
+    If any correction is not finite, nor is the result.
     """
     elements, blocks, border, scratch = state.elements, work.blocks, work.border, work.scratch
     b, unknowns = len(weights), border.shape[0]
@@ -109,7 +109,7 @@ def correct(state, work, weights, first_change, share):
     for part in range(scratch.data.shape[2]):
         found = max(found, scratch.data[0, 0, part])
         total_found += scratch.data[0, 1, part]
-    # a maximum passes over what is not a number, a sum does not
+    # a maximum ignores entries that are not numbers, a sum does not
     return found if total_found < np.inf else total_found
 
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 # Measured on one core of an EPYC (Zen 5): core-seconds per element and step, and per sample
 RIGID_COST, ELASTIC_COST, SAMPLE_COST = 2.4e-6, 3.3e-6, 1e-3
-OF_TWO = 1.5  # cost of a step with two flows of ring material by that of one with one
+OF_TWO = 1.6  # cost of a step with two flows of ring material by that of one with one
 
 _ACROSS = ("amplitude", "frequency", "growth_rate", "amplitude_scatter")  # told of both planes
 VARIABLES = (
