@@ -52,7 +52,7 @@ window.addEventListener("load", () => setTimeout(() => {
 CHOOSE = """
 <script>
 window.addEventListener("load", () => {
-  const onsets = () => document.getElementById("map").data.filter(one => one.mode === "lines").map(one => [one.line.dash, one.x[0]]);
+  const onsets = () => document.getElementById("map").data.filter(one => one.mode === "lines").map(one => [one.line.dash, ...one.x]);
   const pick = (name, value) => {
     const box = [...document.querySelectorAll("#map-controls label")].find(one => one.textContent.startsWith(name));
     const input = box.querySelector("select, input");
@@ -413,8 +413,10 @@ def test_sides_values_and_quantities_are_chosen_in_the_browser(tmp_path):
     scale, x, y, value, panels, text, *lines = json.loads(html.unescape(told))
     hidden, of_small, of_both, legend = lines
     # in each of two panels, the second of which is quiet: that of the disturbance that is chosen; of both
-    assert of_small == [["solid", 90], ["solid", 90], ["solid", None], ["solid", None]]
-    assert of_both[:4] == [["solid", 90], ["solid", 90], ["solid", 50], ["dash", 50]] and hidden == []
+    # along the borders of both rows
+    vibrates, quiet = ["solid", 90, 90, 90, 90], ["solid", None, None, None, None]
+    assert of_small == [vibrates, vibrates, quiet, quiet] and hidden == []
+    assert of_both[:4] == [vibrates, vibrates, ["solid", 50, 50, 40, 40], ["dash", 50, 50, 40, 40]]
     assert legend.endswith("onset from a small startonset from a large start")
     assert (scale, x, y) == ("frequency [Hz]", "friction gradient [s/m]", "load [N m]") and panels == 2
     assert value == "100 µm"
