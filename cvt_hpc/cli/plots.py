@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -11,17 +11,20 @@ from typing import Any
 from cvt_hpc.cli.parts import (
     DONE,
     PICTURES,
+    SOME_FAILED,
     add_assignments,
     add_colour_end,
     add_command,
     add_sides,
     check_output,
     colour_end,
+    complain,
     picture_beside,
     say,
     sides_of,
 )
-from cvt_hpc.errors import mismatch
+from cvt_hpc.errors import InputError
+from cvt_hpc.files import StorageError
 
 
 def add(commands: Any) -> None:
@@ -38,7 +41,10 @@ def add(commands: Any) -> None:
     hysteresis = add_command(kinds, "hysteresis", _hysteresis, text, "RESULTS")
     text = "a quantity over an axis as marks, and others of its unit as lines beside it"
     curve = add_command(kinds, "curve", _curve, text, "RESULTS")
-    curve.add_argument("quantities", nargs="+", metavar="QUANTITY", help="variable of the results")
+    text = "variable of the results; with --lines, A+B share a panel"
+    curve.add_argument("quantities", nargs="+", metavar="QUANTITY", help=text)
+    text = "a curve for each value of that axis, and a panel for each quantity"
+    curve.add_argument("--lines", metavar="AXIS", help=text)
     text = "forces between belt and pulleys over the wrap, of one run or of several"
     wrap = add_command(kinds, "wrap", _wrap, text, "HISTORY")
     wrap.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
@@ -73,14 +79,14 @@ def add(commands: Any) -> None:
         "variator": "quantities along the belt drawn on the variator, such as forces, speeds and slip",
     }
     for kind, text in of_one.items():
-        command = add_command(kinds, kind, _of_one, text, "HISTORY")
+        command = add_command(kinds, kind, _of_one, text, "HISTORIES")
         command.set_defaults(kind=kind)
-        text = f"default: HISTORY_{kind}.png beside the dataset"
+        text = f"default: HISTORY_{kind}.png beside the dataset; of several with the name of each run"
         command.add_argument("--out", type=Path, metavar="PNG", help=text)
-    text = "variable over position; may be repeated (default: push_force)"
+    text = "variable over position; may be repeated (default: push_force, of belt drives tension)"
     command.add_argument("--of", action="append", default=[], metavar="QUANTITY", help=text)
     text = "the belt in the last periods of a run, magnified, as a moving picture"
-    animation = add_command(kinds, "animation", _animation, text, "HISTORY")
+    animation = add_command(kinds, "animation", _animation, text, "HISTORIES")
     text = "FILE.gif, or FILE.mp4 where there is ffmpeg (default: HISTORY.gif beside it)"
     animation.add_argument("--out", type=Path, metavar="GIF", help=text)
     names = {
@@ -149,13 +155,19 @@ def _hysteresis(arguments: argparse.Namespace) -> int:
 
 
 def _curve(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.curve_panels import draw_curve_panels
     from cvt_hpc.analysis.curves import draw_curve
     from cvt_hpc.study import open_results
 
     out = _picture(arguments, "curve", *arguments.quantities, *arguments.at)
     with open_results(arguments.path) as dataset:
-        at = _at(arguments, dataset)
-        say(f"picture: {draw_curve(dataset, arguments.quantities, out, at, str(arguments.path))}")
+        at, source, asked = _at(arguments, dataset), str(arguments.path), arguments.quantities
+        if arguments.lines is None:
+            picture = draw_curve(dataset, asked, out, at, source)
+        else:
+            groups = [quantity.split("+") for quantity in asked]
+            picture = draw_curve_panels(dataset, groups, arguments.lines, out, at, source)
+        say(f"picture: {picture}")
     return DONE
 
 
@@ -172,37 +184,65 @@ def _strands(arguments: argparse.Namespace) -> int:
 
 def _animation(arguments: argparse.Namespace) -> int:
     from cvt_hpc.analysis.animation import check_animation, draw_animation
-    from cvt_hpc.analysis.telling_apart import history_files
 
-    (file,) = history_files([arguments.path])
-    out = arguments.out or file.with_suffix(".gif")
-    check_animation(out)
-    with _opened([file]) as (history,):
-        say(f"animation: {draw_animation(history, out, str(file))}")
-    return DONE
+    def write(history: Any, out: Path, source: str) -> str:
+        return f"animation: {draw_animation(history, out, source)}"
+
+    check_animation(arguments.out or Path("belt.gif"))
+    return _each(arguments, lambda file: file.with_suffix(".gif"), write)
 
 
 def _of_one(arguments: argparse.Namespace) -> int:
     from cvt_hpc.analysis import flanks, histories, on_variator
-    from cvt_hpc.analysis.telling_apart import history_files
 
-    (file, *others), quantities = history_files([arguments.path]), getattr(arguments, "of", [])
-    if others:
-        raise mismatch(str(arguments.path), "one history", f"{len(others) + 1}: {file.name}, ...")
-    out = _picture(arguments, file.stem, arguments.kind, *quantities)
-    with _opened([file]) as (history,):
+    quantities = getattr(arguments, "of", [])
+
+    def write(history: Any, out: Path, source: str) -> str:
         if arguments.kind == "history":
             picture = histories.draw_history(history, out)
         elif arguments.kind == "phase":
-            picture = histories.draw_phase(history, out, str(file))
+            picture = histories.draw_phase(history, out, source)
         elif arguments.kind == "flanks":
-            picture = flanks.draw_flanks(history, out, str(file))
+            picture = flanks.draw_flanks(history, out, source)
         elif arguments.kind == "energy":
-            picture = on_variator.draw_energy(history, out, str(file))
+            picture = on_variator.draw_energy(history, out, source)
         else:
-            picture = on_variator.draw_variator(history, out, quantities or ["push_force"], str(file))
-        say(f"picture: {picture}")
-    return DONE
+            picture = on_variator.draw_variator(history, out, quantities, source)
+        return f"picture: {picture}"
+
+    return _each(arguments, lambda file: _picture(arguments, file.stem, arguments.kind, *quantities), write)
+
+
+def _each(
+    arguments: argparse.Namespace, beside: Callable[[Path], Path], write: Callable[[Any, Path, str], str]
+) -> int:
+    """Write a picture of each history that is given, one by one; of several the others of one that has none.
+
+    Parameters
+    ----------
+    beside : callable
+        Where the picture of a file goes; with --out and several histories there, with the name of the run.
+    write : callable
+        Draws a history to a place, given its source, and tells in a line what was written.
+    """
+    from cvt_hpc.analysis.telling_apart import history_files
+
+    files, status = history_files([arguments.path]), DONE
+    for file in files:
+        out = arguments.out or beside(file)
+        if arguments.out and len(files) > 1:
+            out = out.with_stem(f"{out.stem}_{file.stem}")
+        try:
+            with _opened([file]) as (history,):
+                say(write(history, out, str(file)))
+        except StorageError:
+            raise
+        except InputError as error:
+            if len(files) == 1:
+                raise
+            complain(str(error))
+            status = SOME_FAILED
+    return status
 
 
 def _wrap(arguments: argparse.Namespace) -> int:

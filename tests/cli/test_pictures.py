@@ -25,6 +25,7 @@ KINDS = {
     "campbell of panels": "plot campbell R --panel ratio --orders 1 2 3 8 16 24 --vmax 5um",
     "hysteresis": "plot hysteresis S",
     "curve": "plot curve R efficiency --at ratio=1 --at driving_speed=100rad/s",
+    "curves of values": "plot curve R efficiency amplitude --at ratio=1 --lines driving_speed",
     "strands": "plot strands R --at driving_speed=100rad/s",
     "strands of panels": "plot strands R --at driving_speed=100rad/s --x load --panel ratio",
     "wrap": "plot wrap H H2",
