@@ -183,7 +183,8 @@ class Results:
         Returns
         -------
         DataArray
-            Over the other axes and `boundary` [unit of the axis], ascending, nan behind the last one.
+            Over the other axes and `boundary` [unit of the axis], ascending, nan behind the last one; there
+            are as many places as there can be boundaries, one less than values on the axis.
             `rising` says whether the belt vibrates above: windows begin at rising boundaries. A vibration at
             the lowest value already has no rising boundary.
         """
@@ -191,22 +192,32 @@ class Results:
         if along not in classes.dims or classes[along].dtype.kind not in "iuf":
             numeric = [name for name in map(str, classes.dims) if classes[name].dtype.kind in "iuf"]
             raise mismatch("results: along", f"one of the axes {', '.join(numeric) or '(none)'}", along)
-        others = [name for name in classes.dims if name != along]
-        rows = np.moveaxis(levels(classes.values), classes.dims.index(along), -1)
         axis = np.asarray(classes[along].values, float)
-        found = [onsets(axis, row) for row in rows.reshape(-1, axis.size)]
-        most = max([1, *map(len, found)])
-        places, rising = np.full((2, len(found), most), np.nan)
-        for k, line in enumerate(found):
-            places[k, : len(line)] = [one.load for one in line]
-            rising[k, : len(line)] = [one.rising for one in line]
-        shape, dims = (*rows.shape[:-1], most), (*others, "boundary")
+        most = max(axis.size - 1, 1)
+        places, rising = xr.apply_ufunc(
+            _boundaries,
+            classes,
+            input_core_dims=[[along]],
+            output_core_dims=[["boundary"]] * 2,
+            kwargs={"axis": axis, "most": most},
+            dask="parallelized",
+            dask_gufunc_kwargs={"allow_rechunk": True, "output_sizes": {"boundary": most}},
+            output_dtypes=[float, float],
+        )
         of_axis = classes[along].attrs
         attributes = {key: of_axis[key] for key in ("units", "job_units") if key in of_axis}
         attributes |= {"long_name": f"boundary of vibration in {along}"}
-        array = xr.DataArray(places.reshape(shape), dims=dims, name="boundary", attrs=attributes)
-        coordinates = {name: classes[name] for name in others} | {"rising": (dims, rising.reshape(shape))}
-        return array.assign_coords(coordinates)
+        found = places.rename("boundary").assign_coords(rising=rising.variable)
+        return found.drop_attrs(deep=False).assign_attrs(attributes)
+
+
+def _boundaries(classes: np.ndarray, axis: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """Boundaries along the last dimension, and which of them rise: both (..., most), nan behind the last one."""
+    places, rising = np.full((2, *classes.shape[:-1], most), np.nan)
+    for line in np.ndindex(classes.shape[:-1]):
+        for k, one in enumerate(onsets(axis, levels(classes[line]))):
+            places[line][k], rising[line][k] = one.load, one.rising
+    return places, rising
 
 
 def read_table(path: str | Path) -> xr.Dataset:

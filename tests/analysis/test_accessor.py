@@ -3,6 +3,7 @@
 import runpy
 from pathlib import Path
 
+import dask
 import numpy as np
 import pytest
 import xarray as xr
@@ -12,7 +13,7 @@ from cvt_hpc.analysis.classes import OccurrenceClass
 from cvt_hpc.analysis.maps import PAGE
 from cvt_hpc.errors import InputError
 from cvt_hpc.variables import Status, Vibrates
-from support.studies import GRADIENTS, LOADS, STIFFNESSES, study
+from support.studies import GRADIENTS, LOADS, STIFFNESSES, study, traced
 
 NO, YES, SLIPS = Vibrates.NO, Vibrates.YES, Vibrates.SLIPS
 
@@ -44,8 +45,10 @@ def test_boundaries_lie_midway_and_onset_is_where_a_window_begins():
     found = results(rows).cvt.boundary()
     assert found.dims == ("friction_gradient", "boundary") and found.attrs["units"] == "N m"
     nan = np.nan
-    np.testing.assert_array_equal(found, [[50, 90, nan], [50, 90, nan], [nan] * 3, [40, 70, 90]])
-    np.testing.assert_array_equal(found.rising, [[1, 0, nan], [0, 1, nan], [nan] * 3, [1, 0, 1]])
+    expected = [[50, 90, nan, nan], [50, 90, nan, nan], [nan] * 4, [40, 70, 90, nan]]
+    np.testing.assert_array_equal(found, expected)
+    expected = [[1, 0, nan, nan], [0, 1, nan, nan], [nan] * 4, [1, 0, 1, nan]]
+    np.testing.assert_array_equal(found.rising, expected)
     onset = results(rows).cvt.onset()
     np.testing.assert_array_equal(onset, [50, 90, nan, 40])
     assert onset.attrs == {"units": "N m", "long_name": "onset of vibration in load"}
@@ -54,6 +57,10 @@ def test_boundaries_lie_midway_and_onset_is_where_a_window_begins():
     np.testing.assert_array_equal(turned.cvt.onset(), onset)
     along = results(rows).cvt.boundary("friction_gradient").sel(load=20.0)
     np.testing.assert_allclose(along.dropna("boundary"), [-0.3, -0.1])
+
+
+def too_early(*tasks, **options):
+    raise AssertionError("computed before it was asked for")
 
 
 def test_verbs_take_chunked_datasets_and_read_what_they_need_alone():
@@ -65,7 +72,14 @@ def test_verbs_take_chunked_datasets_and_read_what_they_need_alone():
     spectra = xr.zeros_like(whole["amplitude"]).chunk()
     lazy = whole.chunk({"load": 2}).assign(spectrum=spectra.map_blocks(untouched, template=spectra))
     for verb in ("classes", "onset", "boundary", "strongest"):
-        xr.testing.assert_identical(getattr(lazy.cvt, verb)(), getattr(whole.cvt, verb)())
+        with dask.config.set(scheduler=too_early):
+            asked = getattr(lazy.cvt, verb)()
+        assert asked.chunks
+        xr.testing.assert_identical(asked.compute(), getattr(whole.cvt, verb)())
+    inferred = traced()
+    with dask.config.set(scheduler=too_early):
+        asked = inferred.chunk({"sheave_stiffness": 1}).cvt.classes()
+    xr.testing.assert_identical(asked.compute(), inferred.cvt.classes())
     assert [image.get_array().tolist() for axes in lazy.cvt.map().axes for image in axes.images] == [
         image.get_array().tolist() for axes in whole.cvt.map().axes for image in axes.images
     ]
