@@ -40,8 +40,8 @@ def occurrence_classes(dataset: xr.Dataset) -> xr.DataArray:
     Returns
     -------
     DataArray of int8
-        Values of `OccurrenceClass`, or as they are given; dimensions of `status`. Of a chunked dataset nothing
-        is computed yet.
+        Values of `OccurrenceClass`, or as they are given; dimensions of `status`. Of a chunked dataset
+        nothing is computed yet.
     """
     if "occurrence_class" in dataset:
         return dataset["occurrence_class"]

@@ -7,10 +7,10 @@ Pictures of results take
     source     str, optional: where the results are from, for the errors
 
 and pictures of runs a `history` or `histories`, as `simulate` returns them, with their `sources`. A function
-`..._figure` composes a matplotlib Figure, unknown to pyplot, and writes nothing; `figure.savefig(path)` does.
-`draw_...` takes the same arguments, and writes it as `save_figure` does. InputError is raised where a dataset
-holds no results, a single run or not what is to be drawn, or where `at` names no axis or no value on it; what
-else a picture refuses its docstring says.
+`..._figure` composes a matplotlib Figure, unknown to pyplot, and writes nothing; `figure.savefig(path)` does,
+and `draw` writes it as `save_figure` does. `kinds.py` lists those that are drawn by their kind. InputError is
+raised where a dataset holds no results, a single run or not what is to be drawn, or where `at` names no axis
+or no value on it; what else a picture refuses its docstring says.
 """
 
 from __future__ import annotations

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.figures import WIDTH, balanced, draw, styled
+from cvt_hpc.analysis.figures import WIDTH, balanced, styled
 from cvt_hpc.analysis.followed import around, follow_element, passages
 from cvt_hpc.analysis.profiles import ARC, regions
 from cvt_hpc.analysis.telling_apart import on_axes, titles
@@ -19,11 +18,6 @@ COLOURS = {"radial_sliding": "#0072b2", "tangential_sliding": "#009e73", "slidin
 LINES = {"radial_sliding": "-", "tangential_sliding": ":", "sliding_speed": "--"}
 HIGHEST = 1500.0  # [Hz]
 LABELS = {"radial_sliding": "radial", "tangential_sliding": "tangential", "sliding_speed": "resulting"}
-
-
-def draw_element(history: xr.Dataset, out: Path, region: str | None = None, source: str = "history") -> Path:
-    """Write the figure of `element_figure`."""
-    return draw(lambda: element_figure(history, region, source), out)
 
 
 @styled

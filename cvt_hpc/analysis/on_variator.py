@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -15,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from cvt_hpc.analysis.cells import colours_of
-from cvt_hpc.analysis.figures import WIDTH, axis_label, balanced, draw, styled
+from cvt_hpc.analysis.figures import WIDTH, axis_label, balanced, styled
 from cvt_hpc.analysis.history_panels import FEEDS
 from cvt_hpc.analysis.profiles import regions, shown_unit
 from cvt_hpc.analysis.telling_apart import on_axes, titles
@@ -56,13 +55,6 @@ def draw_pulleys(axes: Axes, path: Variator, distance: float) -> None:
         inwards = INSIDE * distance * np.array([-np.sin(angle[0]), np.cos(angle[0])])
         axes.text(*(1e3 * (place[0] + inwards)), strand, ha="center", va="center", fontsize=9)
     axes.set(aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
-
-
-def draw_variator(
-    history: xr.Dataset, out: Path, quantities: Sequence[str] = ("push_force",), source: str = "history"
-) -> Path:
-    """Write the figure of `variator_figure`."""
-    return draw(lambda: variator_figure(history, quantities, source), out)
 
 
 @styled
@@ -153,11 +145,6 @@ def region_powers(history: xr.Dataset) -> xr.DataArray:
     powers = [[cell * float(history[c].values[region == name].sum()) for name in names] for c in causes]
     shape = np.reshape(powers, (len(causes), len(names)))
     return xr.DataArray(shape, {"cause": causes, "region": names}, ("cause", "region"), attrs={"units": "W"})
-
-
-def draw_energy(history: xr.Dataset, out: Path, source: str = "history") -> Path:
-    """Write the figure of `energy_figure`."""
-    return draw(lambda: energy_figure(history, source), out)
 
 
 @styled

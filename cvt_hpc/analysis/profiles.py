@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -16,7 +15,6 @@ from cvt_hpc.analysis.figures import (
     STYLE,
     WIDTH,
     balanced,
-    draw,
     in_words,
     legend_columns,
     styled,
@@ -32,18 +30,6 @@ MOST_COLUMNS = 3
 HEIGHT = 1.75  # [inch] of a panel
 _UNITS = {"N m-1": (1e-3, "kN/m"), "m s-1": (1e3, "mm/s")}
 _REFERENCES = {"sliding_angle": 90.0}  # [°]: where sliding turns from one hand to the other
-
-
-def draw_profile(
-    histories: Sequence[xr.Dataset],
-    out: Path,
-    quantities: Sequence[str] = DEFAULT,
-    region: str | None = None,
-    columns: str | None = None,
-    sources: Sequence[str] = (),
-) -> Path:
-    """Write the figure of `profile_figure`."""
-    return draw(lambda: profile_figure(histories, quantities, region, columns, sources), out)
 
 
 @styled

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.cells import colours_of
 from cvt_hpc.analysis.eigenfrequencies import strand_frequencies
-from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, draw, in_words, styled
+from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, in_words, styled
 from cvt_hpc.analysis.telling_apart import on_axes, titles
 from cvt_hpc.analysis.waterfall import ORDERS, draw_eigenfrequencies, draw_orders
 from cvt_hpc.errors import mismatch
@@ -50,13 +49,6 @@ class Ramp(NamedTuple):
     label: str
     motion: np.ndarray
     rate: float
-
-
-def draw_ramp(
-    histories: Sequence[xr.Dataset], out: Path, of: str = "t1", sources: Sequence[str] = ()
-) -> Path:
-    """Write the figure of `ramp_figure`."""
-    return draw(lambda: ramp_figure(histories, of, sources), out)
 
 
 @styled
@@ -109,11 +101,6 @@ def ramp_figure(histories: Sequence[xr.Dataset], of: str = "t1", sources: Sequen
     lines = [*titles(histories, f"Along the ramp, {name}", common), "dashed: 500 and 700 Hz"]
     figure.suptitle("\n".join(balanced(line, 80) for line in lines))
     return figure
-
-
-def draw_spectrogram(histories: Sequence[xr.Dataset], out: Path, sources: Sequence[str] = ()) -> Path:
-    """Write the figure of `spectrogram_figure`."""
-    return draw(lambda: spectrogram_figure(histories, sources), out)
 
 
 @styled

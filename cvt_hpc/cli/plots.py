@@ -1,4 +1,4 @@
-"""`plot`: pictures of results beside the map, each by its kind."""
+"""`plot`: pictures of results beside the map, each by its kind; `analysis/kinds.py` declares them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,17 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.cli.parts import DONE, PICTURES, add_assignments, add_command, check_output, picture_beside, say
+from cvt_hpc.analysis.kinds import HISTORIES, HISTORY, KINDS, RESULTS, Kind, compose, function_of
+from cvt_hpc.cli.parts import (
+    DONE,
+    PICTURES,
+    add_assignments,
+    add_command,
+    add_sides,
+    check_output,
+    picture_beside,
+    say,
+)
 from cvt_hpc.errors import mismatch
 
 
@@ -16,136 +26,83 @@ def add(commands: Any) -> None:
     """Declare the command."""
     plot = commands.add_parser("plot", help="draw spectra, curves or forces", description="Draw results.")
     kinds = plot.add_subparsers(metavar="KIND", required=True)
-    text = "spectra of the strands over an axis, with eigenfrequencies where they are known"
-    waterfall = add_command(kinds, "waterfall", _waterfall, text, "RESULTS")
-    text = "Campbell diagram: spectra over the driving speed, with eigenfrequencies and orders"
-    campbell = add_command(kinds, "campbell", _campbell, text, "RESULTS")
-    text = "multiples of the driving pulley's turns (default: 1 2 4 8 16)"
-    campbell.add_argument("--orders", nargs="+", type=float, metavar="ORDER", help=text)
-    text = "where vibration begins and ends along ramps up and down, and the bands between them"
-    hysteresis = add_command(kinds, "hysteresis", _hysteresis, text, "RESULTS")
-    text = "a quantity over an axis as marks, and others of its unit as lines beside it"
-    curve = add_command(kinds, "curve", _curve, text, "RESULTS")
-    curve.add_argument("quantities", nargs="+", metavar="QUANTITY", help="variable of the results")
-    text = "forces between belt and pulleys over the wrap, of one run or of several"
-    wrap = add_command(kinds, "wrap", _wrap, text, "HISTORY")
-    wrap.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
-    text = "quantities along the belt of one run or of several, such as forces and sliding"
-    profile = add_command(kinds, "profile", _profile, text, "HISTORIES")
-    profile.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
-    text = "variable over position; may be repeated (default: push_force, friction_force, ring_friction)"
-    profile.add_argument("--of", action="append", default=[], metavar="QUANTITY", help=text)
-    profile.add_argument("--region", choices=("driving", "driven"), help="over the wrap of that pulley alone")
-    profile.add_argument("--columns", metavar="AXIS", help="a column of panels for each value of an axis")
-    text = "motion of a strand along a ramp of load or speed, with its spectrogram"
-    ramp = add_command(kinds, "ramp", _ramp, text, "HISTORIES")
-    ramp.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
-    ramp.add_argument(
-        "--of", default="t1", metavar="WHAT", help="t1, t2 or a variable over time (default: t1)"
-    )
-    text = "spectra of the strands side by side along a ramp or over time, with eigenfrequencies"
-    spectrogram = add_command(kinds, "spectrogram", _spectrogram, text, "HISTORIES")
-    spectrogram.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
-    text = "sliding of one element on the sheaves over time, along its path"
-    element = add_command(kinds, "element", _element, text, "HISTORY")
-    element.add_argument("--region", choices=("driving", "driven"), help="one passage of that arc alone")
-    text = "what the element meets over time, as a dataset"
-    element.add_argument("--data", type=Path, metavar="FILE.nc", help=text)
-    text = "tension and push force of the strands over an axis, as bars"
-    strands = add_command(kinds, "strands", _strands, text, "RESULTS")
-    of_one = {
-        "history": "a kept run: displacement, spectrum, load, forces and feeds around the belt",
-        "phase": "phase portraits: velocity of each strand over its displacement",
-        "flanks": "left and right flank of a spatial pushbelt, with the ends of the arcs enlarged",
-        "energy": "powers around the belt: what friction takes on the arcs, what feeds the vibration",
-        "variator": "quantities along the belt drawn on the variator, such as forces, speeds and slip",
-    }
-    for kind, text in of_one.items():
-        command = add_command(kinds, kind, _of_one, text, "HISTORY")
-        command.set_defaults(kind=kind)
-        text = f"default: HISTORY_{kind}.png beside the dataset"
-        command.add_argument("--out", type=Path, metavar="PNG", help=text)
-    text = "variable over position; may be repeated (default: push_force)"
-    command.add_argument("--of", action="append", default=[], metavar="QUANTITY", help=text)
+    for name, kind in KINDS.items():
+        _add_kind(kinds, name, kind)
     text = "the belt in the last periods of a run, magnified, as a moving picture"
-    animation = add_command(kinds, "animation", _animation, text, "HISTORY")
+    animation = add_command(kinds, "animation", _animation, text, HISTORY)
     text = "FILE.gif, or FILE.mp4 where there is ffmpeg (default: HISTORY.gif beside it)"
     animation.add_argument("--out", type=Path, metavar="GIF", help=text)
-    names = {
-        strands: "strands",
-        hysteresis: "hysteresis",
-        campbell: "campbell",
-        spectrogram: "spectrogram",
-        waterfall: "waterfall",
-        curve: "curve_QUANTITY",
-        wrap: "HISTORY_wrap",
-        profile: "profile",
-    }
-    names |= {ramp: "ramp_WHAT", element: "element"}
-    for command, name in names.items():
-        text = f"default: {name}.png beside the dataset"
-        command.add_argument("--out", type=Path, metavar="PNG", help=text)
-    waterfall.add_argument("--x", metavar="AXIS", help="axis of the study that runs along x")
-    for command in (waterfall, curve, strands, hysteresis, campbell):
+
+
+def _add_kind(kinds: Any, name: str, kind: Kind) -> None:
+    command = add_command(kinds, name, _draw, kind.text, kind.subject)
+    command.set_defaults(kind=name)
+    for option in kind.options:
+        place: dict[str, Any] = {"dest": option.key} if option.flag else {}
+        command.add_argument(option.flag or option.key, help=option.text, **place, **option.settings)
+    if kind.subject == HISTORIES:
+        command.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
+    if kind.data:
+        text = "what the picture shows, as a dataset"
+        command.add_argument("--data", type=Path, metavar="FILE.nc", help=text)
+    text = f"default: {kind.picture or name}.png beside the dataset"
+    command.add_argument("--out", type=Path, metavar="PNG", help=text)
+    add_sides(command, kind.sides)
+    if kind.subject == RESULTS:
         add_assignments(command, "--at", "fix an axis at a value")
 
 
-def _waterfall(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.arrangement import Sides
-    from cvt_hpc.analysis.waterfall import draw_waterfall
-    from cvt_hpc.study import open_results
+def _draw(arguments: argparse.Namespace) -> int:
+    name, kind = arguments.kind, KINDS[arguments.kind]
+    keys = *(option.key for option in kind.options), *kind.sides
+    options = {key: value for key in keys if (value := getattr(arguments, key)) not in (None, [])}
+    named = [options[option.key] for option in kind.options if option.is_named and option.key in options]
+    words = [word for value in named for word in ([value] if isinstance(value, str) else value)]
+    if kind.subject == RESULTS:
+        return _draw_results(arguments, [name, *words, *arguments.at], options)
+    check_output(arguments.out, PICTURES)
+    from cvt_hpc.analysis.telling_apart import history_files
 
-    out = _picture(arguments, "waterfall", *arguments.at)
-    with open_results(arguments.path) as dataset:
-        at = _at(arguments, dataset)
-        say(f"picture: {draw_waterfall(dataset, out, at, str(arguments.path), Sides(arguments.x))}")
+    files = history_files([arguments.path, *getattr(arguments, "others", [])])
+    if kind.subject == HISTORY and len(files) > 1:
+        raise mismatch(str(arguments.path), "one history", f"{len(files)}: {files[0].name}, ...")
+    runs = [file.stem for file in files] if kind.picture.startswith(HISTORY) else []
+    out = arguments.out or picture_beside(arguments.path, *runs, name, *words)
+    sources = [file.stem if kind.subject == HISTORIES else str(file) for file in files]
+    written = []
+    with _opened(files) as histories:
+        if kind.data and arguments.data:
+            written.append(f"data: {_write_data(kind, histories[0], arguments.data, sources[0], options)}")
+        say(f"picture: {_write(name, histories, out, None, sources, options)}", *written)
     return DONE
 
 
-def _campbell(arguments: argparse.Namespace) -> int:
+def _draw_results(arguments: argparse.Namespace, words: Sequence[str], options: dict[str, Any]) -> int:
+    from cvt_hpc.job.assignments import read_coordinates
+    from cvt_hpc.study import open_results
+
+    check_output(arguments.out, PICTURES)
+    out, source = arguments.out or picture_beside(arguments.path, *words), str(arguments.path)
+    with open_results(arguments.path) as dataset:
+        units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
+        at = read_coordinates(arguments.at, units, source, "--at")
+        say(f"picture: {_write(arguments.kind, [dataset], out, at, [source], options)}")
+    return DONE
+
+
+def _write(
+    name: str, datasets: Sequence[Any], out: Path, at: Any, sources: Sequence[str], options: dict[str, Any]
+) -> Path:
     from cvt_hpc.analysis.figures import draw
-    from cvt_hpc.analysis.waterfall import ORDERS, campbell_figure
-    from cvt_hpc.study import open_results
 
-    out, orders = _picture(arguments, "campbell", *arguments.at), arguments.orders or ORDERS
-    with open_results(arguments.path) as dataset:
-        at = _at(arguments, dataset)
-        picture = draw(lambda: campbell_figure(dataset, at, str(arguments.path), orders), out)
-        say(f"picture: {picture}")
-    return DONE
+    return draw(lambda: compose(name, datasets, at, sources, **options), out)
 
 
-def _hysteresis(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.hysteresis_bands import draw_hysteresis
-    from cvt_hpc.study import open_results
+def _write_data(kind: Kind, history: Any, out: Path, source: str, options: dict[str, Any]) -> Path:
+    from cvt_hpc.netcdf import write_history
 
-    out = _picture(arguments, "hysteresis", *arguments.at)
-    with open_results(arguments.path) as dataset:
-        at = _at(arguments, dataset)
-        say(f"picture: {draw_hysteresis(dataset, out, at, str(arguments.path))}")
-    return DONE
-
-
-def _curve(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.curves import draw_curve
-    from cvt_hpc.study import open_results
-
-    out = _picture(arguments, "curve", *arguments.quantities, *arguments.at)
-    with open_results(arguments.path) as dataset:
-        at = _at(arguments, dataset)
-        say(f"picture: {draw_curve(dataset, arguments.quantities, out, at, str(arguments.path))}")
-    return DONE
-
-
-def _strands(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.strand_bars import draw_strand_bars
-    from cvt_hpc.study import open_results
-
-    out = _picture(arguments, "strands", *arguments.at)
-    with open_results(arguments.path) as dataset:
-        at = _at(arguments, dataset)
-        say(f"picture: {draw_strand_bars(dataset, out, at, str(arguments.path))}")
-    return DONE
+    check_output(out, (".nc",))
+    return write_history(function_of(kind.data)(history, source=source, **options), out)
 
 
 def _animation(arguments: argparse.Namespace) -> int:
@@ -160,91 +117,6 @@ def _animation(arguments: argparse.Namespace) -> int:
     return DONE
 
 
-def _of_one(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis import flanks, histories, on_variator
-    from cvt_hpc.analysis.telling_apart import history_files
-
-    (file, *others), quantities = history_files([arguments.path]), getattr(arguments, "of", [])
-    if others:
-        raise mismatch(str(arguments.path), "one history", f"{len(others) + 1}: {file.name}, ...")
-    out = _picture(arguments, file.stem, arguments.kind, *quantities)
-    with _opened([file]) as (history,):
-        if arguments.kind == "history":
-            picture = histories.draw_history(history, out)
-        elif arguments.kind == "phase":
-            picture = histories.draw_phase(history, out, str(file))
-        elif arguments.kind == "flanks":
-            picture = flanks.draw_flanks(history, out, str(file))
-        elif arguments.kind == "energy":
-            picture = on_variator.draw_energy(history, out, str(file))
-        else:
-            picture = on_variator.draw_variator(history, out, quantities or ["push_force"], str(file))
-        say(f"picture: {picture}")
-    return DONE
-
-
-def _wrap(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.telling_apart import history_files
-
-    files = history_files([arguments.path, *arguments.others])
-    out = _picture(arguments, *(file.stem for file in files), "wrap")
-    from cvt_hpc.analysis.wraps import draw_wrap
-
-    with _opened(files) as histories:
-        say(f"picture: {draw_wrap(histories, out, [file.stem for file in files])}")
-    return DONE
-
-
-def _profile(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.profiles import DEFAULT, draw_profile
-    from cvt_hpc.analysis.telling_apart import history_files
-
-    out = _picture(arguments, "profile", *filter(None, (*arguments.of, arguments.region)))
-    files = history_files([arguments.path, *arguments.others])
-    with _opened(files) as histories:
-        chosen = arguments.of or DEFAULT, arguments.region, arguments.columns
-        say(f"picture: {draw_profile(histories, out, *chosen, [file.stem for file in files])}")
-    return DONE
-
-
-def _ramp(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.ramps import draw_ramp
-    from cvt_hpc.analysis.telling_apart import history_files
-
-    out = _picture(arguments, "ramp", arguments.of)
-    files = history_files([arguments.path, *arguments.others])
-    with _opened(files) as histories:
-        say(f"picture: {draw_ramp(histories, out, arguments.of, [file.stem for file in files])}")
-    return DONE
-
-
-def _spectrogram(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.ramps import draw_spectrogram
-    from cvt_hpc.analysis.telling_apart import history_files
-
-    out = _picture(arguments, "spectrogram")
-    files = history_files([arguments.path, *arguments.others])
-    with _opened(files) as histories:
-        say(f"picture: {draw_spectrogram(histories, out, [file.stem for file in files])}")
-    return DONE
-
-
-def _element(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.followed_drawing import draw_element, followed_of
-    from cvt_hpc.analysis.telling_apart import history_files
-    from cvt_hpc.netcdf import write_history
-
-    out = _picture(arguments, "element", *filter(None, [arguments.region]))
-    check_output(arguments.data, (".nc",))
-    files, written = history_files([arguments.path]), []
-    with _opened(files[:1]) as (history,):
-        if arguments.data is not None:
-            followed = followed_of(history, arguments.region, str(files[0]))
-            written.append(f"data: {write_history(followed, arguments.data)}")
-        say(f"picture: {draw_element(history, out, arguments.region, str(files[0]))}", *written)
-    return DONE
-
-
 @contextmanager
 def _opened(files: Sequence[Path]) -> Iterator[list[Any]]:
     """Histories of runs, open within."""
@@ -254,16 +126,3 @@ def _opened(files: Sequence[Path]) -> Iterator[list[Any]]:
         yield [
             stack.enter_context(xr.open_dataset(file, engine="netcdf4", decode_times=False)) for file in files
         ]
-
-
-def _picture(arguments: argparse.Namespace, *words: str) -> Path:
-    """The picture asked for, or one beside the dataset whose name tells what it shows."""
-    check_output(arguments.out, PICTURES)
-    return arguments.out or picture_beside(arguments.path, *words)
-
-
-def _at(arguments: argparse.Namespace, dataset: Any) -> dict[str, Any]:
-    from cvt_hpc.job.assignments import read_coordinates
-
-    units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
-    return read_coordinates(arguments.at, units, str(arguments.path), "--at")
