@@ -108,6 +108,9 @@ def animation(history: xr.Dataset, source: str = "history") -> Animation:
         The history is none of a variator.
     """
     path, distance = _geometry(history, source)
+    # probes of the motion out of the plane lie behind those in it, at the same places
+    _, in_plane = np.unique(history["probe_position"].values, return_index=True)
+    history = history.isel(probe=np.sort(in_plane))
     time, motion, period = _last_periods(history)
     size = float(np.abs(motion).max())
     factor = LARGEST * distance / size if size else 0.0

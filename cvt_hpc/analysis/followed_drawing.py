@@ -135,14 +135,15 @@ def mean_there(history: xr.Dataset, followed: xr.Dataset, name: str) -> np.ndarr
     return np.interp(followed["position"].values, positions, history[name].values[known])
 
 
-def followed_of(history: xr.Dataset, region: str | None, source: str = "history") -> xr.Dataset:
+def followed_of(history: xr.Dataset, region: str | None = None, source: str = "history") -> xr.Dataset:
     """An element followed through one passage of an arc, or from the driving inlet on; arguments as above."""
     return one_passage(history, region, source) if region else follow_element(history, 0.0, source)
 
 
 def one_passage(history: xr.Dataset, pulley: str, source: str = "history") -> xr.Dataset:
     """An element followed through the arc of a pulley, the last whole passage before the profiles' end."""
-    start = next(first for first, _, name in regions(history) if name == f"{pulley} arc")
+    starts = [first for first, _, name in regions(history) if name == f"{pulley} arc"]
+    start = starts[0] if starts else 0.0  # models with other names of regions keep no profiles over time
     length = around(history)[-1]
     # elements that set out one after the other: the first of them is at the arc's inlet at once
     for behind in np.linspace(0.0, 1.0, 9):

@@ -137,7 +137,7 @@ KINDS = {
         "profiles.profile_figure",
         "quantities along the belt of one run or of several, such as forces and sliding",
         (
-            _several("default: push_force, friction_force, ring_friction"),
+            _several("default: push force or tension, and friction"),
             _region("over the wrap of that pulley alone"),
             Option(
                 "columns", "a column of panels for each value of an axis", "--columns", {"metavar": "AXIS"}

@@ -269,6 +269,10 @@ def read_ramp(
     first = int(np.searchsorted(time, _start_up(history)))
     factor, unit = coordinate_unit(course.attrs) if changing else (1.0, "s")
     rate = 1.0 / (time[1] - time[0])
+    if time.size - first < WINDOW * rate:
+        raise mismatch(source, f"a run of {WINDOW:g} s or more after its start-up", "a shorter one")
+    if rate < 2.0 * band[1]:
+        raise mismatch(source, f"a history of {2.0 * band[1]:g} samples per second or more", f"{rate:.4g}")
     if of in ("t1", "t2"):
         probes = [str(name).split()[0] == of for name in history["probe"].values]
         moved = 1e6 * history["displacement"].values[first:, probes]

@@ -80,9 +80,14 @@ STUDIES = {
 }
 HISTORIES = {
     "elastic_belt": BELT | BRIEF,
-    "elastic_belt_ramp": BELT
+    "elastic_belt_ramp": BELT  # long enough for two windows of a spectrogram
     | BRIEF
-    | {"scene": BRIEF["scene"] | {"load_history": "ramp", "load_start": "40 N m"}, "record": BELT["record"]},
+    | {
+        "scene": BRIEF["scene"] | {"load_history": "ramp", "load_start": "40 N m"},
+        "record": {"sampling_rate": "4 kHz"},
+        "run": {"duration": "95 ms", "longest_duration": "95 ms"},
+        "vibration": {"band_high": "1000 Hz"},
+    },
     "pushbelt": {"model": "pushbelt", **PUSHBELT},
     "spatial_pushbelt": {"model": "spatial_pushbelt", **PUSHBELT},
     "belt_drive": {
