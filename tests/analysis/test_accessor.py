@@ -1,5 +1,6 @@
 """`dataset.cvt` on made-up studies: classes, onsets, boundaries, and pictures laid out as asked."""
 
+import inspect
 import runpy
 from pathlib import Path
 
@@ -9,7 +10,9 @@ import pytest
 import xarray as xr
 
 import cvt_hpc
+from cvt_hpc.accessor import Results
 from cvt_hpc.analysis.classes import OccurrenceClass
+from cvt_hpc.analysis.kinds import HISTORIES, KINDS, RESULTS
 from cvt_hpc.analysis.maps import PAGE
 from cvt_hpc.errors import InputError
 from cvt_hpc.variables import Status, Vibrates
@@ -170,3 +173,83 @@ def test_the_strongest_strand_is_that_of_variables_over_strands(results, name):
 def test_a_part_without_runs_is_refused(ask):
     with pytest.raises(InputError, match="expected results of a study of one run at least, found none"):
         getattr(study().isel(load=slice(0)).cvt, ask)()
+
+
+def test_other_units_are_those_of_values_attributes_and_axes_of_pictures():
+    whole = study()
+    units = {"load": "N cm", "amplitude": "um"}
+    with dask.config.set(scheduler=too_early):
+        converted = whole.chunk({"load": 2}).cvt.in_units(**units)
+    np.testing.assert_allclose(converted["load"], 100.0 * whole["load"])
+    np.testing.assert_allclose(converted.amplitude, 1e6 * whole.amplitude)
+    assert {name: converted[name].attrs["units"] for name in units} == units
+    assert converted.indexes["load"].equals(converted["load"].to_index())
+    assert whole["load"].attrs["units"] == "N m" and "units" in converted.frequency.attrs
+    at = {"friction_gradient": GRADIENTS[0], "sheave_stiffness": 1.0}
+    one, other = (each.cvt.curve("amplitude", **at).axes[0] for each in (whole, converted))
+    assert (one.get_xlabel(), other.get_xlabel()) == ("load [N m]", "load [N cm]")
+    for line, same in zip(one.lines, other.lines, strict=True):  # amplitudes are not taken for metres
+        np.testing.assert_allclose(same.get_ydata(), line.get_ydata())
+    np.testing.assert_allclose(converted.cvt.onset(), 100.0 * whole.cvt.onset())
+    back = converted.cvt.in_units(load="N m")
+    np.testing.assert_allclose(back["load"], whole["load"])
+
+
+@pytest.mark.parametrize(
+    ("units", "told"),
+    [
+        ({"lod": "N m"}, "did you mean load?"),
+        ({"load": "kN"}, "load: expected a unit of the dimension of N m"),
+        ({"status": "kN"}, "status: expected a variable with a unit, found a flag or a text"),
+        (
+            {"frequency": "rad/s"},
+            "expected a unit of the dimension of Hz",
+        ),  # 2 pi apart, and not to be mixed up
+    ],
+)
+def test_units_of_another_dimension_are_refused(units, told):
+    with pytest.raises(InputError, match=told.replace("?", r"\?")):
+        study().cvt.in_units(**units)
+
+
+def test_quantities_of_pint_are_those_of_the_dataset():
+    """The snippet of the guide."""
+    guide = (Path(__file__).parents[2] / "docs" / "guide" / "python.md").read_text()
+    snippet = guide.split("cf_xarray.units")[1].split("```")[0]
+    results = study().assign(loss=("load", np.full(len(LOADS), 2500.0), {"units": "W"})).chunk()
+    names = {"results": results}
+    exec("import cf_xarray.units" + snippet, names)
+    assert names["loss"].pint.units == "kilowatt"
+    np.testing.assert_allclose(names["loss"].pint.magnitude, 2.5)
+
+
+def test_several_studies_are_drawn_on_one_scale():
+    small, large = study(), study().assign_attrs(job_name="other")
+    large["amplitude"] = 3.0 * large["amplitude"]
+    at = {"sheave_stiffness": 1.0}
+    figure = small.cvt.map(beside=large, **at)
+    same = cvt_hpc.maps_figure([small, large], at=at)
+    bars = [
+        [axes.get_ylim()[1] for axes in each.axes if axes.get_label() == "<colorbar>"]
+        for each in (figure, same)
+    ]
+    assert bars[0] == bars[1] and max(bars[0]) >= 3e6 * float(small.amplitude.sel(at).max()) * 0.9
+    titles = {axes.get_title(loc="left") for axes in figure.axes}
+    assert any("other" in title for title in titles) and any("occurrence" in title for title in titles)
+    shown = cvt_hpc.maps_figure([small, large], ["frequency"], at)
+    assert len(shown.axes) > len(small.cvt.map("frequency", **at).axes)
+
+
+def test_each_kind_of_picture_is_a_verb_with_its_options():
+    for name, kind in KINDS.items():
+        verb = getattr(Results, name)
+        taken = set(inspect.signature(verb).parameters)
+        assert {option.key for option in kind.options} | {*kind.sides} <= taken
+        assert ("at" in taken, "beside" in taken) == (kind.subject == RESULTS, kind.subject == HISTORIES)
+        assert kind.text in verb.__doc__ and all(option.text[1:] in verb.__doc__ for option in kind.options)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'loads'"):
+        study().cvt.phase(loads=3.0)
+
+
+def test_a_notebook_is_given_a_picture():
+    assert study().cvt.map(sheave_stiffness=1.0)._repr_png_().startswith(b"\x89PNG")
