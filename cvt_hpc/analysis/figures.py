@@ -8,7 +8,7 @@ Pictures of results take
 
 and pictures of runs a `history` or `histories`, as `simulate` returns them, with their `sources`. A function
 `..._figure` composes a matplotlib Figure, unknown to pyplot, and writes nothing; `figure.savefig(path)` does,
-and `draw` writes it as `save_figure` does. `kinds.py` lists those that are drawn by their kind. InputError is
+and `draw` writes it as `save_figure` does. `picture_kinds.py` lists those drawn by a kind. InputError is
 raised where a dataset holds no results, a single run or not what is to be drawn, or where `at` names no axis
 or no value on it; what else a picture refuses its docstring says.
 """

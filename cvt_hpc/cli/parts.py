@@ -28,7 +28,6 @@ _SUBJECTS = {
     "DIR": "output folder of a run",
     "RESULTS": "output folder of a run, or a dataset (.nc)",
     "HISTORIES": "dataset of one run (.nc), or the folder of a study: all runs whose histories it keeps",
-    "HISTORY": "dataset of one run (.nc), as simulate --out writes it",
 }
 
 

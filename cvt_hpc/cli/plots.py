@@ -1,25 +1,28 @@
-"""`plot`: pictures of results beside the map, each by its kind; `analysis/kinds.py` declares them."""
+"""`plot`: pictures of results beside the map, each by its kind; `picture_kinds.py` declares them."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.analysis.kinds import HISTORIES, HISTORY, KINDS, RESULTS, Kind, compose, function_of
 from cvt_hpc.cli.parts import (
     DONE,
     PICTURES,
+    SOME_FAILED,
     add_assignments,
     add_command,
     add_sides,
     check_output,
+    complain,
     picture_beside,
     say,
 )
-from cvt_hpc.errors import mismatch
+from cvt_hpc.errors import InputError
+from cvt_hpc.files import StorageError
+from cvt_hpc.picture_kinds import HISTORIES, HISTORY, KINDS, RESULTS, Kind
 
 
 def add(commands: Any) -> None:
@@ -29,23 +32,24 @@ def add(commands: Any) -> None:
     for name, kind in KINDS.items():
         _add_kind(kinds, name, kind)
     text = "the belt in the last periods of a run, magnified, as a moving picture"
-    animation = add_command(kinds, "animation", _animation, text, HISTORY)
+    animation = add_command(kinds, "animation", _animation, text, HISTORIES)
     text = "FILE.gif, or FILE.mp4 where there is ffmpeg (default: HISTORY.gif beside it)"
     animation.add_argument("--out", type=Path, metavar="GIF", help=text)
 
 
 def _add_kind(kinds: Any, name: str, kind: Kind) -> None:
-    command = add_command(kinds, name, _draw, kind.text, kind.subject)
+    command = add_command(kinds, name, _draw, kind.text, RESULTS if kind.subject == RESULTS else HISTORIES)
     command.set_defaults(kind=name)
     for option in kind.options:
         place: dict[str, Any] = {"dest": option.key} if option.flag else {}
         command.add_argument(option.flag or option.key, help=option.text, **place, **option.settings)
     if kind.subject == HISTORIES:
         command.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
+    each = "; of several runs with the name of each" if kind.subject == HISTORY else ""
     if kind.data:
-        text = "what the picture shows, as a dataset"
+        text = f"what the picture shows, as a dataset{each}"
         command.add_argument("--data", type=Path, metavar="FILE.nc", help=text)
-    text = f"default: {kind.picture or name}.png beside the dataset"
+    text = f"default: {kind.picture or name}.png beside the dataset{each}"
     command.add_argument("--out", type=Path, metavar="PNG", help=text)
     add_sides(command, kind.sides)
     if kind.subject == RESULTS:
@@ -57,64 +61,108 @@ def _draw(arguments: argparse.Namespace) -> int:
     keys = *(option.key for option in kind.options), *kind.sides
     options = {key: value for key in keys if (value := getattr(arguments, key)) not in (None, [])}
     named = [options[option.key] for option in kind.options if option.is_named and option.key in options]
-    words = [word for value in named for word in ([value] if isinstance(value, str) else value)]
-    if kind.subject == RESULTS:
-        return _draw_results(arguments, [name, *words, *arguments.at], options)
+    words = [name, *(word for value in named for word in ([value] if isinstance(value, str) else value))]
     check_output(arguments.out, PICTURES)
-    from cvt_hpc.analysis.telling_apart import history_files
+    if kind.subject == RESULTS:
+        _draw_results(arguments, words, options)
+        return DONE
+    if kind.subject == HISTORIES:
+        _draw_together(arguments, words, options)
+        return DONE
+    data = getattr(arguments, "data", None)
+    check_output(data, (".nc",))
 
-    files = history_files([arguments.path, *getattr(arguments, "others", [])])
-    if kind.subject == HISTORY and len(files) > 1:
-        raise mismatch(str(arguments.path), "one history", f"{len(files)}: {files[0].name}, ...")
-    runs = [file.stem for file in files] if kind.picture.startswith(HISTORY) else []
-    out = arguments.out or picture_beside(arguments.path, *runs, name, *words)
-    sources = [file.stem if kind.subject == HISTORIES else str(file) for file in files]
-    written = []
-    with _opened(files) as histories:
-        if kind.data and arguments.data:
-            written.append(f"data: {_write_data(kind, histories[0], arguments.data, sources[0], options)}")
-        say(f"picture: {_write(name, histories, out, None, sources, options)}", *written)
-    return DONE
+    def beside(file: Path) -> Path:
+        return picture_beside(arguments.path, *([file.stem] if kind.picture else []), *words)
+
+    def write(history: Any, out: Path, source: str, of_several: str) -> list[str]:
+        written = [f"picture: {_write(name, [history], out, None, [source], options)}"]
+        if data:
+            from cvt_hpc.analysis.composing import function_of
+            from cvt_hpc.netcdf import write_history
+
+            shown = function_of(kind.data)(history, source=source, **options)
+            written.append(f"data: {write_history(shown, data.with_stem(data.stem + of_several))}")
+        return written
+
+    return _each(arguments, beside, write)
 
 
-def _draw_results(arguments: argparse.Namespace, words: Sequence[str], options: dict[str, Any]) -> int:
+def _draw_results(arguments: argparse.Namespace, words: Sequence[str], options: dict[str, Any]) -> None:
     from cvt_hpc.job.assignments import read_coordinates
     from cvt_hpc.study import open_results
 
-    check_output(arguments.out, PICTURES)
-    out, source = arguments.out or picture_beside(arguments.path, *words), str(arguments.path)
+    source = str(arguments.path)
+    out = arguments.out or picture_beside(arguments.path, *words, *arguments.at)
     with open_results(arguments.path) as dataset:
         units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
         at = read_coordinates(arguments.at, units, source, "--at")
         say(f"picture: {_write(arguments.kind, [dataset], out, at, [source], options)}")
-    return DONE
+
+
+def _draw_together(arguments: argparse.Namespace, words: Sequence[str], options: dict[str, Any]) -> None:
+    from cvt_hpc.analysis.telling_apart import history_files
+
+    files = history_files([arguments.path, *arguments.others])
+    names = [file.stem for file in files]
+    runs = names if KINDS[arguments.kind].picture.startswith(HISTORY) else []
+    out = arguments.out or picture_beside(arguments.path, *runs, *words)
+    with _opened(files) as histories:
+        say(f"picture: {_write(arguments.kind, histories, out, None, names, options)}")
 
 
 def _write(
     name: str, datasets: Sequence[Any], out: Path, at: Any, sources: Sequence[str], options: dict[str, Any]
 ) -> Path:
+    from cvt_hpc.analysis.composing import compose
     from cvt_hpc.analysis.figures import draw
 
     return draw(lambda: compose(name, datasets, at, sources, **options), out)
 
 
-def _write_data(kind: Kind, history: Any, out: Path, source: str, options: dict[str, Any]) -> Path:
-    from cvt_hpc.netcdf import write_history
-
-    check_output(out, (".nc",))
-    return write_history(function_of(kind.data)(history, source=source, **options), out)
-
-
 def _animation(arguments: argparse.Namespace) -> int:
     from cvt_hpc.analysis.animation import check_animation, draw_animation
+
+    def write(history: Any, out: Path, source: str, _: str) -> list[str]:
+        return [f"animation: {draw_animation(history, out, source)}"]
+
+    check_animation(arguments.out or Path("belt.gif"))
+    return _each(arguments, lambda file: file.with_suffix(".gif"), write)
+
+
+def _each(
+    arguments: argparse.Namespace,
+    beside: Callable[[Path], Path],
+    write: Callable[[Any, Path, str, str], list[str]],
+) -> int:
+    """Write a picture of each history that is given, one by one; of several the others of one that has none.
+
+    Parameters
+    ----------
+    beside : callable
+        Where the picture of a file goes; of several histories it has the name of the run.
+    write : callable
+        Draws a history to a place, given its source and what tells it from several, and tells in lines what
+        was written.
+    """
     from cvt_hpc.analysis.telling_apart import history_files
 
-    (file,) = history_files([arguments.path])
-    out = arguments.out or file.with_suffix(".gif")
-    check_animation(out)
-    with _opened([file]) as (history,):
-        say(f"animation: {draw_animation(history, out, str(file))}")
-    return DONE
+    files, status = history_files([arguments.path]), DONE
+    for file in files:
+        out, of_several = arguments.out or beside(file), f"_{file.stem}" if len(files) > 1 else ""
+        if arguments.out or file.stem not in out.stem:
+            out = out.with_stem(out.stem + of_several)
+        try:
+            with _opened([file]) as (history,):
+                say(*write(history, out, str(file), of_several))
+        except StorageError:
+            raise
+        except InputError as error:
+            if len(files) == 1:
+                raise
+            complain(str(error))
+            status = SOME_FAILED
+    return status
 
 
 @contextmanager

@@ -138,7 +138,7 @@ def _report(arguments: argparse.Namespace) -> int:
     out = arguments.out or folder_of(arguments.path) / "report.html"
     check_output(out, (".html",))
     with open_results(arguments.path) as dataset:
-        say(f"report: {write_report(dataset, out, str(arguments.path))}")
+        say(f"report: {write_report(dataset, out, str(arguments.path), folder_of(arguments.path))}")
     return DONE
 
 

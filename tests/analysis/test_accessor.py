@@ -12,9 +12,9 @@ import xarray as xr
 import cvt_hpc
 from cvt_hpc.accessor import Results
 from cvt_hpc.analysis.classes import OccurrenceClass
-from cvt_hpc.analysis.kinds import HISTORIES, KINDS, RESULTS
 from cvt_hpc.analysis.maps import PAGE
 from cvt_hpc.errors import InputError
+from cvt_hpc.picture_kinds import HISTORIES, KINDS, RESULTS
 from cvt_hpc.variables import Status, Vibrates
 from support.studies import GRADIENTS, LOADS, STIFFNESSES, study, traced
 

@@ -11,9 +11,9 @@ import cvt_hpc
 from cvt_hpc.accessor import open_results
 from cvt_hpc.analysis import animation
 from cvt_hpc.analysis.classes import count_classes
-from cvt_hpc.analysis.kinds import KINDS, RESULTS
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
+from cvt_hpc.picture_kinds import KINDS, RESULTS
 from cvt_hpc.variables import Status
 
 VERSIONS = sorted(path for path in (Path(__file__).parents[1] / "datasets").iterdir() if path.is_dir())
@@ -105,6 +105,19 @@ def test_the_command_line_draws_the_same_files(datasets, monkeypatch, capsys):
     ]
     with xr.open_dataset("followed.nc") as followed:
         assert (np.diff(followed["travelled"]) > 0.0).all()
+    Path("followed.nc").unlink()
+
+
+def test_each_history_of_a_folder_has_its_own_files(datasets, monkeypatch, capsys):
+    monkeypatch.chdir(datasets)
+    assert main(["plot", "element", ".", "--data", "met.nc"]) == 1  # one history alone has profiles over time
+    told = capsys.readouterr()
+    assert told.out.splitlines() == [
+        "picture: element_history_elastic_belt.png",
+        "data: met_history_elastic_belt.nc",
+    ]
+    assert len(told.err.splitlines()) == len(DRAWN) - 1
+    Path("met_history_elastic_belt.nc").unlink()  # for those who ask for all histories of the folder
 
 
 @pytest.mark.parametrize(

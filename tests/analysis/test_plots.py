@@ -186,7 +186,9 @@ def test_of_many_pulleys_those_with_torque_are_drawn(history):
     [
         (
             lambda d, h: waterfall_figure(d.drop_vars("spectrum")),
-            "results: expected results with the variable",
+            "results: expected results with the variable spectrum, found status, vibrates, "
+            "eigenfrequency, speed_loss, expected_speed_loss, strand_tension; runs of elastic_belt, pushbelt or belt_drive "
+            "record it, up to band_high in [vibration]",
         ),
         (lambda d, h: waterfall_figure(d, {"load": 3.0}), "results: at load: expected a value of that axis"),
         (lambda d, h: curve_figure(d, ["loss"]), "results: loss: unknown numeric variable of the results"),

@@ -20,19 +20,9 @@ from cvt_hpc.simulation import run_point, simulate
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.variator.path import regions
+from support.spatial_belts import COARSE, job
 
-# A belt of few elements between rigid sheaves, clamped and loaded within a quarter of a revolution
-BELT = {"elements": 104, "band_high": 1000.0, "sheave_stiffness": np.inf, "rise_time": 0.01, "duration": 0.04}
 OFFSET = 5e-4  # [m]
-
-
-def job(**values):
-    return build_job(
-        {"name": "spatial", "model": values.pop("model", "spatial_pushbelt")},
-        "spatial",
-        {**BELT, "most_refinements": 0, "longest_duration": values.get("duration", 0.04), "load": 60.0}
-        | values,
-    )
 
 
 def record(**values):
@@ -265,7 +255,7 @@ def test_what_ends_a_run_is_recorded_and_the_sweep_goes_on(tmp_path):
     loose = {"driving_thrust": 20e3, "sheave_rate": 2e-5, "flank_reach": 1e-3}
     faces = {"inner_radius": 0.045, "outer_radius": 0.065}
     short = {"most_refinements": 0, "longest_duration": 0.04}
-    report = run(build_job(document, "ends.toml", BELT | loose | faces | short), tmp_path, progress=False)
+    report = run(build_job(document, "ends.toml", COARSE | loose | faces | short), tmp_path, progress=False)
     assert report.done == 2 and len(report.failed) == 3
     with open_results(report.results) as results:
         statuses, verdicts, reasons = (results[name].values for name in ("status", "vibrates", "reason"))

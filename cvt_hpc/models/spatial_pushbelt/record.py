@@ -53,7 +53,11 @@ VARIABLES = (
     Variable("sheave_force", ("sheave",), "f8", "N", "mean axial force of the belt on each sheave, outwards"),
     Variable("sheave_loss", ("sheave",), "f8", "W", "mean friction power of the flanks at each sheave"),
     Variable(
-        "net_axial_force", ("pulley",), "f8", "N", "mean force of the belt on both sheaves, to the right"
+        "net_axial_force",
+        ("pulley",),
+        "f8",
+        "N",
+        "mean force of the belt on both sheaves along their axis, to the right",
     ),
     Variable(
         "beam_axial_force",
