@@ -109,16 +109,22 @@ KINDS = {
     ),
     "curve": Kind(
         RESULTS,
-        "curves.curve_figure",
+        "curve_panels.curves_figure",
         "a quantity over an axis as marks, and others of its unit as lines beside it",
         (
             Option(
                 "quantities",
-                "variable of the results",
+                "variable of the results; with --lines, A+B share a panel",
                 "",
                 {"nargs": "+", "metavar": "QUANTITY"},
                 True,
                 True,
+            ),
+            Option(
+                "lines",
+                "a curve for each value of that axis, and a panel for each quantity",
+                "--lines",
+                {"metavar": "AXIS"},
             ),
         ),
         picture="curve_QUANTITY",

@@ -91,6 +91,7 @@ def test_histories_open_and_draw(datasets, name, monkeypatch):
 def test_the_command_line_draws_the_same_files(datasets, monkeypatch, capsys):
     monkeypatch.chdir(datasets)
     assert main(["plot", "campbell", "speeds.nc", "--orders", "1", "2"]) == 0
+    assert main(["plot", "curve", "grid.nc", "frequency", "amplitude", "--lines", "friction_gradient"]) == 0
     assert (
         main(["plot", "profile", "history_elastic_belt.nc", "history_pushbelt.nc", "--of", "push_force"]) == 0
     )
@@ -98,6 +99,7 @@ def test_the_command_line_draws_the_same_files(datasets, monkeypatch, capsys):
     assert main(["plot", "variator", "history_spatial_pushbelt.nc", "--of", "gap", "--of", "roll"]) == 0
     assert capsys.readouterr().out.splitlines() == [
         "picture: campbell.png",
+        "picture: curve_frequency_amplitude.png",
         "picture: profile_push_force.png",
         "picture: element.png",
         "data: followed.nc",
