@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from textwrap import fill
 from typing import NamedTuple
 
@@ -20,7 +19,6 @@ from cvt_hpc.analysis.figures import (
     WIDTH,
     balanced,
     coordinate_unit,
-    draw,
     headlines,
     in_words,
     on_a_page,
@@ -62,17 +60,6 @@ class Ramp(NamedTuple):
     label: str
     motion: np.ndarray
     rate: float
-
-
-def draw_ramp(
-    histories: Sequence[xr.Dataset],
-    out: Path,
-    of: str = "t1",
-    sources: Sequence[str] = (),
-    vmax: float | None = None,
-) -> Path:
-    """Write the figure of `ramp_figure`."""
-    return draw(lambda: ramp_figure(histories, of, sources, vmax), out)
 
 
 @styled
@@ -134,13 +121,6 @@ def ramp_figure(
     lines = [*titles(histories, f"Along the ramp, {name}", common), "dashed: 500 and 700 Hz"]
     figure.suptitle(headlines(lines, 80))
     return figure
-
-
-def draw_spectrogram(
-    histories: Sequence[xr.Dataset], out: Path, sources: Sequence[str] = (), vmax: float | None = None
-) -> Path:
-    """Write the figure of `spectrogram_figure`."""
-    return draw(lambda: spectrogram_figure(histories, sources, vmax), out)
 
 
 @styled
@@ -321,6 +301,10 @@ def read_ramp(
     first = int(np.searchsorted(time, _start_up(history)))
     factor, unit = coordinate_unit(course.attrs) if changing else (1.0, "s")
     rate = 1.0 / (time[1] - time[0])
+    if time.size - first < WINDOW * rate:
+        raise mismatch(source, f"a run of {WINDOW:g} s or more after its start-up", "a shorter one")
+    if rate < 2.0 * band[1]:
+        raise mismatch(source, f"a history of {2.0 * band[1]:g} samples per second or more", f"{rate:.4g}")
     if of in STRANDS:
         probes = [str(name).split()[0] == of for name in history["probe"].values]
         moved = 1e6 * history["displacement"].values[first:, probes]

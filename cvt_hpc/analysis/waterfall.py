@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from cvt_hpc.analysis.arrangement import (
 )
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.eigenfrequencies import along_axis
-from cvt_hpc.analysis.figures import WIDTH, draw, headlines, in_words, on_a_page, styled
+from cvt_hpc.analysis.figures import WIDTH, headlines, in_words, on_a_page, styled
 from cvt_hpc.analysis.line_names import OUTLINE, Named, name_lines
 from cvt_hpc.errors import few_of, mismatch, one_line
 
@@ -41,25 +40,12 @@ LINE, ORDER = "#123a6b", "#4d4d4d"
 ORDERS = (1.0, 2.0, 4.0, 8.0, 16.0)  # of the driving pulley, in a Campbell diagram
 
 
-def draw_waterfall(
-    dataset: xr.Dataset,
-    out: Path,
-    at: Mapping[str, Any] | None = None,
-    source: str = "results",
-    sides: Sides = CHOSEN,
-    orders: Sequence[float] = (),
-    vmax: float | None = None,
-) -> Path:
-    """Write the figure of `waterfall_figure`."""
-    return draw(lambda: waterfall_figure(dataset, at, source, sides, orders, vmax), out)
-
-
 def campbell_figure(
     dataset: xr.Dataset,
     at: Mapping[str, Any] | None = None,
     source: str = "results",
     orders: Sequence[float] = ORDERS,
-    panel: str | None = None,
+    sides: Sides = CHOSEN,
     vmax: float | None = None,
 ) -> Figure:
     """Draw a Campbell diagram: `waterfall_figure` over the driving speed, with orders of that speed."""
@@ -68,7 +54,7 @@ def campbell_figure(
         found = ", ".join(map(str, dataset["status"].dims)) or "a single run"
         then = "`cvt-hpc plot waterfall` draws spectra over any axis"
         raise mismatch(source, "results over the axis driving_speed", found, then)
-    return waterfall_figure(dataset, at, source, Sides("driving_speed", panel=panel), orders, vmax)
+    return waterfall_figure(dataset, at, source, Sides("driving_speed", panel=sides.panel), orders, vmax)
 
 
 @styled

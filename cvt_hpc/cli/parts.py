@@ -6,7 +6,7 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,6 @@ _SUBJECTS = {
     "DIR": "output folder of a run",
     "RESULTS": "output folder of a run, or a dataset (.nc)",
     "HISTORIES": "dataset of one run (.nc), or the folder of a study: all runs whose histories it keeps",
-    "HISTORY": "dataset of one run (.nc), as simulate --out writes it",
 }
 
 
@@ -48,12 +47,11 @@ def add_assignments(command: argparse.ArgumentParser, flag: str, text: str) -> N
     command.add_argument(flag, action="append", default=[], metavar="KEY=VALUE", help=text)
 
 
-def add_sides(command: argparse.ArgumentParser, *sides: str) -> None:
-    """Add the options that lay axes of a study out, of x, y and panel those named; `sides_of` reads them."""
+def add_sides(command: argparse.ArgumentParser, sides: Sequence[str] = ("x", "y", "panel")) -> None:
+    """Add the options that lay axes of a study out; `sides_of` reads them."""
     places = {"x": "along x", "y": "along y", "panel": "over the panels"}
     for side in sides:
-        text = f"axis of the study that runs {places[side]}"
-        command.add_argument(f"--{side}", metavar="AXIS", help=text)
+        command.add_argument(f"--{side}", metavar="AXIS", help=f"axis of the study that runs {places[side]}")
 
 
 def sides_of(arguments: argparse.Namespace) -> Sides:
@@ -61,12 +59,6 @@ def sides_of(arguments: argparse.Namespace) -> Sides:
     from cvt_hpc.analysis.arrangement import Sides
 
     return Sides(*(getattr(arguments, side, None) for side in Sides._fields))
-
-
-def add_colour_end(command: argparse.ArgumentParser, runs: str) -> None:
-    """Add the option that ends the colours; `colour_end` reads it."""
-    text = f"value at which the colours end, such as '20 um' (default: that of 98 %% of the {runs})"
-    command.add_argument("--vmax", metavar="VALUE", help=text)
 
 
 def colour_end(text: str | None, unit: str) -> float | None:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from cvt_hpc.cli.parts import (
     DONE,
     add_assignments,
-    add_colour_end,
     add_command,
     add_sides,
     check_output,
@@ -43,8 +42,9 @@ def add(commands: Any) -> None:
     text = "default: map.png, map_QUANTITY.png or, of several studies, maps.png beside the (first) dataset"
     picture.add_argument("--out", type=Path, metavar="PNG", help=text)
     add_assignments(picture, "--at", "fix an axis at a value")
-    add_sides(picture, "x", "y", "panel")
-    add_colour_end(picture, "cells")
+    add_sides(picture)
+    text = "value at which the colours end, such as '20 um' (default: that of 98 %% of the cells)"
+    picture.add_argument("--vmax", metavar="VALUE", help=text)
     text = "draw an axis log or linear (default: log where its values are spread so); may be repeated"
     picture.add_argument("--spacing", action="append", default=[], metavar="AXIS=SPACING", help=text)
     text = "draw the figure of a paper that a study repeats, and measure what the paper says of it"
@@ -88,11 +88,9 @@ def _map(arguments: argparse.Namespace) -> int:
         datasets = [opened.enter_context(open_results(path)) for path in paths]
         dataset, sides = datasets[0], sides_of(arguments)
         if arguments.others:
-            from cvt_hpc.analysis.studies import AXIS, join_studies
+            from cvt_hpc.analysis.studies import side_by_side
 
-            dataset = join_studies(datasets, list(map(str, paths)), arguments.show)
-            if AXIS not in sides:
-                sides = sides._replace(panel=sides.panel or AXIS)
+            dataset, sides = side_by_side(datasets, list(map(str, paths)), arguments.show, sides)
         from cvt_hpc.analysis.arrangement import with_spacings
 
         dataset = with_spacings(dataset, split_assignments(arguments.spacing, source, "--spacing"), source)
