@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import shutil
+from base64 import b64encode
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import matplotlib
 import numpy as np
@@ -50,28 +54,78 @@ def encoder() -> str | None:
         return None
 
 
+@dataclass(frozen=True)
+class Animation:
+    """A moving picture: notebooks show it, and `save` writes it.
+
+    Attributes
+    ----------
+    figure : Figure
+        With the first picture.
+    draw : callable
+        Puts the picture of a number into the figure, and returns what has changed.
+    frames : int
+        Number of pictures.
+    """
+
+    figure: Figure
+    draw: Callable[[int], tuple]
+    frames: int
+
+    def save(self, out: str | Path) -> Path:
+        """Write it, with a name in .gif, or in .mp4 where there is ffmpeg; its folder is made if needed.
+
+        Raises
+        ------
+        InputError
+            The suffix names no moving picture, there is no ffmpeg for .mp4, or the system refuses.
+        """
+        out = Path(out)
+        check_animation(out)
+        moving = FuncAnimation(self.figure, self.draw, frames=self.frames, blit=False)
+        writer = PillowWriter(RATE) if out.suffix.lower() == ".gif" else FFMpegWriter(RATE)
+        settings = {**STYLE, "animation.ffmpeg_path": encoder() or "ffmpeg"}
+        with matplotlib.rc_context(settings), written_aside(out, parents=True) as aside:
+            named = aside.with_name(f"{aside.name}{out.suffix.lower()}")  # the writer goes by the suffix
+            try:
+                moving.save(named, writer=writer, dpi=100)
+                named.replace(aside)
+            finally:
+                named.unlink(missing_ok=True)
+        return out
+
+    def _repr_html_(self) -> str:
+        with TemporaryDirectory() as folder:
+            picture = b64encode(self.save(Path(folder) / "belt.gif").read_bytes()).decode()
+        return f'<img alt="the vibrating belt" src="data:image/gif;base64,{picture}">'
+
+
 def draw_animation(history: xr.Dataset, out: Path, source: str = "history") -> Path:
-    """Write the belt in the last periods of a run as a moving picture.
+    """Write the moving picture of `animation`, with its errors, as `Animation.save` does."""
+    check_animation(Path(out))
+    return animation(history, source).save(out)
+
+
+def animation(history: xr.Dataset, source: str = "history") -> Animation:
+    """Compose a moving picture of the belt in the last periods of a run, magnified.
 
     Parameters
     ----------
     history : Dataset
         Of a run of a variator or of a belt drive, as `simulate` returns it: `displacement` [m] over `time`
         and `probe`, with `probe_position` [m].
-    out : Path
-        A name in .gif, or in .mp4 where there is ffmpeg; its folder is made if needed.
     source : str
         Where the history is from, for the errors.
 
     Raises
     ------
     InputError
-        The history is none of a variator or belt drive, the suffix names no moving picture, there is no
-        ffmpeg for .mp4, or the system refuses.
+        The history is none of a variator or belt drive.
     """
-    out = Path(out)
-    check_animation(out)
     drive = _geometry(history, source)
+    # probes of the motion out of the plane lie behind those in it, at the same places
+    _, in_plane = np.unique(history["probe_position"].values, return_index=True)
+    history = history.isel(probe=np.sort(in_plane))
     time, motion, period = _last_periods(history)
     size = float(np.abs(motion).max())
     factor = LARGEST * drive.size / size if size else 0.0
@@ -80,7 +134,7 @@ def draw_animation(history: xr.Dataset, out: Path, source: str = "history") -> P
     rest, angle, _ = points_at(drive.path, places)
     normal = np.stack([np.sin(angle), -np.cos(angle)], 1)  # outwards
     shapes = _along_belt(history, motion, places, length)
-    with matplotlib.rc_context({**STYLE, "animation.ffmpeg_path": encoder() or "ffmpeg"}):
+    with matplotlib.rc_context(STYLE):
         figure = Figure((6.4, 3.9), layout="constrained")
         axes = figure.subplots()
         draw_pulleys(axes, drive)
@@ -107,16 +161,7 @@ def draw_animation(history: xr.Dataset, out: Path, source: str = "history") -> P
             clock.set_text(f"{1e3 * (time[frame] - time[0]):.2f} ms")
             return belt, clock
 
-        moving = FuncAnimation(figure, draw, frames=len(time), blit=False)
-        writer = PillowWriter(RATE) if out.suffix.lower() == ".gif" else FFMpegWriter(RATE)
-        with written_aside(out, parents=True) as aside:
-            named = aside.with_name(f"{aside.name}{out.suffix.lower()}")  # the writer goes by the suffix
-            try:
-                moving.save(named, writer=writer, dpi=100)
-                named.replace(aside)
-            finally:
-                named.unlink(missing_ok=True)
-    return out
+        return Animation(figure, draw, len(time))
 
 
 def _draw_scale(axes: Axes, size: float, factor: float) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from cvt_hpc.analysis.curves import (
     MARKS,
     check_quantities,
     common_words,
+    curve_figure,
     job_of,
     mark_above,
     panels_of,
@@ -29,7 +29,7 @@ from cvt_hpc.analysis.curves import (
     with_margins,
 )
 from cvt_hpc.analysis.error_axes import COLOURS
-from cvt_hpc.analysis.figures import WIDTH, draw, in_words, styled
+from cvt_hpc.analysis.figures import WIDTH, in_words, styled
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variables import Status
 
@@ -39,16 +39,17 @@ FRAME = 1.0  # [inch]: what title and labels take
 INK = "#333333"  # of styles in the legend, which colours do not tell
 
 
-def draw_curve_panels(
+def curves_figure(
     dataset: xr.Dataset,
-    groups: Sequence[Sequence[str]],
-    lines: str,
-    out: Path,
+    quantities: Sequence[str],
     at: Mapping[str, Any] | None = None,
     source: str = "results",
-) -> Path:
-    """Write the figure of `curve_panels_figure`."""
-    return draw(lambda: curve_panels_figure(dataset, groups, lines, at, source), out)
+    lines: str | None = None,
+) -> Figure:
+    """Draw as `curve_figure`, or with `lines` as `curve_panels_figure`, A+B in one panel."""
+    if lines is None:
+        return curve_figure(dataset, quantities, at, source)
+    return curve_panels_figure(dataset, [name.split("+") for name in quantities], lines, at, source)
 
 
 @styled

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
-from pathlib import Path
 from textwrap import fill
 from typing import Any
 
@@ -17,7 +16,7 @@ from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, val
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.error_axes import COLOURS, MARKERS
-from cvt_hpc.analysis.figures import WIDTH, draw, in_words, legend_columns, styled
+from cvt_hpc.analysis.figures import WIDTH, in_words, legend_columns, styled
 from cvt_hpc.errors import mismatch, one_line, unknown
 from cvt_hpc.variables import Status
 
@@ -26,17 +25,6 @@ MOST_PANELS = 3  # side by side
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 BESIDE = ("-", "--", ":", "-.")
 MARKS = tuple(mark for mark in MARKERS if mark not in {STYLES[kind].mark for kind in WITHOUT_RESULT})
-
-
-def draw_curve(
-    dataset: xr.Dataset,
-    quantities: Sequence[str],
-    out: Path,
-    at: Mapping[str, Any] | None = None,
-    source: str = "results",
-) -> Path:
-    """Write the figure of `curve_figure`."""
-    return draw(lambda: curve_figure(dataset, quantities, at, source), out)
 
 
 @styled

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.figures import WIDTH, balanced, draw, in_words, styled
+from cvt_hpc.analysis.figures import WIDTH, balanced, in_words, styled
 from cvt_hpc.analysis.profiles import ARC, regions, shown_unit
 from cvt_hpc.analysis.telling_apart import check_holds, on_axes, titles
 
@@ -68,11 +67,6 @@ def alone(history: xr.Dataset, end: End) -> tuple[str, float]:
     least = TOUCHES * np.nanmax(np.where(near, forces, 0.0))
     begins = [float(far[near & (force > least)].min(initial=AROUND)) for force in forces]
     return SIDES[int(np.argmin(begins))], abs(begins[0] - begins[1])
-
-
-def draw_flanks(history: xr.Dataset, out: Path, source: str = "history") -> Path:
-    """Write the figure of `flanks_figure`."""
-    return draw(lambda: flanks_figure(history, source), out)
 
 
 @styled

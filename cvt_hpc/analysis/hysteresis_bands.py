@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,6 @@ from cvt_hpc.analysis.figures import (
     axis_label,
     balanced,
     coordinate_unit,
-    draw,
     in_words,
     legend_columns,
     styled,
@@ -193,13 +191,6 @@ def draw_bands(axes: Axes, y: Ruler, ranges: NDArray[np.float64]) -> list[Any]:
         if np.isfinite(limits).any():
             handles.append(Line2D([], [], **line, label=f"vibration begins and ends, ramp {name}"))
     return handles
-
-
-def draw_hysteresis(
-    dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None, source: str = "results"
-) -> Path:
-    """Write the figure of `hysteresis_figure`."""
-    return draw(lambda: hysteresis_figure(dataset, at, source), out)
 
 
 @styled

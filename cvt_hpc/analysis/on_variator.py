@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from cvt_hpc.analysis.cells import colours_of
-from cvt_hpc.analysis.figures import WIDTH, axis_label, balanced, draw, styled
+from cvt_hpc.analysis.figures import WIDTH, axis_label, balanced, styled
 from cvt_hpc.analysis.history_panels import FEEDS
 from cvt_hpc.analysis.power_balance import balance_of, draw_balance
 from cvt_hpc.analysis.profiles import regions, shown_unit
@@ -89,13 +88,6 @@ def draw_pulleys(axes: Axes, drive: Drive) -> None:
         inwards = INSIDE * path.radius.min() * np.array([-np.sin(angle[0]), np.cos(angle[0])])
         axes.text(*(1e3 * (place[0] + inwards)), name, ha="center", va="center", fontsize=9)
     axes.set(aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
-
-
-def draw_variator(
-    history: xr.Dataset, out: Path, quantities: Sequence[str] = (), source: str = "history"
-) -> Path:
-    """Write the figure of `variator_figure`."""
-    return draw(lambda: variator_figure(history, quantities, source), out)
 
 
 @styled
@@ -186,11 +178,6 @@ def region_powers(history: xr.Dataset) -> xr.DataArray:
     powers = [[cell * float(history[c].values[region == name].sum()) for name in names] for c in causes]
     shape = np.reshape(powers, (len(causes), len(names)))
     return xr.DataArray(shape, {"cause": causes, "region": names}, ("cause", "region"), attrs={"units": "W"})
-
-
-def draw_energy(history: xr.Dataset, out: Path, source: str = "history") -> Path:
-    """Write the figure of `energy_figure`."""
-    return draw(lambda: energy_figure(history, source), out)
 
 
 @styled
