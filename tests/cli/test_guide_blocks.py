@@ -48,7 +48,7 @@ CHECKED_MODELS = {"beam_pushbelt"}
 SMALL = {"duration": 0.04, "longest_duration": 0.04, "rise_time": 0.01}
 SHORT = {"duration": 0.022, "longest_duration": 0.022, "rise_time": 0.008, "band_low": 500.0}
 SMALL_OF = {
-    "belt_drive": {"duration": 0.26, "longest_duration": 0.26, "elements": 96},
+    "belt_drive": {"duration": 0.26, "longest_duration": 0.26, "elements": 104},
     "explicit": SHORT,
     "pushbelt": SHORT | {"elements": 104, "band_high": 600.0},
     "quasi_static_belt": SHORT,
@@ -60,11 +60,13 @@ RAMPS = """
 name = "ramps"
 model = "elastic_belt"
 [axes]
-load = ["20 N m", "200 N m"]
-[linked.load]
-load_start = ["200 N m", "20 N m"]
+load_start = ["20 N m", "200 N m"]
+[linked.load_start]
+load = ["200 N m", "20 N m"]
 [scene]
 load_history = "ramp"
+[mesh]
+stations = 64
 [record]
 history = [0, 1]
 """
@@ -82,7 +84,7 @@ BEFORE = {
         cvt-hpc init JOB
         cvt-hpc run jobs/lebrecht_2004.toml --set name=other --set stations=96
         cvt-hpc run jobs/quickstart.toml --set name=speeds --set 'driving_speed=["2000 rpm", "3000 rpm"]'
-        cvt-hpc run jobs/ramps.toml --set duration=0.15 --set longest_duration=0.15
+        cvt-hpc run jobs/ramps.toml --set duration=0.6 --set longest_duration=0.6
         cvt-hpc run jobs/belt_drive_spectra.toml
         cvt-hpc simulate jobs/lebrecht_2004.toml --at load=120 --out run.nc
         cvt-hpc simulate jobs/misalignment.toml --at load=60 --out push.nc
@@ -103,7 +105,7 @@ class Reader:
         A folder for the studies that others take over.
     """
 
-    done: ClassVar[dict] = {}  # folder in the store by the words of a command
+    done: ClassVar[dict] = {}  # folder in the store, by job and words of a command
 
     def __init__(self, page, store):
         self.page, self.store = page, store
@@ -130,21 +132,19 @@ class Reader:
             raise AssertionError(f"nobody does a block of kind {block.kind!r}")
 
     def call(self, words):
+        """Do a command, given by its words."""
         while "=" in words[0]:  # variables of the environment
             words = words[1:]
         if words[:2] == ["mpirun", "-n"]:  # tests/sweep has the same under mpirun
             words = words[3:]
         if words[0] == "cvt-hpc":
-            assert self._main(_smaller(words[1:])) == 0
+            assert self._main(_smaller(words[1:], self.page)) == 0
         elif words[:2] == ["python", "jobs/tabulate.py"]:
             sys.argv = words[1:]
             runpy.run_path(words[1], run_name="__main__")
         else:
             command = " ".join(words)
-            assert any(
-                command == known or command.startswith(f"{known} ") or command.startswith(f"{known}/")
-                for known in ELSEWHERE
-            ), command
+            assert any(f"{command} ".startswith((f"{known} ", f"{known}/")) for known in ELSEWHERE), command
             for word in words[1:]:
                 if word.startswith(("jobs/", "slurm/", "tests/")):
                     assert (ROOT / word).exists(), word
@@ -153,15 +153,14 @@ class Reader:
         """Exit status of the command; runs that another page has had done already are taken over."""
         if words[0] != "run":
             return main(words)
-        before = set(Path("out").glob("*"))
-        if tuple(words) in self.done:
-            shutil.copytree(self.done[tuple(words)], "out", dirs_exist_ok=True)
+        before, study = set(Path("out").glob("*")), (Path(words[1]).read_text(), *words)
+        if study in self.done:
+            shutil.copytree(self.done[study], "out", dirs_exist_ok=True)
         status = main(words)
-        if new := set(Path("out").glob("*")) - before:
-            kept = self.store / str(len(self.done))
+        if study not in self.done and (new := set(Path("out").glob("*")) - before):
+            self.done[study] = self.store / str(len(self.done))
             for folder in new:
-                shutil.copytree(folder, kept / folder.name)
-            self.done.setdefault(tuple(words), kept)
+                shutil.copytree(folder, self.done[study] / folder.name)
         return status
 
     def _check_job(self, text):
@@ -175,35 +174,41 @@ class Reader:
         assert main(["check", "block.toml"]) == 0
 
 
-def _smaller(words):
+def _smaller(words, page):
     """The command with fewer and shorter runs."""
     command = words[0]
-    if command not in {"run", "simulate", *CHECKED_ONLY}:
-        return words
+    if command not in {"run", "simulate", *CHECKED_ONLY} or words[1].startswith("jobs/figures/"):
+        return words  # figures take half a second each
     given = [words[i + 1] for i, word in enumerate(words) if word == "--set"]
     settings = [word for text in given for word in ("--set", text)]
     if command in CHECKED_ONLY:
         return ["check", words[1], "--for", command, *settings]
     job = build_job(read_document(Path(words[1])), words[1], given)
-    if job.model in CHECKED_MODELS:
-        return ["check", words[1], *settings]
+    if job.model in CHECKED_MODELS or job.parameters.get("profile_time"):
+        return ["check", words[1], *settings]  # a course of time cannot be cut short
     changed = SMALL | SMALL_OF.get(job.model, {}) | SMALL_OF.get(job.stepper, {})
     changed = {key: value for key, value in changed.items() if key in job.parameters}
-    if course := job.parameters.get("profile_time"):  # its end, with a judged half behind it
-        changed["duration"] = changed["longest_duration"] = 2.1 * course[-1]
-    for axis in job.axes if job.design.get("kind") != "listed" else ():
-        kept = [axis.values[0], *(value for value in _named(axis.name, job) if value in axis.values)]
-        if axis is job.axes[-1]:
-            kept.append(axis.values[-1])
-        changed[axis.name] = list(dict.fromkeys(kept))
+    longest = max(job.axes, key=lambda axis: len(axis.values), default=None)
+    for axis in job.axes:
+        first, last = axis.values[0], axis.values[-1]
+        kept = [value for value in _named(axis.name, page, job) if value in axis.values] or [first]
+        if axis is longest and "first_spacing" in job.design:  # it is traced along this one
+            kept = axis.values
+        elif "runs" in job.design:
+            kept = [first, last]
+        elif axis is job.axes[-1] and last not in kept:
+            kept.append(last)
+        changed[axis.name] = list(kept)
+    if "runs" in job.design:
+        changed["design.runs"] = 2
     mentioned = {text.partition("=")[0] for text in given}
     more = [f"{key}={value!r}" for key, value in changed.items() if key not in mentioned]
     return [*words, *(word for text in more for word in ("--set", text))]
 
 
-def _named(key, job):
-    """Values of an axis that commands of some page name [SI]."""
-    named = re.findall(rf'--at "?({key}=[^\s"]+(?: \w+")?)', "".join(page.read_text() for page in PAGES))
+def _named(key, page, job):
+    """Values of an axis that commands of the page name [SI]."""
+    named = re.findall(rf'--at "?({key}=[^\s"]+(?: \w+")?)', page.read_text())
     return [read_assignments([text.strip('"')], job.schema, "", "--at")[key] for text in dict.fromkeys(named)]
 
 
