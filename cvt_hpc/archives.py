@@ -1,7 +1,7 @@
 """Parts of a long work that are done, each kept in an archive of its own until all are.
 
-An archive holds arrays, and a head in JSON types: of which job the part is, by what it was computed, and what
-is no array. It may come from somebody else: nothing in it is executed, and what cannot be read is damage.
+An archive holds arrays, and a head in JSON types: the job of the part, its origin, and all values that are
+no arrays. It may come from somebody else: nothing in it is executed, and unreadable content is damage.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cvt_hpc.files import StorageError, kind_of, read_regular, written_aside
 from cvt_hpc.provenance import git_revision, machine, versions
 
 _SUFFIX = ".npz"
-# what an archive raises depends on the byte that is damaged
+# the exception from an archive depends on the damaged byte
 _DAMAGE = (
     *(ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError),
     *(struct.error, SyntaxError, TypeError, ValueError, zipfile.BadZipFile, zlib.error),
@@ -44,7 +44,7 @@ class Archives:
     fingerprint : str
         Of the job.
     limit : int
-        Of an archive, and of what it holds unpacked [bytes].
+        Of an archive, and of its unpacked content [bytes].
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Archives:
         return [*self.folder.glob(f"*{_SUFFIX}"), *self.folder.glob(f".*{_SUFFIX}.*.part")]
 
     def fingerprints(self) -> set[str]:
-        """Return of which jobs there are sound archives."""
+        """Return the jobs that have sound archives."""
         found = set()
         for path in self.written():
             try:
@@ -94,13 +94,13 @@ class Archives:
         name : str
             Of the part.
         unpack : callable
-            Makes the part of what `save` was given; it raises what it will of the usual errors, such as
+            Makes the part from the input of `save`; it raises any of the usual errors, such as
             ValueError and KeyError, where that is none.
 
         Returns
         -------
         object or None
-            None if nothing is kept, or nothing that can be read: that is told.
+            None if nothing is kept or readable; unreadable archives are logged.
 
         Raises
         ------
@@ -130,7 +130,7 @@ class Archives:
         return part
 
     def save(self, name: str, plain: Any, arrays: Arrays) -> None:
-        """Keep a part: what is plain in JSON types, and its arrays."""
+        """Keep a part: its values of JSON types, and its arrays."""
         head = json.dumps({"plain": plain, "fingerprint": self._fingerprint, "maker": self._maker})
         named: dict[str, Any] = {f"values {key}": array for key, array in arrays.items()}
         with written_aside(self._path(name)) as aside, aside.open("wb") as file:

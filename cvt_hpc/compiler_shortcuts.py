@@ -3,8 +3,8 @@
 Each shortcut takes the place of a function of numba for as long as a kernel is compiled, and calls it where
 that has something to do. They are in force for the whole process: threads must not compile at the same time.
 
-Kernels are long, as others are merged into them: what the compiler does for each statement and each variable
-takes longer than the rest.
+Kernels are long, as others are merged into them: the work of the compiler for each statement and each
+variable takes longer than the rest.
 
 `typeof` is no such replacement: it finds the types of a call's arguments.
 """
@@ -51,7 +51,7 @@ _types_of_likes: dict[Any, types.Type] = {}
 
 
 def typeof(value: Any) -> types.Type:
-    """Return what `numba.typeof` does, for tuples of arrays in a tenth of the time.
+    """Return the result of `numba.typeof`, for tuples of arrays in a tenth of the time.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def typeof(value: Any) -> types.Type:
 
 
 def _like(value: Any) -> Any:
-    """What values of one type have in common, and those of no other type."""
+    """Properties that all values of one type have in common, and no values of another type."""
     kind = type(value)
     if kind is np.ndarray:
         return value.dtype, value.ndim, value.flags.num
@@ -92,7 +92,7 @@ def _call_type(function: types.Function, typing: Any, arguments: Any, named: Any
 
 
 def _no_timer(kind: str, callback: Callable[[float], None]) -> AbstractContextManager[None]:
-    """Nothing in the place of a clock; each kernel has two, which those that it calls keep starting."""
+    """An empty replacement of a clock; each kernel has two, which its calls to kernels keep starting."""
     return nullcontext()
 
 
@@ -101,7 +101,7 @@ _declared: WeakKeyDictionary[BaseContext, list[int]] = WeakKeyDictionary()
 
 
 def _refresh_if_declared(context: BaseContext) -> None:
-    """Look for new declarations, if there are any; asked for at every other call in a kernel."""
+    """Look for new declarations, if there are any; called at every other call in a kernel."""
     if _declared.get(context) != _counts(context):
         _refresh(context)
         _declared[context] = _counts(context)
@@ -120,7 +120,7 @@ _merged: dict[Callable[..., Any], Any] = {}
 def _run_untyped_passes_once(
     worker: InlineWorker, function: Callable[..., Any], enable_ssa: bool = False
 ) -> Any:
-    """What comes of a kernel before types are known, which each kernel that it is merged into copies."""
+    """The result of compiling a kernel before types are known; copied into each kernel that calls it."""
     if enable_ssa:
         return _run_untyped_passes(worker, function, enable_ssa)
     if function not in _merged:
@@ -134,7 +134,7 @@ _names_in: WeakKeyDictionary[ir.Block, frozenset[str]] = WeakKeyDictionary()
 
 
 def _run_block_rewrite_where_named(blocks: dict[int, ir.Block], states: dict, handler: Any) -> dict:
-    """Rewrite those blocks in which a variable that is assigned several times is found at all."""
+    """Rewrite only the blocks that have a variable which is assigned several times."""
     named = {label: block for label, block in blocks.items() if states["varname"] in _names(block)}
     if not named:
         return dict(blocks)

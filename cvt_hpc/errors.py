@@ -26,7 +26,7 @@ class InputError(ValueError):
 
 
 class JobWarning(UserWarning):
-    """What a job says may not be what is meant. The command line prints it on stderr."""
+    """A value of a job that may not be intended. The command line prints it on stderr."""
 
 
 class UnitWarning(JobWarning):
@@ -34,16 +34,16 @@ class UnitWarning(JobWarning):
 
 
 def mismatch(where: str, expected: str, found: str, then: str = "") -> InputError:
-    """Return the error for a value that is not what was expected.
+    """Return the error for a value that differs from the expected one.
 
     Parameters
     ----------
     where : str
         File and key, e.g. "jobs/x.toml: [scene] thrust".
     expected, found : str
-        What should stand there, and what stands there.
+        The expected content, and the content that was found.
     then : str
-        What to do next, such as a command, where the place does not say it.
+        The next action, such as a command, where the place does not state it.
 
     Returns
     -------
@@ -61,13 +61,13 @@ def unknown(where: str, what: str, word: str, known: Iterable[str], then: str = 
     where : str
         File and key.
     what : str
-        What the name should have been, e.g. "key" or "model".
+        The kind of name that was expected, e.g. "key" or "model".
     word : str
         The name that was found.
     known : iterable of str
         The names that exist.
     then : str
-        What to do next, such as a command, where no known name is near.
+        The next action, such as a command, where no known name is near.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def show(value: Any) -> str:
 
 
 def one_line(text: str) -> str:
-    """Return a text as a line for a terminal: what does not print is escaped, a very long line cut.
+    """Return a text as a line for a terminal: characters that do not print are escaped, a long line is cut.
 
     Names, keys and descriptions of files may hold anything: line ends, escape sequences, bytes that are no
     text.

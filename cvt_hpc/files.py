@@ -1,6 +1,6 @@
-"""Files that are there whole or not at all, never written through a link, and one error for what goes wrong.
+"""Files that are written whole or not at all, never through a link, and one error for all failures.
 
-A folder may come from somebody else. What is opened in it by a fixed name has to be a regular file: a link
+A folder may come from somebody else. A file that is opened in it by a fixed name has to be regular: a link
 would lead elsewhere, and a pipe or a device may never answer.
 """
 
@@ -41,7 +41,7 @@ def storage_error(path: Path, error: Exception, advice: str = "") -> StorageErro
 
 
 def _reason(error: Exception) -> str:
-    """Return what the system says, without what HDF5 makes of it."""
+    """Return the system's message, without the text that HDF5 adds."""
     text = getattr(error, "strerror", None) or str(error)
     if isinstance(error, OSError) and error.errno and "errno = " in text:
         return os.strerror(error.errno)
@@ -50,7 +50,7 @@ def _reason(error: Exception) -> str:
 
 @contextlib.contextmanager
 def naming_refusals(path: Path, expected: str) -> Iterator[None]:
-    """Turn what the system refuses within a `with` into an error that says what was expected of `path`."""
+    """Turn a refusal of the system within a `with` into an error that states what was expected of `path`."""
     try:
         yield
     except OSError as error:
@@ -60,7 +60,7 @@ def naming_refusals(path: Path, expected: str) -> Iterator[None]:
 
 
 def kind_of(path: Path) -> str | None:
-    """Return what stands at a path, such as "a file" or "a link", without following it; None for nothing."""
+    """Return the kind of object at a path, such as "a file" or "a link", without following it, or None."""
     try:
         return _kind(os.lstat(path).st_mode)
     except (FileNotFoundError, NotADirectoryError):
@@ -88,7 +88,7 @@ def open_regular(path: Path, flags: int = os.O_RDONLY) -> int:
     OSError
         If something else stands there, or the system refuses. Nothing is waited for.
     """
-    # Before it is opened, since that alone may move a device; and after, for what was put there meanwhile.
+    # Before it is opened, since that alone may move a device; and after, for an object put there meanwhile.
     if (found := kind_of(path)) not in (None, "a file"):
         raise OSError(errno.EINVAL, f"{found} in the place of a file")
     descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
@@ -131,7 +131,7 @@ def make_own_folder(path: Path) -> None:
 
 
 def remove_own(path: Path) -> None:
-    """Remove a file or a link, not what it leads to, or an empty folder; OSError if the system refuses."""
+    """Remove a file or a link (not its target), or an empty folder; OSError if the system refuses."""
     if kind_of(path) == "a folder":
         path.rmdir()
     else:
@@ -151,21 +151,21 @@ def try_to_write(folder: Path) -> None:
 
 @contextlib.contextmanager
 def written_aside(path: Path, *, parents: bool = False, advice: str = "") -> Iterator[Path]:
-    """Give a path beside `path` to write to, and put what stands there in the end in its place in one step.
+    """Give a path beside `path` to write to; at the end the new file replaces the old one in one step.
 
     Parameters
     ----------
     path : Path
-        The file to be written or replaced; a link is replaced, and what it leads to is left alone.
+        The file to be written or replaced; a link is replaced, and its target is left alone.
     parents : bool
         Whether to make its folder, where there is none.
     advice : str
-        What a user should know if the system refuses.
+        Advice for the user if the system refuses.
 
     Raises
     ------
     StorageError
-        If the system refuses; what stood at `path` is then untouched.
+        If the system refuses; the object at `path` is then untouched.
     """
     # A name that nobody can guess, and a file that is new: `OutputFolder.leftovers` knows such names.
     aside = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
@@ -203,9 +203,9 @@ def _kind(mode: int) -> str:
 
 
 def _refusal(aside: Path, error: Exception) -> Exception:
-    """Return why a file could not be written: libraries for netCDF do not always pass on what they were told.
+    """Return why a file could not be written: libraries for netCDF do not always pass on the system's reason.
 
-    The system is asked once more, by a write of some size to what there is of the file.
+    The system is asked once more, by writing some bytes to the part of the file that exists.
     """
     if getattr(error, "errno", None):
         return error

@@ -1,20 +1,20 @@
-"""How the kernels are compiled, and where the machine code is kept: one way for all.
+"""Compilation of the kernels, and storage of their machine code.
 
 Compiling takes minutes, so machine code is kept, in a folder for each module with kernels. A folder is named
-by the module and by the content of what its code depends on: the module, all modules of the package that it
-imports, theirs in turn, this one and `lanes`, whose types any kernel may be called with. So code is found
-again whatever the dates of files are, and a change compiles only the kernels again that it may concern.
-A folder that no process has asked for in a month goes when another is made.
+by the module and by the content of all code that it depends on: the module, all modules of the package that
+it imports, theirs in turn, this one and `lanes`, whose types any kernel may be called with. So code is found
+again whatever the dates of files are, and a change compiles only the kernels again that it may concern. A
+folder that no process has used for a month is removed when another is made.
 
 A kernel may be handed to another as an argument, as a right-hand side to a stepper, whose machine code then
-holds that of the kernel. The compiler tells kernels apart by an identity drawn at random, so that it would
+holds that of the kernel. The compiler identifies kernels by an identity drawn at random, so that it would
 never find such code again: here it is the name, and the content that names the kernel's own folder. The
 compiler cannot read an index that names a type of a script that is not at hand: here it skips that entry.
 
 A kernel that only other kernels call gets no entry from Python, which for tuples of arrays takes long to
 compile, and no machine code: each caller takes in its LLVM code and optimises it with its own. That holds for
-all functions that kernels call, also those of numpy. A kernel that is called with lanes does not count who
-uses an array: it makes none, and the arrays that it is given outlast it.
+all functions that kernels call, also those of numpy. A kernel that is called with lanes does not count the
+users of an array: it makes none, and the arrays that it is given outlast it.
 
 Of processes that need the same code at a time one compiles it, and the others wait for it.
 
@@ -22,7 +22,7 @@ The folders lie below NUMBA_CACHE_DIR if that is set; else in the package where 
 the user's cache. Whoever can write to them can run any code as the user, so folders to which others can write
 are not used: without any, code is compiled in each process anew.
 
-What takes long is told to the logger of this module: compiling as INFO, and that nothing is kept as WARNING.
+Slow steps are logged by the logger of this module: compiling as INFO, missing storage as WARNING.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ _PREFIX = f"{_PACKAGE}{os.sep}"  # of the paths of its modules, as texts, since 
 _CODE_OF_ALL = (__file__, f"{_PREFIX}lanes{os.sep}__init__.py")
 _FOLDER = "cvt_hpc-kernels"
 _MONTH = 30 * 86400.0  # [s]: longer than any job lasts, so that none loses the folder it works in
-_LONG = 3.0  # [s]: what compiles faster is not worth a line
+_LONG = 3.0  # [s]: faster compiling is not logged
 _PATIENCE = 600.0  # [s] with a process that compiles the same; any kernel takes less, on a busy machine too
 
 # Division by zero gives inf as in numpy, without a test for it. Every operation is rounded once, as written:
@@ -79,7 +79,7 @@ _logger = logging.getLogger(__name__)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function when it is first called; one that takes lanes can neither make nor return arrays."""
+    """Compile a function at its first call; with lanes it can neither make nor return arrays."""
     return _compiled(function, _OPTIONS)
 
 
@@ -111,12 +111,12 @@ def called_alike(compiled: Any) -> Callable[..., Any]:
 
 
 class _Library(JITCodeLibrary):
-    """The LLVM code of a function; optimised and made machine code once an address in it is asked for."""
+    """The LLVM code of a function; optimised and compiled once an address in it is needed."""
 
     _is_native = False
 
     def _optimize_final_module(self) -> None:
-        """Nothing yet: callers optimise what they take in."""
+        """Nothing yet: callers optimise the code that they include."""
 
     def _finalize_final_module(self) -> None:
         if self._object_caching_enabled and self._compiled_object:  # found on the disk
@@ -131,7 +131,7 @@ class _Library(JITCodeLibrary):
             super()._optimize_final_module()
             self._final_module.verify()
             self._make_native()
-            self._shared_module = None  # callers take in what is optimised
+            self._shared_module = None  # callers include optimised code
         return super().get_pointer_to_function(name)
 
     def _make_native(self) -> None:
@@ -146,7 +146,7 @@ class _Library(JITCodeLibrary):
 
     @property
     def codegen(self) -> Any:
-        """What the compiler has set the function's environment, at its address if it has one."""
+        """The function's environment as set by the compiler, at its address if it has one."""
         return self._codegen if self._is_native else _WITHOUT_ADDRESS
 
     def serialize_using_object_code(self) -> tuple:
@@ -161,14 +161,14 @@ class _Kernel(CPUDispatcher):
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
         super().__init__(*arguments, **named)
-        # of what is being compiled: whether another kernel calls it, whether with lanes
+        # of the kernel being compiled: whether another kernel calls it, whether with lanes
         self._for_kernel = self._takes_lanes = False
         self._without_entry: set[tuple] = set()  # types of arguments
         self._claims = ExitStack()
         self._compiler._customize_flags = self._customized
 
     def typeof_pyval(self, val: Any) -> Any:
-        """Return the type of an argument that the compiler's own code does not tell, as of a named tuple."""
+        """Return the type of an argument that the compiler does not determine, as of a named tuple."""
         try:
             found = typeof(val)
         except (errors.NumbaValueError, ValueError):
@@ -234,7 +234,7 @@ def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     name = f"{function.__module__}.{function.__qualname__}"
     try:
         content = _content(os.path.abspath(function.__code__.co_filename))
-    except (OSError, SyntaxError):  # typed into a shell: what it depends on is not known, and nothing is kept
+    except (OSError, SyntaxError):  # typed into a shell: its dependencies are not known, and nothing is kept
         code = function.__code__
         content = _digest(repr((code.co_code, code.co_consts, code.co_names)).encode())
     else:
@@ -244,11 +244,11 @@ def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     return compiled
 
 
-# What the code of a kernel depends on
+# Dependencies of the code of a kernel
 
 
 def closure(source: str) -> set[str]:
-    """Return the files whose content the machine code of a module's kernels depends on.
+    """Return the files whose content determines the machine code of a module's kernels.
 
     Parameters
     ----------
@@ -281,7 +281,7 @@ def _content(source: str) -> str:
 
 @cache
 def _content_of(source: str, *_: int) -> str:
-    # paths within the package are told as they are there, wherever that is
+    # paths within the package are relative to it, wherever it lies
     listed = sorted((path.removeprefix(_PREFIX), _source(path).digest) for path in closure(source))
     return _digest(repr(listed).encode())
 
@@ -296,7 +296,7 @@ def _source(path: str) -> _Source:
 
 
 def _stamp(path: str) -> tuple[int, int]:
-    """What tells that a file was changed before it is imported again, as in a notebook."""
+    """Time and size of a file, which show that it was changed and is imported again, as in a notebook."""
     found = os.stat(path)
     return found.st_mtime_ns, found.st_size
 
@@ -325,7 +325,7 @@ def _package_of(path: str) -> list[str]:
 
 @cache
 def _paths(name: str) -> frozenset[str]:
-    """What an import of a name runs within the package: a module, and the __init__ of all packages above."""
+    """The modules of the package that an import runs: a module, and the __init__ of all packages above."""
     above, _, last = name.rpartition(".")
     if not above:
         return frozenset([f"{_PREFIX}__init__.py"] if last == _PACKAGE.name else [])
@@ -339,7 +339,7 @@ _STATEMENT = re.compile(r"\n[ \t]*((?:from[ \t]+[\w.]+[ \t]+)?import\b[^()\n]*(?
 
 
 def _import_statements(text: str) -> list[ast.Import | ast.ImportFrom]:
-    """The import statements of a source, at whatever depth, but for those that only a type checker reads.
+    """The import statements of a source, at any depth, except those that only a type checker reads.
 
     To parse whole files would take a tenth of a second for all. So statements are cut out beforehand, if no
     import can be missed.
@@ -393,7 +393,7 @@ def _made_safe(folder: Path) -> Path:
     folder.parent.mkdir(mode=0o755, parents=True, exist_ok=True)
     with suppress(FileExistsError):
         folder.mkdir(mode=0o700)
-    # a link is not followed: where it leads, another may have said
+    # a link is not followed: its target may be controlled by somebody else
     itself, above = folder.lstat(), folder.parent.stat()
     if not stat.S_ISDIR(itself.st_mode):
         raise PermissionError(f"{folder} is no folder")
@@ -417,13 +417,13 @@ def _asked_for(folder: Path) -> None:
 
 
 def _make(folder: Path) -> None:
-    """Make a folder for machine code; what nobody has asked for in a month goes."""
+    """Make a folder for machine code; folders that nobody has used for a month are removed."""
     if folder.is_dir():
         return
     folder.mkdir(mode=0o700, exist_ok=True)
     for other in folder.parent.iterdir():
         with suppress(OSError):
-            # not the file of claims: to open and close it would drop those of this process
+            # not the file of claims: opening and closing it would drop the claims of this process
             if other.is_dir() and time.time() - other.stat().st_mtime > _MONTH:
                 shutil.rmtree(other, ignore_errors=True)
 
@@ -432,7 +432,7 @@ _ADDRESS = re.compile(r"0x[0-9a-f]+")
 
 
 class _Cache(FunctionCache):
-    """The machine code of a kernel on the disk; without what the disk refuses."""
+    """The machine code of a kernel on the disk; refusals of the disk are ignored."""
 
     def __init__(self, compiled: _Kernel, folder: Path) -> None:
         _asked_for(folder)
@@ -467,7 +467,7 @@ class _Cache(FunctionCache):
 
 
 class _Filing(CompileResultCacheImpl):
-    """What is written of a kernel, and under which name."""
+    """The stored content of a kernel, and its name."""
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         self._lineno = function.__code__.co_firstlineno
@@ -476,7 +476,7 @@ class _Filing(CompileResultCacheImpl):
 
 
 class _Locator:
-    """What the compiler asks of where a kernel's code lies."""
+    """The interface by which the compiler finds where a kernel's code lies."""
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         self._py_file = function.__code__.co_filename
@@ -491,7 +491,7 @@ class _Locator:
 
 
 class _ForgivingIndex(IndexDataCacheFile):
-    """An index of machine code, entry by entry: what cannot be read is kept as it is and matches nothing."""
+    """An index of machine code, entry by entry: unreadable entries are kept as they are and match nothing."""
 
     def _load_index(self) -> dict:
         return {_entry(packed): name for packed, name in super()._load_index().items()}
@@ -515,7 +515,7 @@ def _entry(packed: bytes) -> Any:
 
 @cache
 def _claims_file() -> int:
-    """Descriptor of the file whose bytes stand for what processes claim; open as long as the process lives.
+    """Descriptor of the file whose bytes stand for claims of processes; open as long as the process lives.
 
     Raises
     ------
@@ -532,7 +532,7 @@ def _claims_file() -> int:
 def _claimed(what: str, name: str = "") -> Iterator[None]:
     """Wait until no other process claims the same, and claim it; a claim dies with its process.
 
-    After `_PATIENCE`, or where files cannot be locked, it goes on without: all that is lost then is time.
+    After `_PATIENCE`, or where files cannot be locked, it goes on without; only time is lost then.
     """
     place = int.from_bytes(hashlib.sha256(what.encode()).digest()[:7], "big")  # a byte; the file stays empty
     began, told = time.monotonic(), not name
@@ -562,7 +562,7 @@ def _locks(descriptor: int, place: int) -> bool:
     return True
 
 
-# What is told
+# Log messages
 
 
 @cache
@@ -575,7 +575,7 @@ def _tell_not_kept(why: str) -> None:
 
 
 class _Waiting(Listener):
-    """Tells that a kernel is being compiled, not loaded, once that takes long, and how long it took.
+    """Logs that a kernel is being compiled, not loaded, if that takes long, and the time it took.
 
     Meanwhile no garbage is collected: hardly any memory becomes free, and looking for it takes a tenth of
     the time.

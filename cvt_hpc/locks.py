@@ -1,4 +1,4 @@
-"""Who may be at work in an output folder at a time, by locks that die with the process that holds them."""
+"""Locks on an output folder, which end with the process that holds them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cvt_hpc.files import naming_refusals, open_regular
 
 # A start waits this long [s]: `is_locked` takes the lock for an instant to see whether a run is at work.
 _PATIENCE = 1.0
-_SILENCE = 2.0  # [s] of waiting, after which is said for whom
+_SILENCE = 2.0  # [s] of waiting, after which the owner is named
 _HOLDER = re.compile(r"process (\d{1,7}) on ([\w.-]{1,100}), at work since [\d :-]{19}\n", re.ASCII)
 _logger = logging.getLogger(__name__)
 
@@ -42,13 +42,13 @@ def locked(
     path : Path
         The lock file, made where missing; it stays behind, without meaning, when the lock is gone.
     what : str
-        What it stands for, for the error.
+        Purpose of the lock, for the error.
     shared : bool
-        Whether others may hold it as well, who share it too; for this process alone if not.
+        Whether other processes may share it; if not, it is for this process alone.
     patience : float
-        Time [s] to wait for those who hold it; whom, is logged as a warning once it takes longer.
+        Time [s] to wait for other holders. Their names are logged as a warning if the wait takes longer.
     interrupt : callable
-        Tells why the wait should end before its time, None if it should not.
+        Returns a reason to end the wait early, None to go on.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def _take(
     patience: float,
     interrupt: Callable[[], str | None],
 ) -> bool:
-    """Take the lock and leave word of who has it; return whether the file system has locks at all."""
+    """Take the lock and record its owner; return whether the file system has locks at all."""
     began = time.monotonic()
     told = False
     while True:

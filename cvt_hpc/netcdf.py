@@ -1,4 +1,4 @@
-"""Datasets as netCDF files with CF conventions: their attributes, how they are stored, and whose they are."""
+"""Datasets as netCDF files with CF conventions: their attributes, storage and origin."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ VOLATILE = "depends on the machine and the hour; not reproduced bitwise"
 
 
 class Named(Protocol):
-    """What a dataset is of: a job, a study or a chart."""
+    """The content of a dataset: a job, a study or a chart."""
 
     @property
     def name(self) -> str:
@@ -55,9 +55,9 @@ def global_attributes(
     job : mapping
         The whole resolved job, as JSON types.
     subject : str
-        What was computed, as the end of `source`: "model elastic_belt".
+        The computed object, as the end of `source`: "model elastic_belt".
     makers : sequence of mapping
-        `versions` and `git_revision` of all processes that have computed; those of this one by default.
+        `versions` and `git_revision` of all processes that have computed; by default of this process.
     earlier : sequence of str
         Lines of `history` that precede that of this process, oldest first.
 
@@ -88,13 +88,13 @@ def global_attributes(
 
 
 def attributes(long_name: str, units: str = "", comment: str = "") -> dict[str, Any]:
-    """Return the attributes of a variable; without those that are empty."""
+    """Return the attributes of a variable; without empty ones."""
     named = {"long_name": long_name, "units": units, "comment": comment}
     return {key: text for key, text in named.items() if text}
 
 
 def flag_attributes(kind: type[IntEnum], dtype: Any = np.int8) -> dict[str, Any]:
-    """Return the attributes that tell the meaning of a flag variable of type `dtype`."""
+    """Return the attributes that explain a flag variable of type `dtype`."""
     return {
         "flag_values": np.array([int(flag) for flag in kind], dtype),
         "flag_meanings": " ".join(flag.name.lower() for flag in kind),

@@ -1,8 +1,8 @@
-"""An output folder: whose it is, who is at work in it, and what of it may be removed.
+"""An output folder: its content, the process at work in it, and the files that may be removed from it.
 
-Studies, charts and bifurcation diagrams have one each, with a job file that vouches for all else. The folder
-may come from somebody else, damaged or made up: what is read is checked, and nothing is written or removed
-outside.
+Studies, charts and bifurcation diagrams have one each, with a job file against which all else is checked. The
+folder may come from somebody else, damaged or forged: everything read is checked, and nothing is written or
+removed outside.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ Content = TypeVar("Content")
 
 
 class DamagedJobError(InputError):
-    """The file that says whose an output folder is cannot be believed; what lies beside it may tell.
+    """The job file of an output folder is damaged; other files beside it may identify the content.
 
     Attributes
     ----------
     entry : dict
-        What could be read of it.
+        The entries that could be read.
     """
 
     def __init__(self, text: str, entry: dict[str, Any] | None = None) -> None:
@@ -55,12 +55,12 @@ class DamagedJobError(InputError):
 
 
 class Kind(NamedTuple):
-    """What tells one kind of output folder from another.
+    """The properties of one kind of output folder.
 
     Attributes
     ----------
     what : str
-        What is made in it, for people.
+        Its content, in words for people.
     job_file, lock_file : str
         Names of these files.
     format : str
@@ -87,7 +87,7 @@ class OutputFolder(ABC, Generic[Content]):
     Attributes
     ----------
     is_signed : bool
-        Whether the job file, when it was read last, had a checksum; those of earlier versions have none.
+        Whether the job file, when it was read last, had a checksum; files of earlier versions have none.
     """
 
     kind: ClassVar[Kind]
@@ -100,21 +100,21 @@ class OutputFolder(ABC, Generic[Content]):
 
     @abstractmethod
     def document(self, content: Content) -> dict[str, Any]:
-        """Return what the job file says of a content, as JSON types, its fingerprint among them."""
+        """Return the job file of a content as JSON types, its fingerprint among them."""
 
     @abstractmethod
     def accept(self, entry: dict[str, Any]) -> Any:
-        """Return what a sound job file says, in the form in which `refuse_other` takes it.
+        """Return the content of a sound job file, in the form in which `refuse_other` takes it.
 
         Raises
         ------
         ValueError, TypeError, KeyError
-            If it is not what `document` returns.
+            If it is not a result of `document`.
         """
 
     @abstractmethod
     def refuse_other(self, found: Any, asked: Content) -> None:
-        """Raise InputError unless the content that was found is the one that is asked for."""
+        """Raise InputError unless the content that was found is the requested one."""
 
     def agrees(self, found: Any, asked: Content) -> bool:
         """Return whether a content that was found, and is not refused, agrees in all else."""
@@ -122,18 +122,18 @@ class OutputFolder(ABC, Generic[Content]):
 
     @abstractmethod
     def unexplained(self) -> str | None:
-        """Return what lies here that only a job file explains, in words; None for nothing."""
+        """Return, in words, files that only a job file explains; None if there are none."""
 
     @abstractmethod
     def results_tell(self) -> Callable[[Content], bool] | None:
-        """Return what tells whether the results here are of a content; None if there are no results."""
+        """Return a function that decides whether the results are of a content; None if there are none."""
 
     @abstractmethod
     def written(self, found: Any) -> Iterator[Path]:
-        """Yield the files that work in this folder has left, by what a sound job file says."""
+        """Yield the files that work in this folder has left, according to a sound job file."""
 
     def read_job(self) -> Any:
-        """Return what the job file says, as of `accept`; None if there is no such file.
+        """Return the content of the job file, as of `accept`; None if there is no such file.
 
         Raises
         ------
@@ -185,14 +185,14 @@ class OutputFolder(ABC, Generic[Content]):
         Parameters
         ----------
         asked : Content
-            What is to be made in it.
+            The content to be made in it.
         fresh : bool
             Whether earlier results may be thrown away.
 
         Returns
         -------
         object
-            What a sound job file says, None if there is none.
+            Content of a sound job file, None if there is none.
 
         Raises
         ------
@@ -231,9 +231,9 @@ class OutputFolder(ABC, Generic[Content]):
         Parameters
         ----------
         asked : Content
-            What is made in it.
+            The content that is made in it.
         fresh : bool
-            Throw away what earlier work has left.
+            Remove files that earlier work has left.
         inner : context manager, optional
             The lock of a part: the folder's own lock is shared then with other parts.
 
@@ -253,12 +253,12 @@ class OutputFolder(ABC, Generic[Content]):
             yield
 
     def create(self, fresh: bool = False) -> None:
-        """Make the folder and those in it, and try that files can be written there.
+        """Make the folder and its subfolders, and test that files can be written there.
 
         Parameters
         ----------
         fresh : bool
-            Remove what stands in their place, or in that of a lock, and is no folder or file: links, pipes.
+            Remove links and pipes in their place, or in that of a lock; folders and files stay.
 
         Raises
         ------
@@ -284,7 +284,7 @@ class OutputFolder(ABC, Generic[Content]):
         return any(map(is_locked, self.locks()))
 
     def save(self, asked: Content) -> None:
-        """Write the job file, unless a sound one that agrees is there."""
+        """Write the job file, unless a sound one that agrees exists."""
         try:
             found = self.read_job()
         except DamagedJobError:
@@ -304,12 +304,12 @@ class OutputFolder(ABC, Generic[Content]):
             aside.write_text(text)
 
     def clear(self, found: Any) -> None:
-        """Remove what work in the folder has left, and last the job file that vouches for it.
+        """Remove the files that work in the folder has left, and last the job file.
 
         Parameters
         ----------
         found : object
-            What a sound job file says.
+            Content of a sound job file.
         """
         with naming_refusals(self.path, "a folder that results can be removed from"):
             for path in [*self.written(found), *self.leftovers(), self.job_file]:
@@ -332,12 +332,12 @@ class OutputFolder(ABC, Generic[Content]):
 
 
 def checksum(entry: dict[str, Any]) -> str:
-    """Return the SHA-256 [hex] of a document in JSON types, in which the order of keys counts."""
+    """Return the SHA-256 [hex] of a document in JSON types; the order of keys counts."""
     return hashlib.sha256(json.dumps(entry).encode()).hexdigest()
 
 
 def _make_way(path: Path, kinds: tuple[str, ...], fresh: bool) -> None:
-    """Remove what is none of these kinds, if results may be thrown away, or else raise InputError."""
+    """Remove files that are none of these kinds if results may be removed, or else raise InputError."""
     found = kind_of(path)
     if found is None or found in kinds:
         return

@@ -1,4 +1,4 @@
-"""The vocabulary in which models and steppers declare what a job file may set."""
+"""The classes with which models and steppers declare the parameters that a job file may set."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Substitute:
-    """How a parameter follows from another one that a job gives in its place.
+    """How a parameter follows from another one that a job gives instead.
 
     Attributes
     ----------
     key : str
-        The parameter that follows.
+        The parameter that is derived.
     needs : tuple of str
         Parameters that decide its value; a model may know only some of them.
     value : callable
-        Flat values [SI] -> the value [SI]. It raises ValueError where there is none; the text says what is
-        expected of the parameter that the job gives.
+        Flat values [SI] -> the value [SI]. It raises ValueError where there is none; the text states the
+        value expected of the parameter that the job gives.
     """
 
     key: str
@@ -28,14 +28,14 @@ class Substitute:
 
 
 class RowError(ValueError):
-    """What is wrong with one row of a file.
+    """An error in one row of a file.
 
     Parameters
     ----------
     row : int
         Counted from 0, without the header.
     expected, found : str
-        What should stand there, and what does.
+        The expected content, and the content that was found.
     """
 
     def __init__(self, row: int, expected: str, found: str) -> None:
@@ -45,7 +45,7 @@ class RowError(ValueError):
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a file: values [unit], of which `unit` is the SI unit of the file's own one."""
+    """A column of a file: values [unit], where `unit` is the SI unit of the file's own one."""
 
     unit: str
     values: tuple[float, ...]
@@ -58,7 +58,7 @@ class FromFile:
     Attributes
     ----------
     columns : mapping
-        By name the SI units of which a column has one; "" for dimensionless numbers.
+        By name the SI units that a column may have; "" for dimensionless numbers.
     required : tuple of str
         Columns that have to be there.
     gives : tuple of str
@@ -75,14 +75,14 @@ class FromFile:
 
 @dataclass(frozen=True)
 class Notice:
-    """What to tell of a parameter whose values may mean one thing or another, where no key says which.
+    """A message about a parameter whose values have two possible meanings, if no key selects one.
 
     Attributes
     ----------
     settled_by : str
-        The key that says which: who gives it, by whatever value, is told nothing.
+        The key that selects the meaning. A job that sets it, to any value, gets no message.
     text : str
-        What to tell of values other than the default; it follows the file and the parameter's name.
+        Message for values other than the default; it follows the file and the parameter's name.
     """
 
     settled_by: str
@@ -111,18 +111,19 @@ class Parameter:
     choices : tuple of str
         The legal texts of a str parameter.
     compared_only : bool
-        Values other than the default are for `cvt-hpc chart` alone, which shows what is wrong with them.
+        Values other than the default are for `cvt-hpc chart` alone, which shows their errors.
     gives : Substitute or None
-        Another parameter, in whose place a job may give this one; a job that gives both is refused. Runs know
-        it only where the other one follows from it: where the job gives it, or where the job gives neither
-        and this one has a default.
+        Another parameter that is derived if the job gives this one instead; a job that gives both is refused.
+        Runs know it only where the other one follows from it: where the job gives it, or where the job gives
+        neither and this one has a default.
     sensible : tuple of float or None
         Smallest and largest magnitude [unit] that users give, with room: a number without a unit beyond them,
         other than 0, draws a warning that it may be in another unit. Every parameter with a unit has them.
     file : FromFile or None
-        For a text that is the path of a file: what the file gives. Runs do not know such a parameter.
+        For a text that is the path of a file: the parameters that the file gives. Runs do not know such a
+        parameter.
     notice : Notice or None
-        What to tell of values other than the default.
+        Message for values other than the default.
     """
 
     default: Any

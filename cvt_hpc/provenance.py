@@ -1,4 +1,4 @@
-"""Where numbers come from: the command, the host, the versions and the revision, for all that is written."""
+"""The origin of numbers: the command, the host, the versions and the revision, for all that is written."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _PACKAGES = ("numpy", "numba", "scipy", "xarray", "netCDF4", "mpi4py")
 
 
 def new_session(ranks: int) -> dict[str, Any]:
-    """Return what is to be known of one start of a sweep, as JSON types.
+    """Return the description of one start of a sweep, as JSON types.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def command() -> str:
 
 
 def history_line(what: str, seconds: float | None = None) -> str:
-    """Return an entry of the CF attribute `history`: what was done, and when [s] since the epoch, or now."""
+    """Return an entry of the CF attribute `history`: the action, and its time [s] since the epoch, or now."""
     return f"{time.strftime('%Y-%m-%dT%H:%M:%SZ', time.gmtime(seconds))}: {what}"
 
 
@@ -69,7 +69,7 @@ def _installed() -> dict[str, str]:
 
 
 def machine() -> dict[str, Any]:
-    """Return what times depend on: the processor and how many cores there are, as JSON types."""
+    """Return the hardware on which times depend: the processor and the number of cores, as JSON types."""
     processor = platform.processor()
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:
@@ -107,7 +107,7 @@ def revision_of(source: Path) -> str:
 
 
 def _git(source: Path, *arguments: str) -> str | None:
-    """Return what git says in the folder of `source`, None if it is missing or refuses."""
+    """Return the output of git in the folder of `source`, None if it is missing or refuses."""
     try:
         answer = subprocess.run(
             ["git", *arguments], cwd=source.parent, capture_output=True, text=True, timeout=10, check=True

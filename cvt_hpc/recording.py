@@ -1,4 +1,4 @@
-"""How long a run lasts and what is recorded of it: what every job may set, whatever its model."""
+"""Duration of a run and recorded quantities: parameters of every job, in each model."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "longest_duration": not_negative(
             0.0,
             "s",
-            "up to which a run goes on while it is undecided; 0: four times the duration",
+            "up to which an undecided run is prolonged; 0: four times the duration",
             sensible=(0.001, 1000.0),
         ),
     },
@@ -64,7 +64,7 @@ def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     Parameters
     ----------
     parameters : mapping
-        Flat parameters of a run, those of [vibration] included.
+        Flat parameters of a run, including [vibration].
     """
     problems = []
     duration, longest = parameters["duration"], longest_duration(parameters)

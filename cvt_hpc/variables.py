@@ -1,4 +1,4 @@
-"""The vocabulary in which a run's record is declared: one `Variable` per quantity, once for all rooms."""
+"""The class with which a run's record is declared: one `Variable` per quantity, once for all packages."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class Status(IntEnum):
 class Vibrates(IntEnum):
     """Whether a run vibrates; the CF flags of `vibrates` in results.nc.
 
-    UNDECIDED: a longer run may tell. IRREGULAR: a longer run would not, because the amplitude comes and goes
-    about the threshold without a trend. SLIPS: the load is more than friction carries.
+    UNDECIDED: a longer run may decide. IRREGULAR: a longer run would not, because the amplitude comes and
+    goes about the threshold without a trend. SLIPS: the load is more than friction carries.
     """
 
     NO = 0
@@ -73,13 +73,13 @@ class Variable:
     units : str
         CF unit ("1" if dimensionless, "" for flags and texts).
     comment : str
-        CF comment: what it is, in a sentence.
+        CF comment: the meaning, in a sentence.
     flags : type of IntEnum or None
         Meaning of the values of a flag variable.
     volatile : bool
         Depends on the machine and the hour (timings): exempt from bitwise reproducibility.
     words : str
-        A few words for an axis label, where `name` does not say it.
+        A few words for an axis label, where `name` is not enough.
     """
 
     name: str

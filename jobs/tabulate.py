@@ -16,7 +16,6 @@ LAYOUTS = {
     "frequency": ("Hz", 1.0, "{:.1f}"),
     "eigenfrequency": ("Hz", 1.0, "{:.1f}"),
     "mode": ("", 1, "{:d}"),
-    "power_residual": ("", 1.0, "{:.4f}"),
 }
 
 

@@ -1,4 +1,4 @@
-"""What runs come to from several starts along a parameter: quiet, or a limit cycle of some amplitude.
+"""The attractors of runs from several starts along a parameter: quiet, or a limit cycle of some amplitude.
 
 A start is a few settings of the job, such as a disturbance. Where a steady state is known a run may begin in
 it, which a belt that is loaded within tens of milliseconds does not come near. Values lie more closely
@@ -26,7 +26,7 @@ SAID = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
 
 
 class Attractor(NamedTuple):
-    """What a run came to.
+    """Result of a run.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ def _at_rest(batch: Any, state: State) -> _AtRest:
 
 
 def _run_batch(job: Job, group: list[_Started]) -> list[Attractor]:
-    """Do runs that advance together; those with a state begin in it when strands are disturbed."""
+    """Do runs that advance together; runs with a state begin in it when strands are disturbed."""
     batch = load_model(job.model).batch([run.point for run in group], job.stepper)
     states = [run.state for run in group if run.state is not None]
     if states:

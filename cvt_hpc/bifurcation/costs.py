@@ -1,4 +1,4 @@
-"""What a bifurcation diagram is expected to cost, by the cost models of its steady states and its runs."""
+"""Expected cost of a bifurcation diagram, by the cost models of its steady states and its runs."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class Cost(NamedTuple):
 
 
 def predicted_cost(diagram: Diagram, asked: Asked) -> Cost:
-    """Return what a branch takes where vibration begins once and ends once.
+    """Return the cost of a branch where vibration begins once and ends once.
 
     Parameters
     ----------
     diagram : Diagram
-        What is asked for.
+        The requested diagram.
     asked : Asked
         One of its branches.
     """
@@ -52,7 +52,7 @@ def predicted_cost(diagram: Diagram, asked: Asked) -> Cost:
 
 
 def plan_lines(diagram: Diagram) -> Iterator[str]:
-    """Yield the lines that say what a diagram consists of, and what that is expected to cost."""
+    """Yield the lines that describe a diagram and its expected cost."""
     job, loads = diagram.job, diagram.loads
     costs = [predicted_cost(diagram, asked) for asked in diagram.branches]
     yield f"diagram {job.name} ({job.source}): {len(costs)} branches of {len(loads)} loads"

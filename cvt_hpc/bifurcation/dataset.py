@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     _Numbered = Sequence[tuple[int, Followed]]
 
 STRAND = "strand in which the mode is largest: 1 is t1, 2 is t2"
-OF_MODES = {  # what is told of a mode: value, unit, name for people, comment
+OF_MODES = {  # attributes of a mode: value, unit, name for people, comment
     "growth_rate": (lambda mode: mode.growth, "s-1", "growth rate", "of the mode"),
     "frequency": (lambda mode: mode.frequency, "Hz", "frequency", "of the mode"),
     "vibrating_strand": (lambda mode: mode.strand + 1, "1", "vibrating strand", STRAND),
@@ -61,11 +61,11 @@ def diagram_dataset(
     Parameters
     ----------
     diagram : Diagram
-        What was asked for.
+        The requested diagram.
     followed : mapping
-        Branches by their place in `diagram.branches`: all, or those that are done.
+        Branches by their place in `diagram.branches`: all, or the finished ones.
     makers : sequence of mapping
-        By what they were computed, as `global_attributes` takes it.
+        Origin of the results, as `global_attributes` takes it.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def _steady(diagram: Diagram, followed: _Numbered) -> dict[str, Any]:
 
 
 def _modes(diagram: Diagram, followed: _Numbered) -> dict[str, Any]:
-    """What is told of the modes over axes, load and mode."""
+    """Attributes of the modes over axes, load and mode."""
     grid, dims = _grid(diagram)
     lines = [(row, mode_lines(one.branch)) for row, one in followed]
     most = max((len(of_one) for _, of_one in lines), default=0)

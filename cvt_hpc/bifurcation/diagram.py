@@ -30,7 +30,7 @@ from cvt_hpc.study.ranks.progress import Steps
 
 @dataclass(frozen=True)
 class DiagramReport:
-    """What a diagram left.
+    """Results of a diagram.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ def make_diagram(
     Parameters
     ----------
     diagram : Diagram
-        What is asked for.
+        The requested diagram.
     out : Path
         Output folder; made if needed.
     fresh : bool
@@ -109,7 +109,7 @@ def _write(diagram: Diagram, folder: DiagramFolder, followed: Mapping[int, Follo
 def _follow(diagram: Diagram, asked: Asked) -> Followed:
     """Follow one branch."""
     p, grid, belt = asked.parameters, mesh(asked.parameters), SteadyBelt(asked.parameters)
-    band = LOW, p["band_high"]  # from far below that of runs: what enters a band seems to cross zero
+    band = LOW, p["band_high"]  # from far below that of runs: a mode that enters a band seems to cross zero
     found = branch(belt, grid, diagram.loads, band)
     hopf, hidden = onsets(belt, grid, found, band)
     runs: list[Attractor] = []

@@ -46,7 +46,7 @@ KINDS = {
 
 
 def draw_branch(diagram: Diagram, followed: Followed, out: Path) -> Path:
-    """Draw one branch; `out` is as for `save_figure`, with what it returns and raises."""
+    """Draw one branch; `out`, result and errors are those of `save_figure`."""
     return draw(lambda: branch_figure(diagram, followed), out)
 
 
@@ -80,7 +80,7 @@ def stable_parts(piece: list[Point], onsets: list[Onset]) -> list[tuple[float, f
     piece : list of Point
         Without a gap between them.
     onsets : list of Onset
-        Hopf points of the branch; those of states that are unstable anyway do not count.
+        Hopf points of the branch, except those of states that are unstable anyway.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def stable_parts(piece: list[Point], onsets: list[Onset]) -> list[tuple[float, f
 
 
 def _draw_attractors(axes: Axes, followed: Followed, scale: float) -> None:
-    """The steady state, its Hopf points, and what runs came to, over `scale` times the load."""
+    """The steady state, its Hopf points, and the results of runs, over `scale` times the load."""
     for piece in followed.branch.pieces():
         for low, high, stable in stable_parts(piece, followed.onsets):
             style = "-" if stable else (0, (4, 3))
@@ -165,7 +165,7 @@ def _waves(count: int) -> str:
 
 
 def _gaps(loads: np.ndarray, followed: Followed) -> list[tuple[float, float]]:
-    """Loads between which there is no steady state: from the last one that has some to the next."""
+    """Loads between which there is no steady state: from the last load with a state to the next."""
     found = np.array([point.steady.load for point in followed.branch.points])
     gaps = []
     for load in sorted(followed.branch.missed):
@@ -176,7 +176,7 @@ def _gaps(loads: np.ndarray, followed: Followed) -> list[tuple[float, float]]:
 
 
 def _legend(followed: Followed) -> list[Line2D | Patch]:
-    """What is on the sheet, in words."""
+    """Caption of the sheet."""
     handles: list[Line2D | Patch] = [
         Line2D([], [], color="black", linewidth=1.8, label="steady state, stable"),
         Line2D([], [], color="black", linewidth=1.8, linestyle=(0, (4, 3)), label="unstable"),

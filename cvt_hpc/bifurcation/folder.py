@@ -1,4 +1,4 @@
-"""The output folder of a bifurcation diagram: what lies where, and how its dataset tells whose it is."""
+"""The output folder of a bifurcation diagram: its files, and the origin of its dataset."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class DiagramFolder(OutputFolder[Diagram]):
     Attributes
     ----------
     branches : Archives
-        Those that are done, by their number in the names of pictures.
+        Finished branches, by their number in the names of pictures.
     """
 
     kind = Kind("bifurcation diagram", "branch.json", ".branch.lock", "cvt_hpc bifurcation 1", ("branches",))
@@ -83,7 +83,7 @@ class DiagramFolder(OutputFolder[Diagram]):
             return 0
 
     def read_job(self) -> dict[str, Any] | None:
-        """Return what branch.json says, or the dataset of an earlier version, which had no such file."""
+        """Return the content of branch.json, or the dataset of an earlier version, which had no such file."""
         found = super().read_job()
         if found is None and kind_of(self.dataset) is not None:
             self.is_signed = False
@@ -91,7 +91,7 @@ class DiagramFolder(OutputFolder[Diagram]):
         return found
 
     def document(self, content: Diagram) -> dict[str, Any]:
-        """Return what branch.json says of a diagram."""
+        """Return the content of a diagram's branch.json."""
         return {"fingerprint": _fingerprint(content), "job": content.resolved()}
 
     def accept(self, entry: dict[str, Any]) -> dict[str, Any]:
@@ -107,13 +107,13 @@ class DiagramFolder(OutputFolder[Diagram]):
             raise another_job(self.path, there, here)
 
     def unexplained(self) -> str | None:
-        """Return what is here that neither a branch.json nor a dataset explains."""
+        """Return files that neither a branch.json nor a dataset explains."""
         if kind_of(self.dataset):
             return f"{DATASET}, which is no such diagram"
         return f"branches without a {self.job_file.name}" if self.branches.written() else None
 
     def results_tell(self) -> Callable[[Diagram], bool] | None:
-        """Return what tells whether dataset and branches are of a diagram; None if there are none.
+        """Return a function that decides whether dataset and branches are of a diagram; None without these.
 
         None, too, if the dataset is something else, which is not to be written over.
         """
@@ -129,7 +129,7 @@ class DiagramFolder(OutputFolder[Diagram]):
         )
 
     def written(self, found: dict[str, Any] | None) -> Iterator[Path]:
-        """Yield what a diagram has left: branches, dataset, and pictures of as many branches as it has."""
+        """Yield the files of a diagram: branches, dataset, and pictures of as many branches as it has."""
         axes = found["job"]["axes"] if found else {}
         branches = prod(len(values) for name, values in axes.items() if name != "load")
         yield from (*self.branches.written(), self.dataset)
@@ -156,11 +156,11 @@ class DiagramFolder(OutputFolder[Diagram]):
 
 
 def _fingerprint(diagram: Diagram) -> str:
-    """Return the SHA-256 [hex] of what determines the numbers of a diagram."""
+    """Return the SHA-256 [hex] of all entries that determine the numbers of a diagram."""
     numbers = json.dumps(_numbers(diagram.resolved()), sort_keys=True)
     return hashlib.sha256(numbers.encode()).hexdigest()
 
 
 def _numbers(job: dict[str, Any]) -> dict[str, Any]:
-    """Return a resolved job without what has no effect on any number."""
+    """Return a resolved job without the entries that have no effect on any number."""
     return {key: value for key, value in job.items() if key not in LABELS}

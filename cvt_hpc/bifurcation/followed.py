@@ -1,4 +1,4 @@
-"""A branch of a bifurcation diagram with all that was found of it."""
+"""A branch of a bifurcation diagram with all its results."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from cvt_hpc.vibration.criticality import Criticality
 
 
 class Followed(NamedTuple):
-    """One branch with all that was found of it.
+    """One branch with all its results.
 
     Attributes
     ----------
     asked : Asked
-        What was asked for.
+        The requested branch.
     grid : Mesh
         Of the belt.
     branch : Branch
@@ -27,7 +27,7 @@ class Followed(NamedTuple):
     hidden : list of (float, float)
         Loads between which stability changes without a Hopf point that could be found [N m].
     runs : list of Attractor
-        From near the steady state (start 0) and from the large start (1); empty if none were asked for.
+        From near the steady state (start 0) and from the large start (1); empty if none were requested.
     kinds : list of Criticality
         One for each of `onsets`.
     """

@@ -1,4 +1,4 @@
-"""What a job asks of a bifurcation diagram: branches along the load, and the runs beside them."""
+"""The content of a bifurcation job: branches along the load, and the runs beside them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ BRANCH = {
 
 @dataclass(frozen=True)
 class Asked:
-    """One branch that is asked for.
+    """One requested branch.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Diagram:
-    """What a job asks for.
+    """The content of a job.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Diagram:
     resolution : float
         Spacing of the runs where vibration begins or ends [N m].
     settings : dict
-        What else the runs have, as the job gives it.
+        Further keys of the runs, as the job gives them.
     """
 
     job: Job
@@ -83,7 +83,7 @@ class Diagram:
     settings: dict[str, Any]
 
     def resolved(self) -> dict[str, Any]:
-        """Return all that determines the numbers, as a job file is laid out, in JSON types."""
+        """Return all entries that determine the numbers, as a job file is laid out, in JSON types."""
         table = {
             "disturbance": list(self.disturbance),
             "resolution": self.resolution,

@@ -1,4 +1,4 @@
-"""A branch with what was found of it, as arrays that are kept, and back; the kinds of Hopf points follow."""
+"""A branch and its results as arrays that are kept, and back; the kinds of Hopf points follow."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def unpacked(diagram: Diagram, asked: Asked, arrays: Arrays) -> Followed:
     Parameters
     ----------
     diagram, asked : Diagram, Asked
-        What was asked for: the diagram, and the branch of it.
+        The requested diagram, and the requested branch of it.
     arrays : dict
         The arrays; they may come from somebody else.
 
@@ -121,7 +121,7 @@ def _check_modes(modes: list[Mode], states: list[Steady]) -> None:
 
 
 def _require(holds: Any, name: str) -> None:
-    """Raise ValueError with the name of what cannot be so unless it holds."""
+    """Raise ValueError with the name of the impossible entry unless the condition holds."""
     if not holds:
         raise ValueError(f"{name} as no branch has them")
 

@@ -1,4 +1,4 @@
-"""Of what kind the Hopf points of a branch are, by the runs beside them."""
+"""Kinds of the Hopf points of a branch, by the runs beside them."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def judged(
     lowest: float,
     in_words: Callable[[float], str],
 ) -> Criticality:
-    """Whether a Hopf point is super- or subcritical, of one whose mode is within what runs are judged by.
+    """Whether a Hopf point is super- or subcritical, if its mode is within the band by which runs are judged.
 
     Parameters
     ----------

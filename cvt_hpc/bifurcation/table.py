@@ -1,4 +1,4 @@
-"""What a branch says in words: its Hopf points, and where there is no steady state."""
+"""The results of a branch in words: its Hopf points, and loads without a steady state."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST_NAMED = 12  # loads in a row
 
 
 def branch_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
-    """Yield the lines that tell of one branch."""
+    """Yield the lines that describe one branch."""
     yield f"{place_text(diagram, followed.asked)}:"
     yield from onset_lines(diagram, followed)
     if not followed.onsets:
@@ -36,7 +36,7 @@ def branch_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
 
 
 def place_text(diagram: Diagram, asked: Asked) -> str:
-    """Values of the axes other than the load, and of what a branch depends on most."""
+    """Values of the axes other than the load, and of the parameters on which a branch depends most."""
     schema = diagram.job.schema
     values = {name: asked.parameters[name] for name in NAMED} | asked.place
     return ", ".join(
@@ -77,7 +77,7 @@ def kind_text(diagram: Diagram, kind: Criticality) -> str:
 
 
 def gap_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
-    """Yield the lines that say where states were not found, and where stability changes unseen."""
+    """Yield the lines that state where states were not found, and where stability changes unseen."""
     missed = sorted(followed.branch.missed)
     if missed:
         yield f"no steady state found at {load_text(diagram, *missed, most=len(missed))}"
@@ -98,7 +98,7 @@ def load_text(diagram: Diagram, *loads: float, most: int = MOST_NAMED) -> str:
 
 
 def left_out_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
-    """Yield the line that says where there is no run from the steady state, because none is found."""
+    """Yield the line that states where there is no run from the steady state, because none is found."""
     begun = {run.value for run in followed.runs if run.start == 0}
     loads = [run.value for run in followed.runs if run.start == 1 and run.value not in begun]
     if loads:

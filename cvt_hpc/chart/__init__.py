@@ -1,4 +1,4 @@
-"""Speed against accuracy: what each method costs, what error it buys, and which error is the largest."""
+"""Speed against accuracy: cost and error of each method, and the largest source of error."""
 
 import cvt_hpc.analysis  # noqa: F401  first: it keeps a user's settings out of matplotlib
 from cvt_hpc.chart.loading import load_chart

@@ -1,4 +1,4 @@
-"""The picture of an error budget: what each choice changes."""
+"""The picture of an error budget: the effect of each choice."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def budget_figure(comparison: Comparison) -> Figure:
 
 
 def _legend(comparison: Comparison, quantities: Sequence[Quantity]) -> list[Line2D]:
-    """What is drawn in this budget."""
+    """Description of the budget that is drawn."""
     drawn = [choice for choice in comparison.choices if not choice.measurement.reason]
     dot = partial(Line2D, [], [], ls="", marker="o")
     handles = []

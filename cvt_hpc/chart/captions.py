@@ -1,4 +1,4 @@
-"""The text under the panels of a scene: what was chosen, and what is not drawn and why."""
+"""The text under the panels of a scene: the chosen method, and points that are not drawn, with the reason."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from cvt_hpc.analysis.figures import with_units
 from cvt_hpc.chart.comparing import Comparison, Result
 
 _LINE_LENGTH = 104  # [letters]
-LARGEST_ERROR = 10.0  # relative: what is beyond is named, and not drawn
+LARGEST_ERROR = 10.0  # relative: errors beyond are named, and not drawn
 _DETAILS = re.compile(r" \([^()]*\)$")
 
 
 def notes(comparison: Comparison) -> list[str]:
-    """What stands under the panels: what was chosen, and what is not drawn and why."""
+    """Text under the panels: the chosen method, and points that are not drawn, with the reason."""
     point = comparison.reference.point
     known = f"{point.label} at {point.setting_in_words}; its own error from a coarser one"
     lines = [f"reference: {'exact solution' if comparison.scene.exact else known}"]

@@ -1,4 +1,4 @@
-"""What a chart needs of the models, asked for before anything is computed."""
+"""Requirements of a chart on its models, checked before anything is computed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cvt_hpc.models.contract import load_model
 
 
 def check_prospects(chart: Chart) -> None:
-    """Make sure that the models record what is to be judged, know what is called exact, and have the lanes.
+    """Check that the models record the judged quantities, have the exact solution if used, and the lanes.
 
     Raises
     ------

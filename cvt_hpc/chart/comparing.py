@@ -1,4 +1,4 @@
-"""Measurements against their reference: errors, what they are worth, and the cheapest method that will do."""
+"""Measurements against their reference: errors, their meaning, and the cheapest sufficient method."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ class Result:
     Attributes
     ----------
     point : Point
-        What was measured.
+        The measured point.
     measurement : Measurement
-        What it gave.
+        Its result.
     errors : dict
-        Error by quantity; nan where it was not measured or has no meaning, inf where the run lacks what the
+        Error by quantity; nan where it was not measured or has no meaning, inf where the run lacks the
         reference has (a frequency, an onset). That of a reference is its own estimated error.
     values : dict
         Pooled value by quantity [SI], that of the stronger strand where there are two; none of a trajectory.
     below : frozenset of str
-        Quantities whose error is below the reference's own, so that it says no more than that.
+        Quantities whose error is below the reference's own: the true error is only known to be below that.
     chosen : bool
         Whether this is the cheapest point of its scene that meets all tolerances.
     """
@@ -61,11 +61,11 @@ class Comparison:
     series : tuple of str
         All methods of the chart by name, so that each has the same colour in all pictures.
     base : str
-        What choices are compared with; "" where there are none.
+        The point that choices are compared with; "" where there are none.
     shown : tuple of str
         Quantities by which choices are judged.
     verdict : str
-        Which method was chosen and by what, or why none could be.
+        The chosen method and the criterion, or the reason why none was chosen.
     """
 
     scene: Scene
@@ -84,7 +84,7 @@ def compare(chart: Chart, measurements: Mapping[str, Measurement]) -> tuple[Comp
     Parameters
     ----------
     chart : Chart
-        What was asked.
+        The requested chart.
     measurements : mapping
         By the name of the point.
     """
@@ -121,7 +121,7 @@ def _judge(
     point: Point, measurement: Measurement, reference: Measurement, scene: Scene, own: Mapping[str, float]
 ) -> Result:
     errors = {q.name: error(q, measurement, reference) for q in scene.quantities}
-    # what the reference knows exactly, as a rule whether it vibrates, is below nothing
+    # quantities that the reference knows exactly, as a rule whether it vibrates, are below nothing
     below = frozenset(name for name, value in errors.items() if 0.0 < own.get(name, 0.0) >= value)
     return Result(point, measurement, errors, _pooled_values(scene, measurement, reference), below)
 
@@ -133,7 +133,8 @@ def _own_errors(
 
     For an error in proportion to the step the distance is that of the steps, so many times the error; no
     higher order is assumed, and none for a tolerance. The scatter is the standard error of the difference,
-    start by start: nothing where the two stay together, and in a chaotic scene what so few starts leave open.
+    start by start: nothing where the two stay together, and in a chaotic scene the uncertainty of so few
+    starts.
     """
     if scene.exact:
         return {quantity.name: 0.0 for quantity in scene.quantities}
@@ -155,7 +156,7 @@ def error(quantity: Quantity, measurement: Measurement, reference: Measurement) 
     quantity : Quantity
         Which one, with its scale.
     measurement, reference : Measurement
-        What is judged, and against what.
+        The measurement to judge, and its reference.
 
     Returns
     -------
@@ -199,7 +200,7 @@ def pool(name: str, values: Array) -> Array:
 
 
 def choose(scene: Scene, own: Mapping[str, float], results: list[Result]) -> tuple[list[Result], str]:
-    """Mark the cheapest point that meets every tolerance, and say in words what was chosen.
+    """Mark the cheapest point that meets every tolerance, and describe the choice in words.
 
     Parameters
     ----------

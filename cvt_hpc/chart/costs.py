@@ -1,4 +1,4 @@
-"""What a chart is expected to cost, by the cost models of its models."""
+"""Expected cost of a chart, by the cost models of its models."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _march_cost(job: Job, until: float) -> float:
 
 
 def plan_lines(chart: Chart) -> Iterator[str]:
-    """Yield the lines that say what a chart measures, scene by scene, and what that is expected to cost."""
+    """Yield the lines that describe the measurements of a chart, scene by scene, and their expected cost."""
     yield f"chart {chart.name} ({chart.source}): {len(chart.scenes)} scenes, {len(chart.points)} points"
     if chart.description:
         yield chart.description

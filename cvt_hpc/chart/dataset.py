@@ -31,7 +31,7 @@ def chart_dataset(
     comparisons : sequence of Comparison
         The results.
     makers : sequence of dict
-        By what they were measured: versions, revision and machine, each of them once.
+        Origin of the measurements: versions, revision and machine, each of them once.
 
     Returns
     -------

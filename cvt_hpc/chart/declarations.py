@@ -1,4 +1,4 @@
-"""What a chart job may say beside the tables of a job: the keys of [chart] and of the tables in it."""
+"""Keys of a chart job beside the tables of a job: [chart] and the tables in it."""
 
 from __future__ import annotations
 
@@ -63,4 +63,4 @@ CHOICE = {
         False, "", "nearer to the truth than the base: the difference is an error of the base"
     ),
 }
-SETTINGS = ("step", "tolerance")  # what the points of a series may differ in
+SETTINGS = ("step", "tolerance")  # keys in which the points of a series may differ

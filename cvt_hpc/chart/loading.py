@@ -1,4 +1,4 @@
-"""From a chart job to what is measured: every run of it is built and checked before any computing."""
+"""From a chart job to its measurements: every run of it is built and checked before any computing."""
 
 from __future__ import annotations
 

@@ -28,12 +28,12 @@ from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.netcdf import write_netcdf
 from cvt_hpc.study.ranks.progress import Steps
 
-_COMPILING = "cvt_hpc.kernels"  # the logger that tells of it
+_COMPILING = "cvt_hpc.kernels"  # the logger of messages about it
 
 
 @dataclass(frozen=True)
 class ChartReport:
-    """What a chart left.
+    """Results of a chart.
 
     Attributes
     ----------
@@ -59,12 +59,12 @@ def make_chart(
     processes: int | None = None,
     tell: Callable[[str], None] = lambda line: None,
 ) -> ChartReport:
-    """Measure what has not been measured, and write table, dataset and pictures.
+    """Measure the missing points, and write table, dataset and pictures.
 
     Parameters
     ----------
     chart : Chart
-        What to measure.
+        The chart to measure.
     out : Path, optional
         Output folder; out/<job name> by default.
     fresh : bool
@@ -78,8 +78,8 @@ def make_chart(
     Raises
     ------
     InputError
-        If the folder holds another job or is in use, the models do not record what is asked, or the system
-        refuses.
+        If the folder holds another job or is in use, the models do not record the requested quantities, or
+        the system refuses.
     """
     check_prospects(chart)
     folder = ChartFolder(Path(out) if out is not None else Path("out") / chart.name, chart)
@@ -142,7 +142,7 @@ def _measure_together(
 
 
 def _tell_compiling(turn: Lock, level: int) -> None:
-    """Let one of several processes, which all compile the same, tell of it as their parent would."""
+    """Let one of several processes, which all compile the same, report it as their parent would."""
     first = turn.acquire(block=False)
     logging.basicConfig(format="cvt-hpc: %(message)s")
     logging.getLogger(_COMPILING).setLevel(level if first else logging.ERROR)

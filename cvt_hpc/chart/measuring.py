@@ -1,4 +1,4 @@
-"""One point measured: runs from all its starts, what they give, and what they cost."""
+"""One point measured: runs from all its starts, their results, and their cost."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LONG = 2.0  # [s] of processor time: beyond, a run is timed once, because noise 
 
 @dataclass(frozen=True)
 class Measurement:
-    """What a point gave.
+    """Result of a point.
 
     Attributes
     ----------
@@ -53,9 +53,9 @@ def measure(point: Point, scene: Scene, repeats: int, time_limit: float) -> Meas
     Parameters
     ----------
     point : Point
-        What to run.
+        The job to run.
     scene : Scene
-        What is judged.
+        The scene with the judged quantities.
     repeats : int
         How often a quick run is timed.
     time_limit : float
@@ -65,7 +65,7 @@ def measure(point: Point, scene: Scene, repeats: int, time_limit: float) -> Meas
         return _exact(point, scene)
     model, stepper = point.job.model, point.job.stepper
     lanes = point.lanes or min(most_lanes(model, stepper, point.parameters(0)), point.starts)
-    # costs are those of full lanes: further starts, if need be, count for the time alone
+    # costs are those of full lanes: further starts, if needed, count for the time alone
     runs = math.ceil(point.starts / lanes) * lanes if point.timed else point.starts
     points = [point.parameters(k) for k in range(runs)]
     warm_up(model, stepper, points[:lanes])

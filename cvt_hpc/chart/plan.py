@@ -1,4 +1,4 @@
-"""What a chart consists of: scenes, what is judged of them, and the points to be measured."""
+"""The content of a chart: scenes, their judged quantities, and the points to be measured."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
 class Role(Enum):
-    """What a point is measured for."""
+    """The purpose of a point."""
 
-    REFERENCE = "reference"  # what errors are measured against
+    REFERENCE = "reference"  # the reference of errors
     COARSER = "coarser"  # the same method at a longer step, by which the reference's own error is known
     METHOD = "method"
-    BASE = "base"  # what the choices of the error budget are compared with
+    BASE = "base"  # the point with which the choices of the error budget are compared
     CHOICE = "choice"
 
 
@@ -33,13 +33,13 @@ class Quantity:
     name : str
         One of `cvt_hpc.chart.quantities.KINDS`.
     tolerance : float
-        Largest error that is allowed; inf where none is asked.
+        Largest error that is allowed; inf where there is no limit.
     scale : float
-        What errors are divided by [unit of the quantity]; 0: the size of the reference.
+        Scale of errors [unit of the quantity]; 0: the size of the reference.
     since, until : float
         Part of the run [s] that is looked at, where the quantity has one; inf: to the end.
     channel : str
-        Recorded channel by which an onset is told; "" for other quantities.
+        Recorded channel that shows an onset; "" for other quantities.
     """
 
     name: str
@@ -75,7 +75,7 @@ class Scene:
     name, title : str
         For files and for people.
     quantities : tuple of Quantity
-        What is judged, in the order of the panels.
+        The judged quantities, in the order of the panels.
     starts : int
         Number of runs, from as many random starts.
     exact : bool
@@ -83,8 +83,8 @@ class Scene:
     time_limit : float
         Core-seconds [s] after which a run is given up, where the chart allows more.
     lead : Lead or None
-        What brings all runs, the reference's too, to a state from which they start; only trajectories are
-        judged then.
+        The lead-in run that brings all runs, the reference's too, to a state from which they start; only
+        trajectories are judged then.
     """
 
     name: str
@@ -107,13 +107,13 @@ class Point:
     scene : str
         Name of its scene.
     role : Role
-        What it is measured for.
+        Its purpose.
     series, label : str
         The method or the choice: its name in the job, and for people.
     key : str
         Which parameter of the stepper the points of a series differ in; "" where there is none.
     job : Job
-        What is run; with its own seed for the first start, the next ones for the others.
+        The job that is run; with its own seed for the first start, the next ones for the others.
     starts : int
         Number of runs.
     lanes : int
@@ -140,7 +140,7 @@ class Point:
 
     @property
     def timed(self) -> bool:
-        """Whether what it costs is of interest."""
+        """Whether its cost is of interest."""
         return self.role is Role.METHOD
 
     @property
@@ -182,7 +182,7 @@ class Chart:
     scenes : tuple of Scene
         The problems.
     points : tuple of Point
-        All that is measured, references first.
+        All points, references first.
     repeats : int
         How often a quick run is timed.
     time_limit : float
@@ -209,7 +209,7 @@ class Chart:
         return tuple(point for point in self.points if point.scene == scene and point.role in roles)
 
     def resolved(self) -> dict[str, Any]:
-        """Return all that determines what is measured, as JSON types."""
+        """Return all entries that determine the measurements, as JSON types."""
         return {
             "name": self.name,
             "description": self.description,
@@ -237,7 +237,7 @@ class Chart:
 
 
 def fingerprint_of(resolved: dict[str, Any]) -> str:
-    """Return the fingerprint of a chart by what `Chart.resolved` returns of it."""
+    """Return the fingerprint of a chart by the result of `Chart.resolved`."""
     document = {**resolved, "name": "", "description": ""}
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 

@@ -18,7 +18,7 @@ _COARSER = {"step": 2.0, "tolerance": 10.0}  # by which the coarser reference is
 
 
 def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
-    """Yield the reference of a scene and, unless it is exact, the coarser one that tells its error.
+    """Yield the reference of a scene and, unless it is exact, the coarser one that gives its error.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
         The scene.
     raw : Any
         "exact", or a table with a stepper, its step or tolerance, that of the coarser one (by default twice
-        the step or ten times the tolerance), and what else is to be set.
+        the step or ten times the tolerance), and further keys to be set.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def budget_points(raw: Any, stages: list[Stage], where: str) -> tuple[list[Point
         place = where.replace("budget]", f"budget.choices.{name}]")
         check_word(name, place)
         choice = read_table(CHOICE, table, place, ("set",))
-        # what is set for the base's stepper may be unknown to another
+        # keys set for the base's stepper may be unknown to another
         changed = {**({} if choice["stepper"] else base), **read_set(table, place)}
         job = stage.job(place, choice["model"], stepper=choice["stepper"] or stepper, **changed)
         points.append(

@@ -1,7 +1,7 @@
-"""The results by which methods are judged: what a job may say of each, and how runs give them.
+"""The results by which methods are judged: their keys in a job, and their values in runs.
 
 A quantity of one run is an array of one row; runs from several starts are pooled before they are compared,
-so that a chaotic scene is judged by what can be repeated: the rms over the starts of an amplitude, the mean
+so that a chaotic scene is judged by repeatable quantities: the rms over the starts of an amplitude, the mean
 of everything else. Errors are relative: the norm of the difference over the norm of the reference, or over a
 stated scale.
 """
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class History:
-    """What a run recorded.
+    """Recorded values of a run.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Kind:
     unit : str
         Of its values.
     title : str
-        What is compared, for people; the heading of a panel.
+        The compared quantity, for people; the heading of a panel.
     takes_part : bool
         Whether a job may limit it to a part of the run.
     needs_part : bool
@@ -177,7 +177,7 @@ KINDS: dict[str, Kind] = {
 
 
 def read_quantity(name: str, raw: Any, where: str) -> Quantity:
-    """Return a quantity as a chart job asks for it.
+    """Return a quantity as a chart job requests it.
 
     Raises
     ------
@@ -240,15 +240,15 @@ def observe(history: History, quantities: Sequence[Quantity], whole: bool) -> di
     Parameters
     ----------
     history : History
-        What it recorded.
+        The recorded values of the run.
     quantities : sequence of Quantity
-        What is asked.
+        The requested quantities.
     whole : bool
         Whether the run went to its end; of a shorter one only the trajectory counts.
     """
     asked = [quantity for quantity in quantities if whole or quantity.name == "trajectory"]
     values = {quantity.name: KINDS[quantity.name].values(history, quantity) for quantity in asked}
-    # amplitudes tell which strand is judged, whether they are asked for or not
+    # amplitudes determine the judged strand, whether they are requested or not
     return {"amplitude": _assessed(history).amplitude, **values} if whole else values
 
 

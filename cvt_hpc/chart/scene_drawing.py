@@ -34,7 +34,7 @@ def draw_scene(comparison: Comparison, out: Path) -> Path:
     comparison : Comparison
         Results of a scene.
     out : Path
-        As for `save_figure`, with what it returns and raises.
+        `out`, result and errors are those of `save_figure`.
     """
     return draw(lambda: scene_figure(comparison), out)
 
@@ -161,7 +161,7 @@ def _heading(quantity: Quantity) -> str:
 
 
 def error_label(quantity: Quantity) -> str:
-    """What stands at the axis of a quantity's errors."""
+    """Label at the axis of a quantity's errors."""
     if quantity.scale == 0.0:
         return "relative error"
     factor, unit = (

@@ -1,4 +1,4 @@
-"""A scene of a chart job, with what its runs are built from."""
+"""A scene of a chart job, with the data from which its runs are built."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9_]{0,59}")
 
 @dataclass(frozen=True)
 class Stage:
-    """A scene with what its runs are built from.
+    """A scene with the data from which its runs are built.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class Stage:
     document : dict
         Job file without the chart.
     values : dict
-        What the scene, or the command line, sets beside it.
+        Further values of the scene, or of the command line.
     where : str
         File and table, for the errors.
     """
@@ -44,7 +44,7 @@ class Stage:
 
     @property
     def until(self) -> float:
-        """How far its runs are marched [s]: where methods take over, to the end of what is judged."""
+        """End of the march of its runs [s]: where methods take over, or the end of the judged part."""
         return max(q.until for q in self.scene.quantities) if self.scene.lead else math.inf
 
     def job(self, where: str, model: str = "", **values: Any) -> Job:
@@ -86,7 +86,7 @@ def read_stage(name: str, raw: Any, document: dict[str, Any], replaced: dict[str
     document : dict
         The job file without the chart.
     replaced : dict
-        Values from the command line, which count more than those of the scene.
+        Values from the command line, which take precedence over those of the scene.
     source : str
         The job file, for the errors.
 
@@ -119,7 +119,7 @@ def read_stage(name: str, raw: Any, document: dict[str, Any], replaced: dict[str
 
 
 def _check_replaced(replaced: dict[str, Any], model: Any, where: str, source: str) -> None:
-    """Raise what is wrong with values of the command line, for all steppers of the scene's model."""
+    """Raise errors in values of the command line, for all steppers of the scene's model."""
     schemas = [load_schema(model, None, where)]
     schemas += [load_schema(model, name, where) for name in load_model(model).steppers]
     for name, raw in replaced.items():
@@ -129,7 +129,7 @@ def _check_replaced(replaced: dict[str, Any], model: Any, where: str, source: st
 
 
 def _read_lead(stage: Stage, raw: Any) -> Lead:
-    """What brings the runs of a scene to where its methods take over."""
+    """The lead-in run that brings the runs of a scene to the state where its methods take over."""
     where = f"{stage.where} lead"
     own = read_table(LEAD, raw, where, ("set",))
     if stage.scene.exact:

@@ -1,4 +1,4 @@
-"""The output folder of a chart: whose it is, and the points measured so far."""
+"""The output folder of a chart: its origin, and the points measured so far."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ChartFolder(OutputFolder[Chart]):
     Attributes
     ----------
     points : Archives
-        What was measured, by the name of the point.
+        Result of each point, by its name.
     """
 
     kind = Kind("chart", CHART_FILE, ".chart.lock", "cvt_hpc chart 2", ("points",))
@@ -50,7 +50,7 @@ class ChartFolder(OutputFolder[Chart]):
         return self.path / f"{name}.png"
 
     def document(self, content: Chart) -> dict[str, Any]:
-        """Return what chart.json says of a chart."""
+        """Return the content of chart.json."""
         return {"fingerprint": content.fingerprint(), "job": content.resolved()}
 
     def accept(self, entry: dict[str, Any]) -> dict[str, Any]:
@@ -72,7 +72,7 @@ class ChartFolder(OutputFolder[Chart]):
             raise another_job(self.path, found["job"], asked.resolved())
 
     def unexplained(self) -> str | None:
-        """Return what is here that no start of a chart leaves without a chart.json."""
+        """Return files that no start of a chart leaves without a chart.json."""
         own = {self.lock_file, *self.leftovers()}
         points = self.points.folder
         if kind_of(points) == "a folder" and not any(path.name[0] != "." for path in points.iterdir()):
@@ -80,22 +80,22 @@ class ChartFolder(OutputFolder[Chart]):
         return None if own.issuperset(self.path.iterdir()) else f"one without a {self.job_file.name}"
 
     def results_tell(self) -> Callable[[Chart], bool] | None:
-        """Return what tells whether the points are of a chart; None if there are none, of whatever chart."""
+        """Return a function that decides whether the points are of a chart; None if there are none."""
         fingerprints = self.points.fingerprints()
         return (lambda chart: chart.fingerprint() in fingerprints) if fingerprints else None
 
     def written(self, found: dict[str, Any] | None) -> Iterator[Path]:
-        """Yield what a chart has left: points, table, dataset, and the pictures of its scenes."""
+        """Yield the files of a chart: points, table, dataset, and the pictures of its scenes."""
         scenes = found["job"]["scenes"] if found else (scene.name for scene in self._chart.scenes)
         pictures = (self.picture(name) for name in (*scenes, "budget"))
         yield from (*self.points.written(), self.table, self.dataset, *pictures)
 
     def load_point(self, name: str) -> Measurement | None:
-        """Return what was measured at a point, None if nothing was, or nothing that can be read."""
+        """Return the result of a point, None if there is none, or no readable one."""
         return self.points.load(name, _unpack)
 
     def save_point(self, name: str, measurement: Measurement) -> None:
-        """Keep what was measured at a point."""
+        """Keep the result of a point."""
         plain = {key: getattr(measurement, key) for key in _PLAIN}
         self.points.save(name, plain, measurement.values)
 

@@ -24,11 +24,11 @@ class Marched:
     runs : tuple of Transient
         Of the model, in the order of the points.
     failures : tuple of (Status, str) or None
-        What has gone wrong with each.
+        The failure of each.
     core_seconds : float
         Processor time of all of them [s], without compiling.
     simulated : float
-        What they have simulated together [s].
+        Their simulated time together [s].
     """
 
     runs: tuple[Run, ...]
@@ -43,7 +43,7 @@ class Marched:
 
 
 def warm_up(model: str, stepper: str | None, points: Sequence[dict[str, Any]]) -> None:
-    """Compile or load all that a group of runs needs, which is no cost of theirs."""
+    """Compile or load all that a group of runs needs; this does not count as their cost."""
     load_model(model).batch(points, stepper).advance(1)
 
 
@@ -77,7 +77,7 @@ def march(
         Core-seconds after which a group is given up and counts as failed [s]; without one nothing but the
         runs is in their time.
     led : sequence of Transient
-        What the runs take over from, one for each; none: they start by themselves.
+        Runs from which the runs take over, one for each; none: they start by themselves.
     """
     runs: list[Run] = []
     failures: list[Failure | None] = []
@@ -112,7 +112,7 @@ def lead(model: str, stepper: str | None, points: Sequence[dict[str, Any]], unti
 
 
 def _stop_after(seconds: float) -> Callable[[], str | None] | None:
-    """What tells a march that so much processor time is over; None where there is no limit."""
+    """A function that ends a march after so much processor time; None where there is no limit."""
     if math.isinf(seconds):
         return None
     end = time.process_time() + seconds

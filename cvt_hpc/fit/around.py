@@ -19,14 +19,14 @@ _RESAMPLES = 200  # of the bootstrap
 
 
 class Moved(NamedTuple):
-    """What became of the first case with one parameter moved by a factor.
+    """Result of the first case with one parameter moved by a factor.
 
     Attributes
     ----------
     parameter : str
         Its name.
     factor, value : float
-        By which it was moved, and what it was then [SI].
+        The factor, and the resulting value [SI].
     course : Course
         Its runs.
     """
@@ -38,7 +38,7 @@ class Moved(NamedTuple):
 
     @property
     def is_out(self) -> bool:
-        """Whether nothing vibrates any more; what is undecided, failed or not run at all may."""
+        """Whether nothing vibrates any more; undecided, failed and missing runs may vibrate."""
         if (self.course.classes == OccurrenceClass.NOT_RUN).all():
             return False
         open_ = (OccurrenceClass.UNDECIDED, OccurrenceClass.IRREGULAR, OccurrenceClass.FAILED)
@@ -59,7 +59,7 @@ class Index(NamedTuple):
 
 
 class Around(NamedTuple):
-    """What was found around a set: its name, each parameter moved alone, all of them together."""
+    """Results around a set: its name, each parameter moved alone, all of them together."""
 
     name: str
     moved: list[Moved]
@@ -67,12 +67,12 @@ class Around(NamedTuple):
 
 
 def look_around(fit: Fit, evaluation: Evaluation, confirmed: Sequence[Confirmed]) -> list[Around]:
-    """Look around the best set, and around each start of the job if that says so; the best one first.
+    """Examine the surroundings of the best set and, if requested, of each start of the job; the best first.
 
     Parameters
     ----------
     fit : Fit
-        What is fitted.
+        The requested fit.
     evaluation : Evaluation
         Does the runs.
     confirmed : sequence of Confirmed

@@ -1,4 +1,4 @@
-"""The best candidates of a search run in full: what counts of a set."""
+"""The best candidates of a search run in full: the results that count of a set."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Confirmed:
     Attributes
     ----------
     name : str
-        "start 1" for those of the job, else the study of the search in which it was found.
+        "start 1" for a start of the job, else the study of the search in which it was found.
     scene : (free,) array
         Values of the free parameters [SI].
     coarse : float
@@ -66,12 +66,12 @@ class Confirmed:
 
 
 def confirm(fit: Fit, evaluation: Evaluation, found: Found) -> list[Confirmed]:
-    """Run the best candidates and the job's own starts in full, as often as the job says; the best one first.
+    """Run the best candidates and the job's own starts in full, as often as requested; the best one first.
 
     Parameters
     ----------
     fit : Fit
-        What is fitted.
+        The requested fit.
     evaluation : Evaluation
         Does the runs.
     found : Found

@@ -25,7 +25,7 @@ _NOT_RUN: dict[str, Any] = {"class": OccurrenceClass.NOT_RUN, "counted": False}
 
 
 class Stopped(Exception):
-    """A study of a fit was stopped early; the same command goes on from there.
+    """A study of a fit was stopped early; the same command continues it.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Stopped(Exception):
 
 
 class Findings(NamedTuple):
-    """What was found of candidates.
+    """Results of candidates.
 
     Attributes
     ----------
@@ -65,11 +65,11 @@ class Evaluation:
     Parameters
     ----------
     fit : Fit
-        What is fitted.
+        The requested fit.
     out : Path
         Their folder.
     fresh : bool
-        Throw away what earlier studies have left in a folder, instead of going on from there.
+        Remove the results of earlier studies in a folder instead of continuing from them.
 
     Attributes
     ----------
@@ -98,11 +98,11 @@ class Evaluation:
         scenes : (candidates, free) array
             Values of the free parameters [SI].
         settings : mapping
-            What else these runs have.
+            Further keys of these runs.
         values : (runs,) array
             Of the swept parameter.
         cases : sequence of str
-            Those that are run; all by default. Of fewer there are courses and no scores.
+            The candidates that are run; all by default. With fewer there are courses and no scores.
 
         Raises
         ------
@@ -163,7 +163,7 @@ def study_of(
     fit, name, scenes, settings, values
         As `Evaluation.evaluate` takes them.
     cases : mapping
-        Those that are run.
+        The candidates that are run.
 
     Returns
     -------
@@ -187,7 +187,7 @@ def study_of(
     for place in np.ndindex(shape):
         legal[place] = _is_legal(scene, {key: float(column[place]) for key, column in axes.items()})
     if not legal.any():
-        legal[:] = True  # the study says why
+        legal[:] = True  # the study states the reason
     document |= {
         "name": f"{fit.job.name}_{name}",
         "axes": {key: column[legal].tolist() for key, column in axes.items()},
@@ -205,14 +205,14 @@ def _is_legal(scene: Job, at: Mapping[str, float]) -> bool:
 
 
 def _fields(fit: Fit, dataset: xr.Dataset) -> dict[str, NDArray]:
-    """Arrays over the runs: class, whether they count, and what targets ask for."""
+    """Arrays over the runs: class, whether they count, and the quantities of the targets."""
     status, vibrates = dataset["status"].values, dataset["vibrates"].values
     classes = classify_runs(status, vibrates)
     names = {"amplitude", *(target.quantity for target in fit.targets), *fit.counted} - {""}
     found = {name: _quantity(dataset, name) for name in names if name.split()[0] in dataset}
     counted = classes != OccurrenceClass.SLIPPING
     for name, (low, high) in fit.counted.items():
-        # a failed run has no number, and is not to be left out as one that need not be quiet
+        # a failed run has no number, and must not be left out like a run that need not be quiet
         counted &= (status != Status.DONE) | ((found[name] >= low) & (found[name] <= high))
     return {"class": classes, "counted": counted, **found}
 

@@ -1,4 +1,4 @@
-"""What a job asks of a fit: free parameters, cases, targets, and how long to look for a set."""
+"""The content of a fit job: free parameters, cases, targets, and the length of the search."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Free(NamedTuple):
 
 
 class Case(NamedTuple):
-    """Other values of the scene: those that are set [SI], and factors on what a candidate has."""
+    """Other values of the scene: values that are set [SI], and factors on values of a candidate."""
 
     set: Mapping[str, float]
     factor: Mapping[str, float]
@@ -62,14 +62,14 @@ class Case(NamedTuple):
 
 @dataclass(frozen=True)
 class Fit:
-    """What a job asks for.
+    """The content of a fit job.
 
     Attributes
     ----------
     job : Job
         The scene of all runs, without axes.
     free : tuple of Free
-        What is fitted.
+        The requested fit.
     along : str
         The swept parameter.
     values : (runs,) array
@@ -77,7 +77,7 @@ class Fit:
     cases : dict
         By name, in the job's order; the first one is the belt as it is.
     targets : tuple of Target
-        What is to be met.
+        The targets to be met.
     starts : (starts, free) array
         Shares of the ranges at which the search begins, beside its samples.
     coarse : dict
@@ -133,7 +133,7 @@ class Fit:
         return np.stack([share_of(one, value) for one, value in columns], axis=-1)
 
     def resolved(self) -> dict[str, Any]:
-        """Return all that determines the numbers, in JSON types."""
+        """Return all entries that determine the numbers, in JSON types."""
         own = {key: getattr(self, key) for key in (*NUMBERS, "along", "coarse", "repeat", "counted")}
         arrays = {"values": self.values.tolist(), "starts": self.starts.tolist()}
         named = {

@@ -1,4 +1,4 @@
-"""A job for `cvt-hpc fit`: an ordinary job whose axes are the ranges of what is free, with a table [fit]."""
+"""A job for `cvt-hpc fit`: a job whose axes are the ranges of free parameters, with a table [fit]."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def _check_apart(free: tuple[Free, ...], along: str, cases: Mapping[str, Case], 
 
 
 def _read_starts(raw: Any, free: tuple[Free, ...], job: Job, where: str) -> NDArray[np.float64]:
-    """Return the shares at which the search begins; what a start leaves open is as the job has it."""
+    """Return the shares at which the search begins; values that a start leaves open are those of the job."""
     if not isinstance(raw, list):
         raise mismatch(f"{where} starts", "a list of tables", show(raw))
     shares = np.empty((len(raw), len(free)))

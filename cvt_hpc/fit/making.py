@@ -19,12 +19,12 @@ from cvt_hpc.tables import columns
 
 
 class FitReport(NamedTuple):
-    """What a fit left.
+    """Results of a fit.
 
     Attributes
     ----------
     lines : tuple of str
-        What people are told of the best set.
+        Text on the best set for people.
     tables : tuple of Path
         The files that hold the results; none on other ranks than the first.
     """
@@ -36,14 +36,14 @@ class FitReport(NamedTuple):
 def make_fit(
     fit: Fit, out: Path, *, fresh: bool = False, tell: Callable[[str], None] = lambda line: None
 ) -> FitReport:
-    """Look for the set of parameters that meets the targets best, and for what is to be known of it.
+    """Search for the set of parameters that meets the targets best, and examine it.
 
-    On all ranks, by studies that go on where an earlier start has stopped.
+    On all ranks, by studies that continue where an earlier start has stopped.
 
     Parameters
     ----------
     fit : Fit
-        What is fitted.
+        The requested fit.
     out : Path
         Folder of the studies and tables.
     fresh : bool
@@ -79,7 +79,7 @@ def make_fit(
 
 
 def plan_lines(fit: Fit) -> Iterator[str]:
-    """Yield the lines that say what a fit consists of, and what that is expected to cost."""
+    """Yield the lines that describe a fit and its expected cost."""
     job, schema, full, thin = fit.job, fit.job.schema, len(fit.values), len(fit.thinned)
     yield f"fit {job.name} ({job.source}): {len(fit.free)} free parameters, {len(fit.targets)} targets"
     if job.description:

@@ -1,9 +1,9 @@
 """How well the runs of a candidate meet a statement: a score from 0 to 1, by one law for each measure.
 
-A score never takes a run for what it is not: one that failed, is undecided or irregular neither vibrates
+A score counts a run by its own class: a run that failed, is undecided or irregular neither vibrates
 nor is quiet. A run that slips, that the model refuses since no belt carries its load, or that lies beyond a
 bound of `counted` such as one near gross slip, does not count: it does not vibrate, whatever it does, and
-silence is asked of the other runs alone.
+silence is required of the other runs alone.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Course:
     counted : (runs,) array of bool
         Whether its motion counts.
     quantities : mapping of (runs,) arrays
-        By name what was recorded [SI], of the strand or pulley that moves most.
+        Recorded values by name [SI], of the strand or pulley that moves most.
     """
 
     values: NDArray[np.float64]
@@ -63,13 +63,13 @@ class Target:
     name, statement : str
         One word, and the statement as its source has it.
     case : str
-        Whose runs.
+        Name of the case.
     measure : str
         One of MEASURES.
     low, high : float
-        Of the swept parameter [SI]: the runs between are asked.
+        Ends of the swept parameter [SI]: the runs between them count.
     quantity : str
-        Recorded quantity that `within` asks; "" for the other measures.
+        Recorded quantity for `within`; "" for the other measures.
     bounds : tuple of float
         Of the quantity, or of the onset [SI]; () where nothing is bounded.
     fading : float
@@ -112,7 +112,7 @@ def total(targets: Sequence[Target], scores: NDArray[np.float64]) -> NDArray[np.
 
 
 def verdict(value: float) -> str:
-    """What a score says of a statement, in words."""
+    """The meaning of a score for a statement, in words."""
     if value >= REPRODUCED:
         return "reproduced"
     return "not reproduced" if value <= NOT_REPRODUCED else "partly"

@@ -2,7 +2,7 @@
 
 Samples are those of a scrambled Sobol sequence, beside the job's own starts. Differential evolution is that
 of scipy, a generation at once, so that its runs fill the lanes; it needs no gradient, which scores that are
-shares of runs do not have. Both follow from the seed: a search that was stopped asks for the same candidates
+shares of runs do not have. Both follow from the seed: a search that was stopped requests the same candidates
 again, whose studies are there.
 """
 
@@ -19,12 +19,12 @@ from scipy.stats import qmc
 from cvt_hpc.fit.evaluating import Findings
 from cvt_hpc.fit.job import Fit
 
-_DIGITS = 9  # of a share: what the optimiser adds by rounding is no other candidate
+_DIGITS = 9  # of a share: a rounding of the optimiser is no other candidate
 Evaluate = Callable[[str, NDArray[np.float64]], Findings]
 
 
 class Found(NamedTuple):
-    """All candidates of a search, in the order in which they were asked for.
+    """All candidates of a search, in the order in which they were requested.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ def search(fit: Fit, evaluate: Evaluate, tell: Callable[[str], None] = lambda li
     Parameters
     ----------
     fit : Fit
-        What is fitted.
+        The requested fit.
     evaluate : callable
         Given the name of a study and the scenes of its candidates, shape (candidates, free) [SI].
     tell : callable
@@ -59,7 +59,7 @@ def search(fit: Fit, evaluate: Evaluate, tell: Callable[[str], None] = lambda li
     known: dict[tuple[float, ...], tuple[str, NDArray, NDArray, float]] = {}
 
     def totals_of(name: str, shares: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Total score of each candidate, shape (candidates,); those that are known are not run again."""
+        """Total score of each candidate, shape (candidates,); known ones are not run again."""
         keys = [tuple(row) for row in shares.round(_DIGITS).tolist()]
         if new := [key for key in dict.fromkeys(keys) if key not in known]:
             found = evaluate(name, fit.scenes(np.array(new)))

@@ -1,4 +1,4 @@
-"""The results of a fit as tables: comma-separated values below lines that tell where they are from."""
+"""The results of a fit as tables: comma-separated values below lines that state their origin."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Row = Sequence[str | float]
 
 
 class Table(NamedTuple):
-    """A table: the name of its file, what it holds, the names of its columns, and its rows."""
+    """A table: the name of its file, its title, the names of its columns, and its rows."""
 
     name: str
     what: str
@@ -61,7 +61,7 @@ def write_table(fit: Fit, table: Table, folder: Path) -> Path:
 
 
 def set_table(fit: Fit, found: Found, best: Confirmed, around: Around) -> Table:
-    """The set: what is as good, how far each parameter is from silence, and what it decides."""
+    """The set: its equals, the distance of each parameter from silence, and its influence."""
     good = found.scenes[found.totals >= fit.accepted * found.totals.max()]
     of_total = {index.parameter: index for index in around.indices if index.score == "total"}
     rows: list[Row] = []
@@ -89,7 +89,7 @@ def set_table(fit: Fit, found: Found, best: Confirmed, around: Around) -> Table:
 
 
 def verdict_table(fit: Fit, best: Confirmed) -> Table:
-    """What the best set does with each statement."""
+    """Results of the best set for each statement."""
     rows = []
     for k, target in enumerate(fit.targets):
         told = "; ".join(dict.fromkeys(in_words(fit, courses[target.case]) for courses in best.courses))
@@ -127,7 +127,7 @@ def candidate_table(fit: Fit, found: Found) -> Table:
 def conflict_table(fit: Fit, found: Found) -> Table:
     """Pairs of targets that no candidate of the search meets together, the worst first.
 
-    What is told of a pair is the best that a candidate does with the one of the two that it meets less.
+    The score of a pair is the best that a candidate reaches in the one of the two that it meets less.
     """
     alone = found.scores.max(axis=0)
     rows: list[Row] = []
@@ -141,7 +141,7 @@ def conflict_table(fit: Fit, found: Found) -> Table:
 
 
 def distance_table(fit: Fit, looked: Sequence[Around]) -> Table:
-    """What becomes of the first case of each set where one parameter is moved alone."""
+    """Result of the first case of each set where one parameter is moved alone."""
     rows = [
         [
             around.name,
@@ -171,7 +171,7 @@ def sensitivity_table(fit: Fit, looked: Sequence[Around]) -> Table:
 
 
 def set_lines(best: Confirmed, of_set: Table, verdicts: Table) -> Iterator[str]:
-    """Yield what people are told of the best set."""
+    """Yield the description of the best set for people."""
     low, high = best.spread
     scores = f"{best.total:.3f} ({low:.3f} to {high:.3f}), {best.coarse:.3f} in the search"
     yield f"best set: {best.name}, score {scores}"
@@ -182,7 +182,7 @@ def set_lines(best: Confirmed, of_set: Table, verdicts: Table) -> Iterator[str]:
 
 
 def in_words(fit: Fit, course: Course) -> str:
-    """Where a course vibrates, and where nothing can be said."""
+    """Where a course vibrates, and where the result is open."""
 
     def span(low: float, high: float) -> str:
         low, high = (_shown(fit, fit.along, end) for end in (low, high))
@@ -198,7 +198,7 @@ def in_words(fit: Fit, course: Course) -> str:
 
 
 def _free(fit: Fit) -> list[str]:
-    """Names of the free parameters with the units in which people read them."""
+    """Names of the free parameters with their units for people."""
     units = {one.name: fit.job.schema.unit_in_words(one.name) for one in fit.free}
     return [f"{name} [{unit}]" if unit else name for name, unit in units.items()]
 
@@ -212,7 +212,7 @@ def _in_units(fit: Fit, scene: NDArray[np.float64]) -> list[float]:
 
 
 def _shown(fit: Fit, name: str, value: float) -> float:
-    """A value [SI] in the unit in which people read it."""
+    """A value [SI] in its unit for people."""
     schema = fit.job.schema
     return from_si(value, schema.parameters[name].unit, schema.unit_in_words(name))
 

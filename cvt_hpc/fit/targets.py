@@ -28,13 +28,13 @@ def read_targets(
     Parameters
     ----------
     raw : Any
-        What stands in the file: a list of tables.
+        Content of the file: a list of tables.
     job : Job
         For units and quantities.
     along : str
         The swept parameter.
     values : (runs,) array
-        Those of its values that the search runs: some of them have to belong to each target.
+        The values that the search runs: some of them have to belong to each target.
     cases : collection of str
         Names of the cases.
     where : str

@@ -14,7 +14,7 @@ from cvt_hpc.job.values import kind_of, read_value
 from cvt_hpc.parameters import Parameter
 
 Assignments = Mapping[str, Any] | Sequence[str]
-AxisEntry = tuple[Parameter, Any, str]  # what declares an axis, its list or range, and file and key
+AxisEntry = tuple[Parameter, Any, str]  # declaration of an axis, its list or range, and file and key
 
 
 def split_assignments(assignments: Assignments, source: str, label: str) -> dict[str, Any]:
@@ -25,7 +25,7 @@ def split_assignments(assignments: Assignments, source: str, label: str) -> dict
     assignments : mapping, or sequence of "KEY=VALUE"
         As the user gave them.
     source, label : str
-        The job file, and what to call the assignments in an error, e.g. "--set".
+        The job file, and the name of the assignments in an error, e.g. "--set".
 
     Raises
     ------
@@ -52,9 +52,9 @@ def read_assignments(assignments: Assignments, schema: Schema, source: str, labe
     assignments : mapping, or sequence of "KEY=VALUE"
         Numbers [SI] or texts with units; a key may be written section.key.
     schema : Schema
-        What may be set.
+        The declared parameters.
     source, label : str
-        The job file, and what to call the assignments in an error, e.g. "--set".
+        The job file, and the name of the assignments in an error, e.g. "--set".
 
     Raises
     ------
@@ -71,7 +71,7 @@ def read_assignments(assignments: Assignments, schema: Schema, source: str, labe
 
 
 def warn_of_bare_assignments(assignments: Assignments, schema: Schema, source: str, label: str) -> None:
-    """Warn of numbers without a unit that are far from usual, in what `read_assignments` has read."""
+    """Warn of numbers without a unit that are far from usual, in the result of `read_assignments`."""
     for name, raw in split_assignments(assignments, source, label).items():
         where = f"{source}: {label} {name}"
         parameter = schema.parameters[schema.find(name, where)]
@@ -93,7 +93,7 @@ def split_axes(
     Returns
     -------
     axes : dict
-        By key what the parameter declares, the list or the range, and the place for errors.
+        By key the declaration of the parameter, the list or the range, and the place for errors.
     others : dict
         Raw value by name.
 
@@ -127,7 +127,7 @@ def read_coordinates(
     units : mapping
         CF unit of each coordinate; None for one of texts.
     source, label : str
-        The dataset, and what to call the assignments in an error.
+        The dataset, and the name of the assignments in an error.
 
     Raises
     ------

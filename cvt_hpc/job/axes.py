@@ -90,7 +90,7 @@ def read_axis(name: str, parameter: Parameter, raw: Any, where: str) -> Axis:
     name : str
         Name of the parameter.
     parameter : Parameter
-        What it declares.
+        Declaration of the axis.
     raw : Any
         A list of values, a 1-D array of numbers, or a table with from, to and either count (and spacing) or
         step.
@@ -198,7 +198,7 @@ def _read_step(parameter: Parameter, raw: dict[str, Any], where: str) -> float:
 
 
 def _counted(start: float, stop: float, raw: dict[str, Any], where: str) -> tuple[float, ...]:
-    """Return `count` values; in decimal, so that a third step of 0.1 is 0.3 and can be asked for as that."""
+    """Return `count` values; in decimal, so that a third step of 0.1 is 0.3 and can be selected as 0.3."""
     count = read_value(_COUNT, raw["count"], f"{where}.count")
     spacing = read_spacing(raw, start, stop, where)
     first, last = _decimal(start), _decimal(stop)

@@ -1,4 +1,4 @@
-"""What must hold between parameters, asked for every run before any computing."""
+"""Conditions that must hold between parameters, checked for every run before any computing."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cvt_hpc.job.axes import Axis, thinned
 from cvt_hpc.job.rules import Rule, follow, needed_rules, places, varied_by
 from cvt_hpc.job.schema import Schema
 
-MOST_CHECKED_POINTS, MOST_CHECKED_VALUES = 20_000, 5_000  # of runs, and of what follows from others
+MOST_CHECKED_POINTS, MOST_CHECKED_VALUES = 20_000, 5_000  # of runs, and of parameters that follow from others
 
 
 def check_grid(
@@ -77,7 +77,7 @@ def check_point(
     source : str
         The job file, for the error.
     varied : mapping, optional
-        Those of the values that set the run apart, to be named in the error.
+        The values that set the run apart, to be named in the error.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def check_point(
 def complete_point(
     schema: Schema, rules: Iterable[Rule], parameters: Mapping[str, Any], varied: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the parameters [SI] of a run with those that follow from them.
+    """Return the parameters [SI] of a run with those derived from them.
 
     Raises
     ------
@@ -124,13 +124,13 @@ def check_rules(
 ) -> None:
     """Check parameters that follow from others, along the axes with which they vary.
 
-    Where these make a huge grid, at values all over it: what is illegal in between is refused when the runs
+    Where these make a huge grid, at values all over it: illegal values in between are refused when the runs
     begin. Arguments as of `check_grid`; the base scene is without these parameters.
 
     Raises
     ------
     InputError
-        With the first one that has no legal value, and where.
+        With the first parameter that has no legal value, and its place.
     """
     for key, along in varied_by(rules, [axis.name for axis in axes]).items():
         needed = needed_rules(rules, key)
@@ -150,7 +150,7 @@ def without_effect(
 ) -> dict[str, str]:
     """Return the parameters without effect on any run, each with the setting that makes it so.
 
-    All runs are asked: of a huge grid the axes should be `thinned`. Arguments as of `check_grid`.
+    All runs are checked: of a huge grid the axes should be `thinned`. Arguments as of `check_grid`.
     """
     found: dict[str, str] | None = None
     for varied in places(axes, [axis.name for axis in axes], sampled=sampled and bool(axes)):
@@ -160,7 +160,7 @@ def without_effect(
 
 
 def _inert(schema: Schema, rules: Sequence[Rule], point: dict[str, Any]) -> dict[str, str]:
-    """Return the parameters without effect: what others follow from is of effect as far as these are."""
+    """Return the parameters without effect: sources of derived ones have an effect as far as these have."""
     inert = dict(schema.inert(point))
     for rule in reversed(rules):
         if rule.is_substituted and rule.key in inert:

@@ -1,4 +1,4 @@
-"""CSV files that give parameters of a job: columns with units in the header, one error for what is wrong."""
+"""CSV files that give parameters of a job: columns with units in the header, one error for all faults."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ def read_csv(file: FromFile, name: str, source: str, where: str) -> dict[str, An
     """Return the raw values of the parameters that a file gives, by key.
 
     The first line has the names of the columns, each with its unit in brackets, such as "speed [mm/s]"; a
-    column without a unit is dimensionless. Empty lines and those that begin with # do not count.
+    column without a unit is dimensionless. Empty lines and lines that begin with # do not count.
 
     Parameters
     ----------
     file : FromFile
-        What the key declares.
+        Declaration of the key.
     name : str
         Path of the file; a relative one starts at the folder of the job file.
     source : str
@@ -109,7 +109,7 @@ def _column(columns: Mapping[str, tuple[str, ...]], cell: str, place: str) -> tu
             to_si(f"1 {unit}", si)
         except UnitError:
             continue
-        if unit or not si:  # a bare number is legal to `to_si`, but a column says its unit
+        if unit or not si:  # a bare number is legal to `to_si`, but a column states its unit
             return name, unit, si
     raise mismatch(place, _told(name, columns), show(cell))
 

@@ -1,4 +1,4 @@
-"""A validated job: what is run, with every default resolved."""
+"""A validated job: its runs, with every default resolved."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ HEADER = ("name", "model", "stepper", "description")
 
 @dataclass(frozen=True)
 class Derived:
-    """A parameter whose value follows from axes.
+    """A parameter whose value is derived from axes.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Derived:
     unit, description : str
         Of the parameter.
     words : str
-        How it follows: a formula, or what it is linked to or given by.
+        The rule: a formula, or the parameter that it is linked to or given by.
     evaluate : callable
         Returns `values`.
     """
@@ -53,7 +53,7 @@ class Derived:
     def values(self) -> tuple:
         """Its values [unit] along the axes in C order; of a sampled job those of all samples.
 
-        Computed when they are first asked for, because of a huge grid that takes long. InputError where one
+        Computed at the first access, because for a huge grid that takes long. InputError where one
         is not legal.
         """
         return self.evaluate()
@@ -75,7 +75,7 @@ class Job:
         Value by key. A key that is also an axis has the value of its table, or else the axis' first one. What
         follows from others does so here, too.
     axes : tuple of Axis
-        What the study varies, the last axis fastest; empty for a single run.
+        The axes that the study varies, the last one fastest; empty for a single run.
     given : frozenset of str
         The keys that the file or an override sets, defaults excluded.
     design : dict
@@ -83,7 +83,7 @@ class Job:
     histories : tuple of int
         Indices of the runs whose history a sweep keeps; without effect on any number.
     rules : tuple of Rule
-        How parameters follow from others, in an order in which each finds what it needs.
+        Rules for derived parameters, in an order in which each finds its sources.
     units : dict
         By key the unit in which the job gives a parameter, where it names one.
     """
@@ -115,7 +115,7 @@ class Job:
 
     @property
     def size(self) -> int:
-        """Number of runs; of a trace, of those that it chooses from."""
+        """Number of runs; of a trace, of all runs that it chooses from."""
         return math.prod(self.shape)
 
     def __len__(self) -> int:
@@ -124,7 +124,7 @@ class Job:
 
     @property
     def schema(self) -> Schema:
-        """What the model and the stepper declare."""
+        """Declarations of the model and the stepper."""
         return replace(load_schema(self.model, self.stepper, self.source), units=self.units)
 
     @cached_property
@@ -151,7 +151,7 @@ class Job:
         return replace(self, axes=axes, design=design, histories=())
 
     def complete(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the base scene with values [SI] of axes, and with what follows from them."""
+        """Return the base scene with values [SI] of axes, and with the values derived from them."""
         return follow(self.rules, {**self.parameters, **values})
 
     def point(self, index: int) -> dict[str, Any]:
@@ -173,7 +173,7 @@ class Job:
         return self.complete(values)
 
     def with_units_of(self, at: Assignments, label: str = "at") -> Job:
-        """Return this job with the units of `at`, as of `point_at`, for what it gives without a unit."""
+        """Return this job with the units of `at`, as of `point_at`, for its parameters without a unit."""
         written = split_assignments(at, self.source, label)
         found = {self.schema.find(name, f"{self.source}: {label} {name}"): unit_in(raw)
                  for name, raw in written.items()}  # fmt: skip
@@ -186,9 +186,9 @@ class Job:
         ----------
         at : mapping, or sequence of "KEY=VALUE"
             Numbers [SI] or texts with units, by key. A parameter that follows from others has this value
-            instead; what gives it otherwise, as `load_share` gives `load`, is then without value.
+            instead; a parameter that gives it otherwise, as `load_share` gives `load`, is then without value.
         label : str
-            What to call `at` in an error.
+            Name of `at` in an error.
 
         Raises
         ------
@@ -208,9 +208,9 @@ class Job:
         return point
 
     def _derive_anew(self, values: Mapping[str, Any], schema: Schema) -> dict[str, Any]:
-        """Return the base scene with other values, and with what then follows.
+        """Return the base scene with other values, and with the values that are then derived.
 
-        The values may be those of a whole run, with a parameter and what it gives, if these agree.
+        The values may be those of a whole run, with a parameter and its source, if these agree.
         """
         gives = {key: schema.parameters[key].gives for key in values}
         told = {by.key: key for key, by in gives.items() if by and by.key in values}
@@ -232,7 +232,7 @@ class Job:
         return complete_point(schema, rules, scene, values)
 
     def resolved(self) -> dict[str, Any]:
-        """Return all that determines the numbers, as a document that `build_job` takes.
+        """Return all entries that determine the numbers, as a document that `build_job` takes.
 
         Returns
         -------
@@ -265,12 +265,12 @@ class Job:
         return {name: table for name, table in (("derived", derived), ("linked", linked)) if table}
 
     def fingerprint(self) -> str:
-        """Return the SHA-256 [hex] of what determines the numbers; name and description do not count."""
+        """Return the SHA-256 [hex] of entries that determine numbers; name and description do not count."""
         return fingerprint_of(self.resolved())
 
 
 def fingerprint_of(resolved: Mapping[str, Any]) -> str:
-    """Return the fingerprint of a job by what `Job.resolved` returns of it."""
+    """Return the fingerprint of a job by the result of `Job.resolved`."""
     document = {key: value for key, value in resolved.items() if key not in ("name", "description")}
     # the order of the axes counts, that of tables does not
     document["axes"] = list(document["axes"].items())

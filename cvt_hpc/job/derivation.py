@@ -2,7 +2,7 @@
 
 [derived] has formulas, [linked.AXIS] the parameters that follow an axis value by value. Substitutes are the
 model's: `belt_length` gives `driven_radius`, and `step_error` gives `step` where the job gives neither. Each
-rule comes after those that give what it needs.
+rule comes after the rules that give its sources.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def read_linked(tables: Mapping[str, Any], axes: Iterable[Axis], schema: Schema,
     axes : iterable of Axis
         The grid, as the file gives it.
     schema : Schema
-        What may be linked.
+        Parameters that may be linked.
     source : str
         The job file, for the error.
 
@@ -102,13 +102,13 @@ def relinked(rules: Iterable[Rule], axes: Iterable[Axis]) -> list[Rule]:
 
 
 def overridden(keys: Collection[str], schema: Schema) -> set[str]:
-    """Return what values of these keys put out of force: what they give, and what else would give them."""
+    """Return the keys that these keys disable: the parameters that they give, and their other sources."""
     given = {gives.key for key in keys if (gives := schema.parameters[key].gives)}
     return given | {key for key, p in schema.parameters.items() if p.gives and p.gives.key in keys}
 
 
 def ordered_rules(rules: Iterable[Rule], given: Collection[str], schema: Schema, source: str) -> list[Rule]:
-    """Return the rules of a job, substitutes included, in an order in which each finds what it needs.
+    """Return the rules of a job, substitutes included, in an order in which each finds its sources.
 
     Parameters
     ----------

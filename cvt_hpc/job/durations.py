@@ -21,7 +21,7 @@ def read_duration(text: str, where: str) -> float:
     text : str
         Numbers with units, which are added; without a unit one number [s].
     where : str
-        What to call it in an error.
+        Its name in an error.
 
     Raises
     ------

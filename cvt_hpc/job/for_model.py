@@ -11,12 +11,12 @@ from cvt_hpc.models.contract import load_model
 
 
 def answering_model(job: Job) -> tuple[str, str] | None:
-    """Return the model that answers the question which a job asks, and why it does; None for its own model.
+    """Return the model that answers the job's question, and the reason; None for its own model.
 
     Raises
     ------
     InputError
-        If the runs ask different questions.
+        If the runs have different questions.
     """
     answered_by = load_model(job.model).answered_by
     if any(axis.name == "question" for axis in job.axes):
@@ -25,7 +25,7 @@ def answering_model(job: Job) -> tuple[str, str] | None:
 
 
 def handed_to(job: Job, model: str, why: str) -> dict[str, Any]:
-    """Return a document of the same runs for another model: what the job gives and that model knows.
+    """Return a document of the same runs for another model, with the keys that it knows.
 
     Parameters
     ----------
@@ -34,12 +34,12 @@ def handed_to(job: Job, model: str, why: str) -> dict[str, Any]:
     model : str
         The other model.
     why : str
-        What it is handed over for, for the description and the error.
+        The purpose, for the description and the error.
 
     Raises
     ------
     InputError
-        If an axis is nothing that the other model knows. A formula may still name what it does not know.
+        If the other model does not know an axis. A formula may still name keys that it does not know.
     """
     document, known = job.resolved(), load_schema(model, None, job.source).section_of
     for axis in job.axes:

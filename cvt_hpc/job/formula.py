@@ -77,7 +77,7 @@ def read_formula(raw: Any, parameters: Mapping[str, Parameter], where: str) -> F
     raw : Any
         As TOML gives it.
     parameters : mapping
-        What names may stand for; parameters that are no numbers are refused.
+        Parameters that names may stand for; parameters that are no numbers are refused.
     where : str
         File and key, for the error.
 

@@ -1,6 +1,6 @@
-"""Runs whose whole history a sweep is to keep, as they stand in a job file: grid points, or run indices.
+"""Runs whose whole history a sweep is to keep, as written in a job file: grid points, or run indices.
 
-They are no part of what determines the numbers: a folder takes the job with any of them.
+They do not determine the numbers: a folder takes the job with any of them.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def read_histories(
     axes : tuple of Axis
         Its grid.
     replaced : mapping
-        By key what overrides have put in the place of an axis or of a value: a value, or None for an axis of
+        By key the replacement of an axis or a value by overrides: a value, or None for an axis of
         their own. A run that they have taken off the grid is left out.
     source : str
         The job file, for the errors.

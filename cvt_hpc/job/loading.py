@@ -85,7 +85,7 @@ def build_job(
     overrides : mapping, or sequence of "KEY=VALUE"
         See `load_job`.
     label : str, optional
-        What to call the overrides in an error; by default after where they come from.
+        Name of the overrides in an error; by default after their origin.
 
     Returns
     -------
@@ -116,7 +116,7 @@ def rebuild_job(
     document, source, overrides, label
         As of `build_job`.
     units : mapping
-        In which people read parameters: those of the other job.
+        Units for people: those of the other job.
 
     Raises
     ------
@@ -191,9 +191,9 @@ def _build(
 def _written(
     document: Mapping[str, Any], pairs: Mapping[str, Any], schema: Schema, source: str, label: str
 ) -> dict[str, tuple[Any, str]]:
-    """Return what stands for each parameter in the tables, the axes or the overrides, and where.
+    """Return the entry of each parameter in the tables, the axes or the overrides, and its place.
 
-    Where there are several the one that counts most. Nothing is checked.
+    If there are several, the one that takes precedence. Nothing is checked.
     """
     links = [(f"[linked.{axis}]", table) for axis, table in document.get("linked", {}).items()]
     tables = [(f"[{name}]", document.get(name, {})) for name in schema.sections]
@@ -207,7 +207,7 @@ def _written(
 
 
 def _with_files(given: Mapping[str, Any], schema: Schema, source: str) -> dict[str, Any]:
-    """Return given values with what files give in the place of their names."""
+    """Return given values, with the content of files instead of their names."""
     found = dict(given)
     for key in given:
         if (file := schema.parameters[key].file) is None:
@@ -241,7 +241,7 @@ def _read_axes_and_rules(
     kept |= put
     sampled = "runs" in design
     axes = sampled_axes(kept, design, source) if sampled else _read_grid(kept)
-    # a link has a value for each of the file's axis, and keeps those that are left of it
+    # a link has a value for each of the file's axis, and keeps the values that are left of it
     stated = _read_rules(document, () if sampled else _read_grid(of_file), design, schema, source)
     stated = relinked([rule for rule in stated if rule.key not in gone], axes)
     return axes, ordered_rules(stated, {*given, *(axis.name for axis in axes)}, schema, source)
@@ -260,7 +260,7 @@ def _read_rules(
 
 
 def _settled(rules: Sequence[Rule], axes: tuple[Axis, ...]) -> set[str]:
-    """Return the keys linked to what is no axis by an override: each has one value, which is then given."""
+    """Return the keys linked to a former axis that an override set; each then has one given value."""
     swept = {axis.name for axis in axes}
     return {rule.key for rule in rules if isinstance(rule.source, Link) and rule.source.axis not in swept}
 
@@ -338,7 +338,7 @@ def _read_tables(document: Mapping[str, Any], schema: Schema, source: str) -> di
 
 
 def _find_axes(table: Mapping[str, Any], schema: Schema, source: str) -> dict[str, AxisEntry]:
-    """Return what the file's table [axes] has for each key."""
+    """Return the entry of each key in the file's table [axes]."""
     found: dict[str, AxisEntry] = {}
     for name, raw in schema.flatten(table):
         where = f"{source}: [axes] {name}"

@@ -1,4 +1,4 @@
-"""netCDF files that give parameters of a job: variables with units, one error for what is wrong.
+"""netCDF files that give parameters of a job: variables with units, one error for all faults.
 
 A file may come from somebody else. HDF5 lets a variable lie in another file, by links, raw storage or virtual
 parts; a few compressed bytes may stand for any number of values. Neither is read.
@@ -155,7 +155,7 @@ def _values(file: FromFile, name: str, variable: netCDF4.Variable, place: str) -
     try:
         with warnings.catch_warnings(action="error", category=UserWarning):
             read = variable[...]
-    except UserWarning as warning:  # scale_factor and the like, of which netCDF4 would do nothing
+    except UserWarning as warning:  # scale_factor and the like, which netCDF4 would not apply
         raise mismatch(place, "numbers that can be unpacked", str(warning).rstrip(".")) from None
     values = np.ma.filled(np.ma.asarray(read, dtype=float), np.nan) * factor
     if not np.isfinite(values).all():

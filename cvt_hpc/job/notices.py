@@ -1,4 +1,4 @@
-"""Values whose meaning another key decides, told where nothing names that key."""
+"""Messages about values whose meaning another key decides, if nothing names that key."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def warn_of_notices(job: Job, beside: Mapping[str, Sequence[Any]] | None = None)
     Parameters
     ----------
     job : Job
-        Whose base scene, axes and rules are looked at.
+        The job whose base scene, axes and rules are checked.
     beside : mapping, optional
-        Values [SI] by key that a run or a range has beside those of the job. Then these are looked at, of
+        Values [SI] by key that a run or a range has beside those of the job. Then these are checked, for
         keys of which the job itself has drawn no warning.
     """
     varied: dict[str, Axis | Derived] = {axis.name: axis for axis in job.axes}

@@ -52,14 +52,14 @@ def meant(raw: Any, parameter: Parameter) -> str:
 
 
 def warn_of_bare_numbers(parameter: Parameter, raw: Any, where: str) -> None:
-    """Warn of the first number without a unit that is outside of what is sensible for a parameter.
+    """Warn of the first number without a unit that is outside the sensible range of a parameter.
 
-    Zero and infinity say what they say in any unit.
+    Zero and infinity mean the same in any unit.
 
     Parameters
     ----------
     parameter : Parameter
-        What the key declares.
+        Declaration of the key.
     raw : Any
         The value, list, array or range found.
     where : str

@@ -25,11 +25,11 @@ class Rule:
     key : str
         The parameter.
     source : Formula, Link or Substituted
-        What gives its value.
+        The formula, function or list that gives its value.
     where : str
         File and key, for errors.
     parameter : Parameter
-        What the key declares.
+        Declaration of the key.
     """
 
     key: str
@@ -80,7 +80,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class Link:
-    """Values that follow those of an axis, or of what was one, place by place."""
+    """Values that follow those of an axis, or of a former axis, place by place."""
 
     axis: str
     at: tuple
@@ -128,7 +128,7 @@ class Substituted:
 
 
 class Noted(Mapping[str, Any]):
-    """Flat parameters that note which of them were read, and evaluate those of `later` when these are."""
+    """Flat parameters that note which of them were read, and evaluate those of `later` at that time."""
 
     def __init__(
         self, known: Mapping[str, Any], later: Mapping[str, Callable[[], Any]] | None = None
@@ -150,7 +150,7 @@ class Noted(Mapping[str, Any]):
 
 
 def follow(rules: Iterable[Rule], parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Return flat parameters [SI] with those that follow from them.
+    """Return flat parameters [SI] with those derived from them.
 
     Raises
     ------
@@ -175,7 +175,7 @@ def varied_by(rules: Iterable[Rule], axes: Collection[str]) -> dict[str, tuple[s
 def places(
     axes: Iterable[Axis], names: Collection[str], *, sampled: bool = False
 ) -> Iterator[dict[str, Any]]:
-    """Yield the values on some axes, by name: their combinations in C order, or those of each sample."""
+    """Yield the values on some axes, by name: their combinations in C order, or the values of each sample."""
     along = {axis.name: axis.values for axis in axes if axis.name in names}
     for values in zip(*along.values(), strict=True) if sampled else product(*along.values()):
         yield dict(zip(along, values, strict=True))

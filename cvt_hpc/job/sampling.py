@@ -24,9 +24,9 @@ def sampled_axes(
     Parameters
     ----------
     found : mapping
-        By name what the parameter declares; what stands in the job file, a table with from, to and if wanted
-        spacing; and file and key, for the error. In the place of all ranges may stand the lists of drawn
-        values, as the resolved job in a dataset gives them; with the kind "listed" they have to.
+        By name the declaration of the parameter, and the entry in the job file, a table with from, to and
+        optionally spacing; and file and key, for the error. In the place of all ranges may stand the lists of
+        drawn values, as the resolved job in a dataset gives them; with the kind "listed" they have to.
     design : dict
         Kind, `runs` and `seed`.
     source : str
@@ -35,7 +35,7 @@ def sampled_axes(
     Returns
     -------
     tuple of Axis
-        With `runs` values each, of which those at one place belong together.
+        With `runs` values each; values at one place belong together.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def _read_listed(name: str, runs: int, parameter: Parameter, raw: Any, where: st
 
 
 def read_range(parameter: Parameter, raw: Any, where: str) -> tuple[float, float, str]:
-    """Return the ends of a range and the spacing of what is drawn from it."""
+    """Return the ends of a range and the spacing of the values drawn from it."""
     if not isinstance(raw, dict):
         raise mismatch(where, "a range {from=, to=}, to draw samples from", show(raw))
     for key in raw:

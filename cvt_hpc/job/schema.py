@@ -1,4 +1,4 @@
-"""What a job may set: the tables of its model and of its stepper, and those that all transients share."""
+"""The parameters that a job may set: tables of its model and its stepper, and tables of all transients."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from cvt_hpc.vibration import settings as vibration_settings
 SHARED = (
     recording,
     vibration_settings,
-)  # what every job with a transient may set, whatever its model and stepper
+)  # tables of every job with a transient, for each model and stepper
 
 Problem = tuple[str, str, str]
 Check = Callable[[dict[str, Any]], list[Problem]]
@@ -44,7 +44,7 @@ class Schema:
     inert : callable
         Flat values -> the keys without effect on such a run, each with the setting that makes it so.
     units : dict
-        By key the unit in which the job gives a parameter, where it names one; people read it in that.
+        By key the unit in which the job gives a parameter, where it names one; values are shown in it.
     """
 
     model: str
@@ -59,7 +59,7 @@ class Schema:
         return in_words(value, self.parameters[key].unit, self.units.get(key, ""))
 
     def unit_in_words(self, key: str) -> str:
-        """Return the unit in which people read a parameter."""
+        """Return the unit in which a parameter is shown to people."""
         return self.units.get(key, self.parameters[key].unit)
 
     @cached_property
@@ -73,10 +73,10 @@ class Schema:
         return {key: parameter for table in self.sections.values() for key, parameter in table.items()}
 
     def problems(self, parameters: dict[str, Any]) -> Iterator[Problem]:
-        """Yield what is wrong between the values [SI] of a run, as (key, expected, found).
+        """Yield the conflicts between the values [SI] of a run, as (key, expected, found).
 
-        The checks are asked in turn, so that who stops at the first problem spares a stepper's check a scene
-        that the model refuses.
+        The checks run one after the other, so that a caller that stops at the first problem spares a
+        stepper's check a scene that the model refuses.
         """
         for check in self.checks:
             yield from check(parameters)
@@ -133,14 +133,14 @@ class Schema:
 
 
 def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
-    """Return what a job of a model and a stepper may set.
+    """Return the parameters that a job of a model and a stepper may set.
 
     Parameters
     ----------
     model : str
         A name in `cvt_hpc.models.MODELS`.
     stepper : str or None
-        One that the model takes; None for the model's own choice, which is none of a model without a
+        A stepper that the model takes; None for the model's default, which is none for a model without a
         transient.
     source : str
         The file, for the error.
@@ -148,7 +148,8 @@ def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     Returns
     -------
     Schema
-        Of both, and of what all transients share; of this a model may declare keys with defaults of its own.
+        Of both, and of the tables that all transients share; of these a model may declare keys with its own
+        defaults.
 
     Raises
     ------

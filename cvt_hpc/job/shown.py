@@ -21,7 +21,7 @@ def si_unit(attributes: Mapping[str, Any]) -> str:
 
 
 def shown_unit(attributes: Mapping[str, Any]) -> str:
-    """Return the unit in which people read a coordinate: that of the job, else the SI unit."""
+    """Return the unit in which a coordinate is shown: that of the job, else the SI unit."""
     unit, wanted = si_unit(attributes), str(attributes.get(JOB_UNITS, ""))
     return wanted if wanted and _is_of(unit, wanted) else unit
 

@@ -18,12 +18,12 @@ from cvt_hpc.tables import columns
 
 _FEW = 8
 _MOST_DESCRIBED = 20  # lines
-_MOST_EVALUATED = 2_000  # values of what follows from others
-_MOST_ASKED = 500  # runs, for what has no effect
+_MOST_EVALUATED = 2_000  # values of derived parameters
+_MOST_ASKED = 500  # runs, for parameters without effect
 
 
 def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
-    """Return what a job runs: every parameter with where it is from, the axes, and the cost.
+    """Return the content of a job: every parameter with its origin, the axes, and the cost.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
 
 
 def _choices(job: Job) -> list[str]:
-    """Return what else the model and the stepper may be."""
+    """Return the other choices of model and stepper."""
     steppers = load_model(job.model).steppers
     words = [f"models: {', '.join(MODELS)}"]
     return words + ([f"steppers of {job.model}: {', '.join(steppers)}"] if steppers else [])
@@ -151,7 +151,7 @@ def _setting_in_words(value: Any) -> str:
 
 
 def cost_in_words(core_seconds: float, runs: int) -> str:
-    """Return what runs cost, each and in all; nan: not known."""
+    """Return the cost of runs, of each and of all; nan: not known."""
     if math.isnan(core_seconds):
         return "not known for this model"
     return f"{core_seconds:.3g} core-seconds per run, {core_time_in_words(core_seconds * runs)} in all"

@@ -1,4 +1,4 @@
-"""Tables that a command has beside the job's own, such as [chart]: keys against what is declared of them."""
+"""Tables of a command beside the job's own, such as [chart]: checks of keys against their declaration."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def read_table(
     Parameters
     ----------
     declared : mapping
-        What the table may hold.
+        Declared keys of the table.
     raw : Any
-        What stands in the file.
+        Content of the file.
     where : str
         File and table, for the errors.
     tables : tuple of str

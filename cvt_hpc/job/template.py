@@ -1,4 +1,4 @@
-"""What a job may set, in words: the models, the keys of one, and a commented job file to begin with."""
+"""Parameters in words: the models, the keys of one, and a commented job file to begin with."""
 
 from __future__ import annotations
 
@@ -18,19 +18,20 @@ from cvt_hpc.models.contract import load_model
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.tables import columns
 
-# What a study varies first, where the model knows it: load as a share of what friction carries, its gradient
+# Axes that a study varies first, where the model knows them: load as a share of the load that friction
+# carries, its gradient
 _FIRST_AXES = {"load_share": (0.2, 0.4, 0.6), "friction_gradient": None}
 _SHARES = (0.5, 1.0, 1.5)  # of the default, else
 _LONGEST = 120  # letters of a line
 
 
 def model_lines() -> list[str]:
-    """Return a line for each model: its name and what it is."""
+    """Return a line for each model: its name and title."""
     return list(columns([(name, load_model(name).title) for name in sorted(MODELS)]))
 
 
 def key_lines(model: str) -> list[str]:
-    """Return what a job of a model may set: tables, keys, defaults, units, choices and meanings.
+    """Return the parameters of a model that a job may set: tables, keys, defaults, units, choices, meanings.
 
     Raises
     ------
@@ -61,7 +62,7 @@ def job_template(name: str, model: str, source: str) -> str:
     model : str
         A model whose runs are recorded.
     source : str
-        What asks for it, for the error.
+        The command that needs it, for the error.
 
     Raises
     ------

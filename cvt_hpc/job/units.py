@@ -25,7 +25,7 @@ _PREFIXED = ("m", "s", "N", "Hz")
 
 
 class UnitError(ValueError):
-    """A text that is not a number with a unit of the expected dimension; its own text may say why."""
+    """A text that is not a number with a unit of the expected dimension; its text may state the reason."""
 
 
 def to_si(text: str, unit: str) -> float:

@@ -20,7 +20,7 @@ def read_value(parameter: Parameter, raw: Any, where: str) -> Any:
     Parameters
     ----------
     parameter : Parameter
-        What the key declares.
+        Declaration of the key.
     raw : Any
         The value found: a number, a text with or without a unit, a bool, or a (nested) list.
     where : str
@@ -34,7 +34,7 @@ def read_value(parameter: Parameter, raw: Any, where: str) -> Any:
     Raises
     ------
     InputError
-        If the value is not what the parameter declares.
+        If the value does not fit the declaration of the parameter.
     """
     kind = kind_of(parameter)
     if kind is tuple:
@@ -78,12 +78,12 @@ def kind_of(parameter: Parameter) -> type:
     """Return the type of a parameter's values: float, int, bool, str or tuple."""
     if parameter.default is None:
         return str if parameter.choices else float
-    # bool before int, of which it is a subclass; numpy's scalars count as the plain types they derive from
+    # bool before int, its base class; numpy's scalars count as the plain types they derive from
     return next(kind for kind in (bool, int, float, str, tuple) if isinstance(parameter.default, kind))
 
 
 def expectation(parameter: Parameter) -> str:
-    """Return what a parameter takes, in words, e.g. 'a value in N (such as "1 N" or a bare number in N)'."""
+    """Return the legal values of a parameter, e.g. 'a value in N (such as "1 N" or a bare number in N)'."""
     kind = kind_of(parameter)
     if kind is str:
         return f"one of {', '.join(parameter.choices)}" if parameter.choices else "a text"

@@ -1,1 +1,1 @@
-"""What each rung of the ladder of models buys: answers, time and errors side by side, and audits."""
+"""The ladder of models: answers, time and errors of each model side by side, and audits."""

@@ -1,4 +1,4 @@
-"""How often a cheap rung errs: a sample of the runs that it answered, done again in full."""
+"""How often a cheap model errs: a sample of the runs that it answered, repeated in full."""
 
 from __future__ import annotations
 
@@ -31,29 +31,29 @@ if TYPE_CHECKING:
 FOLDER, TABLE = "audit", "audit.csv"  # in the folder of the runs, and in that of the audit
 LOWER = (Rung.PASSIVE, Rung.COARSE)
 OPPOSITE = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
-FORCES = (("mean_ring_tension", "mean_push_force"), ("axial_force",))  # by what they are measured against
+FORCES = (("mean_ring_tension", "mean_push_force"), ("axial_force",))  # each group over its largest
 
 
 class RungAudit(NamedTuple):
-    """What the audit of one rung has found.
+    """Result of the audit of one model of the ladder.
 
     Attributes
     ----------
     rung : Rung
-        The rung that had answered.
+        The model that had answered.
     runs : int
         Runs done again, to their end.
     failed : int
         Further runs, which failed in full or took too long.
     differing : int
-        Of `runs`, those of which the rung gave another class.
+        Number of `runs` with another class by the model.
     contrary : int
-        Of these, those of which one says quiet and the other vibrating.
+        Of these, the number with quiet by one and vibrating by the other.
     interval : (float, float)
         The share of differing runs lies within it, see `interval`.
     force_deviation : float
         Deviation that the mean forces of strands and of sheaves, over the largest of either, keep in 95 % of
-        the runs; not a number where the rung knows no forces.
+        the runs; not a number where the model gives no forces.
     """
 
     rung: Rung
@@ -66,14 +66,14 @@ class RungAudit(NamedTuple):
 
 
 class AuditReport(NamedTuple):
-    """What an audit has found.
+    """Result of an audit.
 
     Attributes
     ----------
     answered : int
-        Runs that the lower rungs have answered, of which a sample was done again.
+        Runs that the cheaper models have answered, of which a sample was repeated.
     rungs : tuple of RungAudit
-        By rung.
+        By model.
     table : Path
         All runs that differ or failed, one by one.
     """
@@ -84,7 +84,7 @@ class AuditReport(NamedTuple):
 
 
 def audit_of(job: Job, out: Path, fraction: float) -> Repeat:
-    """Return the audit of a study: a sample of the runs that lower rungs have answered, in full.
+    """Return the audit of a study: a sample of the runs that cheaper models have answered, in full.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def audit_of(job: Job, out: Path, fraction: float) -> Repeat:
     Raises
     ------
     InputError
-        If the job has no rungs.
+        If the job has no ladder.
     """
     if job.model != AUDITED:
         raise mismatch("--audit", f"a job of model {AUDITED}, whose rungs can err", f"model {job.model}")
@@ -117,12 +117,12 @@ def audit_of(job: Job, out: Path, fraction: float) -> Repeat:
 
 
 def report_audit(audit: Repeat) -> AuditReport:
-    """Compare the runs of an audit with what the lower rungs said, and write the table; on one rank.
+    """Compare the runs of an audit with the answers of the cheaper models, and write the table; on one rank.
 
     Parameters
     ----------
     audit : Repeat
-        As `audit_of` returns it, all runs of which are done.
+        As returned by `audit_of`, with all runs done.
     """
     low = audit.records
     full = read_records(StudyFolder(audit.place).records, describe(audit.job, default_simulator()))
@@ -146,7 +146,7 @@ def report_audit(audit: Repeat) -> AuditReport:
 
 
 def _answered(records: Records) -> np.ndarray:
-    """Whether a lower rung has answered a run, shape (runs,)."""
+    """Whether a cheaper model has answered a run, shape (runs,)."""
     answered = records.recorded.copy()
     places = np.flatnonzero(answered)
     answered[places] = np.isin(records.read(places, "rung"), LOWER)
@@ -166,7 +166,7 @@ def _force_deviation(low: Records, full: Records, runs: np.ndarray) -> float:
 def _write(
     table: Path, study: Study, runs: np.ndarray, both: Sequence[Records], classes: Sequence[np.ndarray]
 ) -> None:
-    """Write what either rung says of some runs."""
+    """Write the answers of both models for some runs."""
     axes = {axis.name: axis.attributes for axis in study.axes}
     heads = [heading(name, attributes) for name, attributes in axes.items()]
     low, full = (records.read(runs) for records in both)

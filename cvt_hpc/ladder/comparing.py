@@ -1,6 +1,6 @@
-"""What each rung of the ladder makes of a question, against the reference.
+"""Answers of each model of the ladder to a question, compared with the reference.
 
-Asked is for what the reference decides, or for the cells that vibrate there. A rung that says nothing of a
+Cells count that the reference decides, or in which it vibrates. A model that gives no answer in a
 cell is not in error there: such cells are counted by themselves.
 """
 
@@ -26,20 +26,20 @@ Array = NDArray[np.float64]
 
 
 class Score(NamedTuple):
-    """How well a rung answers a question.
+    """How well a model answers a question.
 
     Attributes
     ----------
     cells : int
         Cells behind the errors; of onsets, pairs of them.
     median, high : float
-        Median of the errors and what 95 % of them keep: of onsets [N m], of all else relative. Not a number
-        of occurrence, and where there is nothing to compare.
+        Median of the errors and the bound that 95 % of them keep: of onsets [N m], of all else relative. Not
+        a number of occurrence, and where there is nothing to compare.
     wrong : float
         Of occurrence, the share of cells that are decided here and there, but of another class.
     undecided : float
-        Share of the reference's cells that the rung leaves undecided, fails at or does not speak of; of
-        onsets the share of those that it misses.
+        Share of the reference's cells that the model leaves undecided, fails at or does not answer; of
+        onsets the share that it misses.
     additional : int
         Onsets that the reference does not have, though it decides below and above them.
     """
@@ -58,11 +58,11 @@ class Finding(NamedTuple):
     Attributes
     ----------
     question, rung : str
-        What was asked, and who answered.
+        The question, and the model that answered.
     score : Score
         How well; of the reference its estimated error.
     core_seconds : float
-        Of a run of the rung, mean [s].
+        Of a run of the model, mean [s].
     """
 
     question: str
@@ -72,9 +72,9 @@ class Finding(NamedTuple):
 
 
 def compare(rungs: Sequence[Rung], results: Mapping[str, xr.Dataset]) -> Iterator[Finding]:
-    """Yield what each rung makes of each question that it answers, the reference last.
+    """Yield the score of each model for each question that it answers, the reference last.
 
-    The reference's own error is taken as large as the distance of the rung before it, of which it is a
+    The reference's own error is taken as large as the distance of the model before it, which is a
     refined one. Of the elastic belt it would be 0.8 of that if all errors were of second order in mesh and
     step, and twice as much if of the first; of the pushbelt a third, and as much. No onset is known more
     closely than half a step of the load.
@@ -84,7 +84,7 @@ def compare(rungs: Sequence[Rung], results: Mapping[str, xr.Dataset]) -> Iterato
     rungs : sequence of Rung
         As `ladder` returns them, the reference last.
     results : mapping
-        Results of each rung, by its name.
+        Results of each model, by its name.
     """
     reference = results[REFERENCE]
     costs = {name: float(dataset["core_seconds"].mean()) for name, dataset in results.items()}
@@ -93,12 +93,12 @@ def compare(rungs: Sequence[Rung], results: Mapping[str, xr.Dataset]) -> Iterato
             if question in rung.answers:
                 found = score(_beside(results[rung.name], reference), reference)
                 yield Finding(question, rung.name, found, costs[rung.name])
-        # the rung before the reference answers all questions, and stands last
+        # the model before the reference answers all questions, and stands last
         yield Finding(question, REFERENCE, _own(question, found, reference), costs[REFERENCE])
 
 
 def _own(question: str, coarser: Score, reference: xr.Dataset) -> Score:
-    """Estimated error of the reference, by the score of the rung of which it is a refined one."""
+    """Estimated error of the reference, by the score of the model that it refines."""
     if question == "onset":
         spacing = np.diff(np.sort(reference["load"].values)).max(initial=0.0)
         return Score(coarser.cells, median=float(np.fmax(coarser.median, 0.5 * spacing)))
@@ -106,7 +106,7 @@ def _own(question: str, coarser: Score, reference: xr.Dataset) -> Score:
 
 
 def _beside(dataset: xr.Dataset, reference: xr.Dataset) -> xr.Dataset:
-    """A rung's results over all axes of the reference: the same along those that it does not know."""
+    """A model's results over all axes of the reference: the same along axes that it does not know."""
     order = reference["status"].dims
     missing = {name: reference[name] for name in order if name not in dataset["status"].dims}
     return dataset.expand_dims(missing).transpose(*order, ...)
@@ -195,7 +195,7 @@ def _where_done(dataset: xr.Dataset, name: str) -> Array:
 
 
 def _score(errors: Array, asked: int) -> Score:
-    """Score of errors, nan where the rung says nothing, of so many cells that were asked for."""
+    """Score of errors, nan where the model gives no answer, for the number of requested cells."""
     known = errors[np.isfinite(errors)]
     undecided = 1.0 - known.size / asked if asked else math.nan
     if not known.size:

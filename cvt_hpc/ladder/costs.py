@@ -1,4 +1,4 @@
-"""What the rungs of a ladder are expected to cost, by the cost models of their models."""
+"""Expected cost of the models of a ladder, by their cost models."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from cvt_hpc.tables import columns, short
 
 
 def cost_left(rung: Rung, out: Path | None) -> tuple[int, float]:
-    """Return how many runs of a rung are not on record, and their predicted core-seconds.
+    """Return how many runs of a model are not on record, and their predicted core-seconds.
 
     Parameters
     ----------
     rung : Rung
-        The rung.
+        The model.
     out : Path or None
         The folder of its ladder; None: all runs are left.
     """
@@ -34,7 +34,7 @@ def cost_left(rung: Rung, out: Path | None) -> tuple[int, float]:
 
 
 def plan_lines(asked: Ladder, out: Path) -> Iterator[str]:
-    """Yield the lines that say which runs a ladder does on each rung, and what they are expected to cost."""
+    """Yield the lines that state the runs of a ladder on each model, and their expected cost."""
     job, rungs = asked.job, asked.rungs
     yield f"ladder {job.name} ({job.source}): {job.size} runs on {len(rungs)} rungs"
     if job.description:
@@ -59,7 +59,7 @@ def plan_lines(asked: Ladder, out: Path) -> Iterator[str]:
 
 
 def _pushbelt_cost(job: Job) -> str:
-    """What the pushbelt as the reference would cost beside that, or why it cannot take the job."""
+    """Additional cost of the pushbelt as the reference, or the reason why it cannot take the job."""
     try:
         jobs = pushbelt_jobs(job, {})
     except InputError as error:

@@ -1,4 +1,4 @@
-"""The picture of a ladder chart: error against cost of each rung, a panel for each question."""
+"""The picture of a ladder chart: error against cost of each model, a panel for each question."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from cvt_hpc.ladder.table import in_job_unit
 HEIGHT = 7.2  # [inch]
 ROOM = 1.15  # length of a linear axis over its largest error
 HATCHED = {"facecolor": "#f3f3f3", "edgecolor": "#d0d0d0", "hatch": "////", "lw": 0}
-# Title of a panel, label and factor of its errors; those that may well be 0 stand on a linear axis.
+# Title of a panel, label and factor of its errors; errors that may well be 0 stand on a linear axis.
 PANELS = {
     "occurrence": ("does it vibrate", "cells of the wrong class [%]", 100.0),
     "onset": ("at which load it sets in or ends", "error of the load [{unit}]", 1.0),
@@ -38,11 +38,11 @@ def draw_ladder(job: Job, findings: Sequence[Finding], out: Path) -> Path:
     Parameters
     ----------
     job : Job
-        Whose ladder it is.
+        The job of the ladder.
     findings : sequence of Finding
         Its results.
     out : Path
-        As for `save_figure`, with what it returns and raises.
+        Result and errors are those of `save_figure`.
     """
     return draw(lambda: ladder_figure(job, findings), out)
 
@@ -92,7 +92,7 @@ def _draw_panel(
 
 
 def _span(finding: Finding) -> tuple[float, float]:
-    """The error that is marked, and up to where a line goes on: what 95 % keep, or with all undecided."""
+    """The marked error, and the end of its line: the bound that 95 % keep, or with all undecided."""
     score = finding.score
     if finding.question == "occurrence":
         return score.wrong, score.wrong + score.undecided

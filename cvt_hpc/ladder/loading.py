@@ -24,7 +24,7 @@ _KEYS = {
 
 
 class Ladder(NamedTuple):
-    """What a job asks for.
+    """The content of a ladder job.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Ladder(NamedTuple):
     rungs : tuple of Rung
         As `ladder` returns them.
     refusals : dict
-        What was wrong, by the name of a rung that is left out.
+        The reason, by the name of a model that is left out.
     """
 
     job: Job
@@ -48,7 +48,7 @@ def load_ladder(path: str | Path, overrides: Assignments = ()) -> Ladder:
     ----------
     path : str or Path
         A TOML file. Its table [ladder] may have `beside`, one of BESIDE, and `reference`, elastic_belt
-        or pushbelt, for the pushbelt with `set`, a table of what else that has.
+        or pushbelt, for the pushbelt with `set`, a table of its further keys.
     overrides : mapping, or sequence of "KEY=VALUE"
         As `load_job` takes them; ladder.KEY replaces a key of the table.
 

@@ -1,4 +1,4 @@
-"""A ladder chart made: the same runs done on every rung, compared, written and drawn."""
+"""A ladder chart made: the same runs done with every model, compared, written and drawn."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from cvt_hpc.study.ranks.progress import show_duration
 
 
 class LadderReport(NamedTuple):
-    """What a ladder chart left.
+    """Results of a ladder chart.
 
     Attributes
     ----------
     findings : tuple of Finding
-        Each rung's answer to each question, compared.
+        Each model's answer to each question, compared.
     table, dataset, picture : Path
         The files that hold them.
     """
@@ -47,7 +47,7 @@ def run_ladder(
     tell: Callable[[Rung, RunReport], None],
     announce: Callable[[str], None] = lambda line: None,
 ) -> int:
-    """Do the runs of each rung, a study in a folder of its own; on all ranks.
+    """Do the runs of each model, a study in a folder of its own; on all ranks.
 
     Parameters
     ----------
@@ -58,19 +58,19 @@ def run_ladder(
     fresh : bool
         Throw earlier results away.
     tell : callable
-        Given each rung whose runs have ended, and how.
+        Called with each model whose runs have ended, and how.
     announce : callable
-        Given a line before each rung that has runs left, with the time to go.
+        Called with a line before each model that has runs left, with the time to go.
 
     Returns
     -------
     int
-        The largest exit status of a rung; later ones are not begun after one that stopped early.
+        The largest exit status of a model; later ones do not start after one that stopped early.
 
     Raises
     ------
     InputError
-        If the folder of a rung holds another job or cannot be written to; before anything is computed.
+        If the folder of a model holds another job or cannot be written to; before anything is computed.
     """
     status = 0
     begins = {rung.name: fresh or not (out / rung.name).exists() for rung in rungs}
@@ -84,12 +84,12 @@ def run_ladder(
         runs, cost = left[rung.name]
         if runs:
             to_go = sum(left[later.name][1] for later in rungs[number - 1 :])
-            # by what earlier rungs have taken, as far as they count beside all; at first by prediction alone
+            # by the time of earlier models, as far as they count beside all; at first by prediction alone
             to_go *= (spent + predicted / detect_launch().size) / (done + predicted)
             expected = f"{runs} runs, {show_duration(to_go)} to go in all"
             announce(f"rung {number}/{len(rungs)} {rung.name}: {expected}")
         started = time.monotonic()
-        # threads of the linear algebra wait for each other in loops, which would count as a rung's own time
+        # threads of the linear algebra wait for each other in loops, which would count as a model's own time
         with one_thread():
             if rung.job.stepper is None and begins[rung.name]:
                 simulate(rung.job)  # libraries loaded and kernels compiled would count as time of a first run
@@ -103,12 +103,12 @@ def run_ladder(
 
 
 def report_ladder(job: Job, rungs: Sequence[Rung], out: Path) -> LadderReport:
-    """Compare what the rungs have found, and write table, dataset and picture; on one rank.
+    """Compare the results of the models, and write table, dataset and picture; on one rank.
 
     Parameters
     ----------
     job : Job
-        Whose ladder it is.
+        The job of the ladder.
     rungs, out
         As of `run_ladder`, which has come to its end.
 

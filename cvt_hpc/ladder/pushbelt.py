@@ -17,7 +17,7 @@ from cvt_hpc.models.pushbelt.continuous import FOLLOWS, ONLY
 from cvt_hpc.models.pushbelt.profiles import PARAMETERS as PROFILES
 
 PUSHBELT = "pushbelt"
-# Of the rung below the reference: half as many elements as a belt has, at the default step
+# Of the model below the reference: half as many elements as a belt has, at the default step
 COARSER: dict[str, Any] = {"elements": 216, "step": 1e-5}
 # Errors of first order are then the distance between the two, and of second order a third of it.
 FINER = 2
@@ -31,7 +31,7 @@ def pushbelt_jobs(job: Job, settings: Mapping[str, Any]) -> tuple[Job, Job]:
     job : Job
         Of the elastic belt.
     settings : mapping
-        What else the pushbelt has, by key: of COARSER, or of what the elastic belt does not know.
+        Further keys of the pushbelt: of COARSER, or keys that the elastic belt does not know.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def pushbelt_jobs(job: Job, settings: Mapping[str, Any]) -> tuple[Job, Job]:
 
 
 def _check_settings(job: Job, settings: Mapping[str, Any], where: str) -> None:
-    """Refuse what the elastic belt knows as well: both would be different belts."""
+    """Refuse keys that the elastic belt knows as well: both would be different belts."""
     schema = load_schema(PUSHBELT, None, job.source)
     own = {*known_keys(PUSHBELT)} - {*known_keys(job.model, job.stepper), *PROFILES} | {*FOLLOWS, *COARSER}
     for name in settings:
@@ -62,7 +62,7 @@ def _check_settings(job: Job, settings: Mapping[str, Any], where: str) -> None:
 
 
 def _document(job: Job) -> dict[str, Any]:
-    """The pushbelt of which the job's belt is the continuum: what both know, and what follows."""
+    """The pushbelt of which the job's belt is the continuum: common keys, and keys that follow."""
     where = f"{job.source}: [ladder] reference"
     axes = {axis.name: axis for axis in job.axes}
     varied = varied_by(job.rules, axes)
@@ -91,7 +91,7 @@ def _document(job: Job) -> dict[str, Any]:
             expected = f"one value, since {key} of the pushbelt follows and has one"
             raise mismatch(f"{job.source}: [axes] {followed[-1]}", expected, "several")
         table = document.setdefault(section_of[key], {})
-        table.pop(key, None)  # what the continuous belt has under this name is something else
+        table.pop(key, None)  # the continuous belt uses this name for another quantity
         if not followed:
             table[key] = found
             continue

@@ -1,7 +1,7 @@
-"""The rungs of the elastic belt's ladder that a job of it can be done on, from the cheapest up.
+"""The models of the elastic belt's ladder with which its job can be done, from the cheapest up.
 
 Beside them stands a model that takes longer than the elastic belt and answers the same questions, if a job
-asks for it.
+requests it.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ REFERENCE = "reference"
 # In the reference mesh, step and transient shrink together: by 1.5 each error of first order falls by a third
 # and of second order by more than half, while a run costs 4.5 times as much, which keeps it below a second.
 FINER = 1.5
-LONGER = 2.0  # times as long: what grows slowly has its time, and the judged half begins a whole run later
+LONGER = 2.0  # times as long: slow growth has its time, and the judged half begins a whole run later
 
 
 class Rung(NamedTuple):
-    """One rung.
+    """One model of the ladder.
 
     Attributes
     ----------
     name : str
         Of its folder and in the table.
     answers : tuple of str
-        Those of QUESTIONS that it answers.
+        The entries of QUESTIONS that it answers.
     job : Job
         The same runs on it, without the axes that it does not know.
     """
@@ -43,7 +43,7 @@ class Rung(NamedTuple):
     job: Job
 
 
-# By rung its model, what a table of that name says, and the questions that it answers. Of auto, question
+# By name its model, the content of a table of that name, and the questions that it answers. Of auto, question
 # forces without a margin takes every answer of the coarse transient as it is.
 _LOWER: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
     "criterion": ("criterion", {}, ("occurrence",)),
@@ -60,29 +60,29 @@ BESIDE = ("quasi_static_belt",)
 def ladder(
     job: Job, pushbelt: Mapping[str, Any] | None = None, beside: str = NONE
 ) -> tuple[tuple[Rung, ...], dict[str, str]]:
-    """Return the rungs of a job, and why others refuse it.
+    """Return the models of a job's ladder, and why others refuse it.
 
     Parameters
     ----------
     job : Job
         Of the elastic belt, a grid with `load` among its axes.
     pushbelt : mapping, optional
-        What else the pushbelt has, as `pushbelt_jobs` takes it: the reference is a pushbelt then.
+        Further keys of the pushbelt, as `pushbelt_jobs` takes them: the reference is a pushbelt then.
     beside : str
-        One of BESIDE that is asked for, or NONE.
+        A requested entry of BESIDE, or NONE.
 
     Returns
     -------
     rungs : tuple of Rung
-        From the cheapest up, then what is asked for beside them, the job itself, a pushbelt if asked for, the
-        reference last. The reference is the rung before it, refined.
+        From the cheapest up, then the requested model beside them, the job itself, a pushbelt if requested,
+        the reference last. The reference is the model before it, refined.
     refusals : dict
-        What was wrong, by the name of the rung.
+        The reason, by the name of the model.
 
     Raises
     ------
     InputError
-        If it is another job, one that cannot be refined, or one that the pushbelt asked for cannot take.
+        If it is another job, one that cannot be refined, or one that the requested pushbelt cannot take.
     """
     _check(job)
     rungs, refusals = [], {}

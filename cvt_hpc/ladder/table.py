@@ -20,7 +20,7 @@ from cvt_hpc.provenance import machine
 from cvt_hpc.tables import columns, number, short
 
 UNITS = dict.fromkeys(QUESTIONS, "1") | {"onset": "N m"}
-# Column -> its name and what it is; `error_unit` tells the unit of those of errors
+# Column -> its name and meaning; `error_unit` gives the unit of error columns
 NUMBERS = {
     "cells": ("cells", "cells behind the errors; of onsets, pairs of them"),
     "error_median": ("median error", "in the unit error_unit"),
@@ -55,7 +55,7 @@ def in_job_unit(job: Job, findings: Sequence[Finding]) -> tuple[list[Finding], s
 
 
 def write_ladder(job: Job, findings: Sequence[Finding], path: Path) -> None:
-    """Write the findings as comma-separated values, a row for each rung and question."""
+    """Write the findings as comma-separated values, a row for each model and question."""
     findings, unit = in_job_unit(job, findings)
     units = UNITS | {"onset": unit}
     with path.open("w", encoding="utf-8", newline="") as file:
@@ -83,9 +83,9 @@ def ladder_dataset(job: Job, rungs: Sequence[Rung], findings: Sequence[Finding])
     Parameters
     ----------
     job : Job
-        Whose ladder it is.
+        The job of the ladder.
     rungs : sequence of Rung
-        Its rungs.
+        Its models.
     findings : sequence of Finding
         The results.
     """

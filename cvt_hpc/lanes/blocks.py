@@ -59,7 +59,7 @@ class _Lanes:
 
 
 def _tile(lanes: _Lanes, b: int, width: int, to: Any, starts: bool, factors: Any, terms: tuple) -> None:
-    """Write the instructions for columns: what stands there (or zero), plus products, divided by factors.
+    """Write the instructions for columns: their old values (or zero), plus products, divided by factors.
 
     A term is a sign, whether the block is transposed, the block and the columns that it multiplies.
     """
@@ -100,12 +100,12 @@ def _sweep(lanes: _Lanes, b: int, factors: Any, total: list, k: int, others: ran
 
 
 def _on_columns(starts: bool, divides: bool, *signs: tuple[int, bool]) -> Any:
-    """A function for kernels that replaces columns by those that stand there (or zero) and products.
+    """A function for kernels that replaces columns by their old values (or zero) and products.
 
     It may divide them by factors (multiply by the inverse of their product). Of each product it takes a sign
     and whether the block is transposed. Its arguments are the size, the number of columns and a tuple with
     array, row and first field of these columns, of the factors if it divides, and of block and columns of
-    each product. Columns that are read must not be those that are written.
+    each product. Columns that are read must differ from columns that are written.
     """
 
     @intrinsic

@@ -1,4 +1,4 @@
-"""Functions of lanes and of plain numbers: those that the processor has, and those that are made of them."""
+"""Functions of lanes and of plain numbers: functions of the processor, and functions made of them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _as(context, builder, value, kind, wanted):
 
 
 def _common(*kinds):
-    """The type of what is made of numbers: lanes where any is, else a plain number."""
+    """The type of a result of numbers: lanes where any is, else a plain number."""
     return next((kind for kind in kinds if isinstance(kind, Lanes)), types.float64)
 
 
@@ -134,7 +134,7 @@ def like(context, x, pattern):
 
 @intrinsic
 def anywhere(context, mask):
-    """Whether a mask holds in any lane; a plain truth is what it is."""
+    """Whether a mask holds in any lane; a plain truth value stays as it is."""
 
     def build(context, builder, sig, arguments):
         if sig.args[0] == types.boolean:
@@ -231,7 +231,7 @@ def _halving(x):
     if not isinstance(x, Lanes):
         return lambda x: np.exp2(-x)
     # The series without its last Chebyshev polynomials is off by 2e-9 and 3e-18 between -1/2 and 1/2. A
-    # number so large that its last bit is 1 rounds what is added to it.
+    # number so large that its last bit is 1 rounds the number that is added to it.
     degree, largest = (6, 125.0) if x.dtype == types.float32 else (11, 1021.0)
     large = 1.5 * 2.0 ** _BITS[x.dtype][1]
     series = np.polynomial.Polynomial([np.log(2.0) ** k / factorial(k) for k in range(18)])

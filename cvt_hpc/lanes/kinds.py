@@ -50,7 +50,7 @@ class LaneArray:
         first = -memory.ctypes.data % ALIGNMENT
         self.data: np.ndarray = memory[first : first + size].view(dtype).reshape(rows, fields, lanes)
 
-    if TYPE_CHECKING:  # what kernels see of it
+    if TYPE_CHECKING:  # the part that kernels see
         rows: int
 
         def __getitem__(self, place: tuple[int, int]) -> Any: ...
@@ -130,7 +130,7 @@ def _unbox_lane_array(kind, value, context):
 def converted(context, builder, value, kind, wanted: Lanes):
     """A value of any numeric type or precision as one of type `wanted`.
 
-    Between one lane and several: what all lanes have in common.
+    Between one lane and several: the values that all lanes have in common.
     """
     if isinstance(kind, Lanes):
         if kind == wanted:

@@ -117,7 +117,7 @@ def at_station(context, array, row, part, field):
 
 @intrinsic
 def set_station(context, array, row, part, field, value):
-    """Set what `at_station` reads."""
+    """Set the values that `at_station` reads."""
 
     def build(context, builder, sig, arguments):
         pointer = _station(context, builder, sig.args[0], *arguments[:4])

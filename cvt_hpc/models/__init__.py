@@ -1,4 +1,4 @@
-"""The ladder of models; each knows physics and nothing above, and declares what a job may set."""
+"""The ladder of models; each knows physics and nothing above, and declares its parameters in a job."""
 
 MODELS = {
     "auto": "cvt_hpc.models.auto",

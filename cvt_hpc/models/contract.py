@@ -1,20 +1,21 @@
-"""What a model offers to the rest of the program, and `load_model`, the only way to it.
+"""The interface of a model to the rest of the program, and `load_model`, the only way to it.
 
-A model is a package of up to four modules, of which all but the first are imported when they are needed:
+A model is a package of up to four modules. All but the first are imported only when they are needed:
 
-- the package itself (`Declaration`): what a job may set; cheap to import;
-- `record` (`Recorded`): what the record of a run holds, what a run costs, and how a run is judged. A model
+- the package itself (`Declaration`): the parameters that a job may set; cheap to import;
+- `record` (`Recorded`): the variables of a record, the cost of a run, and the verdict on a run. A model
   without it is there to compare steppers. A model without a transient offers `solve` there;
 - `transient` (`Transient`): runs that march;
 - `exact`: `exact(parameters, times)`, the displacement (time, probe) [m] in closed form.
 
-A model leaves out what it has no use for; `Model` has the default of each such member.
+A model leaves out the members that it does not need; `Model` has the default of each such member.
 
 A model with a transient may answer some runs without all of it. Its `record` then has `known(parameters)`,
 the values where no transient is needed, else None; `preliminary(parameters)`, the parameters of a cheaper
 transient that comes first, or None; and `settle(run)`, the values by that transient if it answers, else None.
 
-A `transient` whose runs leave later ones of the process a part of their march has `forget()`, which drops it.
+If the runs of a `transient` keep a part of their march for later runs of the process, it has `forget()`,
+which drops that part.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ Parameters = Mapping[str, Any]  # flat, of one run [SI]
 Values = dict[str, Any]  # of a record, by the names of its variables
 Failure = tuple[Status, str]  # how a run ended before its time, and why; a result, if the status is done
 
-PILOT_SHARE = 0.25  # of a run's simulated time: what a forecast runs to tell the cost of the whole
+PILOT_SHARE = 0.25  # of a run's simulated time: a forecast runs this part
 
 
 class Probe(Protocol):
@@ -79,7 +80,7 @@ class Run(Protocol):
 
     @property
     def failure(self) -> Failure | None:
-        """Why the run does not go on: what has gone wrong, or a result, with the status done."""
+        """Reason why the run cannot continue: a failure, or a result, with the status done."""
 
     @property
     def time(self) -> float:
@@ -111,7 +112,7 @@ class Run(Protocol):
         """Why a run that reached its end is not to be trusted, by its values; None where it is."""
 
     def paused(self) -> Any:
-        """What a batch of the same point over a longer time goes on from."""
+        """The state from which a batch of the same point over a longer time continues."""
 
 
 class Batch(Protocol):
@@ -136,27 +137,27 @@ class Batch(Protocol):
         """March on by so many samples at most; 0 compiles or loads the kernels only."""
 
     def take_over(self, runs: Sequence[Any]) -> None:
-        """Go on from where runs by another stepper stand; of models with TAKES_OVER."""
+        """Continue from the state of runs by another stepper; for models with TAKES_OVER."""
 
 
 class Declaration(Protocol):
-    """The package of a model: what a job may set of it. The first line of its docstring says what it is.
+    """The package of a model: the parameters that a job may set. Its docstring's first line is its title.
 
-    It may also have `check(parameters)`, which yields (key, expected, found) of what does not fit together;
-    `inert(parameters)`, the keys without effect with the reason of each; `GIVES`, by stepper and key what a
-    key of the stepper is for this model (`cvt_hpc.parameters.Substitute`); `REFUSED`, steppers that it does
-    not take, each with the reason; `ANSWERED_BY`, questions that another model answers, each with that
-    model's name and the reason; and `COMPARED`, variables of the record, numbers per run or per strand or
-    pulley, in which two studies are compared beside class, amplitude and frequency.
+    It may also have `check(parameters)`, which yields (key, expected, found) of conflicts between parameters;
+    `inert(parameters)`, the keys without effect with the reason of each; `GIVES`, by stepper and key how a
+    key of the stepper is derived for this model (`cvt_hpc.parameters.Substitute`); `REFUSED`, steppers that
+    it does not take, each with the reason; `ANSWERED_BY`, questions that another model answers, each with
+    that model's name and the reason; and `COMPARED`, variables of the record, numbers per run or per strand
+    or pulley, that are compared between two studies beside class, amplitude and frequency.
     """
 
     @property
     def PARAMETERS(self) -> dict[str, dict[str, Parameter]]:  # noqa: N802
-        """By table and key; one of those that all runs share stands here with the model's own default."""
+        """By table and key; a key that all runs share may stand here with the model's own default."""
 
     @property
     def DEFAULT_STEPPER(self) -> str | None:  # noqa: N802
-        """The model's own choice; None: there is no transient."""
+        """The model's default stepper; None: there is no transient."""
 
     @property
     def STEPPERS(self) -> Mapping[str, str]:  # noqa: N802
@@ -168,7 +169,7 @@ class Recorded(Protocol):
 
     @property
     def VARIABLES(self) -> tuple[Variable, ...]:  # noqa: N802
-        """What the record holds beside verdict and cost."""
+        """Variables of the record beside verdict and cost."""
 
     def coordinates(self, parameters: Parameters) -> dict[str, Coordinate]:
         """Dimensions of the record beside the grid's."""
@@ -177,7 +178,7 @@ class Recorded(Protocol):
         """Core-seconds of a batch with full lanes; of parameters that are arrays, an array."""
 
     def judge(self, run: Any) -> Values:
-        """Values of VARIABLES and the verdict of a run at its end, or of what `solve` found."""
+        """Values of VARIABLES and the verdict of a run at its end, or of the result of `solve`."""
 
 
 class Transient(Protocol):
@@ -193,7 +194,7 @@ class Transient(Protocol):
 
 
 class Model:
-    """A model of the ladder: all that the rest of the program may ask of it.
+    """A model of the ladder: everything that the rest of the program may use of it.
 
     Parameters
     ----------
@@ -207,17 +208,17 @@ class Model:
 
     @property
     def title(self) -> str:
-        """What the model is, in one line: the first one of its package's docstring."""
+        """Title of the model in one line: the first line of its package's docstring."""
         return (self._declared.__doc__ or "").strip().split("\n")[0]
 
     @property
     def parameters(self) -> dict[str, dict[str, Parameter]]:
-        """What a job may set, by table and key."""
+        """Parameters that a job may set, by table and key."""
         return self._declared.PARAMETERS
 
     @property
     def default_stepper(self) -> str | None:
-        """The model's own choice; None of a model without a transient."""
+        """The model's default stepper; None for a model without a transient."""
         return self._declared.DEFAULT_STEPPER
 
     @property
@@ -232,7 +233,7 @@ class Model:
 
     @property
     def gives(self) -> Mapping[str, Mapping[str, Any]]:
-        """By stepper and key what the value of a key follows from for this model."""
+        """By stepper and key the parameters from which the value of a key is derived for this model."""
         return _member(self._declared, "GIVES", {})
 
     @property
@@ -242,7 +243,7 @@ class Model:
 
     @property
     def compared(self) -> tuple[str, ...]:
-        """Variables in which two studies are compared beside class, amplitude and frequency."""
+        """Variables that are compared between two studies beside class, amplitude and frequency."""
         return _member(self._declared, "COMPARED", ())
 
     @property
@@ -267,7 +268,7 @@ class Model:
 
     @property
     def variables(self) -> tuple[Variable, ...]:
-        """What a record holds beside verdict and cost."""
+        """Variables of a record beside verdict and cost."""
         return self._record.VARIABLES
 
     def coordinates(self, parameters: Parameters) -> dict[str, Coordinate]:
@@ -285,16 +286,16 @@ class Model:
         return _member(self._record, "lanes", lambda parameters, stepper: 1)(parameters, stepper)
 
     def lane_key(self, parameters: Parameters) -> tuple:
-        """What runs in one batch have in common."""
+        """Values that all runs of one batch have in common."""
         return _member(self._record, "lane_key", lambda parameters: ())(parameters)
 
     @property
     def pilot_share(self) -> float:
-        """Share of a run's simulated time that tells what the whole run costs."""
+        """Share of a run's simulated time from which the cost of the whole run is estimated."""
         return _member(self._record, "PILOT_SHARE", PILOT_SHARE)
 
     def known(self, parameters: Parameters) -> Values | None:
-        """Values of a run that needs no transient; None where it does."""
+        """Values of a run that needs no transient; None for a run that needs one."""
         return _member(self._record, "known", lambda parameters: None)(parameters)
 
     def preliminary(self, parameters: Parameters) -> Values | None:
@@ -306,15 +307,15 @@ class Model:
         return self._record.settle(run)
 
     def judge(self, run: Any) -> Values:
-        """Values and verdict of a run at its end, or of what `solve` found."""
+        """Values and verdict of a run at its end, or of the result of `solve`."""
         return self._record.judge(run)
 
     def solve(self, parameters: Parameters) -> Any:
-        """What `judge` and `histories` read, of a model without a transient."""
+        """Result that `judge` and `histories` read, for a model without a transient."""
         return self._record.solve(parameters)
 
     def profile_bytes(self, parameters: Parameters) -> int:
-        """Size of what a kept history has along the belt at each sample [byte]."""
+        """Size of a kept history's values along the belt at each sample [byte]."""
         return _member(self._record, "profile_bytes", lambda parameters: 0)(parameters)
 
     @property
@@ -323,7 +324,7 @@ class Model:
         return self.default_stepper is not None or self.is_recorded and hasattr(self._record, "histories")
 
     def histories(self, run: Any) -> xr.Dataset:
-        """What `simulate` has beyond the record, of a run or of what `solve` found."""
+        """Data of `simulate` beyond the record, of a run or of the result of `solve`."""
         import xarray as xr
 
         return _member(self._record, "histories", lambda run: xr.Dataset())(run)
@@ -335,7 +336,7 @@ class Model:
 
     @property
     def takes_over(self) -> bool:
-        """Whether runs can go on from where runs by another stepper stand."""
+        """Whether runs can continue from the state of runs by another stepper."""
         return _member(self._transient, "TAKES_OVER", False)
 
     def batch(self, points: Sequence[Parameters], stepper: str | None, paused: Sequence[Any] = ()) -> Batch:
@@ -343,7 +344,10 @@ class Model:
         return self._transient.batch(points, stepper, paused)
 
     def forget(self) -> None:
-        """Have the next run march all by itself, as one must whose time is to tell of others."""
+        """Discard cached results so that the next run is computed in full.
+
+        Its time is used to predict others.
+        """
         if self._offers("transient"):
             _member(self._transient, "forget", lambda: None)()
 
@@ -358,7 +362,7 @@ class Model:
         return self._module("exact").exact(parameters, times)
 
     def check_recorded(self, source: str) -> None:
-        """Raise InputError where runs are not judged and recorded; `source` is the file that asks for it."""
+        """Raise InputError if runs are not judged and recorded; `source` is the file that needs it."""
         if not self.is_recorded:
             known = ", ".join(name for name in MODELS if load_model(name).is_recorded)
             raise InputError(

@@ -26,14 +26,14 @@ class Probe(NamedTuple):
 
 
 class Marched:
-    """What a run says of its march: how far it has come, and by what work.
+    """State of a run's march: its progress, and its work.
 
     Attributes
     ----------
     marching : Marching
         The stepper at work on the model's equations.
     failure : (Status, str) or None
-        Why the run does not go on.
+        Why the run cannot continue.
     """
 
     marching: Marching
@@ -64,11 +64,11 @@ class Marched:
         return self.marching.counters()
 
     def paused(self) -> Marched:
-        """What a batch of the same point over a longer time goes on from: the run itself."""
+        """The state from which a batch of the same point over a longer time continues: the run itself."""
         return self
 
     def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
-        """Why a run that reached its end is not to be trusted: its marching has told all."""
+        """Why a run that reached its end fails the checks: its march has checked everything."""
         return None
 
 
@@ -90,7 +90,7 @@ class MarchedRun(Marched):
     displacements : sequence of int
         The unknown that is the displacement [m] at each probe.
     frequency : float
-        The model's fastest undamped vibration [rad/s]: what an explicit step must resolve.
+        The model's fastest undamped vibration [rad/s], which an explicit step must resolve.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ class MarchedRun(Marched):
         Parameters
         ----------
         parameters : mapping
-            Those of the run but for `duration` and `judged_fraction`.
+            Parameters of the run but for `duration` and `judged_fraction`.
         """
         self.parameters = parameters
         self.samples = sample_count(parameters)
@@ -159,7 +159,7 @@ class MarchedRun(Marched):
         Returns
         -------
         (Status, str) or None
-            What has gone wrong, where the run cannot go on.
+            The failure, where the run cannot continue.
         """
         first, last = self.done, min(self.done + samples, self.samples)
         outcome = self.marching.advance(self.rows[first:last])
@@ -179,7 +179,7 @@ class MarchedRun(Marched):
         return f"the step is beyond {self._longest:.3g} s, from where the fastest vibration grows by itself"
 
     def _doubt(self, first: int) -> str | None:
-        """Why the samples from `first` on are none of the model's motion, by what the model knows of it."""
+        """Why the samples from `first` on are none of the model's motion, by the model's own laws."""
         return None
 
 
@@ -227,7 +227,7 @@ class BatchOfOne:
         self.runs[0].advance(samples)
 
     def take_over(self, runs: Sequence[Any]) -> None:
-        """Go on from where a run by another stepper stands; of models with TAKES_OVER.
+        """Continue a run by another stepper; for models with TAKES_OVER.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""A run that a kernel of the model's own marches from sample to sample, and what it has recorded so far."""
+"""A run that a kernel of the model's own marches from sample to sample, and its record so far."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LATEST = 0.01  # [s] before a run ends early in which its steps have to be solve
 class SampledRun:
     """One run, advanced sample by sample.
 
-    A model's run prepares its march, says by `_record` what it records, and fills `_rows`, `_totals` and
+    A model's run prepares its march, gives its record by `_record`, and fills `_rows`, `_totals` and
     `_sums`. The first three counters of its state are steps, iterations, and steps that were not solved.
 
     Parameters
@@ -41,10 +41,10 @@ class SampledRun:
     first_judged : int
         The sample at which the judged part begins.
     failure : (Status, str) or None
-        Why the run does not go on: what has gone wrong, or that the belt slips through, with the status done.
+        Why the run cannot continue: the failure, or that the belt slips through, with the status done.
     """
 
-    _state: Any  # what is marched, with `counters`
+    _state: Any  # the marched state, with `counters`
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         self.interval = 1.0 / parameters["sampling_rate"]
@@ -80,7 +80,7 @@ class SampledRun:
         Parameters
         ----------
         parameters : mapping
-            Those of the run but for `duration` and `judged_fraction`.
+            Parameters of the run but for `duration` and `judged_fraction`.
         """
         self.parameters = parameters
         self.samples, self.risen = sample_count(parameters), start_up_samples(parameters)
@@ -156,5 +156,5 @@ class SampledRun:
         return slice(self.first_judged, self.samples)
 
     def paused(self) -> Any:
-        """What a batch of the same point over a longer time goes on from: the run itself."""
+        """The state from which a batch of the same point over a longer time continues: the run itself."""
         return self

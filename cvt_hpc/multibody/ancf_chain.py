@@ -28,7 +28,7 @@ class Chain(NamedTuple):
     stage_q, stage_v : arrays
         Those of the last stage.
     start_q, start_v : arrays
-        What its implicit Euler step began with.
+        Initial values of its implicit Euler step.
     blocks, columns : LaneArrays
         Equations of `cyclic_blocks`.
     work : LaneArray
@@ -71,7 +71,7 @@ def chain(q: np.ndarray, v: np.ndarray, columns: int = 1) -> Chain:
 
 @kernel
 def begin_stage(chain: Chain, scheme: Scheme, dt: float) -> None:
-    """What a stage starts from, with the speeds at the begin of the step as a guess of its own."""
+    """Initial values of a stage, with the speeds at the begin of the step as a guess of its own."""
     begin(scheme, dt, chain.q, chain.dq, chain.start_q)
     begin(scheme, dt, chain.v, chain.dv, chain.start_v)
     for i in range(chain.q.shape[0]):

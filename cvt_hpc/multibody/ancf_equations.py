@@ -19,7 +19,7 @@ from cvt_hpc.multibody.ancf_beam import PER_NODE, POINTS, SHAPES, WEIGHTS, AncfB
 from cvt_hpc.solvers.cyclic_blocks import DIAGONAL, LOWER, UPPER
 
 SIDE_BY_SIDE = 8  # elements in lanes
-# Fields of an element: what it is called with, then what becomes of that
+# Fields of an element: its input, then its results
 EXTENT, Z, RATE, SPEED, ACCELERATION = 0, 4, 10, 16, 24
 GRADIENTS, LATER = 32, 44  # of both curvatures by z, and those at z + tau dz/dt
 INNER = 56  # slopes of the forces on z, (6, 6)
@@ -34,7 +34,7 @@ FIRST, SECOND = (-2.0 - np.sqrt(3.0), -2.0 + np.sqrt(3.0)), (2.0 - np.sqrt(3.0),
 
 
 def empty_work() -> LaneArray:
-    """Room for what is computed of some elements."""
+    """Work space for the forces of some elements."""
     return LaneArray(1, LOST + 1, SIDE_BY_SIDE)
 
 
@@ -124,7 +124,7 @@ def _gather(beam, into, q, u, start, tau, first):
 
 @kernel
 def _compute(beam, w, tau):
-    """Forces of elements and their slopes, from what `_gather` has put there."""
+    """Forces of elements and their slopes, from the input of `_gather`."""
     m, ea, ei, ca = beam.line_mass, beam.axial_stiffness, beam.bending_stiffness, beam.axial_damping
     l0 = w[0, EXTENT + 1]
     per = 1.0 / l0
@@ -186,7 +186,7 @@ def _compute(beam, w, tau):
                 w[0, field + 1] = fma(both, xy, w[0, field + 1])
                 w[0, field + 6] = fma(both, yx, w[0, field + 6])
                 w[0, field + 7] = fma(both, yy, w[0, field + 7])
-    # of mass; then of what is inside the element
+    # of mass; then of the inside of the element
     for r in range(PER_NODE):
         for x in range(2):
             total = -l0 * m * MASS[r, 0] * w[0, ACCELERATION + x]
@@ -286,7 +286,7 @@ def _damp_across(w, weight):
 
 @kernel
 def _scatter(found, lane, i, j, blocks, columns, column):
-    """Hand over what was computed of an element between nodes i and j; elements in order."""
+    """Hand over the results of an element between nodes i and j; elements in order."""
     matrix = blocks.data
     for r in range(PER_NODE):
         columns.data[i, r, column] += found[FORCE + r, lane]

@@ -77,7 +77,7 @@ class RcmBeam(NamedTuple):
 
 
 class Kinematics(NamedTuple):
-    """What the coordinates of an element say of its shape."""
+    """Shape of an element by its coordinates."""
 
     cos_mean: float
     sin_mean: float
@@ -186,7 +186,7 @@ class LinePoint(NamedTuple):
 
 @kernel
 def line_point(l0: float, q: np.ndarray, s: float, along: np.ndarray, across: np.ndarray) -> LinePoint:
-    """A material point, and what the rates of the coordinates make of its motion.
+    """A material point, and its motion by the rates of the coordinates.
 
     The angle here is that of the line, to which the tangent t and the normal n to its left belong; that of
     the section (`material_point`) differs from it where the slope against the nodes' tangents is not small.

@@ -35,7 +35,7 @@ def torque_limit(mu: Any, axial_force: Any, driving_radius: float, half_wedge_an
 def carried_torque(parameters: Mapping[str, Any]) -> float:
     """Torque at the driving pulley [N m] that friction carries on rigid sheaves.
 
-    By `torque_limit`, with the thrust on the driven pulley, which is the one that a job prescribes, and the
+    By `torque_limit`, with the thrust on the driven pulley, which a job prescribes, and the
     coefficient of `friction_level`.
 
     Parameters
@@ -66,5 +66,5 @@ def friction_level(parameters: Mapping[str, Any]) -> float:
 
 
 def shared_load(parameters: Mapping[str, Any]) -> float:
-    """Torque at the driving pulley [N m] that is the share `load_share` of what friction carries."""
+    """Torque at the driving pulley [N m]: the share `load_share` of the torque that friction carries."""
     return parameters["load_share"] * carried_torque(parameters)

@@ -1,4 +1,4 @@
-"""A sheave whose collar tilts freely before it bears: what a clearance adds to the contact of a wrap.
+"""A sheave whose collar tilts freely before it bears: the effect of a clearance on the contact of a wrap.
 
 With the clearance c, as opening of the groove [m], collar and shaft open it by q = (q_1, q_2), in the
 notation of `compliance.py` and with the collar's compliance kappa = a r^2 / c_tilt,
@@ -6,9 +6,9 @@ notation of `compliance.py` and with the collar's compliance kappa = a r^2 / c_t
     q = (kappa + c / |s|) s,   s = sum_k U_k h_k f_k;   |q| <= c where s = 0.
 
 For a given set of closed stations the forces are linear in an opening c p that is added, p = s / |s|, and
-so is what tilts the sheave: s = s_0 - L p, with s_0 that without clearance, L = c M (I + kappa M)^-1 and M
-the stiffness of the closed stations against tilting [N/m]. With sigma = |s| that is one equation in one
-number,
+so is the tilting force of the sheave: s = s_0 - L p, with s_0 that without clearance, L = c M (I + kappa
+M)^-1 and M the stiffness of the closed stations against tilting [N/m]. With sigma = |s| that is one equation
+in one number,
 
     (sigma I + L) p = s_0,   |p| = 1.
 

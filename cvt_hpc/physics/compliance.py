@@ -48,13 +48,13 @@ INVERSE_11, INVERSE_12, INVERSE_22, ROUND_OFF, SOLVES, UNSOLVED = range(5, 11)
 CLEARANCE, LEAST_LOAD, DIRECTION_ERROR, AXIS_COSINE, AXIS_SINE, LARGER, LESSER = range(11, 18)
 LOOSE_1, LOOSE_2 = range(18, 20)
 
-# Forces are 1e5 N/m and come from openings that are 1 % of their parts: what each precision leaves of them.
+# Forces are 1e5 N/m and come from openings that are 1 % of their parts: the error that each precision leaves.
 _ROUND_OFF = {np.dtype(np.float64): 1e-6, np.dtype(np.float32): 2.0}
 _DIRECTION_ERROR = {np.dtype(np.float64): 1e-13, np.dtype(np.float32): 1e-6}  # some ten roundings
 
 
 class Contact(NamedTuple):
-    """The contact of one wrap of m stations, and what its solver keeps between calls.
+    """The contact of one wrap of m stations, and the data that its solver keeps between calls.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Contacts in lanes: one-sided contact, what a step takes at it, and friction's coefficient and memory."""
+"""Contacts in lanes: one-sided contact, its share in a step, and friction's coefficient and memory."""
 
 from __future__ import annotations
 

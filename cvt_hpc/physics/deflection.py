@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-ROUND_OFF = 1e-6  # of the largest entry: what tables of six digits leave of symmetry
+ROUND_OFF = 1e-6  # of the largest entry: asymmetry left by tables of six digits
 
 
 def cone_flexibilities(
@@ -20,8 +20,8 @@ def cone_flexibilities(
     """Flexibilities of a cone that tilts as a whole, the "sinus approach" (Bullinger et al. 2005, fig. 10).
 
     The axis of tilting is shifted from the centre towards the contact, here the middle of the arc; the paper
-    does not say where along the arc it takes the contact. Tilting about the axis across that opens by
-    r cos(phi) - dr, about the other by r sin(phi), phi from the middle.
+    does not give the place along the arc where it takes the contact. Tilting about the axis across that opens
+    by r cos(phi) - dr, about the other by r sin(phi), phi from the middle.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def interpolated(
 def table_problem(
     angles: Sequence[float], table: Sequence[Sequence[float]], wrap: float
 ) -> tuple[str, str] | None:
-    """What is wrong with a table of flexibilities: expected and found; None where all is well.
+    """Error in a table of flexibilities: expected and found; None if there is none.
 
     Parameters
     ----------

@@ -77,7 +77,7 @@ def elastic_band(
     squeeze = 2.0 * np.tan(half_wedge_angle)
 
     def thrust(wrap: float, stretch: float, step: float, slip: float, pull: float) -> float:
-        # the band that keeps its force, and what the slip adds, integral of F - K = step / wedged
+        # the band that keeps its force, and the part of the slip, integral of F - K = step / wedged
         kept = (stiffness - pull) * (stretch - 1.0) - pull
         slipping = (1.0 - pull / stiffness) * step / wedged
         return (kept * (wrap - slip) + slipping) / squeeze

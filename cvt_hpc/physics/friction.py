@@ -117,18 +117,18 @@ def given_law(parameters: Mapping[str, Any]) -> FrictionLaw:
 
 
 def softened(law: FrictionLaw, share: float) -> FrictionLaw:
-    """Law that falls by a share of what a law does; 0: constant, for a table its least coefficient."""
+    """Law whose fall is a share of a given law's; 0: constant, for a table its least coefficient."""
     least = law.table_mu.min() if law.table_mu.size else 0.0
     return law._replace(gradient=share * law.gradient, table_mu=least + share * (law.table_mu - least))
 
 
-FORMULAS: dict[Law, Callable[..., Any]] = {}  # asked for in this order
+FORMULAS: dict[Law, Callable[..., Any]] = {}  # checked in this order
 
 
 def _formula_of(law: Law) -> Callable[..., Any]:
-    """Note a function as the formula of a law: mu and its slope, from what `law_numbers` prepares and v.
+    """Register a function as the formula of a law: mu and its slope, from the numbers of `law_numbers` and v.
 
-    Kernels that take mu alone do not compute the slope: the compiler drops what nobody reads.
+    Kernels that take mu alone do not compute the slope: the compiler drops unused results.
     """
 
     def note(formula: Callable[..., Any]) -> Callable[..., Any]:
@@ -178,7 +178,7 @@ if missing := set(Law) - {Law.TABLE} - set(FORMULAS):
     raise NotImplementedError(f"friction laws without a formula: {missing}")
 
 
-# `friction_law` refuses what is no law. Should a kernel meet one, the run ends, since its state is not a
+# `friction_law` refuses unknown laws. Should a kernel meet one, the run ends, since its state is not a
 # number: an exception would cost each station a test for it.
 
 
@@ -187,7 +187,7 @@ def _unknown(kind, numbers, speed):
 
 
 def _by_kind(formulas: list[tuple[Law, Any]]) -> Any:
-    """What takes a kind and a formula's numbers: the formula of that kind, for others `_unknown`."""
+    """Function of a kind and a formula's numbers: the formula of that kind, for others `_unknown`."""
     # merged, as a call from an inner loop costs more than the formula
     if not formulas:
         return register_jitable(forceinline=True)(_unknown)
@@ -223,7 +223,7 @@ def formula_coefficient(kind: int, numbers, speed):
     kind : int
         One of `Law`, the same in all lanes; not a number comes of any other.
     numbers
-        What `law_numbers` made of the law's.
+        The numbers of the law by `law_numbers`.
     speed
         Sliding speed, >= 0 [m/s]; lanes or a plain number.
 
@@ -242,7 +242,7 @@ def table_coefficient(table: tuple[np.ndarray, np.ndarray, np.ndarray], speed, f
 
     `table` holds forces (nf,) [N/m], speeds (nv,) [m/s] and coefficients (nf, nv). Kernels of lanes choose
     between it and `formula_coefficient` themselves: handing over the table in an inner loop counts references
-    to its arrays, which costs a fifth of all that is done of sliding. Written as a sum over its intervals, of
+    to its arrays, which costs a fifth of all work on sliding. Written as a sum over its intervals, of
     which each lane fills those below its place. At a knot the slope is that of the interval above.
     """
     table_force, table_speed, table_mu = table

@@ -1,4 +1,4 @@
-"""The friction laws: which there are, the parameters that each reads, and what may be wrong with these.
+"""The friction laws: their names, the parameters that each reads, and the checks of these.
 
 A law is declared by an entry in `Law`; its formula, by which this file cannot be read without a compiler,
 goes into `friction`, whose import fails where one is missing.
@@ -65,7 +65,7 @@ class Law(IntEnum):
     reads : tuple of str
         The parameters that the law reads.
     problems : callable
-        What finds its problems in parameters by name.
+        Finds its problems in parameters by name.
     largest : callable
         Parameters by name -> the largest coefficient [1], which is that of v -> 0+ but for a table.
     """
@@ -103,7 +103,7 @@ def friction_problems(parameters: Mapping[str, Any]) -> Problems:
     Parameters
     ----------
     parameters : mapping
-        Values by name [SI], of which those of the law count.
+        Values by name [SI]; those of the law count.
     """
     return _declared(parameters).problems(parameters)
 
@@ -114,7 +114,7 @@ def friction_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
     Parameters
     ----------
     parameters : mapping
-        Values by name [SI], of which those of the law count.
+        Values by name [SI]; those of the law count.
     """
     reads, setting = _declared(parameters).reads, f"friction_law {parameters['friction_law']}"
     inert = {key: setting for key in _ALL_PARAMETERS if key not in reads}
@@ -129,7 +129,7 @@ def largest_friction(parameters: Mapping[str, Any]) -> float:
     Parameters
     ----------
     parameters : mapping
-        Values by name [SI], of which those of the law count.
+        Values by name [SI]; those of the law count.
     """
     return _declared(parameters).largest(parameters)
 

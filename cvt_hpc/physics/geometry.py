@@ -105,7 +105,7 @@ def driven_radius(ratio: float, belt_length: float, centre_distance: float) -> f
     Raises
     ------
     ValueError
-        If no pulleys fit; the text says which lengths there are.
+        If no pulleys fit; the text states the possible lengths.
     """
 
     def residual_and_slope(radius: float) -> tuple[float, float]:
@@ -129,7 +129,7 @@ def driven_radius(ratio: float, belt_length: float, centre_distance: float) -> f
 def cell_counts(path: Variator, cells: int) -> tuple[int, int, int, int]:
     """Cells of each region of a path in `cells`, equal within a region and nearly equal over all.
 
-    At least four in each of the regions but the driven arc, which takes what the others leave.
+    At least four in each of the regions but the driven arc, which takes the rest.
     """
     driving, strand, _, _ = (max(round(cells * part / path.path_length), 4) for part in path.lengths)
     return driving, strand, cells - driving - 2 * strand, strand
@@ -141,7 +141,7 @@ def variator_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str
     Parameters
     ----------
     parameters : mapping
-        Values by name [SI], of which those that `variator` takes count.
+        Values by name [SI]; those that `variator` takes count.
     """
     p = parameters
     try:

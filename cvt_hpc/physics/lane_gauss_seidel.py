@@ -1,9 +1,9 @@
 """The contact of `compliance` by a few sweeps of projected Gauss-Seidel: how inexact may contact be?
 
 Each station in turn takes the force that closes its gap while all others keep theirs, or none if it would
-have to pull. The kernel of local bending is Markov, so what a station feels of those behind it goes along
-with the sweep, and what it feels of those ahead comes from one pass beforehand: a sweep takes linear time.
-Forces start from those of the last call. How slowly sweeps converge on soft sheaves:
+have to pull. The kernel of local bending is Markov, so the effect on a station of stations behind it goes
+along with the sweep, and the effect of stations ahead comes from one pass beforehand: a sweep takes linear
+time. Forces start from those of the last call. How slowly sweeps converge on soft sheaves:
 tests/edges/test_belt_contact.py.
 """
 

@@ -2,7 +2,7 @@
 
 Surfaces are counted from the saddle, 0, to that between the outermost layer and the elements' ears, n. The
 forces per length g_k = (T_k - m_k v^2) kappa press layer k inward. Layers are in contact with a neighbour or
-not: those that would leave the stack outward bear on the ears.
+not: layers that would leave the stack outward bear on the ears.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def ring_friction(speed, kinetic, falls, static_excess, per_stribeck, per_width,
     Parameters
     ----------
     speed
-        Sliding speed, any sign [m/s]; lanes or a plain number, as all that follow but `falls`.
+        Sliding speed, any sign [m/s]; lanes or a plain number, as all parameters that follow but `falls`.
     kinetic, static_excess
         mu_k, or that times a normal force, which then is in the results, and mu_s / mu_k - 1.
     falls : bool

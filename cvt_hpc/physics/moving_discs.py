@@ -64,7 +64,7 @@ def _constants(modes: Modes, compliance: float) -> np.ndarray:
 
 
 def inert_part(modes: Modes, compliance: float) -> np.ndarray:
-    """What of the flexibilities at rest does not follow within a step, sum (c - B) [m/N], (m, m)."""
+    """The part of the flexibilities at rest that does not follow within a step, sum (c - B) [m/N], (m, m)."""
     if not modes.place.size or compliance == 0.0:
         return np.zeros((modes.shapes.shape[1],) * 2)
     held = compliance * modes.flexibility - _constants(modes, compliance)[:, 0]
@@ -88,7 +88,7 @@ def settle(discs: MovingDiscs, lane: int, modes: Modes, compliance: float, force
 
 @kernel
 def open_gaps(discs: MovingDiscs, stations: Any, gap: int) -> None:
-    """Add what modes open before the force of this step to the gaps of stations, field `gap` [m]."""
+    """Add the opening by modes before the force of this step to the gaps of stations, field `gap` [m]."""
     modes, count, states = discs.place.size, discs.harmonics.size, discs.states
     for h in range(2 * count):
         sine = 1 if h >= count else 0

@@ -82,7 +82,7 @@ def moving_modes(
     step: float,
     wrap: tuple[int, float, float],
 ) -> Modes:
-    """Return the modes of a table that have inertia, those of frequencies up to `limit` [Hz].
+    """Return the modes of a table that have inertia: frequencies up to `limit` [Hz].
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Shafts that bend: stepped beams on elastic bearings, and what their deflection does to a pulley's groove.
+"""Shafts that bend: stepped beams on elastic bearings, and the effect of their deflection on a groove.
 
 **The beam** (Bullinger et al. 2005, sec. 4.2.2) has sections of constant cross section. Between its nodes
 (ends of sections, bearings, places of loads) no load acts, so that deflection is a cubic there and beam
@@ -81,7 +81,7 @@ def beam_flexibility(
     modulus : float
         Young's modulus [N/m^2].
     bearings : sequence of Bearing
-        What holds it.
+        Its supports.
     places : sequence of float
         Positions along the shaft [m].
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from cvt_hpc.physics.ritz import NO_MODES, Modes
 
-STIFFNESS_OF = ("disc", "sheave")  # what `sheave_stiffness` scales
+STIFFNESS_OF = ("disc", "sheave")  # the parts that `sheave_stiffness` scales
 
 
 class Sheaves(NamedTuple):
@@ -37,7 +37,7 @@ class Sheaves(NamedTuple):
         W [m/N] in the place of the local kernel, of discs of the reference stiffness: opening at one station
         under a force at another; empty: the kernel.
     modes : Modes
-        Of the discs, those whose inertia counts; W has them at rest.
+        Discs whose inertia counts; W has them at rest.
     clearance : float
         Opening of the groove [m] by which collar and shaft tilt before they bear.
     """
@@ -122,7 +122,7 @@ def stiffness_factors(parameters: Mapping[str, Any]) -> tuple[float, float]:
     Parameters
     ----------
     parameters : mapping
-        Values by name [SI], of which `sheave_stiffness` and `stiffness_of` count.
+        Values by name [SI]; `sheave_stiffness` and `stiffness_of` count.
     """
     factor = parameters["sheave_stiffness"]
     return (1.0, factor) if parameters["stiffness_of"] == "disc" else (factor, 1.0)

@@ -1,4 +1,4 @@
-"""Hierarchical cubic B-splines on a closed path: a coarse basis everywhere, finer splines where asked.
+"""Hierarchical cubic B-splines on a closed path: a coarse basis everywhere, finer splines where requested.
 
 Finer splines are added and change none of the coarser ones (Bullinger et al. 2005, sec. 5.1, fig. 12): each
 level halves the spacing and takes the splines that sit between those of the level before, which with them

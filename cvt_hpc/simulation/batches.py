@@ -1,4 +1,4 @@
-"""Which runs can advance together, and what they cost."""
+"""Groups of runs that can advance together, and their cost."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cvt_hpc.job import Job
     from cvt_hpc.job.definition import Derived
 
-LEFT_SHARE = 1.0  # what refined and prolonged runs add to a map's cost, as measured by lebrecht_2004.toml
+LEFT_SHARE = 1.0  # extra cost of refined and prolonged runs in a map, as measured by lebrecht_2004.toml
 _MOST_ESTIMATED = 2_000  # runs whose costs are averaged
 BATCH_SECONDS = 30.0  # of computing in a batch, as predicted: so much a process that dies may lose
 Item = TypeVar("Item")
@@ -87,8 +87,8 @@ def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
     Parameters
     ----------
     job : Job
-        A validated job. Its model says by `lanes` how many runs a stepper takes at once, and by `lane_key`
-        of a run's parameters which ones: those with equal keys.
+        A validated job. Its model gives by `lanes` how many runs a stepper takes at once, and by `lane_key`
+        of a run's parameters which ones: runs with equal keys.
     indices : sequence of int
         Run indices.
 
@@ -113,8 +113,8 @@ def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
 def _lane_kinds(job: Job) -> np.ndarray:
     """Number of the lane key of each run, shape (runs,).
 
-    A key follows from the parameters that are read for it. So it is asked for at all places along the axes
-    with which these vary, and along no other axis.
+    A key follows from the parameters that are read for it. It is therefore evaluated at all places along the
+    axes with which these vary, and along no other axis.
     """
     names, model = [axis.name for axis in job.axes], load_model(job.model)
     varied = varied_by(job.rules, names)
@@ -155,7 +155,7 @@ def in_lanes(
     parameters : callable
         Flat parameters of such a run [SI].
     apart : callable
-        What else the runs of a group have in common.
+        Further values that the runs of a group have in common.
     """
     for group in _grouped(model, runs, parameters, apart):
         most = model.lanes(parameters(group[0]), stepper)
@@ -186,7 +186,7 @@ def _batch_size(job: Job, parameters: dict[str, Any]) -> int:
 
 
 def turns(job: Job, runs: int) -> int:
-    """How many groups of lanes a batch does one after the other, those of runs that are left apart.
+    """Number of groups of lanes that a batch does one after the other, including runs that are left apart.
 
     Parameters
     ----------
@@ -204,11 +204,11 @@ def forget(job: Job) -> None:
 
 
 def profile_bytes(job: Job) -> int:
-    """Size of what a kept history of a job has along the belt at each sample, at most [byte]."""
+    """Size of a kept history's values along the belt at each sample, of a job, at most [byte]."""
     model = load_model(job.model)
     return max((model.profile_bytes(job.point(index)) for index in job.histories), default=0)
 
 
 def pilot_share(job: Job) -> float:
-    """Share of a run's simulated time that tells what the whole run costs."""
+    """Share of a run's simulated time from which the cost of the whole run is estimated."""
     return load_model(job.model).pilot_share

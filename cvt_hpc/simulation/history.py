@@ -26,7 +26,7 @@ def simulate(job: Job, at: Assignments | None = None) -> xr.Dataset:
     """Do one run and keep its history.
 
     Where `lanes` is not given, its stations fill the lanes of the registers: it is done sooner than in a
-    sweep, and its numbers are those of the sweep's run but for round-off.
+    sweep, and its numbers are equal to the sweep's run but for round-off.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def simulate(job: Job, at: Assignments | None = None) -> xr.Dataset:
     Returns
     -------
     Dataset
-        The record's names as scalars of the run, and what the model has beyond: of a transient
+        The record's names as scalars of the run, and the model's further data: of a transient
         `displacement` (time, probe), histories over `time`, and means over the judged part by `position`.
 
     Raises
@@ -83,7 +83,7 @@ def run_points_keeping(
 
 
 def _history(job: Job, point: dict[str, Any], run: Any, record: dict[str, Any]) -> xr.Dataset:
-    """A run that has ended, or what was found without one, as a dataset."""
+    """A run that has ended, or a result without a run, as a dataset."""
     import xarray as xr
 
     coordinates = {
@@ -101,6 +101,6 @@ def _history(job: Job, point: dict[str, Any], run: Any, record: dict[str, Any]) 
         POINT_UNITS: json.dumps(dict(job.units)),
     }
     if job.stepper is not None and run is not None:
-        told["judged_fraction"] = run.parameters["judged_fraction"]  # less than asked if prolonged
+        told["judged_fraction"] = run.parameters["judged_fraction"]  # less than requested if prolonged
     dataset = xr.Dataset(variables, coordinates, told)
     return dataset.merge(load_model(job.model).histories(run), combine_attrs="override")

@@ -13,11 +13,11 @@ from cvt_hpc.simulation.open_run import OpenRun
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
-_BETWEEN_POLLS = 0.05  # [s] of computing, after which it is asked whether to stop
+_BETWEEN_POLLS = 0.05  # [s] of computing between checks whether to stop
 
 
 class Interrupted(Exception):
-    """The run was asked to stop before its end; the text says why."""
+    """The run was stopped before its end; the text states the reason."""
 
 
 def march(
@@ -30,9 +30,9 @@ def march(
     batch : Batch
         Of any model.
     until : int, optional
-        Samples of which the last one is the end; by default all.
+        Number of samples to march to; by default all.
     stop : callable, optional
-        Asked every few tens of milliseconds; a text ends the march. Without it the batch is marched in one
+        Called every few tens of milliseconds; a text ends the march. Without it the batch is marched in one
         piece, and nothing but the runs is in the time.
 
     Returns
@@ -40,7 +40,7 @@ def march(
     seconds : float
         Processor time [s].
     stopped : str or None
-        What `stop` has said, where the batch has not come to its end.
+        The text of `stop`, where the batch has not come to its end.
     """
     last = batch.samples if until is None else min(until, batch.samples)
     piece = last if stop is None else 1
@@ -63,7 +63,7 @@ def march_runs(
 ) -> list[tuple[Any, dict[str, Any]]]:
     """Do runs to their records.
 
-    All do their first transient, as many together as there are lanes; then those that are to go on or to be
+    All do their first transient, as many together as there are lanes; then the runs that are prolonged or
     done again fill lanes anew, and so on until none is left.
 
     Parameters
@@ -73,9 +73,9 @@ def march_runs(
     points : sequence of dict
         Flat parameters of the runs [SI].
     interrupt : callable
-        Asked every few tens of milliseconds; a text ends all runs.
+        Called every few tens of milliseconds; a text ends all runs.
     kept : collection of int
-        Places in `points` whose transient is returned; the others are dropped as soon as they are judged.
+        Places in `points` whose transient is returned; the others are dropped after their verdict.
 
     Returns
     -------

@@ -1,9 +1,9 @@
-"""A run on its way to its record: which transient comes next, and what those before it have cost.
+"""A run on its way to its record: its next transient, and the cost of its earlier ones.
 
 Most runs are one transient. A run that fails by its numerics is done again from its start at half the step,
-`most_refinements` times at most. A run that is undecided goes on to twice its time, and again, as long as
-that is within `longest_duration`. A model that may answer by less than the full transient says so in its
-record module (`contract.py`), and what it answers so is neither refined nor prolonged.
+`most_refinements` times at most. A run that is undecided is prolonged to twice its time, and again, as long
+as that is within `longest_duration`. A model that may answer by less than the full transient declares so in
+its record module (`contract.py`), and its answers of this kind are neither refined nor prolonged.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from cvt_hpc.vibration.ramped import ramped
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
-_COST = ("core_seconds", "steps", "contact_solves")  # of a record: those of all tries together
+_COST = ("core_seconds", "steps", "contact_solves")  # of a record: sums over all tries
 
 
 class OpenRun:
@@ -40,7 +40,7 @@ class OpenRun:
     next : dict
         Flat parameters of the transient that comes next [SI].
     paused : object or None
-        The shorter run that the next transient goes on from, by its `paused`; None: it begins anew.
+        The shorter run from which the next transient continues, by its `paused`; None: it begins anew.
     record : dict or None
         Value of each of `record_variables`; None until they are known.
     run : object or None
@@ -118,7 +118,7 @@ class OpenRun:
     def _longer(self, run: Any) -> dict[str, Any] | None:
         """The parameters of a run over twice its time; None where that is too long, or a ramp would end.
 
-        The judged part keeps its share, but begins no sooner than the run was prolonged: what is summed over
+        The judged part keeps its share, but begins no sooner than the run was prolonged: sums over
         the judged part is not known of less than that.
         """
         p = run.parameters
@@ -134,7 +134,7 @@ def _is_undecided(record: dict[str, Any]) -> bool:
 
 
 def _remedy(job: Job, point: dict[str, Any]) -> str:
-    """What may help a run that fails at every step, in words."""
+    """Advice for a run that fails at every step, in words."""
     others = load_model(job.model).steppers
     ways = ['stepper = "explicit"'] if job.stepper == "imex" and "explicit" in others else []
     ways += ["a finer or coarser mesh (stations)"] if "stations" in point else []

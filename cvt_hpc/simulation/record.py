@@ -1,4 +1,4 @@
-"""The record of a run: what it holds, and how it is made of a run that has ended."""
+"""The record of a run: its content, and how it is made of a run that has ended."""
 
 from __future__ import annotations
 
@@ -126,13 +126,13 @@ def record_without_run(job: Job, values: dict[str, Any]) -> dict[str, Any]:
     job : Job
         For its model.
     values : dict
-        What is known.
+        The known values.
     """
     return _blank(job) | values | {"core_seconds": 0.0, "simulated_seconds": 0.0}
 
 
 def record_of_solution(job: Job, solution: Any, solving: float) -> dict[str, Any]:
-    """The record of what a model without a transient has found.
+    """The record of the result of a model without a transient.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def record_of_solution(job: Job, solution: Any, solving: float) -> dict[str, Any
 
 
 def _blank(job: Job) -> dict[str, Any]:
-    """A record in which nothing is known."""
+    """An empty record."""
     sizes = {name: len(c.values) for name, c in record_coordinates(job).items()}
     return {
         v.name: v.blank

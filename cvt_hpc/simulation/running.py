@@ -24,7 +24,7 @@ def run_point(job: Job, point: dict[str, Any], interrupt: Callable[[], str | Non
     point : dict
         Flat parameters of the run [SI].
     interrupt : callable
-        Asked every few tens of milliseconds; a text ends the run.
+        Called every few tens of milliseconds; a text ends the run.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def run_points(
     Returns
     -------
     list of dict
-        Records in the order of the points, each bitwise what `run_point` makes of its point alone.
+        Records in the order of the points, each bitwise equal to `run_point` of its point alone.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def do(
     interrupt: Callable[[], str | None],
     kept: Collection[int] = (),
 ) -> list[tuple[Any, dict[str, Any]]]:
-    """Do a batch of runs as `run_points`; beside each record what `histories` of the model reads, if kept."""
+    """Do a batch of runs as `run_points`; beside each record the input of `histories`, if kept."""
     model = recorded_model(job)
     if job.stepper is None:
         return [_solve(job, model, point, interrupt) for point in points]

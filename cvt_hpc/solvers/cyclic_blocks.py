@@ -81,7 +81,7 @@ def factor(blocks: LaneArray, size: tuple[float, ...]) -> bool:
     Parameters
     ----------
     blocks : (n + 1, 5 b) LaneArray
-        DIAGONAL, LOWER and UPPER of each node; then what `solve` needs.
+        DIAGONAL, LOWER and UPPER of each node; then the input of `solve`.
     size : tuple
         `block_size(b)`.
 
@@ -89,7 +89,7 @@ def factor(blocks: LaneArray, size: tuple[float, ...]) -> bool:
     -------
     bool
         Whether it could be done. If not, the matrix is singular up to rounding, needs exchanges between
-        blocks, or has entries that are not finite; what `blocks` hold then is of no use.
+        blocks, or has entries that are not finite; the content of `blocks` is then of no use.
     """
     b = len(size)
     spare = blocks.rows - 1
@@ -178,7 +178,7 @@ def solve_bordered(
     Returns
     -------
     bool
-        Whether the Schur complement is regular. If not, what the arrays hold then is of no use.
+        Whether the Schur complement is regular. If not, the content of the arrays is of no use.
     """
     n, g, b = rows.shape
     solve(blocks, columns, size)

@@ -34,7 +34,7 @@ def generalised_alpha(spectral_radius: float) -> Scheme:
     Parameters
     ----------
     spectral_radius : float
-        What a step leaves of such a vibration, 0 to 1; 1 is the implicit midpoint rule.
+        Share of such a vibration that a step leaves, 0 to 1; 1 is the implicit midpoint rule.
     """
     alpha_m = 0.5 * (3.0 - spectral_radius) / (1.0 + spectral_radius)
     alpha_f = 1.0 / (1.0 + spectral_radius)

@@ -42,7 +42,7 @@ from cvt_hpc.lanes.blocks import (
 )
 
 # Rows of the scratch, of the same fields as those of blocks:
-# what the separators behind lose of A and f; their couplings V to two nodes in U and S
+# change of A and f by the separators behind; their couplings V to two nodes in U and S
 _SEPARATOR = 0
 # couplings U of two nodes as they were, in A and U; later, separators as those ahead of them see them
 _BEHIND = 1

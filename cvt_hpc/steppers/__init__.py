@@ -1,4 +1,4 @@
-"""Time integration only: one method per module, which declares what a job may set.
+"""Time integration only: one method per module, which declares its parameters in a job.
 
 Steps with the structure of one model live with that model. Every module here offers, beside PARAMETERS,
 

@@ -87,7 +87,7 @@ def _stages(system: System, t: float, step: float, y: np.ndarray, work: Work, co
 
 @kernel
 def _error(system: System, step: float, tolerance: float, y: np.ndarray, work: Work) -> float:
-    """Root mean square of the step's error against what is allowed, [1]."""
+    """Root mean square of the step's error over the allowed error, [1]."""
     total = 0.0
     for i in range(y.size):
         error = 0.0
@@ -124,7 +124,7 @@ def _sample(
         counts[STEPS] += 1
         error = max(error, 1e-10)
         factor = SAFETY * error**-INTEGRAL * work.memory[1] ** PROPORTIONAL
-        # a step that was cut at the end says nothing against a longer one
+        # a step that was cut at the end is no reason against a longer one
         proposed = step * min(max(factor, LEAST_FACTOR), LARGEST_FACTOR)
         work.memory[0] = max(proposed, work.memory[0]) if step == left else proposed
         work.memory[1] = error

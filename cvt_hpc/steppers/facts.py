@@ -1,4 +1,4 @@
-"""What a method of time integration says of itself, and of how a march with it has ended."""
+"""Properties of a method of time integration, and the ways in which a march with it can end."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ STEPS, REJECTED, RATES, JACOBIANS, FACTORISATIONS, SOLVES = range(len(COUNTERS))
 LANES = Parameter(
     "runs",
     "",
-    "what fills the lanes of a register: runs side by side, or stations of one run, done sooner so",
+    "content of the lanes of a register: runs side by side, or stations of one run, which then ends sooner",
     choices=("runs", "stations"),
 )
 
 
 @dataclass(frozen=True)
 class Facts:
-    """What a chooser has to know of a method.
+    """Properties by which a method is chosen.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Facts:
     adaptive : bool
         Takes a tolerance instead of a step.
     needs : frozenset of str
-        What a system must offer: "rates"; "partition" (which unknowns are velocities, and of what);
+        Needs of the method: "rates"; "partition" (which unknowns are velocities, and of which positions);
         "friction" (set-valued forces by their bounds).
     implicit : bool
         Solves linear systems with the Jacobian.
@@ -72,7 +72,7 @@ class Facts:
     stability : str
         The limit of the step, in a sentence.
     damping : str
-        What the method does to a vibration, in a sentence.
+        Effect of the method on a vibration, in a sentence.
     rest_limit : float
         Largest step times the rate at which smoothed friction stops sliding, N mu / (m v_reg), with which
         sliding comes to rest [1].

@@ -1,4 +1,4 @@
-"""How fast the fastest motion of a system is: what limits the step of an explicit method.
+"""The rate of the fastest motion of a system, which limits the step of an explicit method.
 
 Beyond its limit an explicit step need not diverge. Where friction saturates it hums from step to step
 instead, and slow motions are wrong by no visible cause: so the limit is looked at, and not the result.

@@ -19,7 +19,7 @@ class Marching:
     Parameters
     ----------
     stepper : str
-        A name in `STEPPERS`, of those that march by themselves.
+        A name in `STEPPERS`, of a stepper that marches by itself.
     parameters : mapping
         Flat parameters of a run [SI], the method's among them.
     system : System or SetValuedSystem
@@ -56,7 +56,7 @@ class Marching:
         self._counts = np.zeros(len(COUNTERS), dtype=np.int64)
 
     def tell(self, **options: Any) -> None:
-        """Tell an integrator of SciPy more of the system, such as its Jacobian by `jac`."""
+        """Give an integrator of SciPy further facts on the system, such as its Jacobian by `jac`."""
         self._work.options |= options
 
     def begin(self, time: float, state: np.ndarray) -> None:
@@ -97,7 +97,7 @@ class Marching:
 
     @property
     def step(self) -> float:
-        """Mean time step so far [s]; before the first one the step that was asked for, nan if none was."""
+        """Mean time step so far [s]; before the first one the requested step, nan if there was none."""
         if not self.steps:
             return float(getattr(self._control, "step", np.nan))
         return (self.time - self._begun) / self.steps
@@ -107,7 +107,7 @@ class Marching:
         return dict(zip(COUNTERS, map(int, self._counts), strict=True))
 
     def explain(self, outcome: Result) -> str:
-        """Say in words how a march has ended, with what was tried.
+        """Describe in words how a march has ended, and the attempted steps.
 
         Parameters
         ----------

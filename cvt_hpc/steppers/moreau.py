@@ -55,7 +55,7 @@ class Work(NamedTuple):
     Attributes
     ----------
     rates : (n,) array
-        Rates; then what the smooth forces add to the unknowns.
+        Rates; then the effect of the smooth forces on the unknowns.
     moves : (n,) bool array
         Unknowns that are no positions.
     held : (c,) bool array

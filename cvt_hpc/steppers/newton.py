@@ -2,14 +2,14 @@
 
 The inverse of I - shift J is kept as long as each pass reduces the correction to half or less, and ends in
 fewer passes than a new Jacobian costs evaluations; else J is taken anew where the iteration stands. Should
-that not suffice, the way along the correction is bisected until what is left shrinks (natural monotonicity
+that not suffice, the way along the correction is bisected until the remainder shrinks (natural monotonicity
 test, Deuflhard 2004, sec. 3.3). So the sharp bends of regularised friction are found from far off. Where
 nothing shrinks it, the iteration leaps by the whole correction: so it gets away from sticking when the pull
 has just grown too large for it, and only the slip far off is a solution.
 
 Where friction falls too steeply, the equations have several solutions, and the one found is not that to which
 the motion leads. A Newton iteration with one matrix that converges does so where the determinant of I - shift
-J has that matrix's sign, so that it is asked once for each matrix (`frozen_jacobian`).
+J has that matrix's sign, so that it is checked once for each matrix (`frozen_jacobian`).
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ LARGEST_MISS = 0.25
 
 
 class Work(NamedTuple):
-    """Matrix; rates at both stages, both k, what the matrix missed, state of the second stage, (n,) each."""
+    """Matrix; rates at both stages, both k, the matrix' error, state of the second stage, (n,) each."""
 
     frozen: Frozen
     first: np.ndarray

@@ -1,8 +1,8 @@
 """The classical Runge-Kutta method with a fixed step.
 
 Order 4, four stages, explicit. Its stability region reaches 2.785 along the negative real axis and 2.828
-along the imaginary one. It is not for stiff friction, and it damps what it cannot resolve: a vibration of
-frequency w decays by itself at a rate of (step w)^6 / (144 step).
+along the imaginary one. It is not for stiff friction, and it damps motion that it cannot resolve: a vibration
+of frequency w decays by itself at a rate of (step w)^6 / (144 step).
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Orders 1 to 12 (Adams) and 1 to 5 (backward differences), chosen as it goes; multistep, adaptive. A yardstick
 that people know, not one of the family: called from Python, with a full matrix by difference quotients (which
-count as evaluations of the rates; it does not tell how many matrices it made).
+count as evaluations of the rates; it does not report how many matrices it made).
 """
 
 from __future__ import annotations

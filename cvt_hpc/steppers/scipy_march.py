@@ -17,7 +17,7 @@ from cvt_hpc.steppers.facts import FACTORISATIONS, JACOBIANS, RATES, STEPS, Fact
 from cvt_hpc.steppers.settings import MOST_STEPS, TOLERANCE, Tolerance, tolerance
 from cvt_hpc.steppers.system import System
 
-# What the three have in common; each says what is its own.
+# Common facts of the three; each states its own.
 FACTS = Facts(
     order=5,
     order_at_events=None,
@@ -33,12 +33,12 @@ control = tolerance
 
 
 class Work:
-    """An integrator with what it has to remember.
+    """An integrator with the data that it keeps.
 
     Attributes
     ----------
     options : dict
-        What else the integrator is told of the system, such as `jac`; may be set before the first march.
+        Further facts on the system, such as `jac`; may be set before the first march.
     solver : OdeSolver or None
         None until it is started.
     time, state
@@ -76,7 +76,7 @@ class Work:
         self.solver = method(rates, time, y.copy(), np.inf, **allowed, **self.options)
 
     def count(self, counts: np.ndarray) -> None:
-        """Add to the work counters what has been done since the last call."""
+        """Add the work since the last call to the counters."""
         now = np.array([self.evaluations, self.solver.njev, self.solver.nlu])
         counts[[RATES, JACOBIANS, FACTORISATIONS]] += now - self.counted
         self.counted = now
@@ -112,7 +112,7 @@ def march_by(
     int
         A `Result`.
     """
-    # what SciPy and its rates say in warnings, the code that is returned says as well
+    # warnings of SciPy and its rates repeat the returned code
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         try:
@@ -125,7 +125,7 @@ def march_by(
                     return int(outcome)
                 clock[0] += interval
                 rows[k] = y
-        except (ValueError, np.linalg.LinAlgError):  # matrices that hold what is no number
+        except (ValueError, np.linalg.LinAlgError):  # matrices with entries that are not numbers
             return int(Result.NOT_FINITE if work.known else Result.NO_VALUE)
         finally:
             if work.solver is not None:

@@ -1,7 +1,7 @@
 """A diagonally implicit Runge-Kutta method with one coefficient on its diagonal (Alexander 1977).
 
 Order 3, three stages of one matrix, L-stable and stiffly accurate: the last stage is the new state, so that
-what is much faster than the step is in balance after it. A vibration of frequency w is damped in third order,
+motion much faster than the step is in balance after it. A vibration of frequency w is damped in third order,
 at the rate 0.0259 step^3 w^4. A motion that grows by exp(z) in a step grows by
 
     R = (1 + (1 - 3 g) z + (1/2 - 3 g + 3 g^2) z^2) / (1 - g z)^3,

@@ -1,4 +1,4 @@
-"""What a job may set of a method: the entries that several methods share, once."""
+"""Parameters of a method that a job may set: the entries that several methods share, once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a stepper is given: rates of change with their constants, and what it has to know of the unknowns."""
+"""The input of a stepper: rates of change with their constants, and facts on the unknowns."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class System(NamedTuple):
         rates(constants, t, y, out) -> bool: writes f(t, y) into `out` (n,); False where there is no value,
         such as that of a contact without a solution.
     constants : NamedTuple
-        What `rates` reads.
+        Input of `rates`.
     velocities : (n,) bool array
         Unknowns that partitioned methods advance first.
     position_of : (n,) int array
@@ -40,8 +40,8 @@ class System(NamedTuple):
 class SetValuedSystem(NamedTuple):
     """A `System` with c forces that are known by bounds only: dry friction, contact of rigid bodies.
 
-    Each acts on a relative speed s = directions y + (what does not depend on y) and stays between its bounds:
-    it is whatever makes s = -restitution s_before where it can, else at the bound that comes nearest.
+    Each acts on a relative speed s = directions y + (terms that do not depend on y) and stays between its
+    bounds: it is whatever makes s = -restitution s_before where it can, else at the bound that comes nearest.
 
     Attributes
     ----------

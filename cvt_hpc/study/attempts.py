@@ -46,11 +46,11 @@ def plan_runs(
     Parameters
     ----------
     job : Job
-        What is run.
+        The job that is run.
     simulator : Simulator
-        What does the runs.
+        Does the runs.
     records : Records
-        What is on record; no run in it is to be given up.
+        The runs on record; no run in it is to be given up.
     asked : numpy.ndarray of bool, shape (runs,)
         Which runs are to be on record in the end.
     ranks : int
@@ -84,9 +84,9 @@ def predicted_costs(job: Job, simulator: Simulator, steps: Mapping[int, float]) 
     Parameters
     ----------
     job : Job
-        What is run.
+        The job that is run.
     simulator : Simulator
-        What does the runs.
+        Does the runs.
     steps : mapping
         Time steps [s] of the runs that do not take that of the job, by run index: as much longer they take.
     """
@@ -106,7 +106,7 @@ def _by_step(runs: list[int], steps: Mapping[int, float]) -> Iterable[list[int]]
 
 
 def given_up(records: Records, asked: np.ndarray) -> dict[int, str]:
-    """Return the runs, of those that `asked` marks, that are not to be tried again, with the reason."""
+    """Return the runs, among those marked in `asked`, that are not tried again, with the reason."""
     lost = np.flatnonzero(asked & ~records.recorded & (records.died_alone >= DEATHS_ALONE))
     return {
         int(index): f"its process died {records.died[index]} times, the last "
@@ -118,13 +118,13 @@ def given_up(records: Records, asked: np.ndarray) -> dict[int, str]:
 def runs_to_repeat(records: Records, asked: np.ndarray, statuses: Collection[Status]) -> np.ndarray:
     """Return the indices of recorded runs that a retry begins again.
 
-    None while runs are left of a sweep in which an earlier retry was begun: the same command, given again
-    after an early end, goes on instead of beginning anew.
+    None while runs are left of a sweep in which an earlier retry began: the same command, given again
+    after an early end, continues instead of beginning anew.
 
     Parameters
     ----------
     records : Records
-        What is on record.
+        The runs on record.
     asked : numpy.ndarray of bool, shape (runs,)
         Which runs are in question.
     statuses : collection of Status
@@ -145,10 +145,10 @@ def enter_attempts(
     session: dict[str, Any],
     refine: float = 1.0,
 ) -> Records:
-    """Record which runs are given up and which are begun again, and return the records as they are then.
+    """Record which runs are given up and which begin again, and return the records as they are then.
 
-    Only of those that `asked`, shape (runs,), marks: others may be at work just now. The factor `refine`, by
-    which the retries shorten their time step, is kept with them, so that whoever goes on does the same.
+    Only of runs marked in `asked`, shape (runs,): others may be at work just now. The factor `refine`, by
+    which the retries shorten their time step, is kept with them, so that a continuation does the same.
     """
     lost, again = given_up(records, asked), runs_to_repeat(records, asked, retry)
     if not lost and not len(again):

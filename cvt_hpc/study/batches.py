@@ -1,12 +1,12 @@
-"""Which runs are done together, and in which order: full lanes, but no rank without work.
+"""The runs that are done together, and their order: full lanes, but no rank without work.
 
 Runs that advance together take little longer than one of them alone, so full lanes cost the least processor
-time. A batch fills the lanes several times, one turn after the other, and then again with those of its runs
-that need more than one transient: the more turns, the fuller. But each batch is done by one rank. So batches
-have no more turns than leave `PER_RANK` of them for each rank. Where even batches of one turn are fewer than
-ranks they are cut, as evenly and as far as all can still be done at once: the sweep ends sooner, or at worst
-at the same time, since few lanes take no longer than all; the price is processor time of ranks that would
-have waited.
+time. A batch fills the lanes several times. Each filling is a turn. Runs that need more than one transient
+then fill the lanes again; with more turns these lanes are fuller. But each batch is done by one rank. The
+number of turns is therefore limited, so that each rank has `PER_RANK` batches. Where even batches of one turn
+are fewer than ranks they are cut, as evenly and as far as all can still be done at once. The sweep then ends
+sooner, or at worst at the same time, since few lanes take no longer than all. The price is processor time of
+ranks that would have waited.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ PER_RANK = 2  # batches, so that ranks end at about the same time
 
 
 class Assignment(NamedTuple):
-    """What one claim gets.
+    """The result of one claim.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Assignment(NamedTuple):
     alone: bool = False
 
     def parts(self) -> list[Assignment]:
-        """Return what is to be done at a time."""
+        """Return the runs of each batch."""
         return [Assignment((index,), alone=True) for index in self.runs] if self.alone else [self]
 
 
@@ -61,7 +61,7 @@ def batch_cost(batch: Batch, costs: np.ndarray, turns: Turns = one_turn) -> floa
 
 
 def share_out(groups: Sequence[Batch], costs: np.ndarray, ranks: int, turns: Turns = one_turn) -> list[Batch]:
-    """Return the batches of a sweep in the order in which they are to be started.
+    """Return the batches of a sweep in the order in which they start.
 
     The longest comes first, so that no rank is left with a long one at the end. Order and batches are a
     matter of speed alone, never of results: the numbers of a run depend on its index only.

@@ -1,7 +1,7 @@
 """The values of results.nc: read block by block, compressed by all cores, written chunk by chunk.
 
-HDF5 compresses in one thread, and searches digits that look random for repetitions. What is written here are
-chunks as its filters shuffle and deflate would have made them, so that every netCDF library reads them.
+HDF5 compresses in one thread, and searches digits that look random for repetitions. The chunks written here
+are chunks as its filters shuffle and deflate would have made them, so that every netCDF library reads them.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ CHUNK = 1 << 17  # [bytes] at most; a map takes some hundred of them, the spectr
 
 
 def chunk_shape(study: Study, name: str) -> tuple[int, ...]:
-    """Return the chunks in which a quantity is stored: runs that follow each other, and all of each run."""
+    """Return the chunks in which a quantity is stored: neighbouring runs, each of them whole."""
     dtype = study.record_dtype[name]
     grid = contiguous_part(study.shape, min(CHUNK // dtype.itemsize, block_length(study)))
     return grid + (dtype.shape if dtype.kind != "S" else (dtype.itemsize,))
@@ -53,7 +53,7 @@ def fill(path: Path, study: Study, records: Records) -> None:
     path : Path
         A netCDF-4 file with the quantities as `chunk_shape` has them, shuffled and deflated.
     study : Study
-        What the quantities are.
+        The quantities.
     records : Records
         Their values.
     """

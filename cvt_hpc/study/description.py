@@ -1,4 +1,4 @@
-"""What a study consists of, as its folder keeps it: enough to read and gather it without the model."""
+"""The content of a study, as its folder keeps it: enough to read and gather it without the model."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ class Study:
     job : dict
         The whole resolved job, as JSON types.
     axes : tuple of Dimension
-        What is varied: a grid, through which run indices count in C order, or the values of all samples.
+        The varied values: a grid, through which run indices count in C order, or the values of all samples.
         Empty for a single run.
     variables : tuple of Variable
         The quantities of a record, `status` first.
     coordinates : tuple of Dimension
         Dimensions of the variables beside the grid.
     derived : tuple of DerivedCoordinate
-        Parameters that follow from the axes, but for those of more than `MOST_DERIVED` values.
+        Parameters that follow from the axes, except those with more than `MOST_DERIVED` values.
     """
 
     name: str
@@ -66,12 +66,12 @@ class Study:
 
     @property
     def is_traced(self) -> bool:
-        """Whether the runs depend on what earlier ones have found."""
+        """Whether the runs depend on the results of earlier ones."""
         return "first_spacing" in self.design
 
     @property
     def dims(self) -> tuple[str, ...]:
-        """Names of the dimensions along which the runs lie: those of the axes, or `run` for samples."""
+        """Names of the dimensions along which the runs lie: the axes, or `run` for samples."""
         return ("run",) if self.is_sampled else tuple(axis.name for axis in self.axes)
 
     @property
@@ -81,7 +81,7 @@ class Study:
 
     @property
     def size(self) -> int:
-        """Number of runs; of a trace, of those that it chooses from."""
+        """Number of runs; of a trace, of all runs that it chooses from."""
         return math.prod(self.shape)
 
     @cached_property
@@ -91,7 +91,7 @@ class Study:
 
     @property
     def record_names(self) -> tuple[str, ...]:
-        """What a record holds, by its names in `record_dtype`."""
+        """Quantities of a record, by their names in `record_dtype`."""
         return self.record_dtype.names or ()
 
     def place(self, index: int) -> dict[str, Any]:
@@ -108,14 +108,14 @@ class Study:
         )
 
     def blank_rows(self, shape: int | tuple[int, ...] = ()) -> np.ndarray:
-        """Return records of runs of which nothing is known."""
+        """Return empty records of runs."""
         rows = np.zeros(shape, self.record_dtype)
         for variable in self.variables:
             rows[variable.name] = variable.blank
         return rows
 
     def pack(self, values: Mapping[str, Any]) -> np.ndarray:
-        """Return the record, shape (), of what a run delivered.
+        """Return the record, shape (), of a run's result.
 
         Raises
         ------

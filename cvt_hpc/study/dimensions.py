@@ -49,7 +49,7 @@ class Dimension:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Those of its coordinate in a dataset."""
+        """Attributes of its coordinate in a dataset."""
         spacing = {"spacing": self.spacing} if self.spacing == "log" else {}
         job_units = {JOB_UNITS: self.job_units} if self.job_units else {}
         return attributes(self.long_name, self.units, self.comment) | spacing | job_units
@@ -70,7 +70,7 @@ class Dimension:
         entry = dict(entry)
         if not entry.pop("texts"):
             entry["values"] = [float(v) if isinstance(v, str) else v for v in entry["values"]]
-        # folders of earlier versions have fewer keys, and those that are left out have defaults
+        # folders of earlier versions have fewer keys; missing ones have defaults
         fields: dict[str, Any] = {
             key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()
         }
@@ -98,7 +98,7 @@ class DerivedCoordinate(Dimension):
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Those of its coordinate in a dataset: with how it follows."""
+        """Attributes of its coordinate in a dataset: with the formula by which it follows."""
         return super().attributes | {"derived": self.follows}
 
 
@@ -117,7 +117,7 @@ def derived_coordinate(derived: Derived, job: Job) -> DerivedCoordinate:
 
 
 def _named(varied: Axis | Derived, job: Job) -> dict[str, str]:
-    """Return what a coordinate tells people."""
+    """Return the label of a coordinate for people."""
     named = {"long_name": _in_words(varied.name), "comment": varied.description}
     return named | {"job_units": job.units.get(varied.name, "")}
 

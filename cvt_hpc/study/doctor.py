@@ -32,9 +32,9 @@ class Finding(NamedTuple):
     fine : bool
         Whether sweeps work with it.
     what, found : str
-        What it is, and what was found.
+        The object of the check, and its finding.
     advice : str
-        What to do, or what follows; "" where there is nothing to say.
+        The next action, or the consequence; "" where there is none.
     """
 
     fine: bool
@@ -44,7 +44,7 @@ class Finding(NamedTuple):
 
 
 def examine(folder: Path) -> Iterator[Finding]:
-    """Yield what was found of this machine, with `folder` as the place where studies are to lie."""
+    """Yield the findings about this machine, with `folder` as the place where studies are to lie."""
     found = versions()
     yield Finding(True, "versions", ", ".join(f"{name} {version}" for name, version in found.items()))
     yield _cores()

@@ -1,4 +1,4 @@
-"""The output folder of a study: what lies where, and how its records tell whose they are."""
+"""The output folder of a study: its files, and the origin of its records."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _PART_LOCKS = ".part-*.lock"
 
 
 def study_instead(path: Path) -> str:
-    """Return what to do where no study is found: take that of the nearest name beside it, or make one."""
+    """Return advice where no study is found: take that of the nearest name beside it, or make one."""
     if path.suffix == ".toml":
         return f"`cvt-hpc run {path}` computes its results, in out/NAME unless --out says otherwise"
     beside = [str(folder.parent) for folder in path.parent.glob("*/job.json")]
@@ -102,11 +102,11 @@ class StudyFolder(OutputFolder[Study]):
         return [*self.path.glob(".results.nc.*.part"), *super().leftovers()]
 
     def half_histories(self) -> list[Path]:
-        """Return the same of histories; only who is alone at work can tell them from those being written."""
+        """Return the same of histories; only a process that works alone can separate unfinished ones."""
         return [*self._inside(self.histories, ".run-*.nc.*.part")]
 
     def document(self, content: Study) -> dict[str, Any]:
-        """Return what job.json says of a study."""
+        """Return the content of a study's job.json."""
         return content.to_json()
 
     def accept(self, entry: dict[str, Any]) -> Study:
@@ -124,11 +124,11 @@ class StudyFolder(OutputFolder[Study]):
         refuse_other(self.path, found, asked)
 
     def agrees(self, found: Study, asked: Study) -> bool:
-        """Return whether two studies of one fingerprint agree in all that has to do with numbers."""
+        """Return whether two studies of one fingerprint agree in all entries that determine numbers."""
         return _numbers(found) == _numbers(asked)
 
     def unexplained(self) -> str | None:
-        """Return what is here that only a job.json explains; hidden files are probes of another start."""
+        """Return files that only a job.json explains; hidden files are probes of another start."""
         for path in (self.results, self.records):
             if (kind := kind_of(path)) == "a folder":
                 kind = next((path.name for path in path.iterdir() if path.name[0] != "."), None)
@@ -137,13 +137,13 @@ class StudyFolder(OutputFolder[Study]):
         return None
 
     def results_tell(self) -> Callable[[Study], bool] | None:
-        """Return what tells whether the logs are of a study; None if there are none, of whatever job."""
+        """Return a function that decides whether the logs are of a study; None if there are none."""
         if not self._has_logs():
             return None
         return lambda study: bool(read_records(self.records, study).recorded.any())
 
     def written(self, found: Study | None) -> Iterator[Path]:
-        """Yield what runs have left: results, histories, records."""
+        """Yield the files that runs have left: results, histories, records."""
         yield from (self.results, self.crash_log, *self.path.glob(_PART_LOCKS))
         yield from self._inside(self.histories, "run-*.nc")
         yield from self.half_histories()

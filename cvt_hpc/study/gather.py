@@ -75,9 +75,9 @@ def gather_records(
     Parameters
     ----------
     folder, study
-        What is gathered.
+        The study that is gathered.
     interrupt : callable
-        Tells why not to wait for another process that gathers, None if to wait.
+        Returns a reason not to wait for another process that gathers, None to wait.
 
     Raises
     ------

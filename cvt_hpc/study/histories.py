@@ -32,9 +32,9 @@ def keep_histories(folder: StudyFolder, histories: Iterable[tuple[int, xr.Datase
 
 
 def leave_out_missing(job: Job, folder: StudyFolder, records: Records) -> None:
-    """Count runs as not recorded that are done, but whose history is wanted and not there; the logs stay.
+    """Mark runs as not recorded that are done, but lack a requested history; the logs stay.
 
-    It was asked for later, or has been removed.
+    The history was requested later, or has been removed.
     """
     done = records.status == Status.DONE
     missing = [index for index in job.histories if done[index] and not folder.history(index).exists()]

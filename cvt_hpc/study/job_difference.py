@@ -1,4 +1,4 @@
-"""In what the job of an output folder differs from the one that is asked for."""
+"""Differences between the job of an output folder and the requested one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cvt_hpc.study.description import Study
 
 
 def refuse_other(path: Path, found: Study, asked: Study) -> None:
-    """Raise InputError unless the study that a folder holds is the one that is asked for."""
+    """Raise InputError unless the study in a folder is the requested one."""
     if found.fingerprint != asked.fingerprint:
         raise another_job(path, found.job, asked.job, f"job {found.name}: ")
     if _layout(found) != _layout(asked):
@@ -47,7 +47,7 @@ def differences(one: dict[str, Any], other: dict[str, Any]) -> dict[str, tuple[A
 
 
 def _layout(study: Study) -> dict[str, Any]:
-    """Return what records must agree in to be of one dataset."""
+    """Return the entries in which records must agree to be of one dataset."""
     return {
         "quantities": [(v.name, v.dims, v.dtype) for v in study.variables],
         "coordinates": [(dimension.name, dimension.values) for dimension in study.coordinates],

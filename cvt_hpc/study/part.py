@@ -28,7 +28,7 @@ class Part(NamedTuple):
         return f"{self.number}/{self.parts}"
 
     def holds(self, index: np.ndarray) -> np.ndarray:
-        """Return whether runs belong to this part, by their index alone: no start has to ask another.
+        """Return whether runs belong to this part, by their index alone, without communication.
 
         The runs are dealt out in turn, and each round begins one part further: otherwise an axis with as many
         values as there are parts would give all runs at its costliest value to one of them.

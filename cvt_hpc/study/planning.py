@@ -1,4 +1,4 @@
-"""What a start of a sweep finds on record and plans to do; on rank 0 alone."""
+"""The records that a start of a sweep finds, and its plan; on rank 0 alone."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ _logger = logging.getLogger(__name__)
 
 
 class Plan(NamedTuple):
-    """What rank 0 finds out and all ranks need."""
+    """The findings of rank 0 that all ranks need."""
 
     assignments: list[Assignment]
-    attempts: dict[int, int]  # of runs that were begun again
+    attempts: dict[int, int]  # of runs that began again
     steps: dict[int, float]  # [s], of runs that do not take the time step of the job
     costs: np.ndarray  # shape (runs,), as they are predicted
     fit: Fit
@@ -61,7 +61,7 @@ def prepare(
     held: ExitStack,
     refine: float | None = None,
 ) -> Plan:
-    """Take the folder into possession and find what is left to do; on rank 0 alone."""
+    """Take the folder into possession and find the runs that are left to do; on rank 0 alone."""
     study = task.study
     inner = None if part is None else folder.part_lock(part)
     held.enter_context(folder.claimed(study, fresh=fresh, inner=inner))
@@ -96,7 +96,7 @@ def prepare(
 
 
 def asked_runs(task: Task, records: Records, part: Part | None = None) -> np.ndarray:
-    """Return whether a run is one of this start, shape (runs,); a trace comes to ask for more."""
+    """Return whether a run belongs to this start, shape (runs,); a trace requires more later."""
     if part is not None:
         return part.holds(np.arange(task.study.size))
     if task.chosen is not None:
@@ -109,12 +109,12 @@ def asked_runs(task: Task, records: Records, part: Part | None = None) -> np.nda
 def next_round(
     folder: StudyFolder, task: Task, plan: Plan, ranks: int, counter: Counter, display: Progress
 ) -> Plan:
-    """Return the plan of what a trace asks for after the runs of a round; on rank 0 alone.
+    """Return the plan of the runs that a trace requires after the runs of a round; on rank 0 alone.
 
     Raises
     ------
     RuntimeError
-        If a run of that round is not on record: to ask for it once more would never end.
+        If a run of that round is not on record: requesting it once more would never end.
     """
     records = read_records(folder.records, task.study)
     lost = [

@@ -1,6 +1,6 @@
 """A sample of a study's runs, done again another way, to see how far its results depend on the way.
 
-The sample is drawn by the runs' indices: whoever goes on with a study, or asks for a larger share, goes on
+The sample is drawn by the runs' indices: a continued study, or a larger share, continues
 with the same sample. Its runs are a study of their own, in a folder of that of the first one.
 """
 
@@ -45,7 +45,7 @@ class Repeat:
     Attributes
     ----------
     label : str
-        What it is called in messages.
+        Its name in messages.
     way : str
         How the runs are done again, in words.
     first : Job
@@ -59,11 +59,11 @@ class Repeat:
     fraction : float
         Share of the eligible runs that is done again; one run at least, if any is eligible.
     eligible : callable
-        Tells of the records of the first study which runs may be drawn, shape (runs,).
+        Returns by the records of the first study the runs that may be drawn, shape (runs,).
     core_seconds : callable
-        Tells what a run that is done again is expected to take [core-seconds], mean over the job.
+        Returns the expected cost of a repeated run [core-seconds], mean over the job.
     steps : callable
-        Tells of these records, and of the indices of drawn runs, the time step [s] of those that are not to
+        Returns by these records and the indices of drawn runs the time step [s] of runs that are not to
         take that of `job`, by index.
     """
 
@@ -90,7 +90,7 @@ class Repeat:
 
     @cached_property
     def records(self) -> Records:
-        """Records of the first study, as they are when they are first asked for."""
+        """Records of the first study, as they are at the first access."""
         return read_records(StudyFolder(self.out).records, self.study)
 
     @cached_property

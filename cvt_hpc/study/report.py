@@ -53,8 +53,8 @@ class RunReport:
     results : Path or None
         The dataset in it; None where another part is at work, and will gather it.
     total, done, remaining : int
-        Number of runs, of the part where one was asked for: all, with results, not yet run. While runs of a
-        trace remain, they may ask for more.
+        Number of runs, of the part where one was requested: all, with results, not yet run. While runs of a
+        trace remain, it may require more.
     failed : tuple of FailedRun
         The runs that ended without results.
     stopped : str or None
@@ -64,8 +64,8 @@ class RunReport:
     unneeded : int
         Number of cells of the grid that a trace does not run.
     undecided, slipping, irregular : int
-        Number of runs with results that were too short to tell, under more load than friction carries, and
-        of irregular motion.
+        Number of runs with results that were too short to be decided, under more load than friction carries,
+        and of irregular motion.
     """
 
     out: Path
@@ -83,7 +83,7 @@ class RunReport:
 
     @property
     def exit_status(self) -> int:
-        """Return 0 if all runs are done, 1 if some failed, 99 if some remain: the same command goes on.
+        """Return 0 if all runs are done, 1 if some failed, 99 if some remain: the same command continues.
 
         98 if some remain and none has ended since the start: the same command may get no further.
         """
@@ -101,7 +101,7 @@ def build_report(
     gained: int,
     stopped: str | None,
 ) -> RunReport:
-    """Return the report of a sweep of the runs that `asked`, shape (runs,), marks."""
+    """Return the report of a sweep of the runs marked in `asked`, shape (runs,)."""
     status = records.status
     without_results = np.flatnonzero(asked & records.recorded & (status != Status.DONE))
     reasons = records.read(without_results, "reason")
@@ -130,7 +130,7 @@ def build_report(
 
 
 def count_special(records: Records, asked: np.ndarray | None = None) -> dict[str, int]:
-    """Return how many runs with results are no plain yes or no, of those that `asked` marks, or of all."""
+    """Return how many runs with results are no plain yes or no, among those marked in `asked`, or all."""
     is_done = records.status == Status.DONE
     done = np.flatnonzero(is_done if asked is None else is_done & asked)
     verdicts = records.read(done, "vibrates")

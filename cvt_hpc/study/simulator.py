@@ -1,4 +1,4 @@
-"""What a sweep asks of its runs, so that tests can put something small in the place of the mechanics."""
+"""The interface of a sweep to its runs, so that tests can replace the mechanics by something small."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Simulator(Protocol):
-    """What a sweep needs to know of its runs; the module `cvt_hpc.simulation` satisfies it."""
+    """The functions that a sweep needs; the module `cvt_hpc.simulation` satisfies it."""
 
     Interrupted: type[Exception]
 
@@ -37,10 +37,10 @@ class Simulator(Protocol):
         """Return how many groups of lanes a batch of so many runs does one after the other."""
 
     def pilot_share(self, job: Job) -> float:
-        """Return the share of a run's simulated time that tells what the whole run costs."""
+        """Return the share of a run's simulated time from which the cost of the whole run is estimated."""
 
     def profile_bytes(self, job: Job) -> int:
-        """Return the size of what a kept history has along the belt at each sample, at most [byte]."""
+        """Return the size of a kept history's values along the belt at each sample, at most [byte]."""
 
     def forget(self, job: Job) -> None:
         """Have the next batch take its full time, whatever runs before it have left."""

@@ -35,7 +35,7 @@ class StudyStatus:
         Of the job.
     total, done, failed, left : int
         Number of runs: all that are needed, with results, ended without results, not yet recorded. While runs
-        of a trace are left, they may ask for more.
+        of a trace are left, it may require more.
     running : bool
         Whether a sweep is at work in the folder now.
     rate : float or None
@@ -48,8 +48,8 @@ class StudyStatus:
     unneeded : int
         Number of cells of the grid that a trace does not run, as far as is known.
     undecided, slipping, irregular : int
-        Number of runs with results that were too short to tell, under more load than friction carries, and
-        of irregular motion.
+        Number of runs with results that were too short to be decided, under more load than friction carries,
+        and of irregular motion.
     finished : float or None
         When the last run was recorded [s since 1970], if none is left and no sweep is at work.
     time_at_work : float
@@ -115,14 +115,14 @@ def read_status(out: str | Path) -> StudyStatus:
 
 
 def expected_cost(job: Job, out: Path) -> tuple[float, int]:
-    """Return the core-seconds of a run, mean over the job, and the number of records that tell.
+    """Return the core-seconds of a run, mean over the job, and the number of records used for it.
 
     Parameters
     ----------
     job : Job
         A validated job.
     out : Path
-        The output folder, whose records of this job tell how fast the machine is.
+        The output folder, whose records of this job give the speed of the machine.
     """
     from cvt_hpc.simulation import estimate_cost
 
@@ -152,7 +152,7 @@ def read_machine_factor(out: Path, job: Job) -> tuple[float, int]:
 
 
 def find_records(out: Path, job: Job) -> Records | None:
-    """Return what is on record in an output folder, None unless it is that of this job."""
+    """Return the records in an output folder, None unless it is that of this job."""
     folder = StudyFolder(out)
     try:
         study = folder.load()

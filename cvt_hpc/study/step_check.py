@@ -1,8 +1,8 @@
 """How far a study depends on its time step: a sample of its runs done again at half the step, or explicitly.
 
-Both ways are repeats as `repeats.py` has them. A run of model auto is done again as such, so that the whole
-climb is at half the step and an error shows that its coarse transient shares with the full one; by the
-explicit step it is done in full.
+Both ways are repeats as `repeats.py` has them. A run of model auto is repeated by that model: its coarse and
+its full transient are both at half the step, so that an error shows that both have in common. By the explicit
+step it is done in full.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def step_check(job: Job, out: Path, fraction: float, way: str = "half") -> Repea
     Parameters
     ----------
     job : Job
-        What was run, by a stepper with a fixed step.
+        The job, with a stepper of a fixed step.
     out : Path
         Its folder.
     fraction : float
@@ -101,7 +101,7 @@ def _halved(job: Job) -> dict[str, Any]:
 
 
 def _explicit(job: Job) -> dict[str, Any]:
-    """The same runs by the explicit step with its own defaults, in full where the job climbs a ladder."""
+    """The same runs by the explicit step with its own defaults, in full if the model is auto."""
     model = FULL_MODEL if job.model == AUDITED else job.model
     document = handed_to(job, model, "by the explicit step, to check the step")
     stepper = load_model(job.model).steppers[job.stepper]  # type: ignore[index]  # with a step there is one

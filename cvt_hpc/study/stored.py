@@ -1,4 +1,4 @@
-"""What has to stand in the job file of a study before it is believed, whoever wrote it."""
+"""Checks of a study's job file, whose content may come from anybody."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NEEDED = {"status": "i1", "vibrates": "i1"}  # `reason`, where there is one, is
 
 
 def check_stored(entry: Mapping[str, Any]) -> None:
-    """See that a document is one that `Study.to_json` may have returned.
+    """Check that a document may be a result of `Study.to_json`.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def check_stored(entry: Mapping[str, Any]) -> None:
     Raises
     ------
     ValueError
-        If it is not; the text says what was found.
+        If it is not; the text states the finding.
     """
     for key in ("name", "description"):
         _need(_is_text(entry[key]), key, "a text")
@@ -132,7 +132,7 @@ def _plain(values: list[Any]) -> list[Any]:
 
 
 def _is_text(value: Any) -> bool:
-    """Return whether a value is a text that a dataset can hold; who shows it escapes what does not print."""
+    """Return whether a value is a text that a dataset can hold; it is escaped when it is shown."""
     return isinstance(value, str) and "\0" not in value and not any("\ud800" <= c <= "\udfff" for c in value)
 
 

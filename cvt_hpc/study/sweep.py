@@ -1,4 +1,4 @@
-"""All runs of a job, on all ranks: compute what is planned, record, gather."""
+"""All runs of a job, on all ranks: compute the plan, record, gather."""
 
 from __future__ import annotations
 
@@ -66,27 +66,27 @@ def run(
     """Do all runs of a job that are not yet recorded, and gather the dataset.
 
     Serial, or on all ranks when started under mpirun or srun. A run that raises is recorded as failed, and
-    the sweep goes on; so do the other ranks when one dies, where MPI lets them. SIGINT, SIGTERM and SIGUSR1
+    the sweep continues; so do the other ranks when one dies, where MPI lets them. SIGINT, SIGTERM and SIGUSR1
     end the sweep early and orderly: the runs at work are broken off, and the same call does them later.
 
     Parameters
     ----------
     job : Job
-        What to run.
+        The job to run.
     out : str or Path, optional
         Output folder; "out/<job name>" by default.
     part : str, optional
         Only the runs of one part of the study: "3/16" for the third of sixteen. Different parts may be at
-        work in a folder at the same time; the one that ends last gathers the dataset.
+        work in a folder at the same time; the part that ends last gathers the dataset.
     fresh : bool
-        Throw away what earlier runs have left in the folder, instead of going on from there.
+        Remove the results of earlier runs in the folder instead of continuing from them.
     simulator : Simulator, optional
-        What does the runs; `cvt_hpc.simulation` by default.
+        Does the runs; `cvt_hpc.simulation` by default.
     progress : bool
         Whether rank 0 shows on stderr how far the sweep is.
     time_limit : float, optional
-        Time [s] in which the sweep is to end; some of it is kept for gathering the dataset. Within a Slurm
-        job, that until its end by default. Runs that are not expected to end in time are not started.
+        Time [s] in which the sweep is to end; some of it is reserved for gathering the dataset. Within a
+        Slurm job, that until its end by default. Runs that are not expected to end in time are not started.
     run_limit : float, optional
         Time [s] that a run may take; runs that take longer are recorded as timed out.
     retry : collection of Status, optional
@@ -96,12 +96,12 @@ def run(
         Factor by which the time step of runs that are done again for failed numerics is shortened, against
         that of the job; a run that fails there is refined by itself from there on. By default the first
         factor that these runs have not tried (`untried_factor`); 1: the step of the job again. Kept on
-        record: a retry that was stopped goes on with it.
+        record: a retry that was stopped continues with it.
     chosen : callable, optional
-        Tells on rank 0 which runs are asked for, shape (runs,), always the same ones; by default those of the
+        Returns on rank 0 the requested runs, shape (runs,), always the same ones; by default those of the
         job's design.
     asked_steps : callable, optional
-        Tells on rank 0 the time step [s] of runs that are not to take that of the job, by run index, always
+        Returns on rank 0 the time step [s] of runs that do not take the job's step, by run index, always
         the same one of a run.
 
     Returns
@@ -126,7 +126,7 @@ def run(
 
     def sweep(team: Team) -> RunReport:
         nonlocal first
-        begins, first = first, False  # the survivors of a death go on from what is on record
+        begins, first = first, False  # the survivors of a death continue from the records
 
         def find_plan() -> Plan:
             again = retry if begins else ()
@@ -176,7 +176,7 @@ def check_start(
 def _accept(
     job: Job, out: str | Path | None, part: str | None, fresh: bool, simulator: Simulator
 ) -> tuple[Study, Part | None, StudyFolder]:
-    """Return what is to be run and where, if it fits together."""
+    """Return the runs to be done and their folder, if all settings agree."""
     share = None if part is None else read_part(part)
     if share is not None and fresh:
         raise mismatch("fresh", "a run of the whole study", f"part {share}, and the others would lose theirs")
@@ -194,7 +194,7 @@ def _compute(
     counter: Counter,
     stop: Stop,
 ) -> str | None:
-    """Do and record the runs that this rank claims; return why it could not go on, if so."""
+    """Do and record the runs that this rank claims; return the reason if it could not continue."""
     layout = RecordFormat(task.study.fingerprint, task.study.record_dtype)
     model = CostModel(plan.costs, plan.fit, task.turns)
     task = replace(task, steps=plan.steps)
@@ -209,7 +209,7 @@ def _compute(
                     keep_histories(folder, result.histories)
                     log.append(result.records)
                     counter.report(len(result.records), result.failed)
-                    if result.failed < len(result.records):  # those that all failed ended before their time
+                    if result.failed < len(result.records):  # failed ones all ended before their time
                         model.learn(result.batch, result.seconds)
     except StorageError as error:
         stop.tell_all()

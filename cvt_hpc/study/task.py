@@ -1,4 +1,4 @@
-"""What a sweep computes: batches of runs, each of which ends with a record, whatever becomes of it."""
+"""The computing of a sweep: batches of runs, each of which ends with a record in every case."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _logger = logging.getLogger(__name__)
 
 
 class Result(NamedTuple):
-    """What came of runs that were done together.
+    """Result of runs that were done together.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Result(NamedTuple):
     seconds : float
         Time [s] that they took together; 0 where it is not known.
     histories : list of (int, xarray.Dataset)
-        Run index and history of those whose history is kept.
+        Run index and history of each run whose history is kept.
     """
 
     records: list[Record]
@@ -61,7 +61,7 @@ class Result(NamedTuple):
 
 
 class _Trouble(NamedTuple):
-    """Why a batch has no records: status and reason of a run, and what to say of several."""
+    """Why a batch has no records: status and reason of a run, and the text for several runs."""
 
     status: Status
     reason: str
@@ -70,24 +70,24 @@ class _Trouble(NamedTuple):
 
 @dataclass(frozen=True)
 class Task:
-    """The runs of a job and what does them.
+    """The runs of a job and the simulator that does them.
 
     Attributes
     ----------
     job : Job
-        What to run.
+        The job to run.
     study : Study
         The layout of its records.
     simulator : Simulator
-        What does the runs.
+        Does the runs.
     run_limit : float
         Time [s] that a run may take; infinite for no limit.
     chosen : callable, optional
-        Tells on rank 0 which runs are asked for, shape (runs,); by default those of the job's design.
+        Returns on rank 0 the requested runs, shape (runs,); by default those of the job's design.
     asked_steps : callable, optional
-        Tells on rank 0 the time step [s] of runs that are not asked for that of the job, by run index.
+        Returns on rank 0 the time step [s] of runs that do not take the job's step, by run index.
     steps : mapping
-        Time step [s] of the runs that do not take that of the job, by run index: asked for, or shortened by a
+        Time step [s] of the runs that do not take the job's step, by run index: requested, or shortened by a
         retry.
     """
 
@@ -105,15 +105,15 @@ class Task:
         return partial(self.simulator.turns, self.job)
 
     def fit(self, records: Records, costs: np.ndarray) -> Fit:
-        """Return what the batches on record tell of the machine, beside the predicted costs of runs [s]."""
+        """Return the factor of the machine by the batches on record and the predicted costs of runs [s]."""
         return fit_recorded(costs, records.timings, records.status == Status.DONE, self.turns)
 
     def do(self, batch: Batch, interrupt: Interrupt, begin: Begin) -> Iterator[Result]:
         """Do the runs of a batch, and yield their records as they come; none of runs that are broken off.
 
         All come at once, unless an exception or the time limit ends the batch. Then its runs are done one by
-        one, so that only those fail that do so alone, and each record comes when its run ends. `begin` is
-        told beforehand what is done.
+        one, so that only runs that fail alone count as failed, and each record comes when its run ends.
+        `begin` is called before with the runs.
         """
         try:
             result, trouble = self._attempt(batch, interrupt, begin)
@@ -140,7 +140,7 @@ class Task:
             _logger.warning("runs %s, done together, %s; none of them does alone", runs, trouble.in_company)
 
     def _attempt(self, batch: Batch, interrupt: Interrupt, begin: Begin) -> tuple[Result, _Trouble | None]:
-        """Return the records of all runs, or none and what ended the batch."""
+        """Return the records of all runs, or none and the reason why the batch ended."""
         begin(batch)
         watch = _Watch(interrupt, self.run_limit * self.turns(len(batch)))
         try:
@@ -166,7 +166,7 @@ class Task:
         return Result([(index, self.study.pack_failure(trouble.reason, trouble.status))])
 
     def _pack(self, values: Mapping[str, Any]) -> np.ndarray:
-        """Return the record of what a run delivered, that of a failure if it is no record."""
+        """Return the record of a run's result; that of a failure if the result is no record."""
         try:
             return self.study.pack(values)
         except Exception as error:
@@ -174,14 +174,14 @@ class Task:
 
 
 class _Watch:
-    """What a run asks whether to go on: it passes the question on, and looks at the run's own limit.
+    """Decides during a run whether to continue: by the given question and by the run's own limit.
 
     The clock starts with the first question: kernels, which a run may have to wait for, are compiled by then.
 
     Parameters
     ----------
     interrupt : callable
-        Asked first.
+        Called first.
     limit : float
         Time [s] that the run may take.
     """
@@ -193,7 +193,7 @@ class _Watch:
         self._started: float | None = None
 
     def __call__(self) -> str | None:
-        """Return why the run should end, None if it should go on."""
+        """Return why the run should end, None if it should continue."""
         if self._started is None:
             self._started = time.monotonic()
         reason = self._interrupt()

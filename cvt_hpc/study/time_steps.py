@@ -20,7 +20,7 @@ MOST_REFINED = 1000.0
 
 
 def asked_step(job: Job, index: int) -> float:
-    """Return the time step that a job asks of a run [s]."""
+    """Return the time step of a run by its job [s]."""
     return job.point(index)[STEP]
 
 
@@ -30,11 +30,11 @@ def refined_steps(job: Job, records: Records, others: Mapping[int, float]) -> di
     Parameters
     ----------
     job : Job
-        What is run.
+        The job that is run.
     records : Records
         With the factors by which retries shorten steps.
     others : mapping
-        Time steps by run index, where those of the job do not count whatever is on record.
+        Time steps by run index, for runs that do not take the job's step, on record or not.
     """
     steps = dict(others)
     for index in np.flatnonzero(records.refinements != 1.0).tolist():
@@ -58,7 +58,7 @@ def untried_factor(job: Job, records: Records, again: NDArray[np.int64], retry: 
     Parameters
     ----------
     job : Job
-        What is run.
+        The job that is run.
     records : Records
         With the factors of earlier retries.
     again : array of int

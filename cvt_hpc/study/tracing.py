@@ -1,4 +1,4 @@
-"""Which cells of a grid a trace has to run, and what their classes say of the cells between them.
+"""The cells of a grid that a trace has to run, and the classes that follow for the cells between them.
 
 The grid is cut into boxes that share their sides, at first as wide as the first spacing. The corners of all
 boxes are run. A box in which, sides included, runs of different classes are known is cut in halves along
@@ -7,11 +7,11 @@ shows in one box is followed into the next, wherever it leads. In the end every 
 is of one class, as far as runs know it, and this class is inferred for its inner cells. Along axes that are
 not traced nothing is inferred: each of their values has boxes of its own.
 
-A further run can only cut more boxes. Hence what a trace runs in the end is the least set of cells that
-asks for no other one: it does not depend on the order of the runs, on rounds, ranks or interruptions.
+A further run can only cut more boxes. Hence a trace runs in the end the least set of cells that
+requires no other one: it does not depend on the order of the runs, on rounds, ranks or interruptions.
 
-What can be missed: of cells of one class that are connected, as neighbours along traced axes, all are found
-if one of them is run. So only patches without a corner of the first boxes are missed, hence none that
+A trace can miss cells: of cells of one class that are connected, as neighbours along traced axes, all are
+found if one of them is run. So only patches without a corner of the first boxes are missed, hence none that
 contains as many cells as the first spacing along each traced axis, side by side.
 """
 
@@ -34,14 +34,14 @@ Box = tuple[Interval, ...]
 
 
 def needed_runs(study: Study, records: Records) -> NDArray[np.bool_]:
-    """Return which runs a study needs by what is on record, shape (runs,): of a grid or of samples all.
+    """Return the runs that a study needs by the records, shape (runs,): of a grid or of samples all.
 
     Parameters
     ----------
     study : Study
         With its design.
     records : Records
-        What is on record; these runs count as needed. Those needed now are among those needed later on.
+        The runs on record; these runs count as needed. Those needed now are among those needed later on.
     """
     if not study.is_traced:
         return np.ones(study.size, bool)
@@ -87,7 +87,7 @@ def leaf_boxes(classes: NDArray[np.int8], intervals: list[list[Interval]]) -> It
     classes : array of int8, shape of the grid
         `OccurrenceClass` of each run; NOT_RUN where it is not known.
     intervals : list of list of (int, int)
-        For each axis, those that the first boxes are made of.
+        For each axis, the places of which the first boxes are made.
     """
     for box in product(*intervals):
         cells = classes[_cells(box)]

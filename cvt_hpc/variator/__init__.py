@@ -1,4 +1,4 @@
-"""What models of a whole variator share: settings, courses, gross slip, verdict, record, history of a run."""
+"""Common parts of the models of a whole variator: settings, courses, gross slip, verdict, record, history."""
 
 STRANDS = ("t1", "t2")  # t1 leaves the driving pulley
 PULLEYS = ("driving", "driven")

@@ -35,6 +35,6 @@ def speed_course(time: float, rise_time: float, ramp_end: float, start):
 
 @merged_kernel
 def start_damping(time: float, rise_time: float) -> float:
-    """What the start-up adds to the transverse damping [N s/m^2]."""
+    """Transverse damping added by the start-up [N s/m^2]."""
     left = max(1.0 - time / rise_time, 0.0)
     return START_DAMPING * left * left

@@ -1,4 +1,4 @@
-"""The history of a run of a variator as a dataset: what moves over time, and what is where along the path."""
+"""The history of a run of a variator as a dataset: quantities over time, and quantities along the path."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ALONG = {
 
 
 def of_means(words: tuple[str, str, str]) -> tuple[str, str, str]:
-    """Long name, unit and comment of a quantity's mean, which says so in one of them."""
+    """Long name, unit and comment of a quantity's mean; one of the texts states that it is a mean."""
     name, unit, comment = words
     return words if name.startswith("mean") else (name, unit, ", ".join(filter(None, ("mean", comment))))
 

@@ -20,7 +20,7 @@ from cvt_hpc.vibration import assessment, ramp
 from cvt_hpc.vibration.ramped import ramped
 from cvt_hpc.vibration.signals import amplitude_spectrum
 
-RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by what a ramp changes
+RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by the ramped quantity
 
 
 def assess(
@@ -122,9 +122,9 @@ def evaluate(run: Any, strongest_probe: np.ndarray) -> dict[str, Any]:
 def power_balance(
     driving: float, load: float, loss: float, storing: float, thrust: float = 0.0, damped: float = 0.0
 ) -> dict[str, float]:
-    """Powers of a run as its record names them [W], but that of a thrust, and what their balance leaves open.
+    """Powers of a run as its record names them [W], but that of a thrust, and the open balance.
 
-    `damped` is what the time step takes by itself.
+    `damped` is the numerical damping of the time step.
     """
     open_power = driving - load - thrust - loss - storing - damped
     return {
@@ -137,12 +137,12 @@ def power_balance(
 
 
 def efficiency(driving: float, load: float, loss: float) -> float:
-    """What losses leave of the power put in [1]: 0 without load; not a number where nothing is put in.
+    """Share of the power put in that is not lost [1]: 0 without load; not a number where nothing is put in.
 
     Parameters
     ----------
     driving, load : float
-        Power of the driving pulley, and what the load takes [W]; negative where power flows backwards.
+        Power of the driving pulley, and power of the load [W]; negative where power flows backwards.
     loss : float
         [W]
     """

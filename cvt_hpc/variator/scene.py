@@ -1,4 +1,4 @@
-"""What a job may set of a variator, whichever model of it: the scene, the friction of the flanks, damping.
+"""Parameters of a variator in every model of it: the scene, the friction of the flanks, damping.
 
 Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht et al. 2004, sec. 3.1); sizes
 are those of a common passenger-car belt; every other default is an assumption, plausible and not measured.

@@ -1,4 +1,4 @@
-"""Gross slip: how far the load lies from what friction carries, and when a run counts as slipping.
+"""Gross slip: distance of the load from the load that friction carries, and when a run counts as slipping.
 
 The largest torque at the driving pulley is, by Bullinger et al. 2005, eq. 2,
 
@@ -45,7 +45,7 @@ VARIABLES = (
         (),
         "f8",
         "N m",
-        "at the driving pulley, what friction carries at nominal radii under these axial forces",
+        "at the driving pulley, torque that friction carries at nominal radii under these axial forces",
     ),
     Variable("torque_ratio", (), "f8", "1", "load over carried_torque, with the load's sign"),
     Variable("slip_margin", (), "f8", "1", "size of torque_ratio, less 1; slips from about 0"),
@@ -84,7 +84,7 @@ def against_slip(load: float, carried: float) -> dict[str, float]:
     Parameters
     ----------
     load, carried : float
-        Torque at the driving pulley, and the largest one that friction carries [N m].
+        Torque at the driving pulley, and the largest torque that friction carries [N m].
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = float(np.divide(load, carried))
@@ -109,7 +109,7 @@ def capacity(run: Any, samples: slice) -> dict[str, float]:
 
 
 def with_slip(run: Any, found: Occurrence, pulleys: Sequence[str] = PULLEYS) -> Occurrence:
-    """What was found of the vibration of a run that reached its end, with gross slip where there is some.
+    """The verdict on the vibration of a run that reached its end, with gross slip where there is some.
 
     The margin is that to gross slip, where this is nearer than the one of the amplitude.
     """
@@ -133,13 +133,13 @@ def slide(run: Any) -> slice:
 
 
 def speed_loss(run: Any, samples: slice) -> float:
-    """What sliding and creep take from the driven speed in some samples, over what it is without [1]."""
+    """Loss of driven speed by sliding and creep in some samples, over the speed without slip [1]."""
     driven_speed = run.channel("driven_speed")[samples].mean()
     return 1.0 - run.parameters["ratio"] * driven_speed / run.mean_driving_speed(samples)
 
 
 def slid(run: Any) -> dict[str, Any]:
-    """What is known of a run that has slipped through before its end: means over its slide."""
+    """Known values of a run that has slipped through before its end: means over its slide."""
     samples = slide(run)
 
     def pair(name: str) -> np.ndarray:

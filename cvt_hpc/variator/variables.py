@@ -1,4 +1,4 @@
-"""What records of a variator have in common, whichever model wrote them."""
+"""Variables that records of all models of a variator have in common."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ _SHARED = (
         (),
         "f8",
         "1",
-        "what losses leave of the power put in, by the driving pulley or by a load that drives",
+        "share of the power put in that is not lost, by the driving pulley or by a load that drives",
     ),
     Variable(
         "power_residual",
         (),
         "f8",
         "1",
-        "what the power balance leaves open, over the larger of drive and losses",
+        "power that the balance leaves open, over the larger of drive and losses",
     ),
 )
 

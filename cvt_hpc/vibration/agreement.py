@@ -1,8 +1,8 @@
-"""What two runs of one cell say together: the same class, a contradiction, or another difference.
+"""The common verdict on two runs of one cell: the same class, a contradiction, or another difference.
 
 A contradiction is a cell that is quiet in one run and vibrating in the other. Near the amplitude threshold a
 small error is enough for one, so contradictions whose larger amplitude lies within NEAR of the threshold are
-told apart from those beyond.
+separated from those beyond.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ WITHOUT_RESULTS = (OccurrenceClass.FAILED, OccurrenceClass.NOT_RUN)
 
 
 class PairClass(IntEnum):
-    """Class of a cell whose two runs, A and B, are of different classes.
+    """Class of a cell whose two runs, A and B, have different classes.
 
-    All values are negative, so that they stand beside those of `OccurrenceClass`, which say that both runs
-    are of that class; NOT_RUN says it of either one.
+    All values are negative, so that they stand beside the values of `OccurrenceClass`, which mean that both
+    runs are of that class; NOT_RUN means that either one has not run.
     """
 
     A_ONLY = -1

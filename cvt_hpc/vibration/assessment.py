@@ -39,7 +39,7 @@ class Occurrence:
     vibrates : Vibrates
         The verdict.
     reason : str
-        One line that says why, ASCII, at most 240 characters.
+        Reason in one line, ASCII, at most 240 characters.
     strands : tuple of str
         Labels of the strands, the order of the arrays below.
     amplitude : array, shape (strand,)
@@ -53,8 +53,8 @@ class Occurrence:
     strongest_probe : array of int, shape (strand,)
         Column of the displacement with the largest amplitude.
     margin : float
-        How far what decided, as a rule the amplitudes, lies from the threshold [e-folds]; 0 where nothing is
-        decided.
+        Distance of the deciding quantity, as a rule the amplitudes, from the threshold [e-folds]; 0 where
+        nothing is decided.
     """
 
     vibrates: Vibrates
@@ -69,7 +69,7 @@ class Occurrence:
     margin: float
 
     def record(self) -> dict[str, Any]:
-        """Return what a record holds of it: that the run is done, the verdict, and VARIABLES."""
+        """Return the entries of a record: that the run is done, the verdict, and VARIABLES."""
         verdict = {"status": Status.DONE, "vibrates": self.vibrates, "reason": self.reason}
         return verdict | {variable.name: getattr(self, variable.name) for variable in VARIABLES}
 
@@ -122,7 +122,7 @@ def assess(
         strands=names,
     )
     if vibrates is Vibrates.YES and amplitudes[strongest].max() < parameters["amplitude_threshold"]:
-        # a short window sees a little beyond the band: what moves there is not in it
+        # a short window sees a little beyond the band: motion there is not in it
         vibrates, reason = Vibrates.UNDECIDED, "moves at the edge of the band only"
     frequency = signals.dominant_frequency(judged[:, strongest], rate, band)
     return Occurrence(

@@ -1,4 +1,4 @@
-"""One class per run: the two flags of a record, and what they leave open, as one category."""
+"""One class per run: the two flags of a record, and the undecided cases, as one category."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cvt_hpc.variables import Status, Vibrates
 
 
 class OccurrenceClass(IntEnum):
-    """What a map says of a run."""
+    """The class of a run in a map."""
 
     QUIET = 0
     VIBRATING = 1
@@ -28,7 +28,7 @@ class OccurrenceClass(IntEnum):
         return self.name.lower().replace("_", " ")
 
 
-# What a longer run would not change: irregular motion is among them, undecided runs are not.
+# Classes that a longer run would not change: irregular motion is among them, undecided runs are not.
 DECIDED = (
     OccurrenceClass.QUIET,
     OccurrenceClass.VIBRATING,

@@ -4,10 +4,10 @@ On the unstable side every start vibrates. Where the limit cycle is born at the 
 from it (supercritical), vibration ends there whatever the start. Where an unstable limit cycle bends back
 over the stable side (subcritical), runs from near the steady state turn quiet at the Hopf point, those from
 a large start only at the fold of limit cycles: in between both attractors exist, which is the hysteresis.
-What lies on the unstable side is none of it: a run that is quiet there is quiet by its amplitude alone.
+Runs on the unstable side do not count: a run that is quiet there is quiet by its amplitude alone.
 
 One run where both attractors are found proves nothing: beside a Hopf point a vibration may fade more slowly
-than a run tells. Two are asked for.
+than a run shows. Two are required.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ QUIET, VIBRATING = OccurrenceClass.QUIET, OccurrenceClass.VIBRATING
 
 
 class Kind(IntEnum):
-    """What becomes of the steady state at a Hopf point."""
+    """The change of the steady state at a Hopf point."""
 
     SUPERCRITICAL = 0
     SUBCRITICAL = 1
@@ -33,7 +33,7 @@ class Kind(IntEnum):
 
 
 class Criticality(NamedTuple):
-    """What runs say of a Hopf point.
+    """The verdict on a Hopf point by runs.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Criticality(NamedTuple):
         The verdict.
     width : float
         From the Hopf point, into the stable side, to where the vibration ends from the large start, in the
-        parameter's unit: of the hysteresis, or what is left of it within the runs' spacing; nan if undecided.
+        parameter's unit: of the hysteresis, or its upper bound by the runs' spacing; nan if undecided.
     error : float
         Half of the spacing of the runs at that end, and the Hopf point's own error; inf where runs from the
         large start vibrate as far as there are any.
@@ -67,7 +67,7 @@ def criticality(
     limits: tuple[float, float] = (-np.inf, np.inf),
     in_words: Callable[[float], str] = "{:.4g}".format,
 ) -> Criticality:
-    """Say whether a Hopf point is super- or subcritical.
+    """Decide whether a Hopf point is super- or subcritical.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def criticality(
     stable_above : bool
         Whether the steady state is stable above it, or else below.
     values : array, shape (n,)
-        Where there are runs, distinct; in the unit of `hopf`, as all that follows.
+        Parameter values of the runs, distinct; in the unit of `hopf`, like all others below.
     small, large : arrays, shape (n,)
         `OccurrenceClass` of the runs from near the steady state and from the large start.
     agreement : float

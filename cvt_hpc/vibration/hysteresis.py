@@ -1,4 +1,4 @@
-"""What two starts say together: where a vibration needs a large start, the steady state has company."""
+"""The common verdict on two starts: where a vibration needs a large start, two attractors exist."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cvt_hpc.vibration.classes import OccurrenceClass
 
 
 class StartClass(IntEnum):
-    """What a map says of a cell whose runs began from a small and from a large disturbance.
+    """The class of a cell whose runs began from a small and from a large disturbance.
 
     The values of `OccurrenceClass`, and one more.
     """
@@ -36,9 +36,9 @@ class StartClass(IntEnum):
 def classify_starts(small: NDArray, large: NDArray) -> NDArray[np.int8]:
     """Class of each cell by its runs from two starts.
 
-    Where a run failed the cell failed, whatever the other says, so that no failure is hidden. Else what
+    Where a run failed the cell failed, whatever the other run gives, so that no failure is hidden. Else the
     vibrates from the small start vibrates; a cell is quiet only if it is so from both. Of a cell that is
-    quiet from the small start the other run decides, and where one run says nothing the cell does not.
+    quiet from the small start the other run decides, and where one run is undecided the cell is.
     A cell that slips or moves irregularly from the small start is of that class.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Whether an amplitude comes and goes about a threshold without a trend, so that a longer run would not tell.
+"""Whether an amplitude comes and goes about a threshold without a trend: a longer run would not decide.
 
 The belt near 40 N m moves so: judder of the driven pulley rings a strand, now above the threshold and now
 below. Called irregular is a record of windows in which
@@ -9,7 +9,7 @@ below. Called irregular is a record of windows in which
   10-15 %, judder by 30-100 %. A steady amplitude that happens to lie at the threshold is not irregular;
 - a trend is ruled out: the 95 % confidence interval of the gain over the record, in e-folds, contains 0 and
   lies within +-`most_gain`. So an amplitude that grows or decays by that much is called irregular in at most
-  one of 40 records. Large scatter asks for more windows: some 15 if the logarithm scatters by 0.5.
+  one of 40 records. Large scatter requires more windows: some 15 if the logarithm scatters by 0.5.
 
 Windows within one burst are alike, so the interval is that of fewer independent windows: n (1 - r)/(1 + r)
 of n, r being the autocorrelation of neighbouring windows about the trend (Santer et al. 2000, J. Geophys.

@@ -1,4 +1,4 @@
-"""Whether a run vibrates: yes, no, irregularly, or undecided because the run was too short to tell.
+"""Whether a run vibrates: yes, no, irregularly, or undecided because the run was too short.
 
 Judged are the amplitudes of each strand within a frequency band, in successive windows of the last part of
 the run, and the growth rate fitted to them; `assessment.py` takes both from the displacement.
@@ -6,8 +6,8 @@ the run, and the growth rate fitted to them; `assessment.py` takes both from the
 A strand vibrates if it is above the threshold in every window and not decaying. It is irregular if it comes
 and goes about the threshold over so many windows that a trend is ruled out (`irregularity.py`): a longer run
 would say no more. It is quiet if it is below the threshold at the end and not on its way there. Everything
-else is undecided, and a longer run may tell: a start transient that has not died out yet, a vibration that is
-still growing. A run vibrates if a strand does, and is quiet only if all strands are. It is irregular if a
+else is undecided, and a longer run may decide: a start transient that has not died out yet, a vibration that
+is still growing. A run vibrates if a strand does, and is quiet only if all strands are. It is irregular if a
 strand is, unless another one is undecided that may have a trend. The thresholds are in `criterion.py`.
 """
 
@@ -56,7 +56,7 @@ def classify(
     Returns
     -------
     Vibrates
-        YES if a strand vibrates, UNDECIDED where a longer run may tell, IRREGULAR where it would not, NO if
+        YES if a strand vibrates, UNDECIDED where a longer run may decide, IRREGULAR where it would not, NO if
         all strands are quiet.
     str
         The reason, in one line, the strongest strand first.

@@ -1,4 +1,4 @@
-"""Loads at which vibration sets in and ends, and how far those that two studies have found lie apart."""
+"""Loads at which vibration sets in and ends, and the distances between the results of two studies."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def paired_errors(
     found, true : sequence of Onset
         Of one line.
     known : (float, float)
-        Between which loads [N m] the truth is known: beyond, nobody can tell whether there is an onset.
+        Loads [N m] between which the truth is known: beyond, it is unknown whether there is an onset.
 
     Returns
     -------
@@ -65,7 +65,7 @@ def paired_errors(
     missed, additional : int
         True ones without a partner, and found ones between the known loads.
     """
-    from scipy.optimize import linear_sum_assignment  # long to load, and maps ask for onsets alone
+    from scipy.optimize import linear_sum_assignment  # long to load, and maps need onsets alone
 
     errors: list[float] = []
     additional = 0

@@ -1,7 +1,7 @@
-"""What each peak of a strand's spectrum is made of: the mode in which the strand moves at that frequency.
+"""The modes in each peak of a strand's spectrum: the mode in which the strand moves at that frequency.
 
 Strands that move at several frequencies have a mode for each; the amplitude of a mode over the whole band
-does not tell which goes with which. A peak is one of the spectrum of all modes together, the root of the sum
+does not show which goes with which. A peak is one of the spectrum of all modes together, the root of the sum
 of their squares. Peaks nearer to a higher one than the window's main lobe, or lower than its side lobes, are
 that one's own, in the band or beside it.
 """

@@ -2,9 +2,9 @@
 
 Under a ramp no part of the run stands for the whole, so all windows after the start-up are judged. The run
 vibrates if a strand stays above the threshold for SUSTAINED windows in a row, wherever that is. It is quiet
-only if no window is above, and the amplitude is not growing at the end. What is above the threshold more
-briefly is undecided: a slower ramp may tell. A vibration takes time to grow, so a fast ramp shows the onset
-late, by what it passes meanwhile.
+only if no window is above, and the amplitude is not growing at the end. Vibration above the threshold for a
+shorter time is undecided: a slower ramp may decide. A vibration takes time to grow, so a fast ramp shows the
+onset late, by the change of the ramped quantity meanwhile.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class RampOccurrence(Occurrence):
     Attributes
     ----------
     quantity : str
-        Of QUANTITIES, what the ramp changes: a load [N m] or a speed [rad/s].
+        The ramped one of QUANTITIES: a load [N m] or a speed [rad/s].
     onset, end : float
         Its values between which the run vibrates; nan where it does not, and where vibration is there from
         the ramp's start, or lasts to its end.
@@ -92,7 +92,7 @@ class RampOccurrence(Occurrence):
     ramp_amplitude: Array
 
     def record(self) -> dict[str, Any]:
-        """Return what a record holds of it: as of `Occurrence`, and VARIABLES of its quantity."""
+        """Return the entries of a record: as of `Occurrence`, and VARIABLES of its quantity."""
         name = self.quantity
         along = {f"onset_{name}": self.onset, f"end_{name}": self.end, f"ramp_{name}": self.mean}
         return super().record() | along | {"ramp_amplitude": self.ramp_amplitude}
@@ -118,11 +118,11 @@ def assess_ramp(
     strands : sequence of str, length probe
         The strand on which each probe lies.
     quantity : str
-        Of QUANTITIES, what the ramp changes.
+        The ramped one of QUANTITIES.
     values : array, shape (time,)
         Its values at the same instants.
     samples : int
-        Samples of the whole ramp, of which a run that ended early has fewer.
+        Samples of the whole ramp; a run that ended early has fewer.
     parameters : mapping
         As `assessment.assess` takes them.
 
@@ -172,9 +172,9 @@ class Passages:
     levels : array, shape (window, strand)
         Amplitudes in successive windows [m].
     values : array, shape (window,)
-        What is ramped, in their middles.
+        The ramped quantity, in their middles.
     quantity : Quantity
-        What the values are of.
+        The quantity of the values.
     parameters : mapping
         As `assess_ramp` takes them.
     """

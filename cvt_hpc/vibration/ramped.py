@@ -1,4 +1,4 @@
-"""What a run changes all along, by its parameters."""
+"""The quantity that a run changes all along, by its parameters."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 
 class Quantity(NamedTuple):
-    """What a ramp changes: the parameter that says so, its name, and its units.
+    """A ramped quantity: the parameter that selects it, its name, and its units.
 
-    Those in sentences are as people give it, of `factor` times a value [cf_units].
+    Units in sentences are those for people, `factor` times a value [cf_units].
     """
 
     history: str

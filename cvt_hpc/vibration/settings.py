@@ -1,4 +1,4 @@
-"""From when on a run counts as vibrating: what a job may set of it, in [vibration].
+"""From when on a run counts as vibrating: the parameters of [vibration].
 
 The defaults, and why:
 
@@ -20,7 +20,8 @@ The defaults, and why:
 - `growth_tolerance` 1 e-fold, gained in a steady rise from the quietest window or, beyond doubt, within one
   more record of the same length: noise in the band scatters by 10-15 % per window, and a factor of e is far
   outside.
-- `negligible_amplitude` 10 nm: strands are given 1 um when the start-up is over, and what grows by itself
+- `negligible_amplitude` 10 nm: strands are given 1 um when the start-up is over, and motion that grows by
+itself
   grows from there; a strand that ends a hundred times below has decayed, whatever rounding does to its trend.
 """
 
@@ -112,7 +113,7 @@ def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     Parameters
     ----------
     parameters : mapping
-        Flat parameters with those of [vibration], the `duration` of a run [s] and its `sampling_rate` [Hz].
+        Flat parameters including [vibration], the `duration` of a run [s] and its `sampling_rate` [Hz].
     """
     low, high, window = parameters["band_low"], parameters["band_high"], parameters["window_length"]
     problems = []

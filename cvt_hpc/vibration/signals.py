@@ -2,7 +2,7 @@
 
 All functions take `signal` with time along the first axis and any number of channels behind it, and share
 one estimator: a segment is multiplied by a Hann window, freed of its mean and slow drift, and
-transformed. How, why, and with what error: `tapering.py`.
+transformed. Reasons and errors: `tapering.py`.
 
 A signal that is constant, or a cubic in time, up to rounding has no vibration: amplitude 0, frequency and
 growth rate nan. A signal with a value that is not finite yields nan in its channel.
@@ -60,8 +60,8 @@ def window_amplitudes(
 ) -> tuple[Array, Array]:
     """Band-limited amplitude in successive windows, each overlapping the one before by half.
 
-    The last window ends with the record; what does not fill a window at the record's start is left out.
-    Hann windows that overlap by half use every sample and are almost uncorrelated.
+    The last window ends with the record; samples at the record's start that do not fill a window are left
+    out. Hann windows that overlap by half use every sample and are almost uncorrelated.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ windows along an exponentially growing vibration read amplitudes in exactly the 
 
 Why the drift cannot leak: the cubic polynomial that fits the windowed segment best is taken out *after*
 windowing, so that mean, slope, curvature and twist vanish to rounding, while a vibration of more than
-three periods in the segment is orthogonal to them. What is left of a belt that settles by 100 um: under
+three periods in the segment is orthogonal to them. The remainder of a belt that settles by 100 um: under
 0.06 um for a 50 ms record and under 0.04 um for a 20 ms window, for settling times of 10 ms and more.
 
 The price is stated in terms of the segment's length L: band edges are soft over 2/L (Hann's main lobe; a

@@ -168,7 +168,7 @@ def test_newton_correction_is_that_of_differences(law):
     evaluated(belt, state, work, STEP)
     _assemble(belt, state, work, STEP)
     solve_bordered(EQUATIONS, belt, state, work, b.NEWTON.weights, STEP)
-    correct(state, work, b.NEWTON.weights, 1.0)
+    correct(state, work, b.NEWTON.weights, b.CHANGE, 1.0)
     change = fields(work.blocks)[:, RIGHT : RIGHT + 4].ravel()
     assert border == 7
     for found, wanted in ((change, expected[:256]), (state.increments, expected[256:])):
@@ -646,9 +646,11 @@ def test_a_march_is_the_same_in_lanes_and_without(monkeypatch):
 )
 def test_corrections_are_halved_once_they_no_longer_fall(monkeypatch, changes, halved):
     shares, left = [], list(changes)
-    fake = stepping.Equations(*6 * [lambda *_: 1.0])
+    fake = stepping.Equations(*6 * [lambda *_: 1.0], b.CHANGE)
     monkeypatch.setattr(stepping, "solve_bordered", lambda *_: True)
-    monkeypatch.setattr(stepping, "correct", lambda _, __, ___, share: shares.append(share) or left.pop(0))
+    monkeypatch.setattr(
+        stepping, "correct", lambda _, __, ___, ____, share: shares.append(share) or left.pop(0)
+    )
     monkeypatch.setattr(stepping, "most_corrected", lambda *_: 0)
     monkeypatch.setattr(stepping, "keep_states", lambda *_: None)
     monkeypatch.setattr(stepping, "name_fault", lambda *_: None)
@@ -700,7 +702,7 @@ def test_a_correction_that_is_not_finite_is_not_passed_over():
             right = work.blocks.data[:, RIGHT : RIGHT + 4]
             right[:] = rng.normal(size=right.shape)
             right[place] = wrong
-            found = correct(state, work, b.NEWTON.weights, 1.0)
+            found = correct(state, work, b.NEWTON.weights, b.CHANGE, 1.0)
             assert not np.isfinite(found)
 
 

@@ -94,6 +94,29 @@ def spinning_ring(nodes, radius, speed):
     return fields
 
 
+def free_ring(nodes, radius, spin, lateral=0.0):
+    """Constants, tension and fields of a free ring in equilibrium with its rotation [m], [rad/s].
+
+    It has speeds lateral cos 2 phi out of its plane [m/s].
+    """
+    chord = 2.0 * radius * np.sin(np.pi / nodes)
+    constants = belt(
+        thickness=0.9 * chord,
+        pitch=chord,
+        mass=2 * 1.858e-3,
+        ring_mass=0.165 / nodes,
+        ring_rotary_inertia=0.165 / nodes * 9.75e-3**2 / 12.0,
+    )
+    tension = (constants.mass + constants.ring_mass) * spin**2 * radius / (2.0 * np.sin(np.pi / nodes))
+    fields = spinning_ring(nodes, radius, spin)
+    fields[:, b.LENGTH] = chord / (1.0 + tension / constants.ring_stiffness)
+    fields[:, b.TENSION] = tension
+    angle = 2.0 * np.pi * np.arange(nodes) / nodes
+    fields[:, b.SPEED + 2] = lateral * np.cos(2.0 * angle)
+    fields[:, b.SLOPE_RATE] = -2.0 * lateral / radius * np.sin(2.0 * angle)
+    return constants, tension, fields
+
+
 def mirrored(f):
     """Fields (n, STATE_FIELDS) of the mirror image, left against right."""
     odd = (2, 5, 8, b.SLOPE, b.SPEED + 2, b.OMEGA, b.OMEGA + 1, b.SLOPE_RATE)
@@ -130,8 +153,12 @@ def energy_and_momentum(constants, fields):
     shear = (np.roll(r[:, 2], -1) - r[:, 2]) / h - 0.5 * (slope + np.roll(slope, -1))
     energy += 0.5 * constants.ring_shear * h * np.sum(shear**2)
     energy += 0.5 * constants.ring_bending / h * np.sum((np.roll(slope, -1) - slope) ** 2)
-    strain = fields[:, b.TENSION] / constants.ring_stiffness
-    energy += 0.5 * constants.ring_stiffness * np.sum(strain**2 * fields[:, b.LENGTH])
+    stretched = fields[:, b.TENSION] ** 2 * fields[:, b.LENGTH]
+    if fields.shape[1] > b.STATE_FIELDS:  # two flows
+        apart, half = fields[:, b.TENSION_DIFFERENCE], fields[:, b.HALF_LENGTH]
+        stretched += apart * (apart * fields[:, b.LENGTH] + 2.0 * fields[:, b.TENSION] * half)
+        energy += 0.5 * constants.ring_mass * np.sum(fields[:, b.HALF_SPEED] ** 2)
+    energy += 0.5 * np.sum(stretched) / constants.ring_stiffness
     return energy, momentum.sum(0), moment.sum(0)
 
 

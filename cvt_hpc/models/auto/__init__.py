@@ -1,6 +1,6 @@
-"""The cheapest rung of the elastic belt's ladder that answers the question asked, run by run.
+"""The cheapest model of the elastic belt's ladder that answers the question, run by run.
 
-`rules.py` has the rules and their grounds, README.md what they cost and how often they err. Importing this
+`rules.py` has the rules and their grounds, README.md their cost and their rate of errors. Importing this
 package is cheap.
 """
 
@@ -8,7 +8,7 @@ from cvt_hpc.models import elastic_belt
 from cvt_hpc.models.elastic_belt import GIVES, check, inert
 from cvt_hpc.parameters import Parameter, not_negative
 
-# Questions that a rung answers which is a model of its own, and why that one
+# Questions that another model of the ladder answers, with the reason
 ANSWERED_BY = {
     "frequencies": ("strand", "at which frequencies a strand can vibrate needs only the strand"),
     "growth": ("linear_stability", "whether small motions grow needs only the steady state's eigenvalues"),

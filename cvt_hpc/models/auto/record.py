@@ -1,4 +1,4 @@
-"""What the record of a run holds: as of the elastic belt, and which rung it is of."""
+"""The record of a run: as of the elastic belt, and the model of the ladder that gave it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 VARIABLES = (
-    Variable("rung", (), "i1", "", "rung of the ladder that answered", Rung),
+    Variable("rung", (), "i1", "", "model of the ladder that answered", Rung),
     Variable(
         "margin",
         (),
@@ -41,7 +41,7 @@ VARIABLES = (
     ),
     *belt_record.VARIABLES,
 )
-PILOT_SHARE = 1.0  # of a run's time that a pilot does: a shorter run would take another rung
+PILOT_SHARE = 1.0  # of a run's time that a pilot does: a shorter run would use another model
 REFINED = 0.2  # of the runs are done in full, more of them in a trace
 
 

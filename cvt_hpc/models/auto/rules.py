@@ -1,6 +1,6 @@
-"""Which rung answers a question, by rules with grounds that can be tested.
+"""Rules that select the model for a question; the ground of each rule can be tested.
 
-The rungs, from the cheapest up:
+The models of the ladder, from the cheapest up:
 
 - PASSIVE, no run: friction that nowhere falls with speed feeds no vibration, and all else in the belt
   dissipates; that its changing normal force does not either is found, not proved. Up to half of the torque
@@ -9,10 +9,11 @@ The rungs, from the cheapest up:
   class is taken if amplitudes and slip lie a factor of two (`least_margin`) above or below their thresholds:
   a coarse mesh shifts the edges of a window by less than a step of the load, but it does shift them. Its mean
   forces are taken always, since vibration hardly moves them.
-- FULL, the transient that the job describes: where the coarse one is undecided, near the threshold, not to
-  be trusted, or refused for a run so short; and for the amplitude of what vibrates or moves irregularly.
+- FULL, the transient that the job describes: where the coarse one is undecided, near the threshold, in
+  doubt by the checks, or refused for a run so short; and for the amplitude of runs that vibrate or move
+  irregularly.
 
-Eigenvalues of the steady state (`linear_stability`) are no rung here: a steady state and its spectrum cost
+Eigenvalues of the steady state (`linear_stability`) are not used here: a steady state and its spectrum cost
 more than the coarse transient that they could spare. Contact that never opens needs no rule either: the
 search for the closed stations ends with its first guess, so that complementarity costs nothing then.
 """
@@ -36,11 +37,11 @@ from cvt_hpc.vibration.ramped import ramped
 
 COARSENESS = 0.6  # stations of the coarse run over those of the full one, and its inverse for the step
 SHARE = 0.3  # of the duration
-CARRIED_SHARE = 0.5  # of what rigid pulleys carry; on such the belt judders from 0.65 on, and slips at 0.7
+CARRIED_SHARE = 0.5  # of the torque that rigid pulleys carry; belts judder from 0.65, slip at 0.7
 
 
 class Rung(IntEnum):
-    """Which rung a record is of; the CF flags of `rung` in results.nc."""
+    """The model that gave a record; the CF flags of `rung` in results.nc."""
 
     NONE = 0
     PASSIVE = 1
@@ -49,7 +50,7 @@ class Rung(IntEnum):
 
 
 def is_passive(parameters: Mapping[str, Any]) -> bool:
-    """Whether friction nowhere falls with speed and carries the load by far, and no force is asked for."""
+    """Whether friction nowhere falls with speed and carries the load by far, and forces are not requested."""
     p = parameters
     is_table = p["friction_law"] == "table"
     falls = bool(np.any(np.diff(p["table_mu"]) < 0.0)) if is_table else p["friction_gradient"] != 0.0
@@ -59,7 +60,7 @@ def is_passive(parameters: Mapping[str, Any]) -> bool:
 
 
 def coarse(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Parameters of the coarse run; None where it would tell nothing.
+    """Parameters of the coarse run; None where it would decide nothing.
 
     That is where load or speed change all the time, and where so short a run could not be judged.
     """
@@ -84,7 +85,7 @@ def is_clear(parameters: Mapping[str, Any], found: Occurrence) -> bool:
 
 
 def is_settled(parameters: Mapping[str, Any], found: Occurrence) -> bool:
-    """Whether what a coarse run has found answers the question.
+    """Whether the result of a coarse run answers the question.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ class BeltState(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """What `step.advance` writes to and needs no longer afterwards.
+    """Work space of `step.advance`, which is not needed afterwards.
 
     Attributes
     ----------

@@ -240,8 +240,8 @@ def _correct_flank(belt, state, work, impulses, j, tolerance):
 def rub(belt, proximal, state, work):
     """Find the impulses of friction of a step; whether all laws hold.
 
-    The speeds of the ring at the elements, in `free`, are those with the impulses of the last step. What is
-    added to these is left in column 0 of the ring's right-hand side.
+    The speeds of the ring at the elements, in `free`, are those with the impulses of the last step. The
+    change of these is left in column 0 of the ring's right-hand side.
     """
     step, e, counters = work.step, state.elements, state.counters
     n, impulses = e.shape[0], work.impulses

@@ -1,4 +1,4 @@
-"""What a job may set of the pushbelt on a ring of beams: of the names of `pushbelt`, and of the ring."""
+"""Parameters of the pushbelt on a ring of beams: those of `pushbelt`, and those of the ring."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ MOST_TURN = np.pi / 3.0  # [rad] of a beam along an arc
 
 
 def as_pushbelt(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters with those that `pushbelt` has beside them."""
+    """Parameters, completed by the further ones of `pushbelt`."""
     return {**_WITHOUT, **parameters}
 
 

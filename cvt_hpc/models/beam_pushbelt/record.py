@@ -1,4 +1,4 @@
-"""What the record of a run holds: that of a run of `pushbelt`, by the same judge."""
+"""The record of a run: that of a run of `pushbelt`, by the same judge."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ BEAM_COST, ELEMENT_COST, RUB_COST, SAMPLE_COST = 3e-6, 6e-7, 2e-7, 3e-4
 
 _OTHERWISE = {
     "iterations": "sweeps over all contacts in a step, mean",
-    "numerical_damping": "0: what time steps damp is not told apart, but left in power_residual",
+    "numerical_damping": "0: power that time steps damp is not separated, but left in power_residual",
 }
 VARIABLES = tuple(
     replace(variable, comment=_OTHERWISE.get(variable.name, variable.comment))

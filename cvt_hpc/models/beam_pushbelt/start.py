@@ -74,7 +74,7 @@ def ring_on_path(
         strains = np.array([mean_strain(length, q[5 * i : 5 * i + 8]) for i in range(beams)])
         if abs(strains - strain).max() < 1e-12:
             break
-        # parts of the path in proportion to what they lack, and the length by what all lack
+        # parts of the path in proportion to their missing length, and the length by the sum of these
         parts = np.diff(nodes) * (1.0 + strains.mean()) / (1.0 + strains)
         nodes = np.concatenate([[0.0], np.cumsum(parts * around / parts.sum())])
         length *= (1.0 + strains.mean()) / (1.0 + strain)

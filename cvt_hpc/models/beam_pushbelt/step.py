@@ -150,7 +150,7 @@ def _take(state, work):
 
 @kernel
 def _accept(belt, state, work, inputs, dt):
-    """Take the state to the end of the step, and add up what it has done."""
+    """Advance the state to the end of the step, and add up the works."""
     ring, e, step, totals, pulleys = state.ring, state.elements, work.step, state.totals, state.pulleys
     length = ring.beam.length
     around = length * ((ring.q.size - 3) // PER_ELEMENT)

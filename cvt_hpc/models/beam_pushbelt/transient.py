@@ -54,7 +54,7 @@ class Transient(pushbelt.Transient):
         return of_ring + 0.5 * float(kinetic + pressed)
 
     def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
-        """As of `pushbelt`; but the balance holds what steps damp, which theta above 1/2 may do at will."""
+        """As of `pushbelt`; but the balance holds the damping of steps, which is free for theta above 1/2."""
         unsolved, flow = record["unsolved_share"], max(abs(record["driving_power"]), record["loss"])
         either = (self._most_damped() + OF_LOSS * record["loss"]) / flow
         most = either if self._method.theta <= 0.5 else np.inf

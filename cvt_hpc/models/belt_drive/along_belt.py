@@ -1,4 +1,4 @@
-"""What is read at a sample, at points along the belt: where they lie, tension, contacts; for kernels."""
+"""Readings of a sample at points along the belt: places, tension, contacts; for kernels."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Line(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """What is read of a belt on P pulleys at p probes.
+    """Readings of a belt on P pulleys at p probes.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ def read(
     probes : (p,) array
         Path coordinates [m].
     line, sample : Line, Sample
-        What is found.
+        The readings.
     sums : (6, place) array
         To which profiles are added at equal shares of the path: length, tension and offset by it, normal
         force and force forwards per length, samples; none at no places.

@@ -47,7 +47,7 @@ class Contact(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """What the contacts of P pulleys and k elements remember, and their forces.
+    """State of the contacts of P pulleys and k elements, and their forces.
 
     Attributes
     ----------
@@ -98,13 +98,13 @@ def add_contacts(
     Parameters
     ----------
     contact, touch : Contact, Touch
-        What the contacts are, and what they remember.
+        The contacts, with their state.
     lengths : (k,) array
         Of the elements [m].
     chain : Chain
         The belt.
     pulleys, wheels : Pulleys, Wheels
-        What it runs around.
+        The pulleys that it runs around.
     tau : float
         [s]
     is_known : bool
@@ -265,7 +265,7 @@ def _add_to_border(
     column: tuple[float, float],
     row: tuple[float, float],
 ) -> None:
-    """Add to column and row k of the border what an unknown there and a point between i and j share."""
+    """Add to column and row k of the border the coupling of an unknown there and a point between i and j."""
     for node in range(2):
         at = i if node == 0 else j
         for kind in range(2):

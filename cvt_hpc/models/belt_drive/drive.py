@@ -1,4 +1,4 @@
-"""The belt on its pulleys: what moves, and the step in time."""
+"""The belt on its pulleys: the moving parts, and the step in time."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Drive(NamedTuple):
     beam : AncfBeam
         Of the belt.
     pulleys : Pulleys
-        What it runs around.
+        The pulleys that it runs around.
     contact : Contact
         Between both.
     """
@@ -76,7 +76,7 @@ def state(
     Parameters
     ----------
     drive : Drive
-        What moves.
+        The moving parts.
     q, v : (n, 4) arrays
         Positions [m, 1] and speeds [m/s, 1/s] of the belt.
     speeds : (P,) array
@@ -113,7 +113,7 @@ def advance(
     Parameters
     ----------
     drive, state : Drive, State
-        What moves, and its motion.
+        The moving parts, and their motion.
     scheme : Scheme
         Of the step.
     inputs : (2, P) array

@@ -3,8 +3,8 @@
 A contact slides by the speed g of the belt's cord over the pulley, and is pressed by the force p per
 length. The friction force per length q acts against g, and all treatments bound it by mu(|g|, p) p.
 
-Regularised: q = mu p tanh(g / friction_speed), with slopes by `cvt_hpc.physics.primal_dual`. What carries a
-force creeps.
+Regularised: q = mu p tanh(g / friction_speed), with slopes by `cvt_hpc.physics.primal_dual`. A contact that
+carries a force creeps.
 
 Set-valued: Coulomb's law. Either g = 0 and |q| <= mu(0, p) p: the contact sticks; or q = mu p g / |g|: it
 slides.
@@ -81,7 +81,7 @@ class Friction(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What friction remembers of the contacts of P pulleys with k elements of C points.
+    """State of the friction in the contacts of P pulleys with k elements of C points.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ class Rub(NamedTuple):
     Attributes
     ----------
     force, settled : float
-        By this iterate, and what is expected of the solution, which turns with the contact [N/m].
+        By this iterate, and the value expected of the solution, which turns with the contact [N/m].
     by_slip, by_pressure : float
         [N s/m^2], [1].
     """
@@ -169,7 +169,7 @@ def rub(
     Parameters
     ----------
     friction, memory : Friction, Memory
-        The treatment, and what it remembers.
+        The treatment, and its state.
     p, i, c : int
         Pulley, element and point.
     slip : float

@@ -44,7 +44,7 @@ def kick(path: BeltPath, line_mass: float, impulse: float, q: np.ndarray, v: np.
 
 
 def answers(before: np.ndarray, after: np.ndarray, rate: float, expected: np.ndarray) -> np.ndarray:
-    """Frequencies at which a strand answers a kick, each near one that is expected.
+    """Frequencies of a strand after a kick, each near an expected one.
 
     Parameters
     ----------

@@ -28,11 +28,11 @@ TWO = (
     "centre_distance",
     "driven_inertia",
     "crossed",
-)  # what lists take the place of
+)  # values that lists replace
 
 
 def _arranged(columns: Mapping[str, Column]) -> dict[str, Any]:
-    """Lists of the columns of a file; what is wrong with them is told by its row, or of all of them."""
+    """Lists of the columns of a file; an error in them names its row, or all of them."""
     lists = {f"pulley_{name}": list(column.values) for name, column in columns.items()}
     for row, key, expected, found in _pulley_faults(lists):
         raise RowError(row, f"{key.removeprefix('pulley_')}: {expected}", found)
@@ -51,7 +51,7 @@ LAYOUT: dict[str, Parameter] = {
     "pulley_file": Parameter(
         "",
         "",
-        f"CSV file of pulleys in the place of lists; a row for each, columns {', '.join(COLUMNS)}",
+        f"CSV file of pulleys instead of lists; a row for each, columns {', '.join(COLUMNS)}",
         file=FromFile(COLUMNS, tuple(COLUMNS), PULLEY_LISTS, _arranged),
     ),
     "pulley_x": _list(
@@ -59,11 +59,11 @@ LAYOUT: dict[str, Parameter] = {
     ),
     "pulley_y": _list("m", "axes of the pulleys along y", (1e-3, 10.0)),
     "pulley_radius": _list("m", "radii at the belt's cord", (5e-3, 1.0), minimum=0.0, exclusive=True),
-    "pulley_turn": _list("", "1 where the belt turns a pulley counter-clockwise, -1 where clockwise"),
+    "pulley_turn": _list("", "direction in which the belt turns a pulley: 1 counter-clockwise, -1 clockwise"),
     "pulley_inertia": _list(
         "kg m^2", "moments of inertia; not read of the first", (1e-6, 100.0), minimum=0.0
     ),
-    "pulley_load": _list("", "what each pulley is braked by over load; 0 of the first"),
+    "pulley_load": _list("", "braking torque of each pulley over load; 0 for the first"),
 }
 TENSIONER: dict[str, Parameter] = {
     "tensioner_pulley": _list("", "numbers of the pulleys that arms carry, from 2 on"),
@@ -75,7 +75,9 @@ TENSIONER: dict[str, Parameter] = {
     "tensioner_stiffness": _list("N m", "moment of the spring by the angle [rad]", (1e-3, 1e5), minimum=0.0),
     "tensioner_damping": _list("N m s", "moment of the dashpot by the speed", (1e-5, 1e3), minimum=0.0),
     "tensioner_moment": _list(
-        "N m", "moments of the springs as drawn, which turn the arms; else those that hold them", (1e-3, 1e4)
+        "N m",
+        "moments of the springs as drawn, which rotate the arms; by default the moments that hold them",
+        (1e-3, 1e4),
     ),
     "strut_fixed_x": _list(
         "m", "fixed ends along x of springs that pull at the arms, if they have such", (1e-3, 10.0)
@@ -222,7 +224,7 @@ def _pulley_problems(p: Mapping[str, Any]) -> list[Problem]:
 
 
 def _pulley_faults(p: Mapping[str, Any]) -> Iterator[tuple[int, str, str, str]]:
-    """Yield what is wrong with single pulleys: number of the pulley from 0 on, key, expected, found."""
+    """Yield errors in single pulleys: number of the pulley from 0 on, key, expected, found."""
     for k in range(len(p["pulley_x"])):
         radius, turn, inertia, load = (
             p[f"pulley_{name}"][k] for name in ("radius", "turn", "inertia", "load")

@@ -5,8 +5,8 @@
 over the coordinates of the belt's nodes and the angles of all pulleys but the first, with K the slope of all
 elastic forces: those of the belt at its tensions, of contacts across the rim with their direction, and of
 contacts that stick, which tie the belt to its pulley. Contacts that slide carry a friction that does not
-change. Damping, and what the belt's running adds (v^2 / c^2 of a frequency, 0.3 % of the default drive), are
-left out, and arms stand still.
+change. Damping, and the effect of the belt's running (v^2 / c^2 of a frequency, 0.3 % of the default drive),
+are left out, and arms stand still.
 
 Strands that bend where they leave a pulley are curved there. So their vibration pulls at the belt to the
 first order and turns the driven pulleys, as Kong and Parker (2003) found of serpentine drives.
@@ -27,8 +27,8 @@ from cvt_hpc.multibody.ancf_equations import assemble
 from cvt_hpc.solvers.cyclic_blocks import LOWER, UPPER
 
 STUCK = 1.5  # friction_speed: slower contacts stick
-TIED = 1e3  # times as stiff as contacts across the rim: what ties them then
-LOWEST = 1.0  # [Hz]: what is below is the belt as it runs around
+TIED = 1e3  # times as stiff as contacts across the rim: the stiffness of ties
+LOWEST = 1.0  # [Hz]: modes below are the belt as it runs around
 
 
 def drive_frequencies(drive: Drive, state: State, count: int) -> np.ndarray:
@@ -37,7 +37,7 @@ def drive_frequencies(drive: Drive, state: State, count: int) -> np.ndarray:
     Parameters
     ----------
     drive, state : Drive, State
-        What moves, and where it is.
+        The moving parts, and their places.
     count : int
         How many.
 
@@ -86,7 +86,7 @@ def _of_belt(beam: AncfBeam, q: np.ndarray, size: int) -> lil_matrix:
 
 
 def _contacts(drive: Drive, state: State, size: int) -> tuple[csc_matrix, csc_matrix, csc_matrix]:
-    """Rows whose squares are stiffnesses: across the rim, of what sticks, of normal forces that turn."""
+    """Rows whose squares are stiffnesses: across the rim, of sticking contacts, of turning normal forces."""
     q, contact, lengths = state.chain.q, drive.contact, drive.beam.lengths
     points = at_places(drive.beam, q, contact.shape)
     touching, ties = np.argwhere(state.touch.normal > 0.0), _ties(contact, state.touch.memory)

@@ -1,4 +1,4 @@
-"""How far the mesh alone may shake the belt, whose elements are cubic and bend where they meet a pulley."""
+"""Largest excitation by the mesh alone, whose elements are cubic and bend where they meet a pulley."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a job may set of the belt drive, with units, bounds and defaults.
+"""Parameters of the belt drive that a job may set, with units, bounds and defaults.
 
 Radii, centre distance, line mass, stiffness and damping of the belt (five ribs) and the inertia of the
 pulleys are those of Cepon and Boltezar 2011, table 1; elements, contact points and the scatter of lengths are
@@ -54,7 +54,9 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "kick": not_negative(
             0.0, "N s", "impulse across each strand when the judged part begins", sensible=(1e-6, 10.0)
         ),
-        "crossed": Parameter(False, "", "the belt crosses itself: the driven pulley turns the other way"),
+        "crossed": Parameter(
+            False, "", "the belt crosses itself: the driven pulley rotates in the opposite direction"
+        ),
     },
     "layout": LAYOUT,
     "tensioner": TENSIONER,

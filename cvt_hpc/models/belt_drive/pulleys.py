@@ -95,7 +95,7 @@ class Pulleys(NamedTuple):
 
 
 class Wheels(NamedTuple):
-    """Motion of P pulleys and A arms, and what they add to the equations of a stage.
+    """Motion of P pulleys and A arms, and their part in the equations of a stage.
 
     Attributes
     ----------
@@ -222,12 +222,12 @@ def finish_wheels(pulleys: Pulleys, wheels: Wheels, scheme: Scheme, dt: float) -
 
 @kernel
 def add_pulleys(pulleys: Pulleys, wheels: Wheels, inputs: np.ndarray, share: float, tau: float) -> None:
-    """Put the inertia of pulleys and arms, and what acts on them beside the belt, into the border.
+    """Put the inertia of pulleys and arms, and the loads on them beside the belt, into the border.
 
     Parameters
     ----------
     pulleys, wheels : Pulleys, Wheels
-        What turns, and its motion.
+        The rotating parts, and their motion.
     inputs : (2, P) array
         Speed of the first pulley [rad/s] and torques on the others [N m], at the begin and the end of steps.
     share : float

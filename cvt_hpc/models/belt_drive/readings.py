@@ -1,4 +1,4 @@
-"""What is read off a belt drive at a sample: displacement, tensions, sliding, forces along the path."""
+"""Readings of a belt drive at a sample: displacement, tensions, sliding, forces along the path."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PLACES = 240  # along the path, at which profiles are recorded: 5 mm of a belt o
 
 
 def scalars_of(drawn: Layout, arms: int) -> tuple[str, ...]:
-    """Names of what is read at a sample beside displacement."""
+    """Names of the readings of a sample beside displacement."""
     names = ["driven_speed", *(f"tension {span}" for span in drawn.spans)]
     names += [f"slip {pulley}" for pulley in drawn.pulleys]
     if len(drawn.pulleys) > 2:
@@ -87,14 +87,14 @@ class Readings:
 
 
 class Reading:
-    """What is read at one sample, until the next one is.
+    """Readings of one sample, until the next one.
 
     Parameters
     ----------
     where : Readings
         Where it is read.
     drive, state : Drive, State
-        What moves, and its motion.
+        The moving parts, and their motion.
     sums : (6, PLACES) array, optional
         To which profiles are added: length, tension and offset by it, forces, and samples at each place.
 
@@ -119,7 +119,7 @@ class Reading:
         self.lifted = found.largest <= 0.0
 
     def scalars(self) -> list[float]:
-        """What `scalars_of` names."""
+        """Values of the names in `scalars_of`."""
         wheels, drawn = self._state.wheels, self._where.drawn
         speeds = drawn.path.turn * wheels.speed[0, : len(drawn.pulleys)]
         slip = drawn.path.turn * self._slip / self._where.belt_speed
@@ -128,7 +128,7 @@ class Reading:
 
 
 def stored_energy(drive: Drive, state: State) -> float:
-    """Kinetic and elastic energy of belt, driven pulleys and arms [J], without what contacts store."""
+    """Kinetic and elastic energy of belt, driven pulleys and arms [J], without that stored in contacts."""
     kinetic, elastic, _ = energies(drive.beam, state.chain.q, state.chain.v)
     pulleys, wheels = drive.pulleys, state.wheels
     count = len(pulleys.radius)

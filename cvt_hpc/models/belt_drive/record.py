@@ -1,4 +1,4 @@
-"""What the record of a run of the belt drive holds, what a run costs, and how it is judged."""
+"""The record of a run of the belt drive: its variables, the cost of a run, and the verdict."""
 
 from __future__ import annotations
 
@@ -104,13 +104,13 @@ VARIABLES = (
     replace(shared("belt_loss")[0], comment="mean power of the belt's damping along, across and in bending"),
     *shared("driving_power", "load_power", "storing_power", "loss", "power_residual"),
     Variable("arm_loss", (), "f8", "W", "mean power of the tensioners' dashpots"),
-    Variable("efficiency", (), "f8", "1", "what losses leave of the power put in"),
+    Variable("efficiency", (), "f8", "1", "share of the power put in that is not lost"),
     Variable(
         "turns",
         (),
         "i8",
         "1",
-        "whole turns of the belt that speed_loss is the mean of, about those with speed_ripple",
+        "whole revolutions of the belt over which speed_loss is the mean, roughly so with speed_ripple",
     ),
     Variable("unsolved_share", (), "f8", "1", "share of steps that were not solved to the tolerance"),
     Variable("iterations", (), "f8", "1", "of Newton's method in a step, mean"),
@@ -225,7 +225,7 @@ def _powers(run: Transient) -> dict[str, Any]:
 
 
 def _of_arms(run: Transient) -> dict[str, np.ndarray]:
-    """What is known of the arms, for the pulleys that they carry; nan of others."""
+    """Values of the arms, for the pulleys that they carry; nan of others."""
     pulleys, judged = run.pulleys, run.judged
     found = {name: np.full(len(pulleys.arm), np.nan) for name in ("arm_angle", "arm_ripple", "stop_share")}
     for p in np.flatnonzero(pulleys.arm >= 0):

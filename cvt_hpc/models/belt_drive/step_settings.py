@@ -2,7 +2,7 @@
 
 Needs of a model: a step kernel with Newton's method and dual slopes of friction.
 
-Order 2 between contacts' events, 1 at these. It resolves what the step resolves and damps the rest.
+Order 2 between contacts' events, 1 at these. It resolves motion slower than the step and damps the rest.
 """
 
 from cvt_hpc.parameters import Parameter
@@ -31,7 +31,7 @@ PARAMETERS = {
         "spectral_radius": Parameter(
             0.6,
             "",
-            "what a step leaves of a vibration that it does not resolve; 1: the midpoint rule",
+            "share that a step leaves of a vibration that it does not resolve; 1: the midpoint rule",
             minimum=0.0,
             maximum=1.0,
         ),

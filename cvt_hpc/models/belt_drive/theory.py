@@ -1,4 +1,4 @@
-"""What theory says of a drive: speed loss, tension where the belt slides, frequencies of the strands."""
+"""Theory of a drive: speed loss, tension where the belt slides, frequencies of the strands."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def unsheared_tension(
     side = mu * np.copysign(1.0, outlet - inlet) / radius  # of dN/ds over N where the rim slides
 
     def rise(stuck: float) -> tuple[float, float]:
-        """Of N over the part that sticks: what it is, and what the shear at its end gives."""
+        """Of N over the part that sticks: its value, and its value by the shear at the end."""
         last = outlet * np.exp(-side * (length - stuck))
         return last - inlet, side * last * np.tanh(0.5 * rate * stuck) / rate
 
@@ -186,8 +186,8 @@ def strand_frequencies(parameters: Mapping[str, Any], path: BeltPath, tension: n
     """Eigenfrequencies of the strands as running beams, pinned where the tangents touch the pulleys.
 
     Bending lifts the belt off a pulley by d = sqrt(EI / (T - m v^2)) before that point. There it is clamped,
-    since the pulley holds its place and its slope, which shortens by d what vibrates. Both together change
-    the frequency of n half waves by about 5/3 (n pi d / L)^3 / (n pi).
+    since the pulley holds its place and its slope, which shortens the vibrating part by d. Both together
+    change the frequency of n half waves by about 5/3 (n pi d / L)^3 / (n pi).
 
     Parameters
     ----------

@@ -126,7 +126,7 @@ class Transient(SampledRun):
         return courses.driving_speed(self.parameters, time)
 
     def load(self, time: float) -> float:
-        """Torque at the driving pulley without losses, or what `pulley_load` counts in [N m]."""
+        """Torque at the driving pulley without losses, or the unit of `pulley_load` [N m]."""
         return courses.load(self.parameters, time)
 
     def _take_sample(self) -> None:
@@ -169,7 +169,7 @@ class Transient(SampledRun):
         return self.steps * self.step
 
     def speed_loss(self, samples: slice) -> float:
-        """What sliding and creep take from the driven speed in some samples, over what it is without [1]."""
+        """Loss of driven speed by sliding and creep in some samples, over the speed without slip [1]."""
         driven = self.channel("driven_speed")[samples].mean()
         return float(1.0 - self.drawn.ratio * driven / self.mean_driving_speed(samples))
 
@@ -208,7 +208,7 @@ class Transient(SampledRun):
     def mean_rate(self, total: int) -> float:
         """Mean rate of one of the totals, by its index; -1: of the stored energy.
 
-        Over whole turns; of a run that ended before, over all that it has recorded.
+        Over whole revolutions; of a run that ended before, over all that it has recorded.
         """
         first, last = max(self.whole_turns.start - 1, 0), self.samples - 1
         if self.done < self.samples:

@@ -1,9 +1,9 @@
 """The energy criterion: whether friction feeds a small radial vibration of elements that creep in the groove.
 
 It answers one question, *does friction that falls as steeply as this excite a contact that slides like
-that?*, for a metre of belt in the wrap that is pressed by `contact_force` and slides at given speeds. It is
-what Lebrecht et al. 2004 derive in sec. 4 (eqs 13-19) from an oscillator of mass m, taken per length here so
-that its quantities are the elastic belt's:
+that?*, for a metre of belt in the wrap that is pressed by `contact_force` and slides at given speeds.
+Lebrecht et al. 2004 derive it in sec. 4 (eqs 13-19) from an oscillator of mass m. It is taken per length
+here, so that its quantities are the elastic belt's:
 
     m x'' = f_rad - d x' - c_belt x - 2 (f_ax + c_ele x tan(th)) (tan(th) + mu_r(v_r + x')),
 
@@ -22,9 +22,9 @@ falling part of mu' is divided by 1 + (w tau)^2, its share in phase with the spe
 work is integrated over the friction law as it is, sliding that turns about included; where E(X) comes back
 to zero from above is the amplitude of a limit cycle in harmonic balance.
 
-What it cannot answer: at which load or ratio a belt vibrates (that needs the sliding of each element: the
+It cannot answer at which load or ratio a belt vibrates (that needs the sliding of each element: the
 elastic belt), in which mode and strand, or with which amplitude the strands move; motions that are not
-harmonic, which are those with a `damping_ratio` below -0.1; and stick-slip.
+harmonic, which have a `damping_ratio` below -0.1; and stick-slip.
 """
 
 from cvt_hpc.models.criterion.parameters import PARAMETERS, check, inert

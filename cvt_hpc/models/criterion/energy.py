@@ -34,7 +34,8 @@ class Flank(NamedTuple):
     radial_speed, speed : float
         v_r and |v| [m/s].
     mass, stiffness : float
-        Per length: m [kg/m], and what a radial displacement meets [N/m^2]; 0 or less: nothing brings it back.
+        Per length: m [kg/m], and the stiffness against a radial displacement [N/m^2]; 0 or less: nothing
+        brings it back.
     damping : (4,) array
         Shares of the radial damping [N s/m^2]: the belt's; of friction its present slope, its falling law in
         phase with the speed, and its turning with the direction of sliding.

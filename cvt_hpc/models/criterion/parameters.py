@@ -1,4 +1,4 @@
-"""What a job may set of the criterion: quantities of the elastic belt, and how its flank slides.
+"""Parameters of the criterion that a job may set: quantities of the elastic belt, and how its flank slides.
 
 The defaults are assumptions: a metre of the driven wrap of the elastic belt at 50 kN (its arc is 0.28 m
 long), on sheaves that tilt (3e5 N m/rad over arc times radius squared), which slides radially.

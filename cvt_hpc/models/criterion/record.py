@@ -1,4 +1,4 @@
-"""What the criterion finds: whether small motions are fed, their growth, and energy over amplitude."""
+"""Result of the criterion: whether small motions are fed, their growth, and energy over amplitude."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ OWN_STEPPERS = {
 }
 STEPPERS = OWN_STEPPERS | taken(REFUSED)
 
-GIVES = {"imex": {"step_error": CHOICE}}  # by stepper: what its parameters give for a scene of the model
+GIVES = {"imex": {"step_error": CHOICE}}  # by stepper: values of its parameters for a scene
 
 __all__ = [
     "DEFAULT_STEPPER",

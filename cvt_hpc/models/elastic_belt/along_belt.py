@@ -1,6 +1,7 @@
 """Speeds and forces along the belt, as Lebrecht et al. 2004 and Bullinger et al. 2005 draw them.
 
-They follow from what every sample holds of each station (`moments.py`), of a single instant or of means.
+They follow from the values that every sample holds of each station (`moments.py`), of a single instant or of
+means.
 
 The flank carries the normal force N = f_P,n and, along its meridian, the friction m N outward, with m =
 -mu v_m/|v|. The axial force is f_ax = N cos d - m N sin d, the radial force of both flanks p_r = 2 (N sin d +
@@ -27,7 +28,7 @@ from cvt_hpc.models.elastic_belt.belt import Mesh
 from cvt_hpc.models.elastic_belt.fluctuation import at_stations
 from cvt_hpc.variator.history import ALONG
 
-# of a sample, what the quantities below follow from
+# quantities of a sample from which the quantities below follow
 NEEDED = (
     "radial_friction",
     "tangential_friction",

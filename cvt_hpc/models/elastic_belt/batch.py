@@ -52,14 +52,14 @@ STEPS: dict[str, Step] = {"imex": (imex_work, march_imex), "explicit": (explicit
 
 
 class Paused(NamedTuple):
-    """A run at its end, as another batch goes on with it; a copy, which keeps no batch alive.
+    """A run at its end, from which another batch continues; a copy, which keeps no batch alive.
 
     Attributes
     ----------
     time : float
         Simulated time [s].
     lane : tuple of (rows, fields) arrays
-        Its lane of all that a batch keeps by lanes, in the order of `lane_arrays`.
+        Its lane of all arrays that a batch keeps by lanes, in the order of `lane_arrays`.
     rows : (done, S + C) array
         Its history, as `LaneRun.rows`.
     """
@@ -88,15 +88,15 @@ class Batch:
     stepper : str
         "imex" or "explicit".
     paused : sequence of Paused, optional
-        What the runs go on from, one for each: shorter runs of the same points by the same stepper and step.
-        Each is then bit by bit the run of its point from the start.
+        Runs from which the runs continue, one for each: shorter runs of the same points by the same stepper
+        and step. Each is then bit by bit the run of its point from the start.
 
     Attributes
     ----------
     points, stepper
         As given.
     plan : Recording
-        What is recorded.
+        The recorded quantities.
     samples : int
         Samples of a whole run.
     done : int
@@ -159,7 +159,7 @@ class Batch:
         self._ordered: np.ndarray | None = None
 
     def _resume(self, paused: Sequence[Paused]) -> None:
-        """Put the runs' states into the lanes, with all that the step remembers."""
+        """Put the runs' states into the lanes, with all data that the step keeps."""
         for k, array in enumerate(lane_arrays(self.state, self.work, self.ended)):
             array.data[:] = np.stack([run.lane[k] for run in paused], axis=-1)
         self.state.time[0] = paused[0].time
@@ -227,7 +227,7 @@ class Batch:
             self.done = end
 
     def take_over(self, runs: Sequence[Any]) -> None:
-        """Go on from where runs by another stepper stand, their history included, but for means begun before.
+        """Continue runs by another stepper, their history included, except for means that began before.
 
         Parameters
         ----------
@@ -242,7 +242,7 @@ class Batch:
         derive(self._belt, self.state, self.work.stations)
         self.begun = self.ended.data[0, ENDED_AT] = runs[0].time
         if self.done > self.plan.first_judged:
-            self.profiles[1].data[:] = np.nan  # what the other has summed up is not known
+            self.profiles[1].data[:] = np.nan  # sums of the other stepper are not known
             if isinstance(self.work, RingWork):
                 self.work.sums.data[:] = np.nan
 
@@ -296,7 +296,7 @@ class LaneRun(RecordedRun):
 
     @property
     def failure(self) -> tuple[Status, str] | None:
-        """What has gone wrong, where the run cannot go on."""
+        """The failure, where the run cannot continue."""
         outcome = int(self._ended(OUTCOME))
         return FAILURES[Outcome(outcome)] if outcome else None
 
@@ -315,7 +315,7 @@ class LaneRun(RecordedRun):
 
     @property
     def momentary(self) -> np.ndarray | None:
-        """What `Momentary` has kept of the run."""
+        """Samples of the run that `Momentary` has kept."""
         return self.batch.momentary.of(self._lane)
 
     @property
@@ -329,7 +329,7 @@ class LaneRun(RecordedRun):
         return take_lane(self.batch.state, self._lane, self.batch.belts[self._lane])
 
     def paused(self) -> Paused:
-        """What a batch of the same point over a longer time goes on from."""
+        """The state from which a batch of the same point over a longer time continues."""
         kept = lane_arrays(self.batch.state, self.batch.work, self.batch.ended)
         lane = tuple(array.data[:, :, self._lane].copy() for array in kept)
         return Paused(float(self.batch.state.time[0]), lane, self.rows.copy(order="K"))

@@ -42,7 +42,7 @@ TIME, DRIVEN_SPEED, DRIVEN_POSITION, LAYER_WORK = range(4)
 FIRST_STATE = 4  # of the pulleys' states, which are 0 where a pulley does not have them
 
 REGIONS = ("driving arc", "t1", "driven arc", "t2")
-MODES = 5  # half waves along a strand that are told apart
+MODES = 5  # half waves along a strand that are resolved
 
 
 class Belt(NamedTuple):
@@ -118,7 +118,7 @@ class State(NamedTuple):
 
     Of rings in n layers `fields` is (7 + 2 n, N), see `rings.py`.
 
-    The work of the layers' dampers [J] until it is asked for is no state of the belt.
+    The work of the layers' dampers [J] until it is read is no state of the belt.
     """
 
     fields: np.ndarray
@@ -268,7 +268,7 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     Returns
     -------
     State
-        Belt seated in both grooves under the tension that the thrust asks for; layers at uniform strain.
+        Belt seated in both grooves under the tension that the thrust requires; layers at uniform strain.
     """
     p, grid = parameters, mesh(parameters)
     tangent = np.tan(p["half_wedge_angle"])
@@ -289,7 +289,7 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
         w[stations] = -(flexibility(sheave) @ force + tilt @ sheave.tilt) / (2.0 * tangent)
         arcs.append((stations, sheave.weight, radius))
     w[arcs[0][0]] -= p["driving_position"] / (2.0 * tangent)
-    # the belt keeps its length: what sinks at the driver comes out at the driven pulley
+    # the belt keeps its length: it moves inward at the driving and outward at the driven pulley
     sunk = sum((weight * w[stations]).sum() / radius for stations, weight, radius in arcs)
     lift = -sunk / grid.path.driven_wrap
     w[arcs[1][0]] += lift

@@ -1,4 +1,4 @@
-"""Bending of the belt about its path, and what the path's curvature adds to the transverse motion.
+"""Bending of the belt about its path, and the effect of the path's curvature on the transverse motion.
 
 The belt's curvature is kappa - kappa^2 w - w_ss in first order. Which energy of it is meant is
 `curvature_terms`; EI bends, ()' is d/ds:

@@ -1,4 +1,4 @@
-"""What a job may set of the belt's bending: curvature terms, and the moment of the pressed elements."""
+"""Parameters of the belt's bending: curvature terms, and the moment of the pressed elements."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ BENDING: dict[str, Parameter] = {
         "none",
         "",
         "terms of the path's curvature in the transverse motion (Bullinger et al. 2005, eqs 14-21): none, or "
-        "those of a belt whose shape at rest is the path, or straight",
+        "those of a belt with the path as shape at rest, or of a belt straight at rest",
         choices=CURVATURE_TERMS,
     ),
     "column_bending": Parameter(

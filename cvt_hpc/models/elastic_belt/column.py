@@ -1,6 +1,6 @@
 """The column of pressed elements: its push force and its bending moment, with edges on which elements rock.
 
-Faces reach from k- inside to k+ outside of the pitch line. What they carry, the push force P and its moment M
+Faces reach from k- inside to k+ outside of the pitch line. Their load, the push force P and its moment M
 (P times its distance outwards from the pitch line), lies between the edges: P >= 0, -k- P <= M <= k+ P.
 Between the faces the bodies give way by P / EA and bend by M / EI. So the complementary energy is
 P^2 / 2 EA + M^2 / 2 EI within that cone, and the energy of a column under the strain eps of its pitch line
@@ -64,7 +64,7 @@ def rocking_column(eps, kappa, stiffness, bending, outer, inner):
 
 @merged_kernel
 def deviating_curvature(belt: Belt, w: np.ndarray, j: int) -> float:
-    """What the belt's curvature at station j has beyond its path's [1/m]."""
+    """Curvature of the belt at station j beyond that of its path [1/m]."""
     n = belt.cell.size
     a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
     turned = ((w[b] - w[j]) / belt.cell[j] - (w[j] - w[a]) / belt.cell[a]) / belt.dual[j]

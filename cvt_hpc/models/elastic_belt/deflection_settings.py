@@ -1,4 +1,4 @@
-"""What a job may set of the deflection of the sheaves' discs, and the flexibilities that follow."""
+"""Parameters of the deflection of the sheaves' discs, and the flexibilities that result."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def kept_modes(parameters: Mapping[str, Any], pulley: str) -> tuple[np.ndarray, 
 def disc_settings(
     parameters: Mapping[str, Any], pulley: str, wrap: tuple[int, float, float]
 ) -> dict[str, Any]:
-    """What `Sheaves` have of the discs of one pulley at the reference stiffness beside local bending.
+    """Data of the discs of one pulley for `Sheaves`, at the reference stiffness, beside local bending.
 
     Parameters
     ----------

@@ -111,7 +111,7 @@ def step_explicit(belt: LaneBelt, state: LaneState, work: ExplicitWork, step: fl
     Parameters
     ----------
     belt, state, work
-        Constants, state (advanced in place), work space, that holds what `derive` finds of this state.
+        Constants, state (advanced in place), work space, that holds the results of `derive` for this state.
     step : float
         Step [s]; stable below 2 / (largest rate), some 0.2 us with the default belt.
     """
@@ -129,7 +129,7 @@ def step_explicit(belt: LaneBelt, state: LaneState, work: ExplicitWork, step: fl
 def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float):
     """Increments of the velocities into DU and DV; the flanks' torques.
 
-    What they take from the driving pulley, where that is free, and their moment on the driven one [N m].
+    The torque taken from the driving pulley, where that is free, and the moment on the driven one [N m].
     """
     n, fields, c = state.fields.rows, state.fields, belt.constants
     sine, cosine, offset = c[0, SINE], c[0, COSINE], c[0, RING_OFFSET]
@@ -258,7 +258,7 @@ def _advance_across(belt: LaneBelt, state: LaneState, stations: LaneArray, step:
         step * lane_carry(belt, DRIVING_CELL, DRIVING_CARRY, belt_speed),
         step * lane_carry(belt, DRIVEN_CELL, DRIVEN_CARRY, belt_speed),
     )
-    # an arc's second station takes what its first becomes, which may be the last of the part behind
+    # an arc's second station takes the new value of its first, which may be the last of the part behind
     last = n - 1
     u = fields[last, U] + stations[last, DU]
     speed = _sliding_speed(belt, fields, stations, last, pulleys, per_cosine, belt_speed, u)

@@ -36,7 +36,7 @@ PARAMETERS = {
         "precision": Parameter(
             "double",
             "",
-            "of the numbers in a step, of which the reference takes no other; 8 runs advance together",
+            "precision of the numbers in a step; this step has no other; 8 runs advance together",
             choices=("double",),
         ),
         "lanes": LANES,

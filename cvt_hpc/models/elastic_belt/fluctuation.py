@@ -1,10 +1,10 @@
-"""What feeds a vibration and what takes from it: the audit of the fluctuations about the mean motion.
+"""Energy that enters and leaves a vibration: the audit of the fluctuations about the mean motion.
 
-A force f that works at the speed v has the mean power <f v> = <f> <v> + <f' v'>: what the mean force does in
-the mean motion, and what it feeds into the fluctuation. Friction of the flanks takes power on the whole, and
-yet feeds where it falls as sliding gets faster (Lebrecht et al. 2004, eqs 15-19). While the mean state stays,
-each equation of motion (`rhs.py`) times the fluctuation of its own speed, u = w_t, v_0 or v_1, has the mean
-0. Summed over the belt,
+A force f that works at the speed v has the mean power <f v> = <f> <v> + <f' v'>: the power of the mean force
+in the mean motion, and the power fed into the fluctuation. Friction of the flanks takes power on the whole,
+and yet feeds where it falls as sliding gets faster (Lebrecht et al. 2004, eqs 15-19). While the mean state
+stays, each equation of motion (`rhs.py`) times the fluctuation of its own speed, u = w_t, v_0 or v_1, has the
+mean 0. Summed over the belt,
 
     flanks + stresses = belt + rings + layers + lag + carried + remainder,
 
@@ -19,14 +19,14 @@ each equation of motion (`rhs.py`) times the fluctuation of its own speed, u = w
 
 Stresses within a belt whose elements touch throughout hand power on, and sum up to 0. Where gaps open and
 close they feed: the mean push works in the mean opening, and elements that the mean motion has drawn apart
-close with a blow. What is carried goes to the mean motion: its speed V works against the force along the path
-<h' w_s'> that the vibration exerts, the pulleys against the changing moment of <f_t' w'>. Flanks less carried
-is what friction does to u and v_0 at a fixed place, as `linear_stability` counts it; an error in the flanks'
-part alone would not open the sum.
+close with an impact. The carried power goes to the mean motion: its speed V works against the force along the
+path <h' w_s'> that the vibration exerts, the pulleys against the changing moment of <f_t' w'>. Flanks less
+carried is the effect of friction on u and v_0 at a fixed place, as `linear_stability` counts it; an error in
+the flanks' part alone would not open the sum.
 
-The remainder is what the numerics do (upwinding, backward Euler, work of dampers that samples do not meet),
-what the vibration gains while it grows, and bending. Fluctuations of all frequencies count, judder and
-hum of gaps too, and a trend of the mean state would: along a ramp of load or speed nothing is known.
+The remainder is the effect of the numerics (upwinding, backward Euler, work of dampers that samples do not
+meet), the energy gained while the vibration grows, and bending. Fluctuations of all frequencies count, judder
+and hum of gaps too, and a trend of the mean state would: along a ramp of load or speed nothing is known.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ VARIABLES = (
         (),
         "f8",
         "W",
-        "power that is fed into the fluctuation less what is taken and carried",
+        "power that is fed into the fluctuation less the power taken and carried",
     ),
 )
 
@@ -99,7 +99,7 @@ class Fluctuation(NamedTuple):
     stresses : (N,) array
         Of the cells [W].
     mean_layers : float
-        What the layers' dampers take from the mean motion, which is no fluctuation [W].
+        Power that the layers' dampers take from the mean motion, which is no fluctuation [W].
     """
 
     flanks: np.ndarray

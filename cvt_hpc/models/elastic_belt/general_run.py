@@ -36,7 +36,7 @@ from cvt_hpc.steppers.fastest_rate import STABLE, fastest_rate
 from cvt_hpc.steppers.marching import Marching
 from cvt_hpc.variables import Status
 
-SAMPLES_TOGETHER = 20  # between two looks at what was sampled: a run that has left its path goes not far
+SAMPLES_TOGETHER = 20  # between two checks of the samples: a run that has left its path goes not far
 
 
 class Form:
@@ -69,7 +69,7 @@ class Form:
         return self._flat.state
 
     def hints(self, stepper: str) -> dict[str, Any]:
-        """What SciPy's integrators can use: the Jacobian, sparse where they take it so."""
+        """Options for SciPy's integrators: the Jacobian, sparse where they take it so."""
         jacobian = SparseJacobian(self._flat)
         if stepper == "scipy_lsoda":
             return {"jac": lambda t, y: jacobian(t, y).toarray()}
@@ -115,7 +115,7 @@ class GeneralTransient(Marched, OneLaneRun):
         return 2 * self.counters()["rates"]
 
     def take_over(self, runs: Sequence[Any]) -> None:
-        """Go on from where a run by another stepper stands, its history included, but for means begun before.
+        """Continue a run by another stepper, its history included, except for means that began before.
 
         Parameters
         ----------
@@ -137,7 +137,7 @@ class GeneralTransient(Marched, OneLaneRun):
         Returns
         -------
         (Status, str) or None
-            What has gone wrong, where the run cannot go on.
+            The failure, where the run cannot continue.
         """
         last = min(self.done + samples, self.samples)
         found = self._march(0) if samples == 0 else None
@@ -214,7 +214,7 @@ def damper_power(belt: Belt, state: State) -> float:
                 damped = min(damped, -belt.element_stiffness * pressed[c]) if pressed[c] < 0.0 else 0.0
             power += damped * closing
     for k in range(FIRST_LAYER, (FIRST_LAYER + state.fields.shape[0]) // 2):
-        # beside what the layers' mean speed takes
+        # beside the transport by the layers' mean speed
         share = 2.0 / (state.fields.shape[0] - FIRST_LAYER)
         v = state.fields[k] - state.fields[V_RING]
         for c in range(n):

@@ -1,4 +1,4 @@
-"""Which runs of the elastic belt can advance together, and what a batch of them costs."""
+"""Runs of the elastic belt that can advance together, and the cost of a batch of them."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ ALONE_SHARE = {"imex": 0.3, "explicit": 0.6}
 
 COST_PER_LAYER = 0.3  # of a ring layer, beside the rings as one
 
-LANES = {"double": 8, "single": 16}  # what registers of 64 bytes hold
-# What the runs of a batch have in common: the mesh, the law's kind, and the course of time.
+LANES = {"double": 8, "single": 16}  # capacity of registers of 64 bytes
+# Values that the runs of a batch have in common: the mesh, the law's kind, and the course of time.
 SHARED = (
     "ratio",
     "driven_radius",
@@ -86,7 +86,7 @@ def lanes(parameters: Mapping[str, Any], stepper: str) -> int:
 
 
 def lane_key(parameters: Mapping[str, Any]) -> tuple:
-    """What two runs must have in common to be in one batch.
+    """Values that two runs must have in common to be in one batch.
 
     Parameters
     ----------

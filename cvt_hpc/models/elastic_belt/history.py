@@ -1,4 +1,4 @@
-"""The history of a run of the elastic belt: what moves over time, and what is where along the path."""
+"""The history of a run of the elastic belt: quantities over time, and quantities along the path."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ a centred one rings where they meet and part: it damps them like EA dt [N s], in
 separated elements is frozen during a step: those that are apart and, with the old speeds, stay apart.
 Elements meet where their gap closes and part where their push, damper included, has ended: were it where
 they reach their length at rest, the cell in which gaps run into pressed elements would be neither, and rattle
-from step to step with pushes in proportion to the step (`EDGES.md`). What limits the step is accuracy,
+from step to step with pushes in proportion to the step (`EDGES.md`). The step is limited by accuracy,
 c dt / h about 5, and the transverse contact and bending.
 """
 
@@ -87,7 +87,7 @@ def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
     Parameters
     ----------
     belt, state, work
-        Constants, state (advanced in place), work space, that holds what `derive` finds of this state.
+        Constants, state (advanced in place), work space, that holds the results of `derive` for this state.
     step : float
         Step [s].
     """
@@ -119,7 +119,7 @@ def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
 
 @kernel
 def forget(work: ImexWork) -> None:
-    """Clear the marks of what a step had to do again."""
+    """Clear the marks of repeated parts of a step."""
     stations = work.stations
     for j in range(stations.rows):
         stations[j, REVERSING] = stations[j, RING_REVERSING] = stations[j, MEETING] = 0.0
@@ -129,7 +129,7 @@ def forget(work: ImexWork) -> None:
 def advance_belt(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
     """Apply the increments, and find the new strains; the flanks' torques.
 
-    What they take from the driving pulley, where that is free, and their moment on the driven one [N m].
+    The torque taken from the driving pulley, where that is free, and the moment on the driven one [N m].
     """
     n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
     per_cosine = 1.0 / c[0, COSINE]
@@ -168,7 +168,7 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
         closing, change = v0_b - v0, dv0_b - dv0
         viscous = damper_0 * per_cell * closing
         damped = fma(damper_0 * per_cell, change, viscous)
-        # what is left of the push beyond the length at rest stores nothing: all of it is damping
+        # the remaining push beyond the length at rest stores nothing: all of it is damping
         damped = select(eps > 0.0, minimum(fma(stiffness, eps, damped), 0.0), damped)
         damped = select(viscous > -stiffness * eps, -stiffness * minimum(eps, 0.0), damped)
         damped = select(stations[j, LINK_0] > 0.0, damped, 0.0)
@@ -194,7 +194,7 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
                 tangential = (stations[j, FLANK] - slopes) * (belt.dual[j] * (here + w))
                 moment = moment - like(select(is_driven, tangential, zero), moment)
                 if belt.is_free:
-                    # beside an arc what stands there is of an earlier step
+                    # beside an arc the values are of an earlier step
                     tangential = select(share > 0.0, tangential, zero)
                     taken = taken + like(select(is_driven, zero, tangential), taken)
             if belt.memory:

@@ -1,6 +1,6 @@
 """The fast step at each station: forces, and slopes with the speeds, without the stresses T and P.
 
-And the step's work space: what it keeps at each station beside the state.
+And the step's work space: its values at each station beside the state.
 """
 
 from __future__ import annotations
@@ -209,7 +209,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
         mobility = 1.0 / radial_mass
         push, lag = (transverse + outward) * mobility, cross * mobility
         if belt.is_curved:
-            # the mean velocity of the step but for what it owes to the layers' speeds
+            # the mean velocity of the step without the part due to the layers' speeds
             turning = belt.ring_curvature[j] * fma(0.5, push, u)
             along_element = fma(-turning * element_mass, full_speed, along_element)
             along_ring = fma(-turning * ring_mass, belt_speed + v1, along_ring)

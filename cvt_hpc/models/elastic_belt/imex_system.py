@@ -120,9 +120,9 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
     element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
     element_damping, ring_damping = c[0, ELEMENT_DAMPING], c[0, RING_DAMPING]
     zero = like(0.0, belt_speed)
-    # of the last row: its own block and right side, and what is found for the last row behind
+    # of the last row: its own block and right side, and the results for the last row behind
     p = q = r = f0 = f1 = p_b = q_b = r_b = f0_b = f1_b = zero
-    # the present row's coupling to the last one behind; what the row before leaves to the present one
+    # the present row's coupling to the last one behind; the remainder of the row before for the present one
     c00 = c01 = c10 = c11 = t00 = t01 = t11 = s0 = s1 = zero
     for k in range(-1, last):
         # the last cell first, which is behind row 0
@@ -131,7 +131,7 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
         v0, v1 = fields[j, V_ELEMENT], fields[j, V_RING]
         closing_0, closing_1 = ahead(fields, j, V_ELEMENT) - v0, ahead(fields, j, V_RING) - v1
         eps = stations[j, EPS_0]
-        # what leaves ahead less what enters behind, per (1 + eps): v[b] - v[j] (1 + eps) / (1 + eps_a)
+        # flow out ahead less flow in behind, per (1 + eps): v[b] - v[j] (1 + eps) / (1 + eps_a)
         entering = (eps - behind(stations, j, EPS_0)) * behind(stations, j, SHORT_0)
         outflow = fma(-(belt_speed + v0), entering, closing_0)
         kappa = belt.curvature[j]
@@ -213,7 +213,7 @@ def substitute(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) ->
       of friction is flat, the step all but explicit, and a large friction force turns it about within a step:
       it chatters from step to step, and takes energy out of nothing.
     - MEETS: elements that the step has taken as apart would be pressed together. Their push would set in a
-      step late, go on by one cell a step instead of at the speed of waves, and pile up.
+      step late, advance by one cell a step instead of at the speed of waves, and pile up.
     """
     stations, scalars, c = work.stations, state.scalars, belt.constants
     last = stations.rows - 1
@@ -275,7 +275,7 @@ def _meeting(belt: LaneBelt, state: LaneState, stations: LaneArray, j: int, open
 
 @merged_kernel
 def _mark(stations: LaneArray, j: int, field: int, mask):
-    """Mark the lanes of a mask; those that were not marked before."""
+    """Mark the lanes of a mask; returns the newly marked ones."""
     before = stations[j, field]
     stations[j, field] = select(mask, 1.0, before)
     return mask & (before < 0.5)

@@ -35,7 +35,8 @@ from cvt_hpc.physics.friction import FrictionLaw
 from cvt_hpc.physics.moving_discs import settle
 from cvt_hpc.physics.sheaves import disc_factor
 
-# Constants of each lane, in SI units; what is not named in `Belt` is explained where it is computed below.
+# Constants of each lane, in SI units; names that are not in `Belt` are explained where they are computed
+# below.
 CONSTANTS = (
     "element_stiffness",
     "ring_stiffness",
@@ -124,8 +125,8 @@ FIRST_LAW = len(CONSTANTS) - len(LAWS)
 ) = range(FIRST_LAW)
 
 # Scalars of the state, of each lane, double in any precision: the driven pulley's two, the work of the
-# layers' dampers until it is asked for [J], how often friction was found to turn sliding about in a step, and
-# from FIRST_STATE on what free pulleys have beside.
+# layers' dampers until it is read [J], how often friction was found to reverse sliding in a step, and
+# from FIRST_STATE on the further states of free pulleys.
 LANE_SCALARS = ("driven_speed", "driven_position", "layer_work", "repeats", *STATES)
 SPEED, POSITION, LAYER_WORK, REPEATS = range(FIRST_STATE)
 
@@ -322,7 +323,7 @@ def _constants_of(belt: Belt) -> list[float]:
         "start_share": belt.speed_start / belt.driving_speed,
         "driving_cell": belt.cell[0],
         "driven_cell": belt.cell[belt.driven_start],
-        # what is stored in a pulley whose speed is given is none of its business
+        # energy stored in a pulley of given speed does not count
         "driven_inertia": belt.driven_inertia if np.isfinite(belt.driven_inertia) else 0.0,
         **dict(zip(LAWS, belt.pulleys.laws[0], strict=True)),
     }

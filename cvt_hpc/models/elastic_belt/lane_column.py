@@ -1,4 +1,4 @@
-"""The column of pressed elements in lanes: what `column.py` has for one run."""
+"""The column of pressed elements in lanes: the functions of `column.py` for one run."""
 
 from __future__ import annotations
 
@@ -77,10 +77,10 @@ def lane_column(belt: LaneBelt, state: LaneState, stations: LaneArray, strain: i
 
 @kernel
 def foresee_column(belt: LaneBelt, state: LaneState, stations: LaneArray, push: int, step: float) -> None:
-    """What the turning of the belt within a step changes of -P / EA, into SHIFT.
+    """Change of -P / EA by the turning of the belt within a step, into SHIFT.
 
-    With the transverse velocities at its end but for what they owe to the layers' speeds, whose increments
-    stand in field `push` of the stations, and with what elements rest on at its beginning.
+    With the transverse velocities at its end without the part due to the layers' speeds, whose increments
+    stand in field `push` of the stations, and with the contacts between elements at its beginning.
     """
     column = state.column
     for j in range(state.fields.rows):

@@ -1,4 +1,4 @@
-"""Forces of the elastic belt in lanes: what steps, recording and audit find of one state.
+"""Forces of the elastic belt in lanes, as steps, recording and audit need them for one state.
 
 Steps keep it in a LaneArray of N stations, their work space: its first fields are those named here, further
 ones each step's own.
@@ -127,7 +127,7 @@ def note_speeds(belt: LaneBelt, state: LaneState, stations: LaneArray, taken: in
 def step_ripple(belt: LaneBelt, state: LaneState, stations: LaneArray):
     """Speed that alternates from step to step [m/s], root mean square over the belt's mass.
 
-    A speed that goes to and fro by A at every step has the second difference 4 A; one that vibrates with the
+    A speed that alternates by A at every step has the second difference 4 A; one that vibrates with the
     amplitude A at the angular frequency w has (w step)^2 A, below A / 3000 at 600 Hz and 4.6 us.
     """
     n, fields, c = state.fields.rows, state.fields, belt.constants
@@ -174,7 +174,7 @@ def lane_acceleration(belt: LaneBelt, time: float, step: float):
     """Mean rate of the belt speed in a step [m/s^2].
 
     A step has it act on the layers, so that their speeds are then counted from the belt speed at its end, and
-    the slopes of friction act on what they change against pulleys that accelerate as well.
+    the slopes of friction act on their speeds against pulleys that accelerate as well.
     """
     return (lane_belt_speed(belt, time + step) - lane_belt_speed(belt, time)) / step
 
@@ -183,7 +183,7 @@ def lane_acceleration(belt: LaneBelt, time: float, step: float):
 def lane_pulleys(belt: LaneBelt, share, scalars: LaneArray):
     """Speeds of both pulleys [rad/s], and of their surfaces less the belt speed [m/s], driving and driven.
 
-    `share` is what `lane_speed_share` gives, whose precision they take; `scalars` are those of the state.
+    `share` is the result of `lane_speed_share`, whose precision they take; `scalars` are those of the state.
     """
     c = belt.constants
     driven_speed, excess = scalars[0, SPEED], like(scalars[0, FIRST_STATE + EXCESS], share)
@@ -260,7 +260,8 @@ def lane_transverse(belt: LaneBelt, fields: LaneArray, j: int, net_left, net_rig
 def saddle_pressure(belt: LaneBelt, j: int, ring_left, ring_right, relief):
     """Twice the force of the rings on the saddles at station j of an arc [N].
 
-    `ring_left`, `ring_right` are T in the cells beside it [N], `relief` what the rings' own weight takes.
+    `ring_left`, `ring_right` are T in the cells beside it [N], `relief` the part taken by the rings' own
+    weight.
     """
     pressure = maximum(ring_right - relief, 0.0) * (belt.cell[j] * belt.curvature[j])
     bent = behind(belt.cell, j, 0) * behind(belt.curvature, j, 0)
@@ -364,7 +365,7 @@ def cell_strains(belt: LaneBelt, stations: LaneArray, j: int, w, w_b, more_0, mo
 
 @kernel
 def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
-    """Sliding speeds on the arcs, and what friction does of them alone.
+    """Sliding speeds on the arcs, and the results of friction that depend on them alone.
 
     A loop of its own: the chain of operations from a speed to the system's rows is longer than what a
     processor looks ahead, so that it would not begin a station before the last one is nearly done.

@@ -1,4 +1,4 @@
-"""Ring layers in lanes: constants, strains, friction of their surfaces, and what a sample takes of them.
+"""Ring layers in lanes: constants, strains, friction of their surfaces, and their part of a sample.
 
 The equations are those of `rings.py`. Surfaces and layers are counted from 0: layer k lies between surface k
 and surface k + 1; surface 0 is the saddle, surface n that of the ears.
@@ -46,7 +46,7 @@ from cvt_hpc.physics.layers import ring_friction
     FIRST_OFFSET,
 ) = range(12)
 
-# What is summed up over the judged part: of surfaces the loss [W] and the mean size of their sliding on both
+# Sums over the judged part: of surfaces the loss [W] and the mean size of their sliding on both
 # arcs [m/s]; of layers the tension in the middle of both strands [N] and the mean speed [m/s].
 SUMS = ("loss", "sliding driving", "sliding driven", "tension t1", "tension t2", "speed")
 LOSS, SLIDING, TENSION, SPEED_SUM = 0, 1, 3, 5
@@ -162,7 +162,7 @@ def audit_layers(
     profiles: LaneArray,
     sums: LaneArray,
 ) -> None:
-    """What the layers add to the audit of a belt whose rings as one do not rub, and to sums over samples.
+    """Part of the layers in the audit of a belt whose rings as one do not rub, and in sums over samples.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from cvt_hpc.models.elastic_belt.sampling import Sensors, sample
 
 
 class Sampled(NamedTuple):
-    """What samples are taken of: the belt that is marched, where that is in linked parts all in one.
+    """The belt of which samples are taken: the marched one, where that is in linked parts all in one.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ def take_sample(
     profiles: LaneArray,
     ended: LaneArray,
 ) -> None:
-    """Sample what is marched, which may be in parts."""
+    """Sample the marched belt, which may be in parts."""
     gather(state, stations, sampled, FIELDS_OF_FORCES)
     sample(sampled.belt, sampled.state, sampled.stations, sensing, rows, k, profiles, ended)
     # a sample takes it to its end
@@ -112,7 +112,7 @@ def take_sample(
 
 @kernel
 def gather(state: LaneState, stations: LaneArray, sampled: Sampled, fields: int) -> None:
-    """Put what is sampled together from linked parts, of the stations' work space its first `fields`."""
+    """Join the sampled values from linked parts, of the stations' work space its first `fields`."""
     merge_parts(state.fields, sampled.state.fields, state.fields.data.shape[1])
     merge_parts(stations, sampled.stations, fields)
     merge_parts(state.column, sampled.state.column, state.column.data.shape[1])

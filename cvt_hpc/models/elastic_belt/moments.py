@@ -1,4 +1,4 @@
-"""Sums of forces, speeds and their products at each station: of what the fluctuations' audit is made."""
+"""Sums of forces, speeds and their products at each station, for the fluctuations' audit."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def add_forces(profiles: LaneArray, j: int, across, u, along, v_element) -> None
 
 @merged_kernel
 def add_stresses(profiles: LaneArray, j: int, power, tension, push, damped) -> None:
-    """Power of the stresses [W], tension, push without its damper, and what that adds [N]."""
+    """Power of the stresses [W], tension, push without its damper, and the damper's part [N]."""
     add(profiles, j, STRESS_POWER, power)
     add(profiles, j, RING_TENSION, tension)
     add(profiles, j, PUSH_FORCE, push)

@@ -24,7 +24,7 @@ _sample, _audit_layers = called_alike(sample_state), called_alike(audit_layers)
 
 
 class OneLaneRun(RecordedRun):
-    """What such runs have in common; attributes as of `RecordedRun`."""
+    """Common parts of such runs; attributes as of `RecordedRun`."""
 
     done: int
 
@@ -34,7 +34,7 @@ class OneLaneRun(RecordedRun):
         Parameters
         ----------
         parameters : dict
-            Those of the run but for `duration` and `judged_fraction`.
+            Parameters of the run but for `duration` and `judged_fraction`.
         """
         plan = recording(parameters, np.float64)
         self._profiles = [LaneArray(rows, len(PROFILES), 1) for rows in (0, plan.mesh.cell.size)]
@@ -48,7 +48,7 @@ class OneLaneRun(RecordedRun):
         self._layer_sums = [LaneArray(layer_count(parameters) + 1, len(SUMS), 1) for _ in range(2)]
 
     def _make_lane(self, belt: Belt, first: State) -> None:
-        """The same run as a single lane, which is what can be sampled."""
+        """The same run as a single lane, which can be sampled."""
         count = layer_count(self.parameters)
         if count > 1:
             self._rings = lane_rings([belt], [ring_constants(self.parameters, belt)], np.float64)
@@ -66,7 +66,7 @@ class OneLaneRun(RecordedRun):
 
     @property
     def momentary(self) -> np.ndarray | None:
-        """What `Momentary` has kept of the run."""
+        """Samples of the run that `Momentary` has kept."""
         return self._momentary.of(0)
 
     @property
@@ -75,15 +75,15 @@ class OneLaneRun(RecordedRun):
         return self._rows.data[: self.done, :, 0]
 
     def _go_on_from(self, run: Any) -> None:
-        """Take over the history of a run by another stepper, but for means begun before."""
+        """Take over the history of a run by another stepper, except for means that began before."""
         self.done, self._disturbed = run.done, run.done > self._plan.kick
         self._rows.data[: self.done, :, 0] = run.rows
         if self.done > self._plan.first_judged:
             for sums in (self._profiles[1], self._layer_sums[1]):
-                sums.data[:] = np.nan  # what the other has summed up is not known
+                sums.data[:] = np.nan  # sums of the other stepper are not known
 
     def _sample_lane(self) -> Outcome:
-        """Record what the lane holds; `done` is left to the caller."""
+        """Record the values in the lane; `done` is left to the caller."""
         is_judged, is_kept = self.done >= self._plan.first_judged, self.done >= self._momentary.first
         sums = self._profiles[int(is_judged)]
         profiles = LaneArray(*self._profiles[1].data.shape) if is_kept else sums

@@ -51,7 +51,7 @@ from cvt_hpc.steppers.system import System
 ROWS = (W, U, V_ELEMENT, V_RING, N_ELEMENT, N_RING)  # of the state, as they follow in y
 VELOCITIES = (U, V_ELEMENT, V_RING)
 
-# What counts alike in each unknown: 0.1 mm off the path, 0.1 m/s of sliding, the strain of the rings.
+# Sizes that count alike in each unknown: 0.1 mm off the path, 0.1 m/s of sliding, the strain of the rings.
 SIZES = {W: 1e-4, U: 0.1, V_ELEMENT: 0.1, V_RING: 0.1, V_FILTERED: 0.1, N_ELEMENT: 1e-3, N_RING: 1e-3}
 SIZE_OF_SPEED, SIZE_OF_POSITION = 1.0, 1e-4  # of a pulley [rad/s], [m]
 SIZE_OF_THRUST = 1e3  # [N]
@@ -59,7 +59,7 @@ SIZES_OF_STATES = (SIZE_OF_SPEED, *[SIZE_OF_POSITION] * (RATIO_SUM - 1), SIZE_OF
 
 
 class FlatBelt(NamedTuple):
-    """What `rates` needs beside t and y.
+    """Input of `rates` beside t and y.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class FlatBelt(NamedTuple):
     loose : (K,) int array
         Those of the state's scalars that are unknowns beside the driven pulley's speed and position.
     origin : (n,) array
-        What the unknowns are counted from.
+        Origin from which the unknowns are counted.
     start : float
         Simulated time at t = 0 [s].
     force, eps, rate, moments : (N,), (2, N), (7, N), (N,) arrays
@@ -168,10 +168,10 @@ def driven_moment(belt: Belt, moments: np.ndarray) -> float:
 
 @kernel
 def pulled_by(belt: Belt, force: np.ndarray, moments: np.ndarray) -> np.ndarray:
-    """What the belt does to its pulleys, (8,).
+    """Action of the belt on its pulleys, (8,).
 
     The torque that it takes from the driving one, its moment on the driven one [N m], the axial forces, and
-    what tilts the sheaves, driving pulley first [N].
+    the tilting forces on the sheaves, driving pulley first [N].
     """
     pull = np.zeros(8)
     pull[0], pull[1] = moments[: belt.driven_start].sum(), driven_moment(belt, moments)

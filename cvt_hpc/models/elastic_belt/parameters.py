@@ -1,4 +1,4 @@
-"""What a job may set of the elastic belt, with units, bounds and defaults.
+"""Parameters of the elastic belt that a job may set, with units, bounds and defaults.
 
 Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht et al. 2004, sec. 3.1); sizes
 are those of a common passenger-car belt; every other default is an assumption, plausible and not measured.
@@ -100,8 +100,8 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "stiffness_of": Parameter(
             "disc",
             "",
-            "what sheave_stiffness scales: the discs alone, as in Lebrecht et al. 2004, or the whole sheave, "
-            "disc and tilt of its collar",
+            "stiffness that sheave_stiffness scales: the discs alone, as in Lebrecht et al. 2004, or the "
+            "whole sheave, disc and tilt of its collar",
             choices=STIFFNESS_OF,
         ),
         "tilt_stiffness": _stiffness(

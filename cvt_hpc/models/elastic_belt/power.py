@@ -1,21 +1,21 @@
-"""Where power enters and leaves the belt drive, and what it stores: the audit of a run.
+"""Where power enters and leaves the belt drive, and where it is stored: the audit of a run.
 
 The driving pulley's speed is prescribed, and its power is its moment times its momentary speed. In a steady
 state, on average over a vibration,
 
     driving = load + thrust + losses,    losses = flanks + rings + belt + layers + lag + seating,
 
-and before that, or along a ramp, the difference is what the stored energy takes up; along a ramp of speed it
-is mostly the kinetic energy of the belt and of the driven pulley. What does not close is the work of the
+and before that, or along a ramp, the difference goes into the stored energy; along a ramp of speed it
+is mostly the kinetic energy of the belt and of the driven pulley. The open part is the work of the
 numerics: upwinded transport, backward Euler in the layers, and the linear stretch that leaves the product of
 changing tension and slope squared out. The layers' loss is not taken from a state, as all else is, but from
 the work of their dampers in the steps since the last one: a damper acts in a cell that is just closing, for a
 step or two, and instants now and then would not meet it as often as it acts.
 
-Seating is what the belt carries out of the sheaves' elastic contact at an outlet beyond what it brings in at
-the inlet. Contact begins and ends at the arcs' ends here, with forces that are not zero; along an arc the
-elastic forces do no work on the whole, whatever the belt's speed, since the compliance depends on the
-distance of two stations alone.
+Seating is the energy that the belt carries out of the sheaves' elastic contact at an outlet beyond the energy
+that it brings in at the inlet. Contact begins and ends at the arcs' ends here, with forces that are not zero;
+along an arc the elastic forces do no work on the whole, whatever the belt's speed, since the compliance
+depends on the distance of two stations alone.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What does not fit together of the pulleys' settings, and which of them are without effect."""
+"""Conflicts between the pulleys' settings, and settings without effect."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def overload_problems(parameters: Mapping[str, Any]) -> list[Problem]:
 
     By `capacity.torque_limit` with the largest coefficient of friction, and ABOVE: a bound on the moment of
     each pulley's flanks, whatever the belt does. Near it a belt slips through long since, which is a result.
-    A ramp may end there, and tells where the belt slips; its start may not lie there.
+    A ramp may end there, and shows where the belt slips; its start may not lie there.
     """
     p = PULLEY_DEFAULTS | dict(parameters)
     key = "load_start" if p.get("load_history") == "ramp" else "load"

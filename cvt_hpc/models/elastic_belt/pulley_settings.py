@@ -1,4 +1,4 @@
-"""What a job may set of the pulleys' freedom and of their shafts; by default they are as they always were.
+"""Parameters of free pulleys and of their shafts that a job may set; by default they are as they always were.
 
 No paper gives numbers of these: every default is an assumption, plausible and not measured.
 """
@@ -119,7 +119,7 @@ PULLEYS: dict[str, Parameter] = {
     "held_torque_ratio": Parameter(
         0.6,
         "",
-        "torque ratio to be held: load over what friction carries at the lesser axial force",
+        "torque ratio to be held: load over the load that friction carries at the lesser axial force",
         minimum=-1.0,
         maximum=1.0,
         exclusive=True,
@@ -202,7 +202,7 @@ PULLEY_DEFAULTS = {
 def are_free(parameters: Mapping[str, Any]) -> bool:
     """Whether pulleys do more than turn by a given speed, or be pressed by a constant thrust.
 
-    Reads no parameter that does not count: those that it reads tell which runs can share a batch.
+    Reads no parameter that does not count: the parameters read decide which runs can share a batch.
     """
 
     def of(key: str) -> Any:
@@ -220,7 +220,7 @@ def are_free(parameters: Mapping[str, Any]) -> bool:
 
 
 def shaft_deflection(parameters: Mapping[str, Any], pulley: str, radius: float) -> tuple[float, float]:
-    """What the shaft of a pulley adds to its groove: compliance [m/N], free opening by its bearings [m].
+    """Effect of a pulley's shaft on its groove: compliance [m/N], free opening by its bearings [m].
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ def lane_thrust(state: LaneState):
 
 @merged_kernel
 def _pull(contact: Contact, pattern):
-    """Axial force of the belt on a sheave [N], and what tilts it, times the cosine and times the sine."""
+    """Axial force of the belt on a sheave [N], and its tilting force, times the cosine and times the sine."""
     pushed = contact.stations
     total, one, other = like(0.0, pattern), like(0.0, pattern), like(0.0, pattern)
     for k in range(contact.weight.size):
@@ -71,7 +71,7 @@ def _pull(contact: Contact, pattern):
 def lane_pulley_rates(belt: LaneBelt, state: LaneState, taken, moment):
     """Rates of free pulleys, ten, by the torques of the belt [N m], as `pulleys.pulley_rates` has them.
 
-    Then what tilts the sheaves, four [N], and the axial forces, two [N].
+    Then the tilting forces on the sheaves, four [N], and the axial forces, two [N].
     """
     c, scalars, time = belt.constants, state.scalars, state.time[0]
     speed = scalars[0, SPEED]
@@ -108,8 +108,8 @@ def lane_pulley_rates(belt: LaneBelt, state: LaneState, taken, moment):
 def advance_pulleys(belt: LaneBelt, state: LaneState, taken, moment, step: float) -> None:
     """Pulleys' speeds, openings and tilts at the end of a step, by torques of the belt [N m] and its forces.
 
-    `taken` is what the belt takes from the driving pulley, which counts where that is free; `moment` is its
-    torque on the driven one.
+    `taken` is the torque that the belt takes from the driving pulley, which counts where that is free;
+    `moment` is its torque on the driven one.
     """
     c, scalars = belt.constants, state.scalars
     speed = scalars[0, SPEED]
@@ -152,7 +152,7 @@ def opening_by_tilt(state: LaneState, wrap: int):
 
 @kernel
 def taken_by_clearance(state: LaneState):
-    """What closed stations do not store of half their force times overlap [J]: a loose collar takes it up."""
+    """Part of half the force times overlap that closed stations do not store [J]: a loose collar takes it."""
     energy = like(0.0, state.scalars[0, SPEED])
     for wrap in range(2):
         contact = state.contacts[1] if wrap else state.contacts[0]
@@ -169,8 +169,8 @@ def audit_pulleys(
 ) -> None:
     """Powers and stored energy of free pulleys, in the place of those of pulleys that are not.
 
-    A lag's oil takes what the axial forces, or moments, put in beyond what springs store. Thrusts work with
-    all that presses but the springs.
+    A lag's oil takes the work of the axial forces, or moments, beyond the energy in springs. Thrusts work
+    with all pressing forces but the springs.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def audit_pulleys(
         put_in, across = tilting[2 * wrap], tilting[2 * wrap + 1]
         opening, moving = rates[4 + 2 * wrap], rates[5 + 2 * wrap]
         lag += fma(fma(-stiffness, elastic, put_in), opening, fma(-stiffness, beside, across) * moving)
-        # of what closed stations store: their gap is less by the opening
+        # of the energy stored by closed stations: their gap is less by the opening
         stored += 0.5 * (
             stiffness * fma(elastic, elastic, beside * beside) - fma(put_in, one, across * other)
         )

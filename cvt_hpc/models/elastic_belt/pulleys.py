@@ -4,12 +4,12 @@
     position   T_1 k z' = sum f - A p - F_c - F_omega           (eq. 8)
     tilt       T_1 q' = kappa s - q (1 - c / |q|)+              (eq. 9), s = sum (cos phi, sin phi) h f
 
-M is the drive's torque, the load's course less `drive_slope` times what the driving pulley is faster than its
-course, or the load; a speed that is given has an infinite inertia. `thrust` is A p and the spring's force at
-its reference together, the spring's change c z and F_omega = C omega^2 come to it. q is the opening of the
-groove, the same for both axes of the collar and the shaft (`physics/shaft.py`), c its part that is free: a
-collar within its clearance moves against the oil alone. A sheave without a lag is no state: its q is part of
-the contact (`physics/compliance.py`, with clearance `physics/clearance.py`), to which T_1 -> 0 leads.
+M is the drive's torque, the load's course less `drive_slope` times the excess of the driving pulley's speed
+over its course, or the load; a speed that is given has an infinite inertia. `thrust` is A p and the spring's
+force at its reference together, the spring's change c z and F_omega = C omega^2 come to it. q is the opening
+of the groove, the same for both axes of the collar and the shaft (`physics/shaft.py`), c its part that is
+free: a collar within its clearance moves against the oil alone. A sheave without a lag is no state: its q is
+part of the contact (`physics/compliance.py`, with clearance `physics/clearance.py`), to which T_1 -> 0 leads.
 
 Two controllers, both PI with limits, whose gains are assumptions:
 
@@ -94,8 +94,9 @@ LAWS = (
     DRIVEN_FREE,
 ) = range(len(LAWS))
 
-# States of the pulleys beside the driven one's speed and position: what the driving pulley's speed is above
-# its course, and its opening above the one given; openings q of both grooves; the controllers' integrals.
+# States of the pulleys beside the driven one's speed and position: the excess of the driving pulley's speed
+# over its course, and its opening above the one given; openings q of both grooves; the controllers'
+# integrals.
 STATES = (
     "driving_excess",
     "driving_shift",
@@ -184,7 +185,7 @@ def with_pulleys(
 
 
 def moving_states(pulleys: Pulleys) -> np.ndarray:
-    """Places in STATES of those that anything moves: of the others a law has no rate, and they stay at 0."""
+    """Places in STATES of the states that can change: other states have no rate, and stay at 0."""
     laws = pulleys.laws[0]
     by = {
         EXCESS: laws[DRIVING_MOBILITY],
@@ -218,7 +219,7 @@ def settled_tilt(pulleys: Pulleys, first: int, tilting: np.ndarray) -> np.ndarra
 
 @merged_kernel
 def beyond_clearance(one, other, free):
-    """What of a groove's opening is elastic [m]: (one, other) less the free part, in its direction."""
+    """Elastic part of a groove's opening [m]: (one, other) less the free part, in its direction."""
     size = sqrt(fma(one, one, other * other))
     share = maximum(size - free, 0.0) / maximum(size, 1e-30)
     return share * one, share * other
@@ -255,7 +256,7 @@ def thrusts(laws, first: int, states, going: float, turning, position, axial, gi
     asked = fma(like(laws[0, first + RATIO_GAIN], thrust), deviation, asked)
     driving = minimum(maximum(asked, least), most)
     ratio_rate = like(laws[0, first + RATIO_RATE], thrust) * deviation
-    # at a limit an integral does not go on towards it
+    # at a limit an integral does not grow beyond it
     ratio_rate = select(asked > most, minimum(ratio_rate, 0.0), ratio_rate)
     ratio_rate = select(asked < least, maximum(ratio_rate, 0.0), ratio_rate)
     needed = like(laws[0, first + NEED], thrust) * maximum(torque, -torque)
@@ -275,7 +276,7 @@ def thrusts(laws, first: int, states, going: float, turning, position, axial, gi
 
 @merged_kernel
 def tilt_rates(laws, first: int, states, tilting):
-    """Rates of the grooves' openings [m/s], four, by what tilts them: s of both pulleys [N], four."""
+    """Rates of the grooves' openings [m/s], four, by the tilting forces s of both pulleys [N], four."""
     pattern = tilting[0]
     rate = like(laws[0, first + TILT_RATE], pattern)
     one, other = beyond_clearance(
@@ -304,15 +305,15 @@ def drive_torque(laws, first: int, excess, load):
 
 @merged_kernel
 def pulley_rates(laws, first: int, states, going: float, turning, position, pulled, given):
-    """Rates of all that moves of both pulleys.
+    """Rates of all states of both pulleys.
 
     Parameters
     ----------
     laws, first, states, going, turning, position
         As of `thrusts`.
     pulled
-        What the belt does to both pulleys: the torque that it takes from the driving one, that on the driven
-        one [N m], its axial forces (2) and what tilts the sheaves (4) [N].
+        Action of the belt on both pulleys: the torque that it takes from the driving one, that on the driven
+        one [N m], its axial forces (2) and the tilting forces on the sheaves (4) [N].
     given
         Load [N m], speed ratio [1], thrust [N], and T_1 k of the driven sheave [N s/m].
 

@@ -1,4 +1,4 @@
-"""What the record of a run holds of the elastic belt: names, units, and how each follows from the samples."""
+"""Variables of the record of the elastic belt: names, units, and how each follows from the samples."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ VARIABLES = (
         ("pulley",),
         "f8",
         "N",
-        "mean force of a piston's pressure, or what it takes: axial force less spring and centrifugal oil",
+        "mean force of a piston's pressure, or force required: axial force less spring and centrifugal oil",
         words="piston force",
     ),
     Variable(

@@ -1,4 +1,4 @@
-"""What every run of the elastic belt records, however it is marched: plan of recording and its reading."""
+"""Recording of every run of the elastic belt, with any stepper: plan of recording and its reading."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cvt_hpc.vibration.ramped import ramped
 
 
 class Recording(NamedTuple):
-    """What is recorded, where, and when.
+    """The recorded quantities, with places and times.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class RecordedRun:
     parameters : dict
         Resolved parameters of the run [SI].
     plan : Recording
-        What is recorded.
+        The recorded quantities.
     sums : (N, 21) array
         PROFILES, summed over the judged part's samples; it may be filled later.
 
@@ -93,18 +93,18 @@ class RecordedRun:
     mesh, probes, interval, samples, kick
         Of the plan.
     rows : (done, S + C) array
-        The sensors' displacement [m], the strands' modes [m], and CHANNELS; of who marches the run.
+        The sensors' displacement [m], the strands' modes [m], and CHANNELS; set by the marching class.
     done : int
-        Samples recorded so far, up to the one at which the run failed; of who marches it.
+        Samples recorded so far, up to the one at which the run failed; set by the marching class.
     failure : (Status, str) or None
-        Why the run does not go on: what has gone wrong, or a result, with the status done; of who marches it.
+        Why the run cannot continue: a failure, or a result, with the status done; set by the marching class.
     time : float
-        Simulated time [s]; of who marches it.
+        Simulated time [s]; set by the marching class.
     momentary : (sample, quantity, N) array or None
-        What `Momentary` has kept of the last samples; of who marches it.
+        Last samples that `Momentary` has kept; set by the marching class.
     """
 
-    if TYPE_CHECKING:  # of who marches the run
+    if TYPE_CHECKING:  # set by the marching class
 
         @property
         def rows(self) -> np.ndarray:
@@ -116,7 +116,7 @@ class RecordedRun:
 
         @property
         def failure(self) -> tuple[Status, str] | None:
-            """Why the run does not go on."""
+            """Why the run cannot continue."""
 
         @property
         def time(self) -> float:
@@ -128,7 +128,7 @@ class RecordedRun:
 
         @property
         def momentary(self) -> np.ndarray | None:
-            """What `Momentary` has kept of the run."""
+            """Samples of the run that `Momentary` has kept."""
 
     def __init__(self, parameters: Mapping[str, Any], plan: Recording, sums: np.ndarray) -> None:
         self.parameters = parameters
@@ -184,7 +184,7 @@ class RecordedRun:
 
     @property
     def fluctuation(self) -> Fluctuation:
-        """What feeds the fluctuations of the judged part, and what takes from them."""
+        """Energy that enters and leaves the fluctuations of the judged part."""
         return fluctuation(self.means, self.mesh, self.parameters)
 
     @property
@@ -203,6 +203,6 @@ class RecordedRun:
         Returns
         -------
         (Status, str) or None
-            What is wrong.
+            The reason.
         """
         return doubt(record, self.parameters["bending_stiffness"], self.mesh)

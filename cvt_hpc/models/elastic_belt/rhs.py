@@ -184,7 +184,7 @@ def accelerations(
         Rows U, V_ELEMENT and V_RING are set [m/s^2].
     moments : (N,) array
         Result: moments of the stations' flanks on the driven pulley, and, of those before `driven_start`,
-        what they take from the driving one [N m].
+        the torque that they take from the driving one [N m].
     """
     n = belt.cell.size
     w, u = state.fields[W], state.fields[U]

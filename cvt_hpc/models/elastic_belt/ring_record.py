@@ -1,4 +1,4 @@
-"""What the record of a run holds of ring layers: tension and speed by layer, loss and sliding by surface."""
+"""Variables of ring layers in a record: tension and speed by layer, loss and sliding by surface."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a job may set of the rings as a stack of layers, what does not fit together, and what has no effect.
+"""Parameters of the rings as a stack of layers: those that a job may set, conflicts, and keys without effect.
 
 No paper gives numbers: thickness and friction are assumptions, those of common belts.
 """
@@ -30,7 +30,7 @@ RINGS: dict[str, Parameter] = {
     "layer_tolerance": Parameter(
         (),
         "",
-        "length of each layer over the one that fits, k_i, inner layer first; none: all fit",
+        "length of each layer over the length that fits, k_i, inner layer first; none: all fit",
         minimum=0.99,
         maximum=1.01,
     ),

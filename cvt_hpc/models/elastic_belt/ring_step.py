@@ -7,13 +7,13 @@ eliminated station by station,
 
     A dv = r + f 1 + b dv_0,      dv the layers' increments, dv_0 the elements',
 
-and what is left is the 2x2 block of `imex`, of elements and the layers' mean dv_1, exactly:
+and the 2x2 block of `imex` remains, of elements and the layers' mean dv_1, exactly:
 
     f = (n dv_1 - 1.A^-1 r - dv_0 1.A^-1 b) / 1.A^-1 1.
 
 A layer's tension beyond the mean, T_k - T / n, is explicit (leapfrog): waves of layers against each other,
-at 5 km/s. Where these cross more than a cell in a step, what layers move against their mean has as much more
-inertia as keeps the step stable,
+at 5 km/s. Where these cross more than a cell in a step, the motion of layers against their mean has as much
+more inertia as keeps the step stable,
 
     factor = max(1, 1.1 (EA dt^2 / h^2 + 2 D dt / h^2) / m),
 
@@ -91,7 +91,7 @@ from cvt_hpc.physics.layers import ring_friction
 # Fields of RingWork.layers, STRIDE of each layer: strain; of the eliminated chain the increment by its own
 # forces, those per common force, per increment of the elements by way of the ears, and of the layer, or the
 # elements, below. Before that the sum of inward forces below the layer, after it the flux of content. Behind
-# them, of the station, what gives f, and the force of the ears.
+# them, of the station, the factors that give f, and the force of the ears.
 EPS, PART, COMMON, ELEMENTS, LINK = range(5)
 DRAG, STIFF = COMMON, LINK
 STRIDE = 5
@@ -156,8 +156,8 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
     Parameters
     ----------
     belt, state, work
-        Constants, state (advanced in place), work space, that holds what `derive` finds of this state, and
-        the layers' strains.
+        Constants, state (advanced in place), work space, that holds the results of `derive` for this state,
+        and the layers' strains.
     step : float
         Step [s].
     """
@@ -186,7 +186,7 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
 
 @merged_kernel
 def heavier_by(rings: LaneRings, step: float):
-    """Factor on the inertia of what layers move against their mean."""
+    """Factor on the inertia of the layers' motion against their mean."""
     c = rings.constants
     needed = 1.1 * (step * step * c[0, STRESS_RATE] + step * c[0, DAMPING_RATE])
     return maximum(needed, 1.0)
@@ -194,9 +194,9 @@ def heavier_by(rings: LaneRings, step: float):
 
 @merged_kernel
 def force_along(rings: LaneRings, fields: LaneArray, layers: LaneArray, j: int, k: int, along):
-    """Force per length on layer k at station j beyond what all have in common [N/m], and its inertia [kg/m].
+    """Force per length on layer k at station j beyond that common to all [N/m], and its inertia [kg/m].
 
-    `along` is, of the station, what `couple_layers` has found.
+    `along` is, of the station, the result of `couple_layers`.
     """
     (per_left, per_cell, even_l, even_r), (stiffness, damping), moving, turn, per_dual = along
     heavy, carried, belt_speed, acceleration = moving
@@ -291,7 +291,7 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
                     sliding, level * pressed, rings.falls, excess, per_stribeck, per_width, least
                 )
                 layers[j, first + DRAG] = secant * sliding
-                # not less than what keeps friction from turning sliding about within the step
+                # not less than the inertia that keeps friction from reversing sliding within the step
                 enough = secant - (between if k > 0 else at_saddle)
                 layers[j, first + STIFF] = maximum(slope, enough)
             # of the surface above the present layer: friction, slope, the factor of the layer below it

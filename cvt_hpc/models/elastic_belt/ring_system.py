@@ -29,7 +29,7 @@ from cvt_hpc.steppers.system import System
 
 
 class FlatRings(NamedTuple):
-    """What `rates` needs beside t and y.
+    """Input of `rates` beside t and y.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ def pack(flat: FlatRings, state: State) -> np.ndarray:
 
 @kernel
 def unpack(flat: FlatRings, t: float, y: np.ndarray) -> None:
-    """Write y into `flat.state`, and what `one_system` takes of it into `flat.one`."""
+    """Write y into `flat.state`, and the part of `one_system` into `flat.one`."""
     belt, fields, one = flat.flat.belt, flat.state.fields, flat.one
     cells, n = belt.cell.size, flat.rings.length.size
     one[:] = y[: one.size]

@@ -152,8 +152,8 @@ def surface_friction(
 ) -> None:
     """Normal line forces [N/m] and sliding speeds [m/s] of the surfaces at station j, (n + 1,) each.
 
-    Sliding is that of what lies below a surface against what lies above; `share` is the belt's speed over its
-    nominal one.
+    Sliding is the speed of the body below a surface against the body above; `share` is the belt's speed over
+    its nominal one.
     """
     n, kappa = rings.length.size, belt.arc_curvature[j]
     a = j - 1 if j > 0 else belt.cell.size - 1
@@ -176,7 +176,7 @@ def surface_friction(
 def layer_rates(
     belt: Belt, rings: Rings, state: State, eps: np.ndarray, share: float, rate: np.ndarray
 ) -> None:
-    """Rates of the layers' speeds and contents, and what the surfaces' friction adds to the elements' speed.
+    """Rates of the layers' speeds and contents, and of the elements' speed by the surfaces' friction.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def layer_rates(
     share : float
         Belt speed over its nominal one.
     rate : (2 n + 1, N) array
-        Result: of the speeds [m/s^2] and contents [1/s], then what is to be added for the elements [m/s^2].
+        Result: of the speeds [m/s^2] and contents [1/s], then the sum to be added for the elements [m/s^2].
     """
     n, cells = rings.length.size, belt.cell.size
     normal, sliding = np.empty(n + 1), np.empty(n + 1)

@@ -1,4 +1,4 @@
-"""What is recorded of the belt at each sampling instant, and when a run has to be stopped."""
+"""The recorded quantities of the belt at each sampling instant, and when a run has to be stopped."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class Outcome(IntEnum):
 
 
 # Where a lane's run has to be stopped for the first time, or the last one: the `Outcome`, the time [s], and
-# until then the linear solves of the contact problem and what friction had to be redone.
+# until then the linear solves of the contact problem and the repeated solutions of friction.
 ENDED = ("outcome", "time", "contact_solves", "repeats")
 OUTCOME, ENDED_AT, CONTACT_SOLVES, REPEATED = range(len(ENDED))
 
@@ -200,7 +200,7 @@ def sample(
     belt, state
         Constants and state.
     stations : LaneArray
-        The step's work space, with what `derive` finds of this state.
+        The step's work space, with the results of `derive` for this state.
     sensing : Sensors
         S rows.
     rows : (samples, S + C) LaneArray of doubles

@@ -33,13 +33,13 @@ REACH = {
     N_RING: {W: (-1, 2), V_RING: (0, 1), N_RING: (-1, 1)},
 }
 # With a column that bears a moment, which knows strains and turning of the cells around, and by the path's
-# curvature, which turns what runs along the belt into what moves across it, and back
+# curvature, which turns motion along the belt into motion across it, and back
 OF_COLUMN = {
     U: {N_ELEMENT: (-2, 1)},
     V_ELEMENT: {W: (-2, 2)},
 }
 OF_CURVATURE = {U: {V_RING: (0, 0)}, V_RING: {U: (0, 0)}}
-# A station's flank forces and filtered speed: beyond the above they know what happens on the driven pulley,
+# A station's flank forces and filtered speed: beyond the above they depend on the driven pulley,
 # and where the belt enters its filtered speed is that of sliding there
 ON_FLANK = {U: (-1, 0), V_ELEMENT: (-1, 0), W: (-2, 1), V_FILTERED: (-1, 0)}
 

@@ -72,7 +72,7 @@ class StateMarch:
         self._layer_work += self._rows.data[0, CHANNELS.index(POWERS[LAYER_LOSS])]
 
     def outcome(self, lane: int = 0) -> Outcome:
-        """Why the run has ended, or that it goes on."""
+        """Why the run has ended, or that it continues."""
         return Outcome(int(self._ended.data[0, OUTCOME, lane]))
 
     def state(self, lane: int = 0) -> State:

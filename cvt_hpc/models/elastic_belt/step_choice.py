@@ -1,6 +1,6 @@
 """The step of `imex` for a scene: as long as accuracy and stability allow.
 
-**Accuracy.** The step is of first order: what it changes of a vibration's amplitude is in proportion to its
+**Accuracy.** The step is of first order: its effect on a vibration's amplitude is in proportion to its
 length. REFERENCE_STEP changes it by REFERENCE_ERROR at the working point of the chart. Elsewhere that is no
 bound: of 81 random scenes that vibrate it changes half by more than 1.2 %, a tenth by more than 9 %
 (`README.md`).

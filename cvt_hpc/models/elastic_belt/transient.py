@@ -13,7 +13,7 @@ from cvt_hpc.variables import Status
 
 __all__ = ["CHANNELS", "TAKES_OVER", "Transient", "batch"]
 
-TAKES_OVER = True  # runs go on from where others stand
+TAKES_OVER = True  # runs continue from the state of others
 
 
 def batch(
@@ -26,9 +26,9 @@ def batch(
     points : sequence of dict
         Resolved parameters of the runs [SI], all of one `lane_key`; one for steppers without lanes.
     stepper : str
-        One that the model takes.
+        A stepper that the model takes.
     paused : sequence, optional
-        What `paused()` of shorter runs has returned, one for each point, to go on from.
+        Results of `paused()` of shorter runs, one for each point, to continue from.
 
     Returns
     -------
@@ -67,7 +67,7 @@ class Transient(LaneRun):
         Returns
         -------
         (Status, str) or None
-            What has gone wrong, where the run cannot go on.
+            The failure, where the run cannot continue.
         """
         self.batch.advance(samples)
         return self.failure

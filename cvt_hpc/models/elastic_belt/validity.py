@@ -1,4 +1,4 @@
-"""What ends a run, and whether one that reached its end left the ground on which its numbers stand."""
+"""Conditions that end a run, and checks of the numbers of a run that reached its end."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cvt_hpc.variables import Status
 from cvt_hpc.variator import LARGEST_DISPLACEMENT
 from cvt_hpc.variator.slip import GAINED, LOST
 
-# What the power balance may leave open, of the power that flows, with cells of REFERENCE_CELL. Sound runs of
+# Limit of the open power balance, over the power that flows, with cells of REFERENCE_CELL. Sound runs of
 # 160 stations leave 0.005-0.2 % (2,000 random scenes: 99 in 100 below 0.05 %, the largest 0.39 %), chatter of
 # friction 0.6 % and more. On coarser meshes the transport leaves more, in proportion to the cells, at
 # any step.
@@ -46,7 +46,7 @@ FAILURES = {
 
 
 def slack_doubt(bending_stiffness: float, cell: float, least_force: float) -> tuple[Status, str] | None:
-    """Whether a strand was pushed so slack that what grows in it is the mesh's.
+    """Whether a strand was pushed so slack that the growth in it is an effect of the mesh.
 
     Under F = T - P - m v^2 < 0 waves of wave number k grow, at rest at the rate k sqrt((-F - EI k^2) / m): it
     buckles. So they do in the discretised strand beyond its critical speed sqrt((T - P) / m), whose shortest
@@ -65,7 +65,7 @@ def slack_doubt(bending_stiffness: float, cell: float, least_force: float) -> tu
     Returns
     -------
     (Status, str) or None
-        What is wrong, where the fastest wave has k cell > 1: fewer than some six cells.
+        The reason, where the fastest wave has k cell > 1: fewer than some six cells.
     """
     bearable = -2.0 * bending_stiffness / cell**2
     if least_force >= bearable:
@@ -102,7 +102,7 @@ def doubt(record: dict[str, Any], bending_stiffness: float, grid: Mesh) -> tuple
     Returns
     -------
     (Status, str) or None
-        What is wrong.
+        The reason.
     """
     residual, cell = abs(record["power_residual"]), float(grid.cell[grid.starts[1]])
     if not residual <= power_limit(cell):

@@ -1,8 +1,8 @@
 """Eigenvalues of the running elastic belt about its steady state, friction memory included.
 
 It answers *does the steady state lose its stability, at what load, in which strand and at what frequency?* by
-the full right-hand side's Jacobian, and says along the belt where friction feeds a vibration and where it
-takes. What it cannot answer: how large the vibration becomes and at what frequency it settles; whether a
+the full right-hand side's Jacobian, and shows along the belt where friction feeds a vibration and where it
+takes energy. It cannot answer how large the vibration becomes and at what frequency it settles; whether a
 larger disturbance starts one where small ones die; and anything where friction has no memory (see README.md).
 Importing this package is cheap.
 """

@@ -1,4 +1,4 @@
-"""Small motions about a steady state: how fast they grow, how they look, and what feeds them.
+"""Small motions about a steady state: their growth, their shape, and the source of their energy.
 
 A mode's growth rate is shared out over the belt by the power of friction. With masses m_k of the velocities
 v_k (u, v_0 and v_1 of each station, complex amplitudes) and the amplitudes a_k of the accelerations that the
@@ -39,7 +39,7 @@ class Mode(NamedTuple):
     amplitudes : (4,) array
         Largest displacement of the regions in the order of REGIONS, over the largest of all.
     strand : int
-        The one that moves most: 0 is t1, 1 is t2.
+        The strand that moves most: 0 is t1, 1 is t2.
     half_waves : int
         Half waves of the strongest sine along that strand, measured from the chord between its ends.
     fed : (N,) array
@@ -83,7 +83,7 @@ def modes(
         raise ValueError("the contact of this state has no solution")
     linearise = Linearisation(flat)
     whole = linearise(flat)
-    # the same without flanks and saddles: the difference is what their friction, and their contact, does
+    # the same without flanks and saddles: the difference is the effect of their friction and contact
     free = linearise(flat._replace(belt=belt._replace(arc_share=np.zeros_like(belt.arc_share))))
     values, vectors = eigenpairs(whole, 2.0 * np.pi * band[0], 2.0 * np.pi * band[1], decay, GROWTH)
     n = belt.cell.size

@@ -1,4 +1,4 @@
-"""What a job may set of linear stability: the steady belt's parameters, and what decides."""
+"""Parameters of linear stability: the steady belt's parameters, and the limits of the verdict."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from cvt_hpc.models import steady_variator
 from cvt_hpc.models.steady_variator.parameters import OF_LAGS
 from cvt_hpc.parameters import Parameter, not_negative, positive
 
-LEAST_MEMORY = 1e-4  # [s]: what has been held against transients, see README.md
+LEAST_MEMORY = 1e-4  # [s]: compared with transients down to this, see README.md
 
 PARAMETERS: dict[str, dict[str, Parameter]] = steady_variator.PARAMETERS | {
     "judgement": {

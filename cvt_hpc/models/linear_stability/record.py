@@ -1,4 +1,4 @@
-"""What the record of linear stability holds: the verdict, and the mode that grows fastest."""
+"""The record of linear stability: the verdict, and the mode that grows fastest."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ VARIABLES = (
         ("region",),
         "f8",
         "s-1",
-        "what friction in each region adds to the growth rate of that mode",
+        "part of the growth rate of that mode that friction in each region adds",
         words="feed by friction",
     ),
     *steady_record.VARIABLES,
@@ -37,7 +37,7 @@ VARIABLES = (
 
 
 class Solution(NamedTuple):
-    """What was found.
+    """Result of linear stability.
 
     Attributes
     ----------

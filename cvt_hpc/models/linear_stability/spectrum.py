@@ -2,7 +2,7 @@
 
 Shift and invert: about a point of the complex plane Arnoldi's method finds the nearest eigenvalues, and no
 other lies in the disc up to the farthest of them. Discs are laid up along the middle of the rectangle that
-was asked for, each as far on as the last one reaches, until they cover it: so nothing in it can be missed.
+was requested, each as far on as the last one reaches, until they cover it: so nothing in it can be missed.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
 NEAREST = 12  # eigenvalues of each disc to begin with: fewer need more discs, more take longer
-FIRST_REACH = 2.0 * np.pi * 400.0  # [rad/s]: half of what the first disc covers of the band, guessed
+FIRST_REACH = 2.0 * np.pi * 400.0  # [rad/s]: half of the part of the band that the first disc covers, guessed
 OVERLAP = 0.95  # of a disc's half height
 ALIKE = 1e-5  # relative: eigenvalues of two discs that are one
 

@@ -1,4 +1,4 @@
-"""What a job may set of the moving string; the defaults are near those of a belt's strand."""
+"""Parameters of the moving string that a job may set; the defaults are near those of a belt's strand."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "shape": Parameter(
             "mode",
             "",
-            "what travels along the string: an eigenmode, or a single pulse",
+            "wave that travels along the string: an eigenmode, or a single pulse",
             choices=("mode", "pulse"),
         ),
         "mode": Parameter(1, "", "number of the eigenmode", minimum=1, maximum=1000),

@@ -28,7 +28,7 @@ class Transient(MarchedRun):
     parameters : mapping
         Resolved parameters of the run [SI].
     stepper : str
-        One that the model takes.
+        A stepper that the model takes.
     """
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:

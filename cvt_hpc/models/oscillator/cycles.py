@@ -35,7 +35,7 @@ def work_per_cycle(run: Transient, starts: np.ndarray) -> dict[str, float]:
     """Mean work of a cycle, by the trapezoidal rule over the samples.
 
     A jump of friction between two samples leaves an error of the first order in their interval, a sticking
-    phase that falls between two is not seen: `energy_residual` tells.
+    phase that falls between two is not seen: `energy_residual` shows it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a job may set of the oscillator. The defaults: stick-slip of unit mass and stiffness."""
+"""Parameters of the oscillator that a job may set. The defaults: stick-slip of unit mass and stiffness."""
 
 from __future__ import annotations
 

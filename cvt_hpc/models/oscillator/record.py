@@ -1,4 +1,4 @@
-"""What the record of a run holds of the oscillator: its vibration, whether it sticks, the work of a cycle."""
+"""Variables of the oscillator in a record: its vibration, whether it sticks, the work of a cycle."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ VARIABLES = (
         (),
         "f8",
         "1",
-        "what the balance of these cycles leaves open, over the work turned over",
+        "work that the balance of these cycles leaves open, over the work converted",
     ),
     Variable("steady_displacement", (), "f8", "m", "displacement in steady sliding"),
     Variable(

@@ -1,4 +1,4 @@
-"""Whether a run has the model's friction at rest: what step and tolerance can find, and what was found.
+"""Whether a run has the model's friction at rest: limits of step and tolerance, and checks of the samples.
 
 Smoothed friction N mu over the sliding speed s = v_belt - x' rises to a peak and falls beyond. With the pull
 p = k x + c x' - P of the spring, m s' = p - N mu(s): a mass that slides slower than at the peak passes it
@@ -35,7 +35,7 @@ class Peak(NamedTuple):
 
 
 def rest_missed(o: Oscillator, facts: Facts, step: float, allowed: float, rows: np.ndarray) -> str | None:
-    """Say whether the mass comes within a step of rest, by a step or tolerance too coarse to find it.
+    """Decide whether the mass comes within a step of rest, by a step or tolerance too coarse to find it.
 
     Beyond the limit of the step, friction chatters instead of bringing the mass to rest: the speed jumps
     over the belt's in every step, by up to step N mu / m. Beyond that of the tolerance, errors of the speed
@@ -84,7 +84,7 @@ def peak(o: Oscillator) -> Peak | None:
 
 
 def wrongly_held(o: Oscillator, peak: Peak | None, rows: np.ndarray, interval: float) -> str | None:
-    """Say whether the mass was let go by a pull that friction holds, or held against one that it does not.
+    """Decide whether the mass was released by a pull that friction holds, or held against a larger one.
 
     Parameters
     ----------

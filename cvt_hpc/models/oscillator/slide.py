@@ -1,4 +1,4 @@
-"""Whether a method silences what friction drives: small swings about steady sliding, by its own steps.
+"""Whether a method silences a vibration that friction drives: small swings about steady sliding.
 
 At the belt's speed v the mass can slide steadily. There a friction that falls by (N mu)' < 0 drives small
 swings at the rate s = -(c + (N mu)') / (2 m). A method whose damping is stronger turns their growth into
@@ -29,7 +29,7 @@ def silenced(
     parameters: Mapping[str, Any],
     interval: float,
 ) -> str | None:
-    """Say whether a method damps small swings about steady sliding that friction drives.
+    """Decide whether a method damps small swings about steady sliding that friction drives.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def silenced(
     start = np.array([rest + SMALL * o.belt_speed / frequency, 0.0])
     rows = np.empty((int(np.ceil(2.0 * np.pi / frequency / interval)) + 1, 2))
     if Marching(stepper, parameters, system, start, interval).advance(rows) != Result.OK:
-        return None  # the run itself will say so
+        return None  # the run itself will report it
     away, speed = rows[:, 0] - rest, rows[:, 1]
     # exp(2 s t) without ripple, for swings that grow at the rate s
     energy = (speed - true * away) ** 2 + (frequency**2 - true**2) * away**2

@@ -1,4 +1,4 @@
-"""Steady sliding of the mass, and what becomes of small motions about it."""
+"""Steady sliding of the mass, and small motions about it."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from cvt_hpc.models.oscillator.slide import silenced
 from cvt_hpc.physics.friction import friction_coefficients
 
 CHANNELS = ("speed",)
-REST = 1e-9  # of the mass' largest speed: what rounding may leave of sliding while friction holds
+REST = 1e-9  # of the mass' largest speed: sliding that rounding may leave while friction holds
 
 
 class Transient(MarchedRun):
@@ -39,7 +39,7 @@ class Transient(MarchedRun):
     parameters : mapping
         Resolved parameters of the run [SI].
     stepper : str
-        One that the model takes.
+        A stepper that the model takes.
 
     Attributes
     ----------

@@ -288,7 +288,7 @@ def residuals(belt, state, pulleys, increments, openings, shapes, load, step, it
 
 @kernel
 def assemble(belt, state, shapes, step, iterate, blocks):
-    """Blocks and right sides of the elements' equations: what takes the residuals to zero.
+    """Blocks and right sides of the elements' equations: the corrections that take the residuals to zero.
 
     The right sides are the residuals, and the columns of the border's unknowns: the driven pulley's speed and
     the openings of the sheaves.
@@ -375,7 +375,7 @@ def _add_to_border(belt, sums, row, slopes, by_opening, driven, shapes, blocks, 
 
 @kernel
 def border_sums(belt, state, shapes, step, iterate, blocks, sums, dt):
-    """Slopes of the border's equations by its unknowns, less what the elements contribute to them.
+    """Slopes of the border's equations by its unknowns, less the contribution of the elements.
 
     As `border.close_border` takes them. The right sides of `blocks` hold the solution without border, then
     those for its columns.

@@ -51,7 +51,7 @@ DRIVING_SPEED, DRIVEN_SPEED, DRIVING_RADIUS, DRIVEN_RADIUS = range(4)
 IN_SPEED, IN_DRIVING_THRUST, IN_DRIVEN_THRUST, IN_LOAD, IN_DRIVING_SHIFT = range(5)
 INPUTS = IN_DRIVING_SHIFT + 1
 
-# Entries of the totals: time, and what adds up over it
+# Entries of the totals: time, and sums over it
 (
     TIME,  # [s]
     WORK_IN,  # of the driving shaft [J]
@@ -68,7 +68,7 @@ INPUTS = IN_DRIVING_SHIFT + 1
     POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
 ) = range(13)
 TOTALS = 13
-DAMPED = {  # what the step damps by itself, by the springs and contacts at which it does
+DAMPED = {  # numerical damping of the step, by the springs and contacts where it occurs
     "elements": ELEMENT_DAMPED,
     "flanks": FLANK_DAMPED,
     "ring": RING_DAMPED,
@@ -85,7 +85,7 @@ CONTACTS = ("edge", "head", "flank", "ring", "nose")
 
 
 class Belt(NamedTuple):
-    """Constants of a belt and its pulleys; of an element where not said otherwise.
+    """Constants of a belt and its pulleys; of an element where not stated otherwise.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ class Newton(NamedTuple):
     power_tolerance : float
         Largest power residual of the whole belt [W].
     weights : tuple of float
-        What the corrections of an element's speeds count with: lengths of angular velocities [m], else 1.
+        Weights of the corrections of an element's speeds: lengths of angular velocities [m], else 1.
     most_iterations, first_half_step : int
         Iterations a step, and the first one whose correction is halved where corrections do not fall.
     most_failures : int
@@ -204,7 +204,7 @@ class BeltState(NamedTuple):
     increments : (1 + 2 modes,) array
         Changes in the last step of the border's unknowns: speed of the driven pulley, openings.
     totals : (TOTALS,) array
-        What has added up since the start.
+        Sums since the start.
     counters : (COUNTERS,) int array
         Work done, and how the last call ended.
     """
@@ -218,7 +218,7 @@ class BeltState(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """What a step writes to and needs no longer afterwards; of elements with b unknowns.
+    """Work space of a step, which is not needed afterwards; of elements with b unknowns.
 
     Attributes
     ----------
@@ -231,6 +231,9 @@ class Workspace(NamedTuple):
     blocks : (rows, b (3 b + columns)) LaneArray
         The system of an iteration (`solvers.linked_blocks`), with a column for the residual and one for each
         unknown of the border.
+    narrow : LaneArray
+        That of an element's first unknowns, where a model assembles it before the others come in; else
+        `blocks` itself.
     scratch : (3, b (3 b + columns)) LaneArray
         Work space of its solution, and sums.
     border : (columns - 1, columns) array
@@ -249,6 +252,7 @@ class Workspace(NamedTuple):
     iterate: LaneArray
     shapes: LaneArray
     blocks: LaneArray
+    narrow: LaneArray
     scratch: LaneArray
     border: np.ndarray
     sums: LaneArray

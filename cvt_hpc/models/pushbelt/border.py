@@ -1,4 +1,4 @@
-"""The border of a belt's equations: what all elements act on, the driven pulley and the sheaves that open.
+"""The border of a belt's equations: unknowns that all elements share, of driven pulley and sheaves.
 
 Sheaves of a pulley open by sum a_k psi_k(phi), psi 1, cos, sin, cos 2, sin 2, ..., each mode with a stiffness
 of its own. Unknowns are the changes of the driven pulley's speed, and of a_k of the driving and of the driven
@@ -16,7 +16,7 @@ from cvt_hpc.models.pushbelt.belt import DRIVEN_SPEED, FLANK_DAMPED, IN_LOAD, TI
 
 @register_jitable
 def of_pulley(driving, driven_one, driven):
-    """What belongs to the pulley of an element, of two numbers."""
+    """The one of two numbers that belongs to the pulley of an element."""
     return driving + driven * (driven_one - driving)
 
 
@@ -41,7 +41,8 @@ def border_residuals(belt, increments, openings, load, torque, power, scratch, b
     Parameters
     ----------
     torque, power : lanes
-        Of the elements on the driven pulley [N m], and what the residuals of the elements leave open [W].
+        Of the elements on the driven pulley [N m], and the power that the residuals of the elements leave
+        open [W].
     scratch : LaneArray
         Its row holds the axial forces of the elements by the modes of both pulleys [N].
     """
@@ -60,7 +61,8 @@ def border_residuals(belt, increments, openings, load, torque, power, scratch, b
 def close_border(belt, sums, border, dt):
     """Set the matrix of the border, and complete its right side, from sums over the elements.
 
-    A row of `sums` for each unknown: what the elements' solutions without border contribute, then by column.
+    A row of `sums` for each unknown: the contribution of the elements' solutions without border, then by
+    column.
     """
     unknowns, modes = border.shape[0], belt.modal_stiffness.shape[1]
     for row in range(unknowns):
@@ -108,7 +110,7 @@ def groove_of(belt, state, work, j, c, s, driven):
 
 @kernel
 def book_openings(belt, state, work):
-    """Add to the totals what the step damps by the modes of the sheaves (`power`)."""
+    """Add to the totals the numerical damping of the step by the modes of the sheaves (`power`)."""
     modes = belt.modal_stiffness.shape[1]
     for k in range(2 * modes):
         change = 0.5 * (state.increments[1 + k] + work.increments[1 + k])

@@ -157,7 +157,7 @@ def predict(belt, state, pulleys, step, dt):
 
 @kernel
 def link(belt, state, step, dt):
-    """What a step needs of pairs of neighbours: tension, contacts, angles."""
+    """Data of pairs of neighbours for a step: tension, contacts, angles."""
     stiffness = 0.5 * belt.angle_stiffness
     for j in range(state.rows):
         ri, rj = (state[j, Y], state[j, Z]), (ahead(state, j, Y), ahead(state, j, Z))

@@ -1,22 +1,22 @@
 """Which pushbelt is the same belt as a continuous one (`elastic_belt`): its parameters from those of that.
 
-What both models know by one key is one quantity: the scene, the masses, ring stiffness, offset, play and
+A key that both models know is one quantity: the scene, the masses, ring stiffness, offset, play and
 friction of the belt, the transverse damping, wedge angle and inertia, the law of friction and its memory.
-`FOLLOWS` has what follows from other keys, so that an element, a flank and a pulley give way alike:
+`FOLLOWS` has the rules for other keys, so that an element, a flank and a pulley deform alike:
 
 - force between neighbours: `edge_stiffness` times strain is `element_stiffness` times strain;
 - a flank alone has half the axial compliance of a station, 1 / c_e + a / k of both flanks, elements and
   local bending in series, a being 1 / sheave_stiffness. Its own stiffness c is normal force over normal
   overlap, of which the axial one is c cos^2 d0: 1 / (c cos^2 d0) = (1 / c_e + a / k) / 2. The pushbelt's own
-  `sheave_stiffness` scales its modes of opening, so a value other than 1 asks for `stiffness_of` "sheave";
+  `sheave_stiffness` scales its modes of opening, so a value other than 1 requires `stiffness_of` "sheave";
 - tilt opens a pulley by r^2 / c_tilt cos(phi) times the sum of F cos(phi), and likewise with sin, while modes
   open each flank by 1 / S: S = 2 c_tilt / r^2 of cos and sin. Nothing opens all around alike;
 - the thrust moves the driven sheave by 1 / (T_1 k) in opening, which is 2 tan d0 of radius: `sheave_rate`.
 
 Assumptions: local bending has no length of its own (`local_length`), which is exact for forces that vary
-over lengths much longer than that. What ABSENT names is left out: damping of the layers, bending (0.5 N m^2
+over lengths much longer than that. The keys in ABSENT are left out: damping of the layers, bending (0.5 N m^2
 adds EI q^2 = 0.9 kN to the 5.7 kN that a strand of 148 mm has in its second mode at 120 N m), and the rings'
-length, since the pushbelt's rings fit the path at a strain of 1e-4; what that changes stands in `README.md`.
+length, since the pushbelt's rings fit the path at a strain of 1e-4; `README.md` has the effect of that.
 Elements have an inertia, a tilt and a second contact of which the continuum knows nothing: the pushbelt's own
 defaults.
 """

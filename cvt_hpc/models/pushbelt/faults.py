@@ -40,7 +40,7 @@ def name_fault(changes, state, element, kept):
     """Enter the contact of an element whose force has changed most since its state was kept.
 
     Contacts with the next element and with the one behind count, the latter as those of that element:
-    `changes(kept, k)` tells by how much forces of the element (k = 0) and of the one behind it (k = 1) have
+    `changes(kept, k)` returns by how much forces of the element (k = 0) and of the one behind it (k = 1) have
     changed, in the order of `CONTACTS`, and 0 for those of the latter that the element has no part in.
     """
     rows, fields, parts = state.elements.data.shape

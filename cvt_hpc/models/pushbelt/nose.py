@@ -1,4 +1,4 @@
-"""The nose of each element in the hole of the next one, in lanes: what holds neighbours side by side.
+"""The nose of each element in the hole of the next one, in lanes: it holds neighbours side by side.
 
 The nose's tip P lies at the front of element i, the hole's centre Q at the rear of element j, both
 `nose_height` above the saddle. Their offset across the next element, (P - Q).o_j, is free up to the clearance

@@ -1,4 +1,4 @@
-"""What a job may set of the planar pushbelt, with units, bounds and defaults.
+"""Parameters of the planar pushbelt that a job may set, with units, bounds and defaults.
 
 Centre distance, belt length, number and mass of the elements are those of a common passenger-car belt; ratio
 and driving_speed are those of Geier and Schindler's measurements (2007, fig. 4). Every other default is an
@@ -84,7 +84,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "element_mass": positive(1.214, "kg/m", "mass per length of the elements", sensible=(0.05, 20.0)),
         "element_height": positive(
-            0.013, "m", "height of an element, of which its inertia is that of a plate", sensible=(1e-3, 0.1)
+            0.013, "m", "height of an element, whose inertia is that of a plate", sensible=(1e-3, 0.1)
         ),
         "play": not_negative(
             0.3e-3, "m", "sum of the gaps between elements on the path", sensible=(1e-07, 0.05)
@@ -127,7 +127,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "nose_height": positive(6e-3, "m", "height of nose and hole above the rings", sensible=(1e-5, 0.05)),
         "nose_stiffness": positive(
-            1e8, "N/m", "force of a nose by what the offset exceeds its play", sensible=(1e4, 1e11)
+            1e8, "N/m", "force of a nose over the offset beyond its play", sensible=(1e4, 1e11)
         ),
         "ring_mass": positive(0.2495, "kg/m", "mass per length of the rings", sensible=(0.01, 10.0)),
         "ring_stiffness": positive(
@@ -191,7 +191,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "sheave_rate": positive(
             5e-6,
             "m/(N s)",
-            "radial speed of the belt by what the thrust exceeds the axial force of the belt",
+            "radial speed of the belt over the thrust beyond the axial force of the belt",
             sensible=(1e-12, 1.0),
         ),
         "driven_inertia": positive(
@@ -324,7 +324,7 @@ def falling_limit(parameters: Mapping[str, Any]) -> float:
 def most_tension(parameters: Mapping[str, Any]) -> float:
     """Tension of the tighter strand under thrust and load [N], by which explicit steps are limited.
 
-    It is estimated by the equilibrium of an arc and of a pulley, with half as much again for what arcs add.
+    It is estimated by the equilibrium of an arc and of a pulley, times 1.5 for the effect of arcs.
     """
     p = parameters
     driving = p["driven_radius"] / p["ratio"]

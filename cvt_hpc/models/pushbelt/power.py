@@ -1,4 +1,4 @@
-"""What the laws of a step take from the motion, in lanes: losses, and what the step damps by itself.
+"""Power that the laws of a step take from the motion, in lanes: losses, and numerical damping.
 
 M (X - X_old) / dt = f times the mean speed (X + X_old) / 2, which belongs to q_k as the directions of all
 forces do, is the change of kinetic energy without remainder. So a force takes its magnitude times the mean
@@ -76,7 +76,7 @@ _FIRST, _COUNT = FLANK_LOSS, TILT_DAMPED + 1 - FLANK_LOSS  # totals that are add
 
 @kernel
 def book(belt, state, work, dt):
-    """Add to the totals what a solved step takes, before it is accepted."""
+    """Add to the totals the work of a solved step, before it is accepted."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     driving_speed = state.pulleys[DRIVING_SPEED]
     driven_speed = state.pulleys[DRIVEN_SPEED] + 0.5 * state.increments[0]

@@ -1,4 +1,4 @@
-"""Profiles: what a job prescribes over time as multiples of its values, as a shift of ratio, or a load cycle.
+"""Profiles: prescribed values over time as multiples of the job's, such as a shift or a load cycle.
 
 Between the times of a profile multiples are linear, before the first and after the last they are constant.
 """

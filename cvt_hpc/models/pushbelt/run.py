@@ -37,10 +37,10 @@ from cvt_hpc.vibration.ramped import ramped
 COURSES = ("load", "driving_speed")
 FIRST_THRUST = 500.0  # [N]: with which the run begins, so that the belt settles in the grooves
 CLAMPED = 0.5  # of the rise time: until then the thrust rises, from then on the load, lest the belt slips
-# What the power balance may leave open beside the equations' tolerance: elastic sheaves lean along the arc,
+# Limit of the open power balance beside the equations' tolerance: elastic sheaves lean along the arc,
 # which has no part in the elements' forces. Sound runs leave up to 0.5 % of the losses.
 OF_LOSS = 0.02  # [1]
-# What the step may damp by itself beside that share of the losses: one of the energy of rotation of elements
+# Limit of numerical damping beside that share of the losses: one of the energy of rotation of elements
 # that meet and leave an arc, and of thrust times belt speed, by step. Without vibration sound runs damp by up
 # to 85 % of these two.
 OF_ROTATION, OF_THRUST = 1.5, 10.0  # [1], [1/s]
@@ -90,7 +90,7 @@ class ElementRun(SampledRun):
         raise NotImplementedError
 
     def _read(self) -> Any:
-        """What is read at the sample that is reached."""
+        """Readings of the sample that is reached."""
         raise NotImplementedError
 
     def _stored_energy(self, found: Any) -> float:
@@ -134,7 +134,7 @@ class ElementRun(SampledRun):
         return self.failure
 
     def _key_of_start_up(self) -> str:
-        """All that the samples before the load acts follow from."""
+        """All values that determine the samples before the load acts."""
         course = [self._inputs_along(sample) for sample in range(self._start_up)]
         marched = self._belt, self._method, self._state, self.interval, self._steps_per_sample, course
         return fingerprint(type(self).__module__, marched, self._readings, self.parameters["ratio"])
@@ -148,7 +148,7 @@ class ElementRun(SampledRun):
             own[...] = kept
 
     def _reached(self) -> tuple[np.ndarray, ...]:
-        """Views of all that marching has changed so far, where nothing is judged yet."""
+        """Views of all arrays that marching has changed so far, where nothing is judged yet."""
         return self._state.elements.data, *self._state[1:], *self._recorded()
 
     def _march(self, inputs: np.ndarray, steps: int) -> int:
@@ -229,7 +229,7 @@ class ElementRun(SampledRun):
         return GAINED if driven > MOST_SPEED * driving else None
 
     def _out_of_place(self) -> str | None:
-        """Whether a sheave has run to its stop, where the job says how far the sheaves reach."""
+        """Whether a sheave has run to its stop, if the job gives the reach of the sheaves."""
         least, most = self.parameters["inner_radius"], self.parameters["outer_radius"]
         radii = self._state.pulleys[[DRIVING_RADIUS, DRIVEN_RADIUS]]
         for pulley, radius in zip(PULLEYS, radii, strict=True):
@@ -301,7 +301,7 @@ class ElementRun(SampledRun):
 
 
 def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """What a `start` takes, from flat parameters of a run [SI]."""
+    """Input of `start`, from flat parameters of a run [SI]."""
     p, length = parameters, path_length(parameters)
     pitch = length / p["elements"]
     rigid = np.isinf(p["sheave_stiffness"])

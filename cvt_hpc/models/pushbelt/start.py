@@ -108,7 +108,7 @@ def equal_chords(
         chords = np.linalg.norm(np.roll(found, -1, axis=0) - found, axis=1)
         if np.ptp(chords) < 1e-13:
             break
-        # arc lengths in proportion to what the chords leave; it contracts, as both differ by their curvature
+        # arc lengths scaled by the mean chord over their own; it contracts, as both differ by their curvature
         gaps = np.diff(np.append(s, length)) * (chords.mean() / chords)
         gaps *= length / gaps.sum()
         s = np.concatenate([[0.0], np.cumsum(gaps[:-1])])
@@ -212,20 +212,25 @@ def workspace(belt: Belt, nodes: int) -> Workspace:
 
 
 def empty_workspace(
-    nodes: int, modes: int, size: int, step: int, iterate: int, state: int, inputs: int
+    nodes: int, modes: int, size: int, step: int, iterate: int, state: int, inputs: int, narrow: int = 0
 ) -> Workspace:
-    """Work space for elements with `size` unknowns and so many fields, and for sheaves with so many modes."""
+    """Work space for elements with `size` unknowns and so many fields, and for sheaves with so many modes.
+
+    Of these unknowns the first `narrow` are assembled apart from the others; 0: all at once.
+    """
     parts, columns = parts_of(nodes), 2 + 2 * modes
     rows = nodes // parts
 
     def lanes(count: int, fields: int) -> LaneArray:
         return LaneArray(count, fields, parts, linked=parts > 1)
 
+    blocks = empty_system(nodes, parts, size, columns)
     return Workspace(
         step=lanes(rows, step),
         iterate=lanes(rows, iterate),
         shapes=lanes(rows, max(modes, 1)),
-        blocks=empty_system(nodes, parts, size, columns),
+        blocks=blocks,
+        narrow=empty_system(nodes, parts, narrow, columns) if narrow else blocks,
         scratch=empty_scratch(parts, size, columns),
         border=np.zeros((columns - 1, columns)),
         sums=lanes(1, (columns - 1) * columns),

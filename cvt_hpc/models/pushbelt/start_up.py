@@ -1,7 +1,7 @@
-"""Start-ups that runs of this process have marched, from which runs that begin alike go on.
+"""Start-ups that runs of this process have marched, from which runs with the same beginning continue.
 
-A start-up is known by a key of all that it follows from. It stays in the memory of its process: on a disk it
-would have to be trusted, to save each process a march of its own.
+A start-up is known by a key of all values that determine it. It stays in the memory of its process: on a disk
+it would have to be trusted, to save each process a march of its own.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class StartUps:
     Parameters
     ----------
     most_bytes : int
-        What all of them may take [byte].
+        Limit of their total size [byte].
     """
 
     def __init__(self, most_bytes: int = MOST_BYTES) -> None:
@@ -30,7 +30,7 @@ class StartUps:
         self._kept: OrderedDict[str, tuple[np.ndarray, ...]] = OrderedDict()
 
     def find(self, key: str) -> tuple[np.ndarray, ...] | None:
-        """What is kept under a key, to be copied; None where there is nothing."""
+        """The start-up that is kept under a key, to be copied; None where there is none."""
         if key in self._kept:
             self._kept.move_to_end(key)
         return self._kept.get(key)

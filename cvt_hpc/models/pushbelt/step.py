@@ -2,7 +2,7 @@
 
 From q_k and X_{k-1/2} a step finds X_{k+1/2}. The magnitudes of stiff laws are those at q_{k+1} = q_k +
 dt X_{k+1/2} and all directions those at q_k: implicit Euler along the direction of each law, symplectic Euler
-for what is slow.
+for slow motion.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
 
 @kernel
 def _prepare(belt, state, work, dt):
-    """What all iterates of a step have in common: geometry, directions, linear laws."""
+    """Values that all iterates of a step have in common: geometry, directions, linear laws."""
     predict(belt, state.elements, state.pulleys, work.step, dt)
     link(belt, state.elements, work.step, dt)
     if belt.nose_clearance < np.inf:
@@ -141,7 +141,7 @@ def _changes(kept, k):
 
 @kernel
 def _accept(belt, state, work, inputs, dt):
-    """Take the state to the end of the step, and add up what it has done."""
+    """Advance the state to the end of the step, and add up the works."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     totals, pulleys = state.totals, state.pulleys
     book(belt, state, work, dt)
@@ -190,5 +190,5 @@ def _accept(belt, state, work, inputs, dt):
     totals[THRUST_WORK] -= closing * (driving_thrust * driving + driven_thrust * driven)
 
 
-EQUATIONS = Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes)
+EQUATIONS = Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, CHANGE)
 advance = partial(advance_by, EQUATIONS)

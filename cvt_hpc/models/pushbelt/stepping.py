@@ -1,8 +1,7 @@
 """Steps in time of a belt of rigid elements in linked lanes, whatever its equations.
 
 A step finds the speeds at its end by Newton's method, for the elements and for a border of unknowns that all
-elements act on. A model gives its equations, and has the last fields of an element be the changes of its
-speeds, as many as an element has unknowns.
+elements act on. A model gives its equations.
 """
 
 from __future__ import annotations
@@ -37,12 +36,12 @@ _LARGE = 1e100  # more than any speed or power that means something
 
 
 class Equations(NamedTuple):
-    """What a model writes of its steps: kernels, which take `belt, state, work` first and `dt` last.
+    """A model's equations of a step: kernels, which take `belt, state, work` first and `dt` last.
 
     Attributes
     ----------
     prepare : kernel
-        What all iterates of a step have in common: geometry, directions, linear laws.
+        Values that all iterates of a step have in common: geometry, directions, linear laws.
     evaluate : kernel
         Forces of the iterate, and the residuals that they leave, that of the border in its last column. Takes
         the load [N m] before `dt`, and returns the power residual [W].
@@ -52,9 +51,11 @@ class Equations(NamedTuple):
     close : kernel
         That of the border, once the elements' is solved (`solvers.linked_blocks`).
     accept : kernel
-        Takes the state to the end of the step, and adds up what it has done. Takes the inputs before `dt`.
+        Advances the state to the end of the step, and adds up the works. Takes the inputs before `dt`.
     changes : kernel
         By how much contact forces have changed, in the order of `CONTACTS` (`faults.name_fault`).
+    first_change : int
+        Field of an element at which the changes of its speeds in the step begin, as many as it has unknowns.
     """
 
     prepare: Callable[..., None]
@@ -63,6 +64,7 @@ class Equations(NamedTuple):
     close: Callable[..., None]
     accept: Callable[..., None]
     changes: Callable[..., tuple[float, ...]]
+    first_change: int
 
 
 @kernel
@@ -81,14 +83,14 @@ def solve_bordered(equations, belt, state, work, size, dt):
 
 
 @kernel
-def correct(state, work, weights, share):
+def correct(state, work, weights, first_change, share):
     """Take the iterate to the solution, or a share of the way; return the largest correction [m/s].
 
-    Where any correction is not finite, nor is what is returned.
+    If any correction is not finite, nor is the result.
     """
     elements, blocks, border, scratch = state.elements, work.blocks, work.border, work.scratch
     b, unknowns = len(weights), border.shape[0]
-    right, changes = 3 * b * b, elements.data.shape[1] - b
+    right = 3 * b * b
     largest = total = like(0.0, blocks[0, right])
     for j in range(blocks.rows):
         for r in range(b):
@@ -96,7 +98,7 @@ def correct(state, work, weights, share):
             for k in range(unknowns):
                 change -= blocks[j, right + b * (1 + k) + r] * border[k, unknowns]
             blocks[j, right + r] = change
-            elements[j, changes + r] += share * change
+            elements[j, first_change + r] += share * change
             change = absolute(change * weights[r])
             largest = maximum(change, largest)
             total += change
@@ -107,7 +109,7 @@ def correct(state, work, weights, share):
     for part in range(scratch.data.shape[2]):
         found = max(found, scratch.data[0, 0, part])
         total_found += scratch.data[0, 1, part]
-    # a maximum passes over what is not a number, a sum does not
+    # a maximum ignores entries that are not numbers, a sum does not
     return found if total_found < np.inf else total_found
 
 
@@ -132,7 +134,7 @@ def _newton(equations, belt, newton, state, work, load, dt):
         equations.assemble(belt, state, work, dt)
         if not solve_bordered(equations, belt, state, work, weights, dt):
             return iteration, np.inf, power
-        change = correct(state, work, weights, share)
+        change = correct(state, work, weights, equations.first_change, share)
         # Contacts that close one after the other along the belt take an iteration each, with corrections that
         # fall. Sets of contacts that take turns do not let them fall.
         share = 0.5 if iteration + 1 >= newton.first_half_step and change > FALLS * least else 1.0

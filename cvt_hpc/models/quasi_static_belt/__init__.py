@@ -1,7 +1,7 @@
-"""The elastic belt with all that is faster than a limit frequency lagging behind its forces.
+"""The elastic belt with all motion faster than a limit frequency lagging behind its forces.
 
-Another model than `elastic_belt`, made of its parts: `README.md` says what it keeps, what it drops, and why
-the equations as printed do not vibrate. Importing this package is cheap.
+Another model than `elastic_belt`, made of its parts: `README.md` states the common and the dropped parts, and
+why the equations as printed do not vibrate. Importing this package is cheap.
 """
 
 from cvt_hpc.models import elastic_belt
@@ -25,7 +25,7 @@ PARAMETERS = {
         "split": Parameter(
             "free_splines",
             "",
-            "whose own frequency counts: each spline's without grooves, with them, or that of eigenmodes",
+            "frequency that counts: that of each spline without grooves or with them, or of eigenmodes",
             choices=("free_splines", "held_splines", "modes"),
         ),
         "spline_spacing": Parameter(

@@ -20,9 +20,9 @@ class Basis(NamedTuple):
     Attributes
     ----------
     dynamic : (N, D) array
-        Those that have inertia.
+        Shapes that have inertia.
     lagging : (N, L) array
-        Those that follow their forces.
+        Shapes that follow their forces.
     stiffness : (N, N) array
         Of the stations, at rest in closed grooves [N/m].
     fastest : float
@@ -85,7 +85,7 @@ def splines_of_belt(grid: Mesh, spacing: float) -> Splines:
 
 
 def free_stiffness(belt: Belt) -> np.ndarray:
-    """Stiffness of the stations by bending and by what the thrust leaves of tension, (N, N) [N/m]."""
+    """Stiffness of the stations by bending and by the tension that the thrust leaves, (N, N) [N/m]."""
     n = belt.cell.size
     stiffness = np.zeros((n, n))
     for j in range(n):

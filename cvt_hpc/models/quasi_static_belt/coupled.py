@@ -5,7 +5,7 @@
 x are the increments of the R coordinates' rates, v = (v_0, v_1) those of both layers' speeds at the N
 stations, c the cross slope of friction, R the shapes; hoop stresses couple both likewise. A is cyclic
 block-tridiagonal, symmetric positive definite: the layers are chains of masses. It is eliminated for all
-columns of c R at once, and what is left is dense and small.
+columns of c R at once, and the remaining system is dense and small.
 """
 
 from __future__ import annotations

@@ -118,7 +118,7 @@ def _fill_chain(model: SplitBelt, work: Work) -> None:
 
 @kernel
 def _reduce(model: SplitBelt, work: Work) -> None:
-    """Add the forces at the stations and their slopes to the dense system, with what the layers leave."""
+    """Add the forces at the stations and their slopes to the dense system, with the layers' remainder."""
     belt, stations, shapes, columns, size = (
         model.belt,
         work.stations,
@@ -164,7 +164,7 @@ def _reduce(model: SplitBelt, work: Work) -> None:
 
 @kernel
 def contradicts(model: SplitBelt, moved: Motion, work: Work) -> bool:
-    """Mark where the step contradicts what it took for granted; whether anywhere newly. As `imex_system`."""
+    """Mark where the step contradicts its assumptions; whether anywhere newly. As `imex_system`."""
     belt, stations, columns = model.belt, work.stations, work.layers.columns
     n, found = belt.cell.size, False
     for j in range(n):

@@ -1,4 +1,4 @@
-"""What the record of a run holds: as of the elastic belt."""
+"""The record of a run: as of the elastic belt."""
 
 from functools import partial
 

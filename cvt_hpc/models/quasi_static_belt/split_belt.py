@@ -1,6 +1,6 @@
 """The quasi-static belt as its step has it: constants, motion, work space.
 
-Rows of `Work.stations` are named here: what a step knows at each station.
+Rows of `Work.stations` are named here: the values of a step at each station.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Motion(NamedTuple):
     Attributes
     ----------
     state : State
-        As of the elastic belt; its u is what slides.
+        As of the elastic belt; its u is the sliding part.
     q, p : (D + L,) arrays
         Coordinates [m] and their rates [m/s].
     contacts : pair of Contact

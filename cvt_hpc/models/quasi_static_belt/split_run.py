@@ -93,11 +93,11 @@ class SplitRun(OneLaneRun):
         return self._motion.state.copy()
 
     def paused(self) -> SplitRun:
-        """What a batch of the same point over a longer time goes on from: the run itself."""
+        """The state from which a batch of the same point over a longer time continues: the run itself."""
         return self
 
     def take_over(self, runs: Sequence[Any]) -> None:
-        """Go on from where a run by another stepper stands, its history included, but for means begun before.
+        """Continue a run by another stepper, its history included, except for means that began before.
 
         Parameters
         ----------
@@ -128,7 +128,7 @@ class SplitRun(OneLaneRun):
         Returns
         -------
         (Status, str) or None
-            What has gone wrong, where the run cannot go on.
+            The failure, where the run cannot continue.
         """
         if samples == 0:
             _march(self._model, self._motion, self._work, 0, self._noted)

@@ -1,6 +1,6 @@
 """Leapfrog of the dynamic coordinates, exact lag of the others, friction and layers linearly implicit.
 
-Needs of a model: what it moves by inertia, what lags, and its stiff forces with their slopes.
+Needs of a model: the shapes with inertia, the lagging shapes, and its stiff forces with their slopes.
 
 Order 1 (the push force by backward Euler; the dynamic coordinates are a leapfrog, without numerical damping).
 """

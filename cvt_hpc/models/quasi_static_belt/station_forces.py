@@ -148,7 +148,7 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
         stations[ELEMENT_STRESS, j] = stress
         pressed = links[0, j] > 0.0
         stations[ELEMENT_HOOP, j] = belt.element_stiffness * per_length if pressed else 0.0
-        # beyond what the explicit force across the belt has of it
+        # beyond its part in the explicit force across the belt
         hoop = belt.element_stiffness * (ahead if pressed else 0.0)
         stations[HOOP_STRESS, j] = hoop - belt.element_stiffness * min(eps[0, j], 0.0)
         grip = belt.ring_damping / length

@@ -6,6 +6,6 @@ from cvt_hpc.models.quasi_static_belt.split_run import SplitRun as Transient
 
 __all__ = ["CHANNELS", "TAKES_OVER", "Transient", "batch"]
 
-TAKES_OVER = True  # runs go on from where others stand
+TAKES_OVER = True  # runs continue from the state of others
 
 batch = batches_of_one(Transient)

@@ -2,7 +2,7 @@
 
 Two methods answer: Bullinger et al. 2005, eq. 2, in a microsecond, and steady states of the elastic belt as
 its driven pulley is slowed down, in seconds. The latter also give the working point that is safe by a factor:
-thrusts of both pulleys, efficiency and losses by their part. What it cannot answer: whether the belt vibrates
+thrusts of both pulleys, efficiency and losses by their part. It cannot answer whether the belt vibrates
 there. A belt whose gaps wander may carry some per cent more than its steady states do. Importing this package
 is cheap.
 """

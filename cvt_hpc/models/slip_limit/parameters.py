@@ -1,4 +1,4 @@
-"""What a job may set of the limit of slip: the steady belt's parameters, and the question."""
+"""Parameters of the limit of slip that a job may set: the steady belt's parameters, and the question."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the record of a limit of slip holds, and how it is found."""
+"""The record of a limit of slip, and the search for it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ VARIABLES = (
     *shared("layer_loss", "seating_loss", "loss", "efficiency", "power_residual"),
 )
 AT_WORK = tuple(variable.name for variable in VARIABLES[5:])
-FIRST_SHARE = 0.4  # of eq. 2's torque: where walks to the limit begin
+FIRST_SHARE = 0.4  # of eq. 2's torque: where continuations to the limit begin
 WITHIN, TRIES = 2e-3, 8  # of the load: how closely a thrust's limit meets it; thrusts tried at most
 
 
@@ -38,7 +38,7 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
 
 
 def cost(parameters: Mapping[str, Any], stepper: None) -> Any:
-    """Core-seconds of a run: of a first state and of the walk to the limit."""
+    """Core-seconds of a run: of a first state and of the continuation to the limit."""
     return np.where(parameters["method"] == "formula", 1e-4, 6e-2 * parameters["stations"])
 
 
@@ -110,13 +110,13 @@ def _by_states(p: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _largest(p: Mapping[str, Any]) -> tuple[Steady, Steady, SteadyBelt]:
-    """State at the largest load that the thrust carries, the one where the walk began, and their belt."""
+    """State at the largest load that the thrust carries, the start of the continuation, and their belt."""
     first, belt = _first(p)
     return belt.carried(first), first, belt
 
 
 def _first(p: Mapping[str, Any]) -> tuple[Steady, SteadyBelt]:
-    """State where walks begin, under a load that is carried by far, and its belt.
+    """State where continuations begin, under a load that is carried by far, and its belt.
 
     Near the largest torque there are other states under the same load, up to a driven pulley that stands.
     """

@@ -303,8 +303,47 @@ NORMAL_YIELD = 110  # and by the opening of the sheaves
 ITERATE_FIELDS = 111
 
 
-def workspace(belt: Belt, nodes: int) -> Workspace:
-    """Work space for a belt of so many nodes."""
-    return empty_workspace(
-        nodes, belt.modal_stiffness.shape[1], SIZE, STEP_FIELDS, ITERATE_FIELDS, STATE_FIELDS, INPUTS
-    )
+# With two flows of ring material, one for each package, an element has one more unknown, w, and more fields.
+WIDE = SIZE + 1
+NEWTON_OF_TWO_FLOWS = NEWTON._replace(weights=(*NEWTON.weights, 1.0))
+
+# Fields of its state behind those of one flow; the first is the change of w in the last step
+CHANGE_OF_HALF = CHANGE + SIZE
+HALF_SPEED = STATE_FIELDS + 1  # w, half of the right package's speed less the left one's [m/s]
+HALF_LENGTH = HALF_SPEED + 1  # half of the right package's unstretched length less the left one's [m]
+TENSION_DIFFERENCE = HALF_LENGTH + 1  # D, the right package's tension less the left one's [N]
+HALF_SLIP = TENSION_DIFFERENCE + 1  # delta, half of the right package's slip less the left one's [m/s]
+FRICTION_DIFFERENCE = HALF_SLIP + 1  # of the elements on the right package, less that on the left one [N]
+SADDLE_RIGHT, SADDLE_LEFT = FRICTION_DIFFERENCE + 1, FRICTION_DIFFERENCE + 2  # normal forces of each [N]
+DUAL_RIGHT, DUAL_LEFT = SADDLE_LEFT + 1, SADDLE_LEFT + 2
+WIDE_STATE_FIELDS = DUAL_LEFT + 1
+
+# Fields of Workspace.step behind those of one flow. Rows of seven are by velocity, angular velocity, and v in
+# laws of both packages together, w in laws of their difference.
+SLIP_BY = STEP_FIELDS  # gradient of sigma, and of delta
+HALF_SLIP_BY = SLIP_BY + 7
+MEAN_I = HALF_SLIP_BY + 7  # direction of T at this element, and at the next one, where T acts against it
+MEAN_J = MEAN_I + 7
+MEAN_BEHIND = MEAN_J + 7  # that of the element behind at this one
+DIFFERENCE_I = MEAN_BEHIND + 7  # the same of D
+DIFFERENCE_J = DIFFERENCE_I + 7
+DIFFERENCE_BEHIND = DIFFERENCE_J + 7
+START_HALF_SLIP = DIFFERENCE_BEHIND + 7
+PREDICTED_DIFFERENCE = START_HALF_SLIP + 1
+CROSS_SLOPE = PREDICTED_DIFFERENCE + 1  # of T by D's direction and of D by T's; TENSION_SLOPE is their own
+WIDE_STEP_FIELDS = CROSS_SLOPE + 1
+
+# Fields of Workspace.iterate behind those of one flow
+ITERATE_DIFFERENCE = ITERATE_FIELDS
+SLOPE_DIFFERENCE = ITERATE_DIFFERENCE + 1  # RING_SLOPE is the sum of both packages' slopes
+HALF_RESIDUAL = SLOPE_DIFFERENCE + 1  # of the equation of w
+WIDE_ITERATE_FIELDS = HALF_RESIDUAL + 1
+
+
+def workspace(belt: Belt, nodes: int, flows: int = 1) -> Workspace:
+    """Work space for a belt of so many nodes, and flows of ring material."""
+    modes = belt.modal_stiffness.shape[1]
+    if flows == 1:
+        return empty_workspace(nodes, modes, SIZE, STEP_FIELDS, ITERATE_FIELDS, STATE_FIELDS, INPUTS)
+    fields = WIDE_STEP_FIELDS, WIDE_ITERATE_FIELDS, WIDE_STATE_FIELDS
+    return empty_workspace(nodes, modes, WIDE, *fields, INPUTS, narrow=SIZE)

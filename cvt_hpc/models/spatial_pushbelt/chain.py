@@ -89,6 +89,28 @@ def package_lines(d, turn, b):
     return right, left, right_size, left_size
 
 
+@register_jitable
+def lines_at(belt, state, j):
+    """Directions of the right and the left package at an element."""
+    front = cross(vector_ahead(state, j, OUTWARD), vector_ahead(state, j, HEADING))
+    back = cross(vector_behind(state, j, OUTWARD), vector_behind(state, j, HEADING))
+    d = minus(vector_ahead(state, j, POSITION), vector_behind(state, j, POSITION))
+    right, left, _, _ = package_lines(d, minus(front, back), belt.package_distance)
+    return right, left
+
+
+@register_jitable
+def lines_to_next(array, j, position, heading, outward, b):
+    """Axial directions of an element and the next one, chord, and packages up to there (`package_lines`).
+
+    Position and directions are those at these fields of the array.
+    """
+    ai = cross(vector(array, j, outward), vector(array, j, heading))
+    aj = cross(vector_ahead(array, j, outward), vector_ahead(array, j, heading))
+    chord = minus(vector_ahead(array, j, position), vector(array, j, position))
+    return ai, aj, chord, package_lines(chord, minus(aj, ai), b)
+
+
 @kernel
 def predict(belt, state, pulleys, step, dt):
     """Everything of the free chain that belongs to a single element."""
@@ -112,10 +134,7 @@ def predict(belt, state, pulleys, step, dt):
         store(step, j, MID_OUTWARD, middle_o)
         store(step, j, MID_AXIAL, turned(a, omega, factors))
 
-        front = cross(vector_ahead(state, j, OUTWARD), vector_ahead(state, j, HEADING))
-        back = cross(vector_behind(state, j, OUTWARD), vector_behind(state, j, HEADING))
-        d = minus(vector_ahead(state, j, POSITION), vector_behind(state, j, POSITION))
-        right, left, _, _ = package_lines(d, minus(front, back), b)
+        right, left = lines_at(belt, state, j)
         right_lever, left_lever = cross(times(b, a), right), cross(times(-b, a), left)
         line = times(0.5, plus(right, left))
         line_lever = times(0.5, plus(right_lever, left_lever))
@@ -174,9 +193,8 @@ def link(belt, state, step, dt):
     stiffness, damping = 0.5 * belt.angle_stiffness, 0.5 * belt.angle_damping
     for j in range(state.rows):
         oi, oj = vector(state, j, OUTWARD), vector_ahead(state, j, OUTWARD)
-        ai, aj = cross(oi, vector(state, j, HEADING)), cross(oj, vector_ahead(state, j, HEADING))
-        chord = minus(vector_ahead(state, j, POSITION), vector(state, j, POSITION))
-        right, left, _, _ = package_lines(chord, minus(aj, ai), b)
+        ai, aj, chord, lines = lines_to_next(state, j, POSITION, HEADING, OUTWARD, b)
+        right, left, _, _ = lines
         e = times(0.5, plus(right, left))
         roll = times(0.5 * b, minus(right, left))
         store(step, j, TENSION_I, minus(e, vector(step, j, RING_LINE)))
@@ -185,12 +203,10 @@ def link(belt, state, step, dt):
         store(step, j, TENSION_J + 3, minus(cross(aj, roll), vector_ahead(step, j, RING_LINE + 3)))
 
         pi, pj = vector(step, j, PREDICTED_OUTWARD), vector_ahead(step, j, PREDICTED_OUTWARD)
-        bi, bj = (
-            cross(pi, vector(step, j, PREDICTED_HEADING)),
-            cross(pj, vector_ahead(step, j, PREDICTED_HEADING)),
+        _, _, predicted, lines = lines_to_next(
+            step, j, PREDICTED_POSITION, PREDICTED_HEADING, PREDICTED_OUTWARD, b
         )
-        predicted = minus(vector_ahead(step, j, PREDICTED_POSITION), vector(step, j, PREDICTED_POSITION))
-        _, _, right_size, left_size = package_lines(predicted, minus(bj, bi), b)
+        _, _, right_size, left_size = lines
         per_unstretched = 1.0 / (state[j, LENGTH] + dt * (step[j, START_SLIP] - ahead(step, j, START_SLIP)))
         mean = 0.5 * (right_size + left_size)
         step[j, PREDICTED_TENSION] = belt.ring_stiffness * (mean * per_unstretched - 1.0)
@@ -240,6 +256,21 @@ def chain_forces(belt, state, step, iterate, dt):
         store(iterate, j, PAIR_J, moved(times(-tension, tj), -1.0, push))
         store(iterate, j, PAIR_J + 3, moved(times(-tension, lj), -moment_j, sj))
         iterate[j, PAIR_J + 6] = -tension
+
+
+@register_jitable
+def mean_stretch(state, step, j):
+    """Mean rate within a step at which the ring between an element and the next one is shortened [m/s]."""
+    u = moved(vector(state, j, SPEED), 0.5, vector(state, j, CHANGE))
+    w = moved(vector(state, j, OMEGA), 0.5, vector(state, j, CHANGE + 3))
+    next_u = moved(vector_ahead(state, j, SPEED), 0.5, vector_ahead(state, j, CHANGE))
+    next_w = moved(vector_ahead(state, j, OMEGA), 0.5, vector_ahead(state, j, CHANGE + 3))
+    v = state[j, V] + 0.5 * state[j, CHANGE + 6]
+    next_v = ahead(state, j, V) + 0.5 * ahead(state, j, CHANGE + 6)
+    here = dot(vector(step, j, TENSION_I), u) + dot(vector(step, j, TENSION_I + 3), w) + v
+    return (
+        here - dot(vector(step, j, TENSION_J), next_u) - dot(vector(step, j, TENSION_J + 3), next_w) - next_v
+    )
 
 
 @register_jitable

@@ -108,6 +108,9 @@ _BELT: dict[str, Parameter] = {
         7.5e-3, "m", "from the middle of an element to that of either ring package", sensible=(1e-4, 0.05)
     ),
     "strip_width": positive(9.75e-3, "m", "width of the rings of a package", sensible=(1e-4, 0.05)),
+    "ring_flows": Parameter(
+        1, "", "flows of ring material: 1 for both packages, or 2, one for each", minimum=1, maximum=2
+    ),
     "lateral_bending_stiffness": positive(
         47.6, "N m^2", "lateral bending stiffness EI of all rings", sensible=(0.01, 1e4)
     ),

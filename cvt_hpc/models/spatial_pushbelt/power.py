@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import ahead, around, like
+from cvt_hpc.lanes import around, like
 from cvt_hpc.models.pushbelt.belt import (
     BELT_LOSS,
     DAMPING_LOSS,
@@ -47,13 +47,12 @@ from cvt_hpc.models.spatial_pushbelt.belt import (
     RADIAL,
     RING_FRICTION,
     SPEED,
-    TENSION_I,
-    TENSION_J,
     TENSION_SLOPE,
     TURN_I,
     TURN_J,
     YAW,
 )
+from cvt_hpc.models.spatial_pushbelt.chain import mean_stretch
 from cvt_hpc.models.spatial_pushbelt.flank import (
     along_arc,
     flank_directions,
@@ -89,12 +88,7 @@ def book_pairs(belt, state, work, dt):
         u, w = moved(vector(elements, j, SPEED), 0.5, du), moved(vector(elements, j, SPEED + 3), 0.5, dw)
         next_u = moved(vector_ahead(elements, j, SPEED), 0.5, ju)
         next_w = moved(vector_ahead(elements, j, SPEED + 3), 0.5, jw)
-        v = elements[j, SPEED + 6] + 0.5 * elements[j, CHANGE + 6]
-        next_v = ahead(elements, j, SPEED + 6) + 0.5 * ahead(elements, j, CHANGE + 6)
-
-        stretch = dot(vector(step, j, TENSION_I), u) + dot(vector(step, j, TENSION_I + 3), w) + v
-        stretch -= dot(vector(step, j, TENSION_J), next_u) + dot(vector(step, j, TENSION_J + 3), next_w)
-        stretch -= next_v
+        stretch = mean_stretch(elements, step, j)
         stretching += step[j, TENSION_SLOPE] * stretch * stretch
 
         apart, more = minus(next_u, u), minus(ju, du)

@@ -27,6 +27,7 @@ SCALARS = (
     *(f"sheave_loss {sheave}" for sheave in SHEAVES),
     "axial_offset",
     *(f"extreme_{what}" for what in EXTREMES),
+    *(f"tension_difference {strand}" for strand in STRANDS),
 )
 _LEAST_FORCE = 1e-9  # [N]: what presses less does not press
 _FLANK = "mean line force of the flank"
@@ -59,6 +60,10 @@ PROFILES = {
     "roll": ("roll of elements", "rad", "mean, heads to the right"),
     "yaw": ("yaw of elements", "rad", "mean, running to the right"),
     "ring_slope": ("slope of the rings", "rad", "mean, running to the right"),
+}
+OF_TWO_FLOWS = {
+    "tension_difference": ("tension of the right package less the left one's", "N", "mean"),
+    "flow_difference": ("speed of the right package less the left one's", "m s-1", "mean"),
 }
 
 
@@ -149,8 +154,12 @@ class Reading:
             [pulleys[f.DRIVEN_MIDDLE] - pulleys[f.DRIVING_MIDDLE]],
             np.abs(self._angles).max(axis=1),
             [e[:, f.PIN].max()],
+            middles @ e[:, f.TENSION_DIFFERENCE] if self._has_two_flows() else [np.nan] * len(STRANDS),
         )
         return [float(value) for group in groups for value in group]
+
+    def _has_two_flows(self) -> bool:
+        return self._elements.shape[1] == f.WIDE_STATE_FIELDS
 
     def _contact_radii(self) -> np.ndarray:
         """Distances of the flanks' pitch points from the shaft of the nearer pulley, (n,) [m]."""
@@ -160,7 +169,10 @@ class Reading:
         return np.hypot(y, pitch_point[:, 1])
 
     def profiles(self) -> np.ndarray:
-        """Sums over the elements at each place: PROFILES, and their number, (profile + 1, place)."""
+        """Sums over the elements at each place: PROFILES, and their number, (profile + 1, place).
+
+        With two flows OF_TWO_FLOWS come before the number.
+        """
         e, pitch = self._elements, self._where.pitch
         normal, grip_m, grip_t, slip_m, slip_t = (
             _points(e, k)
@@ -194,6 +206,8 @@ class Reading:
             self._x[:, 2],
             e[:, f.SLOPE],
         ]
+        if self._has_two_flows():
+            rows += [e[:, f.TENSION_DIFFERENCE], 2.0 * e[:, f.HALF_SPEED]]
         return self._path.sums(rows)
 
     def stored_energy(self, openings: np.ndarray, leans: np.ndarray) -> float:
@@ -221,6 +235,11 @@ class Reading:
             kinetic += 0.5 * belt.ring_mass * ((w**2).sum() - (_dot(t, w) ** 2).sum())
 
         elastic = (e[:, f.TENSION] ** 2 * e[:, f.LENGTH]).sum() / belt.ring_stiffness
+        if self._has_two_flows():
+            tension, difference = e[:, f.TENSION], e[:, f.TENSION_DIFFERENCE]
+            mixed = difference * (difference * e[:, f.LENGTH] + 2.0 * tension * e[:, f.HALF_LENGTH])
+            elastic += mixed.sum() / belt.ring_stiffness
+            kinetic += belt.ring_mass * (e[:, f.HALF_SPEED] ** 2).sum()
         elastic += 2.0 * (self._push**2).sum() / belt.contact_stiffness
         elastic += (e[:, f.PIN] ** 2).sum() / belt.pin_stiffness
         elastic += 2.0 * (_points(e, f.FLANK) ** 2).sum() / belt.flank_stiffness

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.models.pushbelt import record as pushbelt
-from cvt_hpc.models.spatial_pushbelt.readings import ANGLES, EXTREMES, LATERAL, PROFILES, SHEAVES, SIDES
+from cvt_hpc.models.spatial_pushbelt.readings import (
+    ANGLES,
+    EXTREMES,
+    LATERAL,
+    OF_TWO_FLOWS,
+    PROFILES,
+    SHEAVES,
+    SIDES,
+)
 from cvt_hpc.physics.out_of_plane import clamped_force
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
@@ -25,6 +33,7 @@ if TYPE_CHECKING:
 
 # Measured on one core of an EPYC (Zen 5): core-seconds per element and step, and per sample
 RIGID_COST, ELASTIC_COST, SAMPLE_COST = 2.4e-6, 3.3e-6, 1e-3
+OF_TWO = 1.6  # cost of a step with two flows of ring material by that of one with one
 
 _ACROSS = ("amplitude", "frequency", "growth_rate", "amplitude_scatter")  # told of both planes
 VARIABLES = (
@@ -86,6 +95,13 @@ VARIABLES = (
     ),
     Variable("largest_nose_force", (), "f8", "N", "largest force of a nose over the judged part"),
     Variable(
+        "mean_tension_difference",
+        ("strand",),
+        "f8",
+        "N",
+        "ring tension of the right package less the left one's; not a number with one flow for both",
+    ),
+    Variable(
         "final_misalignment", (), "f8", "m", "mean axial offset of the pulleys' mid planes as sheaves stand"
     ),
 )
@@ -107,6 +123,7 @@ def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
     """Core-seconds of a run; of parameters that are arrays, an array."""
     p = parameters
     each_step = np.where(np.isinf(p["sheave_stiffness"]), RIGID_COST, ELASTIC_COST)[()]
+    each_step = each_step * np.where(np.equal(p["ring_flows"], 2), OF_TWO, 1.0)[()]
     return p["duration"] * (each_step * p["elements"] / p["step"] + SAMPLE_COST * p["sampling_rate"])
 
 
@@ -166,6 +183,7 @@ def _evaluate(run: ElementRun) -> dict[str, Any]:
         "strand_one_sidedness": np.array([one_sided(strand) for strand in STRANDS]),
         "arc_one_sidedness": np.array([one_sided(pulley) for pulley in PULLEYS]),
         **largest,
+        "mean_tension_difference": each(run, "tension_difference", STRANDS),
         "final_misalignment": mean(run, "axial_offset"),
     }
 
@@ -189,6 +207,6 @@ def histories(run: ElementRun) -> xr.Dataset:
     for angle in ANGLES:
         over_time[f"extreme_{angle}"] = (f"largest {angle}", "rad", "of any element")
     over_time["extreme_nose_force"] = ("largest force of a nose", "N", "of any element")
-    found = pushbelt.history(run, PROFILES, over_time)
+    found = pushbelt.history(run, {**PROFILES, **OF_TWO_FLOWS}, over_time)
     found["displacement"].attrs["comment"] = "transverse, outward; of lateral probes axial, to the right"
     return found

@@ -11,20 +11,25 @@ from cvt_hpc.models.pushbelt.belt import (
     COUNTERS,
     TOTALS,
 )
-from cvt_hpc.models.pushbelt.start import in_lanes, pitch_line, shared_constants
+from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, pitch_line, shared_constants
 from cvt_hpc.models.spatial_pushbelt.belt import (
     DRIVEN,
+    HALF_LENGTH,
     HEADING,
     LENGTH,
     LOADS,
     OMEGA,
     OUTWARD,
     POSITION,
+    SADDLE,
+    SADDLE_LEFT,
+    SADDLE_RIGHT,
     SLOPE,
     SLOPE_RATE,
     SPEED,
     STATE_FIELDS,
     TENSION,
+    WIDE_STATE_FIELDS,
     Belt,
     BeltState,
     V,
@@ -200,3 +205,20 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
         np.zeros(COUNTERS, np.int64),
     )
     return belt, state
+
+
+def with_two_flows(belt: Belt, state: BeltState) -> BeltState:
+    """The state of a belt with one flow as one of two flows whose packages are strained alike.
+
+    Both share all but the elements.
+    """
+    fields = of_lanes(state.elements)
+    wide = np.zeros((len(fields), WIDE_STATE_FIELDS))
+    wide[:, :STATE_FIELDS] = fields
+    o = fields[:, OUTWARD : OUTWARD + 3]
+    arm = belt.package_distance * np.cross(o, fields[:, HEADING : HEADING + 3])
+    chord, turn = (np.roll(of, -1, axis=0) - of for of in (fields[:, POSITION : POSITION + 3], arm))
+    right, left = (np.linalg.norm(chord + side * turn, axis=1) for side in (1.0, -1.0))
+    wide[:, HALF_LENGTH] = fields[:, LENGTH] * (right - left) / (right + left)
+    wide[:, SADDLE_RIGHT] = wide[:, SADDLE_LEFT] = 0.5 * fields[:, SADDLE]
+    return state._replace(elements=in_lanes(wide))

@@ -89,6 +89,16 @@ from cvt_hpc.models.spatial_pushbelt.rotations import (
     vector,
 )
 from cvt_hpc.models.spatial_pushbelt.saddle import saddle_forces
+from cvt_hpc.models.spatial_pushbelt.two_flows import (
+    accept_difference,
+    book_difference,
+    difference_forces,
+    half_residuals,
+    narrow_solutions,
+    predict_flows,
+    saddle_forces_of_two,
+    widen,
+)
 
 
 @kernel
@@ -108,8 +118,8 @@ def _open_sheaves(belt, state, leans, step, shapes):
 
 
 @kernel
-def _prepare(belt, state, work, dt):
-    """What all iterates of a step have in common: geometry, directions, linear laws."""
+def _place(belt, state, work, dt):
+    """Geometry and directions that all iterates of a step have in common."""
     elements, step = state.elements, work.step
     predict(belt, elements, state.pulleys, step, dt)
     link(belt, elements, step, dt)
@@ -119,12 +129,26 @@ def _prepare(belt, state, work, dt):
         predict_pins(belt, elements, step)
     predict_flanks(belt, elements, state.pulleys, step, dt)
     _open_sheaves(belt, elements, state.leans, step, work.shapes)
-    linear_blocks(belt, step, dt)
 
 
 @kernel
-def _evaluate(belt, state, work, load, dt):
-    """Forces of the iterate, and the residuals that they leave; return the power residual [W]."""
+def _prepare(belt, state, work, dt):
+    """What all iterates of a step have in common."""
+    _place(belt, state, work, dt)
+    linear_blocks(belt, work.step, dt)
+
+
+@kernel
+def _prepare_two_flows(belt, state, work, dt):
+    """The same with two flows."""
+    _place(belt, state, work, dt)
+    predict_flows(belt, state.elements, work.step, dt)
+    linear_blocks(belt, work.step, dt)
+
+
+@kernel
+def _press(belt, state, work, dt):
+    """Forces of the iterate, but for the friction of the rings."""
     elements, step, iterate = state.elements, work.step, work.iterate
     increments, openings, shapes = state.increments, state.openings, work.shapes
     chain_forces(belt, elements, step, iterate, dt)
@@ -133,24 +157,63 @@ def _evaluate(belt, state, work, load, dt):
     if belt.pin_clearance < np.inf:
         pin_forces(belt, elements, step, iterate, dt)
     flank_forces(belt, elements, state.pulleys, increments, openings, shapes, step, iterate, dt)
-    saddle_forces(belt, elements, step, iterate)
+
+
+@kernel
+def _sum_up(belt, state, work, load, dt):
+    """The residuals that forces leave, but for those of a second flow; return the power residual [W]."""
+    elements, increments, openings = state.elements, state.increments, state.openings
+    step, iterate, scratch, border = work.step, work.iterate, work.scratch, work.border
     return residuals(
-        belt, elements, increments, openings, shapes, load, step, iterate, work.scratch, work.border, dt
+        belt, elements, increments, openings, work.shapes, load, step, iterate, scratch, border, dt
     )
 
 
 @kernel
+def _evaluate(belt, state, work, load, dt):
+    """Forces of the iterate, and the residuals that they leave; return the power residual [W]."""
+    _press(belt, state, work, dt)
+    saddle_forces(belt, state.elements, work.step, work.iterate)
+    return _sum_up(belt, state, work, load, dt)
+
+
+@kernel
+def _evaluate_two_flows(belt, state, work, load, dt):
+    """The same with two flows."""
+    elements, step, iterate = state.elements, work.step, work.iterate
+    _press(belt, state, work, dt)
+    difference_forces(belt, elements, step, iterate)
+    saddle_forces_of_two(belt, elements, step, iterate)
+    power = _sum_up(belt, state, work, load, dt)
+    return power + half_residuals(belt, elements, step, iterate, work.scratch, dt)
+
+
+@kernel
 def _assemble(belt, state, work, dt):
-    """The linear system of the elements."""
-    assemble_pairs(belt, state.elements, work.step, work.iterate, work.blocks)
-    add_flank_blocks(belt, state.elements, work.shapes, work.step, work.iterate, work.blocks, dt)
+    """The linear system of the elements, of the unknowns of one flow."""
+    assemble_pairs(belt, state.elements, work.step, work.iterate, work.narrow)
+    add_flank_blocks(belt, state.elements, work.shapes, work.step, work.iterate, work.narrow, dt)
+
+
+@kernel
+def _assemble_two_flows(belt, state, work, dt):
+    """The same with two flows."""
+    _assemble(belt, state, work, dt)
+    widen(belt, work.step, work.iterate, work.narrow, work.blocks, dt)
 
 
 @kernel
 def _close(belt, state, work, dt):
     """That of the border."""
-    border_sums(belt, state.elements, work.shapes, work.iterate, work.blocks, work.sums)
+    border_sums(belt, state.elements, work.shapes, work.iterate, work.narrow, work.sums)
     close_border(belt, work.sums, work.border, dt)
+
+
+@kernel
+def _close_two_flows(belt, state, work, dt):
+    """The same with two flows."""
+    narrow_solutions(work.blocks, work.narrow)
+    _close(belt, state, work, dt)
 
 
 @register_jitable
@@ -277,5 +340,25 @@ def _accept(belt, state, work, inputs, dt):
         totals[THRUST_WORK] += (right - left) * drift - 2.0 * tangent * pressed * closing
 
 
-EQUATIONS = Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes)
-advance = partial(advance_by, EQUATIONS)
+@kernel
+def _accept_two_flows(belt, state, work, inputs, dt):
+    """The same with two flows."""
+    book_difference(state, work, dt)
+    accept_difference(belt, state, work, dt)
+    _accept(belt, state, work, inputs, dt)
+
+
+# By how many flows of ring material there are
+EQUATIONS = {
+    1: Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, CHANGE),
+    2: Equations(
+        _prepare_two_flows,
+        _evaluate_two_flows,
+        _assemble_two_flows,
+        _close_two_flows,
+        _accept_two_flows,
+        _changes,
+        CHANGE,
+    ),
+}
+advance = partial(advance_by, EQUATIONS[1])

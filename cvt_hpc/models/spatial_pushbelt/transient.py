@@ -15,10 +15,18 @@ from cvt_hpc.models.pushbelt.run import COURSES, ElementRun
 from cvt_hpc.models.pushbelt.start import of_lanes
 from cvt_hpc.models.pushbelt.stepping import advance_by
 from cvt_hpc.models.spatial_pushbelt import belt
-from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, workspace
+from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, NEWTON_OF_TWO_FLOWS, workspace
 from cvt_hpc.models.spatial_pushbelt.parameters import LOOSE_SIDES, package_arm
-from cvt_hpc.models.spatial_pushbelt.readings import ANGLES, LATERAL, PROFILES, SCALARS, Reading, angles
-from cvt_hpc.models.spatial_pushbelt.start import start
+from cvt_hpc.models.spatial_pushbelt.readings import (
+    ANGLES,
+    LATERAL,
+    OF_TWO_FLOWS,
+    PROFILES,
+    SCALARS,
+    Reading,
+    angles,
+)
+from cvt_hpc.models.spatial_pushbelt.start import start, with_two_flows
 from cvt_hpc.models.spatial_pushbelt.step import EQUATIONS
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, STRANDS
 
@@ -41,10 +49,15 @@ class Transient(ElementRun):
     _directions = (*STRANDS, *LATERAL)
 
     def _begin(self, p: Mapping[str, Any]) -> None:
-        self._advance = partial(called_alike(advance_by), EQUATIONS)
+        flows = p["ring_flows"]
+        self._advance = partial(called_alike(advance_by), EQUATIONS[flows])
         self._belt, self._state = start(given(p))
-        self._work = workspace(self._belt, p["elements"])
-        self._method = NEWTON._replace(
+        method = NEWTON
+        if flows == 2:
+            self._state, method = with_two_flows(self._belt, self._state), NEWTON_OF_TWO_FLOWS
+            self._profiles = (*PROFILES, *OF_TWO_FLOWS)
+        self._work = workspace(self._belt, p["elements"], flows)
+        self._method = method._replace(
             tolerance=p["speed_tolerance"],
             power_tolerance=p["power_tolerance"],
             most_iterations=p["most_iterations"],

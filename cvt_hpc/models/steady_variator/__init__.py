@@ -2,7 +2,7 @@
 
 It answers *what are the forces?*: ring tension and push force in each strand, contact forces and sliding over
 both wraps, thrust ratio and loss of speed, at a load at which the belt runs quietly. It is the elastic belt
-itself: same parameters, same right-hand side, none of its time. What it cannot answer: whether that state is
+itself: same parameters, same right-hand side, none of its time. It cannot answer whether that state is
 stable, and so whether the belt vibrates about it, or how far; the mean forces of a belt that vibrates.
 Importing this package is cheap.
 """

@@ -2,13 +2,13 @@
 
 Under a given load there may be one steady state, several or none. At the torque that friction carries the
 states turn back. Where neither strand pushes, the play passes from one strand to the driving wrap and on to
-the other strand while the load hardly changes, so that the load does not tell them apart. A brake that holds
+the other strand while the load hardly changes, so that the load does not separate them. A brake that holds
 the driven pulley's speed omega does: as omega falls slip grows, past the largest torque, and play moves; slip
 is measured like that. The driven pulley's balance of moments, sum of the flanks' moments = i M, then gives M,
 and leaves the equations as omega leaves the unknowns.
 
 M(omega) has small folds where single cells open. Steps that do not come through are shortened, and where that
-does not help the walk leaps ahead, onto the curve behind such a fold.
+does not help the continuation leaps ahead, onto the curve behind such a fold.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ OWN: Widths = (1.0, 1.0)
 
 
 class NoSteadyState(ValueError):
-    """None was found; the text says why.
+    """No steady state was found; the text states the reason.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Continuation:
         self.equations = Equations(parameters, self.whole)
 
     def load(self, load: float) -> None:
-        """Go on under a load [N m]."""
+        """Continue under a load [N m]."""
         self.equations.under(load=load, load_start=load)
 
     def own(self) -> None:
@@ -133,7 +133,7 @@ class Continuation:
         tolerance : float
             Of each solution.
         equations : Solvable, optional
-            Those that are changed; by default the belt's.
+            The changed parameters; by default the belt's.
 
         Raises
         ------

@@ -8,7 +8,7 @@ speeds and contents follow:
     v_i = Q_i (1 + eps_i),   n_i = (1 + kappa (w + d_i)) / (1 + eps_i).
 
 As many equations: the rates of u, v_0, v_1 and v_f and of the driven pulley, each by `flat.rates`, so that
-the transient belt is at rest in what is found here; and the content of each layer, which no rate knows.
+the transient belt is at rest in the state found here; and the content of each layer, which no rate knows.
 Pulleys that are free bring those of their states (`pulleys.STATES`) that anything moves, and their rates;
 where the driven pulley keeps its speed, that is the equation in the place of its balance of moments.
 
@@ -46,7 +46,7 @@ from cvt_hpc.models.steady_variator.linearised import Linearisation
 
 LATE = 1e9  # [s]: load and damping are those after any start-up
 TYPICAL_SPEED = 100.0  # [rad/s]: of the driving pulley, from which on the sizes of speeds are those below
-# what counts alike in each unknown: w, eps_0, eps_1, v_f; Q_0, Q_1, driven speed, position
+# sizes that count alike in each unknown: w, eps_0, eps_1, v_f; Q_0, Q_1, driven speed, position
 SIZES = (1e-4, 1e-3, 1e-4, 0.1)
 SIZES_OF_SCALARS = (0.1, 0.1, 1.0, 1e-4)
 SPEED = -2  # place of the driven speed among the unknowns
@@ -97,7 +97,7 @@ class Equations:
         self._out = np.empty(last)
 
     def under(self, **changes: Any) -> None:
-        """Go on with other constants of the belt, of the same mesh and sheaves: load, friction."""
+        """Continue with other constants of the belt, of the same mesh and sheaves: load, friction."""
         self.belt = self.belt._replace(**changes)
         self._flat = self._flat._replace(belt=self.belt)
 
@@ -118,7 +118,7 @@ class Equations:
         return self._flat.state.copy()
 
     def residual(self, x: np.ndarray) -> np.ndarray | None:
-        """What the equations leave, (n,); None where the contact has no solution.
+        """Residual of the equations, (n,); None where the contact has no solution.
 
         Rates are in [m/s^2], [rad/s^2] and [m/s], contents in [m].
         """

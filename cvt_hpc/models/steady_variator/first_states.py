@@ -35,7 +35,7 @@ NARROWING = 0.3  # first step of friction and dampers on their way back, of the 
 WIDE, RING_WIDE = 0.3, 10.0
 SLOWEST_MARCH = 50.0  # [rad/s]: a slower belt takes too long to settle, and a faster one like it is marched
 # Where the way begins if not at the load: shares of a load under which the belt slips through; loads beside
-# one under which it does not settle, in shares of what friction carries.
+# one under which it does not settle, in shares of the load that friction carries.
 LESS, BESIDE = 0.8 ** np.arange(1, 8), (0.1, -0.1, 0.2, -0.2)
 MOST_FORCE = 2.0  # of the thrust: axial forces on either pulley are below
 
@@ -178,7 +178,7 @@ class FirstStates:
 
 
 def least_sliding(belt: Belt, load: float) -> float:
-    """Sliding [m/s] that a load takes at the least, by the regularisation; 0 beyond what friction carries."""
+    """Sliding [m/s] that a load takes at the least, by the regularisation; 0 beyond the limit of friction."""
     coefficient, _ = friction_coefficient(belt.law, 0.0, 0.0)
     most = torque_limit(coefficient, MOST_FORCE * belt.thrust, belt.driving_radius, belt.half_wedge_angle)
     share = abs(load) / most

@@ -1,4 +1,4 @@
-"""What a steady state means: forces and speeds around the belt, and what follows for strands and pulleys.
+"""Results of a steady state: forces and speeds around the belt, and values for strands and pulleys.
 
 Powers and the contact's means are those that a transient of the belt records in this state.
 """

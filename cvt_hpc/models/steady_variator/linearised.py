@@ -39,7 +39,7 @@ from cvt_hpc.physics.sheaves import flexibility
 
 REACH = 2  # stations to either side that a rate knows of
 STRIDE = 2 * REACH + 1
-FORCE = MOMENT = len(FIELDS)  # beside the fields: among what acts, and among what is acted on
+FORCE = MOMENT = len(FIELDS)  # beside the fields: among the acting quantities, and among those acted on
 SIZE_OF_FORCE = 1e5  # [N/m]
 # Relative to the sizes, for central differences: the third derivative's part is 1e-12 of a slope, round-off
 # 1e-10 of the steepest slopes.
@@ -115,7 +115,7 @@ def _evaluate(flat: FlatBelt, out: np.ndarray) -> None:
 def pulley_slopes(flat: FlatBelt, pull: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """Slopes of `free_rates`, (10, 18): with `pulled_by`, driven speed, driven position, and STATES.
 
-    `sizes` (18,) are those of what acts, from which increments follow.
+    `sizes` (18,) are those of the acting quantities, from which increments follow.
     """
     scalars, found = flat.state.scalars, np.zeros((10, sizes.size))
     for k in range(sizes.size):
@@ -158,7 +158,7 @@ class Linearisation:
         o, i, j, d = np.indices((8, 8, n, STRIDE))
         self._loose = len(ROWS) * n + flat.remembering.size + np.arange(flat.loose.size)
         place[MOMENT] = self._count - 2
-        if flat.loose.size:  # what is taken from the driving pulley, and put into the driven one
+        if flat.loose.size:  # torque taken from the driving pulley, and put into the driven one
             place[MOMENT] = self._count + (np.arange(n) >= belt.driven_start)
         place[W] = -1
         rows, columns = place[o, (j + d - REACH) % n], unknown[i, j]
@@ -211,7 +211,7 @@ class Linearisation:
         values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
         there = values != 0.0
         local = csr_array((values[there], (rows[there], columns[there])), shape=(count + 2, width))
-        # what acts on the pulleys, by the unknowns and the forces
+        # actions on the pulleys, by the unknowns and the forces
         acting = np.zeros((18, width))
         acting[:2] = local[count:].toarray()
         first = count

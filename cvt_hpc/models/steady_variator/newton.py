@@ -23,7 +23,7 @@ class Solvable(Protocol):
     sizes: np.ndarray
 
     def residual(self, x: np.ndarray) -> np.ndarray | None:
-        """What the equations leave; None where they have no value."""
+        """Residual of the equations; None where they have no value."""
 
     def jacobian(self, x: np.ndarray) -> csc_array:
         """Slopes of the residual, about the unknowns of its last call."""
@@ -39,7 +39,7 @@ def newton(equations: Solvable, x: np.ndarray, tolerance: float, most: int = FUL
     x : (n,) array
         Where to begin; left as it is.
     tolerance : float
-        Root mean square of what a further step would be, over the unknowns' sizes.
+        Root mean square of the next step, over the unknowns' sizes.
     most : int
         Of steps.
 
@@ -64,7 +64,7 @@ def newton(equations: Solvable, x: np.ndarray, tolerance: float, most: int = FUL
             return None
         x = x + step
         residual = equations.residual(x)
-        # by the same factors, what the next step would be
+        # by the same factors, the next step
         if residual is not None and _size(equations, factors.solve(residual)) < tolerance:
             return x
     return None

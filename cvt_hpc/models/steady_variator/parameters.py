@@ -1,4 +1,4 @@
-"""What a job may set of the steady belt: the elastic belt's parameters, but for those of a run's course."""
+"""Parameters of the steady belt: the elastic belt's parameters, but for those of a run's course."""
 
 from __future__ import annotations
 

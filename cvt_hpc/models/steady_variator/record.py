@@ -1,4 +1,4 @@
-"""What the record of a steady state holds; names are those of the elastic belt's transient."""
+"""Variables in the record of a steady state; names are those of the elastic belt's transient."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Found(NamedTuple):
 
 
 def solve(parameters: Mapping[str, Any]) -> Found | ValueError:
-    """Steady state of the parameters of a run [SI] with what it means; or why none was found."""
+    """Steady state of the parameters of a run [SI] with its results; or the reason why none was found."""
     from cvt_hpc.models.elastic_belt.belt import mesh
     from cvt_hpc.models.steady_variator.forces import quantities
     from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt

@@ -1,8 +1,8 @@
 """Steady states of free pulleys, from that of the same belt between pulleys that are not.
 
-What holds the pulleys is let go little by little: the residual that the free equations have in the held state
-is taken down along a path (Newton's homotopy), r(x) = (1 - share) r(x_held). Only the pulleys' equations have
-one to begin with.
+The hold on the pulleys is released little by little: the residual that the free equations have in the held
+state is taken down along a path (Newton's homotopy), r(x) = (1 - share) r(x_held). Only the pulleys'
+equations have one to begin with.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from cvt_hpc.models.elastic_belt.pulleys import (
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
 from cvt_hpc.models.steady_variator.equations import Equations
 
-# What frees a pulley, and a value with which it does not
+# Keys that free a pulley, each with a value that does not
 HELD = {
     key: PULLEY_DEFAULTS[key]
     for key in (
@@ -107,7 +107,7 @@ class Released:
         self._start = equations.residual(x)
 
     def residual(self, x: np.ndarray) -> np.ndarray | None:
-        """What is left of the residual that the held state has."""
+        """Remaining share of the residual of the held state."""
         left = self._equations.residual(x)
         if left is None or self._start is None:
             return None

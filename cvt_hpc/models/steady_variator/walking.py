@@ -1,7 +1,7 @@
 """Steady states of a belt: a first one by the transient, further ones along the load or the driven speed.
 
 Corners of the push force are sharp: each state begins at the one before, and a step that fails is made again
-in quarters. Near what friction carries the load does not tell states apart, and the driven speed does.
+in quarters. Near the limit of friction the load does not separate states, and the driven speed does.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class SteadyBelt:
         load : float
             Torque at the driving pulley [N m].
         near : Steady, optional
-            A state of this belt where the walk begins; without it, or where that walk does not come through,
+            A state of this belt where the continuation begins; without it, or where that continuation fails,
             a first state is made.
 
         Raises
@@ -85,7 +85,7 @@ class SteadyBelt:
         SlipsThrough
             Where the belt slips through.
         NoSteadyState
-            Where no walk comes through.
+            Where no continuation succeeds.
         """
         if self._free is not None:
             return self._released(self._free, load, near)
@@ -146,8 +146,8 @@ class SteadyBelt:
     def braked(self, near: Steady, sign: float) -> Iterator[Steady]:
         """States from one on as the driven pulley is held at lower (sign -1) or higher (1) speeds.
 
-        As far as they are found; in the direction in which the load's size grows they go on past the largest
-        torque that friction carries.
+        As far as they are found; in the direction in which the load's size grows they continue past the
+        largest torque that friction carries.
         """
         return self._braked(self._own, near.unknowns, sign)
 
@@ -165,7 +165,7 @@ class SteadyBelt:
         Parameters
         ----------
         near : Steady
-            Where to begin; its load says in which direction power flows.
+            Where to begin; its load gives the direction in which power flows.
 
         Raises
         ------
@@ -200,7 +200,7 @@ class SteadyBelt:
         return self._state_of(self._equations, x, load)
 
     def _rise(self, x: np.ndarray, start: float, load: float) -> np.ndarray:
-        """Unknowns under more load; near what friction carries along the curve of states."""
+        """Unknowns under more load; near the limit of friction along the curve of states."""
         try:
             return self._walk(x, start, load)
         except PathEnds as ended:

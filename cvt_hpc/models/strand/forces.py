@@ -8,7 +8,7 @@ slides on an arc before it leaves, where friction changes G by the factor exp(mu
     G_1 (phi - slip) + |G_2 - G_1| / mu* = 2 tan(d) thrust,    slip = |ln(G_2 / G_1)| / mu*,
 
 1 the strand that comes in (t1), 2 the one that leaves (t2), and the driving torque r_dr (F_2 - F_1) = M. How
-F is shared between rings and elements is left open: the strand's frequencies do not ask.
+F is shared between rings and elements is left open: the strand's frequencies do not depend on it.
 
 Sheaves that bend let the belt slide radially, which adds force to both strands: against the elastic belt
 (`lebrecht_2004.toml`, no fall of friction to speak of) these forces are lower by 0.9-1.3 kN of 5-11 kN.

@@ -1,4 +1,4 @@
-"""What a job may set of the strands: quantities of the elastic belt, and how their forces are known."""
+"""Parameters of the strands: quantities of the elastic belt, and the source of their forces."""
 
 from __future__ import annotations
 

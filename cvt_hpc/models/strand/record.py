@@ -1,4 +1,4 @@
-"""What the record of a run holds of the strands: eigenfrequencies, critical speed, and their force."""
+"""Variables of the strands in the record of a run: eigenfrequencies, critical speed, and their force."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""How long a sweep will take, and what to ask a cluster for."""
+"""Forecast of the time of a sweep, and of the resources to request on a cluster."""

@@ -4,7 +4,7 @@ The logarithm of (time taken / predicted cost) is taken to scatter normally abou
 factor; batches with runs that are refined or prolonged widen the scatter. Each rank fits its own factor to
 its own batches: nodes differ, and nothing has to be sent. It starts from rank 0's fit to the batches on
 record, so that the first claim of a resumed sweep is informed; that fit counts as a few batches at most, and
-soon gives way to what the rank sees itself.
+soon gives way to the rank's own measurements.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from cvt_hpc.study.batches import Batch, Turns, batch_cost, one_turn
 
-# Until there are batches to tell, costs are taken to be right within a factor of two, at two standard
+# Until batches are measured, costs are taken to be right within a factor of two, at two standard
 # deviations; this counts as much as two batches.
 _PRIOR_SPREAD = math.log(2.0) / 2
 _PRIOR_WEIGHT = 2
@@ -26,7 +26,7 @@ _DEVIATIONS = 2.0  # standard deviations of the margin: one batch in forty takes
 
 
 class Fit(NamedTuple):
-    """What is known of the logarithm of the machine's factor.
+    """The logarithm of the machine's factor, as far as it is known.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Fit(NamedTuple):
         return math.sqrt((_PRIOR_WEIGHT * _PRIOR_SPREAD**2 + self.squares) / freedom)
 
     def draw(self, generator: np.random.Generator, count: int) -> np.ndarray:
-        """Return factors of `count` batches of one sweep, as likely as what is known makes them.
+        """Return factors of `count` batches of one sweep, drawn from the known distribution.
 
         All share the error of the mean, which without any batch is as large as their own scatter.
         """
@@ -88,7 +88,7 @@ class CostModel:
     costs : numpy.ndarray, shape (runs,)
         Predicted duration of each run of the study, in any unit.
     fit : Fit, optional
-        What is known beforehand.
+        The fit that is known beforehand.
     turns : callable
         How many times so many runs fill the lanes.
     """
@@ -98,7 +98,7 @@ class CostModel:
         self.fit = fit or Fit()
 
     def learn(self, batch: Batch, seconds: float) -> None:
-        """Take in how long [s] a batch has taken; a time that no clock tells is left out."""
+        """Add the time [s] of a batch; a time that no clock has measured is left out."""
         cost = self.cost(batch)
         if 0 < seconds < math.inf and cost > 0:
             self.fit = self.fit.with_ratio(seconds / cost)
@@ -127,7 +127,7 @@ def fit_recorded(
     timings : iterable of (batch, seconds)
         How long batches have taken [s].
     done : numpy.ndarray of bool, shape (runs,)
-        Which runs have results. A batch without any ended before its time, and tells nothing.
+        Runs with results. A batch without any ended before its time, and is left out.
     turns : callable
         How many times so many runs fill the lanes.
     """

@@ -1,4 +1,4 @@
-"""What a sweep needs of memory and disk, and which one is refused before it begins."""
+"""Memory and disk that a sweep needs, and the refusal of sweeps that need too much."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Disk(NamedTuple):
 
 
 class Needs(NamedTuple):
-    """What a sweep needs.
+    """Needs of a sweep.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Needs(NamedTuple):
     disk : Disk
         Space on the disk.
     profiles : int
-        Memory of a rank, and disk at most, for what a kept history has along the belt at each sample [byte].
+        Memory of a rank, and disk at most, for a kept history's values along the belt at each sample [byte].
     """
 
     memory: int
@@ -51,7 +51,7 @@ class Needs(NamedTuple):
 
 
 def needs(job: Job, simulator: Simulator) -> Needs:
-    """Return what a sweep of all runs of a job needs, without the marks of its batches."""
+    """Return the needs of a sweep of all runs of a job, without the marks of its batches."""
     variables, coordinates = record_layout(job, simulator)
     record = record_type(variables, coordinates).itemsize
     size = runs_along(job, [axis.name for axis in job.axes])
@@ -67,16 +67,16 @@ def most_of_results(values: int, named: int) -> int:
 
 
 def refuse_too_large(job: Job, simulator: Simulator, out: Path) -> Needs:
-    """Return what a sweep of all runs of a job needs.
+    """Return the needs of a sweep of all runs of a job.
 
     Parameters
     ----------
     job : Job
         A validated job.
     simulator : Simulator
-        What does the runs.
+        Does the runs.
     out : Path
-        The output folder; what it holds need not be written any more.
+        The output folder; its present content need not be written any more.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def _free(out: Path) -> int:
     """Return the space [byte] on the disk where a folder is, or will be made."""
     try:
         return shutil.disk_usage(next(p for p in (out, *out.absolute().parents) if p.is_dir())).free
-    except OSError:  # the start itself says so, in its own words
+    except OSError:  # the start itself names it, in its own words
         return 1 << 62
 
 

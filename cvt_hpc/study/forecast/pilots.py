@@ -1,4 +1,4 @@
-"""What is known of a job's times before its sweep: by records, by a few short batches, or by prediction."""
+"""Known times of a job before its sweep: by records, by a few short batches, or by prediction."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Knowledge(NamedTuple):
-    """What is known of the times of a job's batches.
+    """The times of a job's batches, as far as they are known.
 
     Attributes
     ----------
@@ -41,18 +41,18 @@ class Knowledge(NamedTuple):
 
 
 def find_out(job: Job, simulator: Simulator, groups: Sequence[Batch], out: Path, pilots: int) -> Knowledge:
-    """Return what is known of the times of a job's batches.
+    """Return the known times of a job's batches.
 
     Parameters
     ----------
     job : Job
         A validated job.
     simulator : Simulator
-        What does the runs, and predicts their cost in core-seconds.
+        Does the runs, and predicts their cost in core-seconds.
     groups : sequence of tuple of int
         All runs, in full batches.
     out : Path
-        The output folder, whose records tell where no pilots are asked for.
+        The output folder, whose records are used if no pilots are requested.
     pilots : int
         Number of batches to be done for this, shortened and without a trace in the folder.
     """

@@ -1,4 +1,4 @@
-"""What to ask a cluster for: time limit and space on the disk."""
+"""Resources to request on a cluster: time limit and space on the disk."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _STEP = 300.0  # [s] to which a time limit is rounded up
 
 
 class Expectation(NamedTuple):
-    """What a sweep will take, by what that is known, and the space for its results."""
+    """Time of a sweep, the source of this forecast, and the space for its results."""
 
     forecasts: list[Forecast]
     basis: str
@@ -32,14 +32,14 @@ class Expectation(NamedTuple):
 
 
 def expect(job: Job, out: Path, ranks: Sequence[int], pilots: int = 0) -> Expectation:
-    """Return what a sweep of all runs of a job will take on each of some numbers of ranks.
+    """Return the time and space of a sweep of all runs of a job on each of some numbers of ranks.
 
     Parameters
     ----------
     job : Job
         A validated job.
     out : Path
-        The output folder, whose records tell how long batches take where no pilots are asked for.
+        The output folder, whose records give the time of batches if no pilots are requested.
     ranks : sequence of int
         Numbers of processes that compute.
     pilots : int
@@ -57,7 +57,7 @@ def expect(job: Job, out: Path, ranks: Sequence[int], pilots: int = 0) -> Expect
 
 
 def suggested_time(forecast: Forecast, runs: int) -> float:
-    """Return the time limit [s] to ask Slurm for: what 39 sweeps in 40 need, start and end included.
+    """Return the time limit [s] to request from Slurm: enough for 39 sweeps in 40, start and end included.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """How long a sweep will take on any number of ranks: its schedule, simulated claim by claim.
 
-The batches are those of `share_out` for that number of ranks, in the order in which they are claimed. A claim
-travels to the counter, waits for those that came earlier, is served, and its batch begins. How long batches
-take is drawn anew in each repeat: the predicted cost times a factor, whose logarithm scatters as the fit
-says. Left out: that ranks of one node share its memory and its clock rate, and that files are written.
+The batches are the result of `share_out` for that number of ranks, in the order in which they are claimed. A
+claim travels to the counter, waits for earlier ones, is served, and its batch begins. The duration of batches
+is drawn anew in each repeat: the predicted cost times a factor, whose logarithm scatters as in the fit. Left
+out: ranks of one node share its memory and its clock rate, and files are written.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ CURVE = tuple(np.unique(np.logspace(0, 4, 25).round().astype(int)).tolist())  # 
 
 
 class ClaimTimes(NamedTuple):
-    """What a claim takes.
+    """Duration of a claim.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ NETWORK = ClaimTimes(2e-6, 65e-6, math.log(11e-3 / 65e-6) / 3.7)
 
 
 class Forecast(NamedTuple):
-    """What a sweep is expected to take.
+    """Expected time of a sweep.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ def forecast(
     seed: int = 0,
     turns: Turns = one_turn,
 ) -> Forecast:
-    """Return what a sweep is expected to take, by repeated simulation.
+    """Return the expected time of a sweep, by repeated simulation.
 
     Parameters
     ----------
@@ -104,14 +104,14 @@ def forecast(
     ranks : int
         Number of processes that compute.
     claims : ClaimTimes
-        What a claim takes.
+        Time that a claim takes.
     seed : int
         Of the random numbers.
     turns : callable
         How many times so many runs fill the lanes.
     """
     planned = np.array([batch_cost(batch, costs, turns) for batch in share_out(groups, costs, ranks, turns)])
-    # What it costs that lanes stay empty, so that no rank does.
+    # Cost of empty lanes, which keep all ranks at work.
     use_of_lanes = sum(batch_cost(batch, costs, turns) for batch in groups) / planned.sum()
     generator = np.random.default_rng(seed)
     repeats = min(max(_EVENTS // (ranks + planned.size), _FEWEST_REPEATS), _MOST_REPEATS)
@@ -138,7 +138,7 @@ def simulate_schedule(
     ranks : int
         Number of processes that compute.
     claims : ClaimTimes
-        What a claim takes.
+        Time that a claim takes.
     generator : numpy.random.Generator
         Of the latencies.
     """

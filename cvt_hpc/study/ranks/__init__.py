@@ -1,1 +1,1 @@
-"""The ranks of a sweep: how they started, who does which runs, and when they end."""
+"""The ranks of a sweep: their start, the distribution of runs, and their end."""

@@ -1,4 +1,4 @@
-"""What ranks share while they compute: who claims which batch next, and how many runs are finished."""
+"""Data that ranks share while they compute: the next batch to claim, and the number of finished runs."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ class Counter(Protocol):
         """Let claims begin at 0 again, unless all are interrupted; by one rank, while none claims."""
 
     def report(self, finished: int, failed: int) -> None:
-        """Count runs that are finished, and those of them that failed."""
+        """Count finished runs, and the failed ones among them."""
 
     def tally(self) -> Tally:
-        """Return what all ranks have reported."""
+        """Return the reports of all ranks."""
 
     def interrupt_all(self) -> None:
-        """Let no rank claim another batch, and all break off the one that they are at."""
+        """Let no rank claim another batch, and let all stop their present one."""
 
     def is_interrupted(self) -> bool:
         """Return whether some rank has interrupted all."""
@@ -58,12 +58,12 @@ class SerialCounter:
         self._next = 0 if self._next < INTERRUPTED else INTERRUPTED
 
     def report(self, finished: int, failed: int) -> None:
-        """Count runs that are finished, and those of them that failed."""
+        """Count finished runs, and the failed ones among them."""
         self._finished += finished
         self._failed += failed
 
     def tally(self) -> Tally:
-        """Return what was reported."""
+        """Return the reports."""
         return Tally(self._finished, self._failed)
 
     def interrupt_all(self) -> None:

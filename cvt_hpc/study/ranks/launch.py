@@ -1,6 +1,6 @@
-"""Who started this process, and with how many others: a serial run never touches MPI.
+"""How this process was started, and with how many others: a serial run never touches MPI.
 
-MPI is imported only where a launcher's environment says that there are other ranks. A launcher that does
+MPI is imported only where a launcher's environment shows that there are other ranks. A launcher that does
 not fit the MPI library starts ranks that cannot see each other, each of which would run the whole sweep: the
 sizes are compared and such a start is refused.
 """
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 Result = TypeVar("Result")
 
-# Size and rank as launchers tell them, the nearest to the process first: an mpirun within a Slurm allocation
-# inherits the numbers of the allocation, which are not those of its own ranks.
+# Size and rank as launchers give them, the nearest to the process first: an mpirun within a Slurm allocation
+# inherits the numbers of the allocation, which are not the numbers of its own ranks.
 _LAUNCHERS = (
     ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"),
     ("PMI_SIZE", "PMI_RANK"),
@@ -42,7 +42,7 @@ _REMEDY = (
 
 @dataclass(frozen=True)
 class Launch:
-    """What the environment says about the start of this process.
+    """The start of this process according to the environment.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Launch:
     rank : int
         Number of this process among them.
     variable : str
-        The environment variable that says so; "" if there is none.
+        The environment variable that shows it; "" if there is none.
     """
 
     size: int = 1
@@ -72,7 +72,7 @@ _rank_of_survivor: int | None = None
 
 
 def process_rank() -> int:
-    """Return the number of this process among those that are left; only 0 should talk to the user."""
+    """Return the number of this process among the remaining ones; only 0 should print for the user."""
     return detect_launch().rank if _rank_of_survivor is None else _rank_of_survivor
 
 
@@ -108,7 +108,7 @@ def noticing_deaths() -> Iterator[None]:
 
 
 def is_tolerated(environment: Mapping[str, str] = os.environ) -> bool:
-    """Return whether the launcher was asked to leave the other ranks alive when one dies."""
+    """Return whether the launcher was told to leave the other ranks alive when one dies."""
     return environment.get("OMPI_MCA_mpi_ft_enable", "").lower() in ("1", "true", "yes")
 
 
@@ -127,7 +127,7 @@ class Team:
         self.size = communicator.size if communicator else 1
 
     def on_root(self, work: Callable[[], Result]) -> Result:
-        """Return on all ranks what `work` returns on rank 0, or raise its `InputError` on all."""
+        """Return on all ranks the result of `work` on rank 0, or raise its `InputError` on all."""
         if self.communicator is None:
             return work()
         result, error = None, None
@@ -155,16 +155,16 @@ class Team:
             return
         with noticing_deaths():
             request = self.communicator.Ibarrier()
-            while not request.Test():  # asks now and then: a blocking wait would keep a core busy
+            while not request.Test():  # polls now and then: a blocking wait would keep a core busy
                 meanwhile()
                 time.sleep(0.01)
 
     def revoke(self) -> None:
-        """Let all that the ranks of this team do together fail, because one of them is dead."""
+        """Let all joint operations of this team's ranks fail, because one of them is dead."""
         self.communicator.Revoke()
 
     def agree(self, fine: bool) -> bool:
-        """Return whether all ranks are alive and say that all is fine; the same on all that are alive."""
+        """Return whether all ranks are alive and report success; the same on all that are alive."""
         try:
             with noticing_deaths():
                 return bool(self.communicator.Agree(int(fine)))
@@ -172,7 +172,7 @@ class Team:
             return False
 
     def survivors(self) -> Team:
-        """Return the team of those that are alive; this one is of no more use."""
+        """Return the team of the ranks that are alive; this team is of no more use."""
         global _rank_of_survivor
         team = Team(self.communicator.Shrink())
         _rank_of_survivor = team.rank
@@ -192,7 +192,7 @@ def assembled_team(crash_log: Path) -> Iterator[Team]:
     Parameters
     ----------
     crash_log : Path
-        A file to which such an error is appended, since launchers may lose what a dying rank prints.
+        A file to which such an error is appended, since launchers may lose the output of a dying rank.
 
     Raises
     ------
@@ -208,7 +208,7 @@ def assembled_team(crash_log: Path) -> Iterator[Team]:
         yield Team()
         return
     _abort_on_uncaught(world, crash_log)
-    team = Team(world.Dup())  # our messages never mix with those of an application
+    team = Team(world.Dup())  # our messages never mix with messages of an application
     try:
         yield team
     except InputError:  # raised by all ranks alike, so all get here
@@ -257,6 +257,6 @@ def _abort(world: MPI.Intracomm, text: str, crash_log: Path) -> None:
             append_text(crash_log, f"{time.strftime('%Y-%m-%dT%H:%M:%S%z')} {message}")
         sys.stdout.flush()
         print(message, end="", file=sys.stderr, flush=True)
-        time.sleep(0.5)  # mpirun, once told to abort, drops output that it has not yet passed on
+        time.sleep(0.5)  # mpirun, after an abort, drops output that it has not yet passed on
     finally:  # whatever became of the message: without this the other ranks wait for ever
         world.Abort(CRASHED)

@@ -25,7 +25,7 @@ class Progress:
     Parameters
     ----------
     counter : Counter
-        What the ranks report to.
+        The counter to which the ranks report.
     total : int
         Number of runs of the study.
     recorded, failed : int
@@ -35,7 +35,7 @@ class Progress:
     costs : numpy.ndarray
         Predicted durations of the runs to be done, in any unit and in the order in which they are started.
     unit : str
-        What is counted.
+        Name of the things that are counted.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Progress:
         self._work = np.cumsum(costs)
         self._unit = unit
         self._bar = None
-        self._lines_above = ExitStack()  # where what is logged goes while the bar is there
+        self._lines_above = ExitStack()  # where log messages go while the bar is shown
         if visible and sys.stderr.isatty():
             from tqdm import tqdm
             from tqdm.contrib.logging import logging_redirect_tqdm
@@ -67,7 +67,7 @@ class Progress:
             self._lines_above.enter_context(logging_redirect_tqdm())
 
     def expect(self, costs: np.ndarray) -> None:
-        """Add runs to those that are to be done, after all of these; `costs` as before."""
+        """Add runs behind the runs that are to be done; `costs` as before."""
         self._total += costs.size
         self._work = np.append(self._work, self._work[-1] + np.cumsum(costs))
 
@@ -83,7 +83,7 @@ class Progress:
             self._show(elapsed)
 
     def tell(self, line: str, tell: Callable[[str], None]) -> None:
-        """Tell a line, above the bar where there is one."""
+        """Print a line, above the bar where there is one."""
         if self._bar is None:
             tell(line)
             return
@@ -91,7 +91,7 @@ class Progress:
             tell(line)
 
     def to_go(self) -> str:
-        """Return how long what is left will take, as ", 0:01:00 to go"; "" before anything has ended."""
+        """Return the time for the remaining runs, as ", 0:01:00 to go"; "" before anything has ended."""
         done, elapsed = self._counter.tally().finished, time.monotonic() - self._started
         if not done or elapsed <= 0.0:
             return ""
@@ -125,19 +125,19 @@ class Progress:
 
 
 class Steps:
-    """Tells of things done one after the other by one process: a line for each, and how long the rest takes.
+    """Reports things done one after the other by one process: a line for each, and the remaining time.
 
     On a terminal the lines stand above a bar.
 
     Parameters
     ----------
     costs : sequence of float
-        Predicted durations of what is left to do, in any unit and in the order in which it is done; those
-        that are not known (nan) count as the mean of the others.
+        Predicted durations of the things left to do, in any unit and in the order in which they are done;
+        those that are not known (nan) count as the mean of the others.
     done : int
         Number of things that were done before.
     unit : str
-        What is counted.
+        Name of the things that are counted.
     tell : callable
         Given each line.
     """
@@ -152,7 +152,7 @@ class Steps:
         self._progress = Progress(self._counter, self._total, done, 0, visible, filled, unit)
 
     def ended(self, line: str, *, failed: bool = False) -> None:
-        """Tell that the next thing has ended, and how."""
+        """Report that the next thing has ended, and how."""
         self._counter.report(1, int(failed))
         tally: Tally = self._counter.tally()
         count = f"{self._before + tally.finished}/{self._total}"

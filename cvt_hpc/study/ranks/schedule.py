@@ -1,4 +1,4 @@
-"""Who does which runs: all ranks compute, and each claims its next batch from one counter."""
+"""Distribution of runs: all ranks compute, and each claims its next batch from one counter."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ def claimed_batches(
     may_claim: Callable[[], bool],
     fits: Callable[[Batch], bool],
 ) -> Iterator[Assignment]:
-    """Yield what this rank is to do, one batch at a time.
+    """Yield the work of this rank, one batch at a time.
 
     Parameters
     ----------
     plan : sequence of Assignment
-        All that is to be done, in the order in which to start; the same on all ranks.
+        All batches to be done, in the order in which they start; the same on all ranks.
     counter : Counter
         Where positions in `plan` are claimed.
     may_claim : callable
-        Asked before each batch; when it answers False, there are no more.
+        Called before each batch; if it returns False, there are no more.
     fits : callable
-        Whether there is time for a batch. One that does not fit is passed over, and nobody does it in this
-        session; shorter ones stand later in the plan.
+        Whether there is time for a batch. A batch that does not fit is passed over, and no rank does it in
+        this session; shorter ones stand later in the plan.
     """
     while may_claim():
         position = counter.claim()

@@ -66,17 +66,17 @@ class SharedCounter:
             self._fetch(self._NEXT, -found, MPI.SUM)  # an interrupt that comes between is not lost
 
     def report(self, finished: int, failed: int) -> None:
-        """Count runs that are finished, and those of them that failed."""
+        """Count finished runs, and the failed ones among them."""
         self._fetch(self._FINISHED, finished, MPI.SUM)
         if failed:
             self._fetch(self._FAILED, failed, MPI.SUM)
 
     def tally(self) -> Tally:
-        """Return what all ranks have reported."""
+        """Return the reports of all ranks."""
         return Tally(self._fetch(self._FINISHED, 0, MPI.NO_OP), self._fetch(self._FAILED, 0, MPI.NO_OP))
 
     def interrupt_all(self) -> None:
-        """Let no rank claim another batch, and all break off the one that they are at."""
+        """Let no rank claim another batch, and let all stop their present one."""
         # By the same operation as a claim: MPI promises nothing for two kinds that meet at one place.
         self._fetch(self._NEXT, INTERRUPTED, MPI.SUM)
 
@@ -101,7 +101,7 @@ class SharedCounter:
             self._progress.stop()
 
     def _fetch(self, place: int, addend: int, operation: MPI.Op) -> int:
-        """Apply an operation to a place in the window, and return what was there before."""
+        """Apply an operation to a place in the window, and return the value before."""
         self._addend[0] = addend
         with noticing_deaths():
             self._window.Fetch_and_op(self._addend, self._fetched, 0, place, operation)

@@ -1,4 +1,4 @@
-"""When a sweep is to end early: a signal, the time limit, or another rank that was told to stop."""
+"""Early end of a sweep: by a signal, the time limit, or another rank that stops."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from cvt_hpc.study.ranks.launch import RankDied
 from cvt_hpc.study.ranks.progress import show_duration
 from cvt_hpc.study.ranks.time_limit import TimeLimit
 
-# What a person at the terminal, Slurm at the end of a job, and Slurm as a warning before that send.
+# Signals sent by a person at the terminal, by Slurm at the end of a job, and by Slurm as a warning before.
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
-_LOOK_INTERVAL = 0.5  # [s] between looks at what the other ranks say
+_LOOK_INTERVAL = 0.5  # [s] between checks of the other ranks
 _IMPATIENCE = 1.0  # [s]; a Ctrl-C later than this after the first one ends the process at once
 
 ELSEWHERE = "stopped by another rank"
@@ -55,16 +55,16 @@ class SignalWatch:
 
 
 class Stop:
-    """Whether this rank goes on.
+    """Whether this rank continues.
 
     Parameters
     ----------
     counter : Counter
-        Through which ranks tell each other.
+        The counter through which ranks communicate.
     signals : SignalWatch
-        What this process was sent.
+        The signals that this process was sent.
     limit : TimeLimit
-        How much time there is from here on. No batch is begun that is not expected to end in it, and those at
+        Time from here on. No batch begins that is not expected to end in it, and batches at
         work when it is over are broken off.
     meanwhile : callable
         Called about twice a second while a run computes: shows the progress.
@@ -86,7 +86,7 @@ class Stop:
 
     @property
     def reason(self) -> str | None:
-        """Why this rank starts no more runs, or not all; None if it goes on."""
+        """Why this rank starts no more runs, or not all; None if it continues."""
         if self._signals.noted:
             return self._signals.noted
         if self._heard:
@@ -118,7 +118,7 @@ class Stop:
         return not late
 
     def interrupt(self) -> str | None:
-        """Return why the run that computes now should be broken off, None if it should go on."""
+        """Return why the present run should be stopped, None if it should continue."""
         self.look()
         over = time.monotonic() >= self._deadline
         if over:
@@ -126,7 +126,7 @@ class Stop:
         return self.reason if self._signals.noted or self._heard or over else None
 
     def look(self) -> None:
-        """Look now and then at what the other ranks say, and tell them if this one is to stop."""
+        """Check the other ranks now and then, and tell them if this one is to stop."""
         now = time.monotonic()
         try:
             if now - self._looked > _LOOK_INTERVAL:
@@ -135,7 +135,7 @@ class Stop:
                 self._heard = self._counter.is_interrupted()
             if self._signals.noted:
                 self.tell_all()
-        except RankDied as death:  # no reason to break off the run that asks
+        except RankDied as death:  # no reason to stop the present run
             self._death = death
 
     def tell_all(self) -> None:

@@ -1,6 +1,6 @@
 """Going on without ranks that have died, where MPI tolerates it (ULFM; Open MPI: `mpirun --with-ft ulfm`).
 
-Elsewhere the launcher ends all ranks when one dies, and the same command goes on later.
+Elsewhere the launcher ends all ranks when one dies, and the same command continues later.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ _logger = logging.getLogger(__name__)
 
 
 def outlive(team: Team, work: Callable[[Team], Result]) -> Result:
-    """Return what `work` returns; when a rank dies during it, it is done again by those that are left.
+    """Return the result of `work`; when a rank dies during it, the remaining ranks do it again.
 
     Parameters
     ----------
     team : Team
         All ranks.
     work : callable
-        What they do together. The shared counter dies with the rank that holds it, and what the dead had
-        claimed is nowhere but in their logs: so `work` has to begin with what is on record.
+        Their joint work. The shared counter dies with the rank that holds it, and the claims of the dead rank
+        are nowhere but in their logs: so `work` has to begin with the records.
     """
     if team.communicator is None or not is_tolerated():
         return work(team)

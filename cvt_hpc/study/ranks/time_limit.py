@@ -1,4 +1,4 @@
-"""How much time a sweep has: what was asked for, or the rest of the Slurm job that it runs in."""
+"""The time of a sweep: as requested, or the rest of the Slurm job that it runs in."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _logger = logging.getLogger(__name__)
 
 
 class TimeLimit(NamedTuple):
-    """Time [s] that is left to compute in, and what to call its end."""
+    """Time [s] that is left to compute in, and the name of its end."""
 
     seconds: float = math.inf
     name: str = "time limit"
@@ -67,7 +67,7 @@ class _TimeUp(BaseException):
 
 @contextmanager
 def planning_within(seconds: float, runs: int) -> Iterator[None]:
-    """End what a `with` does when its time is up: a plan of very many runs can take longer than their limit.
+    """End a `with` block when its time is up: a plan of very many runs can take longer than their limit.
 
     Parameters
     ----------

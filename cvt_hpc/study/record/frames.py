@@ -39,7 +39,7 @@ MOST_ATTEMPTS = 1_000_000
 LATEST = 1e11  # [s] since 1970: no frame is of the year 5138
 PREAMBLE_LIMIT = 1 << 20  # [bytes]; none is longer
 WINDOW = 1 << 22  # [bytes] of a log that are read at a time
-# What looking for frames in damage may cost [bytes]: some seconds. By chance a marker comes once in 1 GB, but
+# Limit of the search for frames in damage [bytes]: some seconds. By chance a marker comes once in 1 GB, but
 # a file can be made of nothing else.
 _TOLERATED = 1 << 31
 _CANDIDATE = 1 << 13  # [bytes] that could be read in the time that a marker takes which begins no frame
@@ -53,7 +53,7 @@ class ForeignLog(Exception):
 
 
 class Frame(NamedTuple):
-    """A valid frame: what it is, its size [bytes], when it was written, of which runs, and a run's record."""
+    """A valid frame: its kind, size [bytes], time of writing, runs, and a run's record."""
 
     kind: bytes
     size: int
@@ -144,7 +144,7 @@ class RecordFormat:
                     place = _next_data(file, place, size)
                     cost += wanted - WINDOW
                 data, base = os.pread(file.fileno(), wanted, place), place
-                if len(data) < wanted:  # the end; what comes after `size` by now is not looked for
+                if len(data) < wanted:  # the end; bytes beyond `size` are not searched
                     size = min(size, base + len(data))
             else:
                 damaged = place if damaged is None else damaged
@@ -167,7 +167,7 @@ class RecordFormat:
         return zlib.crc32(payload, zlib.crc32(_CHECKED.pack(kind, len(payload), written), self._seed))
 
     def _span(self, data: bytes, start: int) -> int:
-        """Return how many bytes it takes to tell whether a frame starts at `start`."""
+        """Return the number of bytes needed to decide whether a frame starts at `start`."""
         if start + HEAD.size > len(data):
             return HEAD.size
         kind, length, *_ = HEAD.unpack_from(data, start)
@@ -186,7 +186,7 @@ def read_preamble(data: bytes, layout: RecordFormat) -> tuple[dict[str, Any] | N
     Raises
     ------
     ForeignLog
-        If a sound header says that the file is not of this study.
+        If a sound header shows that the file is not of this study.
     """
     if not data.startswith(MAGIC):
         return None, 0

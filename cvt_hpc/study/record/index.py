@@ -33,23 +33,23 @@ class Timing(NamedTuple):
 
 @dataclass
 class Records:
-    """What the logs of a study hold; the records themselves stay there, some 60 bytes a run are in memory.
+    """Content of the logs of a study; the records themselves stay there, some 60 bytes a run are in memory.
 
     Attributes
     ----------
     study : Study
         The study that the records belong to.
     logs : sequence of Path
-        The files in which records were looked for.
+        The files in which records were searched.
     entries : numpy.ndarray of ENTRY, shape (runs,)
         The record that counts of each run; `log` is -1, `written` NaN where a run has none.
     attempts : numpy.ndarray of int, shape (runs,)
-        The attempt that counts, from 1: how often the run was asked for.
+        The attempt that counts, from 1: how often the run was requested.
     died, died_alone : numpy.ndarray of int, shape (runs,)
         How often, in that attempt, a process was at work at the run when it died: in all, and while it did
         that run alone because of earlier deaths. Runs that a living process is at count as well.
     refinements : numpy.ndarray of float, shape (runs,)
-        The factor by which the attempt that counts shortens the time step that is else asked of a run; 1 for
+        The factor by which the attempt that counts shortens the time step that the run takes else; 1 for
         most.
     timings : list of Timing
         Of the batches that were done as a whole, the first of each log excepted: it has loaded kernels.
@@ -77,7 +77,7 @@ class Records:
 
     @property
     def recorded(self) -> np.ndarray:
-        """Whether a run has a record, shape (runs,): it is not repeated unless asked for."""
+        """Whether a run has a record, shape (runs,): it is not repeated unless requested."""
         return ~np.isnan(self.written)
 
     @property
@@ -102,13 +102,13 @@ class Records:
         Raises
         ------
         StorageError
-            If a log cannot be read, or is no longer what it was.
+            If a log cannot be read, or has changed.
         """
         return read_rows(self.study, self.logs, self.entries[runs], name)
 
 
 def read_rows(study: Study, logs: Sequence[Path], entries: np.ndarray, name: str | None = None) -> np.ndarray:
-    """Return what lies at some places in the logs; see `Records.read`."""
+    """Return the content of some places in the logs; see `Records.read`."""
     dtype, offset = study.record_dtype.fields[name][:2] if name else (study.record_dtype, 0)  # type: ignore[index]  # it has fields
     blank = study.blank_rows()
     rows = np.empty(np.shape(entries), dtype)
@@ -134,7 +134,7 @@ def choose(study: Study, logs: Sequence[Path], found: np.ndarray, marked: np.nda
     """Return of several records of one run that of the latest attempt, and of these the earliest written.
 
     By content, not by the order in which a folder happens to be listed; equal times, as in a copied file, are
-    told apart by file name and place.
+    separated by file name and place.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def choose(study: Study, logs: Sequence[Path], found: np.ndarray, marked: np.nda
 
 
 def _contradictions(records: Records, later: np.ndarray) -> list[str]:
-    """Return a line for each later record that has other numbers than the one that counts."""
+    """Return a line for each later record with other numbers than the valid one."""
     lines = []
     block = block_length(records.study)
     for first in range(0, later.size, block):

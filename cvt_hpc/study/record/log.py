@@ -1,7 +1,7 @@
 """The durable record: one log per rank and session, one unbuffered write per batch of runs.
 
-Before a batch begins a mark is written. A process that dies leaves it without records after it, which tells
-at what runs it died; one that ends in any orderly way takes it back.
+Before a batch begins a mark is written. A process that dies leaves it without records after it, which shows
+the runs at which it died; a process that ends in an orderly way removes it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Record = tuple[int, np.ndarray]  # run index, and the record of that run, shape 
 
 
 class RecordLog:
-    """A rank's log of one session; the file comes into being with what is first written.
+    """A rank's log of one session; the file is created by the first write.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class RecordLog:
     layout : RecordFormat
         How records are framed.
     session : dict
-        What is to be known of this start of the sweep, see `provenance.new_session`.
+        Description of this start of the sweep, see `provenance.new_session`.
     rank : int
         Of this process.
     attempts : mapping, optional
@@ -70,7 +70,7 @@ class RecordLog:
         batch : sequence of int
             Run indices.
         alone : bool
-            Whether it is one that is done alone because its process has died before.
+            Whether the run is done alone because its process has died before.
 
         Raises
         ------
@@ -124,7 +124,7 @@ class RecordLog:
         return [(int(index), self._attempts.get(int(index), 1)) for index in indices]
 
     def _now(self) -> float:
-        """Return the time [s] since 1970 as of the beginning of the log, and what has passed since then."""
+        """Return the time [s] since 1970 at the beginning of the log, plus the time elapsed since then."""
         return self._clock_lead + time.monotonic()
 
     def _append(self, data: bytes) -> int:

@@ -68,7 +68,7 @@ def read_records(folder: Path, study: Study) -> Records:
 
 
 def _files(folder: Path) -> list[Path]:
-    """Return what may be logs; hidden files are the system's, or those of a start that tries to write."""
+    """Return files that may be logs; hidden files are the system's, or probes of a start."""
     with naming_refusals(folder, "a folder that can be read"):
         entries = sorted(folder.iterdir()) if folder.is_dir() else []
     return [path for path in entries if not path.name.startswith(".")]
@@ -90,7 +90,7 @@ class _Reader:
         self._sessions: dict[str, dict[str, Any]] = {}
 
     def read(self, number: int, file: FileIO) -> None:
-        """Take in a log; what is damaged goes to the warnings.
+        """Read a log; damaged parts go to the warnings.
 
         Raises
         ------
@@ -119,7 +119,7 @@ class _Reader:
         self._refinements |= trace.refinements
 
     def result(self, logs: list[Path]) -> Records:
-        """Return what all logs hold."""
+        """Return the content of all logs."""
         records = choose(self._study, logs, np.concatenate(self._found), self._attempts)
         for death in self._deaths:
             if death.attempt == records.attempts[death.run] and not records.recorded[death.run]:
@@ -145,7 +145,7 @@ class _Reader:
                 flaws.append(f"bytes {begin} to {end} are damaged")
 
     def _is_sound(self, frame: Frame) -> bool:
-        """Whether a frame, though its checksum is right, says what a sweep may have written."""
+        """Whether a frame with a right checksum holds content that a sweep may have written."""
         places = all(
             0 <= run < self._study.size and 0 < attempt <= MOST_ATTEMPTS for run, attempt in frame.places
         )
@@ -155,7 +155,7 @@ class _Reader:
     def _entries(
         self, frames: Iterable[tuple[int, Frame]], number: int, trace: _Trace
     ) -> Iterator[tuple[int, int, float, int, int, int]]:
-        """Yield the records of a log as an ENTRY has them, and follow what its process was at."""
+        """Yield the records of a log as an ENTRY has them, and follow the runs of its process."""
         for begin, frame in frames:
             trace.follow(frame)
             if frame.kind == RECORD:
@@ -168,7 +168,7 @@ class _Reader:
 
 
 class _Trace:
-    """Follows from mark to mark what a process was at.
+    """Follows from mark to mark the runs that a process was doing.
 
     Parameters
     ----------
