@@ -9,11 +9,8 @@ ROOT = Path(__file__).parents[2]
 GUIDE = [ROOT / "README.md", *sorted((ROOT / "docs" / "guide").glob("*.md"))]
 BESIDE_CODE = sorted((ROOT / "cvt_hpc").rglob("*.md"))
 PAGES = [*GUIDE, *BESIDE_CODE]
-IN_PLAIN_WORDS = [
-    *GUIDE,
-    ROOT / "docs" / "CHANGELOG.md",
-    ROOT / "docs" / "coverage.md",
-]  # held to length and words
+# Held to length of lines and words.
+IN_PLAIN_WORDS = [*PAGES, ROOT / "docs" / "CHANGELOG.md", ROOT / "docs" / "coverage.md"]
 _FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
