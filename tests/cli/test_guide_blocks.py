@@ -196,8 +196,8 @@ def _smaller(words, page):
             kept = axis.values
         elif "runs" in job.design:
             kept = [first, last]
-        elif axis is job.axes[-1] and last not in kept:
-            kept.append(last)
+        elif axis is job.axes[-1] and last not in kept and "elements" not in job.parameters:
+            kept.append(last)  # belts of elements are dear: one run each
         changed[axis.name] = list(kept)
     if "runs" in job.design:
         changed["design.runs"] = 2
