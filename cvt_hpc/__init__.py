@@ -1,7 +1,7 @@
 """Vibration-occurrence maps of metal pushbelt CVTs: thousands of transient runs under MPI.
 
-`build_job`, `load_job`, `simulate`, `run`, `open_results`, `read_table`, `map_figure` and `history_figure`;
-what they need is imported at their first use. Datasets of results have `dataset.cvt` (`accessor.py`).
+`build_job`, `load_job`, `simulate`, `run`, `open_results`, `read_table`, `map_figure`, `maps_figure` and
+`history_figure`; what they need is imported at their first use. Datasets have `dataset.cvt` (`accessor.py`).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ __all__ = [
     "history_figure",
     "load_job",
     "map_figure",
+    "maps_figure",
     "open_results",
     "read_table",
     "run",
@@ -26,6 +27,7 @@ _EXPORTS = {
     "history_figure": "cvt_hpc.analysis.histories",
     "load_job": "cvt_hpc.job",
     "map_figure": "cvt_hpc.analysis.maps",
+    "maps_figure": "cvt_hpc.analysis.studies",
     "open_results": "cvt_hpc.accessor",
     "read_table": "cvt_hpc.accessor",
     "run": "cvt_hpc.study",

@@ -12,8 +12,8 @@ program, whoever opened it:
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
+from inspect import Parameter, Signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,22 +22,20 @@ import xarray as xr
 
 from cvt_hpc.analysis.arrangement import Sides
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, check_results, map_classes
+from cvt_hpc.analysis.composing import compose
+from cvt_hpc.analysis.conversion import in_si, in_units
+from cvt_hpc.analysis.result_tables import read_table
 from cvt_hpc.errors import mismatch, unknown
-from cvt_hpc.files import naming_refusals, read_regular
-from cvt_hpc.job.units import to_si
-from cvt_hpc.models import MODELS
-from cvt_hpc.models.contract import load_model
+from cvt_hpc.picture_kinds import HISTORIES, HISTORY, KINDS, RESULTS, Kind
 from cvt_hpc.study import open_results
-from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.onsets import levels, onsets
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Results", "open_results", "read_table"]
+    from cvt_hpc.analysis.animation import Animation
 
-_LARGEST_TABLE = 16 << 20  # [byte]
-_LABELS = {"strand": ("t1", "t2"), "pulley": ("driving", "driven")}
+__all__ = ["Results", "open_results", "read_table"]
 
 
 @xr.register_dataset_accessor("cvt")
@@ -65,6 +63,7 @@ class Results:
         y: str | None = None,
         panel: str | None = None,
         vmax: float | None = None,
+        beside: xr.Dataset | Sequence[xr.Dataset] = (),
         **at: Any,
     ) -> Figure:
         """Draw where vibration occurs, or quantities over two axes.
@@ -77,70 +76,46 @@ class Results:
             Axes that run along x, along y and over the panels.
         vmax : float
             Where the colours end [SI unit of what is shown].
+        beside : Dataset or sequence of Dataset
+            Further studies over the same axes: a panel for each, on one scale of colours.
         **at
             Axes to fix.
         """
-        from cvt_hpc.analysis.maps import map_figure
-        from cvt_hpc.analysis.value_maps import value_map_figure
+        from cvt_hpc.analysis.studies import maps_figure
 
-        sides, quantities = Sides(x, y, panel), [show] if isinstance(show, str) else list(show)
-        if quantities:
-            return value_map_figure(self._dataset, quantities, at, sides=sides, vmax=vmax)
-        return map_figure(self._dataset, at, sides=sides, vmax=vmax)
+        quantities = [show] if isinstance(show, str) else list(show)
+        return maps_figure(_with(self._dataset, beside), quantities, at, sides=Sides(x, y, panel), vmax=vmax)
 
-    def waterfall(self, *, x: str | None = None, **at: Any) -> Figure:
-        """Draw the spectra of the strands over an axis, with eigenfrequencies where they are known."""
-        from cvt_hpc.analysis.waterfall import waterfall_figure
+    def animation(self) -> Animation:
+        """Draw the belt in the last periods of a run, magnified, as a moving picture; of a history.
 
-        return waterfall_figure(self._dataset, at, sides=Sides(x))
+        A notebook shows it, and `save("belt.gif")` writes it.
+        """
+        from cvt_hpc.analysis.animation import animation
 
-    def campbell(self, *, orders: Sequence[float] = (1.0, 2.0, 4.0, 8.0, 16.0), **at: Any) -> Figure:
-        """Draw the spectra over the driving speed, with eigenfrequencies and orders of that speed."""
-        from cvt_hpc.analysis.waterfall import campbell_figure
+        return animation(in_si(self._dataset))
 
-        return campbell_figure(self._dataset, at, orders=orders)
+    def report(self, out: str | Path = "report.html") -> Path:
+        """Write a page about the study: what was found, a map with values, failed runs, cost, assumptions."""
+        from cvt_hpc.report import write_report
 
-    def spectrogram(self) -> Figure:
-        """Draw the spectra of the strands of one run along its ramp, or over time; of a history."""
-        from cvt_hpc.analysis.ramps import spectrogram_figure
+        return write_report(in_si(self._dataset), Path(out))
 
-        return spectrogram_figure([self._dataset])
+    def in_units(self, **units: str) -> xr.Dataset:
+        """Return the dataset with some variables and coordinates in other units: `in_units(loss="kW")`.
 
-    def phase(self) -> Figure:
-        """Draw the phase portraits of the strands of one run; of a history."""
-        from cvt_hpc.analysis.histories import phase_figure
+        Parameters
+        ----------
+        **units
+            By the name of a variable or coordinate a unit of its dimension, such as `driving_speed="rpm"`.
 
-        return phase_figure(self._dataset)
-
-    def flanks(self) -> Figure:
-        """Draw left and right flank along the belt; of a history of a spatial pushbelt."""
-        from cvt_hpc.analysis.flanks import flanks_figure
-
-        return flanks_figure(self._dataset)
-
-    def energy(self) -> Figure:
-        """Draw what friction takes on the arcs of one run, and what feeds its vibration; of a history."""
-        from cvt_hpc.analysis.on_variator import energy_figure
-
-        return energy_figure(self._dataset)
-
-    def variator(self, *quantities: str) -> Figure:
-        """Draw quantities along the belt on the variator, the push force by default; of a history."""
-        from cvt_hpc.analysis.on_variator import variator_figure
-
-        return variator_figure(self._dataset, quantities or ("push_force",))
-
-    def history(self) -> Figure:
-        """Draw one run: motion, spectrum, load and forces; of a history."""
-        from cvt_hpc.analysis.histories import history_figure
-
-        return history_figure(self._dataset)
-
-    def hysteresis(self, **at: Any) -> Figure:
-        """Draw where vibration begins and ends along ramps up and down, and the bands between them."""
-        from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure
-
-        return hysteresis_figure(self._dataset, at)
+        Returns
+        -------
+        Dataset
+            Values and the attribute `units` are converted. Of a chunked dataset nothing is computed yet.
+            Pictures and reports of it are those of the values in SI units, with axes in these units.
+        """
+        return in_units(self._dataset, units)
 
     def classes(self) -> xr.DataArray:
         """Return the class of each run or cell as a flag variable: quiet, vibrating, failed, ..."""
@@ -183,7 +158,8 @@ class Results:
         Returns
         -------
         DataArray
-            Over the other axes and `boundary` [unit of the axis], ascending, nan behind the last one.
+            Over the other axes and `boundary` [unit of the axis], ascending, nan behind the last one; there
+            are as many places as there can be boundaries, one less than values on the axis.
             `rising` says whether the belt vibrates above: windows begin at rising boundaries. A vibration at
             the lowest value already has no rising boundary.
         """
@@ -191,109 +167,74 @@ class Results:
         if along not in classes.dims or classes[along].dtype.kind not in "iuf":
             numeric = [name for name in map(str, classes.dims) if classes[name].dtype.kind in "iuf"]
             raise mismatch("results: along", f"one of the axes {', '.join(numeric) or '(none)'}", along)
-        others = [name for name in classes.dims if name != along]
-        rows = np.moveaxis(levels(classes.values), classes.dims.index(along), -1)
         axis = np.asarray(classes[along].values, float)
-        found = [onsets(axis, row) for row in rows.reshape(-1, axis.size)]
-        most = max([1, *map(len, found)])
-        places, rising = np.full((2, len(found), most), np.nan)
-        for k, line in enumerate(found):
-            places[k, : len(line)] = [one.load for one in line]
-            rising[k, : len(line)] = [one.rising for one in line]
-        shape, dims = (*rows.shape[:-1], most), (*others, "boundary")
+        most = max(axis.size - 1, 1)
+        places, rising = xr.apply_ufunc(
+            _boundaries,
+            classes,
+            input_core_dims=[[along]],
+            output_core_dims=[["boundary"]] * 2,
+            kwargs={"axis": axis, "most": most},
+            dask="parallelized",
+            dask_gufunc_kwargs={"allow_rechunk": True, "output_sizes": {"boundary": most}},
+            output_dtypes=[float, float],
+        )
         of_axis = classes[along].attrs
         attributes = {key: of_axis[key] for key in ("units", "job_units") if key in of_axis}
         attributes |= {"long_name": f"boundary of vibration in {along}"}
-        array = xr.DataArray(places.reshape(shape), dims=dims, name="boundary", attrs=attributes)
-        coordinates = {name: classes[name] for name in others} | {"rising": (dims, rising.reshape(shape))}
-        return array.assign_coords(coordinates)
+        found = places.rename("boundary").assign_coords(rising=rising.variable)
+        return found.drop_attrs(deep=False).assign_attrs(attributes)
 
 
-def read_table(path: str | Path) -> xr.Dataset:
-    """Return the results that a small table of a study keeps, such as jobs/results/lebrecht_2004.csv.
-
-    Parameters
-    ----------
-    path : str or Path
-        A CSV file as `jobs/tabulate.py` writes it: axes [SI], `status`, `vibrates`, quantities with the unit
-        in their head and a column for each strand or pulley. The axes make a full grid.
-
-    Returns
-    -------
-    Dataset
-        As `open_results` returns it, of these quantities alone [SI].
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or is no such table.
-    """
-    with naming_refusals(Path(path), "a table of a study"):
-        rows = list(csv.reader(read_regular(Path(path), _LARGEST_TABLE).decode().splitlines()))
-    head, body = (rows[0] if rows else []), rows[1:]
-    if "status" not in head or any(len(row) != len(head) for row in body):
-        raise mismatch(str(path), "a table of a study, with a column status and full rows", ", ".join(head))
-    columns = dict(zip(head, zip(*body, strict=True), strict=True))
-    axes = {name: _numbers(columns[name]) for name in head[: head.index("status")]}
-    coordinates = {name: np.unique(values) for name, values in axes.items()}
-    shape = tuple(map(len, coordinates.values()))
-    places = tuple(np.searchsorted(coordinates[name], values) for name, values in axes.items())
-    if len(body) != np.prod(shape) or len(set(zip(*places, strict=True))) != len(body):
-        raise mismatch(str(path), "a row for each place of the grid", f"{len(body)} rows")
-
-    def grid(values: np.ndarray) -> np.ndarray:
-        filled = np.empty(shape, values.dtype)
-        filled[places] = values
-        return filled
-
-    dataset = xr.Dataset(
-        coords={name: (name, v, {"units": _unit_of(name)}) for name, v in coordinates.items()}
-    )
-    for name, flags in (("status", Status), ("vibrates", Vibrates)):
-        known = {flag.name.lower(): flag for flag in flags}
-        values = [known.get(word, Vibrates.UNDECIDED) for word in columns[name]]
-        meanings = {"flag_values": np.array(list(flags), np.int8), "flag_meanings": " ".join(known)}
-        dataset[name] = (tuple(axes), grid(np.array(values, np.int8)), meanings)
-    for column in head[head.index("vibrates") + 1 :]:
-        _add(dataset, column, tuple(axes), columns[column], grid)
-    return dataset.assign_attrs(job_name=Path(path).stem)
+def _boundaries(classes: np.ndarray, axis: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """Boundaries along the last dimension, and which of them rise: both (..., most), nan behind the last."""
+    places, rising = np.full((2, *classes.shape[:-1], most), np.nan)
+    for line in np.ndindex(classes.shape[:-1]):
+        for k, one in enumerate(onsets(axis, levels(classes[line]))):
+            places[line][k], rising[line][k] = one.load, one.rising
+    return places, rising
 
 
-def _add(dataset: xr.Dataset, column: str, dims: tuple[str, ...], texts: Sequence[str], grid: Any) -> None:
-    """Add a column of numbers to a dataset, where it belongs to a strand or pulley at its place."""
-    name, _, unit = column.removesuffix("]").partition(" [")
-    try:
-        values = grid(_numbers(texts))
-    except ValueError:
-        return  # of texts
-    si = {"um": "m"}.get(unit, unit)
-    values = values * (to_si(f"1 {unit}", si) if unit else 1.0)
-    name, label = next(
-        (
-            (name.removesuffix(f"_{one}"), one)
-            for labels in _LABELS.values()
-            for one in labels
-            if name.endswith(f"_{one}")
-        ),
-        (name, ""),
-    )
-    attributes = {"units": si or "1"}
-    if not label:
-        dataset[name] = (dims, values, attributes)
-        return
-    extra = next(dim for dim, labels in _LABELS.items() if label in labels)
-    if name not in dataset:
-        labels = list(_LABELS[extra])
-        dataset[name] = ((*dims, extra), np.full((*values.shape, len(labels)), np.nan), attributes)
-        dataset[extra] = labels
-    dataset[name].loc[{extra: label}] = values
+def _with(dataset: xr.Dataset, beside: xr.Dataset | Sequence[xr.Dataset]) -> list[xr.Dataset]:
+    datasets = [dataset, *([beside] if isinstance(beside, xr.Dataset) else beside)]
+    return list(map(in_si, datasets))
 
 
-def _numbers(texts: Sequence[str]) -> np.ndarray:
-    return np.array([float(text) if text else np.nan for text in texts])
+def _verb(name: str, kind: Kind) -> Any:
+    """A method of `Results` that draws a picture of a kind."""
+    options = {option.key: option for option in kind.options}
+    word = next((option for option in kind.options if option.is_word), None)
+    takes_all = word is not None and word.key == "quantities"
+    parameters = [Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)]
+    if word:
+        way = Parameter.VAR_POSITIONAL if takes_all else Parameter.POSITIONAL_OR_KEYWORD
+        parameters.append(Parameter(word.key, way, **({} if takes_all else {"default": None})))
+    keys = [key for key in (*options, *kind.sides) if word is None or key != word.key]
+    keys += ["beside"] if kind.subject == HISTORIES else []
+    parameters += [Parameter(key, Parameter.KEYWORD_ONLY, default=None) for key in keys]
+    if kind.subject == RESULTS:
+        parameters.append(Parameter("at", Parameter.VAR_KEYWORD))
+    signature = Signature(parameters, return_annotation="Figure")
+
+    def verb(self: Results, *words: Any, **given: Any) -> Figure:
+        chosen = signature.bind(self, *words, **given).arguments
+        at, beside = chosen.pop("at", None), chosen.pop("beside", None)
+        del chosen["self"]
+        chosen = {key: value for key, value in chosen.items() if value is not None and value != ()}
+        return compose(name, _with(self._dataset, beside or ()), at, **chosen)
+
+    subjects = {RESULTS: "of results", HISTORY: "of a history", HISTORIES: "of one history or several"}
+    lines = [f"Draw {kind.text}; {subjects[kind.subject]}.", "", "Parameters", "----------"]
+    for key, option in options.items():
+        lines += [key, f"    {option.text[0].upper()}{option.text[1:]}."]
+    lines += [f"{side}\n    Axis that runs there." for side in kind.sides]
+    lines += ["beside\n    Further histories."] if kind.subject == HISTORIES else []
+    lines += ["**at\n    Axes to fix."] if kind.subject == RESULTS else []
+    verb.__name__, verb.__qualname__ = name, f"Results.{name}"
+    verb.__doc__ = "\n".join(lines if len(lines) > 4 else lines[:1])
+    verb.__signature__ = signature  # type: ignore[attr-defined]  # what help() and notebooks show
+    return verb
 
 
-def _unit_of(key: str) -> str:
-    """The SI unit of a parameter of any model; "1" of what none knows."""
-    tables = (table for model in MODELS for table in load_model(model).parameters.values())
-    return next((table[key].unit or "1" for table in tables if key in table), "1")
+for _name, _kind in KINDS.items():
+    setattr(Results, _name, _verb(_name, _kind))

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 from cvt_hpc.job.summary import cost_in_words
 from cvt_hpc.tables import columns
 from cvt_hpc.variables import Status, flag_in_words
-from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS, PairClass
-from cvt_hpc.vibration.classes import OccurrenceClass
+from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -78,9 +77,9 @@ def repeat_line(repeat: Repeat) -> str:
 
 
 def audit_lines(report: AuditReport) -> Iterator[str]:
-    """Yield the lines that say how often the lower rungs of a study erred."""
+    """Yield the lines that say how often the cheaper models of a study erred."""
     runs = sum(rung.runs + rung.failed for rung in report.rungs)
-    yield f"audit: {runs} of {report.answered} runs that lower rungs answered done again in full"
+    yield f"audit: {runs} of {report.answered} runs that cheaper models decided done again in full"
     for rung in report.rungs:
         low, high = rung.interval
         share = f"{rung.differing / rung.runs:.2%}, " if rung.runs else ""
@@ -95,29 +94,19 @@ def audit_lines(report: AuditReport) -> Iterator[str]:
 
 def step_check_lines(check: Repeat, found: Comparison) -> Iterator[str]:
     """Yield the lines that say how far a sample of runs depends on the time step."""
-    from cvt_hpc.study.repeats import interval
+    from cvt_hpc.analysis.repeated import contradictions, deviations
 
     drawn, eligible = int(check.sample.sum()), int(check.may_be_drawn.sum())
     yield f"step check: {drawn} of {eligible} runs that took steps done again {check.way}"
-    runs, contradicting = int(found.answered.sum()), int(found.contradicts.sum())
-    low, high = interval(contradicting, runs)
-    share = f"{contradicting / runs:.2%}, " if runs else ""
-    line = (
-        f"  {contradicting} of {runs} contradict (quiet against vibrating; {share}95 % interval {low:.2%} to "
-    )
-    line += f"{high:.2%}), {int(found.contradicts_beyond.sum())} of them beyond the threshold; "
-    others = int((found.answered & (found.pairs == PairClass.OTHERWISE)).sum())
-    line += f"{others} more of another class"
-    failed = sum(
-        count for kinds, count in found.counts().items() if kinds[1] == OccurrenceClass.FAILED != kinds[0]
-    )
-    yield line + (f"; {failed} more failed {check.way}" if failed else "")
+    yield f"  {contradictions(found, check.way)}"
     yield from islice(map(_cell_line, found.rows(found.contradicts)), MOST_CONTRADICTIONS_NAMED)
-    yield from (f"  {line}" for line in _deviation_lines(found))
+    yield from (f"  {line}" for line in deviations(found))
 
 
 def comparison_lines(found: Comparison, sources: tuple[str, str]) -> Iterator[str]:
     """Yield the lines that say in what two studies agree: A, B, their jobs, classes, and amplitudes."""
+    from cvt_hpc.analysis.repeated import deviations
+
     for label, source, left_out in zip("AB", sources, found.left_out, strict=True):
         yield f"{label}: {source}" + (f"; {left_out} of its runs left out, unknown there" if left_out else "")
     yield from found.notes
@@ -133,7 +122,7 @@ def comparison_lines(found: Comparison, sources: tuple[str, str]) -> Iterator[st
     yield from map(_cell_line, islice(found.rows(found.contradicts), MOST_CONTRADICTIONS_NAMED))
     if contradicting > MOST_CONTRADICTIONS_NAMED:
         yield f"  {contradicting - MOST_CONTRADICTIONS_NAMED} more in the table"
-    yield from _deviation_lines(found)
+    yield from deviations(found)
 
 
 def _class_table(found: Comparison) -> Iterator[str]:
@@ -153,25 +142,6 @@ def _cell_line(cell: Cell) -> str:
     )
     near = ", near the threshold" if cell.pair in NEAR_CONTRADICTIONS else ""
     return f"  {cell.place}: {' | '.join(words)}{near}"
-
-
-def _deviation_lines(found: Comparison) -> Iterator[str]:
-    both = int((found.pairs == OccurrenceClass.VIBRATING).sum())
-    for name in ("amplitude", "frequency"):
-        deviation = found.deviation(name)
-        if not math.isnan(deviation.median):
-            yield (
-                f"{name} where both vibrate ({both} cells): B deviates by {deviation.median:.2%} (median), "
-                f"{deviation.high:.2%} (95 %), {deviation.largest:.2%} (largest)"
-            )
-    for name, unit in found.quantities.items():
-        deviation = found.deviation(name)
-        if not math.isnan(deviation.median):
-            largest = f"{found.largest_difference(name):.3g} {'' if unit == '1' else unit}".rstrip()
-            yield (
-                f"{name} where both have ended: B deviates by {deviation.median:.2%} (median), "
-                f"{deviation.high:.2%} (95 %), {deviation.largest:.2%} (largest); at most {largest}"
-            )
 
 
 def trouble_lines(report: RunReport) -> Iterator[str]:

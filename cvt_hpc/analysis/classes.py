@@ -40,18 +40,19 @@ def occurrence_classes(dataset: xr.Dataset) -> xr.DataArray:
     Returns
     -------
     DataArray of int8
-        Values of `OccurrenceClass`, or as they are given; dimensions of `status`.
+        Values of `OccurrenceClass`, or as they are given; dimensions of `status`. Of a chunked dataset
+        nothing is computed yet.
     """
     if "occurrence_class" in dataset:
         return dataset["occurrence_class"]
-    status = dataset["status"]
-    classes = classify_runs(status.values, dataset["vibrates"].transpose(*status.dims).values)
+    flags = dataset["status"], dataset["vibrates"]
+    classes = xr.apply_ufunc(classify_runs, *flags, dask="parallelized", output_dtypes=[np.int8])
     attributes = {
         "long_name": "vibration occurrence",
         "flag_values": np.array(list(OccurrenceClass), np.int8),
         "flag_meanings": " ".join(c.name.lower() for c in OccurrenceClass),
     }
-    return xr.DataArray(classes, status.coords, status.dims, "occurrence_class", attributes)
+    return classes.rename("occurrence_class").assign_attrs(attributes)
 
 
 def map_classes(dataset: xr.Dataset) -> xr.DataArray:
@@ -88,13 +89,27 @@ def at_strongest_strand(dataset: xr.Dataset, name: str) -> xr.DataArray:
     Returns
     -------
     DataArray
-        Dimensions of `status`; nan where the dataset has no such variable.
+        Dimensions of `status`; nan where the dataset has no such variable. Lazy as of `occurrence_classes`.
     """
     status = dataset["status"]
     if name not in dataset or "amplitude" not in dataset:
         return xr.full_like(status, np.nan, dtype=float)
     extra = [d for d in dataset["amplitude"].dims if d not in status.dims]
-    amplitude = dataset["amplitude"].transpose(*status.dims, *extra).values.reshape(*status.shape, -1)
-    values = dataset[name].transpose(*status.dims, *extra).values.reshape(*status.shape, -1)
-    strongest = np.argmax(np.where(np.isnan(amplitude), -np.inf, amplitude), axis=-1)[..., np.newaxis]
-    return status.copy(data=np.take_along_axis(values, strongest, axis=-1)[..., 0].astype(float))
+    return xr.apply_ufunc(
+        _at_largest,
+        dataset["amplitude"],
+        dataset[name],
+        input_core_dims=[extra, extra],
+        kwargs={"extra": len(extra)},
+        dask="parallelized",
+        dask_gufunc_kwargs={"allow_rechunk": True},
+        output_dtypes=[float],
+    ).transpose(*status.dims)
+
+
+def _at_largest(amplitude: NDArray[np.float64], values: NDArray[np.float64], extra: int) -> NDArray:
+    """Values where the amplitude is largest, over the last `extra` dimensions of both."""
+    shape = amplitude.shape[: amplitude.ndim - extra]
+    flat = np.where(np.isnan(amplitude), -np.inf, amplitude).reshape(*shape, -1)
+    strongest = np.argmax(flat, axis=-1)[..., np.newaxis]
+    return np.take_along_axis(values.reshape(*shape, -1), strongest, axis=-1)[..., 0].astype(float)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
-from pathlib import Path
 from textwrap import fill
 from typing import Any
 
@@ -17,7 +16,7 @@ from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, val
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.error_axes import COLOURS, MARKERS
-from cvt_hpc.analysis.figures import WIDTH, draw, in_words, legend_columns, styled
+from cvt_hpc.analysis.figures import WIDTH, in_words, legend_columns, styled
 from cvt_hpc.errors import mismatch, one_line, unknown
 from cvt_hpc.variables import Status
 
@@ -26,17 +25,6 @@ MOST_PANELS = 3  # side by side
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 BESIDE = ("-", "--", ":", "-.")
 MARKS = tuple(mark for mark in MARKERS if mark not in {STYLES[kind].mark for kind in WITHOUT_RESULT})
-
-
-def draw_curve(
-    dataset: xr.Dataset,
-    quantities: Sequence[str],
-    out: Path,
-    at: Mapping[str, Any] | None = None,
-    source: str = "results",
-) -> Path:
-    """Write the figure of `curve_figure`."""
-    return draw(lambda: curve_figure(dataset, quantities, at, source), out)
 
 
 @styled
@@ -70,7 +58,7 @@ def curve_figure(
     figure = Figure((WIDTH, HEIGHT), layout="constrained")
     all_axes = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
     x = ruler(arrangement.dataset[arrangement.x])
-    factor, unit = _scale(arrangement.dataset, quantities)
+    factor, unit = scale(arrangement.dataset, quantities)
     for axes, (title, shown) in zip(all_axes, panels, strict=True):
         curves = [
             curve
@@ -78,19 +66,30 @@ def curve_figure(
             for curve in _curves(shown[name], factor, arrangement.x, len(quantities) > 1)
         ]
         _draw_curves(axes, x.centres, curves, shown["status"].values == Status.DONE)
-        _mark_above(axes, x.centres, occurrence_classes(shown).values)
+        mark_above(axes, x.centres, occurrence_classes(shown).values)
         axes.set_title(title, loc="left", pad=6)
-        axes.set(xlabel=x.label, xlim=_with_margins(x))
+        axes.set(xlabel=x.label, xlim=with_margins(x))
         x.lay_out(axes.xaxis)
         axes.grid(linewidth=0.4, alpha=0.5)
-    label = _common_words(dataset, quantities)
+    label = common_words(dataset, quantities)
     all_axes[0].set_ylabel(f"{label} [{unit}]" if unit else label)
     legend: dict[str, Any] = {}
     for axes in all_axes:
         handles, labels = axes.get_legend_handles_labels()
         legend |= dict(zip(labels, handles, strict=True))
+    set_frame(figure, legend, [f"{label[0].upper()}{label[1:]}: {job_of(dataset)}".rstrip(": "), *notes])
+    return figure
+
+
+def job_of(dataset: xr.Dataset) -> str:
+    """Name of the job, for a title."""
+    return one_line(dataset.attrs.get("job_name", ""))
+
+
+def set_frame(figure: Figure, legend: Mapping[str, Any], lines: Sequence[str]) -> None:
+    """Title and legend of a figure of curves, which grows by the legend; `legend` has handles by label."""
     columns = legend_columns(list(legend))
-    figure.set_figheight(HEIGHT + 0.2 * (len(legend) // columns))
+    figure.set_figheight(figure.get_figheight() + 0.2 * (len(legend) // columns))
     figure.legend(
         legend.values(),
         legend.keys(),
@@ -98,10 +97,7 @@ def curve_figure(
         frameon=False,
         ncols=columns,
     )
-    job = one_line(dataset.attrs.get("job_name", ""))
-    title = f"{label[0].upper()}{label[1:]}: {job}".rstrip(": ")
-    figure.suptitle("\n".join(fill(line, 72) for line in [title, *notes]))
-    return figure
+    figure.suptitle("\n".join(fill(line, 72) for line in lines))
 
 
 def check_quantities(
@@ -117,8 +113,10 @@ def check_quantities(
             raise mismatch(f"{source}: {name}", f"the unit of {quantities[0]}, {units[0]}", str(units[1]))
 
 
-def panels_of(arrangement: Arrangement, source: str) -> tuple[list[tuple[str, xr.Dataset]], list[str]]:
-    """Title and results over x of each panel, and what is fixed, in words."""
+def panels_of(
+    arrangement: Arrangement, source: str, most: int = MOST_PANELS
+) -> tuple[list[tuple[str, xr.Dataset]], list[str]]:
+    """Title and results over x of each value along y, `most` at most, and what is fixed, in words."""
     dataset, notes = arrangement.dataset, list(arrangement.notes)
     if arrangement.panel:
         notes.append(
@@ -128,10 +126,9 @@ def panels_of(arrangement: Arrangement, source: str) -> tuple[list[tuple[str, xr
     if arrangement.y is None:
         return [("", dataset)], notes
     y = dataset[arrangement.y]
-    if y.size > MOST_PANELS:
-        raise mismatch(
-            f"{source}: {arrangement.y}", f"at most {MOST_PANELS} values, or one that --at fixes", f"{y.size}"
-        )
+    if y.size > most:
+        expected = f"at most {most} values, or one that --at fixes"
+        raise mismatch(f"{source}: {arrangement.y}", expected, f"{y.size}")
     titles = [f"{in_words(y)} {value_text(y, k)}" for k in range(y.size)]
     return [(title, dataset.isel({arrangement.y: k})) for k, title in enumerate(titles)], notes
 
@@ -144,17 +141,17 @@ def _curves(
     words = [in_words(array)] if is_named or not extra else []
     for place in product(*(range(array.sizes[dim]) for dim in extra)):
         at = dict(zip(extra, place, strict=True))
-        labels = [_label(array[dim], k) for dim, k in at.items()]
+        labels = [place_in_words(array[dim], k) for dim, k in at.items()]
         yield str(array.name), " ".join([*words, *labels]), factor * array.isel(at).values
 
 
-def _label(coordinate: xr.DataArray, index: int) -> str:
+def place_in_words(coordinate: xr.DataArray, index: int) -> str:
     """A place along a further dimension: a name speaks for itself, a number has the dimension's."""
     value = coordinate.values[index]
     return str(value) if coordinate.dtype.kind not in "iuf" else f"{in_words(coordinate)} {value:g}"
 
 
-def _scale(dataset: xr.Dataset, quantities: Sequence[str]) -> tuple[float, str]:
+def scale(dataset: xr.Dataset, quantities: Sequence[str]) -> tuple[float, str]:
     """Factor that gives numbers of up to three digits before the point, and the unit with it, for a label."""
     unit = str(dataset[quantities[0]].attrs.get("units", "")).replace("rad s-1", "rad/s")
     unit = "" if unit == "1" else unit
@@ -165,7 +162,7 @@ def _scale(dataset: xr.Dataset, quantities: Sequence[str]) -> tuple[float, str]:
     return 10.0**-power, f"10{str(power).translate(_RAISED)} {unit}".strip()
 
 
-def _with_margins(x: Ruler) -> tuple[float, float]:
+def with_margins(x: Ruler) -> tuple[float, float]:
     """Limits around all values of the axis, also those where nothing is known."""
     margin = 0.05 * np.ptp(x.centres) or 0.5 * np.ptp(x.edges)
     return x.centres.min() - margin, x.centres.max() + margin
@@ -189,7 +186,7 @@ def _draw_curves(
             )
 
 
-def _mark_above(axes: Axes, x: np.ndarray, classes: np.ndarray) -> None:
+def mark_above(axes: Axes, x: np.ndarray, classes: np.ndarray) -> None:
     """Marks on the upper edge, which no curve has, for runs without a value, by what became of them."""
     for kind, label in WITHOUT_RESULT.items():
         if (inside := classes == kind).any():
@@ -198,7 +195,7 @@ def _mark_above(axes: Axes, x: np.ndarray, classes: np.ndarray) -> None:
             axes.plot(x[inside], np.ones(inside.sum()), ls="", transform=place, label=label, **marks)
 
 
-def _common_words(dataset: xr.Dataset, quantities: Sequence[str]) -> str:
+def common_words(dataset: xr.Dataset, quantities: Sequence[str]) -> str:
     """Words that the names of all quantities end with, else the name of the first."""
     words = [in_words(dataset[name]).split() for name in quantities]
     common: list[str] = []

@@ -7,17 +7,18 @@ Pictures of results take
     source     str, optional: where the results are from, for the errors
 
 and pictures of runs a `history` or `histories`, as `simulate` returns them, with their `sources`. A function
-`..._figure` composes a matplotlib Figure, unknown to pyplot, and writes nothing; `figure.savefig(path)` does.
-`draw_...` takes the same arguments, and writes it as `save_figure` does. InputError is raised where a dataset
-holds no results, a single run or not what is to be drawn, or where `at` names no axis or no value on it; what
-else a picture refuses its docstring says.
+`..._figure` composes a matplotlib Figure, unknown to pyplot, and writes nothing; `figure.savefig(path)` does,
+and `draw` writes it as `save_figure` does. `picture_kinds.py` lists those drawn by a kind. InputError is
+raised where a dataset holds no results, a single run or not what is to be drawn, or where `at` names no axis
+or no value on it; what else a picture refuses its docstring says.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from functools import wraps
+from functools import partial, wraps
+from io import BytesIO
 from pathlib import Path
 from textwrap import wrap
 from typing import Any, ParamSpec
@@ -39,6 +40,7 @@ P = ParamSpec("P")
 
 WIDTH = 6.4  # [inch]: letters of 10 points stay readable across a page and on a telephone held sideways
 RESOLUTION = 170  # dots per inch
+_INLINE = 100  # the same, between the cells of a notebook
 SETTLED = 1000  # pixels: the palette is refined until no more than these, one in a thousand, change colour
 FORMATS = (".png", ".svg", ".pdf")
 LEGEND_LETTERS, HANDLE_LETTERS = 84, 8  # across the page, and what a handle with its space takes of them
@@ -138,14 +140,24 @@ def draw(compose: Callable[[], Figure], out: Path) -> Path:
 
 
 def styled(compose: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Make a function compose its figure in the style of all pictures."""
+    """Make a function compose its figure in the style of all pictures, as one that a notebook shows."""
 
     @wraps(compose)
     def within(*args: P.args, **options: P.kwargs) -> Figure:
         with matplotlib.rc_context(STYLE):
-            return as_written(compose(*args, **options))
+            figure = as_written(compose(*args, **options))
+        # Jupyter shows figures that pyplot does not know only after `%matplotlib inline`
+        figure.__dict__["_repr_png_"] = partial(_as_png, figure)
+        return figure
 
     return within
+
+
+def _as_png(figure: Figure) -> bytes:
+    """A picture of a figure for a notebook."""
+    written = BytesIO()
+    figure.savefig(written, format="png", dpi=_INLINE)
+    return written.getvalue()
 
 
 def as_written(figure: Figure) -> Figure:

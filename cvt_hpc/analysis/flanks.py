@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.figures import WIDTH, balanced, draw, in_words, styled
+from cvt_hpc.analysis.figures import WIDTH, balanced, in_words, styled
 from cvt_hpc.analysis.profiles import ARC, regions, shown_unit
 from cvt_hpc.analysis.telling_apart import check_holds, on_axes, titles
 
@@ -62,17 +61,12 @@ def alone(history: xr.Dataset, end: End) -> tuple[str, float]:
         Side, and the distance between the outermost places at which the flanks carry; 0 where both begin at
         the same place.
     """
-    far = end.inwards * _from_end(history, end)
+    far = end.inwards * from_end(history, end)
     forces = [history[f"contact_force_{side}"].values for side in SIDES]
     near = np.abs(far) < AROUND
     least = TOUCHES * np.nanmax(np.where(near, forces, 0.0))
     begins = [float(far[near & (force > least)].min(initial=AROUND)) for force in forces]
     return SIDES[int(np.argmin(begins))], abs(begins[0] - begins[1])
-
-
-def draw_flanks(history: xr.Dataset, out: Path, source: str = "history") -> Path:
-    """Write the figure of `flanks_figure`."""
-    return draw(lambda: flanks_figure(history, source), out)
 
 
 @styled
@@ -108,7 +102,7 @@ def flanks_figure(history: xr.Dataset, source: str = "history") -> Figure:
         first = None
         for column, end in enumerate(ends):
             axes = first = figure.add_subplot(grid[row, column], sharey=first)
-            distance = 1e3 * _from_end(history, end)
+            distance = 1e3 * from_end(history, end)
             order = np.argsort(distance)
             near = order[np.abs(distance[order]) < 1e3 * AROUND]
             _draw(axes, history.isel(position=near), name, distance[near], named=column == 0)
@@ -129,7 +123,7 @@ def flanks_figure(history: xr.Dataset, source: str = "history") -> Figure:
     return figure
 
 
-def _from_end(history: xr.Dataset, end: End) -> np.ndarray:
+def from_end(history: xr.Dataset, end: End) -> np.ndarray:
     """Distance of places from an end along the path, forwards, (position,) [m]."""
     position = history["position"].values
     length = position[-1] + position[0]  # places are the middles of equal parts

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.figures import WIDTH, balanced, draw, styled
+from cvt_hpc.analysis.figures import WIDTH, balanced, styled
 from cvt_hpc.analysis.followed import around, follow_element, passages
 from cvt_hpc.analysis.profiles import ARC, regions
 from cvt_hpc.analysis.telling_apart import on_axes, titles
@@ -19,11 +18,6 @@ COLOURS = {"radial_sliding": "#0072b2", "tangential_sliding": "#009e73", "slidin
 LINES = {"radial_sliding": "-", "tangential_sliding": ":", "sliding_speed": "--"}
 HIGHEST = 1500.0  # [Hz]
 LABELS = {"radial_sliding": "radial", "tangential_sliding": "tangential", "sliding_speed": "resulting"}
-
-
-def draw_element(history: xr.Dataset, out: Path, region: str | None = None, source: str = "history") -> Path:
-    """Write the figure of `element_figure`."""
-    return draw(lambda: element_figure(history, region, source), out)
 
 
 @styled
@@ -141,14 +135,15 @@ def mean_there(history: xr.Dataset, followed: xr.Dataset, name: str) -> np.ndarr
     return np.interp(followed["position"].values, positions, history[name].values[known])
 
 
-def followed_of(history: xr.Dataset, region: str | None, source: str = "history") -> xr.Dataset:
+def followed_of(history: xr.Dataset, region: str | None = None, source: str = "history") -> xr.Dataset:
     """An element followed through one passage of an arc, or from the driving inlet on; arguments as above."""
     return one_passage(history, region, source) if region else follow_element(history, 0.0, source)
 
 
 def one_passage(history: xr.Dataset, pulley: str, source: str = "history") -> xr.Dataset:
     """An element followed through the arc of a pulley, the last whole passage before the profiles' end."""
-    start = next(first for first, _, name in regions(history) if name == f"{pulley} arc")
+    starts = [first for first, _, name in regions(history) if name == f"{pulley} arc"]
+    start = starts[0] if starts else 0.0  # models with other names of regions keep no profiles over time
     length = around(history)[-1]
     # elements that set out one after the other: the first of them is at the arc's inlet at once
     for behind in np.linspace(0.0, 1.0, 9):

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 
 from cvt_hpc.analysis import history_panels as panels
 from cvt_hpc.analysis.figures import WIDTH, balanced, draw, styled
-from cvt_hpc.errors import InputError, mismatch, one_line
+from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.shown import JOB_UNITS, POINT_UNITS, shown
 from cvt_hpc.variables import Status, Vibrates, flag_in_words, shortened
@@ -35,7 +35,7 @@ def draw_history(dataset: xr.Dataset, out: Path) -> Path:
 
 
 @styled
-def history_figure(dataset: xr.Dataset) -> Figure:
+def history_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
     """Draw the history of one run; nothing is written, and what the dataset does not hold is left out.
 
     Parameters
@@ -44,6 +44,8 @@ def history_figure(dataset: xr.Dataset) -> Figure:
         As `simulate` returns it: `displacement` (time, probe) [m], `load` (time) [N m], `ring_tension` and
         `push_force` (position) [N], `contact_force` and what feeds the fluctuations (position) [N/m, W/m],
         `region` (position), and the run's verdict.
+    source : str
+        Where the history is from, for the errors.
 
     Returns
     -------
@@ -82,7 +84,7 @@ def history_figure(dataset: xr.Dataset) -> Figure:
     if _is_known(dataset, "flank_feed"):
         rows.append((1.7, [(WHOLE, panels.draw_feed, dataset)]))
     if not rows:
-        raise InputError("history: expected displacement, load or forces of a run, found none of them")
+        raise mismatch(source, "displacement, load or forces of a run", "none of them")
     title = _title(dataset)
     heights = [height for height, _ in rows]
     figure = Figure((WIDTH, sum(heights) + 0.2 * title.count("\n") + 0.4), layout="constrained")
@@ -95,11 +97,6 @@ def history_figure(dataset: xr.Dataset) -> Figure:
             if columns == RIGHT:
                 axes.xaxis.set_major_locator(MaxNLocator(2))
     return figure
-
-
-def draw_phase(dataset: xr.Dataset, out: Path, source: str = "history") -> Path:
-    """Write the figure of `phase_figure`."""
-    return draw(lambda: phase_figure(dataset, source), out)
 
 
 @styled
@@ -193,7 +190,7 @@ def _title(dataset: xr.Dataset) -> str:
         lines.append(", ".join(place))
     if "rung" in dataset:
         rung = flag_in_words(dataset["rung"])
-        lines.append(f"answered by the {rung} run, of {float(dataset['simulated_seconds']):.3g} s")
+        lines.append(f"decided by the {rung} run of model auto, {float(dataset['simulated_seconds']):.3g} s")
     status = Status(int(dataset["status"])) if "status" in dataset else None
     reason = dataset["reason"].item() if "reason" in dataset else ""
     reason = shortened(reason.decode() if isinstance(reason, bytes) else reason, LONGEST_REASON)

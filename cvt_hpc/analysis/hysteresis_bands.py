@@ -1,9 +1,8 @@
-"""Where vibration sets in and ends over a map: onset lines, and bands in which the way there decides."""
+"""Where vibration sets in and ends over a map: onset lines, and bands where ramps up and down differ."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,6 @@ from cvt_hpc.analysis.figures import (
     axis_label,
     balanced,
     coordinate_unit,
-    draw,
     in_words,
     legend_columns,
     styled,
@@ -59,12 +57,32 @@ def onset_line(along: Ruler, across: Ruler, classes: NDArray[np.int8]) -> NDArra
     array, shape (point, 2)
         Places along and across; nan in rows without an onset.
     """
-    found = []
-    for row, edges in zip(classes, np.stack([across.edges[:-1], across.edges[1:]], 1), strict=True):
-        rising = [one.load for one in onsets(along.centres, levels(row)) if one.rising]
-        at = min(rising, default=np.nan)
-        found += [(at, edges[0]), (at, edges[1])]
-    return np.array(found)
+    borders = np.stack([across.edges[:-1], across.edges[1:]], 1)
+    lowest = lowest_onsets(along.centres, classes)
+    return np.stack([np.repeat(lowest, 2), borders.ravel()], 1)
+
+
+def lowest_onsets(places: NDArray[np.float64], classes: NDArray[np.int8]) -> NDArray[np.float64]:
+    """The lowest onset of each row of classes (row, place), in the unit of the places; nan where none is."""
+    rising = ([one.load for one in onsets(places, levels(row)) if one.rising] for row in classes)
+    return np.array([min(loads, default=np.nan) for loads in rising])
+
+
+def of_each_start(classes: NDArray[np.int8]) -> list[tuple[str, str, NDArray[np.int8]]]:
+    """Name and style of the onset lines of a map, and the classes that each of them separates.
+
+    Parameters
+    ----------
+    classes : array
+        `OccurrenceClass` or `StartClass` of the cells: those that vibrate from a large start only have two
+        lines.
+    """
+    only = classes == StartClass.LARGE_START_ONLY
+    small = np.where(only, OccurrenceClass.QUIET, classes)
+    if not only.any():
+        return [("onset of vibration", "-", small)]
+    large = np.where(only, OccurrenceClass.VIBRATING, classes)
+    return [("onset from a small start", "-", small), ("onset from a large start", "--", large)]
 
 
 def draw_onsets(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], along_y: bool) -> list[Line2D]:
@@ -79,13 +97,8 @@ def draw_onsets(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], along
     along_y : bool
         Whether vibration sets in along y.
     """
-    only = classes == StartClass.LARGE_START_ONLY
-    starts = [("onset of vibration", "-", np.where(only, OccurrenceClass.QUIET, classes))]
-    if only.any():
-        starts = [("onset from a small start", "-", starts[0][2])]
-        starts.append(("onset from a large start", "--", np.where(only, OccurrenceClass.VIBRATING, classes)))
     handles = []
-    for label, style, kinds in starts:
+    for label, style, kinds in of_each_start(classes):
         points = onset_line(y, x, kinds.T)[:, ::-1] if along_y else onset_line(x, y, kinds)
         if np.isfinite(points).all(axis=1).any():
             look = {"color": INK, "ls": style, "lw": 2.2, "label": label}
@@ -169,7 +182,7 @@ def draw_bands(axes: Axes, y: Ruler, ranges: NDArray[np.float64]) -> list[Any]:
     look: dict[str, Any] = {"facecolor": "none", "edgecolor": BAND.ink, "hatch": BAND.hatch, "linewidth": 0}
     if bands:
         axes.add_collection(PolyCollection(bands, **look, zorder=2.5))
-        handles.append(Patch(**look, label="hysteresis: the way there decides"))
+        handles.append(Patch(**look, label="hysteresis: depends on ramp direction"))
     for (name, (style, mark)), limits in zip(LINES.items(), ranges, strict=True):
         line = {"color": INK, "ls": style, "marker": mark, "ms": 5, "lw": 1.8}
         for values in limits:
@@ -178,13 +191,6 @@ def draw_bands(axes: Axes, y: Ruler, ranges: NDArray[np.float64]) -> list[Any]:
         if np.isfinite(limits).any():
             handles.append(Line2D([], [], **line, label=f"vibration begins and ends, ramp {name}"))
     return handles
-
-
-def draw_hysteresis(
-    dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None, source: str = "results"
-) -> Path:
-    """Write the figure of `hysteresis_figure`."""
-    return draw(lambda: hysteresis_figure(dataset, at, source), out)
 
 
 @styled

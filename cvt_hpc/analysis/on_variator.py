@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -15,101 +15,124 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from cvt_hpc.analysis.cells import colours_of
-from cvt_hpc.analysis.figures import WIDTH, axis_label, balanced, draw, styled
+from cvt_hpc.analysis.figures import WIDTH, axis_label, balanced, styled
 from cvt_hpc.analysis.history_panels import FEEDS
+from cvt_hpc.analysis.power_balance import balance_of, draw_balance
 from cvt_hpc.analysis.profiles import regions, shown_unit
 from cvt_hpc.analysis.telling_apart import on_axes, titles
 from cvt_hpc.errors import mismatch, unknown
-from cvt_hpc.physics.geometry import Variator, variator
-from cvt_hpc.variator.path import points_at
+from cvt_hpc.models.belt_drive.layout import layout
+from cvt_hpc.physics.belt_path import BeltPath, belt_path, points_at
+from cvt_hpc.variator import PULLEYS, STRANDS
 
+DEFAULT = "push_force", "tension"  # what is drawn, the first that there is
 PULLEY, INK = "#e4e8ec", "#333333"
-LARGEST = 0.16  # of the distance of the shafts: the longest bar
+LARGEST = 0.16  # of the largest distance of two shafts: the longest bar
 ONE_SIGN, TWO_SIGNS = colours_of("viridis_r", 0.05, 0.95), colours_of("PuOr", 0.02, 0.98)
 HATCHES = ("", "///", "...")
-NAMED_AT, INSIDE = 0.35, 0.07  # of a strand, and of the distance of the shafts: where its name stands
+NAMED_AT, INSIDE = 0.35, 0.36  # of a strand, and of the smallest radius: where its name stands
 HEIGHT = 3.1  # [inch] of a variator
 WATTS = 0.01  # of the largest bar: what is smaller has no number
 
 
-def run_geometry(history: xr.Dataset) -> tuple[Variator, float] | None:
-    """Path of the belt of a run and distance of the shafts [m]; None where the run is none of a variator."""
+class Drive(NamedTuple):
+    """The pulleys of a run and its belt, as they are drawn.
+
+    Attributes
+    ----------
+    path : BeltPath
+        Of the belt; tensioners stand as at rest.
+    pulleys, strands : tuple of str
+        Names; a strand is behind its pulley.
+    """
+
+    path: BeltPath
+    pulleys: tuple[str, ...]
+    strands: tuple[str, ...]
+
+    @property
+    def size(self) -> float:
+        """Largest distance of two shafts [m]."""
+        centre = self.path.centre
+        return float(np.hypot(*(centre[:, None] - centre).T).max())
+
+
+def run_geometry(history: xr.Dataset) -> Drive | None:
+    """The drive of a run: a variator, or a belt drive of any number of pulleys; None of another run."""
     try:
         point = json.loads(history.attrs["point"])
+        if "pulley_x" in point:
+            drawn = layout(point)
+            return Drive(drawn.path, drawn.pulleys, drawn.spans)
         ratio, driven, distance = (float(point[key]) for key in ("ratio", "driven_radius", "centre_distance"))
-        known = all(0.0 < value < np.inf for value in (ratio, driven, distance))
-        return (variator(ratio, driven, distance), distance) if known else None
-    except (KeyError, TypeError, ValueError, RecursionError):
+        if not all(0.0 < value < np.inf for value in (ratio, driven, distance)):
+            return None
+        centre = np.array([[0.0, 0.0], [distance, 0.0]])
+        return Drive(belt_path(centre, np.array([driven / ratio, driven]), np.ones(2)), PULLEYS, STRANDS)
+    except (AttributeError, KeyError, IndexError, TypeError, ValueError, RecursionError):
         return None
 
 
-def draw_pulleys(axes: Axes, path: Variator, distance: float) -> None:
-    """Draw both pulleys and the names of all parts [mm]."""
-    pulleys = ((0.0, path.driving_radius, "driving"), (distance, path.driven_radius, "driven"))
-    for centre, radius, name in pulleys:
-        axes.add_patch(Circle((1e3 * centre, 0.0), 1e3 * radius, color=PULLEY, zorder=0))
-        axes.text(1e3 * centre, 0.0, name, ha="center", va="center", fontsize=9)
-    starts = path.lengths[0], path.path_length
-    for strand, start, way in zip(("t1", "t2"), starts, (1.0, -1.0), strict=True):
-        at = start + way * NAMED_AT * path.strand_length
-        place, angle, _ = points_at(path, distance, np.array([at]))
-        inwards = INSIDE * distance * np.array([-np.sin(angle[0]), np.cos(angle[0])])
-        axes.text(*(1e3 * (place[0] + inwards)), strand, ha="center", va="center", fontsize=9)
+def draw_pulleys(axes: Axes, drive: Drive) -> None:
+    """Draw all pulleys, their names, and those of two strands [mm]."""
+    path = drive.path
+    for centre, radius, name in zip(1e3 * path.centre, 1e3 * path.radius, drive.pulleys, strict=True):
+        axes.add_patch(Circle(tuple(centre), radius, color=PULLEY, zorder=0))
+        axes.text(*centre, name, ha="center", va="center", fontsize=9, zorder=5)
+    # names such as P1-P2 of strands follow from those of the pulleys
+    for k, name in enumerate(drive.strands if len(drive.strands) == 2 else ()):
+        # both nearer to the driving pulley
+        share = NAMED_AT if k == 0 else 1.0 - NAMED_AT
+        at = path.ends[2 * k] + share * path.spans[k]
+        place, angle, _ = points_at(path, np.array([at]))
+        inwards = INSIDE * path.radius.min() * np.array([-np.sin(angle[0]), np.cos(angle[0])])
+        axes.text(*(1e3 * (place[0] + inwards)), name, ha="center", va="center", fontsize=9)
     axes.set(aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
 
 
-def draw_variator(
-    history: xr.Dataset, out: Path, quantities: Sequence[str] = ("push_force",), source: str = "history"
-) -> Path:
-    """Write the figure of `variator_figure`."""
-    return draw(lambda: variator_figure(history, quantities, source), out)
-
-
 @styled
-def variator_figure(
-    history: xr.Dataset, quantities: Sequence[str] = ("push_force",), source: str = "history"
-) -> Figure:
+def variator_figure(history: xr.Dataset, quantities: Sequence[str] = (), source: str = "history") -> Figure:
     """Draw quantities along the belt on the variator: the belt by colour, and bars outwards from it.
 
     Parameters
     ----------
     history : Dataset
-        Of a run of a variator, as `simulate` returns it.
+        Of a run of a variator or of a belt drive, as `simulate` returns it.
     quantities : sequence of str
         Variables over `position` [m], such as forces, sliding and power; each has a panel. Negative values
-        point inwards.
+        point inwards. By default the push force, or the tension of a belt without one.
     source : str
         Where the history is from, for the errors.
 
     Raises
     ------
     InputError
-        The history is none of a variator, or has no such quantity along the belt.
+        The history is none of a variator or belt drive, or has no such quantity along the belt.
     """
     found = run_geometry(history)
     if found is None or "position" not in history.coords:
-        raise mismatch(source, "the history of a run of a variator, with quantities over position", "another")
-    path, distance = found
+        raise mismatch(source, "the history of a run of a variator or belt drive, over position", "another")
     known = [str(key) for key, array in history.data_vars.items() if array.dims == ("position",)]
+    quantities = quantities or [next((name for name in DEFAULT if name in known), DEFAULT[0])]
     for name in quantities:
         if name not in known:
             raise unknown(f"{source}: {name}", "quantity along the belt", name, known)
     figure = Figure((WIDTH, HEIGHT * len(quantities) + 0.7), layout="constrained")
     for axes, name in zip(figure.subplots(len(quantities), 1, squeeze=False)[:, 0], quantities, strict=True):
-        _draw_belt(figure, axes, history[name], path, distance)
+        _draw_belt(figure, axes, history[name], found)
     common, _ = on_axes([history], [source])
-    lines = titles([history], "On the variator", common)
+    lines = titles([history], "On the pulleys", common)
     figure.suptitle("\n".join(balanced(line, 72) for line in lines))
     return figure
 
 
-def _draw_belt(figure: Figure, axes: Axes, array: xr.DataArray, path: Variator, distance: float) -> None:
+def _draw_belt(figure: Figure, axes: Axes, array: xr.DataArray, drive: Drive) -> None:
     """The belt in colours, with a bar at each station; of what is not known there is a thin line."""
-    draw_pulleys(axes, path, distance)
+    draw_pulleys(axes, drive)
     factor, unit = shown_unit(array)
     values = factor * array.values
     position = array["position"].values
-    points, angle, _ = points_at(path, distance, position)
+    points, angle, _ = points_at(drive.path, position)
     points = 1e3 * points
     outwards = np.stack([np.sin(angle), -np.cos(angle)], 1)
     closed = np.vstack([points, points[:1]])
@@ -118,7 +141,9 @@ def _draw_belt(figure: Figure, axes: Axes, array: xr.DataArray, path: Variator, 
     largest = float(np.abs(values[is_known]).max(initial=0.0)) or 1.0
     both = bool((values[is_known] < 0.0).any())
     norm = TwoSlopeNorm(0.0, -largest, largest) if both else Normalize(0.0, largest)
-    ends = points + (1e3 * LARGEST * distance / largest * np.where(is_known, values, 0.0))[:, None] * outwards
+    ends = (
+        points + (1e3 * LARGEST * drive.size / largest * np.where(is_known, values, 0.0))[:, None] * outwards
+    )
     colours = TWO_SIGNS if both else ONE_SIGN
     style = {"cmap": colours, "norm": norm, "array": values[is_known]}
     bars = np.stack([points, ends], 1)[is_known]
@@ -126,7 +151,7 @@ def _draw_belt(figure: Figure, axes: Axes, array: xr.DataArray, path: Variator, 
     belt = np.stack([closed[:-1], closed[1:]], 1)[is_known]
     drawn = axes.add_collection(LineCollection(list(belt), linewidths=4.0, **style, zorder=3))
     axes.plot(*np.vstack([ends, ends[:1]]).T, color=INK, lw=0.7, zorder=4)  # readable in grey
-    margin = 1.15e3 * LARGEST * distance
+    margin = 1.15e3 * LARGEST * drive.size
     for column, set_limits in enumerate((axes.set_xlim, axes.set_ylim)):
         set_limits(points[:, column].min() - margin, points[:, column].max() + margin)
     figure.colorbar(drawn, ax=axes, label=axis_label(array, unit), pad=0.02)
@@ -155,36 +180,40 @@ def region_powers(history: xr.Dataset) -> xr.DataArray:
     return xr.DataArray(shape, {"cause": causes, "region": names}, ("cause", "region"), attrs={"units": "W"})
 
 
-def draw_energy(history: xr.Dataset, out: Path, source: str = "history") -> Path:
-    """Write the figure of `energy_figure`."""
-    return draw(lambda: energy_figure(history, source), out)
-
-
 @styled
 def energy_figure(history: xr.Dataset, source: str = "history") -> Figure:
-    """Draw what friction takes on the arcs, and what feeds the vibration around the belt, in and out [W].
+    """Draw what the pulleys put in and take out, what is lost, and what feeds the vibration [W].
 
     Parameters
     ----------
     history : Dataset
-        As `simulate` returns it: `part_flank_loss` [W] over `pulley` and `arc_part`, or what
-        `region_powers` takes, or both.
+        As `simulate` returns it, with what `balance_of` takes, `part_flank_loss` [W] over `pulley` and
+        `arc_part`, or what `region_powers` takes.
     source : str
         Where the history is from, for the errors.
 
     Raises
     ------
     InputError
-        The history has neither.
+        The history has none of them.
     """
     powers = region_powers(history) if {"position", "region"} <= {*map(str, history.coords)} else None
     has_feeds = powers is not None and powers.sizes["cause"] > 0
     has_loss = "part_flank_loss" in history and bool(np.isfinite(history["part_flank_loss"]).any())
-    if not has_feeds and not has_loss:
-        expected = "a history with flank_feed or part_flank_loss, known at constant load and speed"
+    balance = balance_of(history)
+    rows = (balance is not None) + has_feeds + has_loss
+    if not rows:
+        expected = (
+            "a history with driving_power, flank_feed or part_flank_loss, known at constant load and speed"
+        )
         raise mismatch(source, expected, "none that is known")
-    figure = Figure((WIDTH, 2.2 * (has_feeds + has_loss) + 0.9), layout="constrained")
-    panels = list(figure.subplots(has_feeds + has_loss, 1, squeeze=False)[:, 0])
+    heights = [0.7 + 0.2 * balance.bars] if balance else []
+    heights += [2.2] * (has_feeds + has_loss)
+    figure = Figure((WIDTH, sum(heights) + 0.9), layout="constrained")
+    grid = figure.add_gridspec(rows, 2, width_ratios=(1.0, 1.6), height_ratios=heights)
+    if balance is not None:
+        draw_balance(figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1]), balance)
+    panels = [figure.add_subplot(grid[row, :]) for row in range(rows) if row or balance is None]
     if has_loss:
         axes, loss = panels.pop(0), history["part_flank_loss"].transpose("pulley", "arc_part")
         count = loss.sizes["arc_part"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -16,7 +15,6 @@ from cvt_hpc.analysis.figures import (
     STYLE,
     WIDTH,
     balanced,
-    draw,
     in_words,
     legend_columns,
     styled,
@@ -25,7 +23,8 @@ from cvt_hpc.analysis.figures import (
 from cvt_hpc.analysis.telling_apart import on_axes, titles
 from cvt_hpc.errors import InputError, mismatch, unknown
 
-DEFAULT = ("push_force", "friction_force", "ring_friction")
+# Drawn where nothing else is asked for: of each group the first that all runs have.
+DEFAULT = (("push_force", "tension"), ("friction_force", "tangential_friction"), ("ring_friction",))
 LINES = ("-", "--", "-.", ":")
 ARC = "#ececec"
 MOST_COLUMNS = 3
@@ -34,22 +33,10 @@ _UNITS = {"N m-1": (1e-3, "kN/m"), "m s-1": (1e3, "mm/s")}
 _REFERENCES = {"sliding_angle": 90.0}  # [°]: where sliding turns from one hand to the other
 
 
-def draw_profile(
-    histories: Sequence[xr.Dataset],
-    out: Path,
-    quantities: Sequence[str] = DEFAULT,
-    region: str | None = None,
-    columns: str | None = None,
-    sources: Sequence[str] = (),
-) -> Path:
-    """Write the figure of `profile_figure`."""
-    return draw(lambda: profile_figure(histories, quantities, region, columns, sources), out)
-
-
 @styled
 def profile_figure(
     histories: Sequence[xr.Dataset],
-    quantities: Sequence[str] = DEFAULT,
+    quantities: Sequence[str] = (),
     region: str | None = None,
     columns: str | None = None,
     sources: Sequence[str] = (),
@@ -61,7 +48,7 @@ def profile_figure(
     histories : sequence of Dataset
         As `simulate` returns them: quantities over `position`, with `region`.
     quantities : sequence of str
-        Variables over `position`.
+        Variables over `position`; none: push force or tension, and friction.
     region : str, optional
         "driving" or "driven": that arc alone, over the wrap angle; else the whole belt.
     columns : str, optional
@@ -78,6 +65,7 @@ def profile_figure(
     if not histories:
         raise InputError("profile: expected one history or more, found none")
     names = list(sources) or [f"history {k + 1}" for k in range(len(histories))]
+    quantities = quantities or _usual(histories)
     _check(histories, names, quantities, region)
     common, labels = on_axes(histories, names)
     groups = _groups(labels, columns, MOST_COLUMNS * (2 if len(quantities) == 1 else 1))
@@ -116,6 +104,11 @@ def profile_figure(
     lines = titles(histories, f"Along the belt{where}", common)
     figure.suptitle("\n".join(balanced(line, 76) for line in lines), fontsize=STYLE["figure.titlesize"])
     return figure
+
+
+def _usual(histories: Sequence[xr.Dataset]) -> list[str]:
+    known = [[name for name in group if all(name in history for history in histories)] for group in DEFAULT]
+    return [group[0] for group in known if group] or [group[0] for group in DEFAULT]
 
 
 def _check(

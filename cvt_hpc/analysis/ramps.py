@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.cells import colours_of
 from cvt_hpc.analysis.eigenfrequencies import strand_frequencies
-from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, draw, in_words, styled
+from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, in_words, styled
 from cvt_hpc.analysis.telling_apart import on_axes, titles
 from cvt_hpc.analysis.waterfall import ORDERS, draw_eigenfrequencies, draw_orders
 from cvt_hpc.errors import mismatch
@@ -50,13 +49,6 @@ class Ramp(NamedTuple):
     label: str
     motion: np.ndarray
     rate: float
-
-
-def draw_ramp(
-    histories: Sequence[xr.Dataset], out: Path, of: str = "t1", sources: Sequence[str] = ()
-) -> Path:
-    """Write the figure of `ramp_figure`."""
-    return draw(lambda: ramp_figure(histories, of, sources), out)
 
 
 @styled
@@ -109,11 +101,6 @@ def ramp_figure(histories: Sequence[xr.Dataset], of: str = "t1", sources: Sequen
     lines = [*titles(histories, f"Along the ramp, {name}", common), "dashed: 500 and 700 Hz"]
     figure.suptitle("\n".join(balanced(line, 80) for line in lines))
     return figure
-
-
-def draw_spectrogram(histories: Sequence[xr.Dataset], out: Path, sources: Sequence[str] = ()) -> Path:
-    """Write the figure of `spectrogram_figure`."""
-    return draw(lambda: spectrogram_figure(histories, sources), out)
 
 
 @styled
@@ -282,6 +269,10 @@ def read_ramp(
     first = int(np.searchsorted(time, _start_up(history)))
     factor, unit = coordinate_unit(course.attrs) if changing else (1.0, "s")
     rate = 1.0 / (time[1] - time[0])
+    if time.size - first < WINDOW * rate:
+        raise mismatch(source, f"a run of {WINDOW:g} s or more after its start-up", "a shorter one")
+    if rate < 2.0 * band[1]:
+        raise mismatch(source, f"a history of {2.0 * band[1]:g} samples per second or more", f"{rate:.4g}")
     if of in ("t1", "t2"):
         probes = [str(name).split()[0] == of for name in history["probe"].values]
         moved = 1e6 * history["displacement"].values[first:, probes]

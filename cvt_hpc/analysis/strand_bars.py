@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from matplotlib.figure import Figure
 from cvt_hpc.analysis.arrangement import arrange, ruler
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.curves import panels_of
-from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, draw, styled
+from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, styled
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.variables import Status
 
@@ -23,13 +22,6 @@ SHADES = {"t1": "#8a8a8a", "t2": "#c9c9c9"}
 PUSH = "#d55e00"
 BAR = 0.36  # of the distance of two runs
 NEEDED = ("mean_ring_tension", "mean_push_force")
-
-
-def draw_strand_bars(
-    dataset: xr.Dataset, out: Path, at: Mapping[str, Any] | None = None, source: str = "results"
-) -> Path:
-    """Write the figure of `strand_bars_figure`."""
-    return draw(lambda: strand_bars_figure(dataset, at, source), out)
 
 
 @styled

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.alignment import COMPARED, axes_of
+from cvt_hpc.analysis.arrangement import CHOSEN, Sides
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import mismatch, one_line
@@ -61,6 +64,52 @@ def join_studies(
         name: joined[name].fillna(value).astype(np.int8) for name, value in blank.items() if name in joined
     }
     return joined.assign(filled).drop_attrs(deep=False).assign_attrs(job_name=", ".join(labels))
+
+
+def side_by_side(
+    datasets: Sequence[xr.Dataset], sources: Sequence[str], names: Collection[str], sides: Sides
+) -> tuple[xr.Dataset, Sides]:
+    """Return studies joined, and the sides of their map: a panel for each unless `study` has a side."""
+    placed = sides if AXIS in sides else sides._replace(panel=sides.panel or AXIS)
+    return join_studies(datasets, sources, names), placed
+
+
+def maps_figure(
+    datasets: Sequence[xr.Dataset],
+    quantities: Sequence[str] = (),
+    at: Mapping[str, Any] | None = None,
+    sources: Sequence[str] = (),
+    sides: Sides = CHOSEN,
+    vmax: float | None = None,
+) -> Figure:
+    """Draw where vibration occurs, or quantities, of one study or of several on one scale of colours.
+
+    Parameters
+    ----------
+    datasets : sequence of Dataset
+        Results of studies over the same axes.
+    quantities : sequence of str
+        Variables to be drawn instead of occurrence.
+    at, sides, vmax
+        As `map_figure` takes them; `study` is one of the axes where there are several datasets.
+    sources : sequence of str
+        Where the datasets are from, for the errors; these also name studies of jobs of one name.
+
+    Raises
+    ------
+    InputError
+        As of `join_studies` and of all pictures.
+    """
+    from cvt_hpc.analysis.maps import map_figure
+    from cvt_hpc.analysis.value_maps import value_map_figure
+
+    named = list(sources) or [f"results {k + 1}" if k else "results" for k in range(len(datasets))]
+    dataset, source = datasets[0], ", ".join(named)
+    if len(datasets) > 1:
+        dataset, sides = side_by_side(datasets, named, quantities, sides)
+    if quantities:
+        return value_map_figure(dataset, quantities, at, source, sides, vmax)
+    return map_figure(dataset, at, source, sides, vmax)
 
 
 def _with_values_of(first: xr.Dataset, dataset: xr.Dataset) -> xr.Dataset:

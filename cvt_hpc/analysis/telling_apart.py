@@ -10,7 +10,7 @@ import xarray as xr
 
 from cvt_hpc.analysis.arrangement import infinity_in_words
 from cvt_hpc.analysis.histories import place_of
-from cvt_hpc.errors import mismatch, one_line
+from cvt_hpc.errors import InputError, mismatch, one_line
 
 
 def told_apart(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[str, list[str]]:
@@ -79,13 +79,17 @@ def history_files(paths: Sequence[Path]) -> list[Path]:
         if path.is_dir():
             files = [file for file in files if is_history(file)]
         if not files or not all(map(is_history, files)):
-            raise mismatch(
-                str(path),
-                "a history written by `cvt-hpc simulate --out`",
-                "no history" if path.is_dir() else "another file, or none",
-                "a sweep keeps those of the runs that `history` in [record] of its job names"
-                if path.is_dir()
-                else "",
-            )
+            raise _no_history(path)
         found += files
     return found
+
+
+def _no_history(path: Path) -> InputError:
+    """The error for a place without histories, with what makes one or draws what is there."""
+    if path.is_dir():
+        found, then = "none", "a sweep keeps those of the runs that `history` in [record] of its job names"
+    elif path.exists():
+        found, then = "another file", "`cvt-hpc map` and `cvt-hpc plot curve` draw the results of a study"
+    else:
+        found, then = "nothing", f"`cvt-hpc simulate JOB --out {path}` writes one"
+    return mismatch(str(path), "a history written by `cvt-hpc simulate --out`", found, then)

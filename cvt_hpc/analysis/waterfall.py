@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from textwrap import fill
 from typing import Any
 
@@ -20,7 +19,7 @@ from cvt_hpc.analysis.arrangement import CHOSEN, Ruler, Sides, along_x, arrange,
 from cvt_hpc.analysis.cells import colours_of
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.eigenfrequencies import along_axis
-from cvt_hpc.analysis.figures import WIDTH, draw, styled
+from cvt_hpc.analysis.figures import WIDTH, styled
 from cvt_hpc.errors import few_of, mismatch, one_line
 
 HEIGHT = 4.0  # [inch]
@@ -30,18 +29,6 @@ LABELLED = 0.94  # of the panel's height, up to which there is room for a number
 UNKNOWN = "#d0d4d8"  # of runs without a spectrum
 LINE, ORDER = "#123a6b", "#4d4d4d"
 ORDERS = (1.0, 2.0, 4.0, 8.0, 16.0)  # of the driving pulley, in a Campbell diagram
-
-
-def draw_waterfall(
-    dataset: xr.Dataset,
-    out: Path,
-    at: Mapping[str, Any] | None = None,
-    source: str = "results",
-    sides: Sides = CHOSEN,
-    orders: Sequence[float] = (),
-) -> Path:
-    """Write the figure of `waterfall_figure`."""
-    return draw(lambda: waterfall_figure(dataset, at, source, sides, orders), out)
 
 
 def campbell_figure(
@@ -79,7 +66,8 @@ def waterfall_figure(
     check_results(dataset, source)
     if "spectrum" not in dataset or "frequency_bin" not in dataset["spectrum"].dims:
         found = few_of(list(map(str, dataset.data_vars)), 6)
-        raise mismatch(source, "results with the variable spectrum", found)
+        then = "runs of elastic_belt, pushbelt or belt_drive record it, up to band_high in [vibration]"
+        raise mismatch(source, "results with the variable spectrum", found, then)
     arrangement = arrange(dataset, at or {}, source, sides)
     shown, notes = along_x(arrangement)
     x = ruler(shown[arrangement.x])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cvt_hpc.analysis.error_axes import COLOURS
-from cvt_hpc.analysis.figures import STYLE, WIDTH, balanced, draw, styled
+from cvt_hpc.analysis.figures import STYLE, WIDTH, balanced, styled
 from cvt_hpc.analysis.telling_apart import told_apart
 from cvt_hpc.errors import InputError, mismatch, one_line
 
@@ -29,11 +28,6 @@ INK = "#333333"
 MOST_PANELS = 3  # side by side; of more pulleys only those that carry torque have one
 LEAST_PULL = 0.05  # of the largest sum of friction forces, from which on a pulley carries torque
 FEW = 10  # places on an arc, each of which has a mark
-
-
-def draw_wrap(histories: Sequence[xr.Dataset], out: Path, sources: Sequence[str] = ()) -> Path:
-    """Write the figure of `wrap_figure`, with its arguments and errors, as `save_figure` does."""
-    return draw(lambda: wrap_figure(histories, sources), out)
 
 
 @styled

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import logging
 import os
+import re
 import sys
 import traceback
 import warnings
@@ -18,9 +19,14 @@ from typing import Any, NoReturn
 from cvt_hpc import __version__
 from cvt_hpc.cli import checking, experiments, plots, results, single_run, starting, sweep
 from cvt_hpc.cli.parts import BAD_INPUT, DONE, INTERRUPTED, complain, speaks
-from cvt_hpc.errors import CRASHED, InputError, JobWarning, mismatch, one_line, show
+from cvt_hpc.errors import CRASHED, InputError, JobWarning, did_you_mean, mismatch, one_line, show
 
 __all__ = ["main"]
+
+# How argparse tells of a word that is none of its choices
+_UNKNOWN_WORD = re.compile(
+    r"(?P<place>.*invalid choice: '(?P<word>[^']*)')(?P<rest> \(choose from (?P<known>.*)\))$"
+)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -120,6 +126,9 @@ class _Parser(argparse.ArgumentParser):
     """A parser whose errors are ours: under MPI one rank prints them, not all."""
 
     def error(self, message: str) -> NoReturn:
+        if match := _UNKNOWN_WORD.match(message):
+            word, known = match["word"], re.findall(r"[\w-]+", match["known"])
+            message = f"{match['place']}{did_you_mean(word, known) or match['rest']}"
         raise InputError(f"{message}; see `{self.prog} --help`")
 
 

@@ -26,9 +26,9 @@ def add(commands: Any) -> None:
     chart = add_command(commands, "chart", _chart, "measure speed against accuracy, and draw it", "JOB")
     add_folder(chart, "earlier results of the folder")
     add_assignments(chart, "--set", "replace a value of the job and of all its scenes")
-    text = "do the runs of a job on every rung, and compare them"
+    text = "do the runs of a job with every model of the ladder, and compare them"
     ladder = add_command(commands, "ladder", _ladder, text, "JOB")
-    add_folder(ladder, "earlier results of all rungs")
+    add_folder(ladder, "earlier results of all models")
     add_assignments(ladder, "--set", f"{REPLACE}; ladder.KEY replaces a key of [ladder]")
     text = "follow steady states along the load, to their Hopf points"
     branch = add_command(commands, "branch", _branch, text, "JOB")

@@ -6,7 +6,7 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,6 @@ _SUBJECTS = {
     "DIR": "output folder of a run",
     "RESULTS": "output folder of a run, or a dataset (.nc)",
     "HISTORIES": "dataset of one run (.nc), or the folder of a study: all runs whose histories it keeps",
-    "HISTORY": "dataset of one run (.nc), as simulate --out writes it",
 }
 
 
@@ -48,10 +47,11 @@ def add_assignments(command: argparse.ArgumentParser, flag: str, text: str) -> N
     command.add_argument(flag, action="append", default=[], metavar="KEY=VALUE", help=text)
 
 
-def add_sides(command: argparse.ArgumentParser) -> None:
-    """Add the options that lay axes of a study out; `sides_of` reads them."""
-    for side, place in (("x", "along x"), ("y", "along y"), ("panel", "over the panels")):
-        command.add_argument(f"--{side}", metavar="AXIS", help=f"axis of the study that runs {place}")
+def add_sides(command: argparse.ArgumentParser, sides: Sequence[str] = ("x", "y", "panel")) -> None:
+    """Add the options that lay axes of a study out; `sides_of` reads them where there are all three."""
+    places = {"x": "along x", "y": "along y", "panel": "over the panels"}
+    for side in sides:
+        command.add_argument(f"--{side}", metavar="AXIS", help=f"axis of the study that runs {places[side]}")
 
 
 def sides_of(arguments: argparse.Namespace) -> Sides:

@@ -1,248 +1,168 @@
-"""`plot`: pictures of results beside the map, each by its kind."""
+"""`plot`: pictures of results beside the map, each by its kind; `picture_kinds.py` declares them."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.cli.parts import DONE, PICTURES, add_assignments, add_command, check_output, picture_beside, say
-from cvt_hpc.errors import mismatch
+from cvt_hpc.cli.parts import (
+    DONE,
+    PICTURES,
+    SOME_FAILED,
+    add_assignments,
+    add_command,
+    add_sides,
+    check_output,
+    complain,
+    picture_beside,
+    say,
+)
+from cvt_hpc.errors import InputError
+from cvt_hpc.files import StorageError
+from cvt_hpc.picture_kinds import HISTORIES, HISTORY, KINDS, RESULTS, Kind
 
 
 def add(commands: Any) -> None:
     """Declare the command."""
     plot = commands.add_parser("plot", help="draw spectra, curves or forces", description="Draw results.")
     kinds = plot.add_subparsers(metavar="KIND", required=True)
-    text = "spectra of the strands over an axis, with eigenfrequencies where they are known"
-    waterfall = add_command(kinds, "waterfall", _waterfall, text, "RESULTS")
-    text = "Campbell diagram: spectra over the driving speed, with eigenfrequencies and orders"
-    campbell = add_command(kinds, "campbell", _campbell, text, "RESULTS")
-    text = "multiples of the driving pulley's turns (default: 1 2 4 8 16)"
-    campbell.add_argument("--orders", nargs="+", type=float, metavar="ORDER", help=text)
-    text = "where vibration begins and ends along ramps up and down, and the bands between them"
-    hysteresis = add_command(kinds, "hysteresis", _hysteresis, text, "RESULTS")
-    text = "a quantity over an axis as marks, and others of its unit as lines beside it"
-    curve = add_command(kinds, "curve", _curve, text, "RESULTS")
-    curve.add_argument("quantities", nargs="+", metavar="QUANTITY", help="variable of the results")
-    text = "forces between belt and pulleys over the wrap, of one run or of several"
-    wrap = add_command(kinds, "wrap", _wrap, text, "HISTORY")
-    wrap.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
-    text = "quantities along the belt of one run or of several, such as forces and sliding"
-    profile = add_command(kinds, "profile", _profile, text, "HISTORIES")
-    profile.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
-    text = "variable over position; may be repeated (default: push_force, friction_force, ring_friction)"
-    profile.add_argument("--of", action="append", default=[], metavar="QUANTITY", help=text)
-    profile.add_argument("--region", choices=("driving", "driven"), help="over the wrap of that pulley alone")
-    profile.add_argument("--columns", metavar="AXIS", help="a column of panels for each value of an axis")
-    text = "motion of a strand along a ramp of load or speed, with its spectrogram"
-    ramp = add_command(kinds, "ramp", _ramp, text, "HISTORIES")
-    ramp.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
-    ramp.add_argument(
-        "--of", default="t1", metavar="WHAT", help="t1, t2 or a variable over time (default: t1)"
-    )
-    text = "spectra of the strands side by side along a ramp or over time, with eigenfrequencies"
-    spectrogram = add_command(kinds, "spectrogram", _spectrogram, text, "HISTORIES")
-    spectrogram.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
-    text = "sliding of one element on the sheaves over time, along its path"
-    element = add_command(kinds, "element", _element, text, "HISTORY")
-    element.add_argument("--region", choices=("driving", "driven"), help="one passage of that arc alone")
-    text = "what the element meets over time, as a dataset"
-    element.add_argument("--data", type=Path, metavar="FILE.nc", help=text)
-    text = "tension and push force of the strands over an axis, as bars"
-    strands = add_command(kinds, "strands", _strands, text, "RESULTS")
-    of_one = {
-        "history": "a kept run: displacement, spectrum, load, forces and feeds around the belt",
-        "phase": "phase portraits: velocity of each strand over its displacement",
-        "flanks": "left and right flank of a spatial pushbelt, with the ends of the arcs enlarged",
-        "energy": "powers around the belt: what friction takes on the arcs, what feeds the vibration",
-        "variator": "quantities along the belt drawn on the variator, such as forces, speeds and slip",
-    }
-    for kind, text in of_one.items():
-        command = add_command(kinds, kind, _of_one, text, "HISTORY")
-        command.set_defaults(kind=kind)
-        text = f"default: HISTORY_{kind}.png beside the dataset"
-        command.add_argument("--out", type=Path, metavar="PNG", help=text)
-    text = "variable over position; may be repeated (default: push_force)"
-    command.add_argument("--of", action="append", default=[], metavar="QUANTITY", help=text)
+    for name, kind in KINDS.items():
+        _add_kind(kinds, name, kind)
     text = "the belt in the last periods of a run, magnified, as a moving picture"
-    animation = add_command(kinds, "animation", _animation, text, "HISTORY")
+    animation = add_command(kinds, "animation", _animation, text, HISTORIES)
     text = "FILE.gif, or FILE.mp4 where there is ffmpeg (default: HISTORY.gif beside it)"
     animation.add_argument("--out", type=Path, metavar="GIF", help=text)
-    names = {
-        strands: "strands",
-        hysteresis: "hysteresis",
-        campbell: "campbell",
-        spectrogram: "spectrogram",
-        waterfall: "waterfall",
-        curve: "curve_QUANTITY",
-        wrap: "HISTORY_wrap",
-        profile: "profile",
-    }
-    names |= {ramp: "ramp_WHAT", element: "element"}
-    for command, name in names.items():
-        text = f"default: {name}.png beside the dataset"
-        command.add_argument("--out", type=Path, metavar="PNG", help=text)
-    waterfall.add_argument("--x", metavar="AXIS", help="axis of the study that runs along x")
-    for command in (waterfall, curve, strands, hysteresis, campbell):
+
+
+def _add_kind(kinds: Any, name: str, kind: Kind) -> None:
+    command = add_command(kinds, name, _draw, kind.text, RESULTS if kind.subject == RESULTS else HISTORIES)
+    command.set_defaults(kind=name)
+    for option in kind.options:
+        place: dict[str, Any] = {"dest": option.key} if option.flag else {}
+        command.add_argument(option.flag or option.key, help=option.text, **place, **option.settings)
+    if kind.subject == HISTORIES:
+        command.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
+    each = "; of several runs with the name of each" if kind.subject == HISTORY else ""
+    if kind.data:
+        text = f"what the picture shows, as a dataset{each}"
+        command.add_argument("--data", type=Path, metavar="FILE.nc", help=text)
+    text = f"default: {kind.picture or name}.png beside the dataset{each}"
+    command.add_argument("--out", type=Path, metavar="PNG", help=text)
+    add_sides(command, kind.sides)
+    if kind.subject == RESULTS:
         add_assignments(command, "--at", "fix an axis at a value")
 
 
-def _waterfall(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.arrangement import Sides
-    from cvt_hpc.analysis.waterfall import draw_waterfall
+def _draw(arguments: argparse.Namespace) -> int:
+    name, kind = arguments.kind, KINDS[arguments.kind]
+    keys = *(option.key for option in kind.options), *kind.sides
+    options = {key: value for key in keys if (value := getattr(arguments, key)) not in (None, [])}
+    named = [options[option.key] for option in kind.options if option.is_named and option.key in options]
+    words = [name, *(word for value in named for word in ([value] if isinstance(value, str) else value))]
+    check_output(arguments.out, PICTURES)
+    if kind.subject == RESULTS:
+        _draw_results(arguments, words, options)
+        return DONE
+    if kind.subject == HISTORIES:
+        _draw_together(arguments, words, options)
+        return DONE
+    data = getattr(arguments, "data", None)
+    check_output(data, (".nc",))
+
+    def beside(file: Path) -> Path:
+        return picture_beside(arguments.path, *([file.stem] if kind.picture else []), *words)
+
+    def write(history: Any, out: Path, source: str, of_several: str) -> list[str]:
+        written = [f"picture: {_write(name, [history], out, None, [source], options)}"]
+        if data:
+            from cvt_hpc.analysis.composing import function_of
+            from cvt_hpc.netcdf import write_history
+
+            shown = function_of(kind.data)(history, source=source, **options)
+            written.append(f"data: {write_history(shown, data.with_stem(data.stem + of_several))}")
+        return written
+
+    return _each(arguments, beside, write)
+
+
+def _draw_results(arguments: argparse.Namespace, words: Sequence[str], options: dict[str, Any]) -> None:
+    from cvt_hpc.job.assignments import read_coordinates
     from cvt_hpc.study import open_results
 
-    out = _picture(arguments, "waterfall", *arguments.at)
+    source = str(arguments.path)
+    out = arguments.out or picture_beside(arguments.path, *words, *arguments.at)
     with open_results(arguments.path) as dataset:
-        at = _at(arguments, dataset)
-        say(f"picture: {draw_waterfall(dataset, out, at, str(arguments.path), Sides(arguments.x))}")
-    return DONE
+        units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
+        at = read_coordinates(arguments.at, units, source, "--at")
+        say(f"picture: {_write(arguments.kind, [dataset], out, at, [source], options)}")
 
 
-def _campbell(arguments: argparse.Namespace) -> int:
+def _draw_together(arguments: argparse.Namespace, words: Sequence[str], options: dict[str, Any]) -> None:
+    from cvt_hpc.analysis.telling_apart import history_files
+
+    files = history_files([arguments.path, *arguments.others])
+    names = [file.stem for file in files]
+    runs = names if KINDS[arguments.kind].picture.startswith(HISTORY) else []
+    out = arguments.out or picture_beside(arguments.path, *runs, *words)
+    with _opened(files) as histories:
+        say(f"picture: {_write(arguments.kind, histories, out, None, names, options)}")
+
+
+def _write(
+    name: str, datasets: Sequence[Any], out: Path, at: Any, sources: Sequence[str], options: dict[str, Any]
+) -> Path:
+    from cvt_hpc.analysis.composing import compose
     from cvt_hpc.analysis.figures import draw
-    from cvt_hpc.analysis.waterfall import ORDERS, campbell_figure
-    from cvt_hpc.study import open_results
 
-    out, orders = _picture(arguments, "campbell", *arguments.at), arguments.orders or ORDERS
-    with open_results(arguments.path) as dataset:
-        at = _at(arguments, dataset)
-        picture = draw(lambda: campbell_figure(dataset, at, str(arguments.path), orders), out)
-        say(f"picture: {picture}")
-    return DONE
-
-
-def _hysteresis(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.hysteresis_bands import draw_hysteresis
-    from cvt_hpc.study import open_results
-
-    out = _picture(arguments, "hysteresis", *arguments.at)
-    with open_results(arguments.path) as dataset:
-        at = _at(arguments, dataset)
-        say(f"picture: {draw_hysteresis(dataset, out, at, str(arguments.path))}")
-    return DONE
-
-
-def _curve(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.curves import draw_curve
-    from cvt_hpc.study import open_results
-
-    out = _picture(arguments, "curve", *arguments.quantities, *arguments.at)
-    with open_results(arguments.path) as dataset:
-        at = _at(arguments, dataset)
-        say(f"picture: {draw_curve(dataset, arguments.quantities, out, at, str(arguments.path))}")
-    return DONE
-
-
-def _strands(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.strand_bars import draw_strand_bars
-    from cvt_hpc.study import open_results
-
-    out = _picture(arguments, "strands", *arguments.at)
-    with open_results(arguments.path) as dataset:
-        at = _at(arguments, dataset)
-        say(f"picture: {draw_strand_bars(dataset, out, at, str(arguments.path))}")
-    return DONE
+    return draw(lambda: compose(name, datasets, at, sources, **options), out)
 
 
 def _animation(arguments: argparse.Namespace) -> int:
     from cvt_hpc.analysis.animation import check_animation, draw_animation
+
+    def write(history: Any, out: Path, source: str, _: str) -> list[str]:
+        return [f"animation: {draw_animation(history, out, source)}"]
+
+    check_animation(arguments.out or Path("belt.gif"))
+    return _each(arguments, lambda file: file.with_suffix(".gif"), write)
+
+
+def _each(
+    arguments: argparse.Namespace,
+    beside: Callable[[Path], Path],
+    write: Callable[[Any, Path, str, str], list[str]],
+) -> int:
+    """Write a picture of each history that is given, one by one; of several the others of one that has none.
+
+    Parameters
+    ----------
+    beside : callable
+        Where the picture of a file goes; of several histories it has the name of the run.
+    write : callable
+        Draws a history to a place, given its source and what tells it from several, and tells in lines what
+        was written.
+    """
     from cvt_hpc.analysis.telling_apart import history_files
 
-    (file,) = history_files([arguments.path])
-    out = arguments.out or file.with_suffix(".gif")
-    check_animation(out)
-    with _opened([file]) as (history,):
-        say(f"animation: {draw_animation(history, out, str(file))}")
-    return DONE
-
-
-def _of_one(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis import flanks, histories, on_variator
-    from cvt_hpc.analysis.telling_apart import history_files
-
-    (file, *others), quantities = history_files([arguments.path]), getattr(arguments, "of", [])
-    if others:
-        raise mismatch(str(arguments.path), "one history", f"{len(others) + 1}: {file.name}, ...")
-    out = _picture(arguments, file.stem, arguments.kind, *quantities)
-    with _opened([file]) as (history,):
-        if arguments.kind == "history":
-            picture = histories.draw_history(history, out)
-        elif arguments.kind == "phase":
-            picture = histories.draw_phase(history, out, str(file))
-        elif arguments.kind == "flanks":
-            picture = flanks.draw_flanks(history, out, str(file))
-        elif arguments.kind == "energy":
-            picture = on_variator.draw_energy(history, out, str(file))
-        else:
-            picture = on_variator.draw_variator(history, out, quantities or ["push_force"], str(file))
-        say(f"picture: {picture}")
-    return DONE
-
-
-def _wrap(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.telling_apart import history_files
-
-    files = history_files([arguments.path, *arguments.others])
-    out = _picture(arguments, *(file.stem for file in files), "wrap")
-    from cvt_hpc.analysis.wraps import draw_wrap
-
-    with _opened(files) as histories:
-        say(f"picture: {draw_wrap(histories, out, [file.stem for file in files])}")
-    return DONE
-
-
-def _profile(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.profiles import DEFAULT, draw_profile
-    from cvt_hpc.analysis.telling_apart import history_files
-
-    out = _picture(arguments, "profile", *filter(None, (*arguments.of, arguments.region)))
-    files = history_files([arguments.path, *arguments.others])
-    with _opened(files) as histories:
-        chosen = arguments.of or DEFAULT, arguments.region, arguments.columns
-        say(f"picture: {draw_profile(histories, out, *chosen, [file.stem for file in files])}")
-    return DONE
-
-
-def _ramp(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.ramps import draw_ramp
-    from cvt_hpc.analysis.telling_apart import history_files
-
-    out = _picture(arguments, "ramp", arguments.of)
-    files = history_files([arguments.path, *arguments.others])
-    with _opened(files) as histories:
-        say(f"picture: {draw_ramp(histories, out, arguments.of, [file.stem for file in files])}")
-    return DONE
-
-
-def _spectrogram(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.ramps import draw_spectrogram
-    from cvt_hpc.analysis.telling_apart import history_files
-
-    out = _picture(arguments, "spectrogram")
-    files = history_files([arguments.path, *arguments.others])
-    with _opened(files) as histories:
-        say(f"picture: {draw_spectrogram(histories, out, [file.stem for file in files])}")
-    return DONE
-
-
-def _element(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.followed_drawing import draw_element, followed_of
-    from cvt_hpc.analysis.telling_apart import history_files
-    from cvt_hpc.netcdf import write_history
-
-    out = _picture(arguments, "element", *filter(None, [arguments.region]))
-    check_output(arguments.data, (".nc",))
-    files, written = history_files([arguments.path]), []
-    with _opened(files[:1]) as (history,):
-        if arguments.data is not None:
-            followed = followed_of(history, arguments.region, str(files[0]))
-            written.append(f"data: {write_history(followed, arguments.data)}")
-        say(f"picture: {draw_element(history, out, arguments.region, str(files[0]))}", *written)
-    return DONE
+    files, status = history_files([arguments.path]), DONE
+    for file in files:
+        out, of_several = arguments.out or beside(file), f"_{file.stem}" if len(files) > 1 else ""
+        if arguments.out or file.stem not in out.stem:
+            out = out.with_stem(out.stem + of_several)
+        try:
+            with _opened([file]) as (history,):
+                say(*write(history, out, str(file), of_several))
+        except StorageError:
+            raise
+        except InputError as error:
+            if len(files) == 1:
+                raise
+            complain(str(error))
+            status = SOME_FAILED
+    return status
 
 
 @contextmanager
@@ -254,16 +174,3 @@ def _opened(files: Sequence[Path]) -> Iterator[list[Any]]:
         yield [
             stack.enter_context(xr.open_dataset(file, engine="netcdf4", decode_times=False)) for file in files
         ]
-
-
-def _picture(arguments: argparse.Namespace, *words: str) -> Path:
-    """The picture asked for, or one beside the dataset whose name tells what it shows."""
-    check_output(arguments.out, PICTURES)
-    return arguments.out or picture_beside(arguments.path, *words)
-
-
-def _at(arguments: argparse.Namespace, dataset: Any) -> dict[str, Any]:
-    from cvt_hpc.job.assignments import read_coordinates
-
-    units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
-    return read_coordinates(arguments.at, units, str(arguments.path), "--at")

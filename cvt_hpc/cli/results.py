@@ -88,11 +88,9 @@ def _map(arguments: argparse.Namespace) -> int:
         datasets = [opened.enter_context(open_results(path)) for path in paths]
         dataset, sides = datasets[0], sides_of(arguments)
         if arguments.others:
-            from cvt_hpc.analysis.studies import AXIS, join_studies
+            from cvt_hpc.analysis.studies import side_by_side
 
-            dataset = join_studies(datasets, list(map(str, paths)), arguments.show)
-            if AXIS not in sides:
-                sides = sides._replace(panel=sides.panel or AXIS)
+            dataset, sides = side_by_side(datasets, list(map(str, paths)), arguments.show, sides)
         units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
         at = read_coordinates(arguments.at, units, source, "--at")
         from cvt_hpc.analysis.maps import draw_map
@@ -140,7 +138,7 @@ def _report(arguments: argparse.Namespace) -> int:
     out = arguments.out or folder_of(arguments.path) / "report.html"
     check_output(out, (".html",))
     with open_results(arguments.path) as dataset:
-        say(f"report: {write_report(dataset, out, str(arguments.path))}")
+        say(f"report: {write_report(dataset, out, str(arguments.path), folder_of(arguments.path))}")
     return DONE
 
 

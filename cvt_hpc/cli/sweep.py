@@ -59,11 +59,11 @@ def add(commands: Any) -> None:
         "there as often as most_refinements says (default: the first factor not tried yet, 16 after three "
         "halvings; 1: the job's own step again)",
     )
-    audit = "do so large a part of the runs that lower rungs of model auto have answered in full, and compare"
+    audit = "repeat this share of the runs that model auto has decided by cheaper models in full, and compare"
     run.add_argument("--audit", type=float, metavar="FRACTION", help=audit)
-    check_step = "do so large a part of the runs again at half their time step, and compare"
+    check_step = "repeat this share of the runs at half their time step, and compare"
     run.add_argument("--check-step", type=float, metavar="FRACTION", help=check_step)
-    check_by = "how --check-step does them: at half the step (default), or by the stepper explicit"
+    check_by = "how --check-step repeats them: at half the step (default), or by the stepper explicit"
     run.add_argument("--check-step-by", choices=("half", "explicit"), help=check_by)
     add_assignments(run, "--set", REPLACE)
 

@@ -23,6 +23,19 @@ from cvt_hpc.tables import columns
 _FIRST_AXES = {"load_share": (0.2, 0.4, 0.6), "friction_gradient": None}
 _SHARES = (0.5, 1.0, 1.5)  # of the default, else
 _LONGEST = 120  # letters of a line
+# Units in which engineers give a size, by SI unit: each from a magnitude [SI] on, the largest first
+_CUSTOMARY = {
+    "m": ((1.0, "m"), (1e-4, "mm"), (1e-9, "um")),
+    "s": ((0.1, "s"), (1e-4, "ms"), (1e-9, "us")),
+    "m/s": ((0.1, "m/s"), (1e-9, "mm/s")),
+    "N": ((1e3, "kN"),),
+    "N m": ((1e4, "kN m"),),
+    "N m/rad": ((1e4, "kN m/rad"),),
+    "N/m": ((1e6, "kN/mm"), (1e4, "kN/m")),
+    "N/m^2": ((1e9, "kN/mm^2"), (1e6, "N/mm^2")),
+    "Pa": ((1e9, "GPa"), (1e6, "MPa")),
+    "Hz": ((1e4, "kHz"),),
+}
 
 
 def model_lines() -> list[str]:
@@ -76,7 +89,7 @@ def job_template(name: str, model: str, source: str) -> str:
         raise mismatch(f"{source}: model", "a model whose runs are recorded", f"{model}, for charts alone")
     axis = _axis(schema)
     lines = [
-        f"# A study with the model {model}: {loaded.title}",
+        *_commented(f"A study with the model {model}: {loaded.title}"),
         "# Each key stands here with its default: take away the # to change it. Defaults that no paper gives",
         f"# are assumptions. `cvt-hpc check {name}.toml` shows what this file does and what it costs,",
         f"# `cvt-hpc run {name}.toml` does it, and `cvt-hpc map out/{name}` draws the result.",
@@ -86,7 +99,7 @@ def job_template(name: str, model: str, source: str) -> str:
         'description = ""',
     ]
     if loaded.steppers:
-        lines += [f'# stepper = "{schema.stepper}"  # {", ".join(loaded.steppers)}']
+        lines += [*_commented(f"steppers: {', '.join(loaded.steppers)}"), f'# stepper = "{schema.stepper}"']
     lines += [
         "",
         "[axes]  # what the study varies: any key with a number or a choice",
@@ -151,8 +164,16 @@ def _as_toml(parameter: Parameter) -> str:
         return _list_as_toml(value)
     if isinstance(value, int) or not unit or not math.isfinite(value):
         return repr(value)
-    texts = (angle_in_words(value, unit), in_words(value, unit), f"{value!r} {unit}")
+    texts = (_in_customary(value, unit), in_words(value, unit), f"{value!r} {unit}")
     return next(f'"{text}"' for text in texts if text and to_si(text, unit) == value)
+
+
+def _in_customary(value: float, unit: str) -> str:
+    """Return a number [unit] as engineers give it, rounded for people; "" where that is the SI unit."""
+    wanted = next((other for least, other in _CUSTOMARY.get(unit, ()) if least <= abs(value)), "")
+    if not wanted:
+        return angle_in_words(value, unit)
+    return in_words(value, unit, wanted)
 
 
 def _list_as_toml(values: tuple) -> str:
@@ -167,7 +188,10 @@ def _axis(schema: Schema) -> str:
     key = next(key for key in (*preferred, *known) if _FIRST_AXES.get(key) or _may_be_varied(known[key]))
     unit = known[key].unit
     values = _FIRST_AXES.get(key) or [share * known[key].default for share in _SHARES]
-    texts = [f'"{in_words(value, unit)}"' if unit else in_words(value, unit) for value in values]
+    texts = [
+        f'"{_in_customary(value, unit) or in_words(value, unit)}"' if unit else in_words(value, unit)
+        for value in values
+    ]
     return f"{key} = [{', '.join(texts)}]"
 
 

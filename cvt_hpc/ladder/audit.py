@@ -19,7 +19,7 @@ from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.record.recovery import read_records
-from cvt_hpc.study.repeats import AUDITED, FULL_MODEL, Repeat, built, interval
+from cvt_hpc.study.repeats import AUDIT, AUDITED, FULL_MODEL, Repeat, built, interval
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.status import expected_cost
 from cvt_hpc.variables import Status
@@ -28,7 +28,7 @@ from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, classify_runs
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
-FOLDER, TABLE = "audit", "audit.csv"  # in the folder of the runs, and in that of the audit
+TABLE = "audit.csv"  # in the folder of the audit
 LOWER = (Rung.PASSIVE, Rung.COARSE)
 OPPOSITE = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
 FORCES = (("mean_ring_tension", "mean_push_force"), ("axial_force",))  # each group over its largest
@@ -101,18 +101,20 @@ def audit_of(job: Job, out: Path, fraction: float) -> Repeat:
         If the job has no ladder.
     """
     if job.model != AUDITED:
-        raise mismatch("--audit", f"a job of model {AUDITED}, whose rungs can err", f"model {job.model}")
-    full = built(job, handed_to(job, FULL_MODEL, "done in full, to audit the rungs below"))
+        raise mismatch(
+            "--audit", f"a job of model {AUDITED}, whose cheaper models can err", f"model {job.model}"
+        )
+    full = built(job, handed_to(job, FULL_MODEL, "done in full, to audit the cheaper models"))
     return Repeat(
         "audit",
         "in full",
         job,
         out,
-        FOLDER,
+        AUDIT,
         full,
         fraction,
         _answered,
-        core_seconds=lambda: expected_cost(full, out / FOLDER)[0],
+        core_seconds=lambda: expected_cost(full, out / AUDIT)[0],
     )
 
 

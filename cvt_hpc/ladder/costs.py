@@ -36,11 +36,11 @@ def cost_left(rung: Rung, out: Path | None) -> tuple[int, float]:
 def plan_lines(asked: Ladder, out: Path) -> Iterator[str]:
     """Yield the lines that state the runs of a ladder on each model, and their expected cost."""
     job, rungs = asked.job, asked.rungs
-    yield f"ladder {job.name} ({job.source}): {job.size} runs on {len(rungs)} rungs"
+    yield f"ladder {job.name} ({job.source}): {job.size} runs with {len(rungs)} models"
     if job.description:
         yield job.description
     left = {rung.name: cost_left(rung, out) for rung in rungs}
-    heads = ["rung", "model", "runs", "left", "core-s left", "answers"]
+    heads = ["name", "model", "runs", "left", "core-s left", "answers"]
     yield from columns(
         [
             heads,

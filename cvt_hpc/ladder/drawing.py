@@ -57,7 +57,7 @@ def ladder_figure(job: Job, findings: Sequence[Finding]) -> Figure:
     }
     styles[REFERENCE] = {"color": "black", "marker": "*", "ls": "", "ms": 8}
     figure = Figure((WIDTH, HEIGHT), layout="constrained")
-    figure.suptitle(f"{job.name}: error of each rung against its cost, lower left is better")
+    figure.suptitle(f"{job.name}: error of each model against its cost, lower left is better")
     panels = figure.subplots(3, 2, sharey=True).flat
     for axes, question in zip(panels, QUESTIONS, strict=False):
         _draw_panel(axes, question, [f for f in findings if f.question == question], styles, unit)

@@ -19,7 +19,7 @@ from cvt_hpc.parameters import Parameter
 TABLE = "ladder"
 _KEYS = {
     "reference": Parameter(MODEL, "", "model of the reference", choices=(MODEL, PUSHBELT)),
-    "beside": Parameter(NONE, "", "a dearer model beside the rungs", choices=(NONE, *BESIDE)),
+    "beside": Parameter(NONE, "", "a dearer model beside those of the ladder", choices=(NONE, *BESIDE)),
 }
 
 

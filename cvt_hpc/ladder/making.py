@@ -87,7 +87,7 @@ def run_ladder(
             # by the time of earlier models, as far as they count beside all; at first by prediction alone
             to_go *= (spent + predicted / detect_launch().size) / (done + predicted)
             expected = f"{runs} runs, {show_duration(to_go)} to go in all"
-            announce(f"rung {number}/{len(rungs)} {rung.name}: {expected}")
+            announce(f"model {number}/{len(rungs)} {rung.name}: {expected}")
         started = time.monotonic()
         # threads of the linear algebra wait for each other in loops, which would count as a model's own time
         with one_thread():

@@ -113,7 +113,7 @@ def _check(job: Job) -> None:
         raise mismatch(f"{where}: [axes]", "load among the axes, for its onsets", ", ".join(axes) or "none")
     for key in (quantity.history for quantity in QUANTITIES.values()):
         if (course := job.parameters[key]) != "constant":
-            raise mismatch(f"{where}: [scene] {key}", "constant, as the lower rungs have it", course)
+            raise mismatch(f"{where}: [scene] {key}", "constant, as the cheaper models have it", course)
     stated = [rule.key for rule in job.rules if not rule.is_substituted]
     varied = dict.fromkeys(stated, ("derived", "a formula"))
     varied |= dict.fromkeys(axes, ("axes", "an axis"))
@@ -127,7 +127,7 @@ def _handed(job: Job, model: str, table: dict[str, Any]) -> Job:
     """The same runs on another model, without the axes that it does not know."""
     known = known_keys(model)
     fewer = replace(job, axes=tuple(axis for axis in job.axes if axis.name in known))
-    document = handed_to(fewer, model, "a rung of its ladder")
+    document = handed_to(fewer, model, "a model of its ladder")
     if table:
         document[model] = table
     return rebuild_job(document, job.source, job.units)

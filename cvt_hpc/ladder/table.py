@@ -31,7 +31,7 @@ NUMBERS = {
     ),
     "undecided_share": (
         "undecided cells",
-        "share of cells, or of the reference's onsets, of which the rung says nothing",
+        "share of cells, or of the reference's onsets, of which the model says nothing",
     ),
     "additional": (
         "additional onsets",

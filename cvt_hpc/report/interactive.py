@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from base64 import b64encode
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.arrangement import arrange, ruler, value_text
 from cvt_hpc.analysis.classes import OccurrenceClass, map_classes, occurrence_classes
 from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words
+from cvt_hpc.analysis.hysteresis_bands import ALONG, INK, lowest_onsets, of_each_start
 from cvt_hpc.analysis.scatter import is_sampled, sample_axes
 from cvt_hpc.analysis.starts import AXIS, has_starts, join_starts
 from cvt_hpc.report.findings import is_judged
@@ -61,13 +63,19 @@ def map_data(dataset: xr.Dataset, source: str = "results") -> dict[str, Any]:
         dataset = dataset.sortby([name for name in names if dataset[name].dtype.kind in "iuf"])
         axes = [_grid_axis(dataset[name]) for name in names]
     classes, runs = map_classes(dataset), occurrence_classes(dataset)
+    starts = _from_both_starts(dataset, names)
+    onsets = [] if sampled else list(_onsets(classes.values, names, axes, from_both=False))
+    if starts is not None:
+        onsets += _onsets(starts, names, axes, from_both=True)
     data = {
         "sampled": sampled,
         "axes": axes,
         "sides": {side: names.index(name) if name else -1 for side, name in sides.items()},
         "classes": _bytes(classes.values, np.int8),
         "inferred": _bytes(classes.values != runs.values, np.int8) if (classes != runs).any() else "",
-        "starts": _from_both_starts(dataset, names),
+        "starts": "" if starts is None else _bytes(starts, np.int8),
+        "onsets": onsets,
+        "onsetColour": INK,
         "kinds": {int(kind): _kind(kind) for kind in StartClass},
         "inferredVibration": cells.INFERRED_VIBRATION,
         "vibrating": int(OccurrenceClass.VIBRATING),
@@ -95,6 +103,7 @@ def _grid_axis(axis: xr.DataArray) -> dict[str, Any]:
         "centres": ruled.centres.tolist(),
         "edges": ruled.edges.tolist(),
         "ticks": ticks,
+        "minor": ruled.minor.tolist(),
     }
 
 
@@ -115,12 +124,29 @@ def _sampled_axis(axis: xr.DataArray) -> dict[str, Any]:
     }
 
 
-def _from_both_starts(dataset: xr.Dataset, names: list[str]) -> str:
-    """Classes from the smallest and the largest disturbance, as over the whole grid; "" without that axis."""
+def _from_both_starts(dataset: xr.Dataset, names: list[str]) -> NDArray[np.int8] | None:
+    """Classes from the smallest and the largest disturbance, over the whole grid; None without that axis."""
     if not has_starts(dataset, {}):
-        return ""
+        return None
     joined = map_classes(join_starts(dataset)).expand_dims({AXIS: dataset.sizes[AXIS]})
-    return _bytes(joined.transpose(*names).values, np.int8)
+    return joined.transpose(*names).values
+
+
+def _onsets(
+    classes: NDArray[np.int8], names: list[str], axes: list[dict[str, Any]], from_both: bool
+) -> Iterator[dict[str, Any]]:
+    """Yield the onset lines along each axis on which a vibration may set in.
+
+    Of each line the places along its axis, over all other axes.
+    """
+    for name in (name for name in ALONG if name in names and len(names) > 1):
+        axis = names.index(name)
+        centres = np.array(axes[axis]["centres"])
+        for label, style, kinds in of_each_start(classes):
+            lowest = lowest_onsets(centres, np.moveaxis(kinds, axis, -1).reshape(-1, centres.size))
+            if np.isfinite(lowest).any():
+                line = {"axis": axis, "starts": from_both, "label": label, "dashed": style == "--"}
+                yield line | {"at": _bytes(lowest, np.dtype("<f4"))}
 
 
 def _kind(kind: StartClass) -> dict[str, Any]:

@@ -10,6 +10,7 @@ const OCCURRENCE = -1, STARTS = -2;
 const bytes = text => Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
 const flags = text => text ? new Int8Array(bytes(text).buffer) : null;
 const classes = flags(data.classes), inferred = flags(data.inferred), starts = flags(data.starts);
+for (const one of data.onsets) one.at = new Float32Array(bytes(one.at).buffer);
 for (const one of data.quantities) one.values = new Float32Array(bytes(one.values).buffer);
 const amplitude = data.quantities.find(one => one.key === "amplitude");
 const frequency = data.quantities.find(one => one.key === "frequency");
@@ -131,6 +132,28 @@ function grid(panel, on, kinds, width, height) {
   return layers;
 }
 
+function shownOnsets() { // of the axis along which vibration sets in, where the map shows classes over two axes
+  if (chosen.show >= 0 || chosen.y < 0) return [];
+  const shown = data.onsets.filter(({axis, starts}) => starts === (chosen.show === STARTS) && [chosen.x, chosen.y].includes(axis));
+  return shown.filter(({axis}) => axis === shown[0].axis);
+}
+
+function onsetLine({axis, at, dashed}, panel, on) {
+  const across = axis === chosen.x ? chosen.y : chosen.x, places = [], borders = [];
+  for (let k = 0; k < sizes[across]; k++) {
+    let index = 0; // over all other axes
+    data.axes.forEach((_, other) => {
+      if (other !== axis) index = index * sizes[other] + (other === across ? k : other === chosen.panel ? panel : chosen.places[other]);
+    });
+    const place = Number.isFinite(at[index]) ? at[index] : null;
+    places.push(place, place);
+    borders.push(data.axes[across].edges[k], data.axes[across].edges[k + 1]);
+  }
+  const [x, y] = axis === chosen.x ? [places, borders] : [borders, places];
+  return [["#ffffff", 5, "solid"], [data.onsetColour, 2.5, dashed ? "dash" : "solid"]].map(([color, width, dash]) =>
+    ({type: "scatter", mode: "lines", x, y, line: {color, width, dash}, hoverinfo: "skip", ...on}));
+}
+
 function samples(on, kinds) {
   const x = data.axes[chosen.x].values, y = chosen.y >= 0 ? data.axes[chosen.y].values : x.map(() => 0);
   const at = data.axes.map((_, axis) => axis), traces = [];
@@ -146,10 +169,11 @@ function samples(on, kinds) {
 
 function side(axis, title) {
   if (axis < 0) return {showticklabels: false, showgrid: false, zeroline: false};
-  const {label, ticks, edges, log} = data.axes[axis];
+  const {label, ticks, edges, minor, log} = data.axes[axis];
   const fixed = {title: {text: title ? escaped(label) : "", font: {size: 13}}, showgrid: false, zeroline: false, automargin: true};
   if (data.sampled) return {...fixed, showgrid: true, type: log ? "log" : "-"};
   if (ticks) Object.assign(fixed, {tickvals: ticks.at, ticktext: ticks.texts.map(escaped)});
+  if (minor.length) Object.assign(fixed, {ticks: "outside", ticklen: 6, minor: {tickvals: minor, ticks: "outside", ticklen: 3}});
   return {...fixed, range: [edges[0], edges.at(-1)]};
 }
 
@@ -165,7 +189,7 @@ function draw() {
     annotations: [], showlegend: false,
     plot_bgcolor: "#ffffff", font: {family: "sans-serif", size: 13}, hoverlabel: {align: "left"},
     dragmode: matchMedia("(pointer: coarse)").matches ? false : "zoom"};
-  const traces = [];
+  const traces = [], lines = shownOnsets();
   for (let panel = 0; panel < panels; panel++) {
     const row = Math.floor(panel / columns), column = panel % columns, k = panel ? panel + 1 : "";
     const part = (1 - apart) / columns, left = column * (part + apart), top = 1 - row * (height + GAP) / inside;
@@ -176,6 +200,7 @@ function draw() {
     layout[`xaxis${k}`] = panel ? {...x, matches: "x"} : x;
     layout[`yaxis${k}`] = panel ? {...y, matches: "y"} : y;
     const on = {xaxis: `x${k}`, yaxis: `y${k}`};
+    traces.push(...lines.flatMap(line => onsetLine(line, panel, on))); // below the marks of the cells
     traces.push(...(data.sampled ? samples(on, kinds) : grid(panel, on, kinds, part * (width - 90), height)));
     if (chosen.panel >= 0) {
       const axis = data.axes[chosen.panel];
@@ -197,13 +222,16 @@ function draw() {
   const entries = Object.entries(data.kinds).filter(([kind]) => present.has(Number(kind))).map(([, kind]) => kind);
   if (inferred && inferred.some((is, k) => is && kinds[k] === data.vibrating))
     entries.push({label: "vibrating (inferred)", fill: data.inferredVibration, ink: "", letter: ""});
-  for (const {label, fill, ink, letter} of entries) {
+  const enter = (label, style, letter) => {
     const entry = document.createElement("span"), swatch = document.createElement("i");
-    Object.assign(swatch.style, {background: fill, color: ink});
+    Object.assign(swatch.style, style);
     swatch.textContent = letter;
     entry.append(swatch, label);
     legend.append(entry);
-  }
+  };
+  for (const {label, fill, ink, letter} of entries) enter(label, {background: fill, color: ink}, letter);
+  for (const {label, dashed} of lines)
+    enter(label, {border: "none", borderTop: `3px ${dashed ? "dashed" : "solid"} ${data.onsetColour}`, height: 0}, "");
 }
 
 refresh();

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import resources
 from io import BytesIO
 from itertools import islice, product
@@ -15,11 +15,14 @@ import jinja2
 import numpy as np
 import xarray as xr
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.arrangement import Arrangement, Sides, arrange, known_values, value_text
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.figures import RESOLUTION, with_units
+from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure
 from cvt_hpc.analysis.maps import map_figure
+from cvt_hpc.analysis.repeated import sample_sentences
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.analysis.starts import AXIS, has_starts
 from cvt_hpc.analysis.value_maps import value_map_figure
@@ -66,7 +69,7 @@ class Row(NamedTuple):
     changed: bool
 
 
-def write_report(dataset: xr.Dataset, out: Path, source: str = "results") -> Path:
+def write_report(dataset: xr.Dataset, out: Path, source: str = "results", folder: Path | None = None) -> Path:
     """Write the page.
 
     Parameters
@@ -77,6 +80,8 @@ def write_report(dataset: xr.Dataset, out: Path, source: str = "results") -> Pat
         The page; its folder is made if needed.
     source : str
         Where the results are from, for the errors.
+    folder : Path, optional
+        Folder of the study: runs that `--check-step` and `--audit` have left in it are compared with its own.
 
     Returns
     -------
@@ -93,13 +98,13 @@ def write_report(dataset: xr.Dataset, out: Path, source: str = "results") -> Pat
     if (content := str(dataset.attrs.get(CONTENT, ""))) == HISTORY:
         raise mismatch(source, "results of a study", f"the {content}; `cvt-hpc plot` draws it")
     templates = jinja2.Environment(loader=jinja2.PackageLoader("cvt_hpc.report", "."), autoescape=True)
-    page = templates.get_template("page.html").render(_content(dataset, source))
+    page = templates.get_template("page.html").render(_content(dataset, source, folder))
     with written_aside(Path(out), parents=True) as aside:
         aside.write_text(page, encoding="utf-8")
     return Path(out)
 
 
-def _content(dataset: xr.Dataset, source: str) -> dict[str, Any]:
+def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str, Any]:
     attributes = {str(key): str(value) for key, value in dataset.attrs.items()}
     job = _job(attributes, source)
     arrangement = _arrangement(dataset, source)
@@ -130,12 +135,14 @@ def _content(dataset: xr.Dataset, source: str) -> dict[str, Any]:
         "has_lines": "eigenfrequency" in dataset and "amplitude" not in dataset,
         "map": _map(dataset, source),
         "pictures": _pictures(dataset, arrangement, beyond, source),
+        "hysteresis": _encoded(lambda: hysteresis_figure(dataset, source=source)) if arrangement else "",
         "not_drawn": max(0, combinations - MOST_MAPS),
         "beyond": " and ".join(beyond),
         "failures": found[:MOST_FAILURES],
         "failed": counted(sum(one.runs for one in found), "run"),
         "cost": _cost(dataset),
         "quality": _quality(dataset),
+        "samples": _samples(dataset, folder, source),
         "parameters": parameters,
         "changed": [row for rows in parameters.values() for row in rows if row.changed],
         "derived": rules_in_words(job, job.schema) if job else [],
@@ -206,8 +213,15 @@ def _picture(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> str:
     """
     shown = () if is_judged(dataset) else dict.fromkeys(one.key for one in quantities(dataset))
     drawn = [key for key in shown if dataset[key].dtype.kind in "iuf"][:MOST_VALUE_MAPS]
+    if drawn:
+        return _encoded(lambda: value_map_figure(dataset, drawn, at, source))
+    return _encoded(lambda: map_figure(dataset, at, source))
+
+
+def _encoded(compose: Callable[[], Figure]) -> str:
+    """A picture as a PNG in base64; "" where there is nothing to draw."""
     try:
-        figure = value_map_figure(dataset, drawn, at, source) if drawn else map_figure(dataset, at, source)
+        figure = compose()
     except InputError:
         return ""
     buffer = BytesIO()
@@ -261,6 +275,16 @@ def _quality(dataset: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
             meaning = str(attributes.get("comment", attributes.get("long_name", "")))
             rows.append((name, meaning, unit, f"{np.median(values):.3g}", f"{values.max():.3g}"))
     return rows
+
+
+def _samples(dataset: xr.Dataset, folder: Path | None, source: str) -> list[Markup]:
+    """What runs that were done again tell; where they cannot be compared, why."""
+    if folder is None:
+        return []
+    try:
+        return list(map(_with_code, sample_sentences(dataset, folder, source)))
+    except InputError as error:
+        return [_with_code(f"Runs were done again, but cannot be compared: {error}.")]
 
 
 def _parameters(job: Job) -> dict[str, list[Row]]:

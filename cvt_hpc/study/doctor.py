@@ -93,7 +93,7 @@ def _mpi(installed: bool) -> Finding:
     if launcher is None:
         return Finding(False, "MPI", "mpi4py without an mpirun", "add that of its MPI library to PATH")
     command = [launcher, "-n", str(_RANKS), sys.executable, "-c", _COUNT_RANKS]
-    lines = _said(command)
+    _, lines = _said(command)
     if len(lines) == 1 and lines[0].startswith(f"{_RANKS} "):
         return Finding(True, "MPI", f"{_RANKS} ranks by {launcher} ({lines[0].split()[1]})")
     advice = f"`{launcher}` does not fit the MPI library of mpi4py; {serial}"
@@ -105,12 +105,16 @@ def _mpi(installed: bool) -> Finding:
 def _slurm() -> Finding:
     if shutil.which("sbatch") is None:
         return Finding(True, "Slurm", "none here", "needed on a cluster alone: slurm/sweep.sbatch")
-    kinds = " ".join(_said(["srun", "--mpi=list"]))
-    return Finding(True, "Slurm", f"sbatch is there; srun knows {kinds or 'no --mpi kind'}")
+    status, lines = _said(["srun", "--mpi=list"])
+    if status != 0:
+        found = f"sbatch is there, but srun fails: {lines[-1] if lines else 'no answer'}"
+        advice = "`sinfo` has to list partitions first: ask who runs the cluster, or log in to a node of it"
+        return Finding(False, "Slurm", found, advice)
+    return Finding(True, "Slurm", f"sbatch is there; srun knows {' '.join(lines) or 'no --mpi kind'}")
 
 
-def _said(command: list[str]) -> list[str]:
-    """Return the lines that a program prints, errors included; none where it does not end in time."""
+def _said(command: list[str]) -> tuple[int | None, list[str]]:
+    """Exit status of a program and the lines that it prints, errors included; None where it does not end."""
     try:
         done = subprocess.run(
             command,
@@ -121,5 +125,5 @@ def _said(command: list[str]) -> list[str]:
             check=False,
         )
     except (OSError, subprocess.SubprocessError):
-        return []
-    return [line.strip() for line in done.stdout.splitlines() if line.strip()]
+        return None, []
+    return done.returncode, [line.strip() for line in done.stdout.splitlines() if line.strip()]

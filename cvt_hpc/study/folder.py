@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.errors import InputError, mismatch, nearest
+from cvt_hpc.errors import InputError, few_of, mismatch, nearest
 from cvt_hpc.files import kind_of, make_own_folder, naming_refusals
 from cvt_hpc.job.definition import fingerprint_of
 from cvt_hpc.locks import is_locked, locked
@@ -21,6 +21,7 @@ from cvt_hpc.study.record.index import open_log
 from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.study.stored import check_stored
 
+MOST_NAMED = 5
 _PART_LOCKS = ".part-*.lock"
 
 
@@ -28,6 +29,8 @@ def study_instead(path: Path) -> str:
     """Return advice where no study is found: take that of the nearest name beside it, or make one."""
     if path.suffix == ".toml":
         return f"`cvt-hpc run {path}` computes its results, in out/NAME unless --out says otherwise"
+    if inside := sorted(folder.parent.name for folder in path.glob("*/job.json")):
+        return f"studies in it: {few_of(inside, MOST_NAMED)}"
     beside = [str(folder.parent) for folder in path.parent.glob("*/job.json")]
     if near := nearest(str(path), beside):
         return f"did you mean {near}?"
@@ -75,14 +78,16 @@ class StudyFolder(OutputFolder[Study]):
             if not self.path.is_dir():
                 found = "a file" if self.path.exists() else "nothing"
                 raise mismatch(str(self.path), "the output folder of a run", found, study_instead(self.path))
-            advice = "; `cvt-hpc run` of its job goes on and writes it anew"
+            anew = "`cvt-hpc run` of its job goes on and writes it anew"
             try:
                 study = self.read_job()
             except DamagedJobError as error:
-                raise InputError(f"{error}{advice if error.entry or self._has_logs() else ''}") from error
+                raise InputError(
+                    f"{error}; {anew}" if error.entry or self._has_logs() else str(error)
+                ) from error
             if study is None:
-                found = f"no job.json in it{advice if self._has_logs() else ''}"
-                raise InputError(f"{self.path}: expected the output folder of a run, found {found}")
+                then = anew if self._has_logs() else study_instead(self.path)
+                raise mismatch(str(self.path), "the output folder of a run", "no job.json in it", then)
         return study
 
     def part_lock(self, part: Part) -> AbstractContextManager[None]:

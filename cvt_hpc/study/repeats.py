@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
 CONFIDENCE = 0.95
+AUDIT = "audit"  # folder of the runs of an audit, in that of the study
 AUDITED, FULL_MODEL = "auto", "elastic_belt"  # what answers some runs cheaply, and what does all in full
 
 

@@ -37,23 +37,24 @@ def assess(
     """
     p = run.parameters
     if ramped(p):
-        return with_slip(run, _assess_ramp(run))  # type: ignore[arg-type]  # None is of a run before its end
+        # None is of a run before its end
+        return with_slip(run, _assess_ramp(run, names))  # type: ignore[arg-type]
     columns, strands = _on_strands(run, names)
     found = assessment.assess(run.displacement[:, columns], p["sampling_rate"], strands, p)
     return with_slip(run, replace(found, strongest_probe=columns[found.strongest_probe]), pulleys)
 
 
-def _assess_ramp(run: Any) -> ramp.RampOccurrence | None:
+def _assess_ramp(run: Any, names: Sequence[str]) -> ramp.RampOccurrence | None:
     """Whether and how a run vibrates along a ramp; None if it ended too soon to tell."""
     p, first, quantity = run.parameters, run.risen, ramped(run.parameters)
-    columns, strands = _on_strands(run)
+    columns, strands = _on_strands(run, names)
     rate, moved = p["sampling_rate"], run.displacement[first:, columns]
     values = run.channel(RAMPED_CHANNELS[quantity])[first:]
     found = ramp.assess_ramp(moved, rate, strands, quantity, values, run.samples - first, p)
     return found and replace(found, strongest_probe=columns[found.strongest_probe])
 
 
-def _on_strands(run: Any, names: Sequence[str] = STRANDS) -> tuple[np.ndarray, list[str]]:
+def _on_strands(run: Any, names: Sequence[str]) -> tuple[np.ndarray, list[str]]:
     """Columns of the displacement whose probes lie on strands, and on which."""
     regions = [probe.label.split()[0] for probe in run.probes]
     columns = [k for k, region in enumerate(regions) if region in names]
@@ -66,10 +67,13 @@ def slipped_through(run: Any) -> dict[str, Any]:
     return {"status": status, "vibrates": Vibrates.SLIPS, "reason": f"at {run.time * 1e3:.4g} ms: {why}"}
 
 
-def slipped(run: Any) -> dict[str, Any]:
-    """The record of a run that has slipped through before its end: what is known until then."""
+def slipped(run: Any, names: Sequence[str] = STRANDS) -> dict[str, Any]:
+    """The record of a run that has slipped through before its end: what is known until then.
+
+    `names` are those of its strands, as of `assess`.
+    """
     found = slipped_through(run)
-    before = _assess_ramp(run) if ramped(run.parameters) else None
+    before = _assess_ramp(run, names) if ramped(run.parameters) else None
     if before is not None:
         reason = shortened(f"{found['reason']}; before: {before.reason}")
         found = before.record() | found | {"reason": reason}

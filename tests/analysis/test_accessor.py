@@ -1,18 +1,22 @@
 """`dataset.cvt` on made-up studies: classes, onsets, boundaries, and pictures laid out as asked."""
 
+import inspect
 import runpy
 from pathlib import Path
 
+import dask
 import numpy as np
 import pytest
 import xarray as xr
 
 import cvt_hpc
+from cvt_hpc.accessor import Results
 from cvt_hpc.analysis.classes import OccurrenceClass
 from cvt_hpc.analysis.maps import PAGE
 from cvt_hpc.errors import InputError
+from cvt_hpc.picture_kinds import HISTORIES, KINDS, RESULTS
 from cvt_hpc.variables import Status, Vibrates
-from support.studies import GRADIENTS, LOADS, STIFFNESSES, study
+from support.studies import GRADIENTS, LOADS, STIFFNESSES, study, traced
 
 NO, YES, SLIPS = Vibrates.NO, Vibrates.YES, Vibrates.SLIPS
 
@@ -44,8 +48,10 @@ def test_boundaries_lie_midway_and_onset_is_where_a_window_begins():
     found = results(rows).cvt.boundary()
     assert found.dims == ("friction_gradient", "boundary") and found.attrs["units"] == "N m"
     nan = np.nan
-    np.testing.assert_array_equal(found, [[50, 90, nan], [50, 90, nan], [nan] * 3, [40, 70, 90]])
-    np.testing.assert_array_equal(found.rising, [[1, 0, nan], [0, 1, nan], [nan] * 3, [1, 0, 1]])
+    expected = [[50, 90, nan, nan], [50, 90, nan, nan], [nan] * 4, [40, 70, 90, nan]]
+    np.testing.assert_array_equal(found, expected)
+    expected = [[1, 0, nan, nan], [0, 1, nan, nan], [nan] * 4, [1, 0, 1, nan]]
+    np.testing.assert_array_equal(found.rising, expected)
     onset = results(rows).cvt.onset()
     np.testing.assert_array_equal(onset, [50, 90, nan, 40])
     assert onset.attrs == {"units": "N m", "long_name": "onset of vibration in load"}
@@ -54,6 +60,10 @@ def test_boundaries_lie_midway_and_onset_is_where_a_window_begins():
     np.testing.assert_array_equal(turned.cvt.onset(), onset)
     along = results(rows).cvt.boundary("friction_gradient").sel(load=20.0)
     np.testing.assert_allclose(along.dropna("boundary"), [-0.3, -0.1])
+
+
+def too_early(*tasks, **options):
+    raise AssertionError("computed before it was asked for")
 
 
 def test_verbs_take_chunked_datasets_and_read_what_they_need_alone():
@@ -65,7 +75,14 @@ def test_verbs_take_chunked_datasets_and_read_what_they_need_alone():
     spectra = xr.zeros_like(whole["amplitude"]).chunk()
     lazy = whole.chunk({"load": 2}).assign(spectrum=spectra.map_blocks(untouched, template=spectra))
     for verb in ("classes", "onset", "boundary", "strongest"):
-        xr.testing.assert_identical(getattr(lazy.cvt, verb)(), getattr(whole.cvt, verb)())
+        with dask.config.set(scheduler=too_early):
+            asked = getattr(lazy.cvt, verb)()
+        assert asked.chunks
+        xr.testing.assert_identical(asked.compute(), getattr(whole.cvt, verb)())
+    inferred = traced()
+    with dask.config.set(scheduler=too_early):
+        asked = inferred.chunk({"sheave_stiffness": 1}).cvt.classes()
+    xr.testing.assert_identical(asked.compute(), inferred.cvt.classes())
     assert [image.get_array().tolist() for axes in lazy.cvt.map().axes for image in axes.images] == [
         image.get_array().tolist() for axes in whole.cvt.map().axes for image in axes.images
     ]
@@ -156,3 +173,84 @@ def test_the_strongest_strand_is_that_of_variables_over_strands(results, name):
 def test_a_part_without_runs_is_refused(ask):
     with pytest.raises(InputError, match="expected results of a study of one run at least, found none"):
         getattr(study().isel(load=slice(0)).cvt, ask)()
+
+
+def test_other_units_are_those_of_values_attributes_and_axes_of_pictures():
+    whole = study()
+    units = {"load": "N cm", "amplitude": "um"}
+    with dask.config.set(scheduler=too_early):
+        converted = whole.chunk({"load": 2}).cvt.in_units(**units)
+    np.testing.assert_allclose(converted["load"], 100.0 * whole["load"])
+    np.testing.assert_allclose(converted.amplitude, 1e6 * whole.amplitude)
+    assert {name: converted[name].attrs["units"] for name in units} == units
+    assert converted.indexes["load"].equals(converted["load"].to_index())
+    assert whole["load"].attrs["units"] == "N m" and "units" in converted.frequency.attrs
+    at = {"friction_gradient": GRADIENTS[0], "sheave_stiffness": 1.0}
+    one, other = (each.cvt.curve("frequency", **at).axes[0] for each in (whole, converted))
+    assert (one.get_xlabel(), other.get_xlabel()) == ("load [N m]", "load [N cm]")
+    one, other = (each.cvt.map(sheave_stiffness=1.0) for each in (whole, converted))
+    assert scales(other) == pytest.approx(scales(one))  # amplitudes in um are not taken for metres
+    np.testing.assert_allclose(converted.cvt.onset(), 100.0 * whole.cvt.onset())
+    back = converted.cvt.in_units(load="N m")
+    np.testing.assert_allclose(back["load"], whole["load"])
+
+
+@pytest.mark.parametrize(
+    ("units", "told"),
+    [
+        ({"lod": "N m"}, "did you mean load?"),
+        ({"load": "kN"}, "load: expected a unit of the dimension of N m"),
+        ({"status": "kN"}, "status: expected a variable with a unit, found a flag or a text"),
+        (
+            {"frequency": "rad/s"},
+            "expected a unit of the dimension of Hz",
+        ),  # 2 pi apart, and not to be mixed up
+    ],
+)
+def test_units_of_another_dimension_are_refused(units, told):
+    with pytest.raises(InputError, match=told.replace("?", r"\?")):
+        study().cvt.in_units(**units)
+
+
+def test_quantities_of_pint_are_those_of_the_dataset():
+    """The snippet of the guide."""
+    guide = (Path(__file__).parents[2] / "docs" / "guide" / "python.md").read_text()
+    snippet = guide.split("cf_xarray.units")[1].split("```")[0]
+    results = study().assign(loss=("load", np.full(len(LOADS), 2500.0), {"units": "W"})).chunk()
+    names = {"results": results}
+    exec("import cf_xarray.units" + snippet, names)
+    assert names["loss"].pint.units == "kilowatt"
+    np.testing.assert_allclose(names["loss"].pint.magnitude, 2.5)
+
+
+def scales(figure):
+    return [axes.get_ylim()[1] for axes in figure.axes if axes.get_label() == "<colorbar>"]
+
+
+def test_several_studies_are_drawn_on_one_scale():
+    small = study(gradients=GRADIENTS[:2], stiffnesses=STIFFNESSES[:1])
+    larger = [
+        (k * small).assign(small[["status", "vibrates"]]).assign_attrs(job_name=f"{k} times") for k in (2, 3)
+    ]
+    figure, same = small.cvt.map(beside=larger), cvt_hpc.maps_figure([small, *larger])
+    assert scales(figure) == scales(same)
+    assert scales(figure)[0] == pytest.approx(scales(larger[-1].cvt.map())[0])
+    titles = " ".join(axes.get_title(loc="left") for axes in figure.axes)
+    assert all(name in titles for name in ("occurrence", "2 times", "3 times"))  # a panel for each
+    shown = cvt_hpc.maps_figure([small, *larger], ["frequency"])
+    assert len(shown.axes) > len(small.cvt.map("frequency").axes)
+
+
+def test_each_kind_of_picture_is_a_verb_with_its_options():
+    for name, kind in KINDS.items():
+        verb = getattr(Results, name)
+        taken = set(inspect.signature(verb).parameters)
+        assert {option.key for option in kind.options} | {*kind.sides} <= taken
+        assert ("at" in taken, "beside" in taken) == (kind.subject == RESULTS, kind.subject == HISTORIES)
+        assert kind.text in verb.__doc__ and all(option.text[1:] in verb.__doc__ for option in kind.options)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'loads'"):
+        study().cvt.phase(loads=3.0)
+
+
+def test_a_notebook_is_given_a_picture():
+    assert study().cvt.map(sheave_stiffness=1.0)._repr_png_().startswith(b"\x89PNG")

@@ -1,11 +1,15 @@
 """The belt as a moving picture."""
 
 import json
+import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from PIL import Image
 
 from cvt_hpc.analysis import animation
@@ -71,6 +75,33 @@ def test_a_belt_at_rest_is_drawn_at_rest(tmp_path, monkeypatch):
     assert "at most 0 µm" in titles[0]
 
 
+def test_a_scale_tells_how_large_the_motion_is_drawn(tmp_path, monkeypatch):
+    """Of 20 um and some more, by the spline between the samples: a bar of 20 um, magnified as the belt is."""
+    monkeypatch.setattr(animation, "FRAMES", 1)
+    scales = []
+    monkeypatch.setattr(animation, "_draw_scale", lambda axes, size, factor: scales.append((size, factor)))
+    draw_animation(history(), tmp_path / "belt.gif")
+    ((size, factor),) = scales
+    assert factor * size == pytest.approx(animation.LARGEST * POINT["centre_distance"])
+    monkeypatch.undo()
+    axes = Figure().subplots()
+    axes.set(xlim=(0.0, 300.0), ylim=(0.0, 100.0))
+    animation._draw_scale(axes, 37e-6, 500.0)
+    (bar,), (text,) = axes.lines, axes.texts
+    assert text.get_text() == "20 µm of motion"
+    assert np.ptp(bar.get_xdata()) == pytest.approx(1e3 * 500.0 * 20e-6) and np.ptp(bar.get_ydata()) == 0.0
+    animation._draw_scale(axes, 1.5e-3, 10.0)
+    assert axes.texts[-1].get_text() == "1 mm of motion"
+
+
+def test_a_belt_drive_moves_on_its_pulleys(tmp_path, monkeypatch):
+    monkeypatch.setattr(animation, "FRAMES", 1)
+    lists = {f"pulley_{name}": [] for name in ("x", "y", "radius", "turn", "inertia", "load")}
+    point = POINT | lists | {"driven_inertia": 0.01, "crossed": True}
+    path = draw_animation(history().assign_attrs(point=json.dumps(point)), tmp_path / "belt.gif")
+    assert path.stat().st_size > 0
+
+
 def test_a_name_is_no_formula(tmp_path, monkeypatch):
     monkeypatch.setattr(animation, "FRAMES", 1)
     draw_animation(history().assign_attrs(job_name=r"$\frac{1$"), tmp_path / "belt.gif")
@@ -87,6 +118,25 @@ def test_a_moving_picture_is_written(tmp_path):
         assert picture.n_frames == PERIODS * FRAMES
     assert [path.name for path in tmp_path.iterdir()] == ["belt.gif"]
     assert (tmp_path / "belt.gif").stat().st_size < 1e6
+
+
+def test_a_moving_picture_is_written_as_mp4(tmp_path):
+    if (ffmpeg := animation.encoder()) is None:
+        pytest.skip("no ffmpeg here")
+    out = draw_animation(history(), tmp_path / "belt.mp4")
+    told = subprocess.run(
+        [ffmpeg, "-i", out, "-map", "0:v", "-f", "null", "-"], capture_output=True, text=True, check=True
+    )
+    frames = re.findall(r"frame= *(\d+)", told.stderr)
+    assert int(frames[-1]) == PERIODS * FRAMES and "Video: h264" in told.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["belt.mp4"]
+
+
+def test_without_an_encoder_mp4_is_refused_with_what_brings_one(tmp_path, monkeypatch):
+    monkeypatch.setattr(animation.shutil, "which", lambda name: None)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(InputError, match=r'found none on this machine; .*pip install "cvt_hpc\[mp4\]"'):
+        draw_animation(history(), tmp_path / "belt.mp4")
 
 
 @pytest.mark.parametrize(

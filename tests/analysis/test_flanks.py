@@ -1,6 +1,9 @@
 """Left and right flank along the belt, and which of them carries alone at the ends of the arcs."""
 
+import csv
 import json
+import runpy
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -62,3 +65,15 @@ def test_each_end_has_a_panel_with_the_lead_in_its_title():
 def test_a_history_without_sides_is_refused_by_its_name():
     with pytest.raises(InputError, match=r"run\.nc: expected a history with flank_slip_left \(of a spatial"):
         flanks_figure(history().drop_vars("flank_slip_left"), "run.nc")
+
+
+def test_the_table_of_a_study_has_a_row_for_each_end_of_an_arc_of_each_run():
+    rows = runpy.run_path(str(Path(__file__).parents[2] / "jobs" / "flanks.py"))["rows"]
+    slow, fast = history(), history()
+    fast["flank_slip_right"][:] = np.where(np.arange(PLACES) % 2, -2.0, 1.0)
+    table = list(csv.DictReader(rows([slow, fast], ["slow", "fast"])))
+    assert [row["run"] for row in table] == ["slow"] * 4 + ["fast"] * 4
+    first = table[4]
+    assert (first["end"], first["flank alone"], table[6]["flank alone"]) == ("driving inlet", "right", "both")
+    assert float(first["alone [mm]"]) == pytest.approx(1e3 * LEAD * PITCH, abs=5e-3)  # two digits
+    assert float(first["its largest sliding along the belt [m/s]"]) == -2.0

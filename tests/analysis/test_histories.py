@@ -218,7 +218,7 @@ sheave_stiffness = [1, inf]
 def test_the_title_names_the_rung_by_what_the_dataset_says_of_it():
     flags = {"flag_values": np.array([0, 7], np.int8), "flag_meanings": "none guessed"}
     rung = run().assign(rung=((), np.int8(7), flags), simulated_seconds=0.12)
-    assert "answered by the guessed run, of 0.12\u00a0s" in history_figure(rung).get_suptitle()
+    assert "decided by the guessed run of model auto, 0.12\u00a0s" in history_figure(rung).get_suptitle()
 
 
 @pytest.mark.parametrize(

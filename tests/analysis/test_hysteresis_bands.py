@@ -9,37 +9,11 @@ from cvt_hpc.analysis.arrangement import ruler
 from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure, onset_line, vibration_ranges
 from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.errors import InputError
-from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.variables import Vibrates
 from cvt_hpc.vibration.classes import OccurrenceClass
-from support.studies import flags, study
+from support.studies import ramps, study
 
 Q, V, U, *_ = OccurrenceClass
-GRADIENTS = [-1.0, -0.8, -0.6]
-
-
-def ramps():
-    """Ramps between 20 and 200 N m at three gradients: the last one is quiet, the second lasts to an end."""
-    share = (np.arange(20) + 0.5) / 20
-    up = 20.0 + 180.0 * share
-    over = ("load_start", "friction_gradient")
-    onset = [[85.0, 100.0, np.nan], [166.0, np.nan, np.nan]]
-    end = [[173.0, 150.0, np.nan], [71.0, 96.0, np.nan]]
-    vibrates = [[Vibrates.YES, Vibrates.YES, Vibrates.NO]] * 2
-    units = {"units": "N m"}
-    return xr.Dataset(
-        {
-            "status": flags(np.full((2, 3), Status.DONE), over, Status, "how"),
-            "vibrates": flags(vibrates, over, Vibrates, "whether"),
-            "onset_load": (over, onset, units),
-            "end_load": (over, end, units),
-            "ramp_load": ((*over, "ramp_share"), np.stack([[up] * 3, [up[::-1]] * 3]), units),
-        },
-        {
-            "load_start": ("load_start", [20.0, 200.0], units),
-            "friction_gradient": ("friction_gradient", GRADIENTS, {"units": "s/m"}),
-        },
-        {"job_name": "up $and$ down"},
-    )
 
 
 def test_the_onset_lies_between_quiet_and_vibrating_cells_and_passes_over_undecided_ones():

@@ -8,8 +8,13 @@ import xarray as xr
 
 from cvt_hpc.analysis.histories import SAMPLES, SHOWN_PERIODS, phase_figure
 from cvt_hpc.analysis.on_variator import LARGEST, energy_figure, region_powers, variator_figure
+from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
+from cvt_hpc.models.belt_drive.layout import layout
+from cvt_hpc.netcdf import write_history
+from cvt_hpc.physics.belt_path import points_at
 from cvt_hpc.physics.geometry import variator
+from cvt_hpc.variator.judging import power_balance
 
 POINT = {"ratio": 1.0, "driven_radius": 0.05, "centre_distance": 0.155}
 PATH = variator(**POINT)
@@ -73,6 +78,50 @@ def test_negative_values_point_inwards_and_unknown_ones_have_no_bar():
     assert low == -high  # zero is the middle of the colours
 
 
+SERPENTINE = {
+    "pulley_x": [0.0, 0.25, 0.5, 0.396, 0.2],
+    "pulley_y": [0.0, -0.035, 0.05, 0.264, 0.4],
+    "pulley_radius": [0.07, 0.04, 0.05, 0.04, 0.07],
+    "pulley_turn": [1, -1, 1, -1, 1],
+    "pulley_inertia": [0.013, 1e-4, 0.001, 1e-4, 0.004],
+    "pulley_load": [0, 0, 0, 0, 1],
+}
+LISTS = dict.fromkeys(SERPENTINE, [])
+
+
+@pytest.mark.parametrize(
+    ("point", "names"),
+    [
+        (SERPENTINE, ["P1", "P2", "P3", "P4", "P5"]),
+        (LISTS | POINT | {"driven_inertia": 0.01, "crossed": True}, ["driving", "driven", "t1", "t2"]),
+    ],
+)
+def test_a_belt_drive_is_drawn_on_its_pulleys(point, names):
+    drawn = layout(point)
+    position = np.arange(STATIONS) * drawn.path.path_length / STATIONS
+    run = xr.Dataset(
+        {"tension": ("position", np.full(STATIONS, 300.0), {"units": "N"})},
+        {"position": position},
+        {"point": json.dumps(point)},
+    )
+    axes, bar = variator_figure(run).axes
+    assert bar.get_ylabel() == "tension [N]" and [text.get_text() for text in axes.texts] == names
+    feet = np.array(axes.collections[0].get_segments())[:, 0]
+    for circle, centre, radius in zip(axes.patches, drawn.path.centre, drawn.path.radius, strict=True):
+        assert circle.center == pytest.approx(1e3 * centre) and circle.radius == pytest.approx(1e3 * radius)
+        away = np.hypot(*(feet - 1e3 * centre).T)
+        assert away.min() == pytest.approx(1e3 * radius)  # the belt touches each pulley
+    np.testing.assert_allclose(feet, 1e3 * points_at(drawn.path, position)[0])
+
+
+@pytest.mark.parametrize(
+    "point", [SERPENTINE | {"pulley_x": [0.0, 1e9]}, SERPENTINE | {"pulley_radius": None}]
+)
+def test_pulleys_that_are_none_are_refused(point):
+    with pytest.raises(InputError, match="expected the history of a run of a variator or belt drive"):
+        variator_figure(history().assign_attrs(point=json.dumps(point)))
+
+
 def test_powers_of_regions_are_feeds_times_their_lengths():
     powers = region_powers(history())
     cell = PATH.path_length / STATIONS  # a border lies within a cell
@@ -100,6 +149,46 @@ def test_energy_has_losses_of_arc_parts_and_feeds_of_regions():
     assert len(energy_figure(ramp).axes) == 1
 
 
+def balanced_history():
+    """With the record of a run that puts in 40 kW, whose balance is open by 20 W."""
+    record = power_balance(driving=40e3, load=37e3, loss=2.9e3, storing=50.0, thrust=20.0, damped=10.0)
+    watts = {"units": "W"}
+    run = history().assign_coords(pulley=["driving", "driven"])
+    run = run.assign({name: ((), value, watts) for name, value in record.items()})
+    run["flank_loss"] = ("pulley", [800.0, 1200.0], watts)
+    run["ring_loss"] = ((), 700.0, watts)  # 200 W of the loss have no cause of their own
+    run["thrust_power"] = ((), 20.0, watts)
+    run["numerical_damping"] = ("spring", [4.0, 6.0], watts)
+    run["speed_loss"] = ((), 0.03, {"units": "1"})
+    return run
+
+
+def test_what_goes_in_comes_out_or_is_lost_up_to_what_the_record_leaves_open():
+    run = balanced_history()
+    whole, parts, *rest = energy_figure(run).axes
+    assert len(rest) == 2
+    put_in, taken_out, lost = (1e3 * bar.get_height() for bar in whole.patches)
+    widths = [bar.get_width() for bar in parts.patches]
+    named = dict(
+        zip((label.get_text().split("  ")[0] for label in parts.get_yticklabels()), widths, strict=True)
+    )
+    assert (named["flank loss, driven"], named["other losses"], named["time step"]) == pytest.approx(
+        (1200, 200, 10)
+    )
+    assert "speed loss" not in named
+    assert sum(power for name, power in named.items() if "loss" in name) == pytest.approx(lost)
+    still_open = put_in - taken_out - sum(power for name, power in named.items() if name != "left open")
+    assert still_open == pytest.approx(float(run["power_residual"]) * put_in) and still_open == pytest.approx(
+        20.0
+    )
+    assert named["left open"] == pytest.approx(still_open)
+    assert (
+        whole.get_title(loc="left") == "driving pulley in 40 kW = load out 37 kW + losses 2900 W + rest 100 W"
+    )
+    run["driving_power"] = ((), np.nan)
+    assert len(energy_figure(run).axes) == 2  # of a run that failed nothing is told
+
+
 def test_a_phase_portrait_is_an_ellipse_of_the_vibration_alone():
     figure = phase_figure(history())
     figure.draw_without_rendering()
@@ -113,6 +202,26 @@ def test_a_phase_portrait_is_an_ellipse_of_the_vibration_alone():
         assert end.get_xdata()[0] == x[-1]
         assert axes.get_title(loc="left").endswith(", 500 Hz")
         assert (axes.get_xlabel(), axes.get_ylabel()) == ("displacement [µm]", "velocity [mm/s]")
+
+
+def test_each_kept_history_of_a_folder_has_a_picture(tmp_path, capsys):
+    """Of a study with three kept runs, one of which ended before it moved."""
+    folder = tmp_path / "histories"
+    for index in (2, 3, 12):
+        run = history() if index != 3 else history().drop_vars("displacement")
+        write_history(run, folder / f"run-{index:06d}.nc")
+    assert main(["plot", "phase", str(tmp_path)]) == 1
+    out, err = capsys.readouterr()
+    assert out.splitlines() == [f"picture: {tmp_path}/run-{index:06d}_phase.png" for index in (2, 12)]
+    (line,) = err.splitlines()
+    assert f"{folder}/run-000003.nc: expected the history of a run with the motion of strands" in line
+    (folder / "run-000003.nc").unlink()
+    assert main(["plot", "phase", str(tmp_path), "--out", str(tmp_path / "x.svg")]) == 0
+    written = sorted(path.name for path in tmp_path.iterdir() if path.is_file())
+    assert written == ["run-000002_phase.png", "run-000012_phase.png", "x_run-000002.svg", "x_run-000012.svg"]
+    (folder / "run-000012.nc").unlink()
+    assert main(["plot", "phase", str(tmp_path), "--out", str(tmp_path / "one.svg")]) == 0
+    assert (tmp_path / "one.svg").exists()
 
 
 @pytest.mark.parametrize(

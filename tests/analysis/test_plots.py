@@ -7,13 +7,14 @@ import xarray as xr
 from matplotlib.text import Text
 
 from cvt_hpc.analysis.arrangement import Sides
-from cvt_hpc.analysis.curves import curve_figure
+from cvt_hpc.analysis.curve_panels import curve_panels_figure
+from cvt_hpc.analysis.curves import MARKS, curve_figure
 from cvt_hpc.analysis.figures import STYLE
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.analysis.waterfall import waterfall_figure
 from cvt_hpc.analysis.wraps import wrap_figure
 from cvt_hpc.errors import InputError
-from cvt_hpc.variables import Vibrates
+from cvt_hpc.variables import Status, Vibrates
 
 LOADS, SPEEDS, BINS = [0.0, 2.0, 4.0], [20.0, 60.0], np.arange(0.0, 110.0, 10.0)
 
@@ -186,7 +187,9 @@ def test_of_many_pulleys_those_with_torque_are_drawn(history):
     [
         (
             lambda d, h: waterfall_figure(d.drop_vars("spectrum")),
-            "results: expected results with the variable",
+            "results: expected results with the variable spectrum, found status, vibrates, "
+            "eigenfrequency, speed_loss, expected_speed_loss, strand_tension; runs of elastic_belt, pushbelt or belt_drive "
+            "record it, up to band_high in [vibration]",
         ),
         (lambda d, h: waterfall_figure(d, {"load": 3.0}), "results: at load: expected a value of that axis"),
         (lambda d, h: curve_figure(d, ["loss"]), "results: loss: unknown numeric variable of the results"),
@@ -273,3 +276,52 @@ def test_two_dollars_in_a_name_begin_no_formula(results):
     figure = value_map_figure(results, ["speed_loss"])
     figure.draw_without_rendering()
     assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == [r"$\a$", r"$\b$"]
+
+
+def test_panels_of_quantities_have_a_curve_for_each_value_of_an_axis(results):
+    results["status"][0, 1] = Status.FAILED_NUMERICS
+    groups = [["speed_loss", "expected_speed_loss"], ["strand_tension"]]
+    figure = curve_panels_figure(results, groups, "driving_speed")
+    first, *strands = figure.axes
+    assert [axes.get_title(loc="left") for axes in strands] == [
+        "strand tension t1 [N]",
+        "strand tension t2 [N]",
+    ]
+    assert first.get_title(loc="left") == "speed loss" and first.get_xlabel() == "load [N m]"
+    expected = results["speed_loss"].values.copy()
+    expected[0, 1] = np.nan  # a run that failed has no mark
+    marks = [line for line in first.lines if line.get_marker() in MARKS]
+    np.testing.assert_array_equal([line.get_ydata() for line in marks], expected)
+    beside = [line for line in first.lines if line.get_marker() == "None"]
+    wanted = np.where(
+        np.isfinite(expected) | (results["status"] == Status.DONE), results["expected_speed_loss"], np.nan
+    )
+    np.testing.assert_array_equal([line.get_ydata() for line in beside], wanted)
+    assert [line.get_color() for line in beside] == [line.get_color() for line in marks]
+    for axes, strand in zip(strands, ("t1", "t2"), strict=True):
+        second = [line.get_ydata() for line in axes.lines if line.get_marker() in MARKS][1]
+        np.testing.assert_array_equal(second, results["strand_tension"].sel(strand=strand)[1])
+    (legend,) = figure.legends
+    told = [text.get_text() for text in legend.get_texts()]
+    assert told[:3] == ["driving speed 190.986 rpm", "driving speed 572.958 rpm", "creep and compliance"]
+    assert "failed" in told[3]
+
+
+def test_panels_of_unlike_quantities_are_refused(results):
+    cases = {
+        r"results: strand_tension: expected the unit of speed_loss, 1, found N": [
+            ["speed_loss", "strand_tension"]
+        ],
+        r"results: speed_loss: expected the dimensions of strand_loss: strand, found none": [
+            ["strand_loss", "speed_loss"]
+        ],
+        r"results: panels: expected at most 12, found 13": [["speed_loss"]] * 13,
+    }
+    results["strand_loss"] = results["strand_tension"].assign_attrs(units="1")
+    for words, groups in cases.items():
+        with pytest.raises(InputError, match=words):
+            curve_panels_figure(results, groups, "driving_speed")
+    with pytest.raises(
+        InputError, match="results: y sped: unknown axis of the results; known: driving_speed"
+    ):
+        curve_panels_figure(results, [["speed_loss"]], "sped")

@@ -14,15 +14,28 @@ import pytest
 import xarray as xr
 
 from cvt_hpc.analysis.classes import map_classes, occurrence_classes
+from cvt_hpc.analysis.hysteresis_bands import lowest_onsets
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.netcdf import HISTORY
 from cvt_hpc.report import write_report
 from cvt_hpc.report.interactive import as_script, map_data
 from cvt_hpc.variables import Status, Vibrates
-from support.studies import sampled, study, traced
+from support.studies import ramps, sampled, study, traced
 
 SMALL = {"gradients": (-2.4, -0.8), "stiffnesses": (1.0, np.inf)}
+# Tells the page around how wide what is drawn is and what came of it.
+TELL = """
+<script>
+const tell = told => parent.postMessage(JSON.stringify({told, wide: document.documentElement.scrollWidth,
+  room: document.documentElement.clientWidth, maps: document.querySelectorAll(".heatmaplayer").length}), "*");
+</script>
+"""
+# A page in a frame of its own width: a window of Chromium is at least 500 px wide.
+FRAME = """
+<body><iframe src="{page}" style="border: 0; width: {width}px; height: 900px"></iframe>
+<script>window.addEventListener("message", message => {{ document.body.dataset.told = message.data; }});</script></body>
+"""
 # Moves the pointer to the cell at 100 N m and -2.4 s/m of the first panel, and keeps what stands beside it.
 POINT = """
 <script>
@@ -31,7 +44,7 @@ window.addEventListener("load", () => setTimeout(() => {
   const at = {clientX: place.left + 0.45 * place.width, clientY: place.top + 0.75 * place.height, bubbles: true};
   panel.dispatchEvent(new MouseEvent("mouseover", at));
   panel.dispatchEvent(new MouseEvent("mousemove", at));
-  setTimeout(() => { document.body.dataset.told = document.querySelector(".hoverlayer").textContent; }, 500);
+  setTimeout(() => tell(document.querySelector(".hoverlayer").textContent), 500);
 }, 500));
 </script>
 """
@@ -39,17 +52,21 @@ window.addEventListener("load", () => setTimeout(() => {
 CHOOSE = """
 <script>
 window.addEventListener("load", () => {
+  const onsets = () => document.getElementById("map").data.filter(one => one.mode === "lines").map(one => [one.line.dash, ...one.x]);
   const pick = (name, value) => {
     const box = [...document.querySelectorAll("#map-controls label")].find(one => one.textContent.startsWith(name));
     const input = box.querySelector("select, input");
     input.value = value;
     input.dispatchEvent(new Event(input.type === "range" ? "input" : "change"));
   };
+  const first = onsets(); // white below each line
+  pick("show", -2);
+  const both = onsets(), legend = document.getElementById("map-legend").textContent;
   pick("show", 1); pick("along x", 1); pick("disturbance", 1);
   const {layout, data} = document.getElementById("map"), told = document.querySelector("#map-controls output");
   document.body.dataset.told = JSON.stringify([
     layout.coloraxis.colorbar.title.text, layout.xaxis2.title.text, layout.yaxis.title.text, told.textContent,
-    layout.annotations.length, data[0].text[0][0]]);
+    layout.annotations.length, data[0].text[0][0], onsets(), first, both, legend]);
 });
 </script>
 """
@@ -63,6 +80,9 @@ def page(tmp_path_factory):
     reasons[results["status"].values != Status.DONE] = "<script>alert(1)</script>: 3 steps unsolved"
     results["reason"] = (results["status"].dims, reasons)
     results["core_seconds"] = results["status"].copy(data=np.full(results["status"].shape, 2.0)).astype(float)
+    axes = {name: results[name].values.tolist() for name in results["status"].dims}
+    job = build_job({"name": "a", "model": "elastic_belt", "axes": axes, "sheaves": {"stiffness_of": "disc"}})
+    results.attrs["job"] = json.dumps(job.resolved())
     path = tmp_path_factory.mktemp("report") / "report.html"
     return write_report(results, path)
 
@@ -195,6 +215,69 @@ def test_the_map_has_the_numbers_of_each_run_in_units_for_people():
     assert data["first"] == -1 and data["inferred"] == "" and data["starts"] == ""
 
 
+def two_starts():
+    """The study from two disturbances: from the small one nothing vibrates below 90 N m."""
+    small, large = study(**SMALL), study(**SMALL)
+    small["vibrates"][{"load": slice(0, 4)}] = Vibrates.NO
+    starts = ("disturbance", [1e-6, 1e-4], {"units": "m", "job_units": "um"})
+    return xr.concat([small, large], "disturbance", combine_attrs="override").assign_coords(
+        disturbance=starts
+    )
+
+
+def test_the_map_has_the_onset_lines_of_the_printed_one():
+    results = study(**SMALL)
+    (line,) = map_data(results)["onsets"]
+    assert (line["axis"], line["starts"], line["label"]) == (2, False, "onset of vibration")
+    expected = lowest_onsets(results["load"].values, map_classes(results).values.reshape(-1, 10))
+    np.testing.assert_allclose(decoded(line["at"], "<f4", 4), expected)
+    assert expected[0] == 50.0 and np.isnan(expected[1])  # rigid sheaves are quiet
+    each, small, large = map_data(two_starts())["onsets"]
+    assert (each["label"], small["label"], large["label"]) == (
+        "onset of vibration", "onset from a small start", "onset from a large start")  # fmt: skip
+    # over the disturbance, whose values have it in common, the gradient and the stiffness
+    np.testing.assert_allclose(decoded(each["at"], "<f4", (2, 4))[:, 0], [90.0, 50.0])
+    np.testing.assert_allclose(decoded(small["at"], "<f4", (2, 4))[:, 0], 90.0)
+    np.testing.assert_allclose(decoded(large["at"], "<f4", (2, 4))[:, 0], 50.0)
+    assert large["dashed"] and not small["dashed"]
+
+
+def test_a_logarithmic_axis_has_ticks_between_its_labels():
+    data = map_data(study(loads=np.geomspace(10.0, 1000.0, 9)))
+    assert data["axes"][2]["ticks"]["texts"] == ["10", "20", "50", "100", "200", "500", "1000"]
+    np.testing.assert_allclose(10.0 ** np.array(data["axes"][2]["minor"])[:3], [8.0, 9.0, 10.0])
+    assert data["axes"][0]["minor"] == []
+
+
+def test_ramps_up_and_down_have_a_picture_of_their_bands(tmp_path):
+    heading = "Hysteresis: vibration along ramps up and down"
+    assert heading in page_of(ramps(), tmp_path)
+    assert (tmp_path / "report.html").read_text().count('<img alt="hysteresis"') == 1
+    assert heading not in page_of(study(**SMALL), tmp_path)
+
+
+def test_runs_that_were_done_again_tell_of_the_quality(tmp_path):
+    """The sample has three runs: one alike, one with half the amplitude, one quiet instead of vibrating."""
+    results = study(**SMALL)
+    again = results.copy(deep=True)
+    again["status"][:] = Status.NOT_RUN
+    for load in (4, 5, 6):
+        again["status"][0, 0, load] = Status.DONE
+    again["amplitude"][0, 0, 5] *= 0.5
+    again["vibrates"][0, 0, 6] = Vibrates.NO
+    (tmp_path / "check_step").mkdir()
+    again.to_netcdf(tmp_path / "check_step" / "results.nc")
+    words = words_of(write_report(results, tmp_path / "report.html", "x", tmp_path))
+    assert "3 runs were done again at half the step, in check_step : 1 of 3 contradict" in words
+    assert "those done again deviate by 25.00% (median)" in words
+    assert "done again" not in page_of(results, tmp_path)
+    other = again.assign_coords(load=again["load"] + 1.0)
+    (tmp_path / "check_step" / "results.nc").unlink()
+    other.to_netcdf(tmp_path / "check_step" / "results.nc")
+    words = words_of(write_report(results, tmp_path / "report.html", "x", tmp_path))
+    assert "Runs were done again, but cannot be compared: " in words
+
+
 def test_a_trace_has_inferred_cells_and_counts_them_apart(tmp_path):
     results = traced(**SMALL)
     data = map_data(results)
@@ -308,23 +391,33 @@ def browse(page, *options):
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [1200, 390])
 def test_a_browser_draws_the_map_and_tells_the_values_of_a_cell(page, width):
-    tried = page.with_name(f"tried_{width}.html")
-    tried.write_text(page.read_text().replace("</body>", f"{POINT}</body>"))
-    drawn = browse(tried, f"--window-size={width},900", "--virtual-time-budget=8000", "--dump-dom")
-    told = re.search(r'data-told="([^"]*)"', drawn)
-    assert told and "vibrating" in told[1] and "load: 100 N m" in told[1] and "frequency: 580 Hz" in told[1]
-    assert drawn.count('class="heatmaplayer') >= 2
+    tried, frame = page.with_name(f"tried_{width}.html"), page.with_name(f"frame_{width}.html")
+    tried.write_text(page.read_text().replace("</body>", f"{TELL}{POINT}</body>"))
+    frame.write_text(FRAME.format(page=tried.name, width=width))
+    drawn = browse(frame, "--window-size=1300,1000", "--virtual-time-budget=8000", "--dump-dom")
+    (found,) = re.findall(r'<body data-told="([^"]*)"', drawn)
+    found = json.loads(html.unescape(found))
+    assert "vibrating" in found["told"] and "load: 100 N m" in found["told"]
+    assert "frequency: 580 Hz" in found["told"] and found["maps"] == 2
+    scroll_bar = 15  # [pixel]
+    assert width - scroll_bar <= found["room"] <= width
+    assert found["wide"] <= found["room"]  # nothing to be moved sideways
 
 
 @pytest.mark.slow
 def test_sides_values_and_quantities_are_chosen_in_the_browser(tmp_path):
-    starts = ("disturbance", [1e-6, 1e-4], {"units": "m", "job_units": "um"})
-    results = xr.concat([study(**SMALL)] * 2, "disturbance").assign_coords(disturbance=starts)
-    tried = write_report(results, tmp_path / "report.html")
+    tried = write_report(two_starts(), tmp_path / "report.html")
     tried.write_text(tried.read_text().replace("</body>", f"{CHOOSE}</body>"))
     drawn = browse(tried, "--virtual-time-budget=5000", "--dump-dom")
     (told,) = re.findall(r'<body data-told="([^"]*)"', drawn)
-    scale, x, y, value, panels, text = json.loads(html.unescape(told))
+    scale, x, y, value, panels, text, *lines = json.loads(html.unescape(told))
+    hidden, of_small, of_both, legend = lines
+    # in each of two panels, the second of which is quiet: that of the disturbance that is chosen; of both
+    # along the borders of both rows
+    vibrates, quiet = ["solid", 90, 90, 90, 90], ["solid", None, None, None, None]
+    assert of_small == [vibrates, vibrates, quiet, quiet] and hidden == []
+    assert of_both[:4] == [vibrates, vibrates, ["solid", 50, 50, 40, 40], ["dash", 50, 50, 40, 40]]
+    assert legend.endswith("onset from a small startonset from a large start")
     assert (scale, x, y) == ("frequency [Hz]", "friction gradient [s/m]", "load [N m]") and panels == 2
     assert value == "100 µm"
     place = ["sheave stiffness: 1", "load: 20 N m", "friction gradient: −2.4 s/m"]
@@ -333,6 +426,13 @@ def test_sides_values_and_quantities_are_chosen_in_the_browser(tmp_path):
 
 @pytest.mark.slow
 def test_it_prints_on_paper(page):
+    from pypdf import PdfReader
+
     printed = page.with_name("printed.pdf")
     browse(page, "--virtual-time-budget=5000", f"--print-to-pdf={printed}")
-    assert printed.read_bytes().startswith(b"%PDF") and printed.stat().st_size > 20_000
+    pages = PdfReader(printed).pages
+    words = " ".join(" ".join(one.extract_text() for one in pages).split())
+    assert "40 runs: " in words and "Nothing vibrates in 1 of 4 lines along load." in words
+    assert "Point at a run" not in words  # the printed map stands in the place of that to point at
+    assert sum(len(one.images) for one in pages) == 1
+    assert "[belt] ring_mass" in words  # the defaults, which are folded on the screen

@@ -112,11 +112,11 @@ def test_a_rung_has_the_keys_of_the_job_in_tables_of_its_own(job):
         (["stepper=explicit"], "stepper: expected imex, as all transients below have it, found explicit"),
         (
             ["load_history=ramp"],
-            "[scene] load_history: expected constant, as the lower rungs have it, found ramp",
+            "[scene] load_history: expected constant, as the cheaper models have it, found ramp",
         ),
         (
             ["speed_history=ramp"],
-            "[scene] speed_history: expected constant, as the lower rungs have it, found ramp",
+            "[scene] speed_history: expected constant, as the cheaper models have it, found ramp",
         ),
     ],
 )
@@ -158,7 +158,7 @@ def test_check_tells_the_runs_of_each_rung_and_what_is_left_of_them(job, capsys,
     monkeypatch.chdir(job.parent)
     assert main(["check", str(job), "--for", "ladder", "--set", "friction_memory=0"]) == 0
     first, *lines = capsys.readouterr().out.splitlines()
-    assert first == f"ladder small ({job}): 2 runs on 7 rungs"
+    assert first == f"ladder small ({job}): 2 runs with 7 models"
     rows = {line.split()[0]: line.split() for line in lines if line.startswith("  ")}
     assert rows["criterion"][2:4] == ["1", "1"] and rows["coarse"][1:4] == ["auto", "2", "2"]
     # twice the duration at 1.5 times the stations and steps: 4.5 times the cost, in two digits
@@ -191,8 +191,8 @@ def test_a_ladder_leaves_its_studies_and_what_they_say(made):
     _, out, printed, told = made
     announced = [line for line in told.splitlines() if " to go in all" in line]
     assert [line.split()[1:4] for line in announced[:2]] == [
-        ["rung", "1/8", "criterion:"],
-        ["rung", "2/8", "strand:"],
+        ["model", "1/8", "criterion:"],
+        ["model", "2/8", "strand:"],
     ]
     assert len(announced) == 8
     assert printed.splitlines()[-3:] == [

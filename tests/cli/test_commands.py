@@ -296,8 +296,19 @@ def test_simulate_of_a_run_that_fails_ends_with_1(write_job, call):
         ),
         (["map", "out/x"], None),
         (
-            ["plot", "wrap", "notes.nc"],
-            "notes.nc: expected a history written by `cvt-hpc simulate --out`, found another file, or none",
+            ["plot", "wrap", "absent.nc"],
+            "absent.nc: expected a history written by `cvt-hpc simulate --out`, found nothing; `cvt-hpc simulate JOB "
+            "--out absent.nc` writes one",
+        ),
+        (
+            ["plot", "history", "notes.nc"],
+            "notes.nc: expected a history written by `cvt-hpc simulate --out`, found another file; `cvt-hpc map` and "
+            "`cvt-hpc plot curve` draw the results of a study",
+        ),
+        (["plt"], "argument COMMAND: invalid choice: 'plt'; did you mean plot?; see `cvt-hpc --help`"),
+        (
+            ["plot", "histroy", "x.nc"],
+            "argument KIND: invalid choice: 'histroy'; did you mean history?; see `cvt-hpc plot --help`",
         ),
         (
             ["plot", "waterfall", "out/x", "--out", "h"],

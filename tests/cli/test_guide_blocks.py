@@ -73,7 +73,10 @@ history = [0, 1]
 # What a page takes for granted: work of its reader, or of another page.
 BEFORE = {
     "docs/guide/tutorial.md": "cvt-hpc run jobs/quickstart.toml",
-    "docs/guide/python.md": "cvt-hpc run jobs/lebrecht_2004.toml --set 'sheave_stiffness=[1.2, 1.5]'",
+    "docs/guide/python.md": """"
+        cvt-hpc run jobs/lebrecht_2004.toml --set 'sheave_stiffness=[1.0, 1.5]'
+        cvt-hpc run jobs/lebrecht_fitted.toml --set 'sheave_stiffness=[1.0, 1.5]'
+    """,
     "docs/guide/variables.md": "cvt-hpc run jobs/lebrecht_2004.toml",
     "docs/guide/verdicts.md": """
         cvt-hpc init JOB
@@ -86,6 +89,7 @@ BEFORE = {
         cvt-hpc run jobs/quickstart.toml --set name=speeds --set 'driving_speed=["2000 rpm", "3000 rpm"]'
         cvt-hpc run jobs/ramps.toml --set duration=0.6 --set longest_duration=0.6
         cvt-hpc run jobs/belt_drive_spectra.toml
+        cvt-hpc run jobs/misalignment.toml
         cvt-hpc simulate jobs/lebrecht_2004.toml --at load=120 --out run.nc
         cvt-hpc simulate jobs/misalignment.toml --at load=60 --out push.nc
     """,

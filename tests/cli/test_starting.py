@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -31,7 +32,22 @@ def test_a_template_is_a_job_and_so_is_all_that_is_commented_out_in_it(model):
         key for key, parameter in job.schema.parameters.items() if parameter.default is None
     }
     follow = {parameter.gives.key for parameter in job.schema.parameters.values() if parameter.gives}
+    assert max(map(len, text.splitlines())) <= 120
     assert set(job.parameters) - in_the_place_of_others - follow - {"load"} <= filled.given
+
+
+def test_a_template_has_the_units_of_engineers():
+    lines = job_template("first", "elastic_belt", "init").splitlines()
+    for line in (
+        '# driven_radius = "75 mm"',
+        '# thrust = "50 kN"',
+        '# driving_speed = "3000 rpm"',
+        '# disturbance = "1 um"',
+        '# rise_time = "30 ms"',
+        '# flank_stiffness = "30 kN/mm^2"',
+        '# element_mass = "1 kg/m"',
+    ):
+        assert line in lines
 
 
 def test_init_writes_a_job_that_check_takes_and_overwrites_nothing(call, tmp_path, monkeypatch):
@@ -77,7 +93,7 @@ def test_models_tells_each_model_and_its_keys(call):
 def test_doctor_names_what_is_wrong_and_what_to_do(call, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(
-        doctor, "_said", lambda command: ["1 MPICH", "1 MPICH"]
+        doctor, "_said", lambda command: (0, ["1 MPICH", "1 MPICH"])
     )  # ranks that do not see each other
     monkeypatch.setattr(doctor, "versions", lambda: {"python": "3", "mpi4py": "4"})
     monkeypatch.setattr(doctor, "LEAST_DISK", 1e30)
@@ -89,17 +105,67 @@ def test_doctor_names_what_is_wrong_and_what_to_do(call, tmp_path, monkeypatch):
     assert "does not fit the MPI library" in advice
 
 
+@pytest.mark.parametrize(
+    ("script", "told"),
+    [
+        (
+            "echo 'srun: error: resolve_ctls: no configuration' >&2; exit 1",
+            "trouble  Slurm: sbatch is there, but srun fails: srun: error: resolve_ctls: no configuration",
+        ),
+        (
+            "echo 'MPI plugin types are...'; echo pmi2",
+            "ok       Slurm: sbatch is there; srun knows MPI plugin types are... pmi2",
+        ),
+    ],
+)
+def test_doctor_asks_srun_whether_slurm_answers(call, tmp_path, monkeypatch, script, told):
+    for name in ("sbatch", "srun"):
+        (tmp_path / name).write_text(f"#!/bin/sh\n{script}\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(doctor, "_mpi", lambda installed: doctor.Finding(True, "MPI", ""))
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    status, out, _ = call("doctor")
+    assert told in out and status == (1 if told.startswith("trouble") else 0)
+    if status:
+        assert out[-1].startswith("         `sinfo` has to list partitions first")
+
+
 @pytest.mark.slow
 def test_doctor_starts_two_ranks():
     found = next(finding for finding in doctor.examine(doctor.Path()) if finding.what == "MPI")
     assert found.fine and found.found.startswith("2 ranks by ")
 
 
-def test_completion_names_all_commands():
-    script = subprocess.run(
-        [sys.executable, "-m", "cvt_hpc", "completion", "bash"], capture_output=True, text=True, check=True
-    ).stdout
-    assert subprocess.run(["bash", "-n"], input=script, text=True).returncode == 0
+@pytest.fixture(scope="module")
+def completion():
+    """Return a function that gives the script of a shell."""
+
+    def script(shell):
+        command = [sys.executable, "-m", "cvt_hpc", "completion", shell]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+    return script
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "tcsh"])
+def test_a_shell_takes_its_completion(completion, shell):
+    if shutil.which(shell) is None:
+        pytest.skip(f"no {shell} here")
+    # without a user's settings; tcsh has no syntax check that reads standard input, its script only defines
+    command = {"bash": ["bash", "-n"], "zsh": ["zsh", "-f", "-n"], "tcsh": ["tcsh", "-f"]}[shell]
+    done = subprocess.run(command, input=completion(shell), capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "tcsh"])
+def test_completion_names_the_commands_in_each_shell(completion, shell):
+    words = set(re.findall(r"[\w-]+", completion(shell)))
+    assert {"run", "map", "init", "doctor", "cvt-hpc"} <= words
+
+
+def test_completion_names_all_commands(completion):
+    script = completion("bash")
     commands = re.search(r"(?m)^_shtab_cvt_hpc_subparsers=\((.*)\)$", script)[1]
     assert {"run", "map", "init", "doctor"} <= set(commands.split())
 

@@ -64,7 +64,7 @@ def test_a_ring_that_moves_out_of_its_plane_keeps_its_energy_and_momentum():
     energy_now, momentum_now, moment_now = chains.energy_and_momentum(constants, found)
     assert np.abs(found[:, 2]).max() > 1e-5
     assert momentum_now == pytest.approx(momentum, abs=1e-12)
-    assert moment_now[2] == pytest.approx(moment[2], rel=1e-7)
+    assert moment_now[2] == pytest.approx(moment[2], rel=1e-8)
     assert energy_now == pytest.approx(energy, rel=4e-6)
 
 
@@ -123,27 +123,27 @@ def strand(tension, **given):
     return constants, fields
 
 
-def held_steps(constants, fields, steps, seen, dt=STEP):
-    """What `seen` reads after each step of the model. All but the strand moves along z and psi is held.
+def held_steps(constants, fields, steps, seen, held=(0, 1, 3, 4, 5, 6)):
+    """What `seen` reads after each step of the model, in which all but the strand is held, and unknowns of that.
 
     A strand in compression would buckle in its plane at once, where the rings have no stiffness here.
     """
     state, work = chains.state(fields), b.workspace(constants, len(fields))
     rows = len(work.blocks.data)
     inputs = np.zeros(b.INPUTS)
-    held, readings = np.array([0, 1, 3, 4, 5, 6]), []
+    readings = []
     for _ in range(steps):
-        _prepare(constants, state, work, dt)
+        _prepare(constants, state, work, STEP)
         for _ in range(2):
-            _evaluate(constants, state, work, 0.0, dt)
-            _assemble(constants, state, work, dt)
-            work.blocks.data[:, 9 * held] += 1e15
+            _evaluate(constants, state, work, 0.0, STEP)
+            _assemble(constants, state, work, STEP)
+            work.blocks.data[:, 9 * np.array(held)] += 1e15
             for element in (0, *range(SEGMENTS, len(fields))):
                 work.blocks.data[element % rows, : 9 * b.SIZE : 9, element // rows] += 1e15
-            solve_bordered(EQUATIONS[1], constants, state, work, b.NEWTON.weights, dt)
+            solve_bordered(EQUATIONS[1], constants, state, work, b.NEWTON.weights, STEP)
             correct(state, work, b.NEWTON.weights, b.CHANGE, 1.0)
-        _evaluate(constants, state, work, 0.0, dt)
-        _accept(constants, state, work, inputs, dt)
+        _evaluate(constants, state, work, 0.0, STEP)
+        _accept(constants, state, work, inputs, STEP)
         readings.append(seen(of_lanes(state.elements)))
     return np.array(readings)
 
@@ -177,12 +177,12 @@ def clamped_motion(tension, bending=47.6):
     return held_steps(constants, fields, 400, lambda f: shape @ f[: SEGMENTS + 1, 2]) / (shape @ shape)
 
 
-def frequency_squared(amplitudes, stride):
+def frequency_squared(amplitudes, stride, dt=STEP):
     """(2 pi f)^2 of amplitudes of one mode, of either sign, by q+ + q- = 2 q cos(omega dt) of every so many."""
     middle, outer = amplitudes[stride:-stride], amplitudes[2 * stride :] + amplitudes[: -2 * stride]
     cosine = 0.5 * (middle @ outer) / (middle @ middle)
     angle = np.arccos(cosine) ** 2 if cosine < 1.0 else -(np.arccosh(cosine) ** 2)
-    return angle / (stride * STEP) ** 2
+    return angle / (stride * dt) ** 2
 
 
 def test_frequency_of_a_clamped_strand():
@@ -212,38 +212,74 @@ def test_a_pressed_strand_buckles_at_its_load():
     assert 0.95 + 0.1 * below / (below - above) == pytest.approx(1.0, abs=0.01)
 
 
-def lateral_wave_frequency(waves, tension):
-    """Of waves around a ring that spins as fast as that tension asks, with 50 elements a half wave [Hz]."""
-    nodes, circumference = 100 * waves, 2 * waves * LENGTH_OF_STRAND
+def test_a_pressed_chain_buckles_by_its_closed_edges():
+    """Elements that turn with rings that hardly bend: EI = 2 (c / 2) b^2 h of the edges holds the strand."""
+    h, contact, yaw, soft = LENGTH_OF_STRAND / SEGMENTS, 3.2e6, 1e5, 1e-3  # [m], [N/m], [N m/rad], [N m^2]
+    bending = contact * 10e-3**2 * h + soft
+    # An element pushes the next one along that one's direction, not along the strand: as the rings' shear, which
+    # the yaw springs are in series with, that resists by the load itself: P = EI k^2 / (1 + EI k^2 / (GA + P)), of
+    # which the last P may be EI k^2.
+    load = bending * (2.0 * np.pi / LENGTH_OF_STRAND) ** 2
+    load /= 1.0 + load / (1.0 / (1.0 / 2.4e6 + h / yaw) + load)
+    _, shape, slope = clamped_mode(0.0, bending)
+    # heads lie in the middle of the edges, so that they take half of the push, and no moment
+    heads = {"pitch_depth": 1.5e-3, "head_height": -1.5e-3, "head_width": 0.0}
+    found = []
+    for share in (0.95, 1.05):
+        constants, fields = strand(
+            0.0, ring_bending=soft, yaw_stiffness=yaw, contact_stiffness=contact, **heads
+        )
+        constants = constants._replace(thickness=h + 0.5 * share * load / contact)
+        fields[: SEGMENTS + 1, 2] = 1e-5 * shape
+        for field in (b.SLOPE, b.HEADING + 2):
+            fields[: SEGMENTS + 1, field] = 1e-5 * slope
+        amplitudes = held_steps(
+            constants, fields, 400, lambda f: shape @ f[: SEGMENTS + 1, 2], held=(0, 1, 3, 5, 6)
+        )
+        found.append(frequency_squared(amplitudes, 60))
+    below, above = found
+    assert below > 0.0 > above
+    # points that meet half a thickness off the saddles' line take P t / 2 h off EI, 0.2 %
+    assert 0.95 + 0.1 * below / (below - above) == pytest.approx(1.0, abs=0.01)
+
+
+def lateral_wave_frequency(half_wave, tension, dt):
+    """Of eight half waves [m] around a ring that spins as fast as that tension asks, of 50 elements [Hz]."""
+    nodes, circumference = 400, 8 * half_wave
     h, radius = circumference / nodes, circumference / (2.0 * np.pi)
     mass = PER_LENGTH * h
     spin = np.sqrt(tension / PER_LENGTH) / radius
     constants = chains.belt(
-        pitch=h, thickness=0.5 * h, mass=0.8 * mass, ring_mass=0.2 * mass, ring_rotary_inertia=1e-9
+        pitch=h, thickness=0.5 * h, mass=0.8 * mass, ring_mass=0.2 * mass, ring_rotary_inertia=1e-12
     )
     fields = chains.spinning_ring(nodes, radius, spin)
     chord = 2.0 * radius * np.sin(np.pi / nodes)
     fields[:, b.LENGTH] = chord / (1.0 + mass * spin**2 * radius / (2.0 * np.sin(np.pi / nodes)) / 6.0e6)
     place = h * np.arange(nodes)
-    wave = np.pi / LENGTH_OF_STRAND
+    wave = np.pi / half_wave
     shape = np.sin(wave * place)
     fields[:, 2] = 1e-5 * shape
     fields[:, b.SLOPE] = 1e-5 * wave / (1.0 + 47.6 * wave**2 / 2.4e6) * np.cos(wave * place)
     state, work = chains.state(fields), b.workspace(constants, nodes)
     amplitudes = []
     for _ in range(40):
-        assert advance(constants, b.NEWTON, state, work, np.zeros((2, b.INPUTS)), 10, STEP) == 0
+        assert advance(constants, b.NEWTON, state, work, np.zeros((2, b.INPUTS)), 10, dt) == 0
         amplitudes.append(shape @ of_lanes(state.elements)[:, 2])
-    return np.sqrt(frequency_squared(np.array(amplitudes), 1) / 100.0) / (2.0 * np.pi)
+    return np.sqrt(frequency_squared(np.array(amplitudes), 1, 10.0 * dt)) / (2.0 * np.pi)
 
 
-def test_frequency_of_a_pinned_strand():
+@pytest.mark.parametrize(("mode", "golden"), [(1, 412.10), (2, 1522.50), (3, 3314.13)])
+def test_frequency_of_a_pinned_strand(mode, golden):
     # half a wave of a large ring is a pinned strand: f = 1 / (2 l) sqrt((T + EI_s (pi / l)^2) / m')
-    wave = np.pi / LENGTH_OF_STRAND
+    wave = mode * np.pi / LENGTH_OF_STRAND
     stiff = 47.6 / (1.0 + 47.6 * wave**2 / 2.4e6)
     exact = wave / (2.0 * np.pi) * np.sqrt((4000.0 + stiff * wave**2) / PER_LENGTH)
-    assert exact == pytest.approx(412.10, rel=1e-4)
-    assert lateral_wave_frequency(4, 4000.0) == pytest.approx(exact, rel=1e-3)
+    assert exact == pytest.approx(golden, rel=1e-4)
+    # The step errs by -(2 pi f dt)^2 / 12: by 6e-5 of the first mode, 5e-5 and 4e-5 of the others in steps that
+    # fall with the square of the mode. So few elements err by 1e-4. Rotary inertia of the rings, which the formula
+    # has not, would lower the third mode by 2e-3.
+    found = lateral_wave_frequency(LENGTH_OF_STRAND / mode, 4000.0, STEP / mode**2)
+    assert found == pytest.approx(exact, rel=3e-4)
 
 
 @pytest.mark.parametrize(("tension", "force"), [(0.0, 78.025), (4000.0, 93.562)])

@@ -1,23 +1,17 @@
-"""Contacts of the spatial pushbelt: golden digits, rates of all gaps, forces without resultant, the linear system."""
+"""Contacts of the spatial pushbelt: golden digits of frustum, plane, pin and hole, pressed edges."""
 
 import numpy as np
 import pytest
 from numba import njit
 from scipy.optimize import brentq
 
-from cvt_hpc.models.pushbelt.belt import DRIVEN_RADIUS, DRIVING_RADIUS
-from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start
+from cvt_hpc.models.pushbelt.start import of_lanes
 from cvt_hpc.models.spatial_pushbelt import belt as b
-from cvt_hpc.models.spatial_pushbelt.faces import face_gap
+from cvt_hpc.models.spatial_pushbelt.chain import predict
+from cvt_hpc.models.spatial_pushbelt.faces import face_forces, face_gap, predict_faces
 from cvt_hpc.models.spatial_pushbelt.flank import flank_directions, frustum, frustum_gap
 from cvt_hpc.models.spatial_pushbelt.pin import pin_offset
-from cvt_hpc.models.spatial_pushbelt.step import _assemble, _evaluate, _prepare
-from cvt_hpc.physics.friction_laws import Law
 from support import spatial_chains as chains
-from support.pushbelts import given
-
-NODES, STEP, LOAD = 64, 1e-5, 81.0
-RIGHT = b.RIGHT
 
 
 @njit
@@ -41,11 +35,24 @@ def test_a_point_on_the_frustum_of_a_sheave():
         d = 1e-6 * np.eye(3)[k]
         gaps = [at_flank(belt, tuple(q + sign * d), (0.0, 0.0, 1.0), 1.0, 0.04733)[0] for sign in (1.0, -1.0)]
         assert (gaps[0] - gaps[1]) / 2e-6 == pytest.approx(n[k], abs=1e-8)
-    # Schindler's form, (|d - s a| - r_h) cos phi from the base of the frustum, with phi = pi / 2 - d0
-    # (Schindler 2008, eqs 16-22): r_h = R + (z - B) / tan d0
-    tangent = np.tan(chains.WEDGE)
-    r_h = 0.04733 + (0.0119 - 0.012) / tangent
-    assert (np.hypot(0.040, 0.025) - r_h) * np.sin(chains.WEDGE) == pytest.approx(gap, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("q", "expected", "normal"),
+    [
+        ((0.05, 0.03, 0.0049), 5.917376712540e-4, (-0.16361736, -0.09817042, 0.98162718)),
+        ((0.062, -0.011, 0.006), 4.008747913608e-4, (-0.18787498, 0.03333266, 0.98162718)),
+    ],
+)
+def test_a_point_on_the_frustum_of_the_paper(q, expected, normal):
+    """(|d - s a| - r_h) cos phi, r_h = r_1 + s tan phi, by the frustum's base (Schindler 2008, eqs 16-22)."""
+    # phi = pi / 2 - d0; r_1 is the radius at z = 0, that of the groove where z is half of an element's width
+    belt, tangent = chains.belt(), 5.144554016
+    assert tangent == pytest.approx(1.0 / np.tan(chains.WEDGE), rel=1e-9)
+    gap, n, _, _, _ = at_flank(belt, q, (0.0, 0.0, 1.0), 1.0, 0.03 + tangent * belt.half_width)
+    assert gap == pytest.approx(expected, abs=1e-13)  # tan phi has ten digits
+    # the paper's points into the frustum, ours against the element
+    assert -np.array(n) == pytest.approx(normal, abs=1e-8)
 
 
 @njit
@@ -71,6 +78,49 @@ def test_front_points_at_the_rear_plane(pitch, edge, head):
             2e-3,
         )
         assert 1e6 * gap == pytest.approx(expected, abs=1e-6)
+
+
+def pressed_edges(belt, push, curvature):
+    """Forces at the edges, left and right, and moments (16 - 1,) of elements pressed along an arc out of their plane.
+
+    Each is so close to the one behind as the push at the middle of the edge asks, and tilted, heads apart.
+    """
+    nodes, yaw, tilt, apart = 16, curvature * belt.pitch, 1e-3, push / belt.contact_stiffness
+    fields = np.zeros((nodes, b.STATE_FIELDS))
+    r, x, o = np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])
+    for element in fields:
+        element[:9] = *r, *x, *o
+        edge = r + 0.5 * belt.thickness * x - belt.pitch_depth * o
+        x = np.cos(tilt) * (np.cos(yaw) * x + np.sin(yaw) * np.cross(o, x)) - np.sin(tilt) * o
+        o = o - (o @ x) * x
+        o /= np.linalg.norm(o)
+        r = edge + (0.5 * belt.thickness - apart) * x + belt.pitch_depth * o
+    state, work = chains.state(fields), b.workspace(belt, nodes)
+    predict(belt, state.elements, state.pulleys, work.step, 1e-9)
+    predict_faces(belt, state.elements, work.step)
+    work.iterate.data[:] = 0.0
+    face_forces(belt, state.elements, work.step, work.iterate, 1e-9)
+    forces, turns = (
+        of_lanes(of)[:-1, k : k + n]
+        for of, k, n in ((state.elements, b.PUSH, 4), (work.iterate, b.PAIR_J + 3, 3))
+    )
+    assert not forces[:, 2:].any()
+    return forces[:, :2], -np.sum(turns * fields[1:, 6:9], axis=1)
+
+
+def test_pressed_edges_bend_as_a_beam_until_one_opens():
+    belt, push = chains.belt(), 500.0
+    stiff = belt.contact_stiffness * belt.edge_width**2 * belt.pitch  # EI of 2 (c / 2) b^2 h
+    assert stiff == pytest.approx(153.0, rel=1e-3)
+    opens = push * belt.edge_width / stiff
+    for share in (-0.999, -0.5, 0.0, 0.5, 0.999, 1.001):
+        edges, moment = pressed_edges(belt, push, share * opens)
+        # each edge has half of the push, and of the moment what its width asks, until one has none; tilt takes 5e-7
+        expected = 0.5 * push * (1.0 + share)
+        assert edges[:, 1] == pytest.approx(expected, abs=1e-6 * push)
+        expected = min(share * push, expected) * belt.edge_width
+        assert moment == pytest.approx(expected, abs=1e-6 * push * belt.edge_width)
+        assert (edges[:, 0] > 0.0).all() == (share < 1.0)
 
 
 def circle_and_ellipse(circle, centre, first, second):
@@ -112,189 +162,3 @@ def test_pin_and_hole():
         np.zeros(2), across, np.array([radius * np.cos(tilt), 0.0]), np.array([0.0, radius])
     )
     assert 2e-3 - distances.max() == pytest.approx(clearance - size, abs=1e-8)
-
-
-def shaken(seed, **changes):
-    """A pressed belt with gaps, slips, rotations and modes out of order, beside tilted pulleys."""
-    stiffness = ((6e8, 3e8, 3e8), (9e8, 2e8, 1e8))
-    planar, planar_state = start(given(nodes=NODES, modal_stiffness=stiffness, friction_speed=0.05))
-    axes = np.array([[3e-3, -2e-3, 1.0], [-1e-3, 4e-3, 1.0]])
-    constants = {
-        "axes": axes / np.linalg.norm(axes, axis=1)[:, None],
-        "loose_side": np.array([1.0, -1.0]),
-        "pin_clearance": 2e-5,
-        "thickness": planar.thickness + 2e-5,
-        "ring_friction_speed": 0.02,
-        "lateral_damping": 3.0,
-        "flank_law": int(Law.STRIBECK),
-        "flank_gradient": -0.3,
-        "friction_memory": 3e-4,
-    }
-    belt, state = chains.beside_planar(planar, planar_state, **constants | changes)
-    rng = np.random.default_rng(seed)
-    f = of_lanes(state.elements).copy()
-    f[:, :3] += rng.normal(0.0, 2e-5, (NODES, 3))
-    f[:, 3:6] += rng.normal(0.0, 2e-3, (NODES, 3))
-    f[:, 3:6] /= np.linalg.norm(f[:, 3:6], axis=1)[:, None]
-    f[:, 6:9] += rng.normal(0.0, 2e-3, (NODES, 3))
-    f[:, 6:9] -= np.sum(f[:, 6:9] * f[:, 3:6], 1)[:, None] * f[:, 3:6]
-    f[:, 6:9] /= np.linalg.norm(f[:, 6:9], axis=1)[:, None]
-    f[:, b.SLOPE] = rng.normal(0.0, 2e-3, NODES)
-    f[:, b.SPEED : b.SPEED + 8] += rng.normal(0.0, 0.05, (NODES, 8))
-    f[:, b.SADDLE] = rng.uniform(20.0, 80.0, NODES)
-    f[:, b.V_FILTERED : b.V_FILTERED + 4] = rng.uniform(0.0, 0.2, (NODES, 4))
-    state.elements.data[:] = in_lanes(f).data
-    state.openings[:] = rng.normal(0.0, 1e-6, state.openings.shape)
-    state.leans[:] = rng.normal(0.0, 1e-6, state.openings.shape)
-    state.pulleys[[DRIVING_RADIUS, DRIVEN_RADIUS]] += 1e-4
-    state.pulleys[[b.DRIVING_MIDDLE, b.DRIVEN_MIDDLE]] = 3e-5, -2e-5
-    return belt, state, b.workspace(belt, NODES), rng
-
-
-def rate(own, ahead, first, last, x):
-    """Rate of a law between neighbours by directions at this element and at the next one, by fields of `step`."""
-    return np.sum(own * x[:, first], 1) + np.sum(ahead * np.roll(x, -1, 0)[:, last], 1)
-
-
-U, W = slice(0, 3), slice(3, 6)
-
-
-def directions(step, f, x):
-    """Rates along x (nodes, 8) of all gaps and strains, by the directions that forces have."""
-
-    def of(first):
-        return step[:, first : first + 3]
-
-    xj = np.roll(f[:, 3:6], -1, 0)
-    found = {}
-    for p in range(4):
-        found[b.PUSH_GAP + p] = rate(-xj, xj, U, U, x) + rate(
-            of(b.PUSH_LEVER_I + 3 * p), of(b.PUSH_LEVER_J + 3 * p), W, W, x
-        )
-    n = of(b.PIN_NORMAL)
-    found[b.PIN_GAP] = rate(-n, n, U, U, x) - rate(of(b.PIN_LEVER_I), -of(b.PIN_LEVER_J), W, W, x)
-    tension = rate(of(b.TENSION_I), -of(b.TENSION_J), U, U, x)
-    tension += rate(of(b.TENSION_I + 3), -of(b.TENSION_J + 3), W, W, x) + x[:, 6] - np.roll(x[:, 6], -1)
-    found[b.PREDICTED_TENSION] = tension
-    ci, cj = of(b.CHORD_I), of(b.CHORD_J)
-    found[b.PREDICTED_MOMENT_I] = rate(-ci, ci, U, U, x) + np.sum(of(b.TURN_I) * x[:, W], 1)
-    found[b.PREDICTED_MOMENT_J] = rate(-cj, cj, U, U, x) + np.sum(of(b.TURN_J) * np.roll(x, -1, 0)[:, W], 1)
-    return found
-
-
-def test_rates_of_all_gaps_and_strains():
-    # what forces take as rates along a direction, against differences of gaps at q + X dt
-    belt, state, work, rng = shaken(1, angle_damping=0.0)
-    f, x = of_lanes(state.elements).copy(), rng.normal(0.0, 1.0, (NODES, 8)) * [1, 1, 1, 100, 100, 100, 1, 0]
-    axial = np.cross(f[:, 6:9], f[:, 3:6])
-    lengths = np.zeros(NODES)
-    for side in (1.0, -1.0):
-        line = f[:, :3] + side * belt.package_distance * axial
-        lengths += 0.5 * np.linalg.norm(np.roll(line, -1, 0) - line, axis=1)
-    f[:, b.LENGTH] = lengths  # the direction of the tension is its rate at a strain of zero
-    state.leans[:] = 0.0
-    small, measured = 3e-9, {}
-    for sign in (-1.0, 0.0, 1.0):
-        g = f.copy()
-        g[:, b.SPEED : b.SPEED + 8] = sign * small * x
-        state.elements.data[:] = in_lanes(g).data
-        _prepare(belt, state, work, 1.0)
-        measured[sign] = of_lanes(work.step).copy()
-    step = measured[0.0]
-    difference = (measured[1.0] - measured[-1.0]) / (2.0 * small)
-    difference[:, b.PREDICTED_TENSION] *= -lengths / belt.ring_stiffness
-    moments = [b.PREDICTED_MOMENT_I, b.PREDICTED_MOMENT_J]
-    difference[:, moments] *= 2.0 / belt.angle_stiffness
-    for field, expected in directions(step, f, x).items():
-        scale = np.abs(expected).max()
-        assert difference[:, field] == pytest.approx(expected, abs=2e-7 * scale), field
-    driven = f[:, 0] > 0.5 * belt.centre_distance
-    axis = np.where(driven[:, None], belt.axes[1], belt.axes[0])
-    for p in range(4):
-        side, reach = (-1.0, -1.0, 1.0, 1.0)[p], (-1.0, 1.0)[p % 2] * belt.flank_reach
-        width = belt.half_width + reach * belt.sine / belt.cosine
-        lever = (reach - belt.pitch_depth) * f[:, 6:9] + side * width * axial
-        n = belt.sine * step[:, b.RADIAL + 3 * p : b.RADIAL + 3 * p + 3] - side * belt.cosine * axis
-        expected = np.sum(n * (x[:, U] + np.cross(x[:, W], lever)), 1)
-        scale = np.abs(expected).max()
-        assert difference[:, b.FLANK_GAP + p] == pytest.approx(expected, abs=2e-7 * scale)
-
-
-def test_internal_forces_have_no_resultant_and_no_moment():
-    belt, state, work, rng = shaken(2)
-    f = of_lanes(state.elements).copy()
-    _prepare(belt, state, work, STEP)
-    step = of_lanes(work.step)
-    shift, spin = rng.normal(0.0, 1.0, 3), rng.normal(0.0, 1.0, 3)
-    # every law between neighbours has no rate in a rigid motion, in which the ring's material goes along
-    x = np.zeros((NODES, 8))
-    x[:, U], x[:, W] = shift + np.cross(spin, f[:, :3]), spin
-    axial = np.cross(f[:, 6:9], f[:, 3:6])
-    for side in (1.0, -1.0):
-        arm = side * belt.package_distance * axial
-        place = f[:, :3] + arm
-        t = np.roll(place, -1, 0) - np.roll(place, 1, 0)
-        t /= np.linalg.norm(t, axis=1)[:, None]
-        x[:, 6] += 0.5 * np.sum(t * (x[:, U] + np.cross(x[:, W], arm)), 1)
-    for field, found in directions(step, f, x).items():
-        assert np.abs(found).max() < (1e-9 if field >= b.CHORD_I and field < b.YAW else 1e-12), field
-
-
-def evaluated(belt, state, work, dt):
-    """Residuals of elements and border, of an iterate evaluated twice, so that duals are those of its slips."""
-    for _ in range(2):
-        _evaluate(belt, state, work, LOAD, dt)
-    own = of_lanes(work.iterate)[:, b.RESIDUAL : b.RESIDUAL + 8]
-    return np.concatenate([own.ravel(), work.border[:, -1]])
-
-
-def test_the_linear_system_is_the_slope_of_the_residuals():
-    belt, state, work, rng = shaken(3)
-    _prepare(belt, state, work, STEP)
-    f = of_lanes(state.elements).copy()
-    f[:, b.CHANGE : b.CHANGE + 8] = rng.normal(0.0, 0.01, (NODES, 8))
-    state.increments[:] = [0.3, *rng.normal(0.0, 1e-7, 6)]
-    state.elements.data[:] = in_lanes(f).data
-    evaluated(belt, state, work, STEP)
-    _assemble(belt, state, work, STEP)
-    blocks, iterate = of_lanes(work.blocks), of_lanes(work.iterate)
-    shapes, driven = of_lanes(work.shapes), of_lanes(state.elements)[:, b.DRIVEN]
-    size = 8 * NODES
-    matrix = np.zeros((size + 7, size + 7))
-    for i in range(NODES):
-        j, at = (i + 1) % NODES, slice(8 * i, 8 * i + 8)
-        matrix[at, at] += blocks[i, :64].reshape(8, 8).T
-        link = blocks[i, 64:128].reshape(8, 8).T
-        matrix[at, 8 * j : 8 * j + 8] += link
-        matrix[8 * j : 8 * j + 8, at] += link.T
-        matrix[at, size:] = blocks[i, RIGHT + 8 : RIGHT + 64].reshape(7, 8).T
-        matrix[size, 8 * i : 8 * i + 6] = iterate[i, b.TORQUE_ROW : b.TORQUE_ROW + 6]
-    weights = np.hstack([(1.0 - driven)[:, None] * shapes, driven[:, None] * shapes])  # (nodes, 6)
-    matrix[size, size] = iterate[:, b.TORQUE_OWN].sum() + belt.driven_inertia / STEP
-    matrix[size, size + 1 :] = iterate[:, b.TORQUE_OPENING] @ weights
-    for k in range(6):
-        row = weights[:, k, None] * iterate[:, b.NORMAL_ROW : b.NORMAL_ROW + 6]
-        matrix[size + 1 + k, :size] = np.hstack([row, np.zeros((NODES, 2))]).ravel()
-        matrix[size + 1 + k, size + 1 :] = (weights[:, k] * iterate[:, b.NORMAL_YIELD]) @ weights
-        matrix[size + 1 + k, size + 1 + k] += belt.modal_stiffness[k // 3, k % 3]
-    kinds = {
-        "speeds": np.concatenate([rng.normal(0.0, 1.0, size), np.zeros(7)]),
-        "driven speed": np.eye(size + 7)[size] * 10.0,
-        "openings": np.concatenate([np.zeros(size + 1), rng.normal(0.0, 1e-5, 6)]),
-    }
-    for what, direction in kinds.items():
-        found = []
-        for sign in (1.0, -1.0):
-            g = f.copy()
-            g[:, b.CHANGE : b.CHANGE + 8] += sign * 1e-6 * direction[:size].reshape(NODES, 8)
-            increments = state.increments.copy()
-            state.increments[:] += sign * 1e-6 * direction[size:]
-            state.elements.data[:] = in_lanes(g).data
-            found.append(evaluated(belt, state, work, STEP))
-            state.increments[:] = increments
-        slope = -(found[0] - found[1]) / 2e-6
-        expected = matrix @ direction
-        scale = np.abs(expected).max()
-        # few contacts change over between the two
-        wrong = np.abs(slope - expected) > 1e-5 * scale
-        assert wrong.sum() <= 0, (what, np.flatnonzero(wrong)[:20], slope[wrong][:20], expected[wrong][:20])

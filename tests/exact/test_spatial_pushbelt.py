@@ -9,12 +9,13 @@ from cvt_hpc.models.pushbelt.start import workspace as planar_workspace
 from cvt_hpc.models.pushbelt.step import advance as planar_advance
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.flank import flank_forces
-from cvt_hpc.models.spatial_pushbelt.step import _prepare, advance
+from cvt_hpc.models.spatial_pushbelt.step import _accept, _evaluate, _prepare, advance
 from support import spatial_chains as chains
 from support.pushbelts import THRUST, given
-from support.spatial_belts import LOAD, NODES, RAMP, STEP, inputs, scene
+from support.spatial_belts import LOAD, NODES, RAMP, STEP, inputs, leaning_loads, scene, sheaves_modes
 
 MODES = ((6e8, 3e8, 3e8), (6e8, 3e8, 3e8))  # [N/m]
+UNLIKE = ((6e8, 3e8, 4e8), (7e8, 5e8, 2e8))  # [N/m]
 
 
 @pytest.mark.parametrize("modal", [(), MODES], ids=["rigid", "elastic"])
@@ -142,6 +143,29 @@ def test_stiff_sheaves_are_rigid_ones():
     for k in (b.DRIVING_LEFT, b.DRIVEN_RIGHT, b.DRIVING_TORQUE):
         assert stiff[1].loads[k] == pytest.approx(rigid[1].loads[k], rel=5e-3)
     assert np.abs(stiff[1].openings).max() < 1e-9
+
+
+def test_a_sheave_leans_with_its_lag_under_a_load_that_stays():
+    planar, planar_state = start(given(NODES, modal_stiffness=MODES))
+    belt, state = chains.beside_planar(planar, planar_state, modal_stiffness=np.array(UNLIKE))
+    work, hold = b.workspace(belt, NODES), inputs((THRUST, THRUST), (LOAD, LOAD))[1]
+    _prepare(belt, state, work, STEP)
+    _evaluate(belt, state, work, LOAD, STEP)
+    f = of_lanes(state.elements).copy()
+    f[:, b.FLANK : b.FLANK + 4] = np.random.default_rng(5).uniform(0.0, 500.0, (NODES, 4))
+    target = leaning_loads(belt, f, sheaves_modes(belt, state)) / belt.modal_stiffness
+    assert np.abs(target).min() > 1e-8
+    steps = 200
+    for done in range(1, steps + 1):
+        state.elements.data[:] = in_lanes(f).data
+        _accept(belt, state, work, hold, STEP)
+        # explicit: dw / dt = (load / stiffness - w) / lag
+        reached = 1.0 - (1.0 - STEP / belt.lean_lag) ** done
+        assert state.leans == pytest.approx(reached * target, rel=1e-12)
+        # which is 1 - exp(-t / lag) but for at most dt / (2 e lag)
+        assert reached == pytest.approx(
+            -np.expm1(-done * STEP / belt.lean_lag), abs=0.19 * STEP / belt.lean_lag
+        )
 
 
 def test_pins_push_back_beyond_their_clearance():

@@ -12,7 +12,18 @@ from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.step import advance
 from cvt_hpc.physics.friction_laws import Law
 from support.pushbelts import THRUST
-from support.spatial_belts import LOAD, STEP, TORQUE, gaps, inputs, scene, sheaves_opening, stored
+from support.spatial_belts import (
+    LOAD,
+    STEP,
+    TORQUE,
+    gaps,
+    inputs,
+    leaning_loads,
+    scene,
+    sheaves_modes,
+    sheaves_opening,
+    stored,
+)
 
 OUTPUTS = 450  # of ten steps each: a revolution
 SCENES = {
@@ -23,20 +34,22 @@ SCENES = {
     "pins": {"yaw_stiffness": 0.0, "pin_clearance": 5e-5},
 }
 CONTACTS = slice(b.PUSH, b.FLANK + b.POINTS)  # fields of their normal forces, in the order of b.CONTACTS
-FLANKS = slice(5, 9)
+FRONTS, PIN, FLANKS = slice(0, 4), 4, slice(5, 9)
 
 
 class Revolution(NamedTuple):
-    """`rate` of all totals [W], in place of the time that of the stored energy; all but loads of every other output."""
+    """`rate` of all totals [W], in place of the time that of the stored energy."""
 
     belt: b.Belt
     state: b.BeltState
     rate: np.ndarray
     loads: np.ndarray  # (OUTPUTS, LOADS)
-    elements: np.ndarray  # (outputs, nodes, STATE_FIELDS)
-    saddle_before: np.ndarray  # normal forces of rings one step earlier, (outputs, nodes)
-    gaps: np.ndarray  # (outputs, nodes, 9)
-    openings: np.ndarray  # of the sheaves at the elements, (outputs, nodes)
+    elements: np.ndarray  # (OUTPUTS, nodes, STATE_FIELDS)
+    saddle_before: np.ndarray  # normal forces of rings one step earlier, (OUTPUTS, nodes)
+    gaps: np.ndarray  # (OUTPUTS, nodes, 9)
+    openings: np.ndarray  # of the sheaves at the elements, (OUTPUTS, nodes)
+    leans: np.ndarray  # one step earlier, (OUTPUTS, 2, modes)
+    leaning: np.ndarray  # loads of these modes [N], (OUTPUTS, 2, modes)
 
 
 @cache
@@ -45,14 +58,16 @@ def revolution(name):
     before, energy = state.totals.copy(), stored(belt, state)
     hold = inputs((THRUST, THRUST), (LOAD, LOAD))
     loads, found = [], []
-    for k in range(OUTPUTS):
+    for _ in range(OUTPUTS):
         assert advance(belt, b.NEWTON, state, work, hold, 9, STEP) == 0
         saddle = of_lanes(state.elements)[:, b.SADDLE].copy()
+        leans, shapes = state.leans.copy(), sheaves_modes(belt, state)
         assert advance(belt, b.NEWTON, state, work, hold, 1, STEP) == 0
         loads.append(state.loads.copy())
-        if k % 2 == 1:
-            opening = sheaves_opening(belt, state, state.openings)
-            found.append((of_lanes(state.elements).copy(), saddle, gaps(belt, state), opening))
+        opening = sheaves_opening(belt, state, state.openings)
+        fields = of_lanes(state.elements).copy()
+        leaning = leaning_loads(belt, fields, shapes)
+        found.append((fields, saddle, gaps(belt, state), opening, leans, leaning))
     spent = state.totals - before
     rate = spent / spent[p.TIME]
     rate[p.TIME] = (stored(belt, state) - energy) / spent[p.TIME]
@@ -92,12 +107,18 @@ def test_contacts_press_by_their_gaps_at_every_output(name):
     deformed = normal / np.repeat(stiffness, [4, 1, 4])
     error = np.abs(np.maximum(-found.gaps, 0.0) - deformed)
     deformed[..., FLANKS] += belt.cosine * found.openings[..., None]
-    for part in (slice(0, 4), slice(4, 5), FLANKS):
-        of_part = pressed[..., part]
-        if part.start != 4 or name == "pins":
-            assert error[..., part][of_part].mean() < 0.01 * deformed[..., part][of_part].mean(), part
-    # what is not pressed is open
-    assert error[~pressed].max() < 0.01 * deformed.max()
+    assert pressed[..., FRONTS].any() and pressed[..., FLANKS].any()
+    # the largest error of an output, which what is not pressed but closed has too; 0.4 % found
+    for part in (FRONTS, FLANKS):
+        largest = deformed[..., part].max(axis=(1, 2))
+        assert (error[..., part].max(axis=(1, 2)) < 0.01 * largest).all(), part
+    # Within a step a pin may run along its hole by so much that the direction of its force turns by 0.04: the gap
+    # is another by its cosine's part of the clearance, 40 nm. So few pins err by more than 1 % of the largest.
+    of_pin, pin, largest = error[..., PIN], pressed[..., PIN], deformed[..., PIN].max()
+    assert pin.any() == (name == "pins")
+    assert of_pin.max() <= 0.03 * largest and of_pin[~pin].max() <= 0.01 * largest
+    if pin.any():
+        assert np.percentile(of_pin[pin], 99.0) < 0.01 * largest
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -147,15 +168,15 @@ def changes(name):
     }
 
 
-FRONTS = {"edge left", "edge right", "head left", "head right", "pin"}  # without friction
+AHEAD = {"edge left", "edge right", "head left", "head right", "pin"}  # without friction
 SIDES = {"flank left low", "flank left high", "flank right low", "flank right high"}
 
 
 @pytest.mark.parametrize(
     ("verb", "contacts"),
     [
-        ("opens", FRONTS | SIDES),
-        ("closes", FRONTS | SIDES),
+        ("opens", AHEAD | SIDES),
+        ("closes", AHEAD | SIDES),
         ("sticks", SIDES | {"ring"}),  # saddle and pillar hold the rings from both sides
         ("slips", SIDES | {"ring"}),
     ],
@@ -183,9 +204,14 @@ def test_flanks_touch_on_either_side_and_at_either_height(where, points):
 
 
 def test_sheaves_lean_by_the_difference_of_their_loads():
-    found = revolution("elastic")
-    loads, state = found.loads.mean(axis=0), found.state
-    # the first mode opens a sheave evenly by force over stiffness; it follows within a millisecond
-    difference = 0.5 * (loads[b.DRIVING_RIGHT] - loads[b.DRIVING_LEFT])
-    assert state.leans[0, 0] * 6e8 == pytest.approx(difference, rel=0.3)
-    assert state.openings[0, 0] * 6e8 == pytest.approx(loads[: b.DRIVEN_LEFT].mean(), rel=0.05)
+    found, stiffness = revolution("elastic"), np.array(SCENES["elastic"]["modal"])
+    # every mode follows its load by the lag, so that in the mean it leans by load over stiffness less lag times rate
+    rate = (found.leans[-1] - found.leans[0]) / (OUTPUTS * 10 * STEP)
+    expected = found.leaning.mean(axis=0) / stiffness - found.belt.lean_lag * rate
+    largest = np.abs(expected).max()
+    assert largest > 1e-7 and (np.abs(expected[:, 1]) > 0.5 * largest).all()
+    # loads of every tenth step alone; 0.4 % found
+    assert found.leans.mean(axis=0) == pytest.approx(expected, abs=0.01 * largest)
+    # the first mode opens a sheave evenly by force over stiffness
+    loads = found.loads.mean(axis=0)
+    assert found.state.openings[0, 0] * 6e8 == pytest.approx(loads[: b.DRIVEN_LEFT].mean(), rel=0.05)

@@ -63,11 +63,8 @@ def stretches(step, x):
 def test_tensions_of_both_packages_change_by_their_directions():
     belt, state, work, rng = shaken(1)
     f = of_lanes(state.elements).copy()
-    axial = np.cross(f[:, b.OUTWARD : b.OUTWARD + 3], f[:, b.HEADING : b.HEADING + 3])
-    right, left = (
-        np.linalg.norm(np.roll(line, -1, 0) - line, axis=1)
-        for line in (f[:, :3] + side * belt.package_distance * axial for side in (1.0, -1.0))
-    )
+    place, _ = chains.lines(belt, f)
+    right, left = np.linalg.norm(np.roll(place, -1, axis=1) - place, axis=2)
     # the direction of a tension is its rate at a strain of zero
     f[:, b.LENGTH], f[:, b.HALF_LENGTH] = 0.5 * (right + left), 0.5 * (right - left)
     x = rng.normal(0.0, 1.0, (NODES, 9)) * [1, 1, 1, 100, 100, 100, 1, 0, 1]
@@ -103,14 +100,9 @@ def test_both_packages_slip_along_their_own_lines():
     belt, state, work, _ = shaken(2)
     TWO.prepare(belt, state, work, STEP)
     f, step = of_lanes(state.elements), of_lanes(work.step)
-    axial = np.cross(f[:, b.OUTWARD : b.OUTWARD + 3], f[:, b.HEADING : b.HEADING + 3])
     slips = []
-    for side in (1.0, -1.0):
-        arm = side * belt.package_distance * axial
-        line = f[:, :3] + arm
-        t = np.roll(line, -1, 0) - np.roll(line, 1, 0)
-        t /= np.linalg.norm(t, axis=1)[:, None]
-        moving = f[:, b.SPEED : b.SPEED + 3] + np.cross(f[:, b.OMEGA : b.OMEGA + 3], arm)
+    for side, line, t in zip((1.0, -1.0), *chains.lines(belt, f), strict=True):
+        moving = f[:, b.SPEED : b.SPEED + 3] + np.cross(f[:, b.OMEGA : b.OMEGA + 3], line - f[:, :3])
         slips.append(f[:, b.V] + side * f[:, b.HALF_SPEED] - np.sum(t * moving, 1))
     scale = np.abs(slips).max()
     assert step[:, b.START_SLIP] == pytest.approx(0.5 * (slips[0] + slips[1]), abs=1e-12 * scale)

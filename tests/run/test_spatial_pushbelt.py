@@ -20,19 +20,9 @@ from cvt_hpc.simulation import run_point, simulate
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.variator.path import regions
+from support.spatial_belts import COARSE, job
 
-# A belt of few elements between rigid sheaves, clamped and loaded within a quarter of a revolution
-BELT = {"elements": 104, "band_high": 1000.0, "sheave_stiffness": np.inf, "rise_time": 0.01, "duration": 0.04}
 OFFSET = 5e-4  # [m]
-
-
-def job(**values):
-    return build_job(
-        {"name": "spatial", "model": values.pop("model", "spatial_pushbelt")},
-        "spatial",
-        {**BELT, "most_refinements": 0, "longest_duration": values.get("duration", 0.04), "load": 60.0}
-        | values,
-    )
 
 
 def record(**values):
@@ -106,6 +96,11 @@ def test_profiles_and_histories_agree_with_the_record(misaligned):
     assert profiles["push_force_left"] + profiles["push_force_right"] == pytest.approx(
         profiles["push_force"], nan_ok=True
     )
+    heads = [profiles[f"head_force_{side}"] for side in ("left", "right")]
+    assert sum(heads) == pytest.approx(profiles["head_force"], nan_ok=True)
+    assert max(map(np.nanmax, heads)) > 0.0
+    for side, head in zip(("left", "right"), heads, strict=True):  # the rocking edge has the rest
+        assert np.nanmin(profiles[f"push_force_{side}"] - head) >= -1e-9
     # elements lie in the mid planes of the arcs, and go over along the strands
     region = regions(misaligned.path, misaligned.places)
     for which, at in ((0, -0.5), (2, 0.5)):
@@ -174,24 +169,78 @@ def test_a_sheave_at_its_stop_and_an_element_off_the_grooves_end_a_run():
     )
 
 
-def test_the_vibration_of_both_planes_is_judged_together():
-    run = Transient(job().point(0), "newton")
+def moving(**values):
+    """A run whose samples say that t2 alone moves, out of the plane, by 20 um at 600 Hz."""
+    run = Transient(job(**values).point(0), "newton")
     probes = [probe.label for probe in run.probes]
     assert probes[:5] == [f"t1 {k}" for k in range(1, 6)] and probes[10] == "t1_lateral 1"
     time = run.interval * np.arange(run.samples)
     run._rows[:], run._totals[:], run.done = 0.0, np.linspace(0.0, 1.0, run.samples)[:, None], run.samples
     run._rows[:, run.channels.index("driving_speed") + len(probes)] = 314.0
+    run._rows[:, run.channels.index("load") + len(probes)] = [run.load(t) for t in time]
     run._sums[:] = 1.0
     run._rows[:, probes.index("t2_lateral 3")] = 2e-5 * np.sin(2.0 * np.pi * 600.0 * time)
+    return run
+
+
+def judged(run):
     with np.errstate(divide="ignore", invalid="ignore"):
         found = judge(run)
-    assert found["vibrates"] == Vibrates.YES and "t2_lateral" in found["reason"]
     assert found["lateral_amplitude"] == pytest.approx([0.0, 2e-5], rel=0.02)
     assert found["lateral_frequency"][1] == pytest.approx(600.0, rel=0.01)
-    assert (
-        found["amplitude"] == pytest.approx([0.0, 0.0])
-        and found["spectrum"].shape == found["lateral_spectrum"].shape
+    assert found["amplitude"] == pytest.approx([0.0, 0.0])
+    assert "t2_lateral" in found["reason"]
+    return found
+
+
+def test_the_vibration_of_both_planes_is_judged_together():
+    found = judged(moving())
+    assert found["vibrates"] == Vibrates.YES
+    assert found["spectrum"].shape == found["lateral_spectrum"].shape
+
+
+RAMP = {"load_history": "ramp", "load_start": 20.0}
+
+
+def test_a_ramp_is_judged_in_both_planes():
+    """In all windows of t2, from the ramp's start to its end; loads of the ramp's parts are no values of strands."""
+    found = judged(moving(duration=1.0, **RAMP))
+    assert found["vibrates"] == Vibrates.YES and "from the ramp's start to its end" in found["reason"]
+    known = np.isfinite(found["ramp_load"])
+    assert known.size == 20 and known.sum() > 15
+    assert found["ramp_load"][known] == pytest.approx(
+        20.0 + 40.0 * (np.arange(20.0) + 0.5)[known] / 20.0, abs=2.0
     )
+    assert found["lateral_ramp_amplitude"][1, known] == pytest.approx(2e-5, rel=0.02)
+    assert found["ramp_amplitude"][:, known] == pytest.approx(0.0)
+    assert found["lateral_ramp_amplitude"].shape == found["ramp_amplitude"].shape == (2, 20)
+    assert found["lateral_spectrum"].shape == found["spectrum"].shape
+
+
+def test_a_ramp_that_slips_through_tells_of_both_planes_before():
+    run = moving(**RAMP)
+    run.failure = Status.DONE, "the belt slips through"
+    found = judged(run)
+    assert found["vibrates"] == Vibrates.SLIPS and "before: t2_lateral vibrates" in found["reason"]
+    assert (
+        found["lateral_ramp_amplitude"].shape
+        == (2, 20)
+        == (*found["lateral_amplitude"].shape, found["ramp_load"].size)
+    )
+
+
+def test_a_run_along_a_ramp_has_the_amplitudes_of_both_planes():
+    found = record(misalignment=OFFSET, **RAMP)
+    assert found["status"] == Status.DONE
+    for plane in ("", "lateral_"):
+        along, most = found[f"{plane}ramp_amplitude"], found[f"{plane}amplitude"]
+        known = np.isfinite(found["ramp_load"])
+        assert (
+            along.shape == (2, 20) and (np.isfinite(along) == known).all() and (0.0 < along[:, known]).all()
+        )
+        assert (
+            np.nanmax(along, axis=1) <= most * (1.0 + 1e-12)
+        ).all()  # means of windows, of which the largest counts
 
 
 def test_misalignment_follows_from_the_ratio_at_which_pulleys_are_aligned():
@@ -265,7 +314,7 @@ def test_what_ends_a_run_is_recorded_and_the_sweep_goes_on(tmp_path):
     loose = {"driving_thrust": 20e3, "sheave_rate": 2e-5, "flank_reach": 1e-3}
     faces = {"inner_radius": 0.045, "outer_radius": 0.065}
     short = {"most_refinements": 0, "longest_duration": 0.04}
-    report = run(build_job(document, "ends.toml", BELT | loose | faces | short), tmp_path, progress=False)
+    report = run(build_job(document, "ends.toml", COARSE | loose | faces | short), tmp_path, progress=False)
     assert report.done == 2 and len(report.failed) == 3
     with open_results(report.results) as results:
         statuses, verdicts, reasons = (results[name].values for name in ("status", "vibrates", "reason"))

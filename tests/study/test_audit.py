@@ -45,7 +45,7 @@ def audited(job, capsys, fraction="1", *more):
 def test_rungs_that_are_right_are_found_right(job, capsys):
     status, printed, out = audited(job, capsys)
     assert status == 0
-    assert "audit: 4 of 4 runs that lower rungs answered done again in full" in printed
+    assert "audit: 4 of 4 runs that cheaper models decided done again in full" in printed
     # none of four: with 97.5 % of confidence the rate is below 1 - 0.025^(1/4)
     assert "coarse: 0 of 4 runs of another class (0.00%, 95 % interval 0.00% to 60.24%)" in printed
     assert list(csv.DictReader((out / "audit" / "audit.csv").open())) == []
@@ -88,7 +88,7 @@ def test_forces_are_compared(job, capsys):
 def test_the_smallest_sample_has_a_run(job, capsys):
     status, printed, _ = audited(job, capsys, "1e-9")
     assert status == 0
-    assert "audit: 1 of 4 runs that lower rungs answered done again in full" in printed
+    assert "audit: 1 of 4 runs that cheaper models decided done again in full" in printed
 
 
 def test_a_fresh_study_has_a_fresh_audit(job, capsys):

@@ -241,7 +241,13 @@ def test_half_written_files_of_dead_processes_are_removed(tmp_path):
 
 @pytest.mark.parametrize("read", [read_status, open_results])
 def test_reading_where_no_study_is(tmp_path, read):
-    with pytest.raises(InputError, match="no job.json|found nothing"):
-        read(tmp_path)
+    place = tmp_path / "studies" / "of_mine"  # beside no other study
+    place.mkdir(parents=True)
+    makes = "`cvt-hpc run JOB.toml` makes one"
+    with pytest.raises(InputError, match=f"found no job.json in it; {makes}|found nothing; {makes}"):
+        read(place)
+    sweep(JOB, place / "first")
+    with pytest.raises(InputError, match="; studies in it: first"):
+        read(place)
     with pytest.raises(InputError, match="found nothing|No such file"):
         read(tmp_path / "absent")

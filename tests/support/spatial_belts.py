@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from cvt_hpc.job import build_job
 from cvt_hpc.models.pushbelt import belt as p
 from cvt_hpc.models.pushbelt.start import of_lanes, start
 from cvt_hpc.models.spatial_pushbelt import belt as b
@@ -13,6 +14,20 @@ NODES, STEP, TORQUE = 104, 1e-5, 60.0
 LOAD = 1.35 * TORQUE
 RAMP = 1500  # steps
 OFFSET = 0.5e-3  # of the driven pulley along its axis [m]
+# A belt of few elements between rigid sheaves, clamped and loaded within a quarter of a revolution
+COARSE = {
+    "elements": NODES,
+    "band_high": 1000.0,
+    "sheave_stiffness": np.inf,
+    "rise_time": 0.01,
+    "duration": 0.04,
+}
+
+
+def job(**values):
+    """A job of a coarse belt under 60 N m, with other values."""
+    short = {"most_refinements": 0, "longest_duration": values.get("duration", 0.04), "load": TORQUE}
+    return build_job({"name": "spatial", "model": "spatial_pushbelt"}, "spatial", COARSE | short | values)
 
 
 def inputs(thrusts, loads, fields=b.INPUTS, drift=0.0):
@@ -76,14 +91,25 @@ def gaps(belt, state):
     return np.stack(found, axis=1)
 
 
-def sheaves_opening(belt, state, modes):
-    """How far a sheave gives way where each element is, by a_k of both pulleys (2, modes), (nodes,) [m]."""
+def sheaves_modes(belt, state):
+    """psi_k of either pulley at its elements, 0 at those of the other one, (2, modes, nodes)."""
     f = of_lanes(state.elements)
-    driven = f[:, b.DRIVEN].astype(int)
+    driven = f[:, b.DRIVEN]
     pitch = f[:, :2] - belt.pitch_depth * f[:, 6:8] - driven[:, None] * [belt.centre_distance, 0.0]
     angle = np.arctan2(pitch[:, 1], pitch[:, 0])
-    waves = [
-        np.cos((k + 1) // 2 * angle) if k % 2 else np.sin(k // 2 * angle) for k in range(1, modes.shape[1])
+    shapes = [
+        np.cos((k + 1) // 2 * angle) if k % 2 else np.sin(k // 2 * angle) if k else np.ones_like(angle)
+        for k in range(belt.modal_stiffness.shape[1])
     ]
-    shapes = [np.ones_like(angle), *waves][: modes.shape[1]]
-    return sum((modes[driven, k] * shape for k, shape in enumerate(shapes)), np.zeros_like(angle))
+    return np.stack([1.0 - driven, driven])[:, None] * np.reshape(shapes, (1, len(shapes), len(f)))
+
+
+def sheaves_opening(belt, state, modes):
+    """How far a sheave gives way where each element is, by a_k of both pulleys (2, modes), (nodes,) [m]."""
+    return np.einsum("pk,pkn->n", modes, sheaves_modes(belt, state))
+
+
+def leaning_loads(belt, fields, shapes):
+    """Half of what the flanks press the right sheaves more than the left ones, by modes, (2, modes) [N]."""
+    sides = fields[:, b.FLANK : b.FLANK + 4].reshape(-1, 2, 2).sum(axis=2)
+    return 0.5 * belt.cosine * shapes @ (sides[:, 1] - sides[:, 0])

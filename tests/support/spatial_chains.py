@@ -3,11 +3,15 @@
 import numpy as np
 
 from cvt_hpc.models.pushbelt import belt as p
-from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes
+from cvt_hpc.models.pushbelt.belt import DRIVEN_RADIUS, DRIVING_RADIUS
+from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start
 from cvt_hpc.models.spatial_pushbelt import belt as b
+from cvt_hpc.models.spatial_pushbelt.step import _evaluate
 from cvt_hpc.physics.friction_laws import Law
+from support.pushbelts import given
 
 WEDGE = np.deg2rad(11.0)
+SHAKEN = 64  # elements of `shaken`
 
 
 def belt(**given):
@@ -195,3 +199,55 @@ def beside_planar(planar, planar_state, **given):
     fields[:, b.DRIVEN] = f[:, p.DRIVEN]
     modes = constants.modal_stiffness.shape[1]
     return constants, state(fields, [*planar_state.pulleys, 0.0, 0.0], modes)
+
+
+def shaken(seed, **changes):
+    """A pressed belt with gaps, slips, rotations and modes out of order, beside tilted pulleys."""
+    stiffness = ((6e8, 3e8, 3e8), (9e8, 2e8, 1e8))
+    planar, planar_state = start(given(nodes=SHAKEN, modal_stiffness=stiffness, friction_speed=0.05))
+    axes = np.array([[3e-3, -2e-3, 1.0], [-1e-3, 4e-3, 1.0]])
+    constants = {
+        "axes": axes / np.linalg.norm(axes, axis=1)[:, None],
+        "loose_side": np.array([1.0, -1.0]),
+        "pin_clearance": 2e-5,
+        "thickness": planar.thickness + 2e-5,
+        "ring_friction_speed": 0.02,
+        "lateral_damping": 3.0,
+        "flank_law": int(Law.STRIBECK),
+        "flank_gradient": -0.3,
+        "friction_memory": 3e-4,
+    }
+    belt, state = beside_planar(planar, planar_state, **constants | changes)
+    rng = np.random.default_rng(seed)
+    f = of_lanes(state.elements).copy()
+    f[:, :3] += rng.normal(0.0, 2e-5, (SHAKEN, 3))
+    f[:, 3:6] += rng.normal(0.0, 2e-3, (SHAKEN, 3))
+    f[:, 3:6] /= np.linalg.norm(f[:, 3:6], axis=1)[:, None]
+    f[:, 6:9] += rng.normal(0.0, 2e-3, (SHAKEN, 3))
+    f[:, 6:9] -= np.sum(f[:, 6:9] * f[:, 3:6], 1)[:, None] * f[:, 3:6]
+    f[:, 6:9] /= np.linalg.norm(f[:, 6:9], axis=1)[:, None]
+    f[:, b.SLOPE] = rng.normal(0.0, 2e-3, SHAKEN)
+    f[:, b.SPEED : b.SPEED + 8] += rng.normal(0.0, 0.05, (SHAKEN, 8))
+    f[:, b.SADDLE] = rng.uniform(20.0, 80.0, SHAKEN)
+    f[:, b.V_FILTERED : b.V_FILTERED + 4] = rng.uniform(0.0, 0.2, (SHAKEN, 4))
+    state.elements.data[:] = in_lanes(f).data
+    state.openings[:] = rng.normal(0.0, 1e-6, state.openings.shape)
+    state.leans[:] = rng.normal(0.0, 1e-6, state.openings.shape)
+    state.pulleys[[DRIVING_RADIUS, DRIVEN_RADIUS]] += 1e-4
+    state.pulleys[[b.DRIVING_MIDDLE, b.DRIVEN_MIDDLE]] = 3e-5, -2e-5
+    return belt, state, b.workspace(belt, SHAKEN), rng
+
+
+def lines(belt, f):
+    """Places of both ring packages at the elements, (2, nodes, 3), and their directions there."""
+    place = f[:, :3] + belt.package_distance * np.multiply.outer((1.0, -1.0), np.cross(f[:, 6:9], f[:, 3:6]))
+    t = np.roll(place, -1, axis=1) - np.roll(place, 1, axis=1)
+    return place, t / np.linalg.norm(t, axis=2)[..., None]
+
+
+def evaluated(belt, state, work, dt):
+    """Residuals of elements and border, of an iterate evaluated twice, so that duals are those of its slips."""
+    for _ in range(2):
+        _evaluate(belt, state, work, 1.35 * 60.0, dt)
+    own = of_lanes(work.iterate)[:, b.RESIDUAL : b.RESIDUAL + 8]
+    return np.concatenate([own.ravel(), work.border[:, -1]])

@@ -12,6 +12,7 @@ from cvt_hpc.variables import Status, Vibrates
 GRADIENTS = (-2.4, -1.6, -0.8)
 STIFFNESSES = (1.0, 1.2, 1.5, np.inf)
 LOADS = tuple(np.linspace(20.0, 200.0, 10))
+RAMP_GRADIENTS = [-1.0, -0.8, -0.6]
 
 
 def flags(values, dims, kind, long_name):
@@ -56,6 +57,31 @@ def study(gradients=GRADIENTS, stiffnesses=STIFFNESSES, loads=LOADS):
             "strand": ("strand", ["t1", "t2"]),
         },
         {"job_name": "occurrence", "title": "Vibration occurrence over load, friction and stiffness"},
+    )
+
+
+def ramps():
+    """Ramps between 20 and 200 N m at three gradients: the last one is quiet, the second lasts to an end."""
+    share = (np.arange(20) + 0.5) / 20
+    up = 20.0 + 180.0 * share
+    over = ("load_start", "friction_gradient")
+    onset = [[85.0, 100.0, np.nan], [166.0, np.nan, np.nan]]
+    end = [[173.0, 150.0, np.nan], [71.0, 96.0, np.nan]]
+    vibrates = [[Vibrates.YES, Vibrates.YES, Vibrates.NO]] * 2
+    units = {"units": "N m"}
+    return xr.Dataset(
+        {
+            "status": flags(np.full((2, 3), Status.DONE), over, Status, "how"),
+            "vibrates": flags(vibrates, over, Vibrates, "whether"),
+            "onset_load": (over, onset, units),
+            "end_load": (over, end, units),
+            "ramp_load": ((*over, "ramp_share"), np.stack([[up] * 3, [up[::-1]] * 3]), units),
+        },
+        {
+            "load_start": ("load_start", [20.0, 200.0], units),
+            "friction_gradient": ("friction_gradient", RAMP_GRADIENTS, {"units": "s/m"}),
+        },
+        {"job_name": "up $and$ down"},
     )
 
 

@@ -56,6 +56,10 @@ PROFILES = {
     },
     **{f"push_force_{side}": (f"push force {side}", "N", "mean, at rocking edge and head") for side in SIDES},
     "head_force": ("push force at the heads", "N", "mean"),
+    **{
+        f"head_force_{side}": (f"push force at {side} head", "N", f"mean, part of push_force_{side}")
+        for side in SIDES
+    },
     "lateral_position": ("lateral position", "m", "mean, to the right"),
     "roll": ("roll of elements", "rad", "mean, heads to the right"),
     "yaw": ("yaw of elements", "rad", "mean, running to the right"),
@@ -201,6 +205,7 @@ class Reading:
             ),
             *(self._push[:, [k, k + 2]].sum(axis=1) for k in (0, 1)),
             self._push[:, 2:].sum(axis=1),
+            *self._push[:, 2:].T,
             self._position[:, 2],
             self._o[:, 2],
             self._x[:, 2],

@@ -24,6 +24,7 @@ from cvt_hpc.variator.judging import each, mean
 from cvt_hpc.variator.path import REGIONS, regions
 from cvt_hpc.variator.slip import slide
 from cvt_hpc.variator.variables import frequency_bins
+from cvt_hpc.vibration import assessment, ramp
 from cvt_hpc.vibration.signals import amplitude_spectrum
 
 if TYPE_CHECKING:
@@ -35,13 +36,14 @@ if TYPE_CHECKING:
 RIGID_COST, ELASTIC_COST, SAMPLE_COST = 2.4e-6, 3.3e-6, 1e-3
 OF_TWO = 1.6  # cost of a step with two flows of ring material by that of one with one
 
-_ACROSS = ("amplitude", "frequency", "growth_rate", "amplitude_scatter")  # told of both planes
+# told of each strand, in the plane of the belt and out of it
+_OF_STRANDS = tuple(v for v in (*assessment.VARIABLES, *ramp.VARIABLES) if v.dims[:1] == ("strand",))
 VARIABLES = (
     *pushbelt.VARIABLES,
-    Variable("lateral_amplitude", ("strand",), "f8", "m", "as amplitude, out of the plane"),
-    Variable("lateral_frequency", ("strand",), "f8", "Hz", "as frequency, out of the plane"),
-    Variable("lateral_growth_rate", ("strand",), "f8", "s-1", "as growth_rate, out of the plane"),
-    Variable("lateral_amplitude_scatter", ("strand",), "f8", "1", "as amplitude_scatter, out of the plane"),
+    *(
+        Variable(f"lateral_{v.name}", v.dims, v.dtype, v.units, f"as {v.name}, out of the plane")
+        for v in _OF_STRANDS
+    ),
     Variable(
         "lateral_spectrum",
         ("strand", "frequency_bin"),
@@ -53,7 +55,11 @@ VARIABLES = (
     Variable("sheave_force", ("sheave",), "f8", "N", "mean axial force of the belt on each sheave, outwards"),
     Variable("sheave_loss", ("sheave",), "f8", "W", "mean friction power of the flanks at each sheave"),
     Variable(
-        "net_axial_force", ("pulley",), "f8", "N", "mean force of the belt on both sheaves, to the right"
+        "net_axial_force",
+        ("pulley",),
+        "f8",
+        "N",
+        "mean force of the belt on both sheaves along their axis, to the right",
     ),
     Variable(
         "beam_axial_force",
@@ -130,26 +136,30 @@ def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
 def judge(run: ElementRun) -> dict[str, Any]:
     """The record of a run that has reached its end, or slipped through before, its cost apart.
 
-    Both planes are judged alike, and together: a belt vibrates if a strand does in either. A ramp is judged
-    by the plane of the belt alone.
+    Both planes are judged alike, and together: a belt vibrates if a strand does in either.
 
     Parameters
     ----------
     run : ElementRun
         With all samples recorded, or those until it slipped through.
     """
+    both = (*STRANDS, *LATERAL)
     if run.failure is not None:
-        return judging.slipped(run) | pushbelt.speeds(run, slide(run))
-    found = judging.assess(run, (*STRANDS, *LATERAL))
-    strands, record = len(STRANDS), found.record()
-    probes, lateral = np.split(found.strongest_probe, [strands])
-    if lateral.size:
-        record |= {f"lateral_{name}": record[name][strands:] for name in _ACROSS}
-        record |= {name: values[:strands] for name, values in record.items() if np.size(values) > strands}
-        p, moved = run.parameters, run.displacement[run.judged][:, lateral]
-        spectrum = amplitude_spectrum(moved, p["sampling_rate"], frequency_bins(p).values)
-        record["lateral_spectrum"] = spectrum.T
-    return record | pushbelt.evaluate(run, probes) | _evaluate(run)
+        return _by_plane(judging.slipped(run, both)) | pushbelt.speeds(run, slide(run))
+    found = judging.assess(run, both)
+    probes, lateral = np.split(found.strongest_probe, [len(STRANDS)])
+    p, moved = run.parameters, run.displacement[run.judged][:, lateral]
+    spectrum = amplitude_spectrum(moved, p["sampling_rate"], frequency_bins(p).values).T
+    evaluated = pushbelt.evaluate(run, probes) | _evaluate(run)
+    return _by_plane(found.record()) | {"lateral_spectrum": spectrum} | evaluated
+
+
+def _by_plane(record: dict[str, Any]) -> dict[str, Any]:
+    """A record whose values of strands in both planes are told of each plane."""
+    parted: dict[str, Any] = {}
+    for name in (v.name for v in _OF_STRANDS if v.name in record):
+        parted[name], parted[f"lateral_{name}"] = np.split(record[name], [len(STRANDS)])
+    return record | parted
 
 
 def _evaluate(run: ElementRun) -> dict[str, Any]:

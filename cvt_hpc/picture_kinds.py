@@ -1,0 +1,214 @@
+"""Kinds of pictures beside the map: one table for `cvt-hpc plot KIND` and for `dataset.cvt.KIND()`.
+
+A new kind is a function that composes its figure, by the arguments of all pictures (`analysis/figures.py`)
+and options of its own, and an entry here. The command line reads this table at its start, when nothing that
+draws has been imported yet; `analysis/composing.py` draws by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+# A study; runs in a picture each; runs together in one picture.
+RESULTS, HISTORY, HISTORIES = "RESULTS", "HISTORY", "HISTORIES"
+
+
+class Option(NamedTuple):
+    """A choice that a kind offers.
+
+    Attributes
+    ----------
+    key : str
+        Argument of the figure's function.
+    text : str
+        What it chooses.
+    flag : str
+        Of the command line; "" where its words stand behind the dataset.
+    settings : mapping
+        Of the command line: how `argparse` reads it.
+    is_named : bool
+        Whether the picture's file has it in its name.
+    is_word : bool
+        Whether the accessor takes it without its key, as its first arguments.
+    """
+
+    key: str
+    text: str
+    flag: str
+    settings: Mapping[str, Any]
+    is_named: bool = False
+    is_word: bool = False
+
+
+class Kind(NamedTuple):
+    """A kind of pictures.
+
+    Attributes
+    ----------
+    subject : str
+        RESULTS, HISTORY or HISTORIES.
+    figure : str
+        Module of `analysis/`, and its function that composes the figure.
+    text : str
+        What it shows.
+    options : tuple of Option
+        Beside those of all kinds of the subject.
+    sides : tuple of str
+        Of `x`, `y`, `panel`: sides on which an axis can be put.
+    picture : str
+        Name of its file, with HISTORY for that of the runs; without it the name of the kind.
+    data : str
+        As `figure`: a function that gives a dataset of what is drawn, where there is one.
+    """
+
+    subject: str
+    figure: str
+    text: str
+    options: tuple[Option, ...] = ()
+    sides: tuple[str, ...] = ()
+    picture: str = ""
+    data: str = ""
+
+
+def _several(text: str) -> Option:
+    settings = {"action": "append", "default": [], "metavar": "QUANTITY"}
+    return Option(
+        "quantities", f"variable over position; may be repeated ({text})", "--of", settings, True, True
+    )
+
+
+def _region(text: str) -> Option:
+    return Option("region", text, "--region", {"choices": ("driving", "driven")}, True)
+
+
+KINDS = {
+    "waterfall": Kind(
+        RESULTS,
+        "waterfall.waterfall_figure",
+        "spectra of the strands over an axis, with eigenfrequencies where they are known",
+        sides=("x",),
+    ),
+    "campbell": Kind(
+        RESULTS,
+        "waterfall.campbell_figure",
+        "Campbell diagram: spectra over the driving speed, with eigenfrequencies and orders",
+        (
+            Option(
+                "orders",
+                "multiples of the driving pulley's turns (default: 1 2 4 8 16)",
+                "--orders",
+                {"nargs": "+", "type": float, "metavar": "ORDER"},
+            ),
+        ),
+    ),
+    "hysteresis": Kind(
+        RESULTS,
+        "hysteresis_bands.hysteresis_figure",
+        "where vibration begins and ends along ramps up and down, and the bands between them",
+    ),
+    "curve": Kind(
+        RESULTS,
+        "curve_panels.curves_figure",
+        "a quantity over an axis as marks, and others of its unit as lines beside it",
+        (
+            Option(
+                "quantities",
+                "variable of the results; with --lines, A+B share a panel",
+                "",
+                {"nargs": "+", "metavar": "QUANTITY"},
+                True,
+                True,
+            ),
+            Option(
+                "lines",
+                "a curve for each value of that axis, and a panel for each quantity",
+                "--lines",
+                {"metavar": "AXIS"},
+            ),
+        ),
+        picture="curve_QUANTITY",
+    ),
+    "wrap": Kind(
+        HISTORIES,
+        "wraps.wrap_figure",
+        "forces between belt and pulleys over the wrap, of one run or of several",
+        picture="HISTORY_wrap",
+    ),
+    "profile": Kind(
+        HISTORIES,
+        "profiles.profile_figure",
+        "quantities along the belt of one run or of several, such as forces and sliding",
+        (
+            _several("default: push force or tension, and friction"),
+            _region("over the wrap of that pulley alone"),
+            Option(
+                "columns", "a column of panels for each value of an axis", "--columns", {"metavar": "AXIS"}
+            ),
+        ),
+    ),
+    "ramp": Kind(
+        HISTORIES,
+        "ramps.ramp_figure",
+        "motion of a strand along a ramp of load or speed, with its spectrogram",
+        (
+            Option(
+                "of",
+                "t1, t2 or a variable over time (default: t1)",
+                "--of",
+                {"default": "t1", "metavar": "WHAT"},
+                True,
+                True,
+            ),
+        ),
+        picture="ramp_WHAT",
+    ),
+    "spectrogram": Kind(
+        HISTORIES,
+        "ramps.spectrogram_figure",
+        "spectra of the strands side by side along a ramp or over time, with eigenfrequencies",
+    ),
+    "element": Kind(
+        HISTORY,
+        "followed_drawing.element_figure",
+        "sliding of one element on the sheaves over time, along its path",
+        (_region("one passage of that arc alone"),),
+        data="followed_drawing.followed_of",
+    ),
+    "strands": Kind(
+        RESULTS,
+        "strand_bars.strand_bars_figure",
+        "tension and push force of the strands over an axis, as bars",
+    ),
+    "history": Kind(
+        HISTORY,
+        "histories.history_figure",
+        "a kept run: displacement, spectrum, load, forces and feeds around the belt",
+        picture="HISTORY_history",
+    ),
+    "phase": Kind(
+        HISTORY,
+        "histories.phase_figure",
+        "phase portraits: velocity of each strand over its displacement",
+        picture="HISTORY_phase",
+    ),
+    "flanks": Kind(
+        HISTORY,
+        "flanks.flanks_figure",
+        "left and right flank of a spatial pushbelt, with the ends of the arcs enlarged",
+        picture="HISTORY_flanks",
+    ),
+    "energy": Kind(
+        HISTORY,
+        "on_variator.energy_figure",
+        "powers around the belt: what friction takes on the arcs, what feeds the vibration",
+        picture="HISTORY_energy",
+    ),
+    "variator": Kind(
+        HISTORY,
+        "on_variator.variator_figure",
+        "quantities along the belt drawn on the variator, such as forces, speeds and slip",
+        (_several("default: push_force, of belt drives tension"),),
+        picture="HISTORY_variator",
+    ),
+}
