@@ -33,9 +33,9 @@ def test_there_are_commands_in_prose():
     ("page", "words"), COMMANDS, ids=[f"{page}: {' '.join(words)}" for page, words in COMMANDS]
 )
 def test_commands_in_prose_are_legal(page, words):
-    """As they stand, or with the job, folder or quantity that a sentence leaves out."""
+    """As they stand, or with the kind, job, folder or quantity that a sentence leaves out."""
     words = [PLACEHOLDERS.get(word, word) for word in words if word != "..."]
-    for left_out in ([], ["X"], ["X", "Y"]):
+    for left_out in ([], ["X"], ["X", "Y"], ["history", "X"]):
         try:
             _parser().parse_args([*words, *left_out])
             return

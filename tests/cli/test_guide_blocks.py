@@ -73,9 +73,9 @@ history = [0, 1]
 # What a page takes for granted: work of its reader, or of another page.
 BEFORE = {
     "docs/guide/tutorial.md": "cvt-hpc run jobs/quickstart.toml",
-    "docs/guide/python.md": """"
+    "docs/guide/python.md": """
         cvt-hpc run jobs/lebrecht_2004.toml --set 'sheave_stiffness=[1.0, 1.5]'
-        cvt-hpc run jobs/lebrecht_fitted.toml --set 'sheave_stiffness=[1.0, 1.5]'
+        cvt-hpc run jobs/lebrecht_2004.toml --set name=other --set stations=96 --set 'sheave_stiffness=[1.0, 1.5]'
     """,
     "docs/guide/variables.md": "cvt-hpc run jobs/lebrecht_2004.toml",
     "docs/guide/verdicts.md": """
@@ -142,7 +142,8 @@ class Reader:
         if words[:2] == ["mpirun", "-n"]:  # tests/sweep has the same under mpirun
             words = words[3:]
         if words[0] == "cvt-hpc":
-            assert self._main(_smaller(words[1:], self.page)) == 0
+            status = self._main(_smaller(words[1:], self.page))
+            assert status in ((0, 1) if words[1] == "doctor" else (0,))  # 1: of this machine, not of the page
         elif words[:2] == ["python", "jobs/tabulate.py"]:
             sys.argv = words[1:]
             runpy.run_path(words[1], run_name="__main__")
