@@ -1,0 +1,245 @@
+"""Every block of code of README, guide and the pages beside the code is done, as it stands there, in an empty folder.
+
+A study of a page is the job of that name with fewer and shorter runs: `--set` is added to the command, and nothing else.
+"""
+
+import re
+import runpy
+import shutil
+import sys
+import tomllib
+from pathlib import Path
+from typing import ClassVar
+
+import matplotlib.pyplot as plt
+import pytest
+
+from cvt_hpc.cli import main
+from cvt_hpc.job import build_job
+from cvt_hpc.job.assignments import read_assignments
+from cvt_hpc.job.document import read_document
+from support.pages import PAGES, ROOT, blocks, name_of, shell_calls
+
+# Commands that are not done here, and where they are.
+ELSEWHERE = {
+    ".": "activates the environment, in which the tests already are",
+    "bash jobs/quickstart.sh": "tests/cli/test_quickstart.py",
+    "bash tests/run.sh": "runs this test",
+    "bash .ci/run": "runs this test",
+    "pip install": "needs the network; tests/run.sh installs the same package",
+    "python -m pytest": "runs tests that all runs of the tests have",
+    "python -m mkdocs": "tests/cli/test_guide.py builds the guide",
+    "python tests/benchmarks": "compares models, for minutes of a core",
+    "sbatch": "tests/slurm submits the batch files to a Slurm of its own",
+    "scancel": "tests/slurm stops jobs so",
+    "apptainer": "no container is built in a test; tests/slurm/test_launch_script.py starts the ranks through a stand-in",
+}
+# Blocks that are not done here, by page and kind.
+BLOCKS_ELSEWHERE = {
+    ("docs/guide/extend.md", "python"): "tests/new_model runs them, each in its place",
+}
+DRAWING = "text"  # kind of a block that shows something and is no code
+# Minutes of a core, however few runs they have: `check` reads their jobs, scenes and options instead, and the tests
+# of their own packages run small ones.
+CHECKED_ONLY = {"branch", "chart", "fit", "ladder"}
+CHECKED_MODELS = {"beam_pushbelt"}
+# What runs here have [SI], by key, or by model or stepper and key. Five periods of band_low are judged, the least that
+# there may be; slow models have a high band for that.
+SMALL = {"duration": 0.04, "longest_duration": 0.04, "rise_time": 0.01}
+SHORT = {"duration": 0.022, "longest_duration": 0.022, "rise_time": 0.008, "band_low": 500.0}
+SMALL_OF = {
+    "belt_drive": {"duration": 0.26, "longest_duration": 0.26, "elements": 104},
+    "explicit": SHORT,
+    "pushbelt": SHORT | {"elements": 104, "band_high": 600.0},
+    "quasi_static_belt": SHORT,
+    "spatial_pushbelt": SHORT | {"elements": 104, "band_high": 600.0},
+    "steady_variator": {"stations": 64},
+    "linear_stability": {"stations": 64},
+}
+RAMPS = """
+name = "ramps"
+model = "elastic_belt"
+[axes]
+load_start = ["20 N m", "200 N m"]
+[linked.load_start]
+load = ["200 N m", "20 N m"]
+[scene]
+load_history = "ramp"
+[mesh]
+stations = 64
+[record]
+history = [0, 1]
+"""
+# What a page takes for granted: work of its reader, or of another page.
+BEFORE = {
+    "docs/guide/tutorial.md": "cvt-hpc run jobs/quickstart.toml",
+    "docs/guide/python.md": """
+        cvt-hpc run jobs/lebrecht_2004.toml --set 'sheave_stiffness=[1.0, 1.5]'
+        cvt-hpc run jobs/lebrecht_2004.toml --set name=other --set stations=96 --set 'sheave_stiffness=[1.0, 1.5]'
+    """,
+    "docs/guide/variables.md": "cvt-hpc run jobs/lebrecht_2004.toml",
+    "docs/guide/verdicts.md": """
+        cvt-hpc init JOB
+        cvt-hpc run jobs/quickstart.toml --set name=coarse --set stations=96
+        cvt-hpc run jobs/quickstart.toml --set name=fine
+    """,
+    "docs/guide/sweeps.md": """
+        cvt-hpc init JOB
+        cvt-hpc run jobs/lebrecht_2004.toml --set name=other --set stations=96
+        cvt-hpc run jobs/quickstart.toml --set name=speeds --set 'driving_speed=["2000 rpm", "3000 rpm"]'
+        cvt-hpc run jobs/ramps.toml --set duration=0.6 --set longest_duration=0.6
+        cvt-hpc run jobs/belt_drive_spectra.toml
+        cvt-hpc run jobs/misalignment.toml
+        cvt-hpc simulate jobs/lebrecht_2004.toml --at load=120 --out run.nc
+        cvt-hpc simulate jobs/misalignment.toml --at load=60 --out push.nc
+    """,
+    "cvt_hpc/models/linear_stability/README.md": "cvt-hpc init JOB --model linear_stability",
+    "cvt_hpc/models/steady_variator/README.md": "cvt-hpc init JOB --model steady_variator",
+}
+
+
+class Reader:
+    """Someone who does what a page says, in the present folder.
+
+    Parameters
+    ----------
+    page : Path
+        What is read.
+    store : Path
+        A folder for the studies that others take over.
+    """
+
+    done: ClassVar[dict] = {}  # folder in the store, by job and words of a command
+
+    def __init__(self, page, store):
+        self.page, self.store = page, store
+        self.model = page.parent.name if page.parent.parent.name == "models" else "elastic_belt"
+        document = {"name": "page", "model": self.model, "mesh": SMALL_OF.get(self.model, {})}
+        self.names = {}  # of the page's Python blocks
+        if "stations" in document["mesh"]:  # a page that takes parameters of the model for granted
+            self.names["parameters"] = build_job(document).parameters
+
+    def do(self, block):
+        """Do what a block shows."""
+        if block.kind == "bash":
+            for words in shell_calls(block.text):
+                self.call(words)
+        elif block.kind == "toml":
+            self._check_job(block.text)
+        elif block.kind == "python":
+            code = "\n".join(line for line in block.text.splitlines() if not line.startswith("%"))
+            exec(compile(code, name_of(self.page), "exec"), self.names)
+            plt.close("all")
+        elif block.kind == "csv":
+            Path("measured.csv").write_text(block.text)
+        elif block.kind != DRAWING:
+            raise AssertionError(f"nobody does a block of kind {block.kind!r}")
+
+    def call(self, words):
+        """Do a command, given by its words."""
+        while "=" in words[0]:  # variables of the environment
+            words = words[1:]
+        if words[:2] == ["mpirun", "-n"]:  # tests/sweep has the same under mpirun
+            words = words[3:]
+        if words[0] == "cvt-hpc":
+            status = self._main(_smaller(words[1:], self.page))
+            assert status in ((0, 1) if words[1] == "doctor" else (0,))  # 1: of this machine, not of the page
+        elif words[:2] == ["python", "jobs/tabulate.py"]:
+            sys.argv = words[1:]
+            runpy.run_path(words[1], run_name="__main__")
+        else:
+            command = " ".join(words)
+            assert any(f"{command} ".startswith((f"{known} ", f"{known}/")) for known in ELSEWHERE), command
+            for word in words[1:]:
+                if word.startswith(("jobs/", "slurm/", "tests/")):
+                    assert (ROOT / word).exists(), word
+
+    def _main(self, words):
+        """Exit status of the command; runs that another page has had done already are taken over."""
+        if words[0] != "run":
+            return main(words)
+        before, study = set(Path("out").glob("*")), (Path(words[1]).read_text(), *words)
+        if study in self.done:
+            shutil.copytree(self.done[study], "out", dirs_exist_ok=True)
+        status = main(words)
+        if study not in self.done and (new := set(Path("out").glob("*")) - before):
+            self.done[study] = self.store / str(len(self.done))
+            for folder in new:
+                shutil.copytree(folder, self.done[study] / folder.name)
+        return status
+
+    def _check_job(self, text):
+        """Read a job; a fragment is one of the page's model, and a ladder needs loads."""
+        tables = tomllib.loads(text)
+        if "model" not in tables:
+            text = f'name = "fragment"\nmodel = "{self.model}"\n{text}'
+        if "ladder" in tables:
+            text += "\n[axes]\nload = [60, 120]\n"
+        Path("block.toml").write_text(text)
+        assert main(["check", "block.toml"]) == 0
+
+
+def _smaller(words, page):
+    """The command with fewer and shorter runs."""
+    command = words[0]
+    if command not in {"run", "simulate", *CHECKED_ONLY} or words[1].startswith("jobs/figures/"):
+        return words  # figures take half a second each
+    given = [words[i + 1] for i, word in enumerate(words) if word == "--set"]
+    settings = [word for text in given for word in ("--set", text)]
+    if command in CHECKED_ONLY:
+        return ["check", words[1], "--for", command, *settings]
+    job = build_job(read_document(Path(words[1])), words[1], given)
+    if job.model in CHECKED_MODELS or job.parameters.get("profile_time"):
+        return ["check", words[1], *settings]  # a course of time cannot be cut short
+    changed = SMALL | SMALL_OF.get(job.model, {}) | SMALL_OF.get(job.stepper, {})
+    changed = {key: value for key, value in changed.items() if key in job.parameters}
+    longest = max(job.axes, key=lambda axis: len(axis.values), default=None)
+    for axis in job.axes:
+        first, last = axis.values[0], axis.values[-1]
+        kept = [value for value in _named(axis.name, page, job) if value in axis.values] or [first]
+        if axis is longest and "first_spacing" in job.design:  # it is traced along this one
+            kept = axis.values
+        elif "runs" in job.design:
+            kept = [first, last]
+        elif axis is job.axes[-1] and last not in kept and "elements" not in job.parameters:
+            kept.append(last)  # belts of elements are dear: one run each
+        changed[axis.name] = list(kept)
+    if "runs" in job.design:
+        changed["design.runs"] = 2
+    mentioned = {text.partition("=")[0] for text in given}
+    more = [f"{key}={value!r}" for key, value in changed.items() if key not in mentioned]
+    return [*words, *(word for text in more for word in ("--set", text))]
+
+
+def _named(key, page, job):
+    """Values of an axis that commands of the page name [SI]."""
+    named = re.findall(rf'--at "?({key}=[^\s"]+(?: \w+")?)', page.read_text())
+    return [read_assignments([text.strip('"')], job.schema, "", "--at")[key] for text in dict.fromkeys(named)]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty folder with the jobs alone."""
+    shutil.copytree(ROOT / "jobs", tmp_path / "jobs", ignore=shutil.ignore_patterns("results", "notebooks"))
+    (tmp_path / "jobs" / "results").mkdir()
+    (tmp_path / "jobs" / "ramps.toml").write_text(RAMPS)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", sys.argv)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    """A folder that all pages share."""
+    return tmp_path_factory.mktemp("studies")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)], ids=name_of)
+def test_blocks_of_a_page(page, folder, store):
+    reader = Reader(page, store)
+    for words in shell_calls(BEFORE.get(name_of(page), "")):
+        reader.call(words)
+    for block in blocks(page):
+        if (name_of(page), block.kind) not in BLOCKS_ELSEWHERE:
+            reader.do(block)
