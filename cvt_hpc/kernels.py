@@ -79,9 +79,10 @@ _PATIENCE = 600.0  # [s] with a process that compiles the same; any kernel takes
 _OPTIONS = {"nopython": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 # The name of a compiled function holds its number, which alone tells functions of one factory apart. The
-# compiler counts from 1 in each process. With such numbers functions from two processes could share a name:
-# linking would then drop one, and a run would compute with the other without any error.
-FunctionIdentity._unique_ids = iter(lambda: secrets.randbits(48), None)
+# compiler counts from 1 in each process. With such numbers two functions from two processes could share a
+# name: linking would then drop one, and a run would compute with the other without any error. All numbers
+# have 15 digits, so that the same code has the same size.
+FunctionIdentity._unique_ids = iter(lambda: 10**14 + secrets.randbelow(9 * 10**14), None)
 
 _logger = logging.getLogger(__name__)
 
