@@ -24,6 +24,7 @@ from support.pages import PAGES, ROOT, blocks, name_of, shell_calls
 ELSEWHERE = {
     ".": "activates the environment, in which the tests already are",
     "bash jobs/quickstart.sh": "tests/cli/test_quickstart.py",
+    "bash jobs": "scripts of whole studies, for minutes of a core and more",
     "bash tests/run.sh": "runs this test",
     "bash .ci/run": "runs this test",
     "pip install": "needs the network; tests/run.sh installs the same package",
