@@ -16,7 +16,8 @@ compile, and no machine code: each caller takes in its LLVM code and optimises i
 all functions that kernels call, also those of numpy. A kernel that is called with lanes does not count the
 users of an array: it makes none, and the arrays that it is given outlast it.
 
-Of processes that need the same code at a time one compiles it, and the others wait for it.
+Of processes that need the same code at a time one compiles it, and the others wait for it. Code that several
+processes have compiled is linked, so functions have random numbers in their names, unique in all processes.
 
 The folders lie below NUMBA_CACHE_DIR if that is set; else in the package where it is the user's own, else in
 the user's cache. Whoever can write to them can run any code as the user, so folders to which others can write
@@ -36,6 +37,7 @@ import logging
 import os
 import pickle
 import re
+import secrets
 import shutil
 import stat
 import sys
@@ -51,6 +53,7 @@ from typing import Any, NamedTuple
 import numba
 from numba import types
 from numba.core import compiler_lock, errors
+from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.environment import lookup_environment
@@ -74,6 +77,11 @@ _PATIENCE = 600.0  # [s] with a process that compiles the same; any kernel takes
 # were products contracted with sums, the bits would depend on which kernels the compiler merges, and so on
 # whether their code is compiled or found in the folder.
 _OPTIONS = {"nopython": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+
+# The name of a compiled function holds its number, which alone tells functions of one factory apart. The
+# compiler counts from 1 in each process. With such numbers functions from two processes could share a name:
+# linking would then drop one, and a run would compute with the other without any error.
+FunctionIdentity._unique_ids = iter(lambda: secrets.randbits(48), None)
 
 _logger = logging.getLogger(__name__)
 

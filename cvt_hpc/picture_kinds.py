@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 # A study; runs in a picture each; runs together in one picture.
 RESULTS, HISTORY, HISTORIES = "RESULTS", "HISTORY", "HISTORIES"
+END = "vmax"  # where colours end: a number [SI], by the command line with its unit
 
 
 class Option(NamedTuple):
@@ -78,6 +79,11 @@ def _several(text: str) -> Option:
     )
 
 
+def _end(of: str) -> Option:
+    text = f"value at which the colours end, such as '20 um' (default: that of 98 %% of the {of})"
+    return Option(END, text, "--vmax", {"metavar": "VALUE"})
+
+
 def _region(text: str) -> Option:
     return Option("region", text, "--region", {"choices": ("driving", "driven")}, True)
 
@@ -87,7 +93,8 @@ KINDS = {
         RESULTS,
         "waterfall.waterfall_figure",
         "spectra of the strands over an axis, with eigenfrequencies where they are known",
-        sides=("x",),
+        (_end("runs"),),
+        sides=("x", "panel"),
     ),
     "campbell": Kind(
         RESULTS,
@@ -100,12 +107,15 @@ KINDS = {
                 "--orders",
                 {"nargs": "+", "type": float, "metavar": "ORDER"},
             ),
+            _end("runs"),
         ),
+        sides=("panel",),
     ),
     "hysteresis": Kind(
         RESULTS,
         "hysteresis_bands.hysteresis_figure",
         "where vibration begins and ends along ramps up and down, and the bands between them",
+        sides=("y", "panel"),
     ),
     "curve": Kind(
         RESULTS,
@@ -160,6 +170,7 @@ KINDS = {
                 True,
                 True,
             ),
+            _end("moments"),
         ),
         picture="ramp_WHAT",
     ),
@@ -167,6 +178,7 @@ KINDS = {
         HISTORIES,
         "ramps.spectrogram_figure",
         "spectra of the strands side by side along a ramp or over time, with eigenfrequencies",
+        (_end("moments"),),
     ),
     "element": Kind(
         HISTORY,
@@ -179,6 +191,7 @@ KINDS = {
         RESULTS,
         "strand_bars.strand_bars_figure",
         "tension and push force of the strands over an axis, as bars",
+        sides=("x", "panel"),
     ),
     "history": Kind(
         HISTORY,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,12 +12,13 @@ from matplotlib.axis import Axis
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words
+from cvt_hpc.analysis.spacing import are_few, edges_of, is_logarithmic, on_decades
+from cvt_hpc.analysis.ticks import number, put_ticks, short_numbers
 from cvt_hpc.errors import InputError, few_of, mismatch, show, unknown
 from cvt_hpc.job.shown import shown_as_read, shown_number, shown_unit
 
 MOST_VALUES_NAMED = 12
-EVEN, EQUAL = 1.5, 1.01  # of steps: largest over smallest, below which they are taken for even
-LEAST_SPAN = 4.0  # last over first value of a logarithmic axis
+FEW, FEW_ON_DECADES = 12, 6  # values of an axis that have ticks of their own
 FEW_DECADES = 2.5  # on which 1, 2 and 5 have labels, not powers of ten alone
 
 
@@ -80,7 +81,7 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Side
         left to draw.
     """
     axes = list(map(str, dataset["status"].dims))
-    _check_sides(sides, axes, at, source)
+    check_sides(sides, axes, at, source)
     notes = []
     for name, value in at.items():
         if name not in axes:
@@ -110,7 +111,8 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Side
     return Arrangement(dataset, x, y, panel, tuple(notes))
 
 
-def _check_sides(sides: Sides, axes: list[str], at: Mapping[str, Any], source: str) -> None:
+def check_sides(sides: Sides, axes: list[str], at: Mapping[str, Any], source: str) -> None:
+    """Raise InputError where sides name no axis of the results, one that `at` fixes, or one twice."""
     for side, name in sides._asdict().items():
         if name is None:
             continue
@@ -140,6 +142,47 @@ def along_x(arrangement: Arrangement) -> tuple[xr.Dataset, list[str]]:
         notes.append(f"{in_words(dataset[name])} = {value_text(dataset[name], 0)} (first of {count})")
         dataset = dataset.isel({name: 0})
     return dataset, notes
+
+
+def first_panel(arrangement: Arrangement) -> Arrangement:
+    """The arrangement with the axis of its panels, if it has one, fixed at its first value."""
+    if not arrangement.panel:
+        return arrangement
+    axis = arrangement.dataset[arrangement.panel]
+    note = f"{in_words(axis)} = {value_text(axis, 0)} (first of {axis.size})"
+    fixed = arrangement.dataset.isel({arrangement.panel: 0})
+    return replace(arrangement, dataset=fixed, panel=None, notes=(*arrangement.notes, note))
+
+
+def with_spacings(dataset: xr.Dataset, spacings: Mapping[str, str], source: str) -> xr.Dataset:
+    """Results whose axes are drawn logarithmic or linear as told, whatever their values.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        Results of a study over a grid.
+    spacings : mapping
+        "log" or "linear" by axis.
+    source : str
+        Where the results are from, for the errors.
+
+    Raises
+    ------
+    InputError
+        There is no such axis or spacing, or an axis cannot be logarithmic.
+    """
+    axes = list(map(str, dataset["status"].dims))
+    for name, spacing in spacings.items():
+        where = f"{source}: spacing of {name}"
+        if name not in axes:
+            raise unknown(where, "axis of the results", name, axes)
+        if spacing not in ("log", "linear"):
+            raise mismatch(where, "log or linear", show(spacing))
+        values = dataset[name].values
+        if spacing == "log" and (values.dtype.kind not in "iuf" or values.min() * values.max() <= 0.0):
+            raise mismatch(where, "numbers of one sign on a logarithmic axis", known_values(dataset[name]))
+        dataset = dataset.assign_coords({name: dataset[name].assign_attrs(spacing=spacing)})
+    return dataset
 
 
 def _take(names: list[str], preferred: str, avoid: str = "") -> str | None:
@@ -185,11 +228,7 @@ def value_text(coordinate: xr.DataArray, index: int) -> str:
     if np.isinf(value):
         return infinity_in_words(str(coordinate.name))
     factor, unit = coordinate_unit(coordinate.attrs)
-    return f"{_number(value * factor)} {unit}".strip()
-
-
-def _number(value: float) -> str:
-    return f"{value:.6g}".replace("-", "−")
+    return f"{number(value * factor)} {unit}".strip()
 
 
 def infinity_in_words(name: str) -> str:
@@ -204,7 +243,8 @@ class Ruler:
     Attributes
     ----------
     centres : array, shape (value,)
-        Positions of the grid points, in display units; their logarithms to base 10 on a logarithmic axis.
+        Positions of the grid points, in display units; their logarithms to base 10 on a logarithmic axis, of
+        negative values with the sign turned.
     edges : array, shape (value + 1,)
         Borders of their cells, halfway between.
     ticks : array or None
@@ -227,7 +267,7 @@ class Ruler:
     def lay_out(self, axis: Axis) -> None:
         """Put the ticks on a side of a panel."""
         if self.ticks is not None:
-            axis.set_ticks(self.ticks, self.tick_labels)
+            put_ticks(axis, self.ticks, self.tick_labels)
         if self.minor.size:
             axis.set_ticks(self.minor, minor=True)
 
@@ -235,73 +275,53 @@ class Ruler:
 def ruler(coordinate: xr.DataArray) -> Ruler:
     """Lay out an axis: numbers at their true place, an infinite one behind them, texts side by side.
 
-    The axis is logarithmic where its finite values are spread so.
+    The axis is logarithmic where its finite values are spread so; negative ones are mirrored.
 
     Parameters
     ----------
     coordinate : DataArray, shape (value,)
-        Sorted if numeric; `units` is its SI unit.
+        Sorted if numeric; `units` is its SI unit; `spacing`, "log" or "linear", decides where it is given.
     """
     name = str(coordinate.name)
     factor, unit = coordinate_unit(coordinate.attrs)
     values = coordinate.values
     if values.dtype.kind not in "iuf":
         centres = np.arange(float(values.size))
-        return Ruler(centres, _edges(centres), centres, tuple(map(str, values)), axis_label(coordinate, ""))
+        return Ruler(centres, edges_of(centres), centres, tuple(map(str, values)), axis_label(coordinate, ""))
     centres = values * factor
     finite = np.isfinite(centres)
-    is_log = is_logarithmic(centres[finite])
+    told = coordinate.attrs.get("spacing")
+    is_log = is_logarithmic(centres[finite]) if told is None else told == "log"
     if np.all(finite):
         if is_log:
             return _logarithmic_ruler(centres, axis_label(coordinate, unit))
-        return Ruler(centres, _edges(centres), *_exact_ticks(centres), axis_label(coordinate, unit))
-    labels = tuple(_number(c) if np.isfinite(c) else infinity_in_words(name) for c in centres)
-    centres = np.log10(centres) if is_log else centres
+        return Ruler(centres, edges_of(centres), *_exact_ticks(centres), axis_label(coordinate, unit))
     known = centres[finite]
+    texts = iter(short_numbers(known, is_log=is_log))
+    labels = tuple(next(texts) if is_known else infinity_in_words(name) for is_known in finite)
+    known = on_decades(known) if is_log else known
     gap = np.diff(known).mean() if known.size > 1 else 1.0
-    start = known[-1] if known.size else 0.0
-    centres = np.where(finite, centres, start + gap)
-    return Ruler(centres, _edges(centres), centres, labels, axis_label(coordinate, unit))
-
-
-def is_logarithmic(values: NDArray[np.float64]) -> bool:
-    """Whether sorted numbers are spread by their logarithms: evenly there, and unevenly as they are."""
-    if values.size < 3 or values[0] <= 0.0 or values[-1] < LEAST_SPAN * values[0]:
-        return False
-    steps, ratios = np.diff(values), np.diff(np.log(values))
-    most = EVEN if values.size > 3 else EQUAL  # of three values a middle that is a little off says nothing
-    return bool(ratios.max() < most * ratios.min() and steps.max() > EVEN * steps.min())
+    centres[finite], centres[~finite] = known, (known[-1] if known.size else 0.0) + gap
+    return Ruler(centres, edges_of(centres), centres, labels, axis_label(coordinate, unit))
 
 
 def _logarithmic_ruler(values: NDArray[np.float64], label: str) -> Ruler:
     """A logarithmic axis: ticks at its values where they are few, else at 1, 2 and 5 or at powers of ten."""
-    centres = np.log10(values)
-    edges = _edges(centres)
-    ticks, labels = _exact_ticks(centres)
-    powers = 10.0 ** np.arange(np.floor(edges[0]), np.ceil(edges[-1]) + 1)
-    if ticks is not None:
-        labels = tuple(map(_number, values))
-    else:
-        digits = (1.0, 2.0, 5.0) if np.ptp(edges) < FEW_DECADES else (1.0,)
+    centres, sign = on_decades(values), np.sign(values[0])
+    edges = edges_of(centres)
+    low, high = np.sort(sign * edges[[0, -1]])
+    powers = 10.0 ** np.arange(np.floor(low), np.ceil(high) + 1)
+
+    def inside(digits: NDArray[np.float64]) -> NDArray[np.float64]:
         at = np.outer(powers, digits).ravel()
-        at = at[(np.log10(at) >= edges[0]) & (np.log10(at) <= edges[-1])]
-        ticks, labels = np.log10(at), tuple(map(_number, at))
-    minor = np.log10(np.outer(powers, np.arange(1.0, 10.0)).ravel())
-    return Ruler(centres, edges, ticks, labels, label, minor[(minor >= edges[0]) & (minor <= edges[-1])])
+        return np.sort(sign * at[(np.log10(at) >= low) & (np.log10(at) <= high)])
+
+    digits = np.array([1.0, 2.0, 5.0] if high - low < FEW_DECADES else [1.0])
+    ticks = values if are_few(centres, FEW_ON_DECADES) else inside(digits)
+    minor = on_decades(inside(np.arange(1.0, 10.0)))
+    return Ruler(centres, edges, on_decades(ticks), short_numbers(ticks, is_log=True), label, minor)
 
 
 def _exact_ticks(centres: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
     """Ticks at the grid points where these are few and far enough apart to be labelled."""
-    few = centres.size <= 6
-    if few and (centres.size == 1 or np.diff(centres).min() > 0.5 * np.ptp(centres) / (centres.size - 1)):
-        return centres, tuple(map(_number, centres))
-    return None, ()
-
-
-def _edges(centres: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Borders of the cells around points, halfway between; the outer cells are symmetric."""
-    if centres.size == 1:
-        half = 0.05 * abs(centres[0]) or 0.5
-        return np.array([centres[0] - half, centres[0] + half])
-    middles = (centres[1:] + centres[:-1]) / 2
-    return np.concatenate(([2 * centres[0] - middles[0]], middles, [2 * centres[-1] - middles[-1]]))
+    return (centres, short_numbers(centres)) if are_few(centres, FEW) else (None, ())

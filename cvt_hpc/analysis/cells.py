@@ -12,13 +12,14 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colorbar import Colorbar
-from matplotlib.colors import Colormap, ListedColormap, Normalize, to_rgba
+from matplotlib.colors import Colormap, ListedColormap, Normalize, to_hex, to_rgba
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.image import PcolorImage
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
+from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.arrangement import Ruler
@@ -106,17 +107,19 @@ class Scale:
 def norm_over(values: Array, lowest: float | None = None, highest: float | None = None) -> Normalize:
     """Scale over the finite values, from `lowest` and to `highest` if given.
 
-    Else a few values far above the others do not flatten these: the scale then ends at the MOST share.
+    Else a few values far above or below the others do not flatten these: the scale ends at the MOST share.
     """
     known = values[np.isfinite(values)]
     if known.size == 0:
         return Normalize(0.0, 1.0) if highest is None else Normalize(lowest or 0.0, highest)
-    low, high = known.min() if lowest is None else lowest, known.max()
-    most = low + FAR * (np.quantile(known, MOST) - low)
-    if highest is not None:
-        high = highest
-    elif known.size >= MANY and high > most > low:
-        high = np.quantile(known, MOST)
+    low, high = known.min() if lowest is None else lowest, known.max() if highest is None else highest
+    if known.size >= MANY:
+        least, most = np.quantile(known, (1.0 - MOST, MOST))
+        base = least if lowest is None else lowest
+        if highest is None and most > base and high > base + FAR * (most - base):
+            high = most
+        if lowest is None and least < high and low < high - FAR * (high - least):
+            low = least
     return Normalize(low, high) if high > low else Normalize(low - 0.5, high + 0.5)
 
 
@@ -193,6 +196,7 @@ def draw_marks(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], marked
             markeredgecolor=style.rim,
             markeredgewidth=0.2 * size,
             rasterized=True,
+            zorder=2.2,  # above lines of onset
         )
 
 
@@ -218,9 +222,20 @@ def write_values(
 
 
 def write_value(
-    axes: Axes, place: tuple[float, float], text: str, fill: Array, *, above: float = 0.0, size: float = 8.5
+    axes: Axes,
+    place: tuple[float, float],
+    text: str,
+    fill: Array,
+    *,
+    above: float = 0.0,
+    size: float = 8.5,
+    outlined: bool = False,
 ) -> None:
-    """Write a number at a place in data coordinates [or above it, point] on a cell of a colour (rgba)."""
+    """Write a number at a place in data coordinates [or above it, point] on a cell of a colour (rgba).
+
+    An outline in that colour keeps it apart from hatching.
+    """
+    effects = [withStroke(linewidth=2.5, foreground=to_hex(fill)), Normal()] if outlined else None
     axes.annotate(
         text,
         place,
@@ -230,6 +245,7 @@ def write_value(
         va="bottom" if above else "center",
         fontsize=size,
         color=_ink_on(fill, "#000000"),
+        path_effects=effects,
     )
 
 
@@ -261,7 +277,7 @@ def class_legend(
         handles,
         labels,
         loc="outside lower center",
-        ncols=columns,
+        ncols=-(-len(labels) // -(-len(labels) // columns)),  # rows of like length
         frameon=False,
         handler_map={tuple: HandlerTuple(ndivide=1, pad=0)},
         handlelength=2.2,

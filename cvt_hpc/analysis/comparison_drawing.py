@@ -11,7 +11,7 @@ from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
-from cvt_hpc.analysis.arrangement import Arrangement, arrange
+from cvt_hpc.analysis.arrangement import Arrangement, arrange, first_panel
 from cvt_hpc.analysis.comparison import Comparison
 from cvt_hpc.analysis.figures import WIDTH, draw
 from cvt_hpc.analysis.maps import TITLE_HEIGHT, draw_block, sheet_of
@@ -19,7 +19,9 @@ from cvt_hpc.analysis.scatter import draw_samples, is_sampled, scatter_height
 from cvt_hpc.vibration.agreement import CONTRADICTIONS, NEAR
 from cvt_hpc.vibration.classes import OccurrenceClass
 
-SCATTER_HEIGHT = 4.2  # [inch]
+SCATTER_HEIGHT, FRAME = 4.2, 6.4  # [inch], and what the page holds beside the panels of the map
+MOST_PANELS = 24  # that a page then holds
+SAMPLES_BESIDE, SAMPLES_HEIGHT = 3, 1.5  # panels of samples side by side, and their height [inch]
 LOWEST = 1e-2  # of the threshold: smaller amplitudes are drawn at the border
 _NO_SCALE = cells.Scale(cells.AMPLITUDE_COLOURS, cells.norm_over(np.empty(0)), "")
 
@@ -63,25 +65,28 @@ def _arrangement(found: Comparison) -> Arrangement:
     """Lay out the cells of a grid; samples, and a single run, stay as they are."""
     if is_sampled(found.cells) or found.pairs.ndim == 0:
         return Arrangement(found.cells, "", None, None, ())
-    return arrange(found.cells, {}, "")
+    arrangement = arrange(found.cells, {}, "")
+    panels = found.cells.sizes[arrangement.panel] if arrangement.panel else 1
+    return first_panel(arrangement) if panels > MOST_PANELS else arrangement
 
 
 def _map_height(arrangement: Arrangement) -> float:
     """Height [inch] of the map."""
     if is_sampled(arrangement.dataset):
-        return scatter_height(arrangement.dataset)
+        return scatter_height(arrangement.dataset, SAMPLES_BESIDE, SAMPLES_HEIGHT)
     if not arrangement.x:
         return 0.0
-    sheet = sheet_of(arrangement)
+    sheet = sheet_of(arrangement, frame=FRAME)
     return sheet.rows * sheet.panel_height + TITLE_HEIGHT
 
 
 def _draw_map(figure: SubFigure, arrangement: Arrangement) -> None:
     if is_sampled(arrangement.dataset):
         pairs = arrangement.dataset["occurrence_class"].values
-        draw_samples(figure, arrangement.dataset, pairs, np.full(pairs.shape, np.nan), _NO_SCALE)
+        nothing = np.full(pairs.shape, np.nan)
+        draw_samples(figure, arrangement.dataset, pairs, nothing, _NO_SCALE, SAMPLES_BESIDE)
     elif arrangement.x:
-        sheet = sheet_of(arrangement)
+        sheet = sheet_of(arrangement, frame=FRAME)
         axes = figure.subplots(sheet.rows, sheet.columns, sharex=True, sharey=True, squeeze=False)
         draw_block(figure, axes, sheet, np.full(sheet.classes.shape, np.nan), _NO_SCALE)
         figure.supylabel(sheet.y.label, fontsize=10)

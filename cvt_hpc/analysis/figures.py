@@ -16,16 +16,18 @@ or no value on it; what else a picture refuses its docstring says.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial, wraps
 from io import BytesIO
 from pathlib import Path
 from textwrap import wrap
-from typing import Any, ParamSpec
+from typing import Any, NamedTuple, ParamSpec
+from weakref import WeakSet
 
 import matplotlib
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -37,8 +39,10 @@ from cvt_hpc.files import written_aside
 from cvt_hpc.job.shown import JOB_UNITS, shown_number, shown_unit
 
 P = ParamSpec("P")
+_AS_WRITTEN: WeakSet[Figure] = WeakSet()
 
 WIDTH = 6.4  # [inch]: letters of 10 points stay readable across a page and on a telephone held sideways
+NARROW, LONG = 7.1, 10.5  # [inch]: sides of a page of A4 within margins of 15 mm
 RESOLUTION = 170  # dots per inch
 _INLINE = 100  # the same, between the cells of a notebook
 SETTLED = 1000  # pixels: the palette is refined until no more than these, one in a thousand, change colour
@@ -163,8 +167,11 @@ def _as_png(figure: Figure) -> bytes:
 def as_written(figure: Figure) -> Figure:
     """Let all texts of a figure stand as they are: two `$` in a name or label begin no formula.
 
-    The powers of ten on logarithmic axes remain formulas.
+    The powers of ten on logarithmic axes remain formulas. It takes long, and is done once for a figure.
     """
+    if figure in _AS_WRITTEN:
+        return figure
+    _AS_WRITTEN.add(figure)
     powers = {
         label
         for axes in figure.axes
@@ -173,10 +180,64 @@ def as_written(figure: Figure) -> Figure:
         for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks())
         for label in (tick.label1, tick.label2)
     }
-    for text in figure.findobj(Text):
+    for text in _texts_within(figure):
         if text not in powers:
             text.set_parse_math(False)
     return figure
+
+
+def _texts_within(artist: Artist) -> Iterator[Text]:
+    """All texts of an artist that are drawn: those of hidden axes would be made first, which takes long."""
+    if isinstance(artist, Text):
+        yield artist
+    elif artist.get_visible():
+        for child in artist.get_children():
+            yield from _texts_within(child)
+
+
+class Grid(NamedTuple):
+    """How panels are laid out: how many side by side, and the height of each with its title [inch]."""
+
+    columns: int
+    height: float
+
+
+def fitting(count: int, columns: Sequence[int], heights: tuple[float, float], page: float) -> Grid | None:
+    """Lay panels out within a height, or return None where they would be too low to be read.
+
+    Parameters
+    ----------
+    count : int
+        Number of panels.
+    columns : sequence of int
+        How many may stand side by side, the best one first. Rows are lowered before the next one is taken.
+    heights : (float, float)
+        Of a panel with its title [inch]: the least that is readable, and the one that is wanted.
+    page : float
+        Height that all rows may have [inch].
+    """
+    least, wanted = heights
+    for side_by_side in columns:
+        height = min(wanted, page / -(-count // side_by_side))
+        if height >= min(least, wanted):
+            return Grid(side_by_side, height)
+    return None
+
+
+def on_a_page(
+    count: int, columns: Sequence[int], heights: tuple[float, float], frame: float, source: str, then: str
+) -> Grid:
+    """Lay panels out as `fitting` does, on a page of which title, labels and legend take `frame` [inch].
+
+    Raises
+    ------
+    InputError
+        If the panels do not fit; it names the source, and says what to do `then`.
+    """
+    if (grid := fitting(count, columns, heights, LONG - frame)) is not None:
+        return grid
+    most = max(columns) * int((LONG - frame) / min(heights))
+    raise mismatch(source, f"at most {most} panels, which one page holds", str(count), then)
 
 
 def with_units(line: str) -> str:
@@ -194,6 +255,11 @@ def balanced(line: str, width: int) -> str:
     while width > 1 and len(narrower := wrap(line, width - 1)) == len(lines):
         lines, width = narrower, width - 1
     return "\n".join(lines)
+
+
+def headlines(lines: Sequence[str], width: int = 72) -> str:
+    """Text above a picture: lines that are not empty, each broken as by `balanced`."""
+    return "\n".join(balanced(line, width) for line in lines if line).replace("\u00a0", " ")
 
 
 def legend_columns(labels: Sequence[str]) -> int:

@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.figures import WIDTH, balanced, in_words, styled
+from cvt_hpc.analysis.figures import NARROW, balanced, in_words, styled
 from cvt_hpc.analysis.profiles import ARC, regions, shown_unit
 from cvt_hpc.analysis.telling_apart import check_holds, on_axes, titles
 
@@ -88,7 +88,7 @@ def flanks_figure(history: xr.Dataset, source: str = "history") -> Figure:
     needed = [f"{name}_{side}" for name in QUANTITIES for side in SIDES]
     check_holds([history], [source], dict.fromkeys(needed, "of a spatial pushbelt"))
     ends = ends_of_arcs(history)
-    figure = Figure((WIDTH * 1.25, 1.75 * (1 + len(QUANTITIES)) + 1.0), layout="constrained")
+    figure = Figure((NARROW, 1.75 * (1 + len(QUANTITIES)) + 1.0), layout="constrained")
     grid = figure.add_gridspec(1 + len(QUANTITIES), len(ends))
     whole = figure.add_subplot(grid[0, :])
     position = 1e3 * history["position"].values

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from scipy.interpolate import CubicSpline
 
 from cvt_hpc.analysis import history_panels as panels
-from cvt_hpc.analysis.figures import WIDTH, balanced, draw, styled
+from cvt_hpc.analysis.figures import LONG, WIDTH, balanced, draw, styled
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.shown import JOB_UNITS, POINT_UNITS, shown
@@ -87,7 +87,8 @@ def history_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
         raise mismatch(source, "displacement, load or forces of a run", "none of them")
     title = _title(dataset)
     heights = [height for height, _ in rows]
-    figure = Figure((WIDTH, sum(heights) + 0.2 * title.count("\n") + 0.4), layout="constrained")
+    height = min(sum(heights) + 0.2 * title.count("\n") + 0.4, LONG)
+    figure = Figure((WIDTH, height), layout="constrained")
     figure.suptitle(title)
     grid = figure.add_gridspec(len(rows), 3, height_ratios=heights)
     for i, (_, row) in enumerate(rows):

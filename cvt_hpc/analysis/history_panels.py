@@ -37,7 +37,7 @@ _LINEAR = 0.01  # of the largest feed: below it the axis is linear
 _FLAT = 0.1  # of the largest spectrum: where another one stays below it the axis is logarithmic
 _DEEPEST = 1e-3  # of the largest spectrum, on a logarithmic axis
 _APART = (0.15, 0.13)  # of the panel's width and height, between labels of peaks
-_HEADROOM = 1.45  # for a legend of one line
+_HEADROOM = 1.6  # for a legend of one line
 
 
 @dataclass(frozen=True)
@@ -316,8 +316,8 @@ def draw_feed(axes: Axes, dataset: xr.Dataset) -> None:
         axes.fill_between(position, feed, color=colour, alpha=0.25, linewidth=0)
         axes.plot(position, feed, line, color=colour, linewidth=1.2, label=label)
     axes.axhline(0.0, color=_OTHER_COLOUR, linewidth=0.6)
-    decades = 10.0 ** (np.floor(np.log10(largest)) + np.array([-1.0, 0.0]))
-    axes.set(ylabel="fed [W/m]", ylim=(-3.0 * largest, 80.0 * largest), yticks=[*-decades, 0.0, *decades])
+    decade = 10.0 ** np.floor(np.log10(largest))
+    axes.set(ylabel="fed [W/m]", ylim=(-3.0 * largest, 80.0 * largest), yticks=[-decade, 0.0, decade])
     axes.legend(loc="upper right", ncols=len(FEEDS), frameon=False)
     _lay_out_positions(axes, dataset)
 

@@ -15,16 +15,18 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.arrangement import Ruler, arrange, ruler, value_text
+from cvt_hpc.analysis.arrangement import CHOSEN, Ruler, Sides, arrange, check_sides, ruler, value_text
 from cvt_hpc.analysis.cells import OF_STARTS, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, check_results
 from cvt_hpc.analysis.figures import (
+    STYLE,
     WIDTH,
     axis_label,
     balanced,
     coordinate_unit,
     in_words,
     legend_columns,
+    on_a_page,
     styled,
 )
 from cvt_hpc.errors import mismatch, one_line
@@ -38,7 +40,7 @@ INK = "#00695c"  # beside orange, grey and purple cells, and as dark as these ar
 BAND = OF_STARTS[StartClass.LARGE_START_ONLY]
 UP, DOWN = "up", "down"
 LINES = {UP: ("-", ">"), DOWN: ("--", "<")}
-MOST_PANELS = 4
+LEAST, FRAME = 0.9, 1.8  # [inch]: a panel at least, and title, labels and legend
 OUTLINE = [withStroke(linewidth=4.0, foreground="white"), Normal()]
 
 
@@ -102,7 +104,7 @@ def draw_onsets(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], along
         points = onset_line(y, x, kinds.T)[:, ::-1] if along_y else onset_line(x, y, kinds)
         if np.isfinite(points).all(axis=1).any():
             look = {"color": INK, "ls": style, "lw": 2.2, "label": label}
-            axes.add_collection(LineCollection([points], **look, zorder=3, path_effects=OUTLINE))
+            axes.add_collection(LineCollection([points], **look, zorder=2.1, path_effects=OUTLINE))
             handles.append(Line2D([], [], **look))
     return handles
 
@@ -195,19 +197,25 @@ def draw_bands(axes: Axes, y: Ruler, ranges: NDArray[np.float64]) -> list[Any]:
 
 @styled
 def hysteresis_figure(
-    dataset: xr.Dataset, at: Mapping[str, Any] | None = None, source: str = "results"
+    dataset: xr.Dataset,
+    at: Mapping[str, Any] | None = None,
+    source: str = "results",
+    sides: Sides = CHOSEN,
 ) -> Figure:
     """Draw between which loads or speeds runs vibrate along ramps up and down, and where the two differ.
 
     Arguments and errors as of `vibration_ranges`, and `at` as of all pictures of results (`figures.py`): the
-    first axis that is left runs along y, the next one over the panels.
+    first axis that is left, or that of `sides`, runs along y, the next one, or that of `sides`, over the
+    panels.
     """
     ranges = vibration_ranges(dataset, source)
     axes_left = ranges.isel(ramp=0, limit=0, drop=True)
+    check_sides(sides, list(map(str, axes_left.dims)), at or {}, source)
     notes: tuple[str, ...] = ()
     y_name = panel = None
     if axes_left.dims:
-        shown = arrange(xr.Dataset({"status": axes_left}), at or {}, source)
+        along = Sides(sides.y, sides.panel)
+        shown = arrange(xr.Dataset({"status": axes_left}), at or {}, source, along)
         names = [name for name in (shown.x, shown.y) if name]
         # what runs along x of a map runs along y here, because x is what is ramped
         y_name, panel = names[0], names[1] if len(names) > 1 else None
@@ -218,18 +226,19 @@ def hysteresis_figure(
         fixed = {name: shown.dataset[name] for name in axes_left.dims if name not in names}
         ranges = ranges.sel({**kept, **{k: (v if v.ndim == 0 else v[0]) for k, v in fixed.items()}})
     count = ranges.sizes[panel] if panel else 1
-    if count > MOST_PANELS:
-        raise mismatch(
-            f"{source}: {panel}", f"at most {MOST_PANELS} values, or one that --at fixes", str(count)
-        )
     factor, unit = coordinate_unit(ranges.attrs)
     y = ruler(ranges[y_name]) if y_name else Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
-    height = float(np.clip(0.35 * y.centres.size, 0.6, 2.2)) + 0.35
-    figure = Figure((WIDTH, count * height + 1.8), layout="constrained")
-    panels = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
+    wanted = float(np.clip(0.35 * y.centres.size, 0.6, 2.2)) + 0.35
+    then = f"fix an axis, as by `--at {panel}=VALUE`, or choose another one by `--panel AXIS`"
+    grid = on_a_page(count, (1, 2), (LEAST, wanted), FRAME, source, then)
+    rows = -(-count // grid.columns)
+    figure = Figure((WIDTH, rows * grid.height + FRAME), layout="constrained")
+    panels = figure.subplots(rows, grid.columns, sharex=True, squeeze=False)
+    for axes in panels.flat[count:]:
+        axes.set_axis_off()
     legend: dict[str, Any] = {}
     both = STYLES[OccurrenceClass.VIBRATING].fill
-    for k, axes in enumerate(panels):
+    for k, axes in enumerate(panels.flat[:count]):
         part = ranges.isel({panel: k}) if panel else ranges
         values = part.transpose("ramp", "limit", *([y_name] if y_name else [])).values
         values = factor * values.reshape(2, 2, -1)
@@ -249,12 +258,17 @@ def hysteresis_figure(
         for handle in draw_bands(axes, y, values):
             legend.setdefault(handle.get_label(), handle)
         axes.set_ylim(*y.edges[[0, -1]])
-        axes.set_ylabel(y.label)
+        if count == 1:
+            axes.set_ylabel(y.label)
         y.lay_out(axes.yaxis)
         axes.grid(axis="x", lw=0.4, alpha=0.5)
         if panel:
             axes.set_title(f"{in_words(ranges[panel])}: {value_text(ranges[panel], k)}", loc="left", pad=3)
-    panels[-1].set_xlabel(axis_label(ranges, unit))
+    for axes in panels.flat[:count][-grid.columns :]:
+        axes.set_xlabel(axis_label(ranges, unit))
+        axes.tick_params(labelbottom=True)
+    if count > 1:
+        figure.supylabel(y.label, fontsize=STYLE["axes.labelsize"])
     job = one_line(dataset.attrs.get("job_name", ""))
     lines = [f"Vibration along ramps up and down: {job}".removesuffix(": "), *notes]
     figure.suptitle("\n".join(balanced(line, 72) for line in lines))

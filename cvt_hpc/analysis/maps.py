@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -32,17 +31,31 @@ from cvt_hpc.analysis.classes import (
     occurrence_classes,
 )
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
-from cvt_hpc.analysis.figures import WIDTH, draw, headline, in_words, styled
+from cvt_hpc.analysis.figures import (
+    LONG,
+    WIDTH,
+    as_written,
+    draw,
+    fitting,
+    headline,
+    headlines,
+    in_words,
+    on_a_page,
+    styled,
+)
 from cvt_hpc.analysis.hysteresis_bands import ALONG, draw_onsets
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 from cvt_hpc.analysis.starts import has_starts, join_starts
 from cvt_hpc.errors import mismatch
-from cvt_hpc.variables import Vibrates
+from cvt_hpc.variables import Vibrates, shortened
 
-PAGE, FRAME = 10.5, 1.9  # [inch]: most of a page's height, and what title, labels and legend take of it
-MOST_COLUMNS, NAMED = 4, 2  # panels side by side; in how many columns each has room for the name of its axis
+FRAME = 1.9  # [inch]: what title, labels and legend take of a page's height
+MOST_COLUMNS, NAMED = 6, 2  # panels side by side; in how many columns each has room for the name of its axis
+ROOMY = 4  # panels side by side with ticks that are all labelled
 SMALLEST_APART = 3.0  # [point]: on smaller cells marks, and the lines between, would hide the classes
 TITLE_HEIGHT = 0.42  # [inch], of a panel with the space around it
+LEAST = TITLE_HEIGHT + 0.6  # [inch], of a panel that is readable
+TITLE_LETTERS = 78  # of titles side by side
 ONE_ROW = Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
 
 
@@ -94,7 +107,7 @@ def map_figure(
         return eigenfrequency_figure(dataset, at or {}, source, sides)
     if has_starts(dataset, at or {}):
         dataset = join_starts(dataset)
-    return _grid_figure(arrange(dataset, at or {}, source, sides), vmax)
+    return _grid_figure(arrange(dataset, at or {}, source, sides), vmax, source)
 
 
 @dataclass(frozen=True)
@@ -110,6 +123,7 @@ class Sheet:
     frequency: NDArray[np.float64]  # [Hz], likewise
     irregular: NDArray[np.float64]  # amplitude [um] of runs that are irregular, nan elsewhere
     columns: int = 1  # panels side by side
+    panel_height: float = LEAST  # [inch], with the title
 
     @property
     def writes_frequency(self) -> bool:
@@ -128,8 +142,8 @@ class Sheet:
 
     @property
     def height(self) -> float:
-        """Of the picture [inch]."""
-        return self.blocks * self.rows * self.panel_height + FRAME
+        """Of all panels [inch]."""
+        return self.blocks * self.rows * self.panel_height
 
     @property
     def panels(self) -> int:
@@ -142,8 +156,8 @@ class Sheet:
         return -(-self.panels // self.columns)
 
     @property
-    def panel_height(self) -> float:
-        """[inch]; rows of cells are high enough for a line of text as long as the page allows it."""
+    def wanted_height(self) -> float:
+        """Of a panel [inch]: rows of cells hold a line of text as long as the page allows it."""
         rows = self.y.centres.size
         tall = TITLE_HEIGHT + 0.36 * rows
         height = tall if tall * self.rows <= 6.5 else TITLE_HEIGHT + float(np.clip(0.14 * rows, 0.35, 2.0))
@@ -166,11 +180,12 @@ class Sheet:
         return width >= 22 and height >= 22  # [point]
 
 
-def _grid_figure(arrangement: Arrangement, vmax: float | None) -> Figure:
+def _grid_figure(arrangement: Arrangement, vmax: float | None, source: str) -> Figure:
     """Compose the map of a study over a grid; to be called within STYLE."""
-    sheet = sheet_of(arrangement)
-    figure = Figure((WIDTH, sheet.height), layout="constrained")
-    axes = figure.subplots(sheet.blocks * sheet.rows, sheet.columns, sharex=True, sharey=True, squeeze=False)
+    sheet = sheet_of(arrangement, source)
+    figure = Figure((WIDTH, sheet.height + FRAME), layout="constrained")
+    # not shared: matplotlib would go through all panels for each
+    axes = figure.subplots(sheet.blocks * sheet.rows, sheet.columns, squeeze=False)
     norm = cells.norm_over(sheet.amplitude, 0.0, None if vmax is None else 1e6 * vmax)
     amplitude = cells.Scale(cells.AMPLITUDE_COLOURS, norm, "amplitude [µm]")
     draw_block(figure, axes[: sheet.rows], sheet, sheet.amplitude, amplitude)
@@ -193,7 +208,22 @@ def _grid_figure(arrangement: Arrangement, vmax: float | None) -> Figure:
         styles, columns = cells.STYLES | cells.OF_STARTS, 3  # as wide as the page with the longest label
     shown = {kind: style for kind, style in styles.items() if np.any(sheet.classes == kind)}
     cells.class_legend(figure, shown, columns, with_inferred=bool(sheet.inferred.any()), further=onset)
+    if sheet.columns > NAMED:
+        _lay_out(figure, [ax for ax in axes.flat if not (ax.xaxis.get_visible() or ax.yaxis.get_visible())])
     return figure
+
+
+def _lay_out(figure: Figure, inner: list[Axes]) -> None:
+    """Find the places of all panels by the outer ones, once: to ask each takes as long as to draw it."""
+    as_written(figure)
+    for ax in inner:
+        ax.set_visible(False)
+    engine = figure.get_layout_engine()
+    assert engine is not None
+    engine.execute(figure)
+    figure.set_layout_engine("none")
+    for ax in inner:
+        ax.set_visible(True)
 
 
 def _draw_onsets(axes: NDArray[Any], sheet: Sheet) -> list[Any]:
@@ -211,8 +241,11 @@ def _draw_onsets(axes: NDArray[Any], sheet: Sheet) -> list[Any]:
     return list(handles.values())
 
 
-def sheet_of(arrangement: Arrangement) -> Sheet:
-    """The arranged variables with all three dimensions, missing ones of length one."""
+def sheet_of(arrangement: Arrangement, source: str = "results", frame: float = FRAME) -> Sheet:
+    """The arranged variables with all three dimensions, missing ones of length one, laid out on a page.
+
+    `frame` [inch] is what else the page holds; InputError, which names the source, where it is too small.
+    """
     dataset = arrangement.dataset
     names = [arrangement.panel, arrangement.y, arrangement.x]
 
@@ -237,8 +270,25 @@ def sheet_of(arrangement: Arrangement) -> Sheet:
         np.where(vibrating, grid(at_strongest_strand(dataset, "frequency")), np.nan),
         np.where(irregular, amplitude, np.nan),
     )
-    laid_out = [replace(sheet, columns=count) for count in range(1, min(MOST_COLUMNS, sheet.panels) + 1)]
-    return next((one for one in laid_out if one.height <= PAGE), laid_out[-1])
+    return _laid_out(sheet, source, frame)
+
+
+def _laid_out(sheet: Sheet, source: str, frame: float) -> Sheet:
+    """The sheet on a page: in few columns, else with lower panels, in more columns, or without frequency."""
+    for columns in range(1, min(ROOMY, sheet.panels) + 1):
+        roomy = replace(sheet, columns=columns)
+        roomy = replace(roomy, panel_height=roomy.wanted_height)
+        if roomy.height + frame <= LONG:
+            return roomy
+    name = sheet.arrangement.panel
+    then = f"fix an axis, as by `--at {name}=VALUE`, or choose another one by `--panel AXIS`"
+    counts = range(1, min(MOST_COLUMNS, sheet.panels) + 1)
+    sizes = LEAST, sheet.wanted_height
+    grid = fitting(sheet.panels, counts, sizes, 0.5 * (LONG - frame)) if sheet.has_frequency else None
+    if grid is None:
+        sheet = replace(sheet, frequency=np.full_like(sheet.frequency, np.nan))
+        grid = on_a_page(sheet.panels, counts, sizes, frame, source, then)
+    return replace(sheet, columns=grid.columns, panel_height=grid.height)
 
 
 def draw_block(
@@ -267,11 +317,15 @@ def _label_panel(ax: Axes, sheet: Sheet, panel: int) -> None:
     if name:
         text = value_text(sheet.arrangement.dataset[name], panel)
         heading = f"{in_words(sheet.arrangement.dataset[name])}: " if sheet.columns <= NAMED else ""
-        ax.set_title(f"{heading}{text}", loc="left", pad=3)
+        ax.set_title(shortened(f"{heading}{text}", TITLE_LETTERS // sheet.columns), loc="left", pad=3)
     sheet.x.lay_out(ax.xaxis)
     sheet.y.lay_out(ax.yaxis)
     is_lowest = panel + sheet.columns >= sheet.panels
-    ax.tick_params(labelbottom=is_lowest)
+    is_first = panel % sheet.columns == 0
+    if sheet.columns > NAMED:  # of many panels inner ticks take long, and tell little
+        ax.xaxis.set_visible(is_lowest)
+        ax.yaxis.set_visible(is_first)
+    ax.tick_params(labelbottom=is_lowest, labelleft=is_first)
     if is_lowest:
         ax.set_xlabel(sheet.x.label)
 
@@ -286,11 +340,11 @@ def _title(sheet: Sheet) -> str:
         lines.append(f"each from a small and a large start: disturbance {attributes['starts']}")
     if inferred.size:
         lines.append(f"{inferred.size} cells inferred: {count_classes(inferred)}")
-    lines.extend(sheet.arrangement.notes)
+    lines.append(", ".join(sheet.arrangement.notes))
     if sheet.arrangement.panel and sheet.columns > NAMED:
         lines.append(f"panels: {in_words(sheet.arrangement.dataset[sheet.arrangement.panel])}")
     if sheet.writes_frequency:
         lines.append("in the cells: dominant frequency [Hz]")
     if sheet.has_room and np.isfinite(sheet.irregular).any():
         lines.append("in irregular cells: amplitude [µm]")
-    return "\n".join(fill(line, 72) for line in lines)
+    return headlines(lines)

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from cvt_hpc.analysis.cells import colours_of
-from cvt_hpc.analysis.figures import WIDTH, axis_label, balanced, styled
+from cvt_hpc.analysis.figures import WIDTH, axis_label, balanced, on_a_page, styled
 from cvt_hpc.analysis.history_panels import FEEDS
 from cvt_hpc.analysis.power_balance import balance_of, draw_balance
 from cvt_hpc.analysis.profiles import regions, shown_unit
@@ -31,7 +31,9 @@ LARGEST = 0.16  # of the largest distance of two shafts: the longest bar
 ONE_SIGN, TWO_SIGNS = colours_of("viridis_r", 0.05, 0.95), colours_of("PuOr", 0.02, 0.98)
 HATCHES = ("", "///", "...")
 NAMED_AT, INSIDE = 0.35, 0.36  # of a strand, and of the smallest radius: where its name stands
-HEIGHT = 3.1  # [inch] of a variator
+NEAREST, NEAR = 0.75, 0.05  # of the way to the line of centres; of the path, bars beside a name
+PAPER = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0}  # under names on bars
+LEAST, HEIGHT, FRAME = 1.6, 3.1, 0.7  # [inch]: a variator, and what stands above all
 WATTS = 0.01  # of the largest bar: what is smaller has no number
 
 
@@ -73,21 +75,27 @@ def run_geometry(history: xr.Dataset) -> Drive | None:
         return None
 
 
-def draw_pulleys(axes: Axes, drive: Drive) -> None:
-    """Draw all pulleys, their names, and those of two strands [mm]."""
-    path = drive.path
+def draw_pulleys(axes: Axes, drive: Drive, inwards: Sequence[float] = (0.0, 0.0)) -> None:
+    """Draw all pulleys, their names, and those of two strands [mm], clear of bars that reach inwards [m]."""
+    path, named = drive.path, {"ha": "center", "va": "center", "fontsize": 9, "zorder": 5}
     for centre, radius, name in zip(1e3 * path.centre, 1e3 * path.radius, drive.pulleys, strict=True):
         axes.add_patch(Circle(tuple(centre), radius, color=PULLEY, zorder=0))
-        axes.text(*centre, name, ha="center", va="center", fontsize=9, zorder=5)
-    # names such as P1-P2 of strands follow from those of the pulleys
-    for k, name in enumerate(drive.strands if len(drive.strands) == 2 else ()):
-        # both nearer to the driving pulley
-        share = NAMED_AT if k == 0 else 1.0 - NAMED_AT
-        at = path.ends[2 * k] + share * path.spans[k]
+        axes.text(*centre, name, **named, bbox=PAPER | {"facecolor": PULLEY})
+    for name, at, depth in zip(drive.strands, _named_at(drive), inwards, strict=False):
         place, angle, _ = points_at(path, np.array([at]))
-        inwards = INSIDE * path.radius.min() * np.array([-np.sin(angle[0]), np.cos(angle[0])])
-        axes.text(*(1e3 * (place[0] + inwards)), name, ha="center", va="center", fontsize=9)
+        most = NEAREST * abs(place[0, 1] - path.centre[:, 1].mean())
+        off = min(INSIDE * path.radius.min() + depth, most) * np.array([-np.sin(angle[0]), np.cos(angle[0])])
+        axes.text(*(1e3 * (place[0] + off)), name, **named, bbox=PAPER)
     axes.set(aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
+
+
+def _named_at(drive: Drive) -> list[float]:
+    """Path coordinates of the names of two strands [m], both nearer to the driving pulley.
+
+    Names such as P1-P2 of more strands follow from those of the pulleys.
+    """
+    path, shares = drive.path, (NAMED_AT, 1.0 - NAMED_AT) if len(drive.strands) == 2 else ()
+    return [float(path.ends[2 * k] + share * path.spans[k]) for k, share in enumerate(shares)]
 
 
 @styled
@@ -117,9 +125,15 @@ def variator_figure(history: xr.Dataset, quantities: Sequence[str] = (), source:
     for name in quantities:
         if name not in known:
             raise unknown(f"{source}: {name}", "quantity along the belt", name, known)
-    figure = Figure((WIDTH, HEIGHT * len(quantities) + 0.7), layout="constrained")
-    for axes, name in zip(figure.subplots(len(quantities), 1, squeeze=False)[:, 0], quantities, strict=True):
+    then = "name fewer quantities"
+    grid = on_a_page(len(quantities), (1, 2), (LEAST, HEIGHT), FRAME, source, then)
+    rows = -(-len(quantities) // grid.columns)
+    figure = Figure((WIDTH, grid.height * rows + FRAME), layout="constrained")
+    panels = figure.subplots(rows, grid.columns, squeeze=False)
+    for axes, name in zip(panels.flat, quantities, strict=False):
         _draw_belt(figure, axes, history[name], found)
+    for axes in panels.flat[len(quantities) :]:
+        axes.set_axis_off()
     common, _ = on_axes([history], [source])
     lines = titles([history], "On the pulleys", common)
     figure.suptitle("\n".join(balanced(line, 72) for line in lines))
@@ -128,7 +142,6 @@ def variator_figure(history: xr.Dataset, quantities: Sequence[str] = (), source:
 
 def _draw_belt(figure: Figure, axes: Axes, array: xr.DataArray, drive: Drive) -> None:
     """The belt in colours, with a bar at each station; of what is not known there is a thin line."""
-    draw_pulleys(axes, drive)
     factor, unit = shown_unit(array)
     values = factor * array.values
     position = array["position"].values
@@ -140,10 +153,11 @@ def _draw_belt(figure: Figure, axes: Axes, array: xr.DataArray, drive: Drive) ->
     is_known = np.isfinite(values)
     largest = float(np.abs(values[is_known]).max(initial=0.0)) or 1.0
     both = bool((values[is_known] < 0.0).any())
+    near = [is_known & (np.abs(position - at) < NEAR * drive.path.path_length) for at in _named_at(drive)]
+    longest = LARGEST * drive.size / largest
+    draw_pulleys(axes, drive, [longest * float(np.max(-values[here], initial=0.0)) for here in near])
     norm = TwoSlopeNorm(0.0, -largest, largest) if both else Normalize(0.0, largest)
-    ends = (
-        points + (1e3 * LARGEST * drive.size / largest * np.where(is_known, values, 0.0))[:, None] * outwards
-    )
+    ends = points + (1e3 * longest * np.where(is_known, values, 0.0))[:, None] * outwards
     colours = TWO_SIGNS if both else ONE_SIGN
     style = {"cmap": colours, "norm": norm, "array": values[is_known]}
     bars = np.stack([points, ends], 1)[is_known]

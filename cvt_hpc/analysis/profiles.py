@@ -12,11 +12,13 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.error_axes import COLOURS
 from cvt_hpc.analysis.figures import (
+    NARROW,
     STYLE,
     WIDTH,
     balanced,
     in_words,
     legend_columns,
+    on_a_page,
     styled,
     value_unit,
 )
@@ -28,7 +30,7 @@ DEFAULT = (("push_force", "tension"), ("friction_force", "tangential_friction"),
 LINES = ("-", "--", "-.", ":")
 ARC = "#ececec"
 MOST_COLUMNS = 3
-HEIGHT = 1.75  # [inch] of a panel
+LEAST, HEIGHT, FRAME = 1.0, 1.75, 1.2  # [inch]: a panel, and title, labels and legend
 _UNITS = {"N m-1": (1e-3, "kN/m"), "m s-1": (1e3, "mm/s")}
 _REFERENCES = {"sliding_angle": 90.0}  # [°]: where sliding turns from one hand to the other
 
@@ -71,7 +73,8 @@ def profile_figure(
     groups = _groups(labels, columns, MOST_COLUMNS * (2 if len(quantities) == 1 else 1))
     beside = min(len(groups), MOST_COLUMNS)
     rows = max(len(quantities), -(-len(groups) // beside))
-    figure = Figure((WIDTH * (1.0 + 0.25 * (beside - 1)), HEIGHT * rows + 1.2), layout="constrained")
+    height = on_a_page(rows, (1,), (LEAST, HEIGHT), FRAME, names[0], "name fewer quantities by `--of`").height
+    figure = Figure((NARROW if beside > 1 else WIDTH, height * rows + FRAME), layout="constrained")
     share = "all" if len(quantities) == 1 else "row"
     panels = figure.subplots(rows, beside, sharex="col", sharey=share, squeeze=False)
     # one quantity has its panels row by row

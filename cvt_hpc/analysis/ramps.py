@@ -4,29 +4,40 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from textwrap import fill
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.cells import colours_of
+from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.eigenfrequencies import strand_frequencies
-from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, in_words, styled
+from cvt_hpc.analysis.figures import (
+    NARROW,
+    STYLE,
+    WIDTH,
+    balanced,
+    coordinate_unit,
+    headlines,
+    in_words,
+    on_a_page,
+    styled,
+)
+from cvt_hpc.analysis.line_names import name_lines
 from cvt_hpc.analysis.telling_apart import on_axes, titles
-from cvt_hpc.analysis.waterfall import ORDERS, draw_eigenfrequencies, draw_orders
+from cvt_hpc.analysis.waterfall import COLOURS, ORDERS, draw_eigenfrequencies, draw_orders, spectra_norm
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variator import STRANDS
 from cvt_hpc.vibration.signals import window_amplitudes
 
-COLOURS = colours_of("inferno_r", 0.0, 0.95)
-DEEPEST = 1e-2  # of the largest amplitude
 WINDOW = 0.04  # [s]: lines of the spectrogram 50 Hz wide
 HIGHEST = 1500.0  # [Hz]
 BAND, NOISE = (300.0, 1500.0), (400.0, 800.0)  # [Hz] of strands' vibration, and of the noise
-ROW = 1.5  # [inch]
+LEAST, ROW = 1.1, 1.5  # [inch]: a row of panels of a ramp, at least and else
+LEAST_HEIGHT, HEIGHT = 1.5, 2.2  # [inch]: the same of spectrograms
+LETTERS = 14  # of a label beside a row
+THEN = "name fewer histories"  # of more than a page holds
 LINE_POINTS = 21  # of lines over a spectrogram
 
 
@@ -52,7 +63,12 @@ class Ramp(NamedTuple):
 
 
 @styled
-def ramp_figure(histories: Sequence[xr.Dataset], of: str = "t1", sources: Sequence[str] = ()) -> Figure:
+def ramp_figure(
+    histories: Sequence[xr.Dataset],
+    of: str = "t1",
+    sources: Sequence[str] = (),
+    vmax: float | None = None,
+) -> Figure:
     """Draw motion and spectrogram of runs along their ramps, below each other.
 
     Parameters
@@ -63,20 +79,23 @@ def ramp_figure(histories: Sequence[xr.Dataset], of: str = "t1", sources: Sequen
         "t1" or "t2": the probe of that strand that moves most; or a variable over `time`.
     sources : sequence of str, optional
         Where the runs are from, for errors, and for titles where their axes do not tell them apart.
+    vmax : float, optional
+        Amplitude at which the colours end [SI].
 
     Raises
     ------
     InputError
-        A history has no ramp, no such strand or variable.
+        A history has no ramp, no such strand or variable; or there are more than a page holds.
     """
     names = list(sources) or [f"history {k + 1}" for k in range(len(histories))]
     ramps = [read_ramp(history, of, name) for history, name in zip(histories, names, strict=True)]
     common, labels = on_axes(histories, names)
-    figure = Figure((WIDTH * 1.25, ROW * len(ramps) + 1.1), layout="constrained")
+    grid = on_a_page(len(ramps), (1,), (LEAST, ROW), 1.1, names[0], THEN)
+    figure = Figure((NARROW, grid.height * len(ramps) + 1.1), layout="constrained")
     panels = figure.subplots(len(ramps), 2, sharex=True, sharey="col", squeeze=False)
     spectra = [spectrogram(ramp) for ramp in ramps]
-    largest = max(float(amplitude.max()) for _, _, amplitude in spectra)
-    norm = LogNorm(DEEPEST * largest, largest)
+    scale = 1e6 if of in STRANDS else 1.0
+    norm = spectra_norm([amplitude.T for *_, amplitude in spectra], None if vmax is None else scale * vmax)
     for (left, right), ramp, (values, frequency, amplitude), label in zip(
         panels, ramps, spectra, labels, strict=True
     ):
@@ -88,23 +107,26 @@ def ramp_figure(histories: Sequence[xr.Dataset], of: str = "t1", sources: Sequen
         for edge in (500.0, 700.0):
             right.axhline(edge, color="#123a6b", linewidth=0.8, linestyle=(0, (4, 4)))
         left.set_title(", ".join(label.values()), loc="left", pad=3)
-        right.set_ylabel("frequency [Hz]")
+        right.set_ylabel(fill("frequency [Hz]", LETTERS - 1))
         left.set_xlim(np.sort(ramp.values[[0, -1]]))
-    unit = "µm" if of in ("t1", "t2") else str(histories[0][of].attrs.get("units", ""))
-    name = f"strand {of}" if of in ("t1", "t2") else in_words(histories[0][of])
+    unit = "µm" if of in STRANDS else str(histories[0][of].attrs.get("units", ""))
+    name = f"strand {of}" if of in STRANDS else in_words(histories[0][of])
     for left, _ in panels:
-        left.set_ylabel(f"{name} [{unit}]")
+        left.set_ylabel(fill(f"{name} [{unit}]", LETTERS))
     for axes in panels[-1]:
         axes.set_xlabel(ramps[0].label)
-    bar = figure.colorbar(ScalarMappable(norm, COLOURS), ax=list(panels[:, 1]), pad=0.02, extend="min")
-    bar.set_label(f"amplitude [{unit}]")
+    bar = cells.Scale(COLOURS, norm, f"amplitude [{unit}]")
+    drawn = np.concatenate([amplitude.ravel() for *_, amplitude in spectra])
+    cells.colour_bar(figure, bar, drawn, ax=list(panels[:, 1]), aspect=15 * len(ramps), pad=0.02)
     lines = [*titles(histories, f"Along the ramp, {name}", common), "dashed: 500 and 700 Hz"]
-    figure.suptitle("\n".join(balanced(line, 80) for line in lines))
+    figure.suptitle(headlines(lines, 80))
     return figure
 
 
 @styled
-def spectrogram_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) -> Figure:
+def spectrogram_figure(
+    histories: Sequence[xr.Dataset], sources: Sequence[str] = (), vmax: float | None = None
+) -> Figure:
     """Draw spectrograms of the strands side by side, over the ramp of a run or else over time.
 
     Eigenfrequencies by belt formulas are drawn where the run's parameters tell them, and orders of the
@@ -116,11 +138,13 @@ def spectrogram_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] =
         As `simulate` returns them: `displacement` [m] over `time` [s] and `probe`; each has a row.
     sources : sequence of str, optional
         Where the runs are from, for errors, and for titles where their axes do not tell them apart.
+    vmax : float, optional
+        Amplitude at which the colours end [m].
 
     Raises
     ------
     InputError
-        A history has no motion of strands, or is too short.
+        A history has no motion of strands, or is too short; or there are more than a page holds.
     """
     names = list(sources) or [f"history {k + 1}" for k in range(len(histories))]
     for history, name in zip(histories, names, strict=True):
@@ -138,36 +162,44 @@ def spectrogram_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] =
         for history, name in zip(histories, names, strict=True)
     ]
     spectra = [[spectrogram(ramp) for ramp in row] for row in ramps]
-    largest = max(float(amplitude.max()) for row in spectra for _, _, amplitude in row) or 1.0
-    norm = LogNorm(DEEPEST * largest, largest)
-    figure = Figure((WIDTH, 2.2 * len(ramps) + 1.4), layout="constrained")
-    panels = figure.subplots(len(ramps), len(strands), sharex="row", sharey=True, squeeze=False)
-    told = set()
-    for history, row, of_row, row_of_axes, label in zip(
-        histories, ramps, spectra, panels, labels, strict=True
-    ):
+    drawn = [amplitude.T for row in spectra for *_, amplitude in row]
+    norm = spectra_norm(drawn, None if vmax is None else 1e6 * vmax)
+    grid = on_a_page(len(ramps), (1, 2), (LEAST_HEIGHT, HEIGHT), 1.4, names[0], THEN)
+    count, beside = -(-len(ramps) // grid.columns), grid.columns * len(strands)
+    figure = Figure((WIDTH, grid.height * count + 1.4), layout="constrained")
+    panels = figure.subplots(count, beside, sharey=True, squeeze=False)
+    size, told, each = (0.8 * WIDTH / beside, grid.height - 0.7), set(), iter(panels.flat)
+    pads = np.full(panels.shape, 0.0)
+    for axes in panels.flat[len(ramps) * len(strands) :]:
+        axes.set_axis_off()
+    for history, row, of_row, label in zip(histories, ramps, spectra, labels, strict=True):
         turns, known = _lines_along(history, row[0])
-        for strand, ramp, (values, frequency, amplitude), axes in zip(
-            strands, row, of_row, row_of_axes, strict=True
-        ):
-            cells = np.maximum(amplitude, norm.vmin).T
-            axes.pcolormesh(values, frequency, cells, norm=norm, cmap=COLOURS, rasterized=True)
-            k = STRANDS.index(strand)
+        for strand, ramp, (values, frequency, amplitude) in zip(strands, row, of_row, strict=True):
+            axes, lines = next(each), []
+            shown = np.maximum(amplitude, norm.vmin).T
+            axes.pcolormesh(values, frequency, shown, norm=norm, cmap=COLOURS, rasterized=True)
+            axes.set(xlim=np.sort(values[[0, -1]]), ylim=(0.0, HIGHEST))
             if known is not None:
                 places, waves = known
-                draw_eigenfrequencies(axes, places, waves[k], np.arange(1, len(waves[k]) + 1))
+                of_strand = waves[STRANDS.index(strand)]
+                lines += draw_eigenfrequencies(axes, places, of_strand, np.arange(1, len(of_strand) + 1))
                 told.add("dashed: eigenfrequencies by belt formulas, with their half waves")
             if turns is not None:
-                draw_orders(axes, *turns, ORDERS, HIGHEST)
+                lines += draw_orders(axes, *turns, ORDERS)
                 told.add("dotted: orders of the driving pulley's turns")
-            axes.set_title(", ".join([f"strand {strand}", *label.values()]), loc="left", pad=3)
+            pads[panels == axes] = name_lines(axes, lines, size)
+            axes.set_title(fill(", ".join([f"strand {strand}", *label.values()]), 72 // beside), loc="left")
             axes.set_xlabel(ramp.label)
-            axes.set(xlim=np.sort(values[[0, -1]]), ylim=(0.0, HIGHEST))
-        row_of_axes[0].set_ylabel("frequency [Hz]")
-    bar = figure.colorbar(ScalarMappable(norm, COLOURS), ax=panels, pad=0.02, extend="min")
-    bar.set_label("amplitude [µm]")
-    lines = [*titles(histories, "Spectrogram", common), *sorted(told)]
-    figure.suptitle("\n".join(balanced(line, 72) for line in lines))
+    for axes, pad in zip(panels.flat, np.repeat(pads.max(axis=1), beside), strict=True):
+        axes.set_title(axes.get_title(loc="left"), loc="left", pad=pad)  # alike in a row
+    if count == 1:
+        panels[0, 0].set_ylabel("frequency [Hz]")
+    else:
+        figure.supylabel("frequency [Hz]", fontsize=STYLE["axes.labelsize"])
+    scale = cells.Scale(COLOURS, norm, "amplitude [µm]")
+    values = np.concatenate([each.ravel() for each in drawn])
+    cells.colour_bar(figure, scale, values, ax=panels, aspect=20 * count, pad=0.02)
+    figure.suptitle(headlines([*titles(histories, "Spectrogram", common), *sorted(told)]))
     return figure
 
 
@@ -273,7 +305,7 @@ def read_ramp(
         raise mismatch(source, f"a run of {WINDOW:g} s or more after its start-up", "a shorter one")
     if rate < 2.0 * band[1]:
         raise mismatch(source, f"a history of {2.0 * band[1]:g} samples per second or more", f"{rate:.4g}")
-    if of in ("t1", "t2"):
+    if of in STRANDS:
         probes = [str(name).split()[0] == of for name in history["probe"].values]
         moved = 1e6 * history["displacement"].values[first:, probes]
         _, amplitude = window_amplitudes(moved, rate, band, WINDOW)

@@ -22,6 +22,7 @@ from cvt_hpc.analysis.figures import WIDTH, axis_label, coordinate_unit, headlin
 from cvt_hpc.errors import mismatch
 
 MOST_AXES = 4  # six pairs; the first axes of the job
+BESIDE, HEIGHT = 2, 2.6  # panels side by side, and their height [inch]
 _SIZE = 6.0  # [point], of the mark of a vibrating run
 _FIRST = ("load", "friction_gradient")  # along x and along y, where they are
 
@@ -79,10 +80,10 @@ def scatter_figure(
     return figure
 
 
-def scatter_height(dataset: xr.Dataset) -> float:
-    """Height [inch] of the map of a sampled study."""
+def scatter_height(dataset: xr.Dataset, beside: int = BESIDE, height: float = HEIGHT) -> float:
+    """Height [inch] of the map of a sampled study, of so many panels side by side and so high."""
     pairs = len(_pairs(dataset))
-    return 3.6 if pairs == 1 else 2.6 * -(-pairs // 2) + 1.2
+    return 3.6 if pairs == 1 else height * -(-pairs // beside) + 1.2
 
 
 def draw_samples(
@@ -91,6 +92,7 @@ def draw_samples(
     classes: NDArray[np.int8],
     amplitude: NDArray[np.float64],
     scale: cells.Scale,
+    beside: int = BESIDE,
 ) -> NDArray[Any]:
     """Draw the runs of a sampled study by class, in a panel for each pair of axes, and return the panels.
 
@@ -106,9 +108,11 @@ def draw_samples(
         What colours the vibrating runs; not a number leaves the colour of the class.
     scale : Scale
         How it colours them.
+    beside : int
+        Panels side by side at most.
     """
     pairs = _pairs(dataset)
-    columns = min(len(pairs), 2)
+    columns = min(len(pairs), beside)
     panels = figure.subplots(-(-len(pairs) // columns), columns, squeeze=False)
     for axes, (x, y) in zip(panels.flat, pairs, strict=False):
         _draw_runs(axes, dataset, x, y, classes, amplitude, scale)

@@ -10,10 +10,11 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.arrangement import arrange, ruler
+from cvt_hpc.analysis.arrangement import CHOSEN, Sides, arrange, check_sides, ruler
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.curves import panels_of
 from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, styled
+from cvt_hpc.analysis.ticks import put_ticks, short_numbers
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.variables import Status
 
@@ -26,19 +27,24 @@ NEEDED = ("mean_ring_tension", "mean_push_force")
 
 @styled
 def strand_bars_figure(
-    dataset: xr.Dataset, at: Mapping[str, Any] | None = None, source: str = "results"
+    dataset: xr.Dataset,
+    at: Mapping[str, Any] | None = None,
+    source: str = "results",
+    sides: Sides = CHOSEN,
 ) -> Figure:
     """Draw for each run what each strand carries: ring tension above zero, push force below.
 
     Arguments as of all pictures of results (`figures.py`), with `mean_ring_tension` and `mean_push_force` [N]
-    over the job's axes and `strand`. The axis along x of a map does so here; there is a panel for each
-    value of the one that runs along y, and too many are refused.
+    over the job's axes and `strand`. The axis along x of a map, or that of `sides`, does so here; there is a
+    panel for each value of the one that runs along y of a map, or of `sides.panel`. Too many are refused.
     """
     check_results(dataset, source)
     for name in NEEDED:
         if name not in dataset:
             raise mismatch(source, f"results with {', '.join(NEEDED)}", f"no {name}")
-    arrangement = arrange(dataset, at or {}, source)
+    check_sides(sides, list(map(str, dataset["status"].dims)), at or {}, source)
+    # panels here are what `panels_of` makes of the rows of a map
+    arrangement = arrange(dataset, at or {}, source, Sides(sides.x, sides.panel))
     panels, notes = panels_of(arrangement, source)
     figure = Figure((WIDTH, HEIGHT), layout="constrained")
     row = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
@@ -46,11 +52,11 @@ def strand_bars_figure(
     along = arrangement.dataset[arrangement.x]
     ticks = list(x.tick_labels)
     if len(ticks) != along.size:
-        ticks = [f"{value:g}" for value in coordinate_unit(along.attrs)[0] * along.values]
+        ticks = list(short_numbers(coordinate_unit(along.attrs)[0] * along.values))
     for axes, (title, shown) in zip(row, panels, strict=True):
         _draw_bars(axes, shown.transpose(arrangement.x, ...))
         axes.set_title(title, loc="left", pad=4)
-        axes.set_xticks(np.arange(len(ticks)), ticks)
+        put_ticks(axes.xaxis, np.arange(float(len(ticks))), ticks)
         axes.set_xlabel(x.label)
     row[0].set_ylabel("push force | ring tension [kN]")
     handles, labels = row[0].get_legend_handles_labels()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from textwrap import fill
@@ -14,14 +13,35 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.patches import PathPatch
+from matplotlib.patches import Patch, PathPatch
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
-from cvt_hpc.analysis.arrangement import CHOSEN, Arrangement, Ruler, Sides, arrange, ruler, value_text
+from cvt_hpc.analysis.arrangement import (
+    CHOSEN,
+    Arrangement,
+    Ruler,
+    Sides,
+    arrange,
+    first_panel,
+    ruler,
+    value_text,
+)
 from cvt_hpc.analysis.classes import OccurrenceClass, check_results, count_classes, occurrence_classes
 from cvt_hpc.analysis.curves import check_quantities
-from cvt_hpc.analysis.figures import WIDTH, axis_label, draw, in_words, styled, value_unit
+from cvt_hpc.analysis.figures import (
+    NARROW,
+    WIDTH,
+    Grid,
+    axis_label,
+    draw,
+    fitting,
+    headlines,
+    in_words,
+    on_a_page,
+    styled,
+    value_unit,
+)
 from cvt_hpc.analysis.maps import ONE_ROW
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import mismatch, one_line
@@ -29,9 +49,12 @@ from cvt_hpc.errors import mismatch, one_line
 COLOURS = cells.colours_of("viridis_r", 0.05, 0.85)
 OTHER_SIGN = 0.05  # of the largest size: values of the other sign from here on have colours of their own
 TWO_SIGNS = cells.colours_of("PuOr", 0.08, 0.92)
-MOST_PANELS = 8
+MOST_PANELS = 8  # of an axis that nobody chose
+BESIDE, LETTERS = 3, 14.0  # panels side by side at most; letters of a title to an inch
 ROW, FRAME = 0.25, 0.9  # [inch], of a row of cells, and of title and labels
-HIGHEST = 3.6  # [inch], of a panel's cells
+HIGHEST, LEAST = 3.6, 0.8  # [inch], of a panel's cells
+AROUND = 1.5  # [inch]: labels beside a panel's cells
+NEGATIVE, INK = "---", "#5a5a5a"  # lines over cells below zero that hold no numbers
 HATCH = cells.STYLES[OccurrenceClass.SLIPPING].hatch
 EQUAL = 1e-6  # of a quantity: what differs less is the same
 NARROWEST, LOWEST = 24.0, 11.0  # [point]: cells into which numbers are written
@@ -104,8 +127,8 @@ def value_map_figure(
     Raises
     ------
     InputError
-        As of all pictures; there is no such quantity; there would be more than MOST_PANELS panels; or one end
-        of the colours is given for several quantities.
+        As of all pictures; there is no such quantity; there would be more panels than a page holds; or one
+        end of the colours is given for several quantities.
     """
     check_results(dataset, source)
     if is_sampled(dataset):
@@ -116,22 +139,17 @@ def value_map_figure(
     arrangement = arrange(dataset, at or {}, source, sides)
     panels = _panels(arrangement, quantities)
     if len(panels) > MOST_PANELS and not sides.panel:
-        arrangement = _first_panel(arrangement)
+        arrangement = first_panel(arrangement)
         panels = _panels(arrangement, quantities)
-    if len(panels) > MOST_PANELS:
-        raise mismatch(source, f"at most {MOST_PANELS} panels", f"{len(panels)} of {', '.join(quantities)}")
     shown = arrangement.dataset
     x, y = ruler(shown[arrangement.x]), ruler(shown[arrangement.y]) if arrangement.y else ONE_ROW
-    columns = 1 if len(panels) == 1 else 2
-    rows = -(-len(panels) // columns)
-    height = min(ROW * y.centres.size + 0.3, HIGHEST)
-    figure = Figure(
-        (WIDTH * (1.0 + 0.6 * (columns - 1)), rows * (height + FRAME) + 0.9), layout="constrained"
-    )
-    all_axes = figure.subplots(rows, columns, squeeze=False)
+    size, (columns, height) = _on_paper(len(panels), y.centres.size, source, arrangement)
+    figure = Figure(size, layout="constrained")
+    all_axes = figure.subplots(-(-len(panels) // columns), columns, squeeze=False)
+    room = 72 * np.array([size[0] / columns - AROUND, height - FRAME])  # [point]
     for axes, panel in zip(all_axes.flat, panels, strict=False):
-        _draw_panel(figure, axes, (x, y), panel, vmax)
-        axes.set_title(panel.title, loc="left", pad=3)
+        _draw_panel(figure, axes, (x, y), panel, vmax, room)
+        axes.set_title(fill(panel.title, int(LETTERS * size[0] / columns)), loc="left", pad=3)
     for axes in list(all_axes.flat)[len(panels) :]:
         axes.set_axis_off()
     for axes in all_axes[:, 0]:
@@ -140,30 +158,46 @@ def value_map_figure(
         axes.set_xlabel(x.label)
     job = one_line(dataset.attrs.get("job_name", ""))
     kinds = occurrence_classes(shown)
-    lines = [f"{job}: {_counted(kinds)}".removeprefix(": "), *arrangement.notes]
-    figure.suptitle("\n".join(fill(line, 72 * columns) for line in lines))
+    lines = [f"{job}: {_counted(kinds)}".removeprefix(": "), ", ".join(arrangement.notes)]
+    figure.suptitle(headlines(lines, int(72 * size[0] / WIDTH)))
     marked: dict[cells.CellClass, cells.ClassStyle] = {
         kind: cells.STYLES[kind] for kind in OTHERS if (kinds == kind).any()
     }
-    if marked:
-        cells.class_legend(figure, marked, len(marked))
+    negative = [
+        Patch(facecolor="none", edgecolor=INK, hatch=NEGATIVE, linewidth=0.8, label="below zero")
+        for axes in all_axes.flat
+        if any(patch.get_hatch() == NEGATIVE for patch in axes.patches)
+    ][:1]
+    if marked or negative:
+        cells.class_legend(figure, marked, len(marked) + len(negative), further=negative)
     return figure
+
+
+def _on_paper(
+    count: int, rows: int, source: str, arrangement: Arrangement
+) -> tuple[tuple[float, float], Grid]:
+    """Size of the picture [inch] and its panels: on a page on its side, else on one upright.
+
+    The panels of an axis of three values stand side by side.
+    """
+    wanted = min(ROW * rows + 0.3, HIGHEST) + FRAME
+    if count == 1:
+        return (WIDTH, wanted + FRAME), Grid(1, wanted)
+    sizes, then = (LEAST + FRAME, wanted), "show fewer quantities, or fix an axis by `--at`"
+    if panel := arrangement.panel:
+        then = f"fix an axis, as by `--at {panel}=VALUE`, or choose another one by `--panel AXIS`"
+    is_row = arrangement.dataset.sizes.get(panel) == BESIDE
+    width, least = 1.6 * WIDTH, sizes[0] if is_row else wanted
+    grid = fitting(count, (BESIDE if is_row else 2,), (least, wanted), NARROW - FRAME)
+    if grid is None:
+        width, grid = NARROW, on_a_page(count, (2, BESIDE), sizes, FRAME, source, then)
+    return (width, grid.height * -(-count // grid.columns) + FRAME), grid
 
 
 def _counted(kinds: xr.DataArray) -> str:
     """How many runs there are, and how many of the marked classes."""
     others = kinds.values[np.isin(kinds, OTHERS)]
     return f"{kinds.size} runs" + (f", of them {count_classes(others)}" if others.size else "")
-
-
-def _first_panel(arrangement: Arrangement) -> Arrangement:
-    """The arrangement with the axis of its panels fixed at its first value."""
-    if not arrangement.panel:
-        return arrangement
-    axis = arrangement.dataset[arrangement.panel]
-    note = f"{in_words(axis)} = {value_text(axis, 0)} (first of {axis.size})"
-    fixed = arrangement.dataset.isel({arrangement.panel: 0})
-    return replace(arrangement, dataset=fixed, panel=None, notes=(*arrangement.notes, note))
 
 
 def _of_grid(array: xr.DataArray, arrangement: Arrangement) -> NDArray[Any]:
@@ -181,8 +215,8 @@ def _panels(arrangement: Arrangement, quantities: Sequence[str]) -> list[Panel]:
         factor, unit = value_unit(array)
         over = [arrangement.panel] if arrangement.panel else []
         labelled = [str(dim) for dim in array.dims if dim not in (arrangement.x, arrangement.y, *over)]
-        each = [factor * array.isel(at) for at in _places(array, labelled)]
-        for values, labels in zip(each, _places(array, labelled), strict=True):
+        alike = factor * array.values
+        for labels in _places(array, labelled):
             told = [str(array[dim].values[k]) for dim, k in labels.items()]
             for at in _places(dataset, over):
                 here = [f"{in_words(dataset[dim])} {value_text(dataset[dim], k)}" for dim, k in at.items()]
@@ -191,9 +225,9 @@ def _panels(arrangement: Arrangement, quantities: Sequence[str]) -> list[Panel]:
                         ", ".join([axis_label(array, unit), *told, *here]),
                         unit,
                         factor,
-                        _of_grid(values.isel(at), arrangement),
+                        factor * _of_grid(array.isel(labels | at), arrangement),
                         _of_grid(kinds.isel(at), arrangement).astype(np.int8),
-                        values.values,
+                        alike,
                     )
                 )
     return found
@@ -206,9 +240,14 @@ def _places(array: xr.DataArray | xr.Dataset, dims: Sequence[str]) -> list[dict[
 
 
 def _draw_panel(
-    figure: Figure, axes: Axes, rulers: tuple[Ruler, Ruler], panel: Panel, vmax: float | None
+    figure: Figure,
+    axes: Axes,
+    rulers: tuple[Ruler, Ruler],
+    panel: Panel,
+    vmax: float | None,
+    room: NDArray[np.float64],
 ) -> None:
-    """Cells coloured by a quantity, with its numbers where they have room, and marks of the other runs."""
+    """Cells coloured by a quantity, with numbers where there is room [point], and marks of other runs."""
     (x, y), kinds, values = rulers, panel.kinds, panel.values
     norm = _norm(panel.alike, None if vmax is None else panel.factor * vmax)
     ends = sorted((-float(norm.vmin), float(norm.vmax)))
@@ -222,28 +261,29 @@ def _draw_panel(
     nothing = np.zeros(kinds.shape, bool)
     cells.draw_cells(axes, x, y, drawn, nothing, values, scale)
     cells.draw_grid(axes, x, y)
-    width = 72 * (WIDTH * 0.8 - 1.5) * np.diff(x.edges).min() / np.ptp(x.edges)
-    height = 72 * min(ROW * y.centres.size + 0.3, HIGHEST) * np.diff(y.edges).min() / np.ptp(y.edges)
+    width, height = room * [np.diff(one.edges).min() / np.ptp(one.edges) for one in (x, y)]
     if width >= NARROWEST and height >= LOWEST:
         for row, column in np.argwhere(is_known):
             place, value = (x.centres[column], y.centres[row]), values[row, column]
             fill_colour = np.asarray(scale.colours(scale.norm(value)))
             digits = ".0f" if 1e3 <= abs(value) < 1e5 else ".3g" if abs(value) >= 0.1 else ".2g"
-            cells.write_value(axes, place, f"{value:{digits}}", fill_colour, size=7.5)
+            is_dotted = kinds[row, column] == OccurrenceClass.SLIPPING
+            cells.write_value(axes, place, f"{value:{digits}}", fill_colour, size=7.5, outlined=is_dotted)
+    elif both:  # in grey the colours of both signs are alike
+        _hatch(axes, x, y, is_known & (values < 0.0), NEGATIVE, INK)
     cells.draw_marks(axes, x, y, kinds, np.isin(kinds, OTHERS) & ~is_known, 3.5)
-    if (slips := is_known & (kinds == OccurrenceClass.SLIPPING)).any():
-        dots = {
-            "facecolor": "none",
-            "edgecolor": "#ffffff",
-            "linewidth": 0,
-            "hatch": HATCH,
-            "rasterized": True,
-        }
-        axes.add_patch(PathPatch(cells.area_of(x, y, slips), **dots))
+    _hatch(axes, x, y, is_known & (kinds == OccurrenceClass.SLIPPING), HATCH, "#ffffff")
     x.lay_out(axes.xaxis)
     y.lay_out(axes.yaxis)
     if is_known.any():
         cells.colour_bar(figure, scale, values, ax=axes, pad=0.02)
+
+
+def _hatch(axes: Axes, x: Ruler, y: Ruler, inside: NDArray[np.bool_], hatch: str, ink: str) -> None:
+    """Hatch some cells over their colours."""
+    lines = {"facecolor": "none", "edgecolor": ink, "linewidth": 0, "hatch": hatch, "rasterized": True}
+    if inside.any():
+        axes.add_patch(PathPatch(cells.area_of(x, y, inside), **lines))
 
 
 def _norm(values: NDArray[np.float64], vmax: float | None) -> Normalize:

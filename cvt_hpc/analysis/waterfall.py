@@ -3,29 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from textwrap import fill
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LogNorm
+from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
-from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.arrangement import CHOSEN, Ruler, Sides, along_x, arrange, ruler
-from cvt_hpc.analysis.cells import colours_of
+from cvt_hpc.analysis import cells
+from cvt_hpc.analysis.arrangement import (
+    CHOSEN,
+    Arrangement,
+    Ruler,
+    Sides,
+    along_x,
+    arrange,
+    ruler,
+    value_text,
+)
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.eigenfrequencies import along_axis
-from cvt_hpc.analysis.figures import WIDTH, styled
+from cvt_hpc.analysis.figures import WIDTH, headlines, in_words, on_a_page, styled
+from cvt_hpc.analysis.line_names import OUTLINE, Named, name_lines
 from cvt_hpc.errors import few_of, mismatch, one_line
 
-HEIGHT = 4.0  # [inch]
-COLOURS = colours_of("inferno_r", 0.0, 0.95)
-DEEPEST = 1e-2  # of the largest amplitude: what is smaller has the lightest colour
-LABELLED = 0.94  # of the panel's height, up to which there is room for a number
+LEAST, HEIGHT, FRAME = 1.3, 2.8, 1.2  # [inch]: a row of panels, and title and labels
+# white ground, on which weak ridges are seen
+COLOURS = ListedColormap(["white", *cells.colours_of("magma_r", 0.04, 0.97).colors], "spectra")
+SHALLOWEST, DEEPEST = 1e-2, 1e-4  # of the end of the colours: between them lies their beginning
+LIGHT = 0.9  # share of all amplitudes that may have the lightest colour
 UNKNOWN = "#d0d4d8"  # of runs without a spectrum
 LINE, ORDER = "#123a6b", "#4d4d4d"
 ORDERS = (1.0, 2.0, 4.0, 8.0, 16.0)  # of the driving pulley, in a Campbell diagram
@@ -36,6 +45,8 @@ def campbell_figure(
     at: Mapping[str, Any] | None = None,
     source: str = "results",
     orders: Sequence[float] = ORDERS,
+    sides: Sides = CHOSEN,
+    vmax: float | None = None,
 ) -> Figure:
     """Draw a Campbell diagram: `waterfall_figure` over the driving speed, with orders of that speed."""
     check_results(dataset, source)
@@ -43,7 +54,7 @@ def campbell_figure(
         found = ", ".join(map(str, dataset["status"].dims)) or "a single run"
         then = "`cvt-hpc plot waterfall` draws spectra over any axis"
         raise mismatch(source, "results over the axis driving_speed", found, then)
-    return waterfall_figure(dataset, at, source, Sides("driving_speed"), orders)
+    return waterfall_figure(dataset, at, source, Sides("driving_speed", panel=sides.panel), orders, vmax)
 
 
 @styled
@@ -53,6 +64,7 @@ def waterfall_figure(
     source: str = "results",
     sides: Sides = CHOSEN,
     orders: Sequence[float] = (),
+    vmax: float | None = None,
 ) -> Figure:
     """Draw spectra of all strands over an axis, with the eigenfrequencies where they are known.
 
@@ -60,8 +72,9 @@ def waterfall_figure(
     the job's axes, `strand` and `frequency_bin` [Hz]. `eigenfrequency` [Hz] over the axes, `strand` and
     `half_waves` is drawn as lines; where it is missing it follows from the strands' mean forces. Over the
     driving speed `orders` are drawn, multiples of the turns of the driving pulley. Of the axes that are not
-    fixed the one that runs along x in a map, or that of `sides`, does so here, and the rest are fixed at
-    their first value.
+    fixed the one that runs along x in a map, or that of `sides`, does so here; that of `sides.panel` has a
+    row of panels for each value, and the rest are fixed at their first value. `vmax` is the amplitude at
+    which the colours end [m], else chosen as `spectra_norm` says.
     """
     check_results(dataset, source)
     if "spectrum" not in dataset or "frequency_bin" not in dataset["spectrum"].dims:
@@ -69,93 +82,127 @@ def waterfall_figure(
         then = "runs of elastic_belt, pushbelt or belt_drive record it, up to band_high in [vibration]"
         raise mismatch(source, "results with the variable spectrum", found, then)
     arrangement = arrange(dataset, at or {}, source, sides)
-    shown, notes = along_x(arrangement)
-    x = ruler(shown[arrangement.x])
-    amplitude = 1e6 * shown["spectrum"].transpose("strand", "frequency_bin", arrangement.x).values
-    largest = np.nanmax(amplitude, initial=0.0) or 1.0
-    norm = LogNorm(DEEPEST * largest, largest)
-    known = along_axis(shown, arrangement.x)
-    figure = Figure((WIDTH, HEIGHT), layout="constrained")
-    strands = [str(name) for name in shown["strand"].values]
-    panels = figure.subplots(1, len(strands), sharex=True, sharey=True, squeeze=False)[0]
-    y = ruler(shown["frequency_bin"])
-    for axes, strand, values in zip(panels, strands, amplitude, strict=True):
-        _draw_spectra(axes, x, y, values, norm)
-        if known is not None:
-            of_strand = known.sel(strand=strand)
-            draw_eigenfrequencies(axes, x.centres, of_strand.values, known["half_waves"].values)
-        if arrangement.x == "driving_speed":
-            draw_orders(axes, x.centres, shown["driving_speed"].values / (2.0 * np.pi), orders, y.edges[-1])
-        axes.set_xlim(x.edges[[0, -1]])
-        axes.set_title(f"strand {strand}", loc="left", pad=3)
+    rows, notes = _rows(arrangement, sides.panel)
+    x, y = ruler(arrangement.dataset[arrangement.x]), ruler(dataset["frequency_bin"])
+    over = ("strand", "frequency_bin", arrangement.x)
+    amplitude = [1e6 * shown["spectrum"].transpose(*over).values for _, shown in rows]
+    norm = spectra_norm([of for row in amplitude for of in row], None if vmax is None else 1e6 * vmax)
+    known = [along_axis(shown, arrangement.x) for _, shown in rows]
+    strands = [str(name) for name in dataset["strand"].values]
+    then = f"fix an axis, as by `--at {sides.panel}=VALUE`, or choose another one by `--panel AXIS`"
+    grid = on_a_page(len(rows), (1, 2), (LEAST, HEIGHT), FRAME, source, then)
+    count = -(-len(rows) // grid.columns)
+    figure = Figure((WIDTH, count * grid.height + FRAME), layout="constrained")
+    panels = figure.subplots(count, grid.columns * len(strands), sharex=True, sharey=True, squeeze=False)
+    size = 0.8 * WIDTH / panels.shape[1], grid.height - 0.3
+    for ax in panels.flat[len(rows) * len(strands) :]:
+        ax.set_axis_off()
+    each, pad = iter(panels.flat), 0.0
+    for (title, shown), of_row, modes in zip(rows, amplitude, known, strict=True):
+        for strand, values in zip(strands, of_row, strict=True):
+            axes, lines = next(each), []
+            _draw_spectra(axes, x, y, values, norm)
+            axes.set(xlim=x.edges[[0, -1]], ylim=(0.0, y.edges[-1]))
+            if modes is not None:
+                of_strand = modes.sel(strand=strand).values
+                lines += draw_eigenfrequencies(axes, x.centres, of_strand, modes["half_waves"].values)
+            if arrangement.x == "driving_speed":
+                lines += draw_orders(axes, x.centres, shown["driving_speed"].values / (2.0 * np.pi), orders)
+            pad = max(pad, name_lines(axes, lines, size))
+            words = ", ".join(filter(None, (f"strand {strand}", title)))
+            axes.set_title(words, loc="left", pad=pad)
+            x.lay_out(axes.xaxis)
+    for axes in panels.flat[: len(rows) * len(strands)][-panels.shape[1] :]:
         axes.set_xlabel(x.label)
-        x.lay_out(axes.xaxis)
-    panels[0].set_ylabel("frequency [Hz]")
-    panels[0].set_ylim(0.0, y.edges[-1])
-    bar = figure.colorbar(ScalarMappable(norm, COLOURS), ax=panels, pad=0.02, extend="min")
-    bar.set_label("amplitude [µm]")
+        axes.tick_params(labelbottom=True)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("frequency [Hz]")
+    scale = cells.Scale(COLOURS, norm, "amplitude [µm]")
+    cells.colour_bar(figure, scale, np.stack(amplitude), ax=panels, aspect=20 * count, pad=0.02)
     job = one_line(dataset.attrs.get("job_name", ""))
     subject = "Campbell diagram" if orders else "Spectra of the strands"
-    lines = [f"{subject}: {job}".rstrip(": "), *notes]
+    told = []
     if arrangement.x == "driving_speed" and orders:
-        lines.append("dotted: orders of the driving pulley's turns")
-    if known is not None:
-        lines.append("dashed: eigenfrequencies, with their half waves along the strand")
-    if np.isnan(amplitude).any():
-        unknown = occurrence_classes(shown).values[np.isnan(amplitude).any(axis=(0, 1))]
-        words = [text for kind, text in WITHOUT_RESULT.items() if (unknown == kind).any()]
-        lines.append("grey: no spectrum" + (f" ({', '.join(words)})" if words else ""))
-    figure.suptitle("\n".join(fill(line, 72) for line in lines))
+        told.append("dotted: orders of the driving pulley's turns")
+    if any(modes is not None for modes in known):
+        told.append("dashed: eigenfrequencies, with their half waves along the strand")
+    told += _without_spectrum(rows, amplitude)
+    figure.suptitle(headlines([f"{subject}: {job}".rstrip(": "), ", ".join(notes), *told]))
     return figure
+
+
+def _rows(arrangement: Arrangement, panel: str | None) -> tuple[list[tuple[str, xr.Dataset]], list[str]]:
+    """Title and results over x of each row of panels, and what is fixed, in words."""
+    if panel is None:
+        shown, notes = along_x(arrangement)
+        return [("", shown)], notes
+    axis, rows = arrangement.dataset[panel], []
+    for k in range(axis.size):
+        one = replace(arrangement, dataset=arrangement.dataset.isel({panel: k}), panel=None)
+        shown, notes = along_x(one)
+        rows.append((f"{in_words(axis)} {value_text(axis, k)}", shown))
+    return rows, notes
+
+
+def _without_spectrum(
+    rows: Sequence[tuple[str, xr.Dataset]], amplitude: Sequence[NDArray[np.float64]]
+) -> list[str]:
+    """What became of the runs without a spectrum, as a line; none where all have one."""
+    kinds = [
+        occurrence_classes(shown).values[np.isnan(values).any(axis=(0, 1))]
+        for (_, shown), values in zip(rows, amplitude, strict=True)
+    ]
+    unknown = np.concatenate(kinds)
+    words = [text for kind, text in WITHOUT_RESULT.items() if (unknown == kind).any()]
+    return ["grey: no spectrum" + (f" ({', '.join(words)})" if words else "")] if unknown.size else []
+
+
+def spectra_norm(spectra: Sequence[NDArray[np.float64]], highest: float | None = None) -> LogNorm:
+    """Logarithmic scale of amplitudes, which neither one run nor one harmonic flattens.
+
+    It ends at `highest`, or as `cells.norm_over` ends over the largest amplitude of each run, and begins
+    where LIGHT of all amplitudes lie below, within two to four decades from its end.
+
+    Parameters
+    ----------
+    spectra : sequence of array, shape (line, run)
+        Amplitudes, nan where a run has no spectrum.
+    highest : float
+        In their unit.
+    """
+    strongest = np.concatenate([np.nan_to_num(each, nan=-1.0).max(axis=0) for each in spectra])
+    top = float(cells.norm_over(strongest[strongest > 0.0], 0.0, highest).vmax or 1.0)
+    known = np.concatenate([each[np.isfinite(each)] for each in spectra])
+    low = np.quantile(known, LIGHT) if known.size else 0.0
+    return LogNorm(float(np.clip(low, DEEPEST * top, SHALLOWEST * top)), top)
 
 
 def _draw_spectra(axes: Axes, x: Ruler, y: Ruler, values: NDArray[np.float64], norm: LogNorm) -> None:
     """Cells of one strand, of amplitudes (frequency, x) [um]."""
     axes.set_facecolor(UNKNOWN)
-    cells = np.ma.masked_invalid(np.maximum(values, norm.vmin))  # zero has no logarithm
-    axes.pcolormesh(x.edges, y.edges, cells, norm=norm, cmap=COLOURS, rasterized=True)
+    shown = np.ma.masked_invalid(np.maximum(values, norm.vmin))  # zero has no logarithm
+    axes.pcolormesh(x.edges, y.edges, shown, norm=norm, cmap=COLOURS, rasterized=True)
 
 
 def draw_orders(
-    axes: Axes,
-    x: NDArray[np.float64],
-    turns: NDArray[np.float64],
-    orders: Sequence[float],
-    highest: float,
-) -> None:
-    """Draw multiples of the turns (n,) [Hz] at places (n,), each with its order where it leaves the panel."""
-    outline = [withStroke(linewidth=2.2, foreground="white"), Normal()]
-    for order in orders:
-        line = order * turns
-        inside = np.flatnonzero(line < 0.96 * highest)
-        if inside.size == 0:
-            continue
-        axes.plot(x, line, color=ORDER, ls=":", lw=1.2, path_effects=outline)
-        last = inside[np.argmax(line[inside])]
-        place, at_end = (x[last], line[last]), line[last] < 0.9 * highest
-        style = {"color": ORDER, "fontsize": 8, "path_effects": outline, "ha": "right", "va": "bottom"}
-        offset = (-1, 1) if at_end else (-6, -4)
-        axes.annotate(f"{order:g}×", place, offset, textcoords="offset points", **style)
+    axes: Axes, x: NDArray[np.float64], turns: NDArray[np.float64], orders: Sequence[float]
+) -> list[Named]:
+    """Draw multiples of the turns (n,) [Hz] at places (n,) as dots, and return them with their orders."""
+    lines = [Named(f"{order:g}×", ORDER, x, order * turns) for order in orders]
+    for line in lines:
+        axes.plot(x, line.y, color=ORDER, ls=":", lw=1.2, path_effects=OUTLINE)
+    return lines
 
 
 def draw_eigenfrequencies(
     axes: Axes, x: NDArray[np.float64], lines: NDArray[np.float64], numbers: NDArray[np.int64]
-) -> None:
-    """Dashes (half waves, n) at places (n,) that let the ridges show through, each with its half waves."""
-    outline = [withStroke(linewidth=2.2, foreground="white"), Normal()]
-    for number, line in zip(numbers, lines, strict=True):
-        known = np.flatnonzero(np.isfinite(line) & (line < axes.dataLim.ymax))
-        if known.size == 0:
-            continue
-        axes.plot(x, line, color=LINE, ls=(0, (3, 5)), lw=1.1, path_effects=outline)
-        if line[known[0]] > LABELLED * axes.dataLim.ymax:
-            continue  # the number would lie above the panel
-        axes.annotate(
-            str(number),
-            (x[known[0]], line[known[0]]),
-            (2, 5),
-            textcoords="offset points",
-            color=LINE,
-            fontsize=9,
-            path_effects=outline,
-        )
+) -> list[Named]:
+    """Draw dashes (half waves, n) at places (n,), which let ridges show; return them with their numbers."""
+    found = [
+        Named(str(number), LINE, x, line)
+        for number, line in zip(numbers, lines, strict=True)
+        if np.any(line < axes.get_ylim()[1])
+    ]
+    for line in found:
+        axes.plot(x, line.y, color=LINE, ls=(0, (3, 5)), lw=1.1, path_effects=OUTLINE)
+    return found

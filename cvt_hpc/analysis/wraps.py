@@ -78,7 +78,7 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
             axes.grid(linewidth=0.4, alpha=0.5)
         line_of_axes[0].set_ylabel(label)
     for axes, pulley in zip(grid[0], pulleys, strict=True):
-        axes.set_title(f"{pulley} pulley", loc="left", pad=3)
+        axes.set_title(f"{pulley.removesuffix(' arc')} pulley", loc="left", pad=3)
     panels.supxlabel("wrap angle from inlet [°]", fontsize=STYLE["axes.labelsize"])
     _add_legend(figure, grid[-1, 0], [THEORY] if "sliding_tension" in histories[0] else [])
     figure.suptitle(_title(histories, common, without_torque))

@@ -48,7 +48,7 @@ def add_assignments(command: argparse.ArgumentParser, flag: str, text: str) -> N
 
 
 def add_sides(command: argparse.ArgumentParser, sides: Sequence[str] = ("x", "y", "panel")) -> None:
-    """Add the options that lay axes of a study out; `sides_of` reads them where there are all three."""
+    """Add the options that lay axes of a study out; `sides_of` reads them."""
     places = {"x": "along x", "y": "along y", "panel": "over the panels"}
     for side in sides:
         command.add_argument(f"--{side}", metavar="AXIS", help=f"axis of the study that runs {places[side]}")
@@ -58,7 +58,21 @@ def sides_of(arguments: argparse.Namespace) -> Sides:
     """Return which axes are to run where."""
     from cvt_hpc.analysis.arrangement import Sides
 
-    return Sides(arguments.x, arguments.y, arguments.panel)
+    return Sides(*(getattr(arguments, side, None) for side in Sides._fields))
+
+
+def colour_end(text: str | None, unit: str) -> float | None:
+    """Return the value at which colours end [SI], of a quantity of this SI unit."""
+    from cvt_hpc.job.units import unit_in
+    from cvt_hpc.job.values import read_value
+    from cvt_hpc.parameters import positive
+
+    if text is None:
+        return None
+    unit = unit.removeprefix("1")
+    if unit and not unit_in(text):  # 20 would be 20 m
+        raise mismatch("--vmax", f"a value with its unit, of {unit}", text)
+    return read_value(positive(1.0, unit, ""), text, "--vmax")
 
 
 def add_folder(command: argparse.ArgumentParser, earlier: str) -> None:

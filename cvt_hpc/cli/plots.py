@@ -16,13 +16,14 @@ from cvt_hpc.cli.parts import (
     add_command,
     add_sides,
     check_output,
+    colour_end,
     complain,
     picture_beside,
     say,
 )
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import StorageError
-from cvt_hpc.picture_kinds import HISTORIES, HISTORY, KINDS, RESULTS, Kind
+from cvt_hpc.picture_kinds import END, HISTORIES, HISTORY, KINDS, RESULTS, Kind
 
 
 def add(commands: Any) -> None:
@@ -117,6 +118,10 @@ def _write(
     from cvt_hpc.analysis.composing import compose
     from cvt_hpc.analysis.figures import draw
 
+    if END in options:
+        shown = datasets[0].get(options.get("of"))  # else the motion of a strand
+        unit = "m" if shown is None else str(shown.attrs.get("units", ""))
+        options = options | {END: colour_end(options[END], unit)}
     return draw(lambda: compose(name, datasets, at, sources, **options), out)
 
 

@@ -14,17 +14,15 @@ from cvt_hpc.cli.parts import (
     add_command,
     add_sides,
     check_output,
+    colour_end,
     complain,
     folder_of,
     picture_beside,
     say,
     sides_of,
 )
-from cvt_hpc.errors import mismatch
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from cvt_hpc.analysis.comparison import Comparison
 
 CONTRADICTING = 1  # exit status of `compare`: some cells are quiet in one study and vibrate in the other
@@ -47,6 +45,8 @@ def add(commands: Any) -> None:
     add_sides(picture)
     text = "value at which the colours end, such as '20 um' (default: that of 98 %% of the cells)"
     picture.add_argument("--vmax", metavar="VALUE", help=text)
+    text = "draw an axis log or linear (default: log where its values are spread so); may be repeated"
+    picture.add_argument("--spacing", action="append", default=[], metavar="AXIS=SPACING", help=text)
     text = "draw the figure of a paper that a study repeats, and measure what the paper says of it"
     add_command(commands, "figure", _figure, text, "DIR")
     text = "write a page about a study: what was found, a map with values, failed runs, cost, assumptions"
@@ -79,7 +79,7 @@ def _gather(arguments: argparse.Namespace) -> int:
 def _map(arguments: argparse.Namespace) -> int:
     from contextlib import ExitStack
 
-    from cvt_hpc.job.assignments import read_coordinates
+    from cvt_hpc.job.assignments import read_coordinates, split_assignments
     from cvt_hpc.study import open_results
 
     paths = [arguments.path, *arguments.others]
@@ -91,6 +91,9 @@ def _map(arguments: argparse.Namespace) -> int:
             from cvt_hpc.analysis.studies import side_by_side
 
             dataset, sides = side_by_side(datasets, list(map(str, paths)), arguments.show, sides)
+        from cvt_hpc.analysis.arrangement import with_spacings
+
+        dataset = with_spacings(dataset, split_assignments(arguments.spacing, source, "--spacing"), source)
         units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
         at = read_coordinates(arguments.at, units, source, "--at")
         from cvt_hpc.analysis.maps import draw_map
@@ -98,7 +101,9 @@ def _map(arguments: argparse.Namespace) -> int:
         from cvt_hpc.analysis.value_maps import draw_value_map
 
         out = arguments.out or picture_beside(arguments.path, kind, *arguments.show)
-        vmax = _colour_end(arguments.vmax, dataset, arguments.show[0] if arguments.show else "amplitude")
+        vmax, shown = None, arguments.show[0] if arguments.show else "amplitude"
+        if shown in dataset:  # what draws it refuses a quantity that is not known
+            vmax = colour_end(arguments.vmax, str(dataset[shown].attrs.get("units", "")))
         if arguments.show:
             say(f"map: {draw_value_map(dataset, arguments.show, out, at, source, sides, vmax)}")
             return DONE
@@ -107,20 +112,6 @@ def _map(arguments: argparse.Namespace) -> int:
             say(start_line(dataset, at, source))
         say(f"map: {picture}")
     return DONE
-
-
-def _colour_end(text: str | None, dataset: xr.Dataset, shown: str) -> float | None:
-    """Return the value at which colours end [SI], in the unit of what is shown."""
-    from cvt_hpc.job.units import unit_in
-    from cvt_hpc.job.values import read_value
-    from cvt_hpc.parameters import positive
-
-    if text is None or shown not in dataset:  # what draws it refuses a quantity that is not known
-        return None
-    unit = str(dataset[shown].attrs.get("units", "")).removeprefix("1")
-    if unit and not unit_in(text):  # 20 would be 20 m
-        raise mismatch("--vmax", f"a value with its unit, of {unit}", text)
-    return read_value(positive(1.0, unit, ""), text, "--vmax")
 
 
 def _figure(arguments: argparse.Namespace) -> int:

@@ -12,7 +12,7 @@ import xarray as xr
 import cvt_hpc
 from cvt_hpc.accessor import Results
 from cvt_hpc.analysis.classes import OccurrenceClass
-from cvt_hpc.analysis.maps import PAGE
+from cvt_hpc.analysis.figures import LONG
 from cvt_hpc.errors import InputError
 from cvt_hpc.picture_kinds import HISTORIES, KINDS, RESULTS
 from cvt_hpc.variables import Status, Vibrates
@@ -107,7 +107,7 @@ def test_a_map_is_laid_out_as_asked():
     figure = study().cvt.map(x="sheave_stiffness", y="load", panel="friction_gradient")
     panels = [axes for axes in figure.axes if axes.get_title(loc="left")]
     assert len(panels) == 2 * len(GRADIENTS)  # amplitude and frequency
-    assert figure.get_figheight() <= PAGE
+    assert figure.get_figheight() <= LONG
     assert panels[-1].get_xlim()[1] > STIFFNESSES[0] and panels[0].get_ylim()[1] > LOADS[-1]
     figure = study().cvt.map(x="sheave_stiffness", vmax=5e-6, load=LOADS[3])
     bar = next(axes for axes in figure.axes if axes.get_label() == "<colorbar>")

@@ -1,10 +1,13 @@
 """The layout of maps of made-up studies: what runs along which axis, and what is said of the rest."""
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.arrangement import arrange, ruler, value_text
+from cvt_hpc.analysis.arrangement import arrange, ruler, value_text, with_spacings
 from cvt_hpc.analysis.classes import OccurrenceClass, occurrence_classes
 from cvt_hpc.analysis.maps import draw_map
 from cvt_hpc.errors import InputError
@@ -227,3 +230,54 @@ def test_a_logarithmic_axis_has_ticks_at_round_values():
     rigid = ruler(coordinate("sheave_stiffness", [1.0, 10.0, 100.0, np.inf], "1"))
     np.testing.assert_allclose(rigid.centres, [0.0, 1.0, 2.0, 3.0])
     assert rigid.tick_labels == ("1", "10", "100", "rigid")
+
+
+def test_negative_geometric_values_are_mirrored():
+    values = [-10.0, -3.0, -1.0, -0.3, -0.1]
+    laid = ruler(coordinate("friction_gradient", values, "s/m"))
+    np.testing.assert_allclose(laid.centres, [-1.0, -np.log10(3.0), 0.0, -np.log10(0.3), 1.0])
+    widths = np.diff(laid.edges)
+    assert (widths > 0.0).all() and widths.max() < 1.2 * widths.min()  # no slivers
+    assert laid.tick_labels == ("−10", "−3", "−1", "−0.3", "−0.1")
+    many = ruler(coordinate("friction_gradient", list(-np.geomspace(1e3, 1e-1, 9)), "s/m"))
+    assert many.tick_labels == ("−1000", "−100", "−10", "−1", "−0.1")
+    np.testing.assert_allclose(many.ticks, [-3.0, -2.0, -1.0, 0.0, 1.0], atol=1e-12)
+
+
+def test_an_axis_is_logarithmic_or_linear_as_told():
+    dataset = with_axes(load=[10.0, 20.0, 30.0, 40.0], ratio=[1.0, 10.0, 100.0], mass=[0.0, 1.0])
+    told = with_spacings(dataset, {"load": "log", "ratio": "linear"}, "x")
+    np.testing.assert_allclose(ruler(told["load"]).centres, np.log10([10.0, 20.0, 30.0, 40.0]))
+    assert ruler(told["ratio"]).centres.tolist() == [1.0, 10.0, 100.0]
+    assert "spacing" not in dataset["load"].attrs
+    for spacings, found in (
+        ({"loads": "log"}, "spacing of loads: unknown axis of the results; did you mean load?"),
+        ({"load": "even"}, 'spacing of load: expected log or linear, found "even"'),
+        ({"mass": "log"}, "spacing of mass: expected numbers of one sign on a logarithmic axis, found 0, 1"),
+    ):
+        with pytest.raises(InputError, match=f"^x: {re.escape(found)}"):
+            with_spacings(dataset, spacings, "x")
+
+
+@pytest.mark.parametrize(
+    ("values", "texts"),
+    [
+        ([100.0, 200.0, 300.0], ("955", "1910", "2865")),  # of rad/s, in rpm
+        ([131.0, 132.0], ("1251", "1260.5")),
+    ],
+)
+def test_numbers_on_an_axis_have_the_decimals_that_tell_them_apart(values, texts):
+    assert ruler(coordinate("driving_speed", values, "rad/s")).tick_labels == texts
+
+
+def test_ticks_whose_labels_would_touch_are_left_out_alike():
+    panel = Figure((6.0, 1.0)).add_axes((0.0, 0.0, 1.0, 1.0))
+    laid = ruler(coordinate("load", list(np.linspace(1000.0, 12000.0, 12)), "N m"))
+    panel.set_xlim(laid.edges[[0, -1]])
+    laid.lay_out(panel.xaxis)
+    assert panel.get_xticks().tolist() == laid.centres.tolist()
+    narrow = Figure((1.5, 1.0)).add_axes((0.0, 0.0, 1.0, 1.0))
+    narrow.set_xlim(laid.edges[[0, -1]])
+    laid.lay_out(narrow.xaxis)
+    kept = narrow.get_xticks()
+    assert kept.size > 1 and len(set(np.diff(kept))) == 1 and np.diff(kept)[0] > 1000.0

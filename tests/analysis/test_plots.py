@@ -243,7 +243,26 @@ def test_values_of_both_signs_have_colours_about_zero(results):
     assert value_map_figure(results, ["force"]).axes[1].get_ylim()[0] >= 0.0
 
 
-def test_a_third_axis_has_panels_with_one_scale_of_colours(results):
+def test_negative_values_are_hatched_where_there_are_no_numbers(results):
+    loads = np.linspace(0.0, 40.0, 60)
+    dims = ("driving_speed", "load")
+    fine = xr.Dataset(
+        {
+            name: (dims, np.full((2, loads.size), value, np.int8))
+            for name, value in (("status", 1), ("vibrates", 0))
+        },
+        {"driving_speed": SPEEDS, "load": loads},
+    )
+    fine["force"] = (dims, np.stack([loads - 20.0, 20.0 - loads]), {"units": "W"})
+    figure = value_map_figure(fine, ["force"])
+    (hatched,) = figure.axes[0].patches
+    for load, speed, is_negative in ((5.0, 20.0, True), (35.0, 20.0, False), (35.0, 60.0, True)):
+        assert hatched.get_path().contains_point((load, speed)) == is_negative
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["below zero"]
+    assert not value_map_figure(fine.isel(load=[0, 59]), ["force"]).axes[0].patches  # numbers tell
+
+
+def test_all_panels_of_a_quantity_have_one_scale_of_colours(results):
     sizes = [[[2e-6, 6e-6]], [[20e-6, 50e-6]]] * np.ones((1, len(LOADS), 1))  # by speed and strand
     results["motion"] = results["strand_tension"].dims, sizes, {"units": "m"}
     both = xr.concat([results, results], xr.Variable("wear", [1, 2])).transpose("wear", ...)
@@ -254,7 +273,7 @@ def test_a_third_axis_has_panels_with_one_scale_of_colours(results):
     titles = [f"motion [µm], {strand}, wear {wear}" for strand in ("t1", "t2") for wear in (1, 2)]
     assert [axes.get_title(loc="left") for axes in panels] == titles
     bars = [axes.get_ylim() for axes in figure.axes if axes.get_label() == "<colorbar>"]
-    assert bars[0] == bars[1] and bars[2] == bars[3] != bars[0]
+    assert bars == [pytest.approx((2.0, 75.0))] * 4
 
 
 def test_a_quantity_that_does_not_vary_has_one_colour(results):
@@ -276,6 +295,54 @@ def test_two_dollars_in_a_name_begin_no_formula(results):
     figure = value_map_figure(results, ["speed_loss"])
     figure.draw_without_rendering()
     assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == [r"$\a$", r"$\b$"]
+
+
+def many_runs(results, count=60):
+    """The results at one speed over many loads."""
+    loads = xr.Variable("load", np.linspace(0.0, 100.0, count), {"units": "N m"})
+    one = results.isel(driving_speed=0, load=0, drop=True)
+    return one.expand_dims(load=loads).copy(deep=True)
+
+
+def test_one_harmonic_or_one_run_does_not_flatten_spectra(results):
+    runs = many_runs(results)
+    runs["spectrum"][:] = 1e-9
+    runs["spectrum"][..., 3] = 1e-6 * (1.0 + np.linspace(0.0, 1.0, 60))[:, None]
+    bar = waterfall_figure(runs).axes[-1]
+    assert bar.get_ylim() == pytest.approx((1e-3, 2.0))  # from what nine in ten lines have
+    runs["spectrum"][..., 7] = 1e-3  # a harmonic in all runs, 500 times as large
+    harmonic = waterfall_figure(runs).axes[-1].get_ylim()
+    assert harmonic[1] == pytest.approx(1e3) and harmonic[0] < 2.0  # the ridge is between
+    runs["spectrum"][..., 7] = 1e-9
+    runs["spectrum"][30, :, 3] = 1e-3  # one run
+    figure = waterfall_figure(runs)
+    assert figure.axes[-1].get_ylim()[1] < 3.0
+    assert waterfall_figure(runs, vmax=5e-6).axes[-1].get_ylim()[1] == pytest.approx(5.0)
+
+
+def test_outliers_on_both_sides_do_not_flatten_a_map(results):
+    runs = many_runs(results)
+    runs["speed_loss"] = ("load", np.linspace(1.0, 2.0, 60), {"units": "1"})
+    runs["speed_loss"][0], runs["speed_loss"][-1] = -500.0, 700.0
+    bar = value_map_figure(runs, ["speed_loss"]).axes[-1]
+    assert 0.9 < bar.get_ylim()[0] < 1.2 and 1.8 < bar.get_ylim()[1] < 2.1
+    steady = many_runs(results)
+    steady["speed_loss"] = ("load", np.linspace(1.0, 2.0, 60), {"units": "1"})
+    assert value_map_figure(steady, ["speed_loss"]).axes[-1].get_ylim() == pytest.approx((1.0, 2.0))
+
+
+def test_a_waterfall_has_a_row_of_panels_for_each_value_of_an_axis(results):
+    figure = waterfall_figure(results, sides=Sides("load", panel="driving_speed"))
+    titles = [axes.get_title(loc="left") for axes in figure.axes[:4]]
+    assert titles == [
+        f"strand {s}, driving speed {v} rpm" for v in ("190.986", "572.958") for s in ("t1", "t2")
+    ]
+    for k, axes in enumerate(figure.axes[:4]):
+        wanted = results["eigenfrequency"].isel(driving_speed=k // 2, strand=k % 2)
+        lines = [line.get_ydata() for line in axes.lines]
+        np.testing.assert_array_equal(lines, wanted.transpose("half_waves", "load"))
+    with pytest.raises(InputError, match="results: panel wear: unknown axis of the results"):
+        waterfall_figure(results, sides=Sides(panel="wear"))
 
 
 def test_panels_of_quantities_have_a_curve_for_each_value_of_an_axis(results):

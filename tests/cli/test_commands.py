@@ -4,10 +4,8 @@ import re
 
 import netCDF4
 import pytest
-import xarray as xr
 
-from cvt_hpc.cli.parts import INTERRUPTED
-from cvt_hpc.cli.results import _colour_end
+from cvt_hpc.cli.parts import INTERRUPTED, colour_end
 from cvt_hpc.errors import InputError
 from cvt_hpc.printing import report_lines
 from cvt_hpc.study import FailedRun, RunReport, StudyStatus
@@ -398,8 +396,8 @@ def test_an_interrupt_ends_with_130(write_job, call, monkeypatch):
 
 
 def test_the_end_of_the_colours_is_given_with_its_unit():
-    results = xr.Dataset({"amplitude": ((), 1e-5, {"units": "m"}), "share": ((), 0.5, {"units": "1"})})
-    assert _colour_end("20 um", results, "amplitude") == 20e-6
-    assert _colour_end("0.4", results, "share") == 0.4
+    assert colour_end("20 um", "m") == 20e-6
+    assert colour_end("0.4", "1") == 0.4
+    assert colour_end(None, "m") is None
     with pytest.raises(InputError, match="--vmax: expected a value with its unit, of m, found 20"):
-        _colour_end("20", results, "amplitude")
+        colour_end("20", "m")

@@ -400,6 +400,40 @@ def test_other_processes_take_in_a_kernel_that_they_find(outputs, tmp_path):
     assert found == [["above", "1.5", "1.0", "0"], ["above", "1.5", "1.5", "1"], ["above", "1.5", "1.5", "0"]]
 
 
+SCALED = """
+from numba.extending import register_jitable
+from cvt_hpc.kernels import kernel
+def scaled(factor):
+    @register_jitable
+    def scale(x): return factor * x
+    return scale
+twice, thrice = scaled(2.0), scaled(3.0)
+@kernel
+def first(x): return twice(x)
+@kernel
+def second(x): return thrice(x)
+@kernel
+def calls_first(x): return first(x)
+@kernel
+def calls_second(x): return second(x)
+@kernel
+def calls_both(x): return first(x), second(x)
+"""
+
+
+def test_functions_of_one_factory_that_two_processes_have_compiled_stay_two(outputs, tmp_path):
+    # of both processes `scale` is the third function that is compiled, each time with another factor
+    (tmp_path / "scaled.py").write_text(SCALED)
+    calls = (
+        "calls_first(1.0), 0",
+        "calls_second(1.0), 0",
+        "*calls_both(1.0), sum(first.stats.cache_hits.values())",
+    )
+    texts = [f"from scaled import *\nprint({call})" for call in calls]
+    changes = [partial((tmp_path / "calling.py").write_text, text) for text in texts]
+    assert outputs("import calling", tmp_path, changes) == [["2.0", "0"], ["3.0", "0"], ["2.0", "3.0", "1"]]
+
+
 SLOW = """
 import logging, sys
 from numba.extending import overload
