@@ -24,6 +24,7 @@ from support.pages import PAGES, ROOT, blocks, name_of, shell_calls
 ELSEWHERE = {
     ".": "activates the environment, in which the tests already are",
     "bash jobs/quickstart.sh": "tests/cli/test_quickstart.py",
+    "bash jobs": "scripts of whole studies, for minutes of a core and more",
     "bash tests/run.sh": "runs this test",
     "bash .ci/run": "runs this test",
     "pip install": "needs the network; tests/run.sh installs the same package",
@@ -144,7 +145,7 @@ class Reader:
         if words[0] == "cvt-hpc":
             status = self._main(_smaller(words[1:], self.page))
             assert status in ((0, 1) if words[1] == "doctor" else (0,))  # 1: of this machine, not of the page
-        elif words[:2] == ["python", "jobs/tabulate.py"]:
+        elif words[0] == "python" and words[1].startswith("jobs/"):
             sys.argv = words[1:]
             runpy.run_path(words[1], run_name="__main__")
         else:
@@ -194,7 +195,8 @@ def _smaller(words, page):
     changed = SMALL | SMALL_OF.get(job.model, {}) | SMALL_OF.get(job.stepper, {})
     changed = {key: value for key, value in changed.items() if key in job.parameters}
     longest = max(job.axes, key=lambda axis: len(axis.values), default=None)
-    for axis in job.axes:
+    by_number = f"out/{job.name}/histories/" in page.read_text()  # of a run, which is that in the whole grid
+    for axis in () if by_number else job.axes:
         first, last = axis.values[0], axis.values[-1]
         kept = [value for value in _named(axis.name, page, job) if value in axis.values] or [first]
         if axis is longest and "first_spacing" in job.design:  # it is traced along this one

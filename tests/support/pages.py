@@ -42,7 +42,7 @@ def shell_calls(text: str) -> list[list[str]]:
     """Words of each command of a block of shell lines."""
     return [
         words
-        for line in text.splitlines()
+        for line in text.replace("\\\n", " ").splitlines()
         for call in re.split(r"&&|;", re.split(r"(?:^|\s)#", line)[0])
         if (words := shlex.split(call))
     ]
