@@ -40,7 +40,7 @@ def imported(path):
 
 
 def test_the_tree_names_all_that_is_there():
-    tree = BUILT.split("    cvt_hpc/\n")[1].split("    slurm/")[0]
+    tree = BUILT.split("\ncvt_hpc/\n")[1].split("\nslurm/")[0]
     names = " ".join(re.split(r"\s{2,}", line.strip())[0] for line in tree.splitlines())
     named = set(re.findall(r"[a-z_]+(?:/|[.]py)", names))
     found = {
