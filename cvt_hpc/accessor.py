@@ -26,7 +26,7 @@ from cvt_hpc.analysis.composing import compose
 from cvt_hpc.analysis.conversion import in_si, in_units
 from cvt_hpc.analysis.result_tables import read_table
 from cvt_hpc.errors import mismatch, unknown
-from cvt_hpc.picture_kinds import HISTORIES, HISTORY, KINDS, RESULTS, Kind
+from cvt_hpc.picture_kinds import END, HISTORIES, HISTORY, KINDS, RESULTS, Kind
 from cvt_hpc.study import open_results
 from cvt_hpc.vibration.onsets import levels, onsets
 
@@ -220,13 +220,16 @@ def _verb(name: str, kind: Kind) -> Any:
         chosen = signature.bind(self, *words, **given).arguments
         at, beside = chosen.pop("at", None), chosen.pop("beside", None)
         del chosen["self"]
+        if kind.subject != RESULTS and "status" in self._dataset and self._dataset["status"].dims:
+            raise mismatch("results", f"the history of a run, which {name} draws", "a study of several")
         chosen = {key: value for key, value in chosen.items() if value is not None and value != ()}
         return compose(name, _with(self._dataset, beside or ()), at, **chosen)
 
     subjects = {RESULTS: "of results", HISTORY: "of a history", HISTORIES: "of one history or several"}
     lines = [f"Draw {kind.text}; {subjects[kind.subject]}.", "", "Parameters", "----------"]
     for key, option in options.items():
-        lines += [key, f"    {option.text[0].upper()}{option.text[1:]}."]
+        text = "value at which colours end [SI]" if key == END else option.text
+        lines += [key, f"    {text[0].upper()}{text[1:]}."]
     lines += [f"{side}\n    Axis that runs there." for side in kind.sides]
     lines += ["beside\n    Further histories."] if kind.subject == HISTORIES else []
     lines += ["**at\n    Axes to fix."] if kind.subject == RESULTS else []

@@ -88,7 +88,8 @@ def curve_panels_figure(
     shown, along = arrangement.dataset, {arrangement.x, lines, arrangement.panel}
     panels = [(group, place) for group in groups for place in _places(shown, group, along, source)]
     if len(panels) > MOST_PANELS:
-        raise mismatch(f"{source}: panels", f"at most {MOST_PANELS}", f"{len(panels)}")
+        then = "name fewer quantities: one of both pulleys has a panel for each"
+        raise mismatch(f"{source}: panels", f"at most {MOST_PANELS}", f"{len(panels)}", then)
     columns = min(len(panels), COLUMNS)
     rows = -(-len(panels) // columns)
     width = WIDTH * (1.0 + 0.25 * (columns - 1) / (COLUMNS - 1))

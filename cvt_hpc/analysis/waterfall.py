@@ -79,7 +79,7 @@ def waterfall_figure(
     check_results(dataset, source)
     if "spectrum" not in dataset or "frequency_bin" not in dataset["spectrum"].dims:
         found = few_of(list(map(str, dataset.data_vars)), 6)
-        then = "runs of elastic_belt, pushbelt or belt_drive record it, up to band_high in [vibration]"
+        then = "runs of a belt that marches in time record it, up to band_high in [vibration]"
         raise mismatch(source, "results with the variable spectrum", found, then)
     arrangement = arrange(dataset, at or {}, source, sides)
     rows, notes = _rows(arrangement, sides.panel)

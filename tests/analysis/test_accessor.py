@@ -14,7 +14,7 @@ from cvt_hpc.accessor import Results
 from cvt_hpc.analysis.classes import OccurrenceClass
 from cvt_hpc.analysis.figures import LONG
 from cvt_hpc.errors import InputError
-from cvt_hpc.picture_kinds import HISTORIES, KINDS, RESULTS
+from cvt_hpc.picture_kinds import END, HISTORIES, KINDS, RESULTS
 from cvt_hpc.variables import Status, Vibrates
 from support.studies import GRADIENTS, LOADS, STIFFNESSES, study, traced
 
@@ -247,10 +247,20 @@ def test_each_kind_of_picture_is_a_verb_with_its_options():
         taken = set(inspect.signature(verb).parameters)
         assert {option.key for option in kind.options} | {*kind.sides} <= taken
         assert ("at" in taken, "beside" in taken) == (kind.subject == RESULTS, kind.subject == HISTORIES)
-        assert kind.text in verb.__doc__ and all(option.text[1:] in verb.__doc__ for option in kind.options)
+        assert kind.text in verb.__doc__ and all(
+            o.key == END or o.text[1:] in verb.__doc__ for o in kind.options
+        )
+        assert "%%" not in verb.__doc__ and "'20 um'" not in verb.__doc__  # words of the command line
     with pytest.raises(TypeError, match="unexpected keyword argument 'loads'"):
         study().cvt.phase(loads=3.0)
 
 
 def test_a_notebook_is_given_a_picture():
     assert study().cvt.map(sheave_stiffness=1.0)._repr_png_().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("kind", [name for name, kind in KINDS.items() if kind.subject != RESULTS])
+def test_pictures_of_single_runs_refuse_a_study(kind):
+    results = xr.Dataset({"status": ("load", np.zeros(2, "i1"))}, {"load": [20.0, 40.0]})
+    with pytest.raises(InputError, match=f"expected the history of a run, which {kind} draws, found a study"):
+        getattr(results.cvt, kind)()

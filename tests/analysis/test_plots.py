@@ -188,7 +188,7 @@ def test_of_many_pulleys_those_with_torque_are_drawn(history):
         (
             lambda d, h: waterfall_figure(d.drop_vars("spectrum")),
             "results: expected results with the variable spectrum, found status, vibrates, "
-            "eigenfrequency, speed_loss, expected_speed_loss, strand_tension; runs of elastic_belt, pushbelt or belt_drive "
+            "eigenfrequency, speed_loss, expected_speed_loss, strand_tension; runs of a belt that marches in time "
             "record it, up to band_high in [vibration]",
         ),
         (lambda d, h: waterfall_figure(d, {"load": 3.0}), "results: at load: expected a value of that axis"),
