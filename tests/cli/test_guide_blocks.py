@@ -87,12 +87,8 @@ BEFORE = {
     "docs/guide/sweeps.md": """
         cvt-hpc init JOB
         cvt-hpc run jobs/lebrecht_2004.toml --set name=other --set stations=96
-        cvt-hpc run jobs/quickstart.toml --set name=speeds --set 'driving_speed=["2000 rpm", "3000 rpm"]'
         cvt-hpc run jobs/ramps.toml --set duration=0.6 --set longest_duration=0.6
-        cvt-hpc run jobs/belt_drive_spectra.toml
-        cvt-hpc run jobs/misalignment.toml
         cvt-hpc simulate jobs/lebrecht_2004.toml --at load=120 --out run.nc
-        cvt-hpc simulate jobs/misalignment.toml --at load=60 --out push.nc
     """,
     "cvt_hpc/models/linear_stability/README.md": "cvt-hpc init JOB --model linear_stability",
     "cvt_hpc/models/steady_variator/README.md": "cvt-hpc init JOB --model steady_variator",
