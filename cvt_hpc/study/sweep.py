@@ -22,7 +22,7 @@ from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.forecast.cost_model import CostModel
 from cvt_hpc.study.forecast.needs import refuse_too_large
-from cvt_hpc.study.gather import gather_records
+from cvt_hpc.study.gather import LossError, gather_records
 from cvt_hpc.study.histories import keep_histories, leave_out_missing
 from cvt_hpc.study.part import Part, read_part
 from cvt_hpc.study.planning import Plan, asked_runs, next_round, prepare
@@ -35,7 +35,6 @@ from cvt_hpc.study.ranks.survival import outlive
 from cvt_hpc.study.ranks.time_limit import find_time_limit, planning_within
 from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.log import RecordLog
-from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.study.report import RunReport, build_report
 from cvt_hpc.study.simulator import Simulator, default_simulator
 from cvt_hpc.study.task import Task
@@ -254,9 +253,14 @@ def _conclude(
                 raise
             stopped = stopped or signals.noted
             _logger.warning("%s; not gathered", error)
+        except LossError as error:
+            records = folder.read_records(task.study)
+            if records.recorded.all():
+                raise
+            _logger.warning("%s", error)  # runs that were damaged are yet to be done again
     gathers = records is not None
     if records is None:
-        records = read_records(folder.records, task.study)
+        records = folder.read_records(task.study)
     leave_out_missing(task.job, folder, records)
     asked = asked_runs(task, records, part)
     gained = int(records.recorded[asked].sum()) - plan.recorded
