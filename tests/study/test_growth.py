@@ -2,6 +2,7 @@
 
 import json
 import os
+from functools import partial
 
 import numpy as np
 import pytest
@@ -90,6 +91,7 @@ def test_a_study_grows_twice_and_its_retries_count(tmp_path):
     assert len(sweep(job, tmp_path, retry=[Status.FAILED_ERROR]).failed) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", [SMALL, LARGE], ids=["old", "new"])
 def test_a_kill_at_any_moment_loses_no_run(tmp_path, first):
     """Kill at each file that is renamed, and go on with the old job or at once with the new one."""
@@ -97,7 +99,7 @@ def test_a_kill_at_any_moment_loses_no_run(tmp_path, first):
     for place in range(1, 30):
         out = tmp_path / str(place)
         sweep(SMALL, out)
-        if not _is_killed(lambda: sweep(LARGE, out), place):
+        if not _is_killed(partial(sweep, LARGE, out), place):
             break
         kills += 1
         grown = json.loads((out / "job.json").read_text())["fingerprint"] == LARGE.fingerprint()
