@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
+from cvt_hpc.job.arrays import plain
 from cvt_hpc.job.assignments import (
     Assignments,
     AxisEntry,
@@ -78,8 +79,8 @@ def build_job(
     Parameters
     ----------
     document : mapping
-        Tables and values as TOML gives them. An axis may also be a 1-D numpy array of numbers, and a table of
-        coefficients a 2-D one.
+        Tables and values as TOML gives them. An axis may also be a 1-D array of numpy, pandas, xarray or
+        pint, and a table of coefficients a 2-D one; units of pint, and attributes `units`, count.
     source : str
         Where it is from, for the errors: for a job of a file its path.
     overrides : mapping, or sequence of "KEY=VALUE"
@@ -133,6 +134,7 @@ def _build(
     label: str | None = None,
     units: Mapping[str, str] | None = None,
 ) -> Job:
+    document = plain(document)
     label = label or ("override" if isinstance(overrides, Mapping) else "--set")
     pairs = split_assignments(overrides, source, label)
     head = {**document, **{key: value for key, value in pairs.items() if key in HEADER}}

@@ -95,7 +95,10 @@ def _convert(number: Decimal, given: str, unit: str) -> Decimal:
         raise UnitError
     # pint counts a radian as 1, so that 50 Hz would pass for 50 rad/s.
     if "[mass]" not in source.dimensionality and _angle_power(source) != _angle_power(target):
-        raise UnitError(f"{given} and {unit or 'a plain number'} differ by an angle")
+        per_minute, hint = _parse_unit("1/minute"), ""
+        if source.dimensionality == per_minute.dimensionality and not _angle_power(source):
+            hint = "; write rpm" if source == per_minute else "; write turn/s if turns are meant"
+        raise UnitError(f"{given} and {unit or 'a plain number'} differ by an angle{hint}")
     try:
         return registry.Quantity(number, source).to(target).magnitude
     except TypeError:  # pint's and Python's: decibels, or degrees Celsius within a product
