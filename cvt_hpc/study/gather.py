@@ -12,7 +12,7 @@ import numpy as np
 
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.files import discard, kind_of, naming_refusals, written_aside
-from cvt_hpc.locks import locked
+from cvt_hpc.locks import locked, refuse_locked
 from cvt_hpc.netcdf import global_attributes, variable_attributes
 from cvt_hpc.provenance import history_line
 from cvt_hpc.study.chunks import chunk_shape, fill
@@ -188,6 +188,9 @@ def open_results(path: str | Path) -> xr.Dataset:
             return xr.open_dataset(found, engine="netcdf4", decode_times=False, chunks={})
         except ValueError as error:
             raise InputError(f"{found}: expected a netCDF dataset, found: {error}") from error
+        except OSError:
+            refuse_locked(found)
+            raise
 
 
 def write_results(folder: StudyFolder, study: Study, records: Records) -> Path:

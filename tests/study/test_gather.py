@@ -229,6 +229,23 @@ def test_a_folder_of_an_earlier_version_has_its_sentences_as_comments():
     assert study.axes[0].attributes == {"long_name": "slope of the friction law", "units": "s/m"}
 
 
+def test_a_dataset_that_a_notebook_writes_to_names_who_has_it(out, tmp_path):
+    path = shutil.copy(out / "results.nc", tmp_path)
+    program = f"import h5py; file = h5py.File({str(path)!r}, 'r+'); print('open', flush=True); input()"
+    with subprocess.Popen([sys.executable, "-c", program], stdin=-1, stdout=-1) as other:
+        assert other.stdout.readline() == b"open\n"
+        try:
+            with pytest.raises(InputError) as caught:
+                open_results(path)
+        finally:
+            other.communicate(b"\n")
+    told = f"{path}: expected a file that nobody writes to, found it locked by process {other.pid} (python"
+    assert str(caught.value).startswith(told)
+    assert str(caught.value).endswith("); close it there, or read a copy of it")
+    with open_results(path) as dataset:
+        assert "status" in dataset
+
+
 class TestADatasetThatHoldsMore:
     """A dataset with runs that are not on record stays as it is."""
 
