@@ -12,6 +12,7 @@ import os
 import pwd
 import secrets
 import stat
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -211,6 +212,25 @@ def discard(path: Path) -> None:
     """Remove a file that was not finished, if it is there and the system lets us."""
     with contextlib.suppress(OSError):
         path.unlink()
+
+
+def open_missing_streams() -> None:
+    """Lead standard streams that are closed to nowhere.
+
+    The system would give their numbers to files that are opened next, and what libraries print there would be
+    written into these.
+    """
+    for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
+        if getattr(sys, name) is not None:
+            continue
+        try:
+            os.fstat(number)
+        except OSError:
+            descriptor = os.open(os.devnull, os.O_RDWR)
+            if descriptor != number:
+                os.dup2(descriptor, number)
+                os.close(descriptor)
+        setattr(sys, name, open(os.devnull, mode))
 
 
 def _kind(mode: int) -> str:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cvt_hpc.errors import mismatch
-from cvt_hpc.files import StorageError
+from cvt_hpc.files import StorageError, open_missing_streams
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.locks import BusyError
 from cvt_hpc.study.description import Study, describe
@@ -115,6 +115,7 @@ def run(
         there is no such part, or it is to start over: the other parts would lose their runs; or if steps
         cannot be shortened so; or if memory, disk or time do not suffice for so many runs.
     """
+    open_missing_streams()
     started = time.monotonic()
     simulator = simulator or default_simulator()
     study, share, folder = _accept(job, out, part, fresh, simulator)
