@@ -1,6 +1,7 @@
 """What somebody needs who begins: a job to fill in, the keys of a model, a look at the machine, completion."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -103,6 +104,7 @@ def test_doctor_names_what_is_wrong_and_what_to_do(call, tmp_path, monkeypatch):
     assert {"ok       versions", "ok       machine", "trouble  disk", "trouble  MPI"} <= told
     advice = out[out.index(next(line for line in out if "trouble  MPI" in line)) + 1]
     assert "does not fit the MPI library" in advice
+    assert "fills" not in " ".join(out)  # ranks that cannot be started
 
 
 @pytest.mark.parametrize(
@@ -135,6 +137,7 @@ def test_doctor_asks_srun_whether_slurm_answers(call, tmp_path, monkeypatch, scr
 def test_doctor_starts_two_ranks():
     found = next(finding for finding in doctor.examine(doctor.Path()) if finding.what == "MPI")
     assert found.fine and found.found.startswith("2 ranks by ")
+    assert len(os.sched_getaffinity(0)) == 1 or "fills this machine" in found.advice
 
 
 @pytest.fixture(scope="module")
