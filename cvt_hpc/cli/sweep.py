@@ -14,6 +14,7 @@ from cvt_hpc.cli.parts import (
     add_assignments,
     add_command,
     add_folder,
+    alike,
     complain,
     output_folder,
     say,
@@ -69,28 +70,13 @@ def add(commands: Any) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.job import load_job
-    from cvt_hpc.job.durations import read_duration
-    from cvt_hpc.printing import next_lines, repeat_line, report_lines, trouble_lines
-    from cvt_hpc.study import check_start, run
-    from cvt_hpc.study.ranks.launch import end_process
-    from cvt_hpc.study.time_steps import check_refinement
-    from cvt_hpc.variables import Status
+    job, options, repeats = alike(arguments, lambda: _load(arguments))
 
-    limits = {
-        name: read_duration(getattr(arguments, name), f"--{name.replace('_', '-')}")
-        for name in ("time_limit", "run_limit")
-        if getattr(arguments, name) is not None
-    }
-    retry = [Status[name.upper()] for name in arguments.retry]
-    job = load_job(arguments.path, arguments.set)
-    options = {"fresh": arguments.fresh, "retry": retry, **limits}
-    if arguments.refine is not None:
-        check_refinement(job, arguments.refine, retry)
-        options["refine"] = arguments.refine
-    repeats = _repeats(job, arguments)
+    from cvt_hpc.printing import next_lines, repeat_line, report_lines, trouble_lines
+    from cvt_hpc.study import run
+    from cvt_hpc.study.ranks.launch import end_process
+
     if arguments.dry_run:
-        check_start(job, arguments.out, part=arguments.part, fresh=arguments.fresh)
         show_job(job, arguments.out)
         if speaks():
             for repeat, _ in repeats:
@@ -103,11 +89,37 @@ def _run(arguments: argparse.Namespace) -> int:
         say(*report_lines(report))
     statuses = [report.exit_status]
     for repeat, show in repeats:
-        if not report.remaining:
-            statuses.append(_repeat(repeat, show, options, started))
+        statuses.append(report.status_of_more or _repeat(repeat, show, options, started))
     if speaks():
         say(*next_lines(report))
     return end_process(max(statuses))
+
+
+def _load(
+    arguments: argparse.Namespace,
+) -> tuple[Job, dict[str, Any], list[tuple[Repeat, Callable[[Repeat], None]]]]:
+    """Return the job, the options of its sweep, and the samples that are to be done again."""
+    from cvt_hpc.job import load_job
+    from cvt_hpc.job.durations import read_duration
+    from cvt_hpc.study import check_start
+    from cvt_hpc.study.time_steps import check_refinement
+    from cvt_hpc.variables import Status
+
+    limits = {
+        name: read_duration(getattr(arguments, name), f"--{name.replace('_', '-')}")
+        for name in ("time_limit", "run_limit")
+        if getattr(arguments, name) is not None
+    }
+    retry = [Status[name.upper()] for name in arguments.retry]
+    job = load_job(arguments.path, arguments.set)
+    options = {"fresh": arguments.fresh, "retry": retry, "raises": False, **limits}
+    if arguments.refine is not None:
+        check_refinement(job, arguments.refine, retry)
+        options["refine"] = arguments.refine
+    repeats = _repeats(job, arguments)
+    if arguments.dry_run:
+        check_start(job, arguments.out, part=arguments.part, fresh=arguments.fresh)
+    return job, options, repeats
 
 
 def _repeats(job: Job, arguments: argparse.Namespace) -> list[tuple[Repeat, Callable[[Repeat], None]]]:
