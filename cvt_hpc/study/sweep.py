@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import math
-import threading
 import time
 from collections.abc import Callable, Collection, Mapping
 from contextlib import ExitStack, closing
@@ -19,6 +18,7 @@ from cvt_hpc.errors import mismatch
 from cvt_hpc.files import StorageError
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.locks import BusyError
+from cvt_hpc.netcdf import library_for_sweep
 from cvt_hpc.provenance import program_identity
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
@@ -136,9 +136,6 @@ def run(
     SystemExit
         With the exit status 99, or 98 if no run has ended, after other signals.
     """
-    if threading.current_thread() is not threading.main_thread():
-        found = f"the thread {threading.current_thread().name}"
-        raise mismatch("run", "the main thread of a process", found, "start a process for each sweep")
     started = time.monotonic()
     simulator = simulator or default_simulator()
     folder = _folder(job, out)
@@ -202,7 +199,7 @@ def run(
         noted = next(filter(None, team.collect(signals.noted)), None)
         return replace(report, stopped=report.stopped or noted), noted
 
-    with assembled_team(folder.crash_log, comm) as team:
+    with library_for_sweep(), assembled_team(folder.crash_log, comm) as team:
         study, share = team.agreed(accept, plan_of)
         task = Task(job, study, simulator, run_limit, chosen, asked_steps)
         with SignalWatch() as signals:

@@ -11,7 +11,7 @@ import psutil
 import pytest
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.study import run
+from cvt_hpc.study import open_results, run
 from cvt_hpc.study.ranks.launch import Launch, assembled_team, detect_launch
 from support.study_double import Job, Simulator
 from support.study_processes import find_mpirun, wait_until
@@ -158,19 +158,30 @@ def test_a_rank_can_sweep_by_itself(start, tmp_path):
 
 
 def test_threads_are_refused(tmp_path):
-    refused = []
+    out = run(Job(), tmp_path / "first", simulator=Simulator(), progress=False).out
+    ends = {}
 
-    def sweep():
-        with pytest.raises(
-            InputError, match="expected the main thread of a process, found the thread"
-        ) as error:
-            run(Job(), tmp_path, simulator=Simulator())
-        refused.append(str(error.value))
+    class Reading(Simulator):
+        def run_point(self, *arguments):
+            in_a_thread(lambda: open_results(out), "reads")
+            return super().run_point(*arguments)
 
-    thread = threading.Thread(target=sweep)
-    thread.start()
-    thread.join()
-    assert len(refused) == 1
+    def in_a_thread(work, name):
+        def do():
+            with pytest.raises(
+                InputError, match=f"expected the main thread .*, found the thread {name}"
+            ) as error:
+                work()
+            ends[name] = str(error.value)
+
+        thread = threading.Thread(target=do, name=name)
+        thread.start()
+        thread.join()
+
+    in_a_thread(lambda: run(Job(), tmp_path / "thread", simulator=Simulator()), "sweeps")
+    run(Job(), tmp_path / "second", simulator=Reading(), progress=False)
+    assert sorted(ends) == ["reads", "sweeps"]
+    assert not (tmp_path / "thread").exists()
 
 
 @pytest.mark.parametrize(
