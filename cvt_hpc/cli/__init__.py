@@ -57,7 +57,7 @@ def main(arguments: list[str] | None = None) -> int:
         sys.stdout.flush()
         return status
     except InputError as error:
-        if words and words[0] in _JOINT:
+        if words and words[0] in _JOINT and "--dry-run" not in words:
             from cvt_hpc.study.ranks.launch import agree_on
 
             error = agree_on(error)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.cli.checking import show_job
@@ -25,6 +26,7 @@ from cvt_hpc.errors import mismatch
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
+    from cvt_hpc.study import RunReport
     from cvt_hpc.study.repeats import Repeat
 
 RETRIED = ("timed_out", "failed_error", "failed_numerics")
@@ -70,7 +72,8 @@ def add(commands: Any) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    job, options, repeats = alike(arguments, lambda: _load(arguments))
+    load = partial(_load, arguments)
+    job, options, repeats = load() if arguments.dry_run else alike(arguments, load)
 
     from cvt_hpc.printing import next_lines, repeat_line, report_lines, trouble_lines
     from cvt_hpc.study import run
@@ -87,9 +90,13 @@ def _run(arguments: argparse.Namespace) -> int:
     complain(*trouble_lines(report))
     if speaks():
         say(*report_lines(report))
-    statuses = [report.exit_status]
+    latest, statuses = report, [report.exit_status]
     for repeat, show in repeats:
-        statuses.append(report.status_of_more or _repeat(repeat, show, options, started))
+        if stopped := latest.status_of_more:
+            statuses.append(stopped)
+            break
+        latest = _repeat(repeat, show, options, started)
+        statuses.append(latest.exit_status)
     if speaks():
         say(*next_lines(report))
     return end_process(max(statuses))
@@ -146,7 +153,9 @@ def _repeats(job: Job, arguments: argparse.Namespace) -> list[tuple[Repeat, Call
     return repeats
 
 
-def _repeat(repeat: Repeat, show: Callable[[Repeat], None], options: dict[str, Any], started: float) -> int:
+def _repeat(
+    repeat: Repeat, show: Callable[[Repeat], None], options: dict[str, Any], started: float
+) -> RunReport:
     """Do the runs of a sample again in the time that is left, and print what was found."""
     from cvt_hpc.printing import trouble_lines
 
@@ -157,7 +166,7 @@ def _repeat(repeat: Repeat, show: Callable[[Repeat], None], options: dict[str, A
     complain(*(f"{repeat.label}: {line}" for line in trouble_lines(report)))
     if speaks() and not report.remaining:
         show(repeat)
-    return report.exit_status
+    return report
 
 
 def _show_audit(audit: Repeat) -> None:
