@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+BAD_INPUT = 2  # exit status
 CRASHED = 70  # exit status after a defect of this program; EX_SOFTWARE of sysexits.h
 LONGEST_KEY = 100  # letters
 _LONGEST_QUOTE = 60
@@ -19,7 +20,14 @@ class InputError(ValueError):
 
     The command line prints it and ends with exit status 2. It is one line, whatever the names and texts in it
     hold.
+
+    Attributes
+    ----------
+    everywhere : bool
+        Whether all ranks that were started together raise it.
     """
+
+    everywhere = False
 
     def __init__(self, text: str) -> None:
         super().__init__(one_line(text))
