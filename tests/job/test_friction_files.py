@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cvt_hpc.errors import InputError, JobWarning
-from cvt_hpc.job import build_job, load_job
+from cvt_hpc.job import build_job, load_job, rebuild_job
 from cvt_hpc.job.csv_files import read_csv
 from cvt_hpc.job.summary import summarize
 from cvt_hpc.parameters import FromFile
@@ -258,6 +258,39 @@ def test_a_table_in_any_dialect_gives_its_numbers_or_is_refused(tmp_path_factory
     told = " ".join(str(one.message) for one in caught)
     assert ("decimal commas" in told) == (dialect.mark == "," and bool(marked))
     assert ("semicolons between columns" in told) == (dialect.separator == ";")
+
+
+@pytest.mark.parametrize(
+    ("model", "table", "told"),
+    [
+        ("elastic_belt", {"friction": {"table_file": "mu.csv"}},
+         '[friction] table_file: expected nothing, as it has no effect with friction_law stribeck, found "mu.csv"; delete it, or set table_file = ""'),
+        ("oscillator", {"friction": {"friction_law": "coulomb", "table_mu": [[1, 2]]}},
+         "[friction] table_mu: expected nothing, as it has no effect with friction_law coulomb, found a list; delete it, or set table_mu = []"),
+        ("elastic_belt", {"deflection": {"driven_flexibility_file": "w.csv"}},
+         '[deflection] driven_flexibility_file: expected nothing, as it has no effect with sheave_deformation bending, found "w.csv"; '
+         'delete it, or set driven_flexibility_file = ""'),
+        ("elastic_belt", {"axes": {"friction_law": ["linear", "cubic"]}, "friction": {"table_file": "mu.csv"}}, "[friction] table_file: expected nothing"),
+    ],
+)  # fmt: skip
+def test_a_file_or_a_list_without_effect_is_an_error(write, model, table, told):
+    source = write(PER_LENGTH)
+    (source.parent / "w.csv").write_text("angle [deg],flexibility [um/N]\n0,1\n1,0.5\n")
+    with pytest.raises(InputError) as caught:
+        build_job({"name": "x", "model": model} | table, str(source))
+    assert told in str(caught.value)
+
+
+def test_a_file_has_an_effect_if_any_run_reads_it_and_none_in_a_stored_job(write):
+    path = write(
+        PER_LENGTH,
+        job='name = "x"\nmodel = "elastic_belt"\n[axes]\nfriction_law = ["linear", "table"]\n[friction]\n',
+    )
+    stored = load_job(path).resolved()
+    stored["axes"]["friction_law"] = ["linear"]
+    assert rebuild_job(stored, "x", {}).parameters["table_mu"]  # of an earlier version, which took it
+    with pytest.raises(InputError, match="table_force: expected nothing"):
+        build_job(stored)
 
 
 @pytest.mark.parametrize(
