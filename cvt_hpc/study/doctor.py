@@ -62,7 +62,7 @@ def _cores() -> Finding:
 
 
 def _cache() -> Finding:
-    from cvt_hpc.kernels import cache_folder
+    from cvt_hpc.kernel_store import folder as cache_folder
 
     if (place := cache_folder()) is None:
         advice = "set NUMBA_CACHE_DIR to a folder of your own, or each start compiles again"
