@@ -183,7 +183,8 @@ class Walk:
                 yield self.value(cell.cell_contents)
             except ValueError:  # not filled yet
                 raise UnknownValueError(f"{function.__qualname__}, which is not complete") from None
-        yield from map(self.value, _overloads(function))
+        for options, overload in _overloads(len(templates.builtin_registry.globals)).get(function, ()):
+            yield self.value(options), overload and self.value(overload)
         names = _names(function.__code__)
         for name in names:
             if name not in function.__globals__:
@@ -267,7 +268,7 @@ def _checked_name(value: Any, module: str | None, name: str | None) -> Any:
 
 
 def extensions() -> str:
-    """Return a digest of what has told the compiler of types and operations: `lanes`, and whoever registered."""
+    """Return a digest of what has told the compiler of types and operations: `lanes`, and code of users."""
     found = [_of_module(module) for name, module in sorted(sys.modules.items()) if name.startswith(_LANES)]
     return digest((found, _registered(*map(len, _registries()))))
 
@@ -339,17 +340,13 @@ def _is_foreign(value: Any) -> bool:
     return module is not None and module.split(".")[0] not in _VERSIONED | {"abc"}  # classes made by type()
 
 
-def _overloads(function: FunctionType) -> list[FunctionType]:
-    """The functions that say how others than the compiler itself translate a function."""
-    return _all_overloads(len(templates.builtin_registry.globals)).get(function, [])
-
-
 @cache
-def _all_overloads(length: int) -> dict[Any, list[FunctionType]]:
-    found: dict[Any, list[FunctionType]] = {}
+def _overloads(length: int) -> dict[Any, list[tuple[dict, FunctionType | None]]]:
+    """Return, by function, options for its compilation, and another one that tells how to translate it."""
+    found: dict[Any, list[tuple[dict, FunctionType | None]]] = {}
     for value, kind in templates.builtin_registry.globals:
-        for template in getattr(kind, "templates", ()):
-            overload = getattr(template, "_overload_func", None)
-            if overload is not None and isinstance(value, FunctionType) and _is_foreign(overload):
-                found.setdefault(value, []).append(overload)
+        for template in getattr(kind, "templates", ()) if isinstance(value, FunctionType) else ():
+            if overload := getattr(template, "_overload_func", None):
+                options = {**template._jit_options, "inline": template._inline.value}
+                found.setdefault(value, []).append((options, overload if _is_foreign(overload) else None))
     return found

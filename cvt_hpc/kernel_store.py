@@ -1,4 +1,4 @@
-"""Machine code on the disk: a file for each entry, whole or absent, in a folder that only the user can write to.
+"""Machine code on the disk: a file for each entry, whole or absent, in a folder that nobody else can change.
 
 The name of a file is a digest of all that decides the code. It begins with a digest of its name and content,
 without which nothing in it is used: machine code with a changed bit may compute anything. What is damaged, or

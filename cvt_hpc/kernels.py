@@ -1,8 +1,8 @@
 """Compilation of the kernels, whose machine code is kept on the disk, since compiling takes minutes.
 
 An entry of `kernel_store` is found by all that decides it: the kernel and all that it calls, as in memory
-(`kernel_identity`), the types of its arguments, the compiler with its switches, and the processor. A kernel of
-which this cannot be told is compiled and not kept.
+(`kernel_identity`), the types of its arguments, the compiler with its switches, and the processor. Where this
+cannot be told a kernel is compiled and not kept.
 
 A kernel that only other kernels call gets no entry from Python, which for tuples of arrays takes long to
 compile, and no machine code: each caller takes in its LLVM code and optimises it with its own. That holds for
@@ -65,7 +65,7 @@ _logger = logging.getLogger(__name__)
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function at its first call; with lanes it can neither make nor return arrays."""
-    return _Kernel(function, {}, dict(_OPTIONS), _Compiler)
+    return _Kernel(function, {}, dict(_OPTIONS))
 
 
 def merged_kernel(function: Callable[..., Any]) -> Any:
@@ -74,7 +74,7 @@ def merged_kernel(function: Callable[..., Any]) -> Any:
     Its call must not be its caller's last statement, nor that of another merged kernel unless it is straight
     lines: the compiler loses such calls (numba 0.68).
     """
-    return _Kernel(function, {}, _OPTIONS | {"inline": "always"}, _Compiler)
+    return _Kernel(function, {}, _OPTIONS | {"inline": "always"})
 
 
 def called_alike(compiled: Any) -> Callable[..., Any]:
@@ -99,7 +99,7 @@ class _Kernel(CPUDispatcher):
     """A function and its machine code, with an entry from Python where Python has called it."""
 
     def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)
+        super().__init__(*arguments, pipeline_class=_Compiler)
         # of the kernel being compiled: whether another kernel calls it, whether with lanes
         self._for_kernel = self._takes_lanes = False
         self._without_entry: set[tuple] = set()  # types of arguments
@@ -150,8 +150,8 @@ class _Kernel(CPUDispatcher):
                     return found.entry_point
                 work.tell()
                 entry = super().compile(sig)
-                if name:
-                    _keep(name, self.overloads[kinds], work.walk)
+                if name and (found := self.overloads.get(kinds)):
+                    _keep(name, found, work.walk)
                 return entry
 
     def add_overload(self, cres: Any) -> None:
