@@ -66,7 +66,7 @@ def _usable_cores() -> int:
 
 
 def _cache() -> Finding:
-    from cvt_hpc.kernels import cache_folder
+    from cvt_hpc.kernel_store import folder as cache_folder
 
     if (place := cache_folder()) is None:
         advice = "set NUMBA_CACHE_DIR to a folder of your own, or each start compiles again"
