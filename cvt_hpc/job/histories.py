@@ -83,7 +83,7 @@ def _index(
         )
     for key in values.keys() - replaced.keys():
         raise mismatch(where, f"axes of this job ({', '.join(axis.name for axis in axes)})", key)
-    return index if all(replaced[key] == value for key, value in values.items()) else None
+    return index if all(without_rounding(replaced[key]) == value for key, value in values.items()) else None
 
 
 def _numbered(entry: Any, size: int, where: str) -> int:

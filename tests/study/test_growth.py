@@ -148,6 +148,20 @@ def test_parts_grow_a_study_together_but_not_beside_the_smaller_one(tmp_path):
     assert_whole(tmp_path, LARGE)
 
 
+def test_a_trace_grows_and_finds_the_same_boundaries(tmp_path):
+    steered, design = {"window": [9, 25]}, {"kind": "trace", "first_spacing": {"load": 8}}
+    small, large = (
+        Job((Axis("load", tuple(range(0, 40, step))),), steered, design=design) for step in (2, 1)
+    )
+    sweep(small, tmp_path)
+    first = int((results(tmp_path)["status"] == Status.DONE).sum())
+    report = sweep(large, tmp_path)
+    assert report.gained == report.done - first and report.unneeded > 10
+    inferred = results(tmp_path)["inferred_class"]
+    vibrates = inferred.sel(load=slice(9, 25)).values
+    assert (vibrates == vibrates[0]).all() and int((inferred == vibrates[0]).sum()) == 17
+
+
 def test_fresh_leaves_nothing_of_the_smaller_study(tmp_path):
     for job in (SMALL, LARGE):
         sweep(job, tmp_path)
