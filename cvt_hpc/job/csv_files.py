@@ -233,13 +233,12 @@ def _told(name: str, file: FromFile) -> str:
 def _left_out(of_names: Row, rows: Sequence[Row], separator: str, place: str) -> str:
     """Return what is not read beside the columns; InputError if it may be anything of meaning."""
     line, names = of_names
-    then = "separate columns by semicolons where commas are decimal" if separator == "," else ""
     for n, cells in rows:
         if len(cells) != len(names):
-            expected = f"{len(names)} columns, as in line {line}"
-            raise mismatch(
-                f"{place}: line {n}", expected, str(len(cells)), then if len(cells) > len(names) else ""
-            )
+            where, expected = f"{place}: line {n}", f"{len(names)} columns, as in line {line}"
+            may_be_decimal = separator == "," and len(cells) > len(names)
+            then = "separate columns by semicolons where commas are decimal" if may_be_decimal else ""
+            raise mismatch(where, expected, str(len(cells)), then)
     found = ""
     for i in (i for i, name in enumerate(names) if not name):
         below = [cells[i] for _, cells in rows]
@@ -247,11 +246,8 @@ def _left_out(of_names: Row, rows: Sequence[Row], separator: str, place: str) ->
             found = "no column for the numbers of the rows"
         elif any(below):
             n, cells = next((n, cells) for n, cells in rows if cells[i])
-            where, expected = (
-                f"{place}: line {n}, column {i + 1}",
-                f"nothing, as it has no name in line {line}",
-            )
-            raise mismatch(where, expected, show(cells[i]))
+            where = f"{place}: line {n}, column {i + 1}"
+            raise mismatch(where, f"nothing, as it has no name in line {line}", show(cells[i]))
     return found
 
 
@@ -271,7 +267,7 @@ def _decimal_mark(rows: Sequence[Row], separator: str, place: str) -> str:
     mark = next(iter(seen), ".")
     if seen and mark not in certain:
         expected = "a number that shows whether the mark is decimal or separates thousands"
-        raise mismatch(place, expected, f"none, such as {seen[mark]}", then)
+        raise mismatch(place, expected, f"only such as {seen[mark]}", then)
     return mark
 
 

@@ -297,7 +297,7 @@ def test_a_file_has_an_effect_if_any_run_reads_it_and_none_in_a_stored_job(write
     ("table", "told"),
     [
         ("speed [m/s];mu\n0;1.234\n1;1.125\n", 'expected a number that shows whether the mark is decimal or separates thousands, '
-         'found none, such as "1.234" in line 2; write numbers with decimal points, without separators of thousands'),
+         'found only such as "1.234" in line 2; write numbers with decimal points, without separators of thousands'),
         ("speed [m/s];mu\n0;0,13\n1;0.1\n", 'expected one decimal mark, found "0,13" in line 2 and "0.1" in line 3; write'),
         ("speed [m/s];mu\n0;1.234,5\n", 'line 2, mu: expected a number such as 1500 or 0.13, found "1.234,5"'),
         ("speed [m/s],mu\n0,0,13\n", "line 2: expected 2 columns, as in line 1, found 3; separate columns by semicolons where commas are decimal"),
