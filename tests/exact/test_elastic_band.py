@@ -47,8 +47,9 @@ def test_the_limit_of_no_moment():
     assert found.slip_arc == pytest.approx(0.0, abs=1e-12)
     assert found.driven_speed == pytest.approx(SPEED * RADII[0] / RADII[1], rel=1e-12)
     assert found.driving_thrust == pytest.approx(THRUST * (2.0 * np.pi - wrap) / wrap, rel=1e-9)
+    # of 170 N m that the forces would carry at most, 1 mN m is nearly nothing
     beside = elastic_band(RADII, SPEED, 1e-3, THRUST, *loads)
-    assert np.array(beside) == pytest.approx(np.array(found), rel=2e-6, abs=2e-5)
+    assert np.array(beside) == pytest.approx(np.array(found), rel=1e-5, abs=2e-5)
 
 
 def test_more_than_friction_carries_has_no_equilibrium():
