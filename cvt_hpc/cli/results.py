@@ -1,4 +1,4 @@
-"""`status`, `gather`, `map`, `figure` and `compare`: what a run has left in its folder."""
+"""`status`, `gather`, `table`, `map`, `figure` and `compare`: what a run has left in its folder."""
 
 from __future__ import annotations
 
@@ -33,6 +33,10 @@ def add(commands: Any) -> None:
     status = add_command(commands, "status", _status, "how far a study is", "DIR")
     status.add_argument("--json", action="store_true", help="for programs: one line of JSON, times in s")
     add_command(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
+    text = "write the results as a table with a row for each run: axes, class, and what each run gave"
+    table = add_command(commands, "table", _table, text, "RESULTS")
+    text = "FILE.csv, or FILE.xlsx for a spreadsheet (default: table.csv beside the dataset)"
+    table.add_argument("--out", type=Path, metavar="FILE", help=text)
     text = "draw where vibration occurs, or quantities over two axes"
     picture = add_command(commands, "map", _map, text, "RESULTS")
     text = "further studies over the same axes: a panel for each, on one scale of colours"
@@ -73,6 +77,18 @@ def _gather(arguments: argparse.Namespace) -> int:
     from cvt_hpc.study import gather
 
     say(f"results: {gather(arguments.path)}")
+    return DONE
+
+
+def _table(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.run_table import FORMATS, run_table, write_table
+    from cvt_hpc.study import open_results
+
+    out = arguments.out or folder_of(arguments.path) / "table.csv"
+    check_output(out, FORMATS)
+    with open_results(arguments.path) as dataset:
+        frame = run_table(dataset, str(arguments.path))
+    say(f"table: {write_table(frame, out)}")
     return DONE
 
 
