@@ -9,6 +9,7 @@ from pathlib import Path
 import xarray as xr
 
 from cvt_hpc.analysis.arrangement import infinity_in_words
+from cvt_hpc.analysis.figures import check_known
 from cvt_hpc.analysis.histories import place_of
 from cvt_hpc.errors import InputError, mismatch, one_line
 
@@ -60,6 +61,7 @@ def check_holds(histories: Sequence[xr.Dataset], names: Sequence[str], wanted: d
         for key, by in wanted.items():
             if key not in dataset:
                 raise mismatch(name, f"a history with {key} ({by})", "none")
+            check_known(dataset, [key], name)
 
 
 def history_files(paths: Sequence[Path]) -> list[Path]:

@@ -1,8 +1,10 @@
 """The commands within this process, on the toy model and runs without mechanics."""
 
 import re
+import sys
 
 import netCDF4
+import numpy as np
 import pytest
 
 from cvt_hpc.cli.parts import INTERRUPTED, colour_end
@@ -211,9 +213,9 @@ def test_simulate_prints_the_outcome_and_keeps_the_history(write_job, call, mech
         "at      load 0.05 kN m, sheave_stiffness 1",
         "status     done",
         "vibrates   yes",
+        "amplitude  t1 1, t2 25 um",
         "load       50 N m",
         "steps      3",
-        "amplitude  t1 1e-06, t2 2.5e-05 m",
         "history: new/h.nc",
         "picture: h.png",
     ]
@@ -221,6 +223,24 @@ def test_simulate_prints_the_outcome_and_keeps_the_history(write_job, call, mech
     ((drawn, picture),) = mechanics["drawn"]
     assert (str(where), str(picture)) == ("new/h.nc", "h.png")
     assert written is drawn and written["load"] == 50
+
+
+def test_simulate_prints_what_matters_and_the_rest_when_asked(write_job, call, mechanics, monkeypatch):
+    write_job(GRID)
+    double = sys.modules["cvt_hpc.simulation"]
+    made = double.simulate
+    forces = {f"force_{k}": ((), 2.5e3 * 10.0**-k, {"units": "N"}) for k in range(12)}
+    speed = {"efficiency": ((), 0.9, {"units": "1"}), "driven_speed": ((), np.pi, {"units": "rad s-1"})}
+    monkeypatch.setattr(double, "simulate", lambda job, at: made(job, at).assign(forces).assign(speed))
+    command = ("simulate", "x.toml", "--set", "thrust=20 kN", "--set", "driving_speed=30 rpm")
+    status, out, err = call(*command)
+    assert (status, err, len(out)) == (0, [], 13)
+    told = [" ".join(line.split()) for line in out[1:]]
+    assert told[:4] == ["status done", "vibrates no", "amplitude t1 1, t2 25 um", "efficiency 0.9"]
+    assert told[-1] == "8 more by --all"
+    whole = [" ".join(line.split()) for line in call(*command, "--all")[1][1:]]
+    assert whole[:11] == told[:11] and len(whole) == 19
+    assert {"force 0 2.5 kN", "force 3 2.5 N", "force 11 2.5e-08 N", "driven speed 30 rpm"} <= set(whole)
 
 
 def test_simulate_replaces_an_earlier_history(write_job, call, tmp_path, mechanics):
