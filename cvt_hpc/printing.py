@@ -16,7 +16,9 @@ from cvt_hpc.variables import Status, flag_in_words
 from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS
 
 if TYPE_CHECKING:
+    import numpy as np
     import xarray as xr
+    from numpy.typing import NDArray
 
     from cvt_hpc.analysis.comparison import Cell, Comparison
     from cvt_hpc.job import Job
@@ -130,16 +132,40 @@ def comparison_lines(found: Comparison, sources: tuple[str, str]) -> Iterator[st
     yield from (f"differs: {line}" for line in found.differences or ("nothing that the datasets tell",))
     yield f"{found.pairs.size} cells, by class in A (rows) and in B (columns):"
     yield from _class_table(found)
-    contradicting = int(found.contradicts.sum())
+    yield from _design_lines(found) if found.are_designs else _contradiction_lines(found)
+    yield from deviations(found)
+
+
+def _contradiction_lines(found: Comparison) -> Iterator[str]:
+    """Yield in what two methods contradict each other, and where."""
     beyond = int(found.contradicts_beyond.sum())
     yield (
-        f"{contradicting} of {int(found.answered.sum())} cells contradict (quiet against vibrating), "
-        f"{beyond} of them beyond the threshold (larger amplitude not within {NEAR:.0%} of it)"
+        f"{int(found.contradicts.sum())} of {int(found.answered.sum())} cells contradict (quiet against "
+        f"vibrating), {beyond} of them beyond the threshold (larger amplitude not within {NEAR:.0%} of it)"
     )
-    yield from map(_cell_line, islice(found.rows(found.contradicts), MOST_CONTRADICTIONS_NAMED))
-    if contradicting > MOST_CONTRADICTIONS_NAMED:
-        yield f"  {contradicting - MOST_CONTRADICTIONS_NAMED} more in the table"
-    yield from deviations(found)
+    yield from _cell_lines(found, found.contradicts)
+
+
+def _design_lines(found: Comparison) -> Iterator[str]:
+    """Yield in what the second of two designs is better, in what worse, and where it is worse."""
+    better, worse = int(found.better.sum()), int(found.worse.sum())
+    yield (
+        f"two designs: of {int(found.answered.sum())} cells B is better in {better} (quiet where A vibrates) "
+        f"and worse in {worse} (vibrates where A is quiet)"
+    )
+    if not math.isnan(ratio := found.amplitude_ratio()):
+        word = "better" if ratio < 1.0 else "worse" if ratio > 1.0 else "alike"
+        yield f"amplitude where both vibrate: in B {ratio:.3g} times that in A (median), {word}"
+    if worse:
+        yield "worse in B:"
+        yield from _cell_lines(found, found.worse)
+
+
+def _cell_lines(found: Comparison, chosen: NDArray[np.bool_]) -> Iterator[str]:
+    """Yield a line for each of the first cells that are chosen, and the number of the others."""
+    yield from map(_cell_line, islice(found.rows(chosen), MOST_CONTRADICTIONS_NAMED))
+    if (left := int(chosen.sum()) - MOST_CONTRADICTIONS_NAMED) > 0:
+        yield f"  {left} more in the table"
 
 
 def _class_table(found: Comparison) -> Iterator[str]:
@@ -258,7 +284,7 @@ def point_lines(job: Job, at: Mapping[str, Any]) -> Iterator[str]:
     # a load that is given leaves no share of which it would follow
     keys = dict.fromkeys([*(axis.name for axis in job.axes), *(value.name for value in job.derived), *at])
     schema = job.schema
-    words = [f"{key} {schema.in_words(key, point[key])}" for key in keys if key in point]
+    words = [f"{key.replace('_', ' ')} {schema.in_words(key, point[key])}" for key in keys if key in point]
     if words:
         yield f"at      {', '.join(words)}"
 
