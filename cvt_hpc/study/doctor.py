@@ -109,7 +109,8 @@ def _mpi(installed: bool) -> Finding:
 
 def _slurm() -> Finding:
     if shutil.which("sbatch") is None:
-        return Finding(True, "Slurm", "none here", "needed on a cluster alone: slurm/sweep.sbatch")
+        advice = "needed on a cluster alone: `cvt-hpc examples slurm` copies batch files"
+        return Finding(True, "Slurm", "none here", advice)
     status, lines = _said(["srun", "--mpi=list"])
     if status != 0:
         found = f"sbatch is there, but srun fails: {lines[-1] if lines else 'no answer'}"
