@@ -66,7 +66,7 @@ def _usable_cores() -> int:
 
 
 def _cache() -> Finding:
-    from cvt_hpc.kernels import cache_folder
+    from cvt_hpc.kernel_store import folder as cache_folder
 
     if (place := cache_folder()) is None:
         advice = "set NUMBA_CACHE_DIR to a folder of your own, or each start compiles again"
@@ -109,7 +109,8 @@ def _mpi(installed: bool) -> Finding:
 
 def _slurm() -> Finding:
     if shutil.which("sbatch") is None:
-        return Finding(True, "Slurm", "none here", "needed on a cluster alone: slurm/sweep.sbatch")
+        advice = "needed on a cluster alone: `cvt-hpc examples slurm` copies batch files"
+        return Finding(True, "Slurm", "none here", advice)
     status, lines = _said(["srun", "--mpi=list"])
     if status != 0:
         found = f"sbatch is there, but srun fails: {lines[-1] if lines else 'no answer'}"

@@ -13,7 +13,7 @@ import numpy as np
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.files import discard, kind_of, naming_refusals, written_aside
 from cvt_hpc.locks import locked, refuse_locked
-from cvt_hpc.netcdf import global_attributes, variable_attributes
+from cvt_hpc.netcdf import global_attributes, refuse_beside_sweep, variable_attributes
 from cvt_hpc.provenance import history_line
 from cvt_hpc.study.chunks import chunk_shape, fill
 from cvt_hpc.study.description import Study
@@ -161,10 +161,11 @@ def open_results(path: str | Path) -> xr.Dataset:
     Raises
     ------
     InputError
-        If there is no dataset, or none that can be read.
+        If there is no dataset, or none that can be read, or in a thread beside a sweep.
     """
     import xarray as xr
 
+    refuse_beside_sweep(str(path))
     found = Path(path)
     with naming_refusals(found, "a netCDF dataset"):
         if found.is_dir():

@@ -7,10 +7,14 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from pathlib import Path
 
 import pytest
 
+import cvt_hpc
+from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
+from cvt_hpc.job.examples import example_files
 from cvt_hpc.job.template import job_template
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
@@ -89,6 +93,61 @@ def test_models_tells_each_model_and_its_keys(call):
     told = [" ".join(line.split()) for line in call("models", "criterion")[1]]
     assert "half_wedge_angle 0.1919862177 rad (11 deg) half wedge angle of the groove" in told
     assert call("models", "nothing")[0] == 2
+
+
+def test_variables_tells_what_the_runs_of_a_model_leave(call):
+    status, out, err = call("variables", "elastic_belt")
+    assert (status, err) == (0, [])
+    told = [" ".join(line.split()) for line in out]
+    assert any(line.startswith("frequency strand Hz ") for line in told)
+    (vibrates,) = (line for line in told if line.startswith("vibrates "))
+    assert vibrates.endswith("(0 no, 1 yes, 2 undecided, 3 slips, 4 irregular)")
+    names = {line.split()[0] for line in told[1 : told.index("")]}
+    assert names >= {variable.name for variable in load_model("elastic_belt").variables}
+    assert any(line.startswith("frequency_bin Hz ") for line in told[told.index("") :])
+    assert call("variables", "elastic_bel")[2][0].endswith("did you mean elastic_belt?")
+    assert "moving_string" in call("variables", "moving_string")[2][0]
+
+
+def test_examples_are_listed_and_copied_with_what_they_read_and_replace_nothing(call, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, out, err = call("examples")
+    assert (status, err) == (0, [])
+    listed = {line.split()[0]: line for line in out[: out.index("")]}
+    assert listed["jobs/quickstart.toml"].endswith("A first map: fall of friction x sheave stiffness x load")
+    assert {"jobs/notebooks/read_a_map.ipynb", "slurm/sweep.sbatch"} <= listed.keys()
+    status, out, err = call("examples", "sheave_deformation.toml", "read_a_map", "slurm", "--out", "mine")
+    copied = {path.relative_to(tmp_path / "mine").as_posix() for path in (tmp_path / "mine").rglob("*.*")}
+    assert (status, err) == (0, []) and len(out) == len(copied)
+    assert copied >= {"jobs/sheave/driving.nc", "jobs/results/lebrecht_2004.csv", "slurm/launch.sh"}
+    assert call("check", "mine/jobs/sheave_deformation.toml")[0] == 0
+    (tmp_path / "mine/slurm/launch.sh").write_text("mine")
+    status, out, err = call("examples", "quickstart", "slurm/launch.sh", "--out", "mine")
+    assert (status, out) == (2, []) and "mine/slurm/launch.sh: expected a place that is free" in err[0]
+    assert (tmp_path / "mine/slurm/launch.sh").read_text() == "mine"
+    assert not (tmp_path / "mine/jobs/quickstart.toml").exists()
+    assert call("examples", "quickstar")[2] == [
+        "cvt-hpc: examples: quickstar: unknown example; did you mean quickstart?"
+    ]
+
+
+@pytest.mark.slow
+def test_the_package_that_is_built_brings_the_same_examples(tmp_path, monkeypatch):
+    root = Path(cvt_hpc.__file__).parent.parent
+    for name in ("pyproject.toml", "setup.py", "README.md", "jobs", "slurm"):
+        (tmp_path / name).symlink_to(root / name)
+    (tmp_path / "cvt_hpc").mkdir()
+    shutil.copy(root / "cvt_hpc" / "__init__.py", tmp_path / "cvt_hpc")
+    build = [sys.executable, "setup.py", "-q", "build_py", "--build-lib", tmp_path / "built"]
+    subprocess.run(build, cwd=tmp_path, check=True, capture_output=True)
+    known = example_files()
+    monkeypatch.setattr(cvt_hpc, "__file__", str(tmp_path / "built" / "cvt_hpc" / "__init__.py"))
+    built = example_files()
+    assert built.keys() == known.keys() and len(built) > 90
+    assert all(path.read_bytes() == known[name].read_bytes() for name, path in built.items())
+    shutil.rmtree(tmp_path / "built" / "cvt_hpc" / "examples")
+    with pytest.raises(InputError, match="examples: expected those of a wheel or a checkout"):
+        example_files()
 
 
 def test_doctor_names_what_is_wrong_and_what_to_do(call, tmp_path, monkeypatch):
