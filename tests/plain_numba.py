@@ -80,7 +80,10 @@ def main():
         with tempfile.TemporaryDirectory() as folder:
             ours, plain = map(partial(simulate, run=run, folder=folder), ("ours", "plain"))
         found = differences(ours, plain)
-        print(f"{run}: {len(ours.variables)} variables", f"differ in {', '.join(found)}" if found else "are the same")
+        print(
+            f"{run}: {len(ours.variables)} variables",
+            f"differ in {', '.join(found)}" if found else "are the same",
+        )
         status = status or bool(found)
     return int(status)
 
