@@ -19,12 +19,12 @@ import xarray as xr
 
 JOBS = Path(__file__).parents[1] / "jobs"
 RUNS = {
-    "elastic belt": ("quickstart.toml", "load=100 N m", ["duration=20 ms", "rise_time=2 ms"]),
+    "elastic belt": ("quickstart.toml", "load=100 N m", ["duration=40 ms", "rise_time=4 ms"]),
     "pushbelt": (
         "push_force.toml",
         "load=30 N m",
         [
-            *("duration=10 ms", "longest_duration=10 ms", "rise_time=2 ms"),
+            *("duration=40 ms", "longest_duration=40 ms", "rise_time=4 ms"),
             *("elements=104", "band_high=1000 Hz"),
         ],
     ),
@@ -80,7 +80,10 @@ def main():
         with tempfile.TemporaryDirectory() as folder:
             ours, plain = map(partial(simulate, run=run, folder=folder), ("ours", "plain"))
         found = differences(ours, plain)
-        print(f"{run}: {len(ours.variables)} variables", f"differ in {', '.join(found)}" if found else "are the same")
+        print(
+            f"{run}: {len(ours.variables)} variables",
+            f"differ in {', '.join(found)}" if found else "are the same",
+        )
         status = status or bool(found)
     return int(status)
 
