@@ -27,6 +27,7 @@ import numpy as np
 from numba import types
 from numba.core import imputils
 from numba.core.dispatcher import Dispatcher
+from numba.core.registry import CPUDispatcher
 from numba.core.typing import templates
 
 _VERSIONED = {"numpy", "numba", "llvmlite", "math", "cmath", "operator", "_operator", "builtins"}
@@ -83,7 +84,7 @@ class Walk:
             If it is none of those that kernels are usually called with.
         """
         if isinstance(kind, types.Dispatcher):
-            return "kernel", self.kernel(kind.dispatcher)
+            return "kernel", self.value(kind.dispatcher)
         if isinstance(kind, types.BaseTuple):
             of = self._tuple_class(kind.instance_class) if isinstance(kind, types.BaseNamedTuple) else ()
             return (type(kind).__name__, of, *map(self.type, kind))
@@ -111,6 +112,8 @@ class Walk:
         if kind is FunctionType:
             return self._function(value)
         if isinstance(value, Dispatcher):
+            if kind is CPUDispatcher:  # it may have been compiled before a global was changed
+                raise UnknownValueError("a function that is no kernel, but compiled by numba alone")
             return self.kernel(value)
         if kind in (tuple, list):
             return kind.__name__, *map(self.value, value)

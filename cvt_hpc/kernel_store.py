@@ -29,6 +29,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numba
 
@@ -79,8 +80,7 @@ def read(name: str, what: str) -> bytes | None:
     except FileNotFoundError:
         return None
     except OSError as error:
-        _logger.warning("machine code of %s cannot be used and is compiled again: %s", what, error)
-        return None
+        return tell_damaged(what, str(error))
 
 
 def _content(path: Path) -> bytes:
@@ -93,13 +93,16 @@ def _content(path: Path) -> bytes:
     """
     # a pipe is opened without waiting for anybody who writes to it
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | _NO_LINK)
-    with open(descriptor, "rb") as file:
+    try:
         found = os.fstat(descriptor)
         if not stat.S_ISREG(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o022:
             raise PermissionError(f"{path} is not a file that only you can write to")
-        content = file.read()
+        with open(descriptor, "rb", closefd=False) as file:
+            content = file.read()
         with suppress(OSError):
             os.utime(descriptor)  # it is in use
+    finally:
+        os.close(descriptor)
     if content[:_DIGEST] != _digest(path.name, content[_DIGEST:]):
         raise OSError(f"{path} is damaged")
     return content[_DIGEST:]
@@ -136,6 +139,12 @@ def _replace(aside: Path, path: Path) -> None:
 
 def _digest(name: str, content: bytes) -> bytes:
     return hashlib.sha256(name.encode() + content).digest()
+
+
+@cache
+def tell_damaged(what: str, why: str) -> Any:
+    """Log, once, why machine code is compiled again."""
+    _logger.warning("machine code of %s cannot be used and is compiled again: %s", what, why)
 
 
 @cache

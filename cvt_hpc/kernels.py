@@ -406,8 +406,7 @@ def _found(name: str, compiled: _Kernel, kinds: tuple, walk: Walk) -> CompileRes
             *(False, (), "", reload, environments),
         )
     except Exception as error:  # whatever it is: it can be compiled again
-        _logger.warning("machine code of %s is compiled again: %s", compiled.__name__, error)
-        return None
+        return kernel_store.tell_damaged(compiled.__name__, str(error))
 
 
 def _keep(name: str, found: CompileResult, walk: Walk) -> None:

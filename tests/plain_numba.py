@@ -19,12 +19,12 @@ import xarray as xr
 
 JOBS = Path(__file__).parents[1] / "jobs"
 RUNS = {
-    "elastic belt": ("quickstart.toml", "load=100 N m", ["duration=20 ms", "rise_time=2 ms"]),
+    "elastic belt": ("quickstart.toml", "load=100 N m", ["duration=40 ms", "rise_time=4 ms"]),
     "pushbelt": (
         "push_force.toml",
         "load=30 N m",
         [
-            *("duration=10 ms", "longest_duration=10 ms", "rise_time=2 ms"),
+            *("duration=40 ms", "longest_duration=40 ms", "rise_time=4 ms"),
             *("elements=104", "band_high=1000 Hz"),
         ],
     ),

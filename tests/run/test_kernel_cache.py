@@ -37,7 +37,12 @@ PACKAGE = Path(kernels.__file__).parent
 @pytest.fixture
 def chosen(monkeypatch, tmp_path):
     """A folder that the user has chosen; what has been told before is told again."""
-    for told in (kernel_store.not_kept, kernel_store._remove_forgotten, kernels._tell_unknown):
+    for told in (
+        kernel_store.not_kept,
+        kernel_store.tell_damaged,
+        kernel_store._remove_forgotten,
+        kernels._tell_unknown,
+    ):
         told.cache_clear()
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "mine"))
     return tmp_path / "mine" / "cvt_hpc-kernels"
@@ -160,7 +165,7 @@ def test_kernels_are_alike_wherever_they_stand(text, values):
 def test_what_cannot_be_compared_is_not_guessed(value):
     if value in (open, Pair):
         value = partial(value)
-    with pytest.raises(UnknownValueError, match="g: a"):
+    with pytest.raises(UnknownValueError, match="g(.name)?: a"):
         Walk().kernel(
             kernel(made("def f(x): return g.name", g=value if value is not module else module(name=object())))
         )
@@ -232,7 +237,8 @@ def test_types_of_arguments_count_with_the_names_of_fields():
         )
     ]
     kinds += [numba.types.Omitted(1), numba.types.Omitted(2), numba.types.literal(1)]
-    kinds += [numba.typeof(kernel(made(text))) for text in ("def f(x): return x", "def f(x): return -x")]
+    given = [kernel(made(text)) for text in ("def f(x): return x", "def f(x): return -x")]
+    kinds += map(numba.typeof, given)
     assert len({repr(Walk().type(kind)) for kind in kinds}) == len(kinds)
     with pytest.raises(UnknownValueError, match="a value of the type"):
         Walk().type(numba.types.pyobject)
@@ -337,7 +343,7 @@ def test_what_is_typed_into_a_notebook_is_kept_and_follows_each_change(printed):
         "0.5",
         "1",
         "0.75",
-        "0",
+        "1",
     ]
 
 
@@ -429,7 +435,7 @@ def plus(x): pass
 @overload(plus)
 def typed(x):
     print("typing", flush=True)
-    sys.stdin.readline()
+    input()
     return lambda x: x + 1.0
 @kernels.kernel
 def slow(x): return plus(x)
@@ -463,11 +469,11 @@ def test_who_needs_the_same_code_waits_for_the_process_that_compiles_it(tmp_path
 
 def test_a_kernel_of_which_not_all_is_known_is_compiled_and_not_kept(chosen, caplog):
     compiled = kernel(lambda x: other(x))
-    other = numba.njit(plus_one)  # its name could be that of another process's function
+    other = numba.njit(plus_one)  # what it has been compiled from is not known
     assert compiled(1.0) == 2.0
     assert entries(chosen) == []
     (line,) = caplog.messages
-    assert "is not kept: it depends on" in line and "plus_one" in line
+    assert "is not kept: it depends on a function that is no kernel" in line
 
 
 def test_a_result_of_a_type_that_only_this_process_knows_is_not_kept(chosen, caplog):
