@@ -133,9 +133,17 @@ def one_line(text: str) -> str:
     """
     if len(text) > _LONGEST_LINE:
         text = f"{text[: _LONGEST_LINE - _LINE_END]} ... {text[-_LINE_END:]}"
+    return escaped(text)
+
+
+def escaped(text: str, kept: str = "") -> str:
+    """Return a text with escapes for characters that do not print, other than those `kept`.
+
+    Among them are those that turn the direction of what follows, so that it reads as something else.
+    """
     if text.isprintable():
         return text
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    return "".join(c if c.isprintable() or c in kept else c.encode("unicode_escape").decode() for c in text)
 
 
 def check_keys(entry: Any, where: str, depth: int = DEEPEST) -> None:

@@ -22,6 +22,7 @@ EXPANSION = 1032  # bytes of values that deflate keeps in one byte, at most
 SMALL = 1 << 26  # [bytes] of values that any file may declare
 LONGEST_TEXT = 1_000  # [bytes] of an attribute by which this program knows a file
 MOST_PARTS = 5_000  # variables and attributes; a study has some 600
+MOST_ATTRIBUTES = 200  # of a variable or the file; the library goes through all of them to find one
 DAMAGE = (  # what fails in a file with changed bytes
     ArithmeticError,
     AttributeError,
@@ -115,7 +116,9 @@ def _values(stored: h5d.DatasetID, size: int, place: str) -> int:
 
 
 def _attributes(stored: Any, size: int, most: int, place: str) -> Iterator[tuple[str, int]]:
-    for index in range(h5a.get_num_attrs(stored)):
+    if (count := h5a.get_num_attrs(stored)) > MOST_ATTRIBUTES:
+        raise mismatch(place, f"at most {MOST_ATTRIBUTES} attributes", str(count))
+    for index in range(count):
         one = h5a.open(stored, index=index)
         where = f"{place}: {one.name.decode('utf-8', 'replace')}"
         yield where, _attribute(one, stored, size, most, where)
@@ -127,7 +130,9 @@ def _attribute(one: h5a.AttrID, stored: Any, size: int, most: int, place: str) -
     if one.name == b"DIMENSION_LIST":  # of the netCDF library's own: what leads to the coordinates
         sound = within == h5t.VLEN and kind.get_super().get_class() == h5t.REFERENCE and count == stored.rank
     elif one.name == b"REFERENCE_LIST":  # and back
-        parts = [kind.get_member_class(k) for k in range(kind.get_nmembers())] if within == h5t.COMPOUND else []
+        parts = (
+            [kind.get_member_class(k) for k in range(kind.get_nmembers())] if within == h5t.COMPOUND else []
+        )
         sound = parts == [h5t.REFERENCE, h5t.INTEGER]
     else:
         sound = _width(kind, size) > 0

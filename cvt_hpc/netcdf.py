@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from cvt_hpc.dataset_form import check_form
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.files import kind_of, naming_refusals, open_regular, written_aside
 from cvt_hpc.provenance import command, git_revision, history_line, merge_versions, versions
@@ -205,9 +206,6 @@ def holds(path: Path, content: str, *, follow: bool = False) -> bool:
     from cvt_hpc.hdf5 import global_text
 
     return global_text(path, CONTENT) == content
-
-
-def check_form(dataset, source): pass
 
 
 def open_netcdf(path: Path, *, follow: bool = False, **options: Any) -> xr.Dataset:

@@ -73,8 +73,7 @@ def opened(folder: Path) -> Iterator[Kept]:
     with ExitStack() as stack:
         results = stack.enter_context(open_results(folder)).load()
         histories = [
-            stack.enter_context(open_netcdf(path))
-            for path in sorted((folder / "histories").glob("run-*.nc"))
+            stack.enter_context(open_netcdf(path)) for path in sorted((folder / "histories").glob("run-*.nc"))
         ]
         yield Kept(results, histories)
 
