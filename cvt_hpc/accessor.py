@@ -25,6 +25,7 @@ from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, check
 from cvt_hpc.analysis.composing import compose
 from cvt_hpc.analysis.conversion import in_si, in_units
 from cvt_hpc.analysis.result_tables import read_table
+from cvt_hpc.dataset_form import check_form
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.picture_kinds import END, HISTORIES, HISTORY, KINDS, RESULTS, Kind
 from cvt_hpc.study import open_results
@@ -54,6 +55,7 @@ class Results:
     """
 
     def __init__(self, dataset: xr.Dataset) -> None:
+        check_form(dataset, "results")
         self._dataset = dataset
 
     def map(

@@ -75,10 +75,10 @@ def naming_refusals(path: Path, expected: str) -> Iterator[None]:
         raise StorageError(f"{path}: expected {expected}, found: {found}") from error
 
 
-def kind_of(path: Path) -> str | None:
-    """Return the kind of object at a path, such as "a file" or "a link", without following it, or None."""
+def kind_of(path: Path, *, follow: bool = False) -> str | None:
+    """Return the kind of object at a path, such as "a file", or "a link", unless it is followed, or None."""
     try:
-        return _kind(os.lstat(path).st_mode)
+        return _kind(os.stat(path, follow_symlinks=follow).st_mode)
     except (FileNotFoundError, NotADirectoryError):
         return None
 
@@ -89,7 +89,7 @@ def refuse_link(path: Path) -> None:
         raise InputError(f"{path}: expected a folder of its own, found a link, which may lead anywhere")
 
 
-def open_regular(path: Path, flags: int = os.O_RDONLY) -> int:
+def open_regular(path: Path, flags: int = os.O_RDONLY, *, follow: bool = False) -> int:
     """Return the descriptor of a regular file, which is neither a link nor, for writing, linked twice.
 
     Parameters
@@ -98,6 +98,8 @@ def open_regular(path: Path, flags: int = os.O_RDONLY) -> int:
         The file.
     flags : int
         As of `os.open`.
+    follow : bool
+        Whether a link may lead to the file, since the user named it herself.
 
     Raises
     ------
@@ -105,9 +107,11 @@ def open_regular(path: Path, flags: int = os.O_RDONLY) -> int:
         If something else stands there, or the system refuses. Nothing is waited for.
     """
     # Before it is opened, since that alone may move a device; and after, for an object put there meanwhile.
-    if (found := kind_of(path)) not in (None, "a file"):
-        raise OSError(errno.EINVAL, f"{found} in the place of a file")
-    descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+    if (found := kind_of(path, follow=follow)) not in (None, "a file"):
+        number = errno.EISDIR if found == "a folder" else errno.EINVAL
+        raise OSError(number, f"{found} in the place of a file")
+    flags |= os.O_NONBLOCK | os.O_CLOEXEC | (0 if follow else os.O_NOFOLLOW)
+    descriptor = os.open(path, flags, 0o666)
     opened = os.fstat(descriptor)
     if not stat.S_ISREG(opened.st_mode):
         os.close(descriptor)
@@ -118,9 +122,9 @@ def open_regular(path: Path, flags: int = os.O_RDONLY) -> int:
     return descriptor
 
 
-def read_regular(path: Path, limit: int) -> bytes:
+def read_regular(path: Path, limit: int, *, follow: bool = False) -> bytes:
     """Return the content of a regular file of at most `limit` bytes; OSError as of `open_regular`."""
-    with os.fdopen(open_regular(path), "rb") as file:
+    with os.fdopen(open_regular(path, follow=follow), "rb") as file:
         if (size := os.fstat(file.fileno()).st_size) > limit:
             raise OSError(errno.EFBIG, f"a file of more than {limit >> 20} MiB")
         return file.read(size)

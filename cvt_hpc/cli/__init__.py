@@ -74,6 +74,12 @@ def main(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
+    except (MemoryError, RuntimeError) as error:
+        if not isinstance(error, MemoryError) and not str(error).startswith("NetCDF: "):
+            traceback.print_exc()
+            return CRASHED
+        complain(f"a dataset: expected values that can be read, found damaged or too many ones: {error}")
+        return BAD_INPUT
     except Exception:  # Python's own status for a defect, 1, means here that some runs failed
         traceback.print_exc()
         end_all(CRASHED)

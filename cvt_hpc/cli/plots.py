@@ -177,9 +177,7 @@ def _each(
 @contextmanager
 def _opened(files: Sequence[Path]) -> Iterator[list[Any]]:
     """Histories of runs, open within."""
-    import xarray as xr
+    from cvt_hpc.netcdf import open_netcdf
 
     with ExitStack() as stack:
-        yield [
-            stack.enter_context(xr.open_dataset(file, engine="netcdf4", decode_times=False)) for file in files
-        ]
+        yield [stack.enter_context(open_netcdf(file, follow=True)) for file in files]

@@ -26,7 +26,7 @@ from cvt_hpc.analysis.repeated import sample_sentences
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.analysis.starts import AXIS, has_starts
 from cvt_hpc.analysis.value_maps import value_map_figure
-from cvt_hpc.errors import InputError, mismatch, one_line
+from cvt_hpc.errors import InputError, escaped, mismatch, one_line
 from cvt_hpc.files import written_aside
 from cvt_hpc.job import Job, rebuild_job
 from cvt_hpc.job.summary import core_time_in_words, rules_in_words, value_in_words
@@ -42,7 +42,7 @@ from cvt_hpc.report.findings import (
     summary,
     window_sentences,
 )
-from cvt_hpc.report.interactive import as_script, map_data
+from cvt_hpc.report.interactive import KEPT, as_script, map_data
 from cvt_hpc.report.quantities import quantities
 
 MOST_FAILURES = 30  # kinds of failure in the table
@@ -97,11 +97,17 @@ def write_report(dataset: xr.Dataset, out: Path, source: str = "results", folder
     check_results(dataset, source)
     if (content := str(dataset.attrs.get(CONTENT, ""))) == HISTORY:
         raise mismatch(source, "results of a study", f"the {content}; `cvt-hpc plot` draws it")
-    templates = jinja2.Environment(loader=jinja2.PackageLoader("cvt_hpc.report", "."), autoescape=True)
+    loader = jinja2.PackageLoader("cvt_hpc.report", ".")
+    templates = jinja2.Environment(loader=loader, autoescape=True, finalize=_as_it_stands)
     page = templates.get_template("page.html").render(_content(dataset, source, folder))
     with written_aside(Path(out), parents=True) as aside:
         aside.write_text(page, encoding="utf-8")
     return Path(out)
+
+
+def _as_it_stands(value: Any) -> Any:
+    """What a page shows of a text: escapes for characters that would turn or hide what is beside them."""
+    return escaped(value, KEPT) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str, Any]:
@@ -231,7 +237,7 @@ def _encoded(compose: Callable[[], Figure]) -> str:
 
 def _with_code(text: str) -> Markup:
     """A text as HTML: what stands between backticks as code, numbers never parted from their units."""
-    text = with_units(text).replace("N m", "N\u00a0m")
+    text = with_units(_as_it_stands(text)).replace("N m", "N\u00a0m")
     parts = [
         Markup("<code>{}</code>" if k % 2 else "{}").format(part) for k, part in enumerate(text.split("`"))
     ]

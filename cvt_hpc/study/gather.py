@@ -12,8 +12,8 @@ import numpy as np
 
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.files import discard, kind_of, naming_refusals, written_aside
-from cvt_hpc.locks import locked, refuse_locked
-from cvt_hpc.netcdf import global_attributes, refuse_beside_sweep, variable_attributes
+from cvt_hpc.locks import locked
+from cvt_hpc.netcdf import global_attributes, open_netcdf, refuse_beside_sweep, variable_attributes
 from cvt_hpc.provenance import history_line
 from cvt_hpc.study.chunks import chunk_shape, fill
 from cvt_hpc.study.description import Study
@@ -163,12 +163,10 @@ def open_results(path: str | Path) -> xr.Dataset:
     InputError
         If there is no dataset, or none that can be read, or in a thread beside a sweep.
     """
-    import xarray as xr
-
     refuse_beside_sweep(str(path))
     found = Path(path)
     with naming_refusals(found, "a netCDF dataset"):
-        if found.is_dir():
+        if is_folder := found.is_dir():
             folder = StudyFolder(found)
             found = folder.results
             if not found.exists() or kind_of(folder.job_file) is not None:
@@ -179,19 +177,10 @@ def open_results(path: str | Path) -> xr.Dataset:
                 )
         if not found.exists():
             raise mismatch(str(found), "a netCDF dataset", "nothing", study_instead(found))
-        if not found.is_file():
-            raise InputError(f"{found}: expected a netCDF dataset, found {kind_of(found)}")
         if found.suffix == ".toml":
             expected = "the output folder of a run, or a dataset"
             raise mismatch(str(found), expected, "a job file", study_instead(found))
-        try:
-            # Quantities in seconds are numbers, not dates.
-            return xr.open_dataset(found, engine="netcdf4", decode_times=False, chunks={})
-        except ValueError as error:
-            raise InputError(f"{found}: expected a netCDF dataset, found: {error}") from error
-        except OSError:
-            refuse_locked(found)
-            raise
+    return open_netcdf(found, follow=not is_folder, chunks={})
 
 
 def write_results(folder: StudyFolder, study: Study, records: Records) -> Path:

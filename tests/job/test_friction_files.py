@@ -152,6 +152,13 @@ def test_only_regular_text_files_of_a_sane_size_are_read(write):
     assert refusal(path) == f"{place}: {file}: expected a text file (CSV in UTF-8), found binary data"
 
 
+@pytest.mark.parametrize("name", ["/proc/kmsg", "/proc/self/maps", "/dev/zero", "/dev/tty"])
+def test_a_file_of_the_kernel_is_not_waited_for(write, name):
+    path = write(None)
+    path.write_text(path.read_text().replace("mu.csv", name))
+    assert refusal(path).startswith(f"[friction] table_file: {name}: expected ")
+
+
 def test_a_file_is_one_and_beside_no_lists(write):
     path = write(PER_LENGTH, job=JOB + "table_mu = [[1, 2], [1, 2]]\n")
     assert refusal(path) == "[friction] table_file: expected either table_file or table_mu, found both"
