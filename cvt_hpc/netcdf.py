@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -24,6 +26,38 @@ CONTENT = "cvt_hpc_content"  # global attribute by which this program knows its 
 HISTORY = "history of one run"
 DIAGRAM = "bifurcation diagram"
 VOLATILE = "depends on the machine and the hour; not reproduced bitwise"
+
+
+_is_sweeping = False
+
+
+@contextmanager
+def library_for_sweep() -> Iterator[None]:
+    """Let no second thread use the HDF5 library, which would break, while this one sweeps.
+
+    Raises
+    ------
+    InputError
+        If this is not the main thread: signals reach no other one.
+    """
+    global _is_sweeping
+    _expect_main_thread("run", "start a process for each sweep")
+    _is_sweeping = True
+    try:
+        yield
+    finally:
+        _is_sweeping = False
+
+
+def refuse_beside_sweep(what: str) -> None:
+    """Raise InputError if this is a thread beside a sweep."""
+    if _is_sweeping:
+        _expect_main_thread(what, "read datasets before the sweep, or in another process")
+
+
+def _expect_main_thread(what: str, then: str) -> None:
+    if (thread := threading.current_thread()) is not threading.main_thread():
+        raise mismatch(what, "the main thread of the process", f"the thread {thread.name}", then)
 
 
 class Named(Protocol):
