@@ -15,7 +15,10 @@ from typing import Any
 _QUANTITY = re.compile(
     r"\s*(?P<number>[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|(?:inf|nan)(?![A-Za-z])))\s*(?P<unit>.*?)\s*"
 )
-_TOKEN = re.compile(r"(?P<name>[A-Za-zµμ_]+)(?:(?:\^|\*\*)?(?P<power>[+-]?[1-9]))?(?!\d)|[*/()]|1(?!\d)|\s+")
+_TOKEN = re.compile(
+    r"(?P<name>[A-Za-zµμ_]+)(?:(?:\s*(?:\^|\*\*)\s*)?(?P<power>[+-]?[1-9]))?(?!\d)|"
+    r"[*/()]|1(?!\d)|\s+"
+)
 _TYPOGRAPHY = str.maketrans(
     {"·": "*", "²": "2", "³": "3", "⁻": "-", "¹": "1", "%": " percent ", "°": " degree "}
 )
@@ -66,6 +69,14 @@ def from_si(value: float, unit: str, wanted: str) -> float:
     if wanted == unit or not math.isfinite(value):
         return value
     return float(_convert(Decimal(repr(float(value))), unit, wanted))
+
+
+def is_unit(text: str) -> bool:
+    """Return whether a text is a unit, of whatever dimension."""
+    try:
+        return bool(_parse_unit(text))
+    except UnitError:
+        return False
 
 
 def unit_in(raw: Any) -> str:
