@@ -32,6 +32,7 @@ from cvt_hpc.vibration.onsets import levels, onsets
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
     from cvt_hpc.analysis.animation import Animation
 
@@ -100,6 +101,18 @@ class Results:
         from cvt_hpc.report import write_report
 
         return write_report(in_si(self._dataset), Path(out))
+
+    def table(self) -> DataFrame:
+        """Return a data frame with a row for each run.
+
+        Its columns are the axes in the units of the job, `status`, `class`, and all results in the units of
+        the dataset, those of strands and pulleys by their names: `amplitude_t1 [m]`. Flags are words. Unlike
+        `to_dataframe`, which has a row for each value of each spectrum, it leaves out spectra and profiles.
+        `cvt-hpc table` writes it as CSV or XLSX.
+        """
+        from cvt_hpc.analysis.run_table import run_table
+
+        return run_table(self._dataset)
 
     def in_units(self, **units: str) -> xr.Dataset:
         """Return the dataset with some variables and coordinates in other units: `in_units(loss="kW")`.

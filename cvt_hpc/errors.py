@@ -41,6 +41,10 @@ class UnitWarning(JobWarning):
     """A number without a unit that is far from usual: it may be meant in another unit."""
 
 
+class NoEffectWarning(JobWarning):
+    """A value of a job that changes none of its runs."""
+
+
 def mismatch(where: str, expected: str, found: str, then: str = "") -> InputError:
     """Return the error for a value that differs from the expected one.
 

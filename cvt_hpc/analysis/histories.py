@@ -204,9 +204,14 @@ def _title(dataset: xr.Dataset) -> str:
 
 
 def place_of(attributes: Mapping[str, Any]) -> list[str]:
-    """Where a run stands: its values on the axes of the job, and where else it departs from the job."""
+    """Where a run stands, in words: the parts of `values_of`, such as "friction gradient -0.8 s/m"."""
+    return [f"{key.replace('_', ' ')} {text}" for key, text in values_of(attributes).items()]
+
+
+def values_of(attributes: Mapping[str, Any]) -> dict[str, str]:
+    """By key the values of a run on the axes of its job, and where else it departs from the job."""
     if not {"job", "point"} <= attributes.keys():
-        return []
+        return {}
     job, point = json.loads(attributes["job"]), json.loads(attributes["point"])
     schema = load_schema(job["model"], job["stepper"], "history")
     tables = {key: value for section in schema.sections for key, value in job.get(section, {}).items()}
@@ -215,7 +220,7 @@ def place_of(attributes: Mapping[str, Any]) -> list[str]:
     keys = [key for key in (*job["axes"], *others) if key in point]
     units = _job_units(attributes)
     told = {key: {"units": schema.parameters[key].unit, JOB_UNITS: units.get(key, "")} for key in keys}
-    return [f"{key} {shown(point[key], told[key])}" for key in keys]
+    return {key: shown(point[key], told[key]) for key in keys}
 
 
 def _job_units(attributes: Mapping[str, Any]) -> dict[str, str]:

@@ -20,6 +20,7 @@ from cvt_hpc import __version__
 from cvt_hpc.cli import checking, experiments, plots, results, single_run, starting, sweep
 from cvt_hpc.cli.parts import DONE, INTERRUPTED, complain, end_all, speaks
 from cvt_hpc.errors import BAD_INPUT, CRASHED, InputError, JobWarning, did_you_mean, mismatch, one_line, show
+from cvt_hpc.files import open_missing_streams
 
 __all__ = ["main"]
 
@@ -45,6 +46,7 @@ def main(arguments: list[str] | None = None) -> int:
         Exit status: 0 done, 1 some runs failed, 2 bad input, 70 a defect of this program, 99 stopped early
         and to be gone on with, 98 the same without any gain.
     """
+    open_missing_streams()
     told = logging.StreamHandler()
     told.setFormatter(_OneLine("cvt-hpc: %(message)s"))
     logging.basicConfig(handlers=[told])

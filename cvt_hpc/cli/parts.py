@@ -20,7 +20,7 @@ Result = TypeVar("Result")
 
 DONE, SOME_FAILED, INTERRUPTED = 0, 1, 130
 PICTURES = (".png", ".svg", ".pdf")
-LONGEST_NAME = 100  # letters of a picture's name
+LONGEST_NAME, LONGEST_NAMES = 100, 60  # letters of a picture's name, and of the files' names within it
 # what --set does
 REPLACE = (
     "replace a value of the job, or an axis by one value, a list [40, 60] or a range {from=, to=, step=}"
@@ -112,6 +112,11 @@ def end_all(status: int, line: str = "") -> None:
         launch.end_all(status, line)
 
 
+def files_of(results: Path) -> list[Path]:
+    """Return the dataset by whose name a picture of results is called; of a folder there is none."""
+    return [] if results.is_dir() else [results]
+
+
 def refuse_ranks(command: str, why: str) -> None:
     """Raise InputError if several processes were started together for a command that one does."""
     from cvt_hpc.study.ranks.launch import detect_launch
@@ -120,9 +125,15 @@ def refuse_ranks(command: str, why: str) -> None:
         raise mismatch(command, f"one process, because it {why}", f"{size} started")
 
 
-def picture_beside(path: Path, *words: str) -> Path:
-    """A picture beside a dataset, or in a folder, whose name tells what it shows."""
-    name = "_".join(re.sub(r"[^\w.=+-]+", "_", word) for word in words)
+def picture_beside(path: Path, files: Sequence[Path], *words: str) -> Path:
+    """The picture of datasets beside the first one, or in a folder: NAME_KIND_WHAT_AXIS=VALUE.png.
+
+    NAME is that of the files; `results`, which each study has, is left out. Of many it is that of the first.
+    """
+    names = [name for file in files if (name := file.stem) != "results"]
+    if len("_".join(names)) > LONGEST_NAMES:
+        names = [names[0][:LONGEST_NAMES], f"and_{len(names) - 1}_more"]
+    name = "_".join(re.sub(r"[^\w.=+-]+", "_", word) for word in (*names, *words))
     return folder_of(path) / f"{name[:LONGEST_NAME]}.png"
 
 

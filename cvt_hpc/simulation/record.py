@@ -71,6 +71,28 @@ def record_variables(job: Job) -> tuple[Variable, ...]:
     return (*_VERDICT, *own, *_COST, *march)
 
 
+def declared_record(model: str, source: str) -> tuple[list[Variable], dict[str, Coordinate]]:
+    """Return all quantities that a model declares of a run, with default settings or others, and dimensions.
+
+    Parameters
+    ----------
+    model : str
+        A model whose runs are recorded.
+    source : str
+        Who asks, for the error.
+
+    Raises
+    ------
+    InputError
+        If there is no such model, or its runs are not recorded.
+    """
+    from cvt_hpc.job import build_job
+
+    job = build_job({"name": model, "model": model}, source)
+    variables = {v.name: v for v in (*record_variables(job), *recorded_model(job).variables)}
+    return list(variables.values()), record_coordinates(job)
+
+
 def record_coordinates(job: Job) -> dict[str, Coordinate]:
     """Dimensions of a run's record beside the grid's.
 

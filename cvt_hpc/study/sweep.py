@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.errors import mismatch
-from cvt_hpc.files import StorageError
+from cvt_hpc.files import StorageError, open_missing_streams
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.locks import BusyError
 from cvt_hpc.netcdf import library_for_sweep
@@ -24,7 +24,7 @@ from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.forecast.cost_model import CostModel
 from cvt_hpc.study.forecast.needs import refuse_too_large
-from cvt_hpc.study.gather import gather_records
+from cvt_hpc.study.gather import LossError, gather_records
 from cvt_hpc.study.histories import keep_histories, leave_out_missing
 from cvt_hpc.study.part import Part, read_part
 from cvt_hpc.study.planning import Plan, asked_runs, next_round, prepare
@@ -37,7 +37,6 @@ from cvt_hpc.study.ranks.survival import outlive
 from cvt_hpc.study.ranks.time_limit import find_time_limit, planning_within
 from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.log import RecordLog
-from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.study.report import STOPPED, RunReport, build_report
 from cvt_hpc.study.simulator import Simulator, default_simulator
 from cvt_hpc.study.task import Task
@@ -136,6 +135,7 @@ def run(
     SystemExit
         With the exit status 99, or 98 if no run has ended, after other signals.
     """
+    open_missing_streams()
     started = time.monotonic()
     simulator = simulator or default_simulator()
     folder = _folder(job, out)
@@ -302,9 +302,14 @@ def _conclude(
                 raise
             stopped = stopped or signals.noted
             _logger.warning("%s; not gathered", error)
+        except LossError as error:
+            records = folder.read_records(task.study)
+            if records.recorded.all():
+                raise
+            _logger.warning("%s", error)  # runs that were damaged are yet to be done again
     gathers = records is not None
     if records is None:
-        records = read_records(folder.records, task.study)
+        records = folder.read_records(task.study)
     leave_out_missing(task.job, folder, records)
     asked = asked_runs(task, records, part)
     gained = int(records.recorded[asked].sum()) - plan.recorded
