@@ -18,7 +18,7 @@ class BuildWithExamples(build_py):
         super().run()
         if self.editable_mode:
             return
-        settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
+        settings = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
         examples = Path(self.build_lib) / "cvt_hpc" / "examples"
         shutil.rmtree(examples, ignore_errors=True)
         for pattern in settings["tool"]["cvt_hpc"]["examples"]:

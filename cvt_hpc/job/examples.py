@@ -32,8 +32,11 @@ def example_files() -> dict[str, Path]:
     patterns = ["**/*"]
     if not root.is_dir() and settings.is_file():
         root = package.parent
-        patterns = tomllib.loads(settings.read_text()).get("tool", {}).get("cvt_hpc", {}).get("examples", [])
+        patterns = (
+            tomllib.loads(settings.read_text("utf-8")).get("tool", {}).get("cvt_hpc", {}).get("examples", [])
+        )
     files = {path for pattern in patterns for path in root.glob(pattern) if path.is_file()}
+    files = {path for path in files if path.suffix != ".pyc"}  # which an installer makes of scripts
     if not files:
         raise mismatch("examples", f"those of a wheel or a checkout, beside {package}", "none")
     return {path.relative_to(root).as_posix(): path for path in sorted(files)}
@@ -98,7 +101,7 @@ def _read_by(name: str, known: Mapping[str, Path]) -> Iterator[str]:
     """Names of the other examples that a job or a notebook reads."""
     if known[name].suffix not in (".toml", ".ipynb"):
         return
-    for word in _QUOTED.findall(known[name].read_text()):
+    for word in _QUOTED.findall(known[name].read_text("utf-8")):
         other = os.path.normpath(PurePosixPath(name).parent / word)
         if other in known:
             yield other
@@ -106,7 +109,7 @@ def _read_by(name: str, known: Mapping[str, Path]) -> Iterator[str]:
 
 def _subject(path: Path) -> str:
     """What an example is about, by its own first words."""
-    text = path.read_text()
+    text = path.read_text("utf-8")
     if path.suffix == ".toml":
         return str(tomllib.loads(text).get("description", ""))
     if path.suffix == ".ipynb":
