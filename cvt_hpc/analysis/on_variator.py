@@ -268,7 +268,7 @@ def _draw_feeds(axes: Axes, powers: xr.DataArray, whole: dict[str, float]) -> No
     places, width = np.arange(len(names)), 0.8 / max(causes.size, 1)
     regions = powers.sizes["region"]
     largest = max([float(np.abs(powers.values).max()), *map(abs, whole.values())]) or 1.0
-    drawn = [
+    drawn: list[tuple[np.ndarray, np.ndarray, tuple[str, str], int]] = [
         (places[:regions] + (k - 0.5 * (causes.size - 1)) * width, powers.values[k], FEEDS[str(cause)][:2], k)
         for k, cause in enumerate(causes)
     ]

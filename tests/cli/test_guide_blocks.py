@@ -71,9 +71,7 @@ BEFORE = {
         cvt-hpc run jobs/quickstart.toml --set name=coarse --set stations=96
         cvt-hpc run jobs/quickstart.toml --set name=fine
     """,
-    "docs/guide/sweeps.md": """
-        cvt-hpc init JOB
-    """,
+    "docs/guide/sweeps.md": "cvt-hpc init JOB",
     "cvt_hpc/models/linear_stability/README.md": "cvt-hpc init JOB --model linear_stability",
     "cvt_hpc/models/steady_variator/README.md": "cvt-hpc init JOB --model steady_variator",
 }
