@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+BAD_INPUT = 2  # exit status
 CRASHED = 70  # exit status after a defect of this program; EX_SOFTWARE of sysexits.h
 LONGEST_KEY = 100  # letters
 DEEPEST = 20  # levels of tables and lists; a chart has some six
@@ -20,7 +21,14 @@ class InputError(ValueError):
 
     The command line prints it and ends with exit status 2. It is one line, whatever the names and texts in it
     hold.
+
+    Attributes
+    ----------
+    everywhere : bool
+        Whether all ranks that were started together raise it.
     """
+
+    everywhere = False
 
     def __init__(self, text: str) -> None:
         super().__init__(one_line(text))
@@ -32,6 +40,10 @@ class JobWarning(UserWarning):
 
 class UnitWarning(JobWarning):
     """A number without a unit that is far from usual: it may be meant in another unit."""
+
+
+class NoEffectWarning(JobWarning):
+    """A value of a job that changes none of its runs."""
 
 
 def mismatch(where: str, expected: str, found: str, then: str = "") -> InputError:

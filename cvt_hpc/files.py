@@ -9,8 +9,10 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import pwd
 import secrets
 import stat
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -36,7 +38,7 @@ class StorageError(InputError):
 
 def storage_error(path: Path, error: Exception, advice: str = "") -> StorageError:
     """Return the error to raise when the system refuses to write `path`; `advice` is added to its text."""
-    found = _reason(error)
+    found = f"{_reason(error)}{_of_whom(path, error)}"
     return StorageError(f"{path}: expected to be able to write, found: {found}{advice and f'. {advice}'}")
 
 
@@ -48,6 +50,19 @@ def _reason(error: Exception) -> str:
     return text
 
 
+def _of_whom(path: Path, error: Exception) -> str:
+    """Return, where the system refuses a right, who can grant it, and what else to do; else nothing."""
+    if getattr(error, "errno", None) not in (errno.EACCES, errno.EPERM):
+        return ""
+    place = Path(path).absolute()
+    while not os.path.lexists(place):  # what is missing was refused by the first folder above
+        place = place.parent
+    with contextlib.suppress(OSError, KeyError):
+        owner = pwd.getpwuid(os.lstat(place).st_uid).pw_name
+        return f" ({place} belongs to {owner}, who can grant the right; or choose another --out, or copy it)"
+    return ""
+
+
 @contextlib.contextmanager
 def naming_refusals(path: Path, expected: str) -> Iterator[None]:
     """Turn a refusal of the system within a `with` into an error that states what was expected of `path`."""
@@ -56,7 +71,8 @@ def naming_refusals(path: Path, expected: str) -> Iterator[None]:
     except OSError as error:
         if error.errno in _FULL:
             raise storage_error(path, error) from error
-        raise StorageError(f"{path}: expected {expected}, found: {_reason(error)}") from error
+        found = f"{_reason(error)}{_of_whom(path, error)}"
+        raise StorageError(f"{path}: expected {expected}, found: {found}") from error
 
 
 def kind_of(path: Path, *, follow: bool = False) -> str | None:
@@ -200,6 +216,25 @@ def discard(path: Path) -> None:
     """Remove a file that was not finished, if it is there and the system lets us."""
     with contextlib.suppress(OSError):
         path.unlink()
+
+
+def open_missing_streams() -> None:
+    """Lead standard streams that are closed to nowhere.
+
+    The system would give their numbers to files that are opened next, and what libraries print there would be
+    written into these.
+    """
+    for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
+        if getattr(sys, name) is not None:
+            continue
+        try:
+            os.fstat(number)
+        except OSError:
+            descriptor = os.open(os.devnull, os.O_RDWR)
+            if descriptor != number:
+                os.dup2(descriptor, number)
+                os.close(descriptor)
+        setattr(sys, name, open(os.devnull, mode))
 
 
 def _kind(mode: int) -> str:

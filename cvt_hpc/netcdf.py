@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import os
 import platform
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -15,6 +17,7 @@ import numpy as np
 from cvt_hpc.dataset_form import check_form
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.files import kind_of, naming_refusals, open_regular, written_aside
+from cvt_hpc.locks import refuse_locked
 from cvt_hpc.provenance import command, git_revision, history_line, merge_versions, versions
 
 if TYPE_CHECKING:
@@ -26,6 +29,38 @@ CONTENT = "cvt_hpc_content"  # global attribute by which this program knows its 
 HISTORY = "history of one run"
 DIAGRAM = "bifurcation diagram"
 VOLATILE = "depends on the machine and the hour; not reproduced bitwise"
+
+
+_is_sweeping = False
+
+
+@contextmanager
+def library_for_sweep() -> Iterator[None]:
+    """Let no second thread use the HDF5 library, which would break, while this one sweeps.
+
+    Raises
+    ------
+    InputError
+        If this is not the main thread: signals reach no other one.
+    """
+    global _is_sweeping
+    _expect_main_thread("run", "start a process for each sweep")
+    _is_sweeping = True
+    try:
+        yield
+    finally:
+        _is_sweeping = False
+
+
+def refuse_beside_sweep(what: str) -> None:
+    """Raise InputError if this is a thread beside a sweep."""
+    if _is_sweeping:
+        _expect_main_thread(what, "read datasets before the sweep, or in another process")
+
+
+def _expect_main_thread(what: str, then: str) -> None:
+    if (thread := threading.current_thread()) is not threading.main_thread():
+        raise mismatch(what, "the main thread of the process", f"the thread {thread.name}", then)
 
 
 class Named(Protocol):
@@ -229,6 +264,8 @@ def open_netcdf(path: Path, *, follow: bool = False, **options: Any) -> xr.Datas
     ------
     StorageError
         Something other than a file is there, or the system refuses.
+    BusyError
+        A process that may write to the file has it open.
     InputError
         The file is not netCDF-4, is damaged, or is not as `check_hdf5` and `check_form` have it.
     """
@@ -247,6 +284,7 @@ def open_netcdf(path: Path, *, follow: bool = False, **options: Any) -> xr.Datas
         try:
             dataset = xr.open_dataset(path, engine="netcdf4", decode_times=False, **options)
         except OSError as error:
+            refuse_locked(path)
             if error.errno and error.errno > 0:  # of the system, not of the library
                 raise
             raise mismatch(place, "a netCDF dataset", "one that is damaged") from None

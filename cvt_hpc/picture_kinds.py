@@ -57,8 +57,6 @@ class Kind(NamedTuple):
         Beside those of all kinds of the subject.
     sides : tuple of str
         Of `x`, `y`, `panel`: sides on which an axis can be put.
-    picture : str
-        Name of its file, with HISTORY for that of the runs; without it the name of the kind.
     data : str
         As `figure`: a function that gives a dataset of what is drawn, where there is one.
     """
@@ -68,7 +66,6 @@ class Kind(NamedTuple):
     text: str
     options: tuple[Option, ...] = ()
     sides: tuple[str, ...] = ()
-    picture: str = ""
     data: str = ""
 
 
@@ -137,13 +134,11 @@ KINDS = {
                 {"metavar": "AXIS"},
             ),
         ),
-        picture="curve_QUANTITY",
     ),
     "wrap": Kind(
         HISTORIES,
         "wraps.wrap_figure",
         "forces between belt and pulleys over the wrap, of one run or of several",
-        picture="HISTORY_wrap",
     ),
     "profile": Kind(
         HISTORIES,
@@ -172,7 +167,6 @@ KINDS = {
             ),
             _end("moments"),
         ),
-        picture="ramp_WHAT",
     ),
     "spectrogram": Kind(
         HISTORIES,
@@ -197,31 +191,26 @@ KINDS = {
         HISTORY,
         "histories.history_figure",
         "a kept run: displacement, spectrum, load, forces and feeds around the belt",
-        picture="HISTORY_history",
     ),
     "phase": Kind(
         HISTORY,
         "histories.phase_figure",
         "phase portraits: velocity of each strand over its displacement",
-        picture="HISTORY_phase",
     ),
     "flanks": Kind(
         HISTORY,
         "flanks.flanks_figure",
         "left and right flank of a spatial pushbelt, with the ends of the arcs enlarged",
-        picture="HISTORY_flanks",
     ),
     "energy": Kind(
         HISTORY,
         "on_variator.energy_figure",
         "powers around the belt: what friction takes on the arcs, what feeds the vibration",
-        picture="HISTORY_energy",
     ),
     "variator": Kind(
         HISTORY,
         "on_variator.variator_figure",
         "quantities along the belt drawn on the variator, such as forces, speeds and slip",
         (_several("default: push_force, of belt drives tension"),),
-        picture="HISTORY_variator",
     ),
 }

@@ -8,13 +8,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+from cvt_hpc.job.shown import JOB_UNITS, shown_number
 from cvt_hpc.job.summary import cost_in_words
+from cvt_hpc.job.template import CUSTOMARY
 from cvt_hpc.tables import columns
 from cvt_hpc.variables import Status, flag_in_words
 from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS
 
 if TYPE_CHECKING:
+    import numpy as np
     import xarray as xr
+    from numpy.typing import NDArray
 
     from cvt_hpc.analysis.comparison import Cell, Comparison
     from cvt_hpc.job import Job
@@ -40,7 +44,22 @@ _AGAIN = {
     "failed_numerics": "does them again, at half the step where they take steps",
     "timed_out": "and a longer --run-limit does them again",
 }
-_FLAGS_FIRST = ("status", "vibrates", "reason")
+# of one run, the first lines of all
+_FIRST = (
+    "status",
+    "vibrates",
+    "reason",
+    "amplitude",
+    "frequency",
+    "growth_rate",
+    "thrust_ratio",
+    "slip_margin",
+    "speed_loss",
+    "loss",
+    "efficiency",
+)
+MOST_OUTCOMES = len(_FIRST)
+_LEAST, _MOST = (1.0, 0.1), 1e4  # between these numbers are readable, above the first least best
 _ALWAYS_SHOWN = {"strand", "pulley"}
 _LARGEST_LINE = 4  # values along other dimensions: no spectrum and no history
 
@@ -113,16 +132,40 @@ def comparison_lines(found: Comparison, sources: tuple[str, str]) -> Iterator[st
     yield from (f"differs: {line}" for line in found.differences or ("nothing that the datasets tell",))
     yield f"{found.pairs.size} cells, by class in A (rows) and in B (columns):"
     yield from _class_table(found)
-    contradicting = int(found.contradicts.sum())
+    yield from _design_lines(found) if found.are_designs else _contradiction_lines(found)
+    yield from deviations(found)
+
+
+def _contradiction_lines(found: Comparison) -> Iterator[str]:
+    """Yield in what two methods contradict each other, and where."""
     beyond = int(found.contradicts_beyond.sum())
     yield (
-        f"{contradicting} of {int(found.answered.sum())} cells contradict (quiet against vibrating), "
-        f"{beyond} of them beyond the threshold (larger amplitude not within {NEAR:.0%} of it)"
+        f"{int(found.contradicts.sum())} of {int(found.answered.sum())} cells contradict (quiet against "
+        f"vibrating), {beyond} of them beyond the threshold (larger amplitude not within {NEAR:.0%} of it)"
     )
-    yield from map(_cell_line, islice(found.rows(found.contradicts), MOST_CONTRADICTIONS_NAMED))
-    if contradicting > MOST_CONTRADICTIONS_NAMED:
-        yield f"  {contradicting - MOST_CONTRADICTIONS_NAMED} more in the table"
-    yield from deviations(found)
+    yield from _cell_lines(found, found.contradicts)
+
+
+def _design_lines(found: Comparison) -> Iterator[str]:
+    """Yield in what the second of two designs is better, in what worse, and where it is worse."""
+    better, worse = int(found.better.sum()), int(found.worse.sum())
+    yield (
+        f"two designs: of {int(found.answered.sum())} cells B is better in {better} (quiet where A vibrates) "
+        f"and worse in {worse} (vibrates where A is quiet)"
+    )
+    if not math.isnan(ratio := found.amplitude_ratio()):
+        word = "better" if ratio < 1.0 else "worse" if ratio > 1.0 else "alike"
+        yield f"amplitude where both vibrate: in B {ratio:.3g} times that in A (median), {word}"
+    if worse:
+        yield "worse in B:"
+        yield from _cell_lines(found, found.worse)
+
+
+def _cell_lines(found: Comparison, chosen: NDArray[np.bool_]) -> Iterator[str]:
+    """Yield a line for each of the first cells that are chosen, and the number of the others."""
+    yield from map(_cell_line, islice(found.rows(chosen), MOST_CONTRADICTIONS_NAMED))
+    if (left := int(chosen.sum()) - MOST_CONTRADICTIONS_NAMED) > 0:
+        yield f"  {left} more in the table"
 
 
 def _class_table(found: Comparison) -> Iterator[str]:
@@ -241,15 +284,44 @@ def point_lines(job: Job, at: Mapping[str, Any]) -> Iterator[str]:
     # a load that is given leaves no share of which it would follow
     keys = dict.fromkeys([*(axis.name for axis in job.axes), *(value.name for value in job.derived), *at])
     schema = job.schema
-    words = [f"{key} {schema.in_words(key, point[key])}" for key in keys if key in point]
+    words = [f"{key.replace('_', ' ')} {schema.in_words(key, point[key])}" for key in keys if key in point]
     if words:
         yield f"at      {', '.join(words)}"
 
 
-def outcome_lines(dataset: xr.Dataset) -> Iterator[str]:
+def units_of(job: Job) -> dict[str, list[str]]:
+    """Return by SI unit, as datasets write it, the units in which a job gives values of it."""
+    units: dict[str, list[str]] = {}
+    for key, unit in job.units.items():
+        if key in job.schema.parameters:
+            units.setdefault(_with_powers(job.schema.parameters[key].unit), []).append(unit)
+    return units
+
+
+def _with_powers(unit: str) -> str:
+    """Return "m/s" as "m s-1"."""
+    above, divided, below = unit.partition("/")
+    return f"{above} {below}-1" if divided else unit
+
+
+_CUSTOMARY = {_with_powers(unit): [wanted for _, wanted in known] for unit, known in CUSTOMARY.items()}
+
+
+def outcome_lines(
+    dataset: xr.Dataset, units: Mapping[str, Sequence[str]] | None = None, most: int | None = None
+) -> Iterator[str]:
     """Yield the lines that say what one run gave: its scalars, and what is per strand or pulley.
 
     No number that is none; of a run that failed only what is known, without a verdict.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        A run.
+    units : mapping, optional
+        By SI unit those that are preferred, as of `units_of`; without it all numbers are in SI units.
+    most : int, optional
+        Number of lines, with what matters first; all by default, and where one line alone would be left out.
     """
     names = [
         str(name)
@@ -260,21 +332,42 @@ def outcome_lines(dataset: xr.Dataset) -> Iterator[str]:
     ]
     if int(dataset["status"]) != Status.DONE:
         names = [name for name in names if name in _KNOWN_OF_FAILURES]
-    names.sort(key=lambda name: name not in _FLAGS_FIRST)
-    rows = [(name, words) for name in names if (words := _array_in_words(dataset[name]))]
-    yield from columns(rows, indent="")
+    names.sort(key=lambda name: _FIRST.index(name) if name in _FIRST else len(_FIRST))
+    rows = [(name, words) for name in names if (words := _array_in_words(dataset[name], units))]
+    shown = rows[: None if most is None or len(rows) <= most + 1 else most]
+    yield from columns([(name.replace("_", " "), words) for name, words in shown], indent="")
+    if left := len(rows) - len(shown):
+        yield f"{left} more by --all"
 
 
-def _array_in_words(array: xr.DataArray) -> str:
+def _array_in_words(array: xr.DataArray, units: Mapping[str, Sequence[str]] | None) -> str:
     """Return the values of a small array, each with its place where there are several, and the unit."""
     if "flag_meanings" in array.attrs:
         return flag_in_words(array)
+    known = array[array.notnull()] if array.ndim else array
     unit = array.attrs.get("units", "")
     unit = "" if unit == "1" else unit
-    if array.ndim == 0:
-        value = array.item()
-        return f"{value:.6g} {unit}".rstrip() if isinstance(value, float) else f"{value} {unit}".rstrip()
-    (dimension,) = array.dims
-    known = array[array.notnull()]
-    places = zip(known[dimension].values, known.values, strict=True)
-    return f"{', '.join(f'{place} {value:.6g}' for place, value in places)} {unit}".rstrip()
+    told = {"units": unit, JOB_UNITS: _readable_unit(known, unit, units)}
+    texts = [_number_in_words(value, told) for value in known.values.ravel().tolist()]
+    if array.ndim:
+        texts = [f"{place} {text}" for place, text in zip(known[array.dims[0]].values, texts, strict=True)]
+    return f"{', '.join(texts)} {told[JOB_UNITS] or unit}".rstrip()
+
+
+def _number_in_words(value: Any, told: Mapping[str, Any]) -> str:
+    return f"{shown_number(value, told):.6g}" if isinstance(value, float) else str(value)
+
+
+def _readable_unit(array: xr.DataArray, unit: str, units: Mapping[str, Sequence[str]] | None) -> str:
+    """Return the first unit, of the job and then of engineers, in which the largest value is readable.
+
+    It is "" for the SI unit, which comes last.
+    """
+    if units is None or array.dtype.kind != "f":
+        return ""
+    largest = float(abs(array).max())
+    for least in _LEAST:
+        for wanted in dict.fromkeys([*units.get(unit, ()), *_CUSTOMARY.get(unit, ()), ""]):
+            if least <= shown_number(largest, {"units": unit, JOB_UNITS: wanted}) < _MOST:
+                return wanted
+    return ""

@@ -97,6 +97,14 @@ class Variable:
         return self.words or self.name.replace("_", " ")
 
     @property
+    def meaning(self) -> str:
+        """Meaning in a line: words, comment, and the values of a flag."""
+        told = f"{self.words}: {self.comment}" if self.words else self.comment
+        if self.flags is None:
+            return told
+        return f"{told} ({', '.join(f'{flag.value} {flag.name.lower()}' for flag in self.flags)})"
+
+    @property
     def blank(self) -> float | int | str:
         """Value where nothing is known: NaN, 0, an empty text, and UNDECIDED of flags that have it."""
         if self.flags is not None:
@@ -130,3 +138,8 @@ class Coordinate(NamedTuple):
     units: str
     long_name: str
     comment: str = ""
+
+    @property
+    def meaning(self) -> str:
+        """Meaning in a line: long name and comment."""
+        return ": ".join(filter(None, (self.long_name, self.comment)))

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from cvt_hpc.job import build_job
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
-from cvt_hpc.simulation import record_coordinates, record_variables
+from cvt_hpc.simulation import declared_record
 
 PAGE, VARIABLES, DIMENSIONS = "variables.md", "<!-- variables -->", "<!-- dimensions -->"
 
@@ -20,17 +19,13 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     dimensions: dict[tuple[str, ...], list[str]] = {}
     recorded = [name for name in MODELS if load_model(name).is_recorded]
     for name in recorded:
-        job = build_job({"name": "guide", "model": name}, "guide")
-        declared = {v.name: v for v in (*record_variables(job), *load_model(name).variables)}
-        for v in declared.values():
-            meaning = f"{v.words}: {v.comment}" if v.words else v.comment
-            if v.flags is not None:
-                meaning += f" ({', '.join(f'{flag.value} {flag.name.lower()}' for flag in v.flags)})"
-            row = (f"`{v.name}`", ", ".join(v.dims), v.units, meaning)
+        declared, coordinates = declared_record(name, "guide")
+        for v in declared:
+            row = (f"`{v.name}`", ", ".join(v.dims), v.units, v.meaning)
             variables.setdefault(row, []).append(name)
-        for dimension, coordinate in record_coordinates(job).items():
-            meaning = ": ".join(filter(None, (coordinate.long_name, coordinate.comment)))
-            dimensions.setdefault((f"`{dimension}`", coordinate.units, meaning), []).append(name)
+        for dimension, coordinate in coordinates.items():
+            along = (f"`{dimension}`", coordinate.units, coordinate.meaning)
+            dimensions.setdefault(along, []).append(name)
     return markdown.replace(
         VARIABLES, _table(("variable", "along", "unit", "meaning", "models"), variables, recorded)
     ).replace(DIMENSIONS, _table(("dimension", "unit", "meaning", "models"), dimensions, recorded))

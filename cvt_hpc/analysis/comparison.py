@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -42,6 +42,9 @@ _HEAD = (
     "frequency_a [Hz]",
     "frequency_b [Hz]",
 )
+# Tables and keys that say how a scene is computed or disturbed, not what it is
+_METHOD = ("model", "stepper", "mesh", "numerics", "record", "run", "vibration", "auto", "design", "versions")
+_METHOD_KEYS = ("seed", "disturbance", "git_revision")
 
 
 class Deviation(NamedTuple):
@@ -113,6 +116,8 @@ class Comparison:
     quantities : dict
         Units of what the model has compared beside amplitude and frequency, by name: of a variable along
         strands or pulleys that with the label of the place, such as "strand_tension_t1".
+    are_designs : bool
+        Whether A and B are different scenes, of which one may be better, and not one scene computed twice.
     """
 
     cells: xr.Dataset
@@ -121,6 +126,17 @@ class Comparison:
     notes: tuple[str, ...]
     differences: tuple[str, ...]
     quantities: dict[str, str]
+    are_designs: bool = False
+
+    @property
+    def better(self) -> NDArray[np.bool_]:
+        """Whether a cell that vibrates in A is quiet in B, shape of the grid."""
+        return np.isin(self.pairs, (PairClass.A_ONLY, PairClass.A_ONLY_NEAR))
+
+    @property
+    def worse(self) -> NDArray[np.bool_]:
+        """Whether a cell that is quiet in A vibrates in B, shape of the grid."""
+        return np.isin(self.pairs, (PairClass.B_ONLY, PairClass.B_ONLY_NEAR))
 
     @property
     def pairs(self) -> NDArray[np.int8]:
@@ -159,6 +175,12 @@ class Comparison:
         if not known.size:
             return Deviation(math.nan, math.nan, math.nan)
         return Deviation(float(np.median(known)), float(np.quantile(known, 0.95)), float(known.max()))
+
+    def amplitude_ratio(self) -> float:
+        """Return the median of amplitude B over amplitude A where both vibrate; not a number of none."""
+        a, b = (self.cells[f"amplitude_{study}"].values for study in "ab")
+        both = (self.pairs == OccurrenceClass.VIBRATING) & (a > 0.0)
+        return float(np.median(b[both] / a[both])) if both.any() else math.nan
 
     def largest_difference(self, name: str) -> float:
         """Return the largest magnitude of B - A of one of `quantities` [SI] where both end; 0 of none."""
@@ -212,7 +234,9 @@ def compare(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str] = ("A", "B"))
     for study, found in zip("ab", quantities, strict=True):
         values |= {f"{name}_{study}": found[name][0] for name in common}
     cells = xr.Dataset({name: frame.copy(data=array) for name, array in values.items()})
-    return Comparison(cells, thresholds, aligned.left_out, aligned.notes, tuple(_differences(a, b)), common)
+    found = _differing(a, b)
+    told = aligned.left_out, aligned.notes, tuple(_in_words(found))
+    return Comparison(cells, thresholds, *told, common, any(map(_is_of_scene, found.items())))
 
 
 def _compared(*studies: xr.Dataset) -> list[str]:
@@ -274,11 +298,22 @@ def _threshold(dataset: xr.Dataset) -> float:
     return float(job_of(dataset).get("vibration", {}).get("amplitude_threshold", math.nan))
 
 
-def _differences(a: xr.Dataset, b: xr.Dataset) -> Iterator[str]:
-    """Yield in what two studies differ beside their axes, in words."""
+def _differing(a: xr.Dataset, b: xr.Dataset) -> dict[str, tuple[Any, Any]]:
+    """By key the values in A and in B of what differs beside their axes; None where there is none."""
     swept = {name for dataset in (a, b) for name in axes_of(dataset)}
     found = differences(_document(a), _document(b))
-    found = {key: pair for key, pair in found.items() if key.rpartition(".")[2] not in swept}
+    return {key: pair for key, pair in found.items() if key.rpartition(".")[2] not in swept}
+
+
+def _is_of_scene(difference: tuple[str, tuple[Any, Any]]) -> bool:
+    """Whether two studies that differ so are of two scenes; what one model alone knows makes none."""
+    key, pair = difference
+    words = key.split(".")
+    return None not in pair and words[0] not in _METHOD and words[-1] not in _METHOD_KEYS
+
+
+def _in_words(found: Mapping[str, tuple[Any, Any]]) -> Iterator[str]:
+    """Yield the differences of two studies in words."""
     for key, (in_a, in_b) in found.items():
         if in_a is not None and in_b is not None:
             yield f"{key}: {short(in_a)} in A, {short(in_b)} in B"

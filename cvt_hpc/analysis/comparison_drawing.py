@@ -1,4 +1,4 @@
-"""The picture of a comparison: a map of agreement and contradiction, and amplitude B against amplitude A."""
+"""The picture of a comparison: a map of the cells in which studies differ, and amplitude B against A."""
 
 from __future__ import annotations
 
@@ -94,11 +94,16 @@ def _draw_map(figure: SubFigure, arrangement: Arrangement) -> None:
 
 def _title(found: Comparison, shown: NDArray[np.int8], sources: tuple[str, str]) -> list[str]:
     total, beyond = int(found.contradicts.sum()), int(found.contradicts_beyond.sum())
+    better, worse = int(found.better.sum()), int(found.worse.sum())
     lines = [f"A: {sources[0]}; B: {sources[1]}"]
     lines.append(f"{int(found.answered.sum())} of {found.pairs.size} cells have results in both")
-    lines.append(f"{total} contradict, {beyond} of these beyond the threshold")
+    if found.are_designs:
+        lines.append(f"B is better in {better} (quiet where A vibrates), worse in {worse} (the reverse)")
+    else:
+        lines.append(f"{total} contradict, {beyond} of these beyond the threshold")
     hidden = total - int(np.isin(shown, CONTRADICTIONS).sum())
-    return lines + ([f"{hidden} contradicting cells are not on this map"] if hidden else [])
+    kind = "of these" if found.are_designs else "contradicting"
+    return lines + ([f"{hidden} {kind} cells are not on this map"] if hidden else [])
 
 
 def _draw_amplitudes(figure: SubFigure, found: Comparison) -> None:

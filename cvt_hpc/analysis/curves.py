@@ -16,7 +16,7 @@ from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, val
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.error_axes import COLOURS, MARKERS
-from cvt_hpc.analysis.figures import WIDTH, in_words, legend_columns, styled
+from cvt_hpc.analysis.figures import WIDTH, check_known, in_words, legend_columns, styled
 from cvt_hpc.errors import mismatch, one_line, unknown
 from cvt_hpc.variables import Status
 
@@ -111,6 +111,7 @@ def check_quantities(
         units = [dataset[key].attrs.get("units", "") for key in (quantities[0], name)]
         if of_one_unit and units[0] != units[1]:
             raise mismatch(f"{source}: {name}", f"the unit of {quantities[0]}, {units[0]}", str(units[1]))
+    check_known(dataset, quantities, source)
 
 
 def panels_of(

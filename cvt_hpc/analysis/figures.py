@@ -16,7 +16,7 @@ or no value on it; what else a picture refuses its docstring says.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial, wraps
 from io import BytesIO
 from pathlib import Path
@@ -126,6 +126,13 @@ def in_words(array: xr.DataArray) -> str:
 def axis_label(array: xr.DataArray, unit: str) -> str:
     """Name of a variable in words, with its display unit in brackets."""
     return f"{in_words(array)} [{unit}]" if unit else in_words(array)
+
+
+def check_known(dataset: xr.Dataset, names: Iterable[str], source: str) -> None:
+    """Raise InputError if none of some variables, which a picture draws, has a finite value."""
+    names = list(names)
+    if not any(name in dataset and bool(np.isfinite(dataset[name]).any()) for name in names):
+        raise mismatch(source, f"known values of {' or '.join(names)}", "none")
 
 
 def headline(attributes: Mapping[str, Any]) -> str:

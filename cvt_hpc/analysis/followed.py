@@ -76,6 +76,12 @@ def around(history: xr.Dataset) -> np.ndarray:
     return np.append(position, 2.0 * position[-1] - position[-2])
 
 
+def lengths_of(history: xr.Dataset) -> np.ndarray:
+    """Length of the path that each station stands for, half of either cell beside it [m], (N,)."""
+    cells = np.diff(around(history))
+    return 0.5 * (cells + np.roll(cells, 1))
+
+
 def path_of(time: np.ndarray, places: np.ndarray, speed: np.ndarray, start: float) -> np.ndarray:
     """Path coordinate of an element at each time [m], counted on round by round.
 

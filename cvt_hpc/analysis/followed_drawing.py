@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.figures import WIDTH, balanced, styled
+from cvt_hpc.analysis.figures import WIDTH, balanced, check_known, styled
 from cvt_hpc.analysis.followed import around, follow_element, passages
 from cvt_hpc.analysis.profiles import ARC, regions
 from cvt_hpc.analysis.telling_apart import on_axes, titles
@@ -47,6 +47,7 @@ def element_figure(
         There are no profiles over time, or too few for a whole passage.
     """
     followed = followed_of(history, region, source)
+    check_known(followed, parts, source)
     time = 1e3 * (followed["time"].values - (followed["time"].values[0] if region else 0.0))
     figure = Figure((WIDTH, 3.6), layout="constrained")
     axes = figure.subplots()

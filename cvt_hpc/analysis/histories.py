@@ -14,6 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from scipy.interpolate import CubicSpline
 
 from cvt_hpc.analysis import history_panels as panels
+from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.figures import LONG, WIDTH, balanced, draw, styled
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.job.schema import load_schema
@@ -57,6 +58,7 @@ def history_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
     InputError
         There is nothing to draw.
     """
+    dataset = standard(dataset, source)
     settings = _vibration_settings(dataset)
     band = (settings["band_low"], settings["band_high"])
     judged = settings["judged_fraction"] if _is_judged(dataset) else 0.0
@@ -204,9 +206,14 @@ def _title(dataset: xr.Dataset) -> str:
 
 
 def place_of(attributes: Mapping[str, Any]) -> list[str]:
-    """Where a run stands: its values on the axes of the job, and where else it departs from the job."""
+    """Where a run stands, in words: the parts of `values_of`, such as "friction gradient -0.8 s/m"."""
+    return [f"{key.replace('_', ' ')} {text}" for key, text in values_of(attributes).items()]
+
+
+def values_of(attributes: Mapping[str, Any]) -> dict[str, str]:
+    """By key the values of a run on the axes of its job, and where else it departs from the job."""
     if not {"job", "point"} <= attributes.keys():
-        return []
+        return {}
     job, point = json.loads(attributes["job"]), json.loads(attributes["point"])
     try:
         schema = load_schema(job["model"], job["stepper"], "history")
@@ -216,7 +223,7 @@ def place_of(attributes: Mapping[str, Any]) -> list[str]:
         keys = [key for key in (*job["axes"], *others) if key in point]
         units = _job_units(attributes)
         told = {key: {"units": schema.parameters[key].unit, JOB_UNITS: units.get(key, "")} for key in keys}
-        return [f"{key} {shown(point[key], told[key])}" for key in keys]
+        return {key: shown(point[key], told[key]) for key in keys}
     except (AttributeError, KeyError, TypeError):
         raise mismatch("history: job, point", "a job of this program and a point of it", "others") from None
 

@@ -137,7 +137,9 @@ def vibration_ranges(dataset: xr.Dataset, source: str = "results") -> xr.DataArr
     known = (name for name in QUANTITIES if f"onset_{name}" in dataset and f"ramp_{name}" in dataset)
     name = next((name for name in known if np.isfinite(dataset[f"ramp_{name}"]).any()), None)
     if name is None:
-        raise mismatch(source, expected, "no onset along a ramp", "`jobs/speed_ramp.toml` is a job of ramps")
+        raise mismatch(
+            source, expected, "no onset along a ramp", "`cvt-hpc examples speed_ramp` copies a job of ramps"
+        )
     course = dataset[f"ramp_{name}"]
     rise = course.diff("ramp_share").mean("ramp_share")
     dims = [str(dim) for dim in dataset["status"].dims]

@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from cvt_hpc.analysis.cells import colours_of
-from cvt_hpc.analysis.figures import WIDTH, axis_label, balanced, on_a_page, styled
+from cvt_hpc.analysis.figures import WIDTH, axis_label, balanced, check_known, on_a_page, styled
+from cvt_hpc.analysis.followed import lengths_of
 from cvt_hpc.analysis.history_panels import FEEDS
 from cvt_hpc.analysis.power_balance import balance_of, draw_balance
 from cvt_hpc.analysis.profiles import regions, shown_unit
@@ -34,6 +35,7 @@ NAMED_AT, INSIDE = 0.35, 0.36  # of a strand, and of the smallest radius: where 
 NEAREST, NEAR = 0.75, 0.05  # of the way to the line of centres; of the path, bars beside a name
 PAPER = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0}  # under names on bars
 LEAST, HEIGHT, FRAME = 1.6, 3.1, 0.7  # [inch]: a variator, and what stands above all
+BALANCE, WHOLE_BELT = 1.3, "#8a8a8a"  # [inch]: what goes in and out; colour of what has no region
 WATTS = 0.01  # of the largest bar: what is smaller has no number
 
 
@@ -125,6 +127,7 @@ def variator_figure(history: xr.Dataset, quantities: Sequence[str] = (), source:
     for name in quantities:
         if name not in known:
             raise unknown(f"{source}: {name}", "quantity along the belt", name, known)
+        check_known(history, [name], source)
     then = "name fewer quantities"
     grid = on_a_page(len(quantities), (1, 2), (LEAST, HEIGHT), FRAME, source, then)
     rows = -(-len(quantities) // grid.columns)
@@ -185,11 +188,10 @@ def region_powers(history: xr.Dataset) -> xr.DataArray:
         Over `cause` and `region` [W], sums over the stations; negative: taken. Causes without a finite value
         are left out.
     """
-    position, region = history["position"].values, history["region"].values.astype(str)
-    cell = float(np.diff(position).mean())
+    lengths, region = lengths_of(history), history["region"].values.astype(str)
     names = [name for _, _, name in regions(history)]
     causes = [name for name in FEEDS if name in history and np.isfinite(history[name]).all()]
-    powers = [[cell * float(history[c].values[region == name].sum()) for name in names] for c in causes]
+    powers = [[float((lengths * history[c].values)[region == name].sum()) for name in names] for c in causes]
     shape = np.reshape(powers, (len(causes), len(names)))
     return xr.DataArray(shape, {"cause": causes, "region": names}, ("cause", "region"), attrs={"units": "W"})
 
@@ -215,19 +217,17 @@ def energy_figure(history: xr.Dataset, source: str = "history") -> Figure:
     has_feeds = powers is not None and powers.sizes["cause"] > 0
     has_loss = "part_flank_loss" in history and bool(np.isfinite(history["part_flank_loss"]).any())
     balance = balance_of(history)
-    rows = (balance is not None) + has_feeds + has_loss
-    if not rows:
+    heights = [BALANCE, 0.7 + 0.18 * balance.bars] if balance else []
+    heights += [2.1] * (has_feeds + has_loss)
+    if not heights:
         expected = (
             "a history with driving_power, flank_feed or part_flank_loss, known at constant load and speed"
         )
         raise mismatch(source, expected, "none that is known")
-    heights = [0.7 + 0.2 * balance.bars] if balance else []
-    heights += [2.2] * (has_feeds + has_loss)
     figure = Figure((WIDTH, sum(heights) + 0.9), layout="constrained")
-    grid = figure.add_gridspec(rows, 2, width_ratios=(1.0, 1.6), height_ratios=heights)
+    panels = list(figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0])
     if balance is not None:
-        draw_balance(figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1]), balance)
-    panels = [figure.add_subplot(grid[row, :]) for row in range(rows) if row or balance is None]
+        draw_balance(panels.pop(0), panels.pop(0), balance)
     if has_loss:
         axes, loss = panels.pop(0), history["part_flank_loss"].transpose("pulley", "arc_part")
         count = loss.sizes["arc_part"]
@@ -239,30 +239,51 @@ def energy_figure(history: xr.Dataset, source: str = "history") -> Figure:
         axes.margins(y=0.15)
         axes.set_ylabel("power [W]")
     if has_feeds and powers is not None:
-        _draw_feeds(panels[0], powers)
+        _draw_feeds(panels[0], powers, whole_powers(history))
     common, _ = on_axes([history], [source])
     lines = titles([history], "Energy around the belt", common)
     figure.suptitle("\n".join(balanced(line, 72) for line in lines))
     return figure
 
 
-def _draw_feeds(axes: Axes, powers: xr.DataArray) -> None:
-    """Bars of each cause in each region, into the vibration above zero and out of it below."""
-    names, causes = powers["region"].values, powers["cause"].values
-    places, width = np.arange(names.size), 0.8 / max(causes.size, 1)
-    largest = float(np.abs(powers.values).max()) or 1.0
-    for k, cause in enumerate(causes):
-        label, colour, _ = FEEDS[str(cause)]
-        at = places + (k - 0.5 * (causes.size - 1)) * width
+def whole_powers(history: xr.Dataset) -> dict[str, float]:
+    """What else the fluctuations of the whole belt get and give [W], by its name; negative: taken.
+
+    With what `region_powers` sums up it is 0. "left open" is what the numerics, and a vibration that still
+    grows or decays, leave over. Empty where a term is not known.
+    """
+    taken = {
+        "layer_taken": "layer\ndampers",
+        "lag_taken": "sheave\nlag",
+        "carried_power": "mean\nmotion",
+        "fluctuation_remainder": "left\nopen",
+    }
+    found = {words: -float(history.get(name, np.nan)) for name, words in taken.items()}
+    return found if np.isfinite(list(found.values())).all() else {}
+
+
+def _draw_feeds(axes: Axes, powers: xr.DataArray, whole: dict[str, float]) -> None:
+    """Bars of each cause in each region, into the vibration above zero and out of it below; then the rest."""
+    names, causes = [*powers["region"].values, *whole], powers["cause"].values
+    places, width = np.arange(len(names)), 0.8 / max(causes.size, 1)
+    regions = powers.sizes["region"]
+    largest = max([float(np.abs(powers.values).max()), *map(abs, whole.values())]) or 1.0
+    drawn = [
+        (places[:regions] + (k - 0.5 * (causes.size - 1)) * width, powers.values[k], FEEDS[str(cause)][:2], k)
+        for k, cause in enumerate(causes)
+    ]
+    if whole:
+        drawn.append((places[regions:], np.array(list(whole.values())), ("whole belt", WHOLE_BELT), 0))
+    for at, values, (label, colour), k in drawn:
+        least = WATTS * largest if at[0] < regions - 0.5 else 0.0
         style = {"color": colour, "edgecolor": "#ffffff", "hatch": HATCHES[k % len(HATCHES)], "lw": 0.6}
-        bars = axes.bar(at, powers.values[k], 0.9 * width, label=label, **style)
-        texts = [f"{p:+.2g}".replace("-", "−") if abs(p) > WATTS * largest else "" for p in powers.values[k]]
+        bars = axes.bar(at, values, 0.9 * width, label=label, **style)
+        texts = [f"{p:+.2g}".replace("-", "−") if abs(p) > least else "" for p in values]
         axes.bar_label(bars, texts, fontsize=8, padding=1)
     axes.axhline(0.0, color=INK, lw=0.8)
-    total = float(powers.sum())
-    title = f"into (+) and out of (−) the vibration, sum {total:+.2g} W".replace("-", "−")
-    axes.set_title(title, loc="left", pad=4)
+    told = "0 W with what is left open" if whole else "not all terms known"
+    axes.set_title(f"into (+) and out of (−) the vibration, {told}", loc="left", pad=4)
     axes.set_xticks(places, names)
     axes.set_ylabel("power [W]")
     axes.margins(y=0.2)
-    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.14), ncols=3, frameon=False)
+    axes.figure.legend(loc="outside lower center", ncols=2, frameon=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -81,27 +82,26 @@ def _power(history: xr.Dataset, name: str) -> float | None:
 
 
 def draw_balance(whole: Axes, parts: Axes, balance: Balance) -> None:
-    """Draw what goes in and out, and beside it, enlarged, what is lost, by cause, and the rest."""
+    """Draw what goes in and out, and below it, enlarged, what is lost, by cause, and the rest."""
     lost, rest = sum(balance.losses.values()), sum(balance.rest.values())
     is_large = max(abs(balance.put_in), abs(balance.taken_out)) >= KILOWATTS
     factor, unit = (1e-3, "kW") if is_large else (1.0, "W")
-    powers = {"in": balance.put_in, "out": balance.taken_out, "lost": lost}
-    heights = [factor * power for power in powers.values()]
-    bars = whole.bar(list(powers), heights, 0.7, color=[IN, OUT, LOST], edgecolor=INK, lw=0.6)
-    whole.bar_label(bars, list(map(_number, heights)), fontsize=8, padding=1)
-    whole.axhline(0.0, color=INK, lw=0.8)
-    whole.margins(y=0.18)
-    whole.set_ylabel(f"power [{unit}]")
-    told = f"driving pulley in {_number(heights[0])} {unit} = load out {_number(heights[1])} {unit}"
-    told += f" + losses {_number(lost)} W + rest {_number(rest)} W"
-    whole.set_title(told, loc="left", pad=4)
-    drawn = balance.losses | balance.rest
+    powers = {"driving pulley, in": balance.put_in, "load, out": balance.taken_out}
+    powers |= {"all losses": lost, "all of the rest": rest}
+    _draw_bars(whole, {name: factor * power for name, power in powers.items()}, (IN, OUT, LOST, KEPT), unit)
+    whole.set_title("in = out + losses + rest", loc="left", pad=4)
     colours = [LOST] * len(balance.losses) + [KEPT] * len(balance.rest)
-    names = [f"{name}  {_number(power)}" for name, power in drawn.items()]
-    parts.barh(names, list(drawn.values()), 0.7, color=colours, edgecolor=INK, lw=0.6)
-    parts.axvline(0.0, color=INK, lw=0.8)
-    parts.invert_yaxis()
-    parts.set_xlabel("power [W]")
+    _draw_bars(parts, balance.losses | balance.rest, colours, "W")
+    parts.set_title("losses by cause, and the rest", loc="left", pad=4)
+
+
+def _draw_bars(axes: Axes, powers: dict[str, float], colours: Sequence[str], unit: str) -> None:
+    """A bar for each power, below each other; its number stands with its name, where no bar reaches."""
+    names = [f"{name}  {_number(power)}" for name, power in powers.items()]
+    axes.barh(names, list(powers.values()), 0.7, color=colours, edgecolor=INK, lw=0.6)
+    axes.axvline(0.0, color=INK, lw=0.8)
+    axes.invert_yaxis()
+    axes.set_xlabel(f"power [{unit}]")
 
 
 def _number(power: float) -> str:

@@ -16,6 +16,7 @@ from cvt_hpc.analysis.figures import (
     STYLE,
     WIDTH,
     balanced,
+    check_known,
     in_words,
     legend_columns,
     on_a_page,
@@ -122,6 +123,7 @@ def _check(
         for quantity in quantities:
             if quantity not in known:
                 raise unknown(f"{name}: {quantity}", "quantity along the belt", quantity, known)
+            check_known(dataset, [quantity], name)
         if region is not None and not inside(dataset, region).any():
             found = ", ".join(dict.fromkeys(dataset["region"].values.astype(str)))
             raise mismatch(f"{name}: --region", "a pulley of the belt's path", f"{region}; it has {found}")

@@ -18,6 +18,7 @@ from cvt_hpc.analysis.figures import (
     STYLE,
     WIDTH,
     balanced,
+    check_known,
     coordinate_unit,
     headlines,
     in_words,
@@ -306,11 +307,13 @@ def read_ramp(
     if rate < 2.0 * band[1]:
         raise mismatch(source, f"a history of {2.0 * band[1]:g} samples per second or more", f"{rate:.4g}")
     if of in STRANDS:
+        check_known(history, ["displacement"], source)
         probes = [str(name).split()[0] == of for name in history["probe"].values]
         moved = 1e6 * history["displacement"].values[first:, probes]
         _, amplitude = window_amplitudes(moved, rate, band, WINDOW)
         motion = moved[:, int(np.argmax(amplitude.max(axis=0)))]
     elif of in history and history[of].dims == ("time",):
+        check_known(history, [of], source)
         motion = history[of].values[first:]
     else:
         raise mismatch(source, "t1, t2 or a variable over time", of)

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from cvt_hpc.analysis.arrangement import CHOSEN, Sides, arrange, check_sides, ruler
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.curves import panels_of
-from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, styled
+from cvt_hpc.analysis.figures import WIDTH, balanced, check_known, coordinate_unit, styled
 from cvt_hpc.analysis.ticks import put_ticks, short_numbers
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.variables import Status
@@ -45,6 +45,7 @@ def strand_bars_figure(
     check_sides(sides, list(map(str, dataset["status"].dims)), at or {}, source)
     # panels here are what `panels_of` makes of the rows of a map
     arrangement = arrange(dataset, at or {}, source, Sides(sides.x, sides.panel))
+    check_known(arrangement.dataset, NEEDED, source)
     panels, notes = panels_of(arrangement, source)
     figure = Figure((WIDTH, HEIGHT), layout="constrained")
     row = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]

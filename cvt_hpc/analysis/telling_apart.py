@@ -9,7 +9,8 @@ from pathlib import Path
 import xarray as xr
 
 from cvt_hpc.analysis.arrangement import infinity_in_words
-from cvt_hpc.analysis.histories import place_of
+from cvt_hpc.analysis.figures import check_known
+from cvt_hpc.analysis.histories import place_of, values_of
 from cvt_hpc.errors import InputError, mismatch, one_line
 from cvt_hpc.files import kind_of
 
@@ -43,8 +44,8 @@ def _axes_of(dataset: xr.Dataset) -> dict[str, str]:
     """By axis of the run's job its value with its name, such as "load 120 N m"; its model by "model"."""
     job = json.loads(dataset.attrs.get("job", "{}"))
     axes, model = job.get("axes", {}), {"model": str(job.get("model", "")).replace("_", " ")}
-    told = dict(text.split(" ", 1) for text in place_of(dataset.attrs))
-    texts = {key: text if text != "inf" else infinity_in_words(key) for key, text in told.items()}
+    told = values_of(dataset.attrs).items()
+    texts = {key: text if text != "inf" else infinity_in_words(key) for key, text in told}
     return model | {key: f"{key} {texts[key]}".replace("_", " ") for key in axes if key in texts}
 
 
@@ -61,6 +62,7 @@ def check_holds(histories: Sequence[xr.Dataset], names: Sequence[str], wanted: d
         for key, by in wanted.items():
             if key not in dataset:
                 raise mismatch(name, f"a history with {key} ({by})", "none")
+            check_known(dataset, [key], name)
 
 
 def history_files(paths: Sequence[Path]) -> list[Path]:

@@ -26,7 +26,7 @@ from cvt_hpc.analysis.arrangement import (
 )
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.eigenfrequencies import along_axis
-from cvt_hpc.analysis.figures import WIDTH, headlines, in_words, on_a_page, styled
+from cvt_hpc.analysis.figures import WIDTH, check_known, headlines, in_words, on_a_page, styled
 from cvt_hpc.analysis.line_names import OUTLINE, Named, name_lines
 from cvt_hpc.errors import few_of, mismatch, one_line
 
@@ -82,6 +82,7 @@ def waterfall_figure(
         then = "runs of a belt that marches in time record it, up to band_high in [vibration]"
         raise mismatch(source, "results with the variable spectrum", found, then)
     arrangement = arrange(dataset, at or {}, source, sides)
+    check_known(arrangement.dataset, ["spectrum"], source)
     rows, notes = _rows(arrangement, sides.panel)
     x, y = ruler(arrangement.dataset[arrangement.x]), ruler(dataset["frequency_bin"])
     over = ("strand", "frequency_bin", arrangement.x)

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cvt_hpc.analysis.error_axes import COLOURS
-from cvt_hpc.analysis.figures import STYLE, WIDTH, balanced, styled
+from cvt_hpc.analysis.figures import STYLE, WIDTH, balanced, check_known, styled
+from cvt_hpc.analysis.profiles import inside
 from cvt_hpc.analysis.telling_apart import told_apart
 from cvt_hpc.errors import InputError, mismatch, one_line
 
@@ -60,6 +61,7 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
         missing = [key for key in ("normal_force", "friction_force", "wrap_angle") if key not in dataset]
         if missing:
             raise mismatch(name, "the history of a run with normal_force and wrap_angle", f"no {missing[0]}")
+        check_known(dataset, ["normal_force"], name)
     pulleys, without_torque = _pulleys(histories)
     common, labels = told_apart(histories, names)
     rows = [row for row in ROWS if row[0] in histories[0]]
@@ -87,8 +89,9 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
 
 def _pulleys(histories: Sequence[xr.Dataset]) -> tuple[list[str], list[str]]:
     """Pulleys that have panels, and those that have none because no run has torque there."""
-    region = _regions(histories[0])
-    pulleys = list(dict.fromkeys(region[np.isfinite(histories[0]["wrap_angle"].values)]))
+    region, angle = _regions(histories[0]), histories[0]["wrap_angle"].values
+    # the first station of a strand may be the end of the arc before it
+    pulleys = [name for name in dict.fromkeys(region) if np.isfinite(angle[region == name]).all()]
     if len(pulleys) <= MOST_PANELS:
         return pulleys, []
     pulls = [[np.nansum(h["friction_force"].values[_regions(h) == p]) for p in pulleys] for h in histories]
@@ -103,10 +106,10 @@ def _regions(dataset: xr.Dataset) -> np.ndarray:
 
 def _draw(axes: Axes, dataset: xr.Dataset, pulley: str, name: str, factor: float, **style: Any) -> None:
     """A quantity over the wrap of a pulley."""
-    inside = (_regions(dataset) == pulley) & np.isfinite(dataset["wrap_angle"].values)
-    angle = np.degrees(dataset["wrap_angle"].values[inside])
+    here = inside(dataset, pulley.removesuffix(" arc"))
+    angle = np.degrees(dataset["wrap_angle"].values[here])
     marker = "." if angle.size < FEW else ""
-    axes.plot(angle, factor * dataset[name].values[inside], marker=marker, ms=5, **style)
+    axes.plot(angle, factor * dataset[name].values[here], marker=marker, ms=5, **style)
 
 
 def _add_legend(figure: Figure, axes: Axes, theory: Sequence[str]) -> None:

@@ -128,7 +128,7 @@ def load_diagram(path: str | Path, overrides: Assignments = ()) -> Diagram:
             )
     job = build_job(document, source, replaced, "--set")
     if job.model != STEADY:
-        raise mismatch(f"{source}: model", STEADY, job.model, "`jobs/branch.toml` is such a job")
+        raise mismatch(f"{source}: model", STEADY, job.model, "`cvt-hpc examples branch` copies such a job")
     if job.design:
         raise mismatch(f"{source}: [design]", "the full grid of the axes", job.design["kind"])
     along = [axis for axis in job.axes if axis.name == "load"]

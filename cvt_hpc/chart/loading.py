@@ -40,7 +40,8 @@ def load_chart(path: str | Path, overrides: Assignments = ()) -> Chart:
     source = str(path)
     document = read_document(Path(path))
     if "chart" not in document:
-        raise mismatch(f"{source}: chart", "a table [chart]; see `jobs/chart_oscillator.toml`", "nothing")
+        then = "`cvt-hpc examples chart_oscillator` copies a job that has one"
+        raise mismatch(f"{source}: chart", "a table [chart]", "nothing", then)
     table = document.pop("chart")
     if "axes" in document:
         raise InputError(f"{source}: [axes]: expected no axes in a chart job, found some")

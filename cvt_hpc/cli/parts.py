@@ -8,7 +8,7 @@ import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from cvt_hpc.errors import mismatch, one_line
 
@@ -16,9 +16,11 @@ if TYPE_CHECKING:
     from cvt_hpc.analysis.arrangement import Sides
     from cvt_hpc.job import Job
 
-DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+Result = TypeVar("Result")
+
+DONE, SOME_FAILED, INTERRUPTED = 0, 1, 130
 PICTURES = (".png", ".svg", ".pdf")
-LONGEST_NAME = 100  # letters of a picture's name
+LONGEST_NAME, LONGEST_NAMES = 100, 60  # letters of a picture's name, and of the files' names within it
 # what --set does
 REPLACE = (
     "replace a value of the job, or an axis by one value, a list [40, 60] or a range {from=, to=, step=}"
@@ -91,6 +93,30 @@ def folder_of(results: Path) -> Path:
     return results if results.is_dir() else results.parent
 
 
+def alike(arguments: argparse.Namespace, load: Callable[[], Result]) -> Result:
+    """Return what `load` returns, once it has succeeded on all ranks, and all have the same options."""
+    from cvt_hpc.study.ranks.launch import assembled_team
+
+    def options(_: Result) -> dict[str, dict[str, str]]:
+        given = vars(arguments).items()
+        words = {name: str(value) for name, value in given if name not in ("path", "command", "parser")}
+        return {"options": {"command": arguments.command.__name__.strip("_"), **words}}
+
+    with assembled_team() as team:
+        return team.agreed(load, options)
+
+
+def end_all(status: int, line: str = "") -> None:
+    """End all ranks with a line of this one, if there are several."""
+    if launch := sys.modules.get("cvt_hpc.study.ranks.launch"):  # else they are not connected
+        launch.end_all(status, line)
+
+
+def files_of(results: Path) -> list[Path]:
+    """Return the dataset by whose name a picture of results is called; of a folder there is none."""
+    return [] if results.is_dir() else [results]
+
+
 def refuse_ranks(command: str, why: str) -> None:
     """Raise InputError if several processes were started together for a command that one does."""
     from cvt_hpc.study.ranks.launch import detect_launch
@@ -99,9 +125,15 @@ def refuse_ranks(command: str, why: str) -> None:
         raise mismatch(command, f"one process, because it {why}", f"{size} started")
 
 
-def picture_beside(path: Path, *words: str) -> Path:
-    """A picture beside a dataset, or in a folder, whose name tells what it shows."""
-    name = "_".join(re.sub(r"[^\w.=+-]+", "_", word) for word in words)
+def picture_beside(path: Path, files: Sequence[Path], *words: str) -> Path:
+    """The picture of datasets beside the first one, or in a folder: NAME_KIND_WHAT_AXIS=VALUE.png.
+
+    NAME is that of the files; `results`, which each study has, is left out. Of many it is that of the first.
+    """
+    names = [name for file in files if (name := file.stem) != "results"]
+    if len("_".join(names)) > LONGEST_NAMES:
+        names = [names[0][:LONGEST_NAMES], f"and_{len(names) - 1}_more"]
+    name = "_".join(re.sub(r"[^\w.=+-]+", "_", word) for word in (*names, *words))
     return folder_of(path) / f"{name[:LONGEST_NAME]}.png"
 
 

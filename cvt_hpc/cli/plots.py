@@ -18,12 +18,13 @@ from cvt_hpc.cli.parts import (
     check_output,
     colour_end,
     complain,
+    files_of,
     picture_beside,
     say,
 )
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import StorageError
-from cvt_hpc.picture_kinds import END, HISTORIES, HISTORY, KINDS, RESULTS, Kind
+from cvt_hpc.picture_kinds import END, HISTORIES, KINDS, RESULTS, Kind
 
 
 def add(commands: Any) -> None:
@@ -34,7 +35,7 @@ def add(commands: Any) -> None:
         _add_kind(kinds, name, kind)
     text = "the belt in the last periods of a run, magnified, as a moving picture"
     animation = add_command(kinds, "animation", _animation, text, HISTORIES)
-    text = "FILE.gif, or FILE.mp4 where there is ffmpeg (default: HISTORY.gif beside it)"
+    text = "FILE.gif, or FILE.mp4 where there is ffmpeg (default: HISTORY_animation.gif beside the dataset)"
     animation.add_argument("--out", type=Path, metavar="GIF", help=text)
 
 
@@ -46,11 +47,11 @@ def _add_kind(kinds: Any, name: str, kind: Kind) -> None:
         command.add_argument(option.flag or option.key, help=option.text, **place, **option.settings)
     if kind.subject == HISTORIES:
         command.add_argument("others", nargs="*", type=Path, metavar="HISTORY", help="further runs")
-    each = "; of several runs with the name of each" if kind.subject == HISTORY else ""
     if kind.data:
-        text = f"what the picture shows, as a dataset{each}"
+        text = "what the picture shows, as a dataset; of several runs with the name of each"
         command.add_argument("--data", type=Path, metavar="FILE.nc", help=text)
-    text = f"default: {kind.picture or name}.png beside the dataset{each}"
+    named = "".join(f"_{option.key.upper()}" for option in kind.options if option.is_named)
+    text = f"default: {'' if kind.subject == RESULTS else 'HISTORY_'}{name}{named}.png beside the dataset"
     command.add_argument("--out", type=Path, metavar="PNG", help=text)
     add_sides(command, kind.sides)
     if kind.subject == RESULTS:
@@ -74,7 +75,7 @@ def _draw(arguments: argparse.Namespace) -> int:
     check_output(data, (".nc",))
 
     def beside(file: Path) -> Path:
-        return picture_beside(arguments.path, *([file.stem] if kind.picture else []), *words)
+        return picture_beside(arguments.path, [file], *words)
 
     def write(history: Any, out: Path, source: str, of_several: str) -> list[str]:
         written = [f"picture: {_write(name, [history], out, None, [source], options)}"]
@@ -90,12 +91,14 @@ def _draw(arguments: argparse.Namespace) -> int:
 
 
 def _draw_results(arguments: argparse.Namespace, words: Sequence[str], options: dict[str, Any]) -> None:
+    from cvt_hpc.analysis.conversion import standard
     from cvt_hpc.job.assignments import read_coordinates
     from cvt_hpc.study import open_results
 
     source = str(arguments.path)
-    out = arguments.out or picture_beside(arguments.path, *words, *arguments.at)
-    with open_results(arguments.path) as dataset:
+    out = arguments.out or picture_beside(arguments.path, files_of(arguments.path), *words, *arguments.at)
+    with open_results(arguments.path) as opened:
+        dataset = standard(opened, source)
         units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
         at = read_coordinates(arguments.at, units, source, "--at")
         say(f"picture: {_write(arguments.kind, [dataset], out, at, [source], options)}")
@@ -106,8 +109,7 @@ def _draw_together(arguments: argparse.Namespace, words: Sequence[str], options:
 
     files = history_files([arguments.path, *arguments.others])
     names = [file.stem for file in files]
-    runs = names if KINDS[arguments.kind].picture.startswith(HISTORY) else []
-    out = arguments.out or picture_beside(arguments.path, *runs, *words)
+    out = arguments.out or picture_beside(arguments.path, files, *words)
     with _opened(files) as histories:
         say(f"picture: {_write(arguments.kind, histories, out, None, names, options)}")
 
@@ -132,7 +134,11 @@ def _animation(arguments: argparse.Namespace) -> int:
         return [f"animation: {draw_animation(history, out, source)}"]
 
     check_animation(arguments.out or Path("belt.gif"))
-    return _each(arguments, lambda file: file.with_suffix(".gif"), write)
+
+    def beside(file: Path) -> Path:
+        return picture_beside(arguments.path, [file], "animation").with_suffix(".gif")
+
+    return _each(arguments, beside, write)
 
 
 def _each(
@@ -145,7 +151,7 @@ def _each(
     Parameters
     ----------
     beside : callable
-        Where the picture of a file goes; of several histories it has the name of the run.
+        Where the picture of a file goes, with the name of the run.
     write : callable
         Draws a history to a place, given its source and what tells it from several, and tells in lines what
         was written.
@@ -154,9 +160,9 @@ def _each(
 
     files, status = history_files([arguments.path]), DONE
     for file in files:
-        out, of_several = arguments.out or beside(file), f"_{file.stem}" if len(files) > 1 else ""
-        if arguments.out or file.stem not in out.stem:
-            out = out.with_stem(out.stem + of_several)
+        of_several = f"_{file.stem}" if len(files) > 1 else ""
+        out = arguments.out
+        out = beside(file) if out is None else out.with_stem(out.stem + of_several)
         try:
             with _opened([file]) as (history,):
                 say(*write(history, out, str(file), of_several))
@@ -173,7 +179,9 @@ def _each(
 @contextmanager
 def _opened(files: Sequence[Path]) -> Iterator[list[Any]]:
     """Histories of runs, open within."""
+    from cvt_hpc.analysis.conversion import standard
     from cvt_hpc.netcdf import open_netcdf
 
     with ExitStack() as stack:
-        yield [stack.enter_context(open_netcdf(file, follow=True)) for file in files]
+        opened = [stack.enter_context(open_netcdf(file, follow=True)) for file in files]
+        yield [standard(history, str(file)) for history, file in zip(opened, files, strict=True)]

@@ -1,4 +1,4 @@
-"""`status`, `gather`, `map`, `figure` and `compare`: what a run has left in its folder."""
+"""`status`, `gather`, `table`, `map`, `figure` and `compare`: what a run has left in its folder."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from cvt_hpc.cli.parts import (
     check_output,
     colour_end,
     complain,
+    files_of,
     folder_of,
     picture_beside,
     say,
@@ -25,7 +26,7 @@ from cvt_hpc.cli.parts import (
 if TYPE_CHECKING:
     from cvt_hpc.analysis.comparison import Comparison
 
-CONTRADICTING = 1  # exit status of `compare`: some cells are quiet in one study and vibrate in the other
+CONTRADICTING = 1  # exit status of `compare`: by one method some cells are quiet that vibrate by the other
 
 
 def add(commands: Any) -> None:
@@ -33,13 +34,17 @@ def add(commands: Any) -> None:
     status = add_command(commands, "status", _status, "how far a study is", "DIR")
     status.add_argument("--json", action="store_true", help="for programs: one line of JSON, times in s")
     add_command(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
+    text = "write the results as a table with a row for each run: axes, class, and what each run gave"
+    table = add_command(commands, "table", _table, text, "RESULTS")
+    text = "FILE.csv, or FILE.xlsx for a spreadsheet (default: table.csv beside the dataset)"
+    table.add_argument("--out", type=Path, metavar="FILE", help=text)
     text = "draw where vibration occurs, or quantities over two axes"
     picture = add_command(commands, "map", _map, text, "RESULTS")
     text = "further studies over the same axes: a panel for each, on one scale of colours"
     picture.add_argument("others", type=Path, nargs="*", metavar="RESULTS", help=text)
     text = "variable of the results, such as efficiency, instead of where vibration occurs; may be repeated"
     picture.add_argument("--show", action="append", default=[], metavar="QUANTITY", help=text)
-    text = "default: map.png, map_QUANTITY.png or, of several studies, maps.png beside the (first) dataset"
+    text = "default: map.png, map_QUANTITY.png or, of several studies, maps.png beside the first dataset"
     picture.add_argument("--out", type=Path, metavar="PNG", help=text)
     add_assignments(picture, "--at", "fix an axis at a value")
     add_sides(picture)
@@ -52,7 +57,7 @@ def add(commands: Any) -> None:
     text = "write a page about a study: what was found, a map with values, failed runs, cost, assumptions"
     page = add_command(commands, "report", _report, text, "RESULTS")
     page.add_argument("--out", type=Path, metavar="HTML", help="default: report.html beside the dataset")
-    text = "compare two studies, cell by cell; exit status 1: some contradict"
+    text = "compare two methods or two designs, cell by cell; exit status 1: two methods contradict somewhere"
     compare = add_command(commands, "compare", _compare, text, "RESULTS")
     compare.add_argument("other", type=Path, metavar="RESULTS", help="the one to compare with it")
     folder = "folder of compare.csv and compare.png (default: that of the second study)"
@@ -76,16 +81,30 @@ def _gather(arguments: argparse.Namespace) -> int:
     return DONE
 
 
+def _table(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.conversion import plain
+    from cvt_hpc.analysis.run_table import FORMATS, run_table, write_table
+    from cvt_hpc.study import open_results
+
+    out = arguments.out or folder_of(arguments.path) / "table.csv"
+    check_output(out, FORMATS)
+    with open_results(arguments.path) as dataset:
+        frame = run_table(plain(dataset, str(arguments.path)), str(arguments.path))
+    say(f"table: {write_table(frame, out)}")
+    return DONE
+
+
 def _map(arguments: argparse.Namespace) -> int:
     from contextlib import ExitStack
 
+    from cvt_hpc.analysis.conversion import standard
     from cvt_hpc.job.assignments import read_coordinates, split_assignments
     from cvt_hpc.study import open_results
 
     paths = [arguments.path, *arguments.others]
     source, kind = ", ".join(map(str, paths)), "maps" if arguments.others else "map"
     with ExitStack() as opened:
-        datasets = [opened.enter_context(open_results(path)) for path in paths]
+        datasets = [standard(opened.enter_context(open_results(path)), str(path)) for path in paths]
         dataset, sides = datasets[0], sides_of(arguments)
         if arguments.others:
             from cvt_hpc.analysis.studies import side_by_side
@@ -100,7 +119,9 @@ def _map(arguments: argparse.Namespace) -> int:
         from cvt_hpc.analysis.starts import has_starts, start_line
         from cvt_hpc.analysis.value_maps import draw_value_map
 
-        out = arguments.out or picture_beside(arguments.path, kind, *arguments.show)
+        files = [file for path in paths for file in files_of(path)]
+        words = (kind, *arguments.show, *arguments.at)
+        out = arguments.out or picture_beside(arguments.path, files, *words)
         vmax, shown = None, arguments.show[0] if arguments.show else "amplitude"
         if shown in dataset:  # what draws it refuses a quantity that is not known
             vmax = colour_end(arguments.vmax, str(dataset[shown].attrs.get("units", "")))
@@ -123,27 +144,31 @@ def _figure(arguments: argparse.Namespace) -> int:
 
 
 def _report(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.conversion import standard
     from cvt_hpc.report import write_report
     from cvt_hpc.study import open_results
 
     out = arguments.out or folder_of(arguments.path) / "report.html"
     check_output(out, (".html",))
-    with open_results(arguments.path) as dataset:
-        say(f"report: {write_report(dataset, out, str(arguments.path), folder_of(arguments.path))}")
+    source = str(arguments.path)
+    with open_results(arguments.path) as opened:
+        dataset = standard(opened, source)
+        say(f"report: {write_report(dataset, out, source, folder_of(arguments.path))}")
     return DONE
 
 
 def _compare(arguments: argparse.Namespace) -> int:
     from cvt_hpc.analysis.comparison import compare
+    from cvt_hpc.analysis.conversion import standard
     from cvt_hpc.printing import comparison_lines
     from cvt_hpc.study import open_results
 
     sources = str(arguments.path), str(arguments.other)
     with open_results(arguments.path) as a, open_results(arguments.other) as b:
-        found = compare(a, b, sources)
+        found = compare(standard(a, sources[0]), standard(b, sources[1]), sources)
     written = leave_comparison(found, arguments.out or folder_of(arguments.other), sources)
     say(*comparison_lines(found, sources), *written)
-    return CONTRADICTING if found.contradicts.any() else DONE
+    return CONTRADICTING if found.contradicts.any() and not found.are_designs else DONE
 
 
 def leave_comparison(found: Comparison, folder: Path, sources: tuple[str, str]) -> list[str]:

@@ -25,6 +25,8 @@ def add(commands: Any) -> None:
     simulate = add_command(commands, "simulate", _simulate, "one run with its full history", "JOB")
     simulate.add_argument("--out", type=Path, metavar="FILE.nc", help="dataset of the history")
     simulate.add_argument("--plot", type=Path, metavar="PNG", help="picture of the history")
+    text = "print all numbers of the run, not only those that matter most"
+    simulate.add_argument("--all", action="store_true", help=text)
     add_assignments(simulate, "--set", REPLACE)
     at = "where to run; an axis that is not named takes the value of its table, or else its first one"
     add_assignments(simulate, "--at", at)
@@ -39,9 +41,8 @@ def _simulate(arguments: argparse.Namespace) -> int:
     job.point_at(at, "--at")
     check_output(arguments.out, (".nc",))
     check_output(arguments.plot, PICTURES)
-    from cvt_hpc.analysis.histories import draw_history
     from cvt_hpc.netcdf import is_history, write_history
-    from cvt_hpc.printing import outcome_lines, point_lines
+    from cvt_hpc.printing import MOST_OUTCOMES, outcome_lines, point_lines, units_of
     from cvt_hpc.simulation import simulate
     from cvt_hpc.variables import Status
 
@@ -53,10 +54,13 @@ def _simulate(arguments: argparse.Namespace) -> int:
     if arguments.out is not None:
         written.append(f"history: {write_history(dataset, arguments.out)}")
     if arguments.plot is not None and dataset.sizes.get("time", 0) > 1:
+        from cvt_hpc.analysis.histories import draw_history
+
         written.append(f"picture: {draw_history(dataset, arguments.plot)}")
     elif arguments.plot is not None:
         written.append("picture: none, the run has no history")
-    say(*point_lines(job, at), *outcome_lines(dataset), *written)
+    most = None if arguments.all else MOST_OUTCOMES
+    say(*point_lines(job, at), *outcome_lines(dataset, units_of(job), most), *written)
     status = Status(int(dataset["status"]))
     if status != Status.DONE:
         complain(f"the run failed: {status.name.lower()}: {dataset['reason'].item()}")

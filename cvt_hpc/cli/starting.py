@@ -1,4 +1,4 @@
-"""`init`, `models`, `doctor` and `completion`: what somebody needs who begins."""
+"""`init`, `models`, `variables`, `examples`, `doctor`, `completion`: what somebody needs who begins."""
 
 from __future__ import annotations
 
@@ -24,6 +24,17 @@ def add(commands: Any) -> None:
     models = commands.add_parser("models", help=text, description=f"{text[0].upper()}{text[1:]}.")
     models.add_argument("model", nargs="?", metavar="MODEL", help="a model, for its keys")
     models.set_defaults(command=_models)
+    text = "list the variables that the runs of a model leave in the dataset: names, units and meaning"
+    variables = commands.add_parser("variables", help=text, description=f"{text[0].upper()}{text[1:]}.")
+    variables.add_argument("model", metavar="MODEL", help="one of `cvt-hpc models`")
+    variables.set_defaults(command=_variables)
+    text = "list the jobs, notebooks and batch files that come with the program, or copy some"
+    examples = commands.add_parser("examples", help=text, description=f"{text[0].upper()}{text[1:]}.")
+    text = "an example or a folder of them, such as quickstart, notebooks or slurm, to be copied"
+    examples.add_argument("names", nargs="*", metavar="NAME", help=text)
+    text = "folder below which the copies go (default: this one)"
+    examples.add_argument("--out", type=Path, default=Path(), metavar="DIR", help=text)
+    examples.set_defaults(command=_examples)
     text = "look at MPI, cores, cache, disk and Slurm of this machine, and say what to do"
     doctor = commands.add_parser("doctor", help=text, description=f"{text[0].upper()}{text[1:]}.")
     doctor.set_defaults(command=_doctor)
@@ -56,6 +67,28 @@ def _models(arguments: argparse.Namespace) -> int:
             "",
             "keys: cvt-hpc models MODEL; a job: cvt-hpc init NAME --model MODEL",
         )
+    return DONE
+
+
+def _variables(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.simulation import declared_record
+    from cvt_hpc.tables import columns
+
+    declared, coordinates = declared_record(arguments.model, "variables")
+    rows = [(v.name, ", ".join(v.dims), v.units, v.meaning) for v in declared]
+    along = [(name, coordinate.units, coordinate.meaning) for name, coordinate in coordinates.items()]
+    say(*columns([("variable", "along", "unit", "meaning"), *rows], indent=""), "")
+    say(*columns([("dimension", "unit", "meaning"), *along], indent=""))
+    return DONE
+
+
+def _examples(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.job.examples import copy_examples, example_lines
+
+    if arguments.names:
+        say(*(f"example: {path}" for path in copy_examples(arguments.names, arguments.out)))
+    else:
+        say(*example_lines(), "", "copies: cvt-hpc examples NAME")
     return DONE
 
 

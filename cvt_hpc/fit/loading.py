@@ -51,7 +51,8 @@ def load_fit(path: str | Path, overrides: Assignments = ()) -> Fit:
     own_keys = [key for key in replaced if key.startswith(prefix)]
     put = {key.removeprefix(prefix): structured(replaced.pop(key)) for key in own_keys}
     if TABLE not in document:
-        raise mismatch(where, "a table of cases and targets", "nothing", "`jobs/fit_lebrecht.toml` has one")
+        then = "`cvt-hpc examples fit_lebrecht` copies a job that has one"
+        raise mismatch(where, "a table of cases and targets", "nothing", then)
     table = document.pop(TABLE)
     for key in put:
         if key not in NUMBERS:

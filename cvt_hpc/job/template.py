@@ -24,7 +24,7 @@ _FIRST_AXES = {"load_share": (0.2, 0.4, 0.6), "friction_gradient": None}
 _SHARES = (0.5, 1.0, 1.5)  # of the default, else
 _LONGEST = 120  # letters of a line
 # Units in which engineers give a size, by SI unit: each from a magnitude [SI] on, the largest first
-_CUSTOMARY = {
+CUSTOMARY = {
     "m": ((1.0, "m"), (1e-4, "mm"), (1e-9, "um")),
     "s": ((0.1, "s"), (1e-4, "ms"), (1e-9, "us")),
     "m/s": ((0.1, "m/s"), (1e-9, "mm/s")),
@@ -170,7 +170,7 @@ def _as_toml(parameter: Parameter) -> str:
 
 def _in_customary(value: float, unit: str) -> str:
     """Return a number [unit] as engineers give it, rounded for people; "" where that is the SI unit."""
-    wanted = next((other for least, other in _CUSTOMARY.get(unit, ()) if least <= abs(value)), "")
+    wanted = next((other for least, other in CUSTOMARY.get(unit, ()) if least <= abs(value)), "")
     if not wanted:
         return angle_in_words(value, unit)
     return in_words(value, unit, wanted)

@@ -113,6 +113,10 @@ def _as_it_stands(value: Any) -> Any:
 def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str, Any]:
     attributes = {str(key): str(value) for key, value in dataset.attrs.items()}
     job = _job(attributes, source)
+    own = ["run", *(axis.name for axis in job.axes)] if job else dataset["status"].dims
+    joined = [str(name) for name in dataset["status"].dims if name not in own]
+    if joined:  # the attributes are those of one of several studies
+        job = None
     arrangement = _arrangement(dataset, source)
     found = failures(dataset)
     parameters = _parameters(job) if job else {}
@@ -134,6 +138,7 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
         "description": attributes.get("title", ""),
         "model": f"{job.model}: {load_model(job.model).title}" if job else "",
         "axes": _axes(dataset, job),
+        "joined": " and ".join(joined),
         "summary": summary(dataset),
         "sentences": list(map(_with_code, sentences)),
         "windows": any("vibration from" in line or "vibration up to" in line for line in sentences),
@@ -194,7 +199,8 @@ def _pictures(
 def _axes(dataset: xr.Dataset, job: Job | None) -> list[tuple[str, str, str]]:
     """Name, meaning and values of each axis, in the units of the job; of an axis that is fixed its value."""
     dims = set(dataset["status"].dims)
-    names = [str(name) for name in dataset.coords if dims & set(dataset[name].dims)]
+    names = list(dict.fromkeys([*dataset.coords, *dataset["status"].dims]))
+    names = [str(name) for name in names if dims & set(dataset[name].dims)]
     if job is not None:
         names = [axis.name for axis in job.axes if axis.name in dataset.coords]
     rows = []
@@ -207,7 +213,8 @@ def _axes(dataset: xr.Dataset, job: Job | None) -> list[tuple[str, str, str]]:
             ends = int(np.argmin(axis.values)), int(np.argmax(axis.values))
             values = " to ".join(value_text(axis, place) for place in ends)
         else:
-            values = known_values(axis)
+            once = axis.values if axis.ndim == 1 else np.unique(axis.values)
+            values = known_values(xr.DataArray(once, name=name, attrs=axis.attrs))
         rows.append((name, meaning, values))
     return rows
 

@@ -10,10 +10,11 @@ from cvt_hpc.simulation.batches import (
     turns,
 )
 from cvt_hpc.simulation.history import run_points_keeping, simulate
-from cvt_hpc.simulation.record import record_coordinates, record_variables
+from cvt_hpc.simulation.record import declared_record, record_coordinates, record_variables
 from cvt_hpc.simulation.running import Interrupted, run_point, run_points
 
 __all__ = [
+    "declared_record",
     "Interrupted",
     "estimate_cost",
     "forget",

@@ -46,6 +46,7 @@ _MARCH = (
     Variable("steps", (), "i8", "1", "time steps taken, all tries"),
     Variable("contact_solves", (), "i8", "1", "linear solves of the contact problem, all tries"),
 )
+COMMON = (*_VERDICT, *_COST, *_MARCH)  # of all models; those without a march have none of its
 
 
 def recorded_model(job: Job) -> Model:
@@ -69,6 +70,28 @@ def record_variables(job: Job) -> tuple[Variable, ...]:
     model, dims = recorded_model(job), record_coordinates(job).keys()
     own = (variable for variable in model.variables if dims >= {*variable.dims})
     return (*_VERDICT, *own, *_COST, *march)
+
+
+def declared_record(model: str, source: str) -> tuple[list[Variable], dict[str, Coordinate]]:
+    """Return all quantities that a model declares of a run, with default settings or others, and dimensions.
+
+    Parameters
+    ----------
+    model : str
+        A model whose runs are recorded.
+    source : str
+        Who asks, for the error.
+
+    Raises
+    ------
+    InputError
+        If there is no such model, or its runs are not recorded.
+    """
+    from cvt_hpc.job import build_job
+
+    job = build_job({"name": model, "model": model}, source)
+    variables = {v.name: v for v in (*record_variables(job), *recorded_model(job).variables)}
+    return list(variables.values()), record_coordinates(job)
 
 
 def record_coordinates(job: Job) -> dict[str, Coordinate]:

@@ -1,11 +1,15 @@
 """`dataset.cvt` on made-up studies: classes, onsets, boundaries, and pictures laid out as asked."""
 
 import inspect
+import re
 import runpy
+import sys
+import zipfile
 from pathlib import Path
 
 import dask
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -13,6 +17,7 @@ import cvt_hpc
 from cvt_hpc.accessor import Results
 from cvt_hpc.analysis.classes import OccurrenceClass
 from cvt_hpc.analysis.figures import LONG
+from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.picture_kinds import END, HISTORIES, KINDS, RESULTS
 from cvt_hpc.variables import Status, Vibrates
@@ -259,8 +264,93 @@ def test_a_notebook_is_given_a_picture():
     assert study().cvt.map(sheave_stiffness=1.0)._repr_png_().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("kind", [name for name, kind in KINDS.items() if kind.subject != RESULTS])
+@pytest.mark.parametrize(
+    "kind", [*(name for name, kind in KINDS.items() if kind.subject != RESULTS), "animation"]
+)
 def test_pictures_of_single_runs_refuse_a_study(kind):
     results = xr.Dataset({"status": ("load", np.zeros(2, "i1"))}, {"load": [20.0, 40.0]})
     with pytest.raises(InputError, match=f"expected the history of a run, which {kind} draws, found a study"):
         getattr(results.cvt, kind)()
+
+
+def in_rpm(whole):
+    """A study with an axis of speeds whose job gives them in rpm, and with what a table leaves out or names."""
+    speeds = np.array([1000.0, 3000.0]) * np.pi / 30.0
+    shown = {"units": "rad/s", "job_units": "rpm"}
+    whole = whole.expand_dims(driving_speed=speeds).copy()
+    whole["driving_speed"].attrs |= shown
+    shape = whole["status"].shape
+    reasons = np.full(shape, b"", "S240")
+    reasons[0, 0, 0, 0] = b"=1+1"
+    whole["reason"] = whole["status"].dims, reasons
+    whole["spectrum"] = (*whole["amplitude"].dims, "frequency_bin"), np.zeros((*shape, 2, 3))
+    twice = (whole["load"] * 2.0).assign_attrs(units="N m", job_units="kN mm")
+    return whole.assign_coords(frequency_bin=[0.0, 10.0, 20.0], driven_load=twice)
+
+
+@pytest.mark.parametrize("chunks", [None, {"load": 2}])
+def test_a_table_has_a_row_for_each_run_with_units_words_and_a_column_for_each_strand(chunks):
+    whole = in_rpm(study())
+    table = (whole if chunks is None else whole.chunk(chunks)).cvt.table()
+    assert list(table.columns) == [
+        "driving_speed [rpm]",
+        "friction_gradient [s/m]",
+        "sheave_stiffness",
+        "load [N m]",
+        "driven_load [kN mm]",
+        "status",
+        "class",
+        "vibrates",
+        "amplitude_t1 [m]",
+        "amplitude_t2 [m]",
+        "frequency_t1 [Hz]",
+        "frequency_t2 [Hz]",
+        "reason",
+    ]
+    assert len(table) == whole["status"].size
+    assert set(table["driving_speed [rpm]"]) == {1000.0, 3000.0}
+    np.testing.assert_allclose(table["driven_load [kN mm]"], 2.0 * table["load [N m]"])
+    classes = whole.cvt.classes().values.ravel()
+    assert [OccurrenceClass[name.upper()] for name in table["class"]] == list(classes)
+    assert table["reason"][0] == "=1+1" and set(table["status"][classes == OccurrenceClass.FAILED]) == {
+        "failed_numerics",
+        "failed_error",
+        "timed_out",
+    }
+    for k, strand in enumerate(("t1", "t2")):
+        column = table[f"amplitude_{strand} [m]"]
+        np.testing.assert_array_equal(column, whole["amplitude"].values[..., k].ravel())
+    of_one = whole.isel(load=2).cvt.in_units(amplitude="um").cvt.table()
+    np.testing.assert_allclose(of_one["amplitude_t1 [um]"], 1e6 * table["amplitude_t1 [m]"][2::10])
+
+
+def test_a_table_of_many_runs_leaves_spectra_unread():
+    whole = study(loads=tuple(np.linspace(20.0, 200.0, 9000)))
+
+    def untouched(block):
+        raise AssertionError("spectra are read for a table")
+
+    spectra = xr.zeros_like(whole["amplitude"]).expand_dims(frequency_bin=[0.0, 1.0], axis=-1).chunk()
+    lazy = whole.chunk({"load": 500}).assign(spectrum=spectra.map_blocks(untouched, template=spectra))
+    assert len(lazy.cvt.table()) == whole["status"].size > 1e5
+
+
+def test_a_table_is_written_for_programs_and_for_spreadsheets(tmp_path, capsys, monkeypatch):
+    whole = in_rpm(study())
+    whole.to_netcdf(tmp_path / "results.nc")
+    assert main(["table", str(tmp_path)]) == 0
+    assert capsys.readouterr().out == f"table: {tmp_path}/table.csv\n"
+    read, table = pd.read_csv(tmp_path / "table.csv"), whole.cvt.table()
+    assert list(read.columns) == list(table.columns) and len(read) == len(table)
+    np.testing.assert_array_equal(read["amplitude_t2 [m]"], table["amplitude_t2 [m]"])
+    assert main(["table", str(tmp_path), "--out", str(tmp_path / "x.xlsx")]) == 0
+    sheet = zipfile.ZipFile(tmp_path / "x.xlsx").read("xl/worksheets/sheet1.xml").decode()
+    rows = re.findall("<row .*?</row>", sheet)
+    assert len(rows) == len(table) + 1
+    assert re.findall("<t>([^<]*)</t>", rows[0]) == list(table.columns)
+    assert "<t>=1+1</t>" in rows[1] and "<f>" not in sheet  # a text, and no formula
+    assert main(["table", str(tmp_path), "--out", str(tmp_path / "x.txt")]) == 2
+    monkeypatch.setitem(sys.modules, "xlsxwriter", None)
+    assert main(["table", str(tmp_path), "--out", str(tmp_path / "y.xlsx")]) == 2
+    assert 'found none; `pip install "cvt_hpc[xlsx]"`, or write a .csv' in capsys.readouterr().err
+    assert not (tmp_path / "y.xlsx").exists()

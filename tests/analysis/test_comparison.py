@@ -206,6 +206,38 @@ def test_the_report_says_both_counts_and_names_the_cells():
     ]
 
 
+@pytest.mark.parametrize(
+    ("changes", "are_designs"),
+    [
+        ({"sheaves": {"tilt_stiffness": 3e5}}, True),
+        ({"scene": {"ratio": 2.0, "seed": 2}}, True),
+        ({"scene": {"ratio": 2.5, "seed": 2, "disturbance": 1e-5}}, False),
+        ({"numerics": {"step": 2e-6}, "mesh": {"stations": 96}, "model": "pushbelt"}, False),
+        ({"vibration": {"amplitude_threshold": 1e-6}, "rings": {"layers": 3}}, False),
+    ],
+)
+def test_of_two_designs_one_is_better_and_of_two_methods_one_contradicts(changes, are_designs):
+    scene = {
+        "scene": {"ratio": 2.5, "seed": 1, "disturbance": 1e-6},
+        "sheaves": {"tilt_stiffness": 2e5},
+        "mesh": {"stations": 160},
+    }
+    a = row([VIBRATING, VIBRATING, QUIET, VIBRATING], [5.5, 9.0, 1.0, 20.0], **scene)
+    b = row([QUIET, QUIET, VIBRATING, VIBRATING], [4.5, 1.0, 9.0, 10.0], **(scene | changes))
+    found = compare(a, b)
+    lines = list(comparison_lines(found, ("a", "b")))
+    assert found.are_designs == are_designs and any("contradict" in line for line in lines) != are_designs
+    if are_designs:
+        start = next(k for k, line in enumerate(lines) if line.startswith("two designs"))
+        assert lines[start : start + 4] == [
+            "two designs: of 4 cells B is better in 2 (quiet where A vibrates) and worse in 1 (vibrates where A is "
+            "quiet)",
+            "amplitude where both vibrate: in B 0.5 times that in A (median), better",
+            "worse in B:",
+            "  load = 2: quiet 1 um 500 Hz | vibrating 9 um 500 Hz",
+        ]
+
+
 def test_studies_without_amplitudes_are_compared_by_class():
     a, b = (two_flags([Status.DONE] * 2, verdicts) for verdicts in ([QUIET, QUIET], [QUIET, VIBRATING]))
     found = compare(a, b)

@@ -60,6 +60,9 @@ def draw_all(dataset, kinds, applying):
 
 def test_this_version_has_its_datasets():
     assert cvt_hpc.__version__ in [path.name for path in VERSIONS]
+    expected = {f"{name}.nc.xz" for name in (*FOUND, *(f"history_{name}" for name in DRAWN))}
+    for version in VERSIONS:
+        assert {path.name for path in version.glob("*.nc.xz")} == expected
 
 
 @pytest.mark.parametrize("name", FOUND)
@@ -98,10 +101,10 @@ def test_the_command_line_draws_the_same_files(datasets, monkeypatch, capsys):
     assert main(["plot", "element", "history_elastic_belt.nc", "--data", "followed.nc"]) == 0
     assert main(["plot", "variator", "history_spatial_pushbelt.nc", "--of", "gap", "--of", "roll"]) == 0
     assert capsys.readouterr().out.splitlines() == [
-        "picture: campbell.png",
-        "picture: curve_frequency_amplitude.png",
-        "picture: profile_push_force.png",
-        "picture: element.png",
+        "picture: speeds_campbell.png",
+        "picture: grid_curve_frequency_amplitude.png",
+        "picture: history_elastic_belt_history_pushbelt_profile_push_force.png",
+        "picture: history_elastic_belt_element.png",
         "data: followed.nc",
         "picture: history_spatial_pushbelt_variator_gap_roll.png",
     ]
@@ -115,7 +118,7 @@ def test_each_history_of_a_folder_has_its_own_files(datasets, monkeypatch, capsy
     assert main(["plot", "element", ".", "--data", "met.nc"]) == 1  # one history alone has profiles over time
     told = capsys.readouterr()
     assert told.out.splitlines() == [
-        "picture: element_history_elastic_belt.png",
+        "picture: history_elastic_belt_element.png",
         "data: met_history_elastic_belt.nc",
     ]
     assert len(told.err.splitlines()) == len(DRAWN) - 1

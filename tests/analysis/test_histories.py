@@ -209,7 +209,7 @@ sheave_stiffness = [1, inf]
     attributes["point_units"] = json.dumps(dict(job.units))
     figure = history_figure(run().assign_attrs(attributes))
     lines = figure.get_suptitle().splitlines()
-    assert lines[1].replace("\u00a0", " ") == "load 0.05 kN m, sheave_stiffness inf, driving_speed 2000 rpm"
+    assert lines[1].replace("\u00a0", " ") == "load 0.05 kN m, sheave stiffness inf, driving speed 2000 rpm"
     assert panel(figure, "load [kN m]").lines[0].get_ydata()[[0, -1]] == pytest.approx([0.02, 0.14], rel=1e-3)
     (printed,) = point_lines(job, {**at, "driving_speed": point["driving_speed"]})
     assert printed.endswith(lines[1].replace("\u00a0", " "))

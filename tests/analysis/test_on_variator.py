@@ -142,7 +142,8 @@ def test_energy_has_losses_of_arc_parts_and_feeds_of_regions():
     assert [bar.get_height() for bar in above.patches] == list(range(8))
     powers = region_powers(history())
     np.testing.assert_allclose([bar.get_height() for bar in below.patches], powers.values.ravel())
-    texts = [text.get_text() for text in below.get_legend().get_texts()]
+    assert "not all terms known" in below.get_title(loc="left")
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
     assert texts == ["friction of the flanks", "damping, rings' friction"]
     ramp = history()
     ramp["flank_feed"][:] = ramp["damping_feed"][:] = np.nan
@@ -167,7 +168,7 @@ def test_what_goes_in_comes_out_or_is_lost_up_to_what_the_record_leaves_open():
     run = balanced_history()
     whole, parts, *rest = energy_figure(run).axes
     assert len(rest) == 2
-    put_in, taken_out, lost = (1e3 * bar.get_height() for bar in whole.patches)
+    put_in, taken_out, lost, others = (1e3 * bar.get_width() for bar in whole.patches)
     widths = [bar.get_width() for bar in parts.patches]
     named = dict(
         zip((label.get_text().split("  ")[0] for label in parts.get_yticklabels()), widths, strict=True)
@@ -182,11 +183,34 @@ def test_what_goes_in_comes_out_or_is_lost_up_to_what_the_record_leaves_open():
         20.0
     )
     assert named["left open"] == pytest.approx(still_open)
-    assert (
-        whole.get_title(loc="left") == "driving pulley in 40 kW = load out 37 kW + losses 2900 W + rest 100 W"
-    )
+    assert [label.get_text() for label in whole.get_yticklabels()] == [
+        "driving pulley, in  40",
+        "load, out  37",
+        "all losses  2.9",
+        "all of the rest  0.1",
+    ]
+    assert put_in == pytest.approx(taken_out + lost + others)
     run["driving_power"] = ((), np.nan)
     assert len(energy_figure(run).axes) == 2  # of a run that failed nothing is told
+
+
+def test_what_feeds_the_vibration_and_what_takes_from_it_is_nothing_in_sum():
+    """On a path whose cells differ from arc to arc, with the terms that have no region."""
+    run = history()
+    lengths = np.where(run["region"] == "driven arc", 2.0, 1.0)
+    position = np.cumsum(lengths) - lengths
+    run = run.assign_coords(position=position * PATH.path_length / lengths.sum())
+    fed = float(region_powers(run).sum())
+    cells = np.diff(run["position"], append=PATH.path_length)
+    feeds = (run["flank_feed"] + run["damping_feed"]).values
+    assert fed == pytest.approx(float(feeds @ (cells + np.roll(cells, 1)) / 2.0))
+    taken = {"layer_taken": 0.5, "lag_taken": 0.1, "carried_power": 0.2}
+    run = run.assign(taken | {"fluctuation_remainder": fed - sum(taken.values())})
+    below = energy_figure(run).axes[-1]
+    assert sum(bar.get_height() for bar in below.patches) == pytest.approx(0.0, abs=1e-12)
+    names = [label.get_text().replace("\n", " ") for label in below.get_xticklabels()]
+    assert names[4:] == ["layer dampers", "sheave lag", "mean motion", "left open"]
+    assert "0 W with what is left open" in below.get_title(loc="left")
 
 
 def test_a_phase_portrait_is_an_ellipse_of_the_vibration_alone():

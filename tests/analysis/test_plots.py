@@ -7,6 +7,7 @@ import xarray as xr
 from matplotlib.text import Text
 
 from cvt_hpc.analysis.arrangement import Sides
+from cvt_hpc.analysis.composing import compose
 from cvt_hpc.analysis.curve_panels import curve_panels_figure
 from cvt_hpc.analysis.curves import MARKS, curve_figure
 from cvt_hpc.analysis.figures import STYLE
@@ -14,7 +15,9 @@ from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.analysis.waterfall import waterfall_figure
 from cvt_hpc.analysis.wraps import wrap_figure
 from cvt_hpc.errors import InputError
+from cvt_hpc.picture_kinds import KINDS, RESULTS
 from cvt_hpc.variables import Status, Vibrates
+from support import pictured
 
 LOADS, SPEEDS, BINS = [0.0, 2.0, 4.0], [20.0, 60.0], np.arange(0.0, 110.0, 10.0)
 
@@ -212,6 +215,37 @@ def test_what_cannot_be_drawn_is_refused(results, history, compose, message):
     with matplotlib.rc_context(STYLE), pytest.raises(InputError) as caught:
         compose(results, history)
     assert str(caught.value).startswith(message)
+
+
+BLANK = {
+    "curve": ({"quantities": ["efficiency"]}, {"ratio": 1.0, "driving_speed": 100.0}),
+    "strands": ({}, {"driving_speed": 100.0}),
+}
+
+
+@pytest.mark.parametrize("name", sorted(set(KINDS) - {"hysteresis"}))  # ramps may all be quiet
+def test_a_picture_without_data_is_refused_by_what_it_lacks(name):
+    options, at = BLANK.get(name, ({}, None))
+    ramped = {"ramp": "load", "spectrogram": "driving_speed"}.get(name)
+    whole = pictured.results() if KINDS[name].subject == RESULTS else pictured.history(ramped=ramped)
+    floats = [key for key, array in whole.data_vars.items() if array.dtype.kind == "f"]
+    kept = {"load", "driving_speed", "wrap_angle", "momentary_element_speed"}
+    nothing = whole.assign({key: np.nan * whole[key] for key in set(floats) - kept})
+    for lacking in (nothing, whole.drop_vars(floats)):
+        with pytest.raises(InputError) as caught:
+            compose(name, [lacking], at, ["x.nc"], **options)
+        assert str(caught.value).startswith("x.nc: ") and "\n" not in str(caught.value)
+    assert compose(name, [whole], at, ["x.nc"], **options).axes
+
+
+def test_a_wrap_ends_where_the_strand_begins_and_strands_have_no_panel(history):
+    """The end of an arc is the first station of the strand behind it."""
+    angle = history["wrap_angle"].values
+    angle[[9, 21]] = 3.2
+    figure = wrap_figure([history])
+    assert [axes.get_title(loc="left") for axes in figure.axes[:2]] == ["driving pulley", "driven pulley"]
+    for axes in figure.axes[:2]:
+        np.testing.assert_allclose(axes.lines[0].get_xdata()[-2:], np.degrees([3.0, 3.2]))
 
 
 def test_a_map_of_quantities_has_a_panel_for_each_and_tells_their_numbers(results):

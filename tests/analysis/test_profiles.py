@@ -34,8 +34,10 @@ def belt(load, front=3, **values):
 
 @pytest.fixture
 def runs(monkeypatch):
-    place = "cvt_hpc.analysis.telling_apart.place_of"
-    monkeypatch.setattr(place, lambda attributes: [f"load {json.loads(attributes['point'])['load']:g} N m"])
+    place = "cvt_hpc.analysis.telling_apart.values_of"
+    monkeypatch.setattr(
+        place, lambda attributes: {"load": f"{json.loads(attributes['point'])['load']:g} N m"}
+    )
     return [belt(8.0), belt(16.0, front=5)]
 
 

@@ -82,7 +82,8 @@ def test_bad_input_is_one_line_and_nothing_is_written(write_chart, call, tmp_pat
         2,
         [],
         [
-            "cvt-hpc: c.toml: chart: expected a table [chart]; see `jobs/chart_oscillator.toml`, found nothing",
+            "cvt-hpc: c.toml: chart: expected a table [chart], found nothing; `cvt-hpc examples "
+            "chart_oscillator` copies a job that has one",
         ],
     )
     assert [path.name for path in tmp_path.iterdir()] == ["c.toml"]

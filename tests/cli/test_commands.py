@@ -1,11 +1,13 @@
 """The commands within this process, on the toy model and runs without mechanics."""
 
 import re
+import sys
 
 import netCDF4
+import numpy as np
 import pytest
 
-from cvt_hpc.cli.parts import INTERRUPTED, colour_end
+from cvt_hpc.cli.parts import INTERRUPTED, colour_end, picture_beside
 from cvt_hpc.errors import InputError
 from cvt_hpc.printing import report_lines
 from cvt_hpc.study import FailedRun, RunReport, StudyStatus
@@ -37,14 +39,22 @@ def test_run_status_gather_and_map_of_one_study(write_job, call, tmp_path):
     assert call("gather", "out/x") == (0, ["results: out/x/results.nc"], [])
     with netCDF4.Dataset("out/x/results.nc") as results:
         assert results["vibrates"][:].tolist() == [[0, 0]] * 2 + [[1, 1]] * 3
-    assert call("map", "out/x", "--at", "sheave_stiffness=3") == (0, ["map: out/x/map.png"], [])
+    assert call("map", "out/x", "--at", "sheave_stiffness=3") == (
+        0,
+        ["map: out/x/map_sheave_stiffness=3.png"],
+        [],
+    )
     assert call("map", "out/x/results.nc", "--out", "y.png") == (0, ["map: y.png"], [])
     assert call("map", "out/x", "out/x/results.nc") == (0, ["map: out/x/maps.png"], [])
     status, _, told = call("map", "out/x", "--show", "vibrate", "--vmax", "20 um")
     assert status == 2 and "unknown numeric variable of the results; did you mean vibrates?" in told[0]
     curve = "plot", "curve", "out/x", "vibrates", "--at", "sheave_stiffness=3"
     assert call(*curve) == (0, ["picture: out/x/curve_vibrates_sheave_stiffness=3.png"], [])
-    for picture in ("out/x/map.png", "y.png", "out/x/curve_vibrates_sheave_stiffness=3.png"):
+    for picture in (
+        "out/x/map_sheave_stiffness=3.png",
+        "y.png",
+        "out/x/curve_vibrates_sheave_stiffness=3.png",
+    ):
         assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
 
 
@@ -160,10 +170,11 @@ def test_limits_and_retries_reach_the_sweep(write_job, call, monkeypatch, tmp_pa
         "time_limit": 9000.0,
         "run_limit": 600.0,
         "retry": [Status.TIMED_OUT, Status.FAILED_ERROR],
+        "raises": False,
     }
     given.clear()
     call("run", "x.toml")
-    assert given == {"part": None, "fresh": False, "retry": []}
+    assert given == {"part": None, "fresh": False, "retry": [], "raises": False}
 
 
 def test_status_of_a_sweep_at_work(call, monkeypatch):
@@ -202,18 +213,34 @@ def test_another_job_in_the_folder_is_refused_and_kept(write_job, call, tmp_path
     assert (tmp_path / "out/x/results.nc").read_bytes() == before
 
 
+def test_pictures_are_named_by_dataset_kind_quantity_and_place(tmp_path):
+    def name(path, *words, files=()):
+        return (
+            picture_beside(path, [tmp_path / file for file in files], *words).relative_to(tmp_path).as_posix()
+        )
+
+    study, run = tmp_path / "study", tmp_path / "run-000001.nc"
+    study.mkdir()
+    assert name(study, "map", "loss", "load=20 N m") == "study/map_loss_load=20_N_m.png"
+    assert name(study / "results.nc", "map", files=["study/results.nc"]) == "study/map.png"
+    assert name(run, "wrap", files=[run.name]) == "run-000001_wrap.png"
+    assert name(run, "wrap", files=["a.nc", "b.nc"]) == "a_b_wrap.png"
+    many = [f"run-{k:06d}.nc" for k in range(40)]
+    assert name(study, "ramp", "t1", files=many) == "study/run-000000_and_39_more_ramp_t1.png"
+
+
 def test_simulate_prints_the_outcome_and_keeps_the_history(write_job, call, mechanics):
     write_job(GRID)
     arguments = ("--at", "load=0.05 kN m", "--set", "ratio=2", "--out", "new/h.nc", "--plot", "h.png")
     status, out, err = call("simulate", "x.toml", *arguments)
     assert (status, err) == (0, [])
     assert out == [
-        "at      load 0.05 kN m, sheave_stiffness 1",
+        "at      load 0.05 kN m, sheave stiffness 1",
         "status     done",
         "vibrates   yes",
+        "amplitude  t1 1, t2 25 um",
         "load       50 N m",
         "steps      3",
-        "amplitude  t1 1e-06, t2 2.5e-05 m",
         "history: new/h.nc",
         "picture: h.png",
     ]
@@ -221,6 +248,24 @@ def test_simulate_prints_the_outcome_and_keeps_the_history(write_job, call, mech
     ((drawn, picture),) = mechanics["drawn"]
     assert (str(where), str(picture)) == ("new/h.nc", "h.png")
     assert written is drawn and written["load"] == 50
+
+
+def test_simulate_prints_what_matters_and_the_rest_when_asked(write_job, call, mechanics, monkeypatch):
+    write_job(GRID)
+    double = sys.modules["cvt_hpc.simulation"]
+    made = double.simulate
+    forces = {f"force_{k}": ((), 2.5e3 * 10.0**-k, {"units": "N"}) for k in range(12)}
+    speed = {"efficiency": ((), 0.9, {"units": "1"}), "driven_speed": ((), np.pi, {"units": "rad s-1"})}
+    monkeypatch.setattr(double, "simulate", lambda job, at: made(job, at).assign(forces).assign(speed))
+    command = ("simulate", "x.toml", "--set", "thrust=20 kN", "--set", "driving_speed=30 rpm")
+    status, out, err = call(*command)
+    assert (status, err, len(out)) == (0, [], 13)
+    told = [" ".join(line.split()) for line in out[1:]]
+    assert told[:4] == ["status done", "vibrates no", "amplitude t1 1, t2 25 um", "efficiency 0.9"]
+    assert told[-1] == "8 more by --all"
+    whole = [" ".join(line.split()) for line in call(*command, "--all")[1][1:]]
+    assert whole[:11] == told[:11] and len(whole) == 19
+    assert {"force 0 2.5 kN", "force 3 2.5 N", "force 11 2.5e-08 N", "driven speed 30 rpm"} <= set(whole)
 
 
 def test_simulate_replaces_an_earlier_history(write_job, call, tmp_path, mechanics):
@@ -236,7 +281,7 @@ def test_simulate_of_a_run_that_fails_ends_with_1(write_job, call):
     assert status == 1
     # no verdict, and no number that is none
     assert out == [
-        "at      load 0 N m, sheave_stiffness inf",
+        "at      load 0 N m, sheave stiffness inf",
         "status  failed_numerics",
         "reason  step 3: too stiff",
         "steps   3",

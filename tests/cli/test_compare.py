@@ -50,6 +50,16 @@ def test_studies_that_agree_and_studies_that_do_not(write_job, call, tmp_path, m
     assert [row["load [N m]"] for row in rows if row["pair"] == "vibrates in A only"] == ["75.0"] * 2
 
 
+def test_two_designs_are_compared_without_a_contradiction(write_job, call, monkeypatch):
+    write_job(GRID)
+    call("run", "x.toml")
+    contrary_at(75, monkeypatch)
+    call("run", "x.toml", "--set", "thrust=30 kN", "--out", "out/other")
+    status, out, err = call("compare", "out/x", "out/other")
+    assert (status, err) == (0, [])
+    assert any(line.startswith("two designs: of 10 cells B is better in 2") for line in out)
+
+
 def test_studies_of_other_grids(write_job, call):
     write_job(GRID)
     call("run", "x.toml")

@@ -44,7 +44,7 @@ DRAWING = "text"  # kind of a block that shows something and is no code
 # of their own packages run small ones.
 CHECKED_ONLY = {"branch", "chart", "fit", "ladder"}
 CHECKED_MODELS = {"beam_pushbelt"}
-# What runs here have [SI], by key, or by model or stepper and key. Five periods of band_low are judged, the least that
+# What runs here have [SI], by key, or by model, stepper or job and key. Five periods of band_low are judged, the least that
 # there may be; slow models have a high band for that.
 SMALL = {"duration": 0.04, "longest_duration": 0.04, "rise_time": 0.01}
 SHORT = {"duration": 0.022, "longest_duration": 0.022, "rise_time": 0.008, "band_low": 500.0}
@@ -53,24 +53,11 @@ SMALL_OF = {
     "explicit": SHORT,
     "pushbelt": SHORT | {"elements": 104, "band_high": 600.0},
     "quasi_static_belt": SHORT,
+    "ramps": {"duration": 0.6, "longest_duration": 0.6, "stations": 64},
     "spatial_pushbelt": SHORT | {"elements": 104, "band_high": 600.0},
     "steady_variator": {"stations": 64},
     "linear_stability": {"stations": 64},
 }
-RAMPS = """
-name = "ramps"
-model = "elastic_belt"
-[axes]
-load_start = ["20 N m", "200 N m"]
-[linked.load_start]
-load = ["200 N m", "20 N m"]
-[scene]
-load_history = "ramp"
-[mesh]
-stations = 64
-[record]
-history = [0, 1]
-"""
 # What a page takes for granted: work of its reader, or of another page.
 BEFORE = {
     "docs/guide/tutorial.md": "cvt-hpc run jobs/quickstart.toml",
@@ -86,9 +73,6 @@ BEFORE = {
     """,
     "docs/guide/sweeps.md": """
         cvt-hpc init JOB
-        cvt-hpc run jobs/lebrecht_2004.toml --set name=other --set stations=96
-        cvt-hpc run jobs/ramps.toml --set duration=0.6 --set longest_duration=0.6
-        cvt-hpc simulate jobs/lebrecht_2004.toml --at load=120 --out run.nc
     """,
     "cvt_hpc/models/linear_stability/README.md": "cvt-hpc init JOB --model linear_stability",
     "cvt_hpc/models/steady_variator/README.md": "cvt-hpc init JOB --model steady_variator",
@@ -188,7 +172,7 @@ def _smaller(words, page):
     job = build_job(read_document(Path(words[1])), words[1], given)
     if job.model in CHECKED_MODELS or job.parameters.get("profile_time"):
         return ["check", words[1], *settings]  # a course of time cannot be cut short
-    changed = SMALL | SMALL_OF.get(job.model, {}) | SMALL_OF.get(job.stepper, {})
+    changed = SMALL | SMALL_OF.get(job.model, {}) | SMALL_OF.get(job.stepper, {}) | SMALL_OF.get(job.name, {})
     changed = {key: value for key, value in changed.items() if key in job.parameters}
     longest = max(job.axes, key=lambda axis: len(axis.values), default=None)
     by_number = f"out/{job.name}/histories/" in page.read_text()  # of a run, which is that in the whole grid
@@ -220,7 +204,6 @@ def folder(tmp_path, monkeypatch):
     """An empty folder with the jobs alone."""
     shutil.copytree(ROOT / "jobs", tmp_path / "jobs", ignore=shutil.ignore_patterns("results", "notebooks"))
     (tmp_path / "jobs" / "results").mkdir()
-    (tmp_path / "jobs" / "ramps.toml").write_text(RAMPS)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", sys.argv)
     return tmp_path

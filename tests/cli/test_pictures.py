@@ -1,9 +1,11 @@
 """Every kind of picture by the command line: on one page, no text on another or cut, lines told apart by all."""
 
+import re
 from itertools import combinations
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 from cvt_hpc.analysis.figures import LONG, NARROW
 from cvt_hpc.cli import main
@@ -11,6 +13,16 @@ from cvt_hpc.netcdf import write_history
 from support import pictured
 from support.eyes import EYES, lightness, seen
 
+RAW = re.compile(
+    "|".join(
+        {
+            str(name)
+            for whole in (pictured.results(), pictured.ramps(), pictured.history())
+            for name in whole.variables
+            if "_" in str(name)
+        }
+    )
+)  # names as datasets have them, which stand in no picture
 MARGIN = 0.01  # [inch]
 IN_GREY, IN_COLOUR = 15.0, 10.0  # differences that an eye sees without looking twice
 KINDS = {
@@ -84,6 +96,7 @@ def test_a_picture_is_one_page_with_texts_that_are_whole_and_apart(line, drawn, 
     figure = drawn(line)
     assert_on_a_page(figure)
     assert pictured.faults_of(figure, monkeypatch) == []
+    assert not [text.get_text() for text in figure.findobj(Text) if RAW.search(text.get_text())]
     for axes in figure.axes:
         assert_lines_apart([line for line in axes.lines if not line.get_label().startswith("_")])
 

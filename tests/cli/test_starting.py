@@ -1,15 +1,20 @@
 """What somebody needs who begins: a job to fill in, the keys of a model, a look at the machine, completion."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
 import sys
 import tomllib
+from pathlib import Path
 
 import pytest
 
+import cvt_hpc
+from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
+from cvt_hpc.job.examples import example_files
 from cvt_hpc.job.template import job_template
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
@@ -90,6 +95,85 @@ def test_models_tells_each_model_and_its_keys(call):
     assert call("models", "nothing")[0] == 2
 
 
+def test_variables_tells_what_the_runs_of_a_model_leave(call):
+    status, out, err = call("variables", "elastic_belt")
+    assert (status, err) == (0, [])
+    told = [" ".join(line.split()) for line in out]
+    assert any(line.startswith("frequency strand Hz ") for line in told)
+    (vibrates,) = (line for line in told if line.startswith("vibrates "))
+    assert vibrates.endswith("(0 no, 1 yes, 2 undecided, 3 slips, 4 irregular)")
+    names = {line.split()[0] for line in told[1 : told.index("")]}
+    assert names >= {variable.name for variable in load_model("elastic_belt").variables}
+    assert any(line.startswith("frequency_bin Hz ") for line in told[told.index("") :])
+    assert call("variables", "elastic_bel")[2][0].endswith("did you mean elastic_belt?")
+    assert "moving_string" in call("variables", "moving_string")[2][0]
+
+
+def test_examples_are_listed_and_copied_with_what_they_read_and_replace_nothing(call, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, out, err = call("examples")
+    assert (status, err) == (0, [])
+    listed = {line.split()[0]: line for line in out[: out.index("")]}
+    assert listed["jobs/quickstart.toml"].endswith("A first map: fall of friction x sheave stiffness x load")
+    assert {"jobs/notebooks/read_a_map.ipynb", "slurm/sweep.sbatch"} <= listed.keys()
+    status, out, err = call("examples", "sheave_deformation.toml", "read_a_map", "slurm", "--out", "mine")
+    copied = {path.relative_to(tmp_path / "mine").as_posix() for path in (tmp_path / "mine").rglob("*.*")}
+    assert (status, err) == (0, []) and len(out) == len(copied)
+    assert copied >= {"jobs/sheave/driving.nc", "jobs/results/lebrecht_2004.csv", "slurm/launch.sh"}
+    assert call("check", "mine/jobs/sheave_deformation.toml")[0] == 0
+    (tmp_path / "mine/slurm/launch.sh").write_text("mine")
+    status, out, err = call("examples", "quickstart", "slurm/launch.sh", "--out", "mine")
+    assert (status, out) == (2, []) and "mine/slurm/launch.sh: expected a place that is free" in err[0]
+    assert (tmp_path / "mine/slurm/launch.sh").read_text() == "mine"
+    assert not (tmp_path / "mine/jobs/quickstart.toml").exists()
+    assert call("examples", "quickstar")[2] == [
+        "cvt-hpc: examples: quickstar: unknown example; did you mean quickstart?"
+    ]
+
+
+@pytest.mark.slow
+def test_the_wheel_brings_the_same_examples(tmp_path):
+    root = Path(cvt_hpc.__file__).parents[1]
+    source = tmp_path / "source"  # a build writes beside its sources
+    shutil.copytree(root / "cvt_hpc", source / "cvt_hpc", ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "README.md", "jobs", "slurm"):
+        (source / name).symlink_to(root / name)
+    pip = [sys.executable, "-m", "pip", "-q", "--disable-pip-version-check"]
+    offline = ["--no-deps", "--no-index"]
+    subprocess.run(
+        [*pip, "wheel", *offline, "--no-build-isolation", "--wheel-dir", tmp_path, source], check=True
+    )
+    (wheel,) = tmp_path.glob("*.whl")
+    subprocess.run(
+        [*pip, "install", *offline, "--no-compile", "--prefix", tmp_path / "own", wheel], check=True
+    )
+    (package,) = (tmp_path / "own").glob("lib*/python*/site-packages")
+    program = (
+        "import json, cvt_hpc; from cvt_hpc.job.examples import example_files;"
+        "print(json.dumps([cvt_hpc.__file__, {name: str(path) for name, path in example_files().items()}]))"
+    )
+    environment = os.environ | {"PYTHONPATH": str(package)}
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, env=environment, check=True, capture_output=True
+    )
+    used, examples = json.loads(done.stdout)
+    assert Path(used).is_relative_to(package)
+    known = example_files()
+    assert examples.keys() == known.keys() and len(examples) > 90
+    for name, path in examples.items():
+        assert (
+            Path(path).is_relative_to(tmp_path / "own")
+            and Path(path).read_bytes() == known[name].read_bytes()
+        )
+
+
+def test_a_package_without_examples_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(cvt_hpc, "__file__", str(tmp_path / "cvt_hpc" / "__init__.py"))
+    monkeypatch.setattr("cvt_hpc.job.examples.metadata.files", lambda _: None)
+    with pytest.raises(InputError, match="examples: expected those of a wheel, or of a checkout"):
+        example_files()
+
+
 def test_doctor_names_what_is_wrong_and_what_to_do(call, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(
@@ -103,6 +187,7 @@ def test_doctor_names_what_is_wrong_and_what_to_do(call, tmp_path, monkeypatch):
     assert {"ok       versions", "ok       machine", "trouble  disk", "trouble  MPI"} <= told
     advice = out[out.index(next(line for line in out if "trouble  MPI" in line)) + 1]
     assert "does not fit the MPI library" in advice
+    assert "fills" not in " ".join(out)  # ranks that cannot be started
 
 
 @pytest.mark.parametrize(
@@ -135,6 +220,7 @@ def test_doctor_asks_srun_whether_slurm_answers(call, tmp_path, monkeypatch, scr
 def test_doctor_starts_two_ranks():
     found = next(finding for finding in doctor.examine(doctor.Path()) if finding.what == "MPI")
     assert found.fine and found.found.startswith("2 ranks by ")
+    assert len(os.sched_getaffinity(0)) == 1 or "fills this machine" in found.advice
 
 
 @pytest.fixture(scope="module")

@@ -270,7 +270,7 @@ def test_people_read_values_in_the_units_of_the_job(write_job):
     assert "load 0.02, 0.03, 0.04 kN m 3 values" in told
     assert "element_mass 900 to 1000 g/m linked to driving_speed varies with driving_speed" in told
     assert list(point_lines(job, {"driving_speed": 100 * math.pi})) == [
-        "at      driving_speed 3000 rpm, load 0.02 kN m, element_mass 1000 g/m"
+        "at      driving speed 3000 rpm, load 0.02 kN m, element mass 1000 g/m"
     ]
     # what counts more has the unit
     assert "driving_speed" not in load_job("x.toml", ["driving_speed=[100, 200]", "element_mass=1"]).units

@@ -1,5 +1,7 @@
 """Drives of other layouts: crossed, of three pulleys, with a tensioner; speed profiles; what is refused."""
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -237,8 +239,8 @@ def test_a_fault_in_a_file_is_told_by_its_line(tmp_path, row, message):
 
 def test_what_is_per_pulley_is_printed(started):
     """However many pulleys there are; of arms those that are there."""
-    lines = {line.split()[0]: line.split(maxsplit=1)[1] for line in outcome_lines(started)}
-    assert lines["arm_angle"].startswith("P2 ") and "P1" not in lines["arm_angle"]
+    lines = dict(re.split(r"\s{2,}", line, maxsplit=1) for line in outcome_lines(started))
+    assert lines["arm angle"].startswith("P2 ") and "P1" not in lines["arm angle"]
     assert lines["slip"].count("P") == 3 and "spectrum" not in lines
     wider = xr.Dataset({"status": started.status, "slip": ("pulley", np.arange(9.0), {"units": "1"})})
     (slip,) = (line for line in outcome_lines(wider.assign_coords(pulley=np.arange(9))) if "slip" in line)

@@ -31,6 +31,20 @@ PATH = variator(*(POINT[key] for key in ("ratio", "driven_radius", "centre_dista
 STATIONS, RATE = 240, 10e3
 SPEEDS, LOADS, RATIOS = np.linspace(100.0, 600.0, 6), np.linspace(20.0, 200.0, 10), (1.0, 1.6, 2.52)
 BINS = np.arange(0.0, 1510.0, 10.0)
+POWERS = {
+    "driving_power": 39e3,
+    "load_power": 36e3,
+    "thrust_power": -0.2,
+    "storing_power": -7.8,
+    "ring_loss": 400.0,
+    "layer_loss": 2.8,
+    "seating_loss": 370.0,
+    "loss": 3e3,
+    "layer_taken": 2.3,
+    "lag_taken": 0.6,
+    "carried_power": 0.9,
+    "fluctuation_remainder": -0.1,
+}
 INK = 0.12  # share of a text's box at each side that its letters leave free
 
 
@@ -149,6 +163,7 @@ def history(load=100.0, ramped=None, duration=0.4):
         "displacement": (("time", "probe"), np.stack(motion, 1) @ shapes.T, {"units": "m"}),
         "load": ("time", loads, {"units": "N m"}),
         "driving_speed": ("time", speeds, {"units": "rad s-1"}),
+        **{name: ((), power, {"units": "W"}) for name, power in POWERS.items()},
         "part_flank_loss": (("pulley", "arc_part"), 5.0 * np.arange(8.0).reshape(2, 4), {"units": "W"}),
     }
     coordinates = {

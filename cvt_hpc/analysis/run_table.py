@@ -1,0 +1,130 @@
+"""The results of a study as one table for spreadsheets and data frames: a row for each run."""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from cvt_hpc.analysis.classes import check_results, map_classes
+from cvt_hpc.errors import mismatch
+from cvt_hpc.files import written_aside
+from cvt_hpc.job.shown import heading, shown_number
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+FORMATS = (".csv", ".xlsx")
+MOST_ROWS = (1 << 20) - 1  # of a sheet, below its head
+_DIGITS = 14  # of what was converted: 3000 rpm from 314.1592653589793 rad/s
+
+
+def run_table(dataset: xr.Dataset, source: str = "results") -> DataFrame:
+    """Return results with a row for each run, or each cell of the grid.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        Results of a study, in memory or in chunks.
+    source : str
+        Where they are from, for the errors.
+
+    Returns
+    -------
+    DataFrame
+        Columns are the axes and what follows from them in the units of the job; `status` and `class`; then
+        all results in the units of the dataset, with a column for each strand, pulley or other named place,
+        such as `amplitude_t1 [m]`. Flags are words. Spectra and other series are left out.
+
+    Raises
+    ------
+    InputError
+        The dataset holds no results of a study.
+    """
+    from pandas import DataFrame
+
+    check_results(dataset, source)
+    dims = dataset["status"].dims
+    axes = [name for name, values in dataset.coords.items() if set(values.dims) <= set(dims)]
+    results = [name for name, array in dataset.data_vars.items() if _is_named(array, dims)]
+    loaded = dataset[[*axes, *results]].assign({"class": map_classes(dataset)}).load()
+    status = loaded["status"]
+    columns: dict[str, np.ndarray] = {}
+    for name in axes:
+        values = _flat(loaded[name].broadcast_like(status), dims)
+        columns[heading(str(name), loaded[name].attrs)] = _in_job_units(values, loaded[name].attrs)
+    for name in dict.fromkeys(["status", "class", *results]):
+        array = loaded[name]
+        unit = str(array.attrs.get("units", "1"))
+        of_unit = "" if unit in ("", "1") else f" [{unit}]"
+        extra = [dim for dim in array.dims if dim not in dims]
+        for place in product(*(range(array.sizes[dim]) for dim in extra)):
+            at = dict(zip(extra, place, strict=True))
+            labels = [str(array[dim].values[k]) for dim, k in at.items()]
+            values = _flat(array.isel(at).broadcast_like(status), dims)
+            columns["_".join([str(name), *labels]) + of_unit] = _in_words(values, array.attrs)
+    return DataFrame(columns)
+
+
+def write_table(frame: DataFrame, out: Path) -> Path:
+    """Write a table as CSV, or as a sheet for Excel and the like, by its suffix, and return its path.
+
+    Raises
+    ------
+    InputError
+        The suffix is none of FORMATS; of a sheet, the library is missing or there are more than MOST_ROWS.
+    """
+    if out.suffix.lower() not in FORMATS:
+        raise mismatch(str(out), f"a table: {', '.join(FORMATS)}", out.suffix or "no suffix")
+    if out.suffix.lower() == ".csv":
+        with written_aside(out, parents=True) as aside:
+            frame.to_csv(aside, index=False, lineterminator="\n")
+        return out
+    try:
+        from xlsxwriter import Workbook
+    except ImportError:
+        then = '`pip install "cvt_hpc[xlsx]"`, or write a .csv, which spreadsheets read too'
+        raise mismatch(str(out), "the library XlsxWriter", "none", then) from None
+    if len(frame) > MOST_ROWS:
+        raise mismatch(
+            str(out), f"at most {MOST_ROWS} runs, which a sheet holds", f"{len(frame)}", "write .csv"
+        )
+    # texts stay texts, whoever has written them: no formulas and no links
+    options = {"constant_memory": True, "strings_to_formulas": False, "strings_to_urls": False}
+    cells = frame.astype(object).where(frame.notna(), None).replace([np.inf, -np.inf], ["inf", "-inf"])
+    with written_aside(out, parents=True) as aside, Workbook(str(aside), options) as book:
+        sheet = book.add_worksheet("runs")
+        for row, values in enumerate([frame.columns, *cells.itertuples(index=False, name=None)]):
+            sheet.write_row(row, 0, values)
+    return out
+
+
+def _is_named(array: xr.DataArray, dims: tuple[Any, ...]) -> bool:
+    """Whether a variable has one value for each run, or one for each of named places."""
+    extra = [dim for dim in array.dims if dim not in dims]
+    return all(dim in array.coords and array[dim].dtype.kind in "OUST" for dim in extra)
+
+
+def _flat(array: xr.DataArray, dims: tuple[Any, ...]) -> np.ndarray:
+    return array.transpose(*dims).values.ravel()
+
+
+def _in_job_units(values: np.ndarray, attributes: dict[str, Any]) -> np.ndarray:
+    """Values [SI] of an axis in the unit that `heading` names; texts as they are."""
+    if values.dtype.kind != "f" or (factor := shown_number(1.0, attributes)) == 1.0:
+        return _in_words(values, attributes)
+    return np.array([float(f"{factor * value:.{_DIGITS}g}") for value in values.tolist()])
+
+
+def _in_words(values: np.ndarray, attributes: dict[str, Any]) -> np.ndarray:
+    """Words of flags, texts of bytes, numbers as they are."""
+    if "flag_meanings" in attributes:
+        meanings = dict(zip(attributes["flag_values"], attributes["flag_meanings"].split(), strict=True))
+        known, places = np.unique(values, return_inverse=True)
+        return np.array([meanings.get(value, "") for value in known], object)[places]
+    if values.dtype.kind == "S":
+        return np.char.decode(values, errors="replace")
+    return values
