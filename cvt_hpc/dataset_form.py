@@ -111,7 +111,7 @@ def _holds_texts(variable: xr.Variable) -> bool:
 
 
 def _check_coordinate(variable: xr.Variable, place: str) -> None:
-    if variable.ndim != 1 or variable.dtype.kind not in "fOU":
+    if variable.ndim != 1 or variable.dtype.kind not in "fOU" or not isinstance(variable.data, np.ndarray):
         return
     if variable.dtype.kind == "f":
         largest = np.abs(variable.values)
