@@ -25,7 +25,6 @@ from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, check
 from cvt_hpc.analysis.composing import compose
 from cvt_hpc.analysis.conversion import in_units, plain, standard
 from cvt_hpc.analysis.result_tables import read_table
-from cvt_hpc.dataset_form import check_form
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.picture_kinds import END, HISTORIES, HISTORY, KINDS, RESULTS, Kind
 from cvt_hpc.study import open_results
@@ -61,7 +60,6 @@ class Results:
     @property
     def _dataset(self) -> xr.Dataset:
         """In the form of this program, as of now: datasets can be changed in place."""
-        check_form(self._given, "results")
         return standard(self._given)
 
     def _history(self, verb: str) -> xr.Dataset:

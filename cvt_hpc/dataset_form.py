@@ -75,6 +75,9 @@ def _check_table(attributes: Mapping[Any, Any], key: str, place: str) -> None:
         table = None
     if not isinstance(table, dict):
         raise mismatch(f"{place}: {key}", "a table in JSON", "none")
+    for inner in ("axes", "vibration") if key == "job" else ():
+        if not isinstance(table.get(inner, {}), dict):
+            raise mismatch(f"{place}: {key}: {inner}", "a table", show(table[inner]))
 
 
 def _check_variable(variable: xr.Variable, place: str) -> None:
@@ -108,7 +111,7 @@ def _holds_texts(variable: xr.Variable) -> bool:
 
 
 def _check_coordinate(variable: xr.Variable, place: str) -> None:
-    if variable.ndim != 1 or variable.dtype.kind not in "fOU":
+    if variable.ndim != 1 or variable.dtype.kind not in "fOU" or not isinstance(variable.data, np.ndarray):
         return
     if variable.dtype.kind == "f":
         largest = np.abs(variable.values)

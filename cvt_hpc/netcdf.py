@@ -238,7 +238,7 @@ def holds(path: Path, content: str, *, follow: bool = False) -> bool:
     """
     if kind_of(path, follow=follow) != "a file":  # a pipe would be waited for
         return False
-    from cvt_hpc.hdf5 import global_text
+    from cvt_hpc.foreign_files import global_text
 
     return global_text(path, CONTENT) == content
 
@@ -271,7 +271,7 @@ def open_netcdf(path: Path, *, follow: bool = False, **options: Any) -> xr.Datas
     """
     import xarray as xr
 
-    from cvt_hpc.hdf5 import DAMAGE, check_hdf5
+    from cvt_hpc.foreign_files import DAMAGE, check_hdf5
 
     place = str(path)
     with naming_refusals(path, "a netCDF dataset"):

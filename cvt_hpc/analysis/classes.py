@@ -24,6 +24,12 @@ def check_results(dataset: xr.Dataset, source: str) -> None:
         if name not in dataset:
             found = few_of(list(map(str, dataset.data_vars)), _MOST_NAMED) or "no variables"
             raise mismatch(source, f"results of a study, with the variable {name}", found)
+        if dataset[name].dtype.kind not in "biuf":
+            raise mismatch(f"{source}: {name}", "flags as numbers", "others")
+    if beyond := set(dataset["vibrates"].dims) - set(dataset["status"].dims):
+        raise mismatch(
+            f"{source}: vibrates", "the dimensions of status", f"{min(map(str, beyond))} beside them"
+        )
     if not dataset["status"].size:
         raise mismatch(source, "results of a study of one run at least", "none")
 

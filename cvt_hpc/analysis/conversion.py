@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from xarray.indexes import PandasMultiIndex
 
+from cvt_hpc.dataset_form import check_form
 from cvt_hpc.errors import mismatch, show, unknown
 from cvt_hpc.job.shown import JOB_UNITS
 from cvt_hpc.job.units import UnitError, from_si, is_unit
@@ -105,12 +106,14 @@ def plain(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
     Raises
     ------
     InputError
-        Flags are no whole numbers, which is raised when they are computed.
+        The dataset is not as `check_form` has it, or flags are no whole numbers, which is raised when they
+        are computed.
     """
-    if any(variable.dtype.kind == "S" for variable in dataset.variables.values()):
-        dataset = xr.decode_cf(dataset, decode_times=False, decode_timedelta=False)
     for name in [key for key in dataset.dims if isinstance(dataset.xindexes.get(key), PandasMultiIndex)]:
         dataset = dataset.reset_index(name).rename_dims({name: "run"} if name != "run" else {})
+    check_form(dataset, source)
+    if any(variable.dtype.kind == "S" for variable in dataset.variables.values()):
+        dataset = xr.decode_cf(dataset, decode_times=False, decode_timedelta=False)
     return _with(dataset, dict(_restored(dataset, source)))
 
 

@@ -215,14 +215,17 @@ def values_of(attributes: Mapping[str, Any]) -> dict[str, str]:
     if not {"job", "point"} <= attributes.keys():
         return {}
     job, point = json.loads(attributes["job"]), json.loads(attributes["point"])
-    schema = load_schema(job["model"], job["stepper"], "history")
-    tables = {key: value for section in schema.sections for key, value in job.get(section, {}).items()}
-    others = [key for key in point if key not in job["axes"] and point[key] != tables.get(key)]
-    # a parameter that follows from others stands in no table; where a load was given there is no `load_share`
-    keys = [key for key in (*job["axes"], *others) if key in point]
-    units = _job_units(attributes)
-    told = {key: {"units": schema.parameters[key].unit, JOB_UNITS: units.get(key, "")} for key in keys}
-    return {key: shown(point[key], told[key]) for key in keys}
+    try:
+        schema = load_schema(job["model"], job["stepper"], "history")
+        tables = {key: value for section in schema.sections for key, value in job.get(section, {}).items()}
+        others = [key for key in point if key not in job["axes"] and point[key] != tables.get(key)]
+        # a parameter that follows from others is in no table; where a load was given there is no `load_share`
+        keys = [key for key in (*job["axes"], *others) if key in point]
+        units = _job_units(attributes)
+        told = {key: {"units": schema.parameters[key].unit, JOB_UNITS: units.get(key, "")} for key in keys}
+        return {key: shown(point[key], told[key]) for key in keys}
+    except (AttributeError, KeyError, TypeError):
+        raise mismatch("history: job, point", "a job of this program and a point of it", "others") from None
 
 
 def _job_units(attributes: Mapping[str, Any]) -> dict[str, str]:

@@ -207,4 +207,7 @@ FORMS = {
     "deep job": (attribute("job", "[" * 50_000), "job: expected a table in JSON"),
     "changed name": (lambda path: path.write_bytes(path.read_bytes().replace(b"loss", b"lo\x1bs")), "one that is damaged"),
 }  # fmt: skip
+FLAGS = {
+    "flags of texts": (replaced("status", 2, 2, 3, dtype="S1"), "status: expected flags as numbers"),
+}
 HOSTILE = PLACES | SIZES | TYPES | FORMS
