@@ -232,9 +232,10 @@ def test_a_report_of_joined_studies_lists_what_varies(dim, tmp_path):
     assert f"Several studies are joined along {name}" in page
 
 
-def test_stacked_runs_are_samples():
+def test_stacked_runs_are_samples(tmp_path):
     dataset = stored("grid")
     stacked = dataset.stack(runs=dataset["status"].dims)
     assert count_classes(stacked.cvt.classes().values) == count_classes(dataset.cvt.classes().values)
     assert standard(stacked)["status"].dims == ("run",)
+    assert "6 runs" in words_of(stacked.cvt.report(tmp_path / "report.html"))
     stacked.cvt.map()
