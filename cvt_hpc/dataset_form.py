@@ -107,7 +107,7 @@ def _holds_texts(variable: xr.Variable) -> bool:
     if variable.encoding.get("dtype") in (str, np.dtype("S1")) or not variable.size:
         return True
     first = variable[(0,) * variable.ndim].values.item()
-    return isinstance(first, (str, bytes, float))  # nan, where it is not known
+    return isinstance(first, (str, bytes, float, tuple))  # nan, where it is not known; of stacked axes
 
 
 def _check_coordinate(variable: xr.Variable, place: str) -> None:
