@@ -60,8 +60,9 @@ def patience(environment: Mapping[str, str] = os.environ) -> float:
 def bounded_start(rank: int, size: int) -> Iterator[None]:
     """End this process by SIGKILL, with a line on stderr, if MPI_Init in a `with` block takes too long."""
     seconds = patience()
+    ranks = f"all {size} ranks" if size > 1 else "all ranks"  # a launcher may not tell their number
     line = (
-        f"cvt-hpc: MPI: expected all {size} ranks to start it within {seconds:.4g} s, found that rank {rank} "
+        f"cvt-hpc: MPI: expected {ranks} to start it within {seconds:.4g} s, found that rank {rank} "
         f"waits for others: look above for one that has ended or hangs; {_VARIABLE}=20min would wait longer"
     )
     program = Path(__file__).with_name("watcher.py")
