@@ -39,7 +39,6 @@ def _simulate(arguments: argparse.Namespace) -> int:
     job.point_at(at, "--at")
     check_output(arguments.out, (".nc",))
     check_output(arguments.plot, PICTURES)
-    from cvt_hpc.analysis.histories import draw_history
     from cvt_hpc.netcdf import is_history, write_history
     from cvt_hpc.printing import outcome_lines, point_lines
     from cvt_hpc.simulation import simulate
@@ -53,6 +52,8 @@ def _simulate(arguments: argparse.Namespace) -> int:
     if arguments.out is not None:
         written.append(f"history: {write_history(dataset, arguments.out)}")
     if arguments.plot is not None and dataset.sizes.get("time", 0) > 1:
+        from cvt_hpc.analysis.histories import draw_history  # takes longer than a short run
+
         written.append(f"picture: {draw_history(dataset, arguments.plot)}")
     elif arguments.plot is not None:
         written.append("picture: none, the run has no history")

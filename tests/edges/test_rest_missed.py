@@ -117,7 +117,9 @@ def random_scene(rng, law):
     changes = {
         "kinetic_friction": level,
         "static_friction": level * rng.choice([1.0, 1.2, 2.0]),
-        "friction_gradient": 0.0 if law in ("coulomb", "table") else -level / speed * 10.0 ** rng.uniform(-2, 1),
+        "friction_gradient": 0.0
+        if law in ("coulomb", "table")
+        else -level / speed * 10.0 ** rng.uniform(-2, 1),
         "stribeck_velocity": speed * 10.0 ** rng.uniform(-1.5, 0.5),
         "friction_speed": speed * 10.0 ** rng.uniform(-4.0, -1.0),
         "table_force": (0.2 * load, load, 3.0 * load),
@@ -130,7 +132,11 @@ def random_scene(rng, law):
         "damping": rng.choice([0.0, 0.02, 0.1]) * np.sqrt(stiffness * mass),
         "normal_stiffness": rng.choice([0.0, 0.1]) * stiffness,
     }
-    sampling = {"sampling_rate": 1.0 / interval, "step": min(interval, 1e-2 * period), "duration": 40.0 * period}
+    sampling = {
+        "sampling_rate": 1.0 / interval,
+        "step": min(interval, 1e-2 * period),
+        "duration": 40.0 * period,
+    }
     return scene(
         "oscillator",
         mass=mass,
