@@ -1,7 +1,7 @@
 """Texts with units ("50 kN", "3000 rpm", "20 %") to numbers in SI; pint is loaded where a text needs it.
 
-It takes a second to load, which most jobs are spared: their texts have a prefix before the wanted unit, or are
-in rpm, degrees or per cent.
+It takes a second to load, which most jobs are spared: their texts have a prefix before the wanted unit, or
+are in rpm, degrees or per cent.
 """
 
 from __future__ import annotations
