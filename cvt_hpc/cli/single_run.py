@@ -54,7 +54,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
     if arguments.out is not None:
         written.append(f"history: {write_history(dataset, arguments.out)}")
     if arguments.plot is not None and dataset.sizes.get("time", 0) > 1:
-        from cvt_hpc.analysis.histories import draw_history
+        from cvt_hpc.analysis.histories import draw_history  # takes longer than a short run
 
         written.append(f"picture: {draw_history(dataset, arguments.plot)}")
     elif arguments.plot is not None:

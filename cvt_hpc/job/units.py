@@ -1,6 +1,7 @@
 """Texts with units ("50 kN", "3000 rpm", "20 %") to numbers in SI; pint is loaded where a text needs it.
 
-It takes half a second to load, which most jobs are spared: their texts have a prefix before the wanted unit.
+It takes a second to load, which most jobs are spared: their texts have a prefix before the wanted unit, or
+are in rpm, degrees or per cent.
 """
 
 from __future__ import annotations
@@ -24,7 +25,14 @@ _TYPOGRAPHY = str.maketrans(
 )
 _LONGEST_UNIT = 40
 _PREFIXES = {"M": 6, "k": 3, "m": -3, "u": -6, "µ": -6, "μ": -6}  # powers of ten
-_PREFIXED = ("m", "s", "N", "Hz")
+_PREFIXED = re.compile(r"(?:m|s|N|Hz)(?:[ /].*)?")  # a prefix belongs to the first of the units
+# Of 28 digits, as decimal numbers are rounded
+_PI = Decimal("3.141592653589793238462643383")
+_PLAIN = {
+    ("rpm", "rad/s"): lambda number: number * _PI / 30,
+    ("deg", "rad"): lambda number: number * _PI / 180,
+    ("%", ""): lambda number: number.scaleb(-2),
+}
 
 
 class UnitError(ValueError):
@@ -96,10 +104,12 @@ def unit_in(raw: Any) -> str:
 
 
 def _convert(number: Decimal, given: str, unit: str) -> Decimal:
-    if unit in _PREFIXED and given[1:] == unit and given[0] in _PREFIXES:
+    if given[1:] == unit and given[0] in _PREFIXES and _PREFIXED.fullmatch(unit):
         return number.scaleb(_PREFIXES[given[0]])
-    if given in _PREFIXED and unit[1:] == given and unit[0] in _PREFIXES:
+    if unit[1:] == given and unit[0] in _PREFIXES and _PREFIXED.fullmatch(given):
         return number.scaleb(-_PREFIXES[unit[0]])
+    if plain := _PLAIN.get((given, unit)):
+        return plain(number)
     factor, shift = _conversion(given, unit)
     return number * factor + shift
 

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import stdtrit
 
 LEAST_WINDOWS = 12  # that are independent
 LEAST_CROSSINGS = 4
@@ -76,5 +75,7 @@ def _gain(levels: NDArray[np.float64]) -> tuple[float, float]:
     freedom = n * (1.0 - alike) / (1.0 + alike) - 2.0
     if freedom < LEAST_WINDOWS - 2:
         return float(slope), np.inf
+    from scipy.special import stdtrit  # takes long, and quiet runs do without
+
     error = np.sqrt(scatter @ scatter / (freedom * (t @ t)))
     return float(slope), float(stdtrit(freedom, _CONFIDENCE) * error)

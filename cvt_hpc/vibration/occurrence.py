@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import stdtrit
 
 from cvt_hpc.variables import Vibrates, shortened
 from cvt_hpc.vibration.irregularity import is_irregular, is_stationary
@@ -129,6 +128,8 @@ def _judge_strand(
     threshold = parameters["amplitude_threshold"]
     last = windows[-1]
     size = f"{last * 1e6:.3g} um at the end"
+    from scipy.special import stdtrit  # takes long, and quiet runs do without
+
     margin = error * stdtrit(max(len(windows) - 2, 1), CONFIDENCE)
     if np.all(windows >= threshold):
         loss = -rate * judged_time

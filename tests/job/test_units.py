@@ -117,16 +117,24 @@ def test_bare_numbers_and_texts_in_the_si_unit_or_with_a_prefix_do_without_pint(
     program = (
         "import sys; from cvt_hpc.job.units import from_si, to_si; "
         "print(to_si('20', 'N m'), to_si('20 N m', 'N m'), to_si('75 mm', 'm'), from_si(0.075, 'm', 'mm'), "
-        "'pint' in sys.modules)"
+        "to_si('2 kN m', 'N m'), to_si('30 rpm', 'rad/s'), to_si('20 %', ''), 'pint' in sys.modules)"
     )
-    assert run_program(program) == ("20.0 20.0 0.075 75.0 False\n", "")
+    assert run_program(program) == ("20.0 20.0 0.075 75.0 2000.0 3.141592653589793 0.2 False\n", "")
 
 
 def test_prefixes_are_those_of_pint():
     for prefix, power in units._PREFIXES.items():
-        for unit in units._PREFIXED:
-            known = units._registry().Quantity(Decimal(1), prefix + unit).to(unit).magnitude
-            assert known == Decimal(10) ** power
+        for unit in ("m", "s", "N", "Hz", "N m", "m/s", "N s/m", "N/m^2"):
+            known = units._registry().Quantity(Decimal(1), units._parse_unit(prefix + unit))
+            assert known.to(units._parse_unit(unit)).magnitude == Decimal(10) ** power
+            assert units._convert(Decimal(1), prefix + unit, unit) == Decimal(10) ** power
+
+
+@given(st.decimals(min_value=-100_000, max_value=100_000, places=4))
+def test_plain_factors_are_those_of_pint(number):
+    for (given_unit, unit), factor in units._PLAIN.items():
+        quantity = units._registry().Quantity(number, units._parse_unit(given_unit))
+        assert float(factor(number)) == float(quantity.to(units._parse_unit(unit)).magnitude)
 
 
 def test_conversion_is_silent():
