@@ -23,8 +23,9 @@ import xarray as xr
 from cvt_hpc.analysis.arrangement import Sides
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, check_results, map_classes
 from cvt_hpc.analysis.composing import compose
-from cvt_hpc.analysis.conversion import in_si, in_units
+from cvt_hpc.analysis.conversion import in_units, plain, standard
 from cvt_hpc.analysis.result_tables import read_table
+from cvt_hpc.dataset_form import check_form
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.picture_kinds import END, HISTORIES, HISTORY, KINDS, RESULTS, Kind
 from cvt_hpc.study import open_results
@@ -50,11 +51,25 @@ class Results:
     Parameters
     ----------
     dataset : Dataset
-        As `open_results` returns it, or a part of it.
+        As `open_results` or xarray open it, or what xarray and pint-xarray have made of it: a part, several
+        studies in one, values in other units.
     """
 
     def __init__(self, dataset: xr.Dataset) -> None:
-        self._dataset = dataset
+        self._given = dataset
+
+    @property
+    def _dataset(self) -> xr.Dataset:
+        """In the form of this program, as of now: datasets can be changed in place."""
+        check_form(self._given, "results")
+        return standard(self._given)
+
+    def _history(self, verb: str) -> xr.Dataset:
+        """The same of a run, which a verb draws."""
+        dataset = self._dataset
+        if "status" in dataset and dataset["status"].dims:
+            raise mismatch("results", f"the history of a run, which {verb} draws", "a study of several")
+        return dataset
 
     def map(
         self,
@@ -85,7 +100,8 @@ class Results:
         from cvt_hpc.analysis.studies import maps_figure
 
         quantities = [show] if isinstance(show, str) else list(show)
-        return maps_figure(_with(self._dataset, beside), quantities, at, sides=Sides(x, y, panel), vmax=vmax)
+        datasets = [self._given, *_several(beside)]
+        return maps_figure(datasets, quantities, at, sides=Sides(x, y, panel), vmax=vmax)
 
     def animation(self) -> Animation:
         """Draw the belt in the last periods of a run, magnified, as a moving picture; of a history.
@@ -94,13 +110,13 @@ class Results:
         """
         from cvt_hpc.analysis.animation import animation
 
-        return animation(in_si(self._dataset))
+        return animation(self._history("animation"))
 
     def report(self, out: str | Path = "report.html") -> Path:
         """Write a page about the study: what was found, a map with values, failed runs, cost, assumptions."""
         from cvt_hpc.report import write_report
 
-        return write_report(in_si(self._dataset), Path(out))
+        return write_report(self._dataset, Path(out))
 
     def table(self) -> DataFrame:
         """Return a data frame with a row for each run.
@@ -112,7 +128,7 @@ class Results:
         """
         from cvt_hpc.analysis.run_table import run_table
 
-        return run_table(self._dataset)
+        return run_table(plain(self._given))
 
     def in_units(self, **units: str) -> xr.Dataset:
         """Return the dataset with some variables and coordinates in other units: `in_units(loss="kW")`.
@@ -128,28 +144,30 @@ class Results:
             Values and the attribute `units` are converted. Of a chunked dataset nothing is computed yet.
             Pictures and reports of it are those of the values in SI units, with axes in these units.
         """
-        return in_units(self._dataset, units)
+        return in_units(self._given, units)
 
     def classes(self) -> xr.DataArray:
         """Return the class of each run or cell as a flag variable: quiet, vibrating, failed, ..."""
-        check_results(self._dataset, "results")
-        return map_classes(self._dataset)
+        dataset = plain(self._given)
+        check_results(dataset, "results")
+        return map_classes(dataset)
 
     def strongest(self, name: str = "amplitude") -> xr.DataArray:
         """Return a variable at the strand with the largest amplitude, where the run vibrates; else nan.
 
         It has the dimensions of `amplitude`, such as `frequency`.
         """
-        check_results(self._dataset, "results")
-        if name not in self._dataset:
-            raise unknown("results", "variable", name, map(str, self._dataset.data_vars))
-        dims = set(self._dataset["amplitude"].dims) if "amplitude" in self._dataset else set()
-        if set(self._dataset[name].dims) != dims:
-            found = ", ".join(map(str, self._dataset[name].dims)) or "none"
+        dataset = plain(self._given)
+        check_results(dataset, "results")
+        if name not in dataset:
+            raise unknown("results", "variable", name, map(str, dataset.data_vars))
+        dims = set(dataset["amplitude"].dims) if "amplitude" in dataset else set()
+        if set(dataset[name].dims) != dims:
+            found = ", ".join(map(str, dataset[name].dims)) or "none"
             raise mismatch(f"results: {name}", "a variable with the dimensions of amplitude", found)
-        values = at_strongest_strand(self._dataset, name)
-        values.attrs = dict(self._dataset[name].attrs)
-        return values.rename(name).where(self.classes() == OccurrenceClass.VIBRATING)
+        values = at_strongest_strand(dataset, name)
+        values.attrs = dict(dataset[name].attrs)
+        return values.rename(name).where(map_classes(dataset) == OccurrenceClass.VIBRATING)
 
     def onset(self, along: str = "load") -> xr.DataArray:
         """Return where vibration sets in: the lowest load, or value of another axis, of a change from quiet.
@@ -208,9 +226,8 @@ def _boundaries(classes: np.ndarray, axis: np.ndarray, most: int) -> tuple[np.nd
     return places, rising
 
 
-def _with(dataset: xr.Dataset, beside: xr.Dataset | Sequence[xr.Dataset]) -> list[xr.Dataset]:
-    datasets = [dataset, *([beside] if isinstance(beside, xr.Dataset) else beside)]
-    return list(map(in_si, datasets))
+def _several(beside: xr.Dataset | Sequence[xr.Dataset]) -> Sequence[xr.Dataset]:
+    return [beside] if isinstance(beside, xr.Dataset) else beside
 
 
 def _verb(name: str, kind: Kind) -> Any:
@@ -233,10 +250,9 @@ def _verb(name: str, kind: Kind) -> Any:
         chosen = signature.bind(self, *words, **given).arguments
         at, beside = chosen.pop("at", None), chosen.pop("beside", None)
         del chosen["self"]
-        if kind.subject != RESULTS and "status" in self._dataset and self._dataset["status"].dims:
-            raise mismatch("results", f"the history of a run, which {name} draws", "a study of several")
+        dataset = self._dataset if kind.subject == RESULTS else self._history(name)
         chosen = {key: value for key, value in chosen.items() if value is not None and value != ()}
-        return compose(name, _with(self._dataset, beside or ()), at, **chosen)
+        return compose(name, [dataset, *map(standard, _several(beside or ()))], at, **chosen)
 
     subjects = {RESULTS: "of results", HISTORY: "of a history", HISTORIES: "of one history or several"}
     lines = [f"Draw {kind.text}; {subjects[kind.subject]}.", "", "Parameters", "----------"]

@@ -7,8 +7,10 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+BAD_INPUT = 2  # exit status
 CRASHED = 70  # exit status after a defect of this program; EX_SOFTWARE of sysexits.h
 LONGEST_KEY = 100  # letters
+DEEPEST = 20  # levels of tables and lists; a chart has some six
 _LONGEST_QUOTE = 60
 _LONGEST_LINE = 4000  # a list of all keys fits
 _LINE_END = 500  # letters of a longer one that stay
@@ -19,7 +21,14 @@ class InputError(ValueError):
 
     The command line prints it and ends with exit status 2. It is one line, whatever the names and texts in it
     hold.
+
+    Attributes
+    ----------
+    everywhere : bool
+        Whether all ranks that were started together raise it.
     """
+
+    everywhere = False
 
     def __init__(self, text: str) -> None:
         super().__init__(one_line(text))
@@ -31,6 +40,10 @@ class JobWarning(UserWarning):
 
 class UnitWarning(JobWarning):
     """A number without a unit that is far from usual: it may be meant in another unit."""
+
+
+class NoEffectWarning(JobWarning):
+    """A value of a job that changes none of its runs."""
 
 
 def mismatch(where: str, expected: str, found: str, then: str = "") -> InputError:
@@ -132,21 +145,31 @@ def one_line(text: str) -> str:
     """
     if len(text) > _LONGEST_LINE:
         text = f"{text[: _LONGEST_LINE - _LINE_END]} ... {text[-_LINE_END:]}"
+    return escaped(text)
+
+
+def escaped(text: str, kept: str = "") -> str:
+    """Return a text with escapes for characters that do not print, other than those `kept`.
+
+    Among them are those that turn the direction of what follows, so that it reads as something else.
+    """
     if text.isprintable():
         return text
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    return "".join(c if c.isprintable() or c in kept else c.encode("unicode_escape").decode() for c in text)
 
 
-def check_keys(entry: Any, where: str) -> None:
-    """Raise InputError if a key in nested tables is not a word of printable letters.
+def check_keys(entry: Any, where: str, depth: int = DEEPEST) -> None:
+    """Raise InputError if a key in nested tables is not a word of printable letters, or they nest too deep.
 
     Keys stand in errors, tables and pictures as they are.
     """
+    if depth < 0:
+        raise mismatch(where, f"lists and tables nested at most {DEEPEST} deep", "deeper ones")
     if isinstance(entry, (list, tuple)):
         for item in entry:
-            check_keys(item, where)
+            check_keys(item, where, depth - 1)
     elif isinstance(entry, Mapping):
         for key, value in entry.items():
             if len(key) > LONGEST_KEY or not key.isprintable():
                 raise mismatch(where, f"keys of at most {LONGEST_KEY} printable characters", show(key))
-            check_keys(value, where)
+            check_keys(value, where, depth - 1)

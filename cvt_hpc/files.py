@@ -9,8 +9,10 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import pwd
 import secrets
 import stat
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -36,7 +38,7 @@ class StorageError(InputError):
 
 def storage_error(path: Path, error: Exception, advice: str = "") -> StorageError:
     """Return the error to raise when the system refuses to write `path`; `advice` is added to its text."""
-    found = _reason(error)
+    found = f"{_reason(error)}{_of_whom(path, error)}"
     return StorageError(f"{path}: expected to be able to write, found: {found}{advice and f'. {advice}'}")
 
 
@@ -48,6 +50,19 @@ def _reason(error: Exception) -> str:
     return text
 
 
+def _of_whom(path: Path, error: Exception) -> str:
+    """Return, where the system refuses a right, who can grant it, and what else to do; else nothing."""
+    if getattr(error, "errno", None) not in (errno.EACCES, errno.EPERM):
+        return ""
+    place = Path(path).absolute()
+    while not os.path.lexists(place):  # what is missing was refused by the first folder above
+        place = place.parent
+    with contextlib.suppress(OSError, KeyError):
+        owner = pwd.getpwuid(os.lstat(place).st_uid).pw_name
+        return f" ({place} belongs to {owner}, who can grant the right; or choose another --out, or copy it)"
+    return ""
+
+
 @contextlib.contextmanager
 def naming_refusals(path: Path, expected: str) -> Iterator[None]:
     """Turn a refusal of the system within a `with` into an error that states what was expected of `path`."""
@@ -56,13 +71,14 @@ def naming_refusals(path: Path, expected: str) -> Iterator[None]:
     except OSError as error:
         if error.errno in _FULL:
             raise storage_error(path, error) from error
-        raise StorageError(f"{path}: expected {expected}, found: {_reason(error)}") from error
+        found = f"{_reason(error)}{_of_whom(path, error)}"
+        raise StorageError(f"{path}: expected {expected}, found: {found}") from error
 
 
-def kind_of(path: Path) -> str | None:
-    """Return the kind of object at a path, such as "a file" or "a link", without following it, or None."""
+def kind_of(path: Path, *, follow: bool = False) -> str | None:
+    """Return the kind of object at a path, such as "a file", or "a link", unless it is followed, or None."""
     try:
-        return _kind(os.lstat(path).st_mode)
+        return _kind(os.stat(path, follow_symlinks=follow).st_mode)
     except (FileNotFoundError, NotADirectoryError):
         return None
 
@@ -73,7 +89,7 @@ def refuse_link(path: Path) -> None:
         raise InputError(f"{path}: expected a folder of its own, found a link, which may lead anywhere")
 
 
-def open_regular(path: Path, flags: int = os.O_RDONLY) -> int:
+def open_regular(path: Path, flags: int = os.O_RDONLY, *, follow: bool = False) -> int:
     """Return the descriptor of a regular file, which is neither a link nor, for writing, linked twice.
 
     Parameters
@@ -82,6 +98,8 @@ def open_regular(path: Path, flags: int = os.O_RDONLY) -> int:
         The file.
     flags : int
         As of `os.open`.
+    follow : bool
+        Whether a link may lead to the file, since the user named it herself.
 
     Raises
     ------
@@ -89,9 +107,11 @@ def open_regular(path: Path, flags: int = os.O_RDONLY) -> int:
         If something else stands there, or the system refuses. Nothing is waited for.
     """
     # Before it is opened, since that alone may move a device; and after, for an object put there meanwhile.
-    if (found := kind_of(path)) not in (None, "a file"):
-        raise OSError(errno.EINVAL, f"{found} in the place of a file")
-    descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+    if (found := kind_of(path, follow=follow)) not in (None, "a file"):
+        number = errno.EISDIR if found == "a folder" else errno.EINVAL
+        raise OSError(number, f"{found} in the place of a file")
+    flags |= os.O_NONBLOCK | os.O_CLOEXEC | (0 if follow else os.O_NOFOLLOW)
+    descriptor = os.open(path, flags, 0o666)
     opened = os.fstat(descriptor)
     if not stat.S_ISREG(opened.st_mode):
         os.close(descriptor)
@@ -102,9 +122,9 @@ def open_regular(path: Path, flags: int = os.O_RDONLY) -> int:
     return descriptor
 
 
-def read_regular(path: Path, limit: int) -> bytes:
+def read_regular(path: Path, limit: int, *, follow: bool = False) -> bytes:
     """Return the content of a regular file of at most `limit` bytes; OSError as of `open_regular`."""
-    with os.fdopen(open_regular(path), "rb") as file:
+    with os.fdopen(open_regular(path, follow=follow), "rb") as file:
         if (size := os.fstat(file.fileno()).st_size) > limit:
             raise OSError(errno.EFBIG, f"a file of more than {limit >> 20} MiB")
         return file.read(size)
@@ -196,6 +216,25 @@ def discard(path: Path) -> None:
     """Remove a file that was not finished, if it is there and the system lets us."""
     with contextlib.suppress(OSError):
         path.unlink()
+
+
+def open_missing_streams() -> None:
+    """Lead standard streams that are closed to nowhere.
+
+    The system would give their numbers to files that are opened next, and what libraries print there would be
+    written into these.
+    """
+    for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
+        if getattr(sys, name) is not None:
+            continue
+        try:
+            os.fstat(number)
+        except OSError:
+            descriptor = os.open(os.devnull, os.O_RDWR)
+            if descriptor != number:
+                os.dup2(descriptor, number)
+                os.close(descriptor)
+        setattr(sys, name, open(os.devnull, mode))
 
 
 def _kind(mode: int) -> str:

@@ -1,95 +1,71 @@
-"""Compilation of the kernels, and storage of their machine code.
+"""Compilation of the kernels, whose machine code is kept on the disk, since compiling takes minutes.
 
-Compiling takes minutes, so machine code is kept, in a folder for each module with kernels. A folder is named
-by the module and by the content of all code that it depends on: the module, all modules of the package that
-it imports, theirs in turn, this one and `lanes`, whose types any kernel may be called with. So code is found
-again whatever the dates of files are, and a change compiles only the kernels again that it may concern. A
-folder that no process has used for a month is removed when another is made.
-
-A kernel may be handed to another as an argument, as a right-hand side to a stepper, whose machine code then
-holds that of the kernel. The compiler identifies kernels by an identity drawn at random, so that it would
-never find such code again: here it is the name, and the content that names the kernel's own folder. The
-compiler cannot read an index that names a type of a script that is not at hand: here it skips that entry.
+An entry of `kernel_store` is found by all that decides it: the kernel and all that it calls, as in memory
+(`kernel_identity`), the types of its arguments, the compiler with its switches, and the processor. Where this
+cannot be told a kernel is compiled and not kept.
 
 A kernel that only other kernels call gets no entry from Python, which for tuples of arrays takes long to
 compile, and no machine code: each caller takes in its LLVM code and optimises it with its own. That holds for
 all functions that kernels call, also those of numpy. A kernel that is called with lanes does not count the
 users of an array: it makes none, and the arrays that it is given outlast it.
 
-Of processes that need the same code at a time one compiles it, and the others wait for it. Code that several
-processes have compiled is linked, so functions have random numbers in their names, unique in all processes.
-
-The folders lie below NUMBA_CACHE_DIR if that is set; else in the package where it is the user's own, else in
-the user's cache. Whoever can write to them can run any code as the user, so folders to which others can write
-are not used: without any, code is compiled in each process anew.
+Code that several processes have compiled is linked. The compiler tells functions of one name apart by numbers
+that it counts from 1 in each process; functions of two processes with one name and number would be taken for
+one. So the names of compiled functions hold a number drawn by the process, and code without one is not kept.
 
 Slow steps are logged by the logger of this module: compiling as INFO, missing storage as WARNING.
 """
 
 from __future__ import annotations
 
-import ast
-import errno
-import fcntl
+import functools
 import gc
-import hashlib
+import io
 import logging
 import os
 import pickle
-import re
 import secrets
-import shutil
-import stat
 import sys
 import time
-import weakref
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from functools import cache
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
+import llvmlite
+import llvmlite.binding
 import numba
+import numpy as np
 from numba import types
 from numba.core import compiler_lock, errors
-from numba.core.bytecode import FunctionIdentity
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
-from numba.core.codegen import JITCodeLibrary
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.compiler import Compiler, CompileResult
 from numba.core.environment import lookup_environment
-from numba.core.event import Event, Listener, register
-from numba.core.registry import CPUDispatcher
+from numba.core.funcdesc import default_mangler
+from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.sigutils import normalize_signature
+from numba.core.target_extension import CPU, dispatcher_registry, jit_registry
 from numba.core.targetconfig import ConfigStack
+from numba.core.typing import signature
 
-from cvt_hpc.compiler_shortcuts import replaced, shortcuts, typeof
+from cvt_hpc import kernel_store
+from cvt_hpc.kernel_identity import UnknownValueError, Walk, code_of_classes, digest, extensions
 from cvt_hpc.lanes.kinds import LaneArrayKind
 
-_PACKAGE = Path(__file__).parent
-_PREFIX = f"{_PACKAGE}{os.sep}"  # of the paths of its modules, as texts, since Path objects take long
-_CODE_OF_ALL = (__file__, f"{_PREFIX}lanes{os.sep}__init__.py")
-_FOLDER = "cvt_hpc-kernels"
-_MONTH = 30 * 86400.0  # [s]: longer than any job lasts, so that none loses the folder it works in
 _LONG = 3.0  # [s]: faster compiling is not logged
-_PATIENCE = 600.0  # [s] with a process that compiles the same; any kernel takes less, on a busy machine too
 
 # Division by zero gives inf as in numpy, without a test for it. Every operation is rounded once, as written:
 # were products contracted with sums, the bits would depend on which kernels the compiler merges, and so on
 # whether their code is compiled or found in the folder.
 _OPTIONS = {"nopython": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
-# The name of a compiled function holds its number, which alone tells functions of one factory apart. The
-# compiler counts from 1 in each process. With such numbers two functions from two processes could share a
-# name: linking would then drop one, and a run would compute with the other without any error. All numbers
-# have 15 digits, so that the same code has the same size.
-FunctionIdentity._unique_ids = iter(lambda: 10**14 + secrets.randbelow(9 * 10**14), None)
-
 _logger = logging.getLogger(__name__)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function at its first call; with lanes it can neither make nor return arrays."""
-    return _compiled(function, _OPTIONS)
+    return _Kernel(function, {}, dict(_OPTIONS))
 
 
 def merged_kernel(function: Callable[..., Any]) -> Any:
@@ -98,7 +74,7 @@ def merged_kernel(function: Callable[..., Any]) -> Any:
     Its call must not be its caller's last statement, nor that of another merged kernel unless it is straight
     lines: the compiler loses such calls (numba 0.68).
     """
-    return _compiled(function, _OPTIONS | {"inline": "always"})
+    return _Kernel(function, {}, _OPTIONS | {"inline": "always"})
 
 
 def called_alike(compiled: Any) -> Callable[..., Any]:
@@ -119,62 +95,14 @@ def called_alike(compiled: Any) -> Callable[..., Any]:
     return call
 
 
-class _Library(JITCodeLibrary):
-    """The LLVM code of a function; optimised and compiled once an address in it is needed."""
-
-    _is_native = False
-
-    def _optimize_final_module(self) -> None:
-        """Nothing yet: callers optimise the code that they include."""
-
-    def _finalize_final_module(self) -> None:
-        if self._object_caching_enabled and self._compiled_object:  # found on the disk
-            self._make_native()
-        else:
-            self._finalize_dynamic_globals()
-            self._finalized = True
-
-    def get_pointer_to_function(self, name: str) -> int:
-        self._ensure_finalized()
-        if not self._is_native and any(found.name == name for found in self.get_defined_functions()):
-            super()._optimize_final_module()
-            self._final_module.verify()
-            self._make_native()
-            self._shared_module = None  # callers include optimised code
-        return super().get_pointer_to_function(name)
-
-    def _make_native(self) -> None:
-        """Make machine code, and set the environments that it refers to."""
-        self._is_native = True
-        self._dynamic_globals.clear()  # of the code before it was optimised
-        super()._finalize_final_module()
-        # the compiler does so for the function itself, but not for those taken in, which had no address
-        for variable in self._final_module.global_variables:
-            if environment := lookup_environment(variable.name):
-                self._codegen.set_env(variable.name, environment)
-
-    @property
-    def codegen(self) -> Any:
-        """The function's environment as set by the compiler, at its address if it has one."""
-        return self._codegen if self._is_native else _WITHOUT_ADDRESS
-
-    def serialize_using_object_code(self) -> tuple:
-        return super().serialize_using_object_code() if self._is_native else self.serialize_using_bitcode()
-
-
-_WITHOUT_ADDRESS = SimpleNamespace(set_env=lambda name, environment: None)
-
-
 class _Kernel(CPUDispatcher):
     """A function and its machine code, with an entry from Python where Python has called it."""
 
-    def __init__(self, *arguments: Any, **named: Any) -> None:
-        super().__init__(*arguments, **named)
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments, pipeline_class=_Compiler)
         # of the kernel being compiled: whether another kernel calls it, whether with lanes
         self._for_kernel = self._takes_lanes = False
         self._without_entry: set[tuple] = set()  # types of arguments
-        self._claims = ExitStack()
-        self._compiler._customize_flags = self._customized
 
     def typeof_pyval(self, val: Any) -> Any:
         """Return the type of an argument that the compiler does not determine, as of a named tuple."""
@@ -206,14 +134,25 @@ class _Kernel(CPUDispatcher):
             if not self._for_kernel and kinds in self._without_entry:
                 self._without_entry.remove(kinds)
                 del self.overloads[kinds]
+            if found := self.overloads.get(kinds):
+                return found.entry_point
             self._takes_lanes = any(_holds(kind, LaneArrayKind) for kind in kinds)
-            with (
-                shortcuts(),
-                replaced(self.targetctx.codegen(), "_library_class", _Library),
-                ExitStack() as claims,  # kept until the code is saved, or failed to compile
-                replaced(self, "_claims", claims),
-            ):
-                return super().compile(sig)
+            self.targetoptions.update(no_cpython_wrapper=self._for_kernel, _nrt=not self._takes_lanes)
+            with _work(self.__name__) as work, ExitStack() as claims:  # until the code is kept
+                name = _name_of_entry(self, kinds, work)
+                if (found := _found(name, self, kinds, work.walk)) is None and name:
+                    claims.enter_context(kernel_store.claimed(name, self.__name__))
+                    found = _found(name, self, kinds, work.walk)
+                if found is not None:
+                    self._cache_hits[sig] += 1
+                    self.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
+                    self.add_overload(found)
+                    return found.entry_point
+                work.tell()
+                entry = super().compile(sig)
+                if name and (found := self.overloads.get(kinds)):
+                    _keep(name, found, work.walk)
+                return entry
 
     def add_overload(self, cres: Any) -> None:
         """Take machine code."""
@@ -225,11 +164,6 @@ class _Kernel(CPUDispatcher):
         self._without_entry.add(kinds)
         self.overloads[kinds] = cres
 
-    def _customized(self, flags: Any) -> Any:
-        flags.no_cpython_wrapper = self._for_kernel
-        flags.nrt = not self._takes_lanes
-        return flags
-
 
 def _holds(kind: types.Type, wanted: type) -> bool:
     """Whether a type is, or a tuple has, one of a wanted kind."""
@@ -238,382 +172,292 @@ def _holds(kind: types.Type, wanted: type) -> bool:
     return isinstance(kind, wanted)
 
 
-def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    compiled = _Kernel(function, {}, options)
-    name = f"{function.__module__}.{function.__qualname__}"
-    try:
-        content = _content(os.path.abspath(function.__code__.co_filename))
-    except (OSError, SyntaxError):  # typed into a shell: its dependencies are not known, and nothing is kept
-        code = function.__code__
-        content = _digest(repr((code.co_code, code.co_consts, code.co_names)).encode())
-    else:
-        if place := cache_folder():
-            compiled._cache = _Cache(compiled, place / f"{function.__module__}-{content}")
-    compiled._set_uuid(f"{name}-{content}")
-    return compiled
+# How a function is compiled: as the compiler does it, but for names, and for when code is optimised
 
 
-# Dependencies of the code of a kernel
+class _Target(CPU):
+    """The processor, as the compiler takes it for kernels."""
 
 
-def closure(source: str) -> set[str]:
-    """Return the files whose content determines the machine code of a module's kernels.
+class _Library(JITCodeLibrary):
+    """The LLVM code of a function; optimised and compiled once an address in it is needed."""
 
-    Parameters
-    ----------
-    source : str
-        Path of the module; one outside the package may be a script.
+    _is_native = False
+    _kept: tuple[bytes, frozenset[str]] | None = None  # of code from the disk: LLVM code, names of functions
 
-    Returns
-    -------
-    set of str
-        Paths: of the module itself, and of all of the package that it imports, also by way of others.
+    def _optimize_final_module(self) -> None:
+        """Nothing yet: callers optimise the code that they include."""
 
-    Raises
-    ------
-    OSError
-        If it is no file.
-    """
-    found: set[str] = set()
-    left = {source, *_CODE_OF_ALL}
-    while left:
-        path = left.pop()
-        found.add(path)
-        left |= _source(path).imports - found
-    return found
+    def _finalize_final_module(self) -> None:
+        if self._object_caching_enabled and self._compiled_object:  # found on the disk
+            self._make_native()
+        else:
+            self._finalize_dynamic_globals()
+            self._finalized = True
 
+    def get_pointer_to_function(self, name: str) -> int:
+        self._ensure_finalized()
+        if self._kept:
+            return self._codegen._engine.get_function_address(name) if name in self._kept[1] else 0
+        if not self._is_native and any(found.name == name for found in self.get_defined_functions()):
+            super()._optimize_final_module()
+            self._final_module.verify()
+            self._make_native()
+            self._shared_module = None  # callers include optimised code
+        return super().get_pointer_to_function(name)
 
-def _content(source: str) -> str:
-    """A digest of the content of a closure, and of the path of a module outside the package."""
-    return _content_of(source, *_stamp(source))
+    def _make_native(self) -> None:
+        """Make machine code, and set the environments that it refers to."""
+        self._is_native = True
+        self._dynamic_globals.clear()  # of the code before it was optimised
+        super()._finalize_final_module()
+        # the compiler does so for the function itself, but not for those taken in, which had no address
+        for variable in self._final_module.global_variables:
+            if environment := lookup_environment(variable.name):
+                self._codegen.set_env(variable.name, environment)
 
+    @property
+    def codegen(self) -> Any:
+        """The function's environment as set by the compiler, at its address if it has one."""
+        return self._codegen if self._is_native else _WITHOUT_ADDRESS
 
-@cache
-def _content_of(source: str, *_: int) -> str:
-    # paths within the package are relative to it, wherever it lies
-    listed = sorted((path.removeprefix(_PREFIX), _source(path).digest) for path in closure(source))
-    return _digest(repr(listed).encode())
+    def serialize_using_object_code(self) -> tuple:
+        if not self._is_native:
+            return self.serialize_using_bitcode()
+        name, kind, (code, bitcode) = super().serialize_using_object_code()
+        return name, kind, (code, bitcode, frozenset(found.name for found in self.get_defined_functions()))
 
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: tuple) -> Any:
+        name, kind, data = state
+        if kind == "bitcode":
+            return super()._unserialize(codegen, state)
+        self = codegen.create_library(name)
+        self.enable_object_caching()
+        self._set_compiled_object(data[0])
+        self._kept = data[1:]
+        self._finalize_final_module()
+        return self
 
-class _Source(NamedTuple):
-    digest: str
-    imports: frozenset[str]  # paths of modules of the package
-
-
-def _source(path: str) -> _Source:
-    return _read(path, *_stamp(path))
-
-
-def _stamp(path: str) -> tuple[int, int]:
-    """Time and size of a file, which show that it was changed and is imported again, as in a notebook."""
-    found = os.stat(path)
-    return found.st_mtime_ns, found.st_size
-
-
-@cache
-def _read(path: str, *_: int) -> _Source:
-    content = Path(path).read_bytes()
-    package = _package_of(path)
-    paths = [_paths(".".join(package))]
-    for statement in _import_statements(content.decode(errors="replace")):
-        names = [alias.name for alias in statement.names]
-        if isinstance(statement, ast.ImportFrom):
-            above = package[: len(package) + 1 - statement.level] if statement.level else []
-            module = ".".join([*above, *filter(None, [statement.module])])
-            names = [module, *(f"{module}.{name}" for name in names)]
-        paths += map(_paths, names)
-    return _Source(_digest(content), frozenset().union(*paths))
+    def _get_module_for_linking(self) -> Any:
+        if self._kept and self._shared_module is None:  # which is seldom asked for, and takes long to read
+            self._shared_module = llvmlite.binding.parse_bitcode(self._kept[0])
+        return super()._get_module_for_linking()
 
 
-def _package_of(path: str) -> list[str]:
-    """The names of the packages that a file of this package lies in; none of others."""
-    if not path.startswith(_PREFIX):
-        return []
-    return [_PACKAGE.name, *path.removeprefix(_PREFIX).split(os.sep)[:-1]]
+_WITHOUT_ADDRESS = SimpleNamespace(set_env=lambda name, environment: None)
+
+
+class _Codegen(JITCPUCodegen):
+    _library_class = _Library
 
 
 @cache
-def _paths(name: str) -> frozenset[str]:
-    """The modules of the package that an import runs: a module, and the __init__ of all packages above."""
-    above, _, last = name.rpartition(".")
-    if not above:
-        return frozenset([f"{_PREFIX}__init__.py"] if last == _PACKAGE.name else [])
-    runs, module = _paths(above), _PREFIX + os.sep.join([*above.split(".")[1:], last])
-    found = (f"{module}.py", f"{module}{os.sep}__init__.py") if runs else ()
-    return runs.union(path for path in found if os.path.isfile(path))
-
-
-_NEVER_RUN = re.compile(r"\nif TYPE_CHECKING:\n(?:(?:[ \t].*)?\n)+")
-_STATEMENT = re.compile(r"\n[ \t]*((?:from[ \t]+[\w.]+[ \t]+)?import\b[^()\n]*(?:\([^()]*\))?)")
-
-
-def _import_statements(text: str) -> list[ast.Import | ast.ImportFrom]:
-    """The import statements of a source, at any depth, except those that only a type checker reads.
-
-    To parse whole files would take a tenth of a second for all. So statements are cut out beforehand, if no
-    import can be missed.
-    """
-    run = _NEVER_RUN.sub("\n", f"\n{text}")
-    cut = "\n".join(_STATEMENT.findall(run))
-    for part in (cut, run) if cut.count("import") == run.count("import") else (run,):
-        with suppress(SyntaxError):
-            return _imports(part)
-    return _imports(text)
-
-
-def _imports(text: str) -> list[ast.Import | ast.ImportFrom]:
-    return [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import | ast.ImportFrom)]
-
-
-def _digest(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()[:16]
-
-
-# Where it is kept
-
-
-@cache
-def cache_folder() -> Path | None:
-    """Return the folder of all folders with machine code; None if nothing can be kept."""
-    if chosen := numba.config.CACHE_DIR:
-        bases = [Path(chosen).absolute()]
-    else:
-        own = _PACKAGE.stat().st_uid == os.getuid() and os.access(_PACKAGE, os.W_OK)
-        users = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
-        bases = [_PACKAGE / "__pycache__"] * own + [users] * users.is_absolute()
-    refusals = ["there is no home folder"]
-    for base in bases:
-        try:
-            return _made_safe(base / _FOLDER)
-        except OSError as error:
-            refusals.append(str(error))
-    _tell_not_kept(refusals[-1])
-    return None
-
-
-def _made_safe(folder: Path) -> Path:
-    """A folder in which nobody else can put code; made if needed.
-
-    Raises
-    ------
-    OSError
-        If there is none to be had.
-    """
-    folder.parent.mkdir(mode=0o755, parents=True, exist_ok=True)
-    with suppress(FileExistsError):
-        folder.mkdir(mode=0o700)
-    # a link is not followed: its target may be controlled by somebody else
-    itself, above = folder.lstat(), folder.parent.stat()
-    if not stat.S_ISDIR(itself.st_mode):
-        raise PermissionError(f"{folder} is no folder")
-    if itself.st_uid != os.getuid():
-        raise PermissionError(f"{folder} belongs to somebody else")
-    if itself.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        raise PermissionError(f"others can write to {folder}")
-    open_to_all = above.st_mode & stat.S_IWOTH and not above.st_mode & stat.S_ISVTX
-    if open_to_all or above.st_uid not in (0, os.getuid()):
-        raise PermissionError(f"others can replace {folder}")
-    if not os.access(folder, os.W_OK):
-        raise PermissionError(f"no permission to write to {folder}")
-    return folder
-
-
-@cache
-def _asked_for(folder: Path) -> None:
-    """Set the date of a folder to now, by best effort."""
-    with suppress(OSError):
-        os.utime(folder)
-
-
-def _make(folder: Path) -> None:
-    """Make a folder for machine code; folders that nobody has used for a month are removed."""
-    if folder.is_dir():
-        return
-    folder.mkdir(mode=0o700, exist_ok=True)
-    for other in folder.parent.iterdir():
-        with suppress(OSError):
-            # not the file of claims: opening and closing it would drop the claims of this process
-            if other.is_dir() and time.time() - other.stat().st_mtime > _MONTH:
-                shutil.rmtree(other, ignore_errors=True)
-
-
-_ADDRESS = re.compile(r"0x[0-9a-f]+")
-
-
-class _Cache(FunctionCache):
-    """The machine code of a kernel on the disk; refusals of the disk are ignored."""
-
-    def __init__(self, compiled: _Kernel, folder: Path) -> None:
-        _asked_for(folder)
-        self._kernel = weakref.ref(compiled)
-        self._py_func = function = compiled.py_func
-        self._name = repr(function)
-        self._impl = _Filing(function, folder)
-        self._cache_path = str(folder)
-        self._cache_file = _ForgivingIndex(self._cache_path, self._impl.filename_base, source_stamp="")
-        self.enable()
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Find machine code; where there is none, claim to compile it, once nobody else does so."""
-        found = super().load_overload(sig, target_context)
-        kernel = self._kernel()
-        if found is None and kernel:
-            types_called = _ADDRESS.sub("", str(sig))  # a kernel that is an argument shows its address
-            what = f"{self._cache_path} {self._impl.filename_base} {types_called} {kernel._for_kernel}"
-            kernel._claims.enter_context(_claimed(what, kernel.__name__))
-            found = super().load_overload(sig, target_context)
-        return found
-
-    def _index_key(self, sig: Any, codegen: Any) -> tuple:
-        return (*super()._index_key(sig, codegen), self._kernel()._for_kernel)  # type: ignore[union-attr]  # it lives as long as its cache
-
-    @contextmanager
-    def _guard_against_spurious_io_errors(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            _tell_not_kept(str(error))
-
-
-class _Filing(CompileResultCacheImpl):
-    """The stored content of a kernel, and its name."""
-
-    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
-        self._lineno = function.__code__.co_firstlineno
-        self._locator = _Locator(function, folder)
-        self._filename_base = self.get_filename_base(function.__qualname__, sys.abiflags)
-
-
-class _Locator:
-    """The interface by which the compiler finds where a kernel's code lies."""
-
-    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
-        self._py_file = function.__code__.co_filename
-        self._line = function.__code__.co_firstlineno
-        self._folder = folder
-
-    def get_disambiguator(self) -> str:
-        return str(self._line)
-
-    def ensure_cache_path(self) -> None:
-        _make(self._folder)
-
-
-class _ForgivingIndex(IndexDataCacheFile):
-    """An index of machine code, entry by entry: unreadable entries are kept as they are and match nothing."""
-
-    def _load_index(self) -> dict:
-        return {_entry(packed): name for packed, name in super()._load_index().items()}
-
-    def save(self, key: Any, data: Any) -> None:
-        """Add an entry; another process that adds one meanwhile could take its file for its own."""
-        with _claimed(self._index_path):
-            super().save(key, data)
-
-    def _save_index(self, overloads: dict) -> None:
-        packed = {key if isinstance(key, bytes) else self._dump(key): name for key, name in overloads.items()}
-        super()._save_index(packed)
-
-
-def _entry(packed: bytes) -> Any:
-    try:
-        return pickle.loads(packed)
-    except (AttributeError, ImportError):
-        return packed
-
-
-@cache
-def _claims_file() -> int:
-    """Descriptor of the file whose bytes stand for claims of processes; open as long as the process lives.
-
-    Raises
-    ------
-    OSError
-        If there is none to be had.
-    """
-    place = cache_folder()
-    if place is None:
-        raise FileNotFoundError("no folder for machine code")
-    return os.open(place / "claims", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
-
-
-@contextmanager
-def _claimed(what: str, name: str = "") -> Iterator[None]:
-    """Wait until no other process claims the same, and claim it; a claim dies with its process.
-
-    After `_PATIENCE`, or where files cannot be locked, it goes on without; only time is lost then.
-    """
-    place = int.from_bytes(hashlib.sha256(what.encode()).digest()[:7], "big")  # a byte; the file stays empty
-    began, told = time.monotonic(), not name
-    with suppress(OSError):
-        while not _locks(_claims_file(), place):
-            if time.monotonic() - began > _PATIENCE:
-                break
-            if not told and time.monotonic() - began > _LONG:
-                told = True
-                _logger.info("waiting for another process that compiles %s ...", name)
-            time.sleep(0.05)
-    try:
-        yield
-    finally:
-        with suppress(OSError):
-            fcntl.lockf(_claims_file(), fcntl.LOCK_UN, 1, place)
-
-
-def _locks(descriptor: int, place: int) -> bool:
-    """Lock a byte of a file, unless another process has done so."""
-    try:
-        fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, place)
-    except OSError as error:
-        if error.errno in (errno.EACCES, errno.EAGAIN):
-            return False
-        raise
-    return True
-
-
-# Log messages
-
-
-@cache
-def _tell_not_kept(why: str) -> None:
-    _logger.warning(
-        "machine code is not kept, and every process compiles for minutes: %s; "
-        "NUMBA_CACHE_DIR can name a folder of your own",
-        why,
+def _context() -> Any:
+    """What the compiler has for the processor, with the libraries and names of kernels."""
+    return cpu_target.target_context.subtarget(
+        _internal_codegen=_Codegen("cvt_hpc"), mangler=_name_of_process, target=_Target
     )
 
 
-class _Waiting(Listener):
-    """Logs that a kernel is being compiled, not loaded, if that takes long, and the time it took.
+class _Compiler(Compiler):
+    """Compiles kernels, and what they call."""
 
-    Meanwhile no garbage is collected: hardly any memory becomes free, and looking for it takes a tenth of
-    the time.
+    def __init__(self, typing_context: Any, _: Any, *others: Any) -> None:
+        super().__init__(typing_context, _context(), *others)
+
+
+dispatcher_registry[_Target] = CPUDispatcher
+jit_registry[_Target] = functools.partial(numba.jit, pipeline_class=_Compiler)  # for what kernels call
+
+_MARK = "of_process_"
+_of_process: list[str] = []
+
+
+def _draw_number() -> None:
+    _of_process[:] = [_MARK + secrets.token_hex(8)]
+
+
+_draw_number()
+os.register_at_fork(after_in_child=_draw_number)
+
+
+def _name_of_process(name: str, kinds: Any, *, abi_tags: Any = (), uid: Any = None) -> str:
+    """Return the name of a compiled function, which no other process gives to one of its own."""
+    return default_mangler(name, kinds, abi_tags=(*_of_process, *abi_tags), uid=uid)
+
+
+# What is kept
+
+
+class _Work:
+    """What has to be known of all kernels that are compiled for one call from Python.
+
+    Meanwhile no garbage is collected: hardly any memory becomes free, and looking for it takes a tenth of the
+    time.
     """
 
-    def __init__(self) -> None:
-        self._depth = 0  # the kernels that a kernel calls are compiled within its own compilation
-        self._name, self._began, self._told, self._collects = "", 0.0, False, False
+    def __init__(self, name: str) -> None:
+        self.walk, self.extensions = Walk(), extensions()
+        self._name, self._began, self._told = name, time.monotonic(), False
 
-    def on_start(self, event: Event) -> None:
-        if self._depth == 0:
-            self._collects = gc.isenabled()
-            gc.disable()
-            self._name = getattr(event.data["dispatcher"], "__name__", "a kernel")
-            self._began, self._told = time.monotonic(), False
-        self._depth += 1
+    def tell(self) -> None:
+        """Log that something is being compiled, not found, once that takes long."""
         if not self._told and self._elapsed() > _LONG:
             self._told = True
             _logger.info("compiling %s, once ...", self._name)
 
-    def on_end(self, event: Event) -> None:
-        self._depth -= 1
-        if self._depth == 0 and self._collects:
-            gc.enable()
-        if self._depth == 0 and self._elapsed() > _LONG:
+    def tell_end(self) -> None:
+        """Log how long it took."""
+        if self._told:
             _logger.info("compiled %s in %.0f s", self._name, self._elapsed())
 
     def _elapsed(self) -> float:
         return time.monotonic() - self._began
 
 
-register("numba:compile", _Waiting())
+_works: list[_Work] = []  # one at most: the compiler's lock is held
+
+
+@contextmanager
+def _work(name: str) -> Iterator[_Work]:
+    if _works:
+        yield _works[0]
+        return
+    collects = gc.isenabled()
+    gc.disable()
+    _works.append(_Work(name))
+    try:
+        yield _works[0]
+        _works[0].tell_end()
+    finally:
+        _works.clear()
+        if collects:
+            gc.enable()
+
+
+def _name_of_entry(compiled: _Kernel, kinds: tuple, work: _Work) -> str:
+    """Return a digest of all that decides the machine code of a kernel, or "" where that is not known."""
+    try:
+        described = work.walk.kernel(compiled), [work.walk.type(kind) for kind in kinds]
+    except UnknownValueError as error:
+        _tell_unknown(f"{compiled.__module__}.{compiled.__qualname__}", str(error))
+        return ""
+    finally:
+        work.walk.take()
+    return digest((described, compiled._for_kernel, work.extensions, _compiler()))
+
+
+@cache
+def _tell_unknown(name: str, what: str) -> None:
+    _logger.warning("machine code of %s is not kept: it depends on %s, which cannot be compared", name, what)
+
+
+_SWITCHES_OF_PLACES = ("CACHE_", "COLOR_", "CUDA", "DEBUG_CACHE", "GDB_", "THREADING_")
+
+
+def _compiler() -> Any:
+    """Describe the compiler, its switches and the processor."""
+    switches = [
+        (name, repr(value))
+        for name, value in sorted(vars(numba.config).items())
+        if name.isupper() and not name.startswith(_SWITCHES_OF_PLACES) and "NUM_THREADS" not in name
+    ]
+    versions = numba.__version__, llvmlite.__version__, np.__version__, sys.version
+    return versions, switches, _context().codegen().magic_tuple(), _own_code()
+
+
+@cache
+def _own_code() -> list[Any]:
+    return code_of_classes(_Kernel, _Library, _Codegen, _Compiler)
+
+
+class _Pickler(pickle.Pickler):
+    """Writes kernels, as in types of results, by their digests."""
+
+    def __init__(self, file: Any, walk: Walk) -> None:
+        super().__init__(file, pickle.HIGHEST_PROTOCOL)
+        self._digests = {kernel: found for found, kernel in walk.kernels.items()}
+
+    def persistent_id(self, value: Any) -> str | None:
+        return self._digests[value] if isinstance(value, CPUDispatcher) else None
+
+
+class _Unpickler(pickle.Unpickler):
+    def __init__(self, content: bytes, walk: Walk) -> None:
+        super().__init__(io.BytesIO(content))
+        self._walk = walk
+
+    def persistent_load(self, name: str) -> Any:
+        return self._walk.kernels[name]
+
+
+def _found(name: str, compiled: _Kernel, kinds: tuple, walk: Walk) -> CompileResult | None:
+    """Return the machine code of an entry; None where there is none that can be used."""
+    content = kernel_store.read(name, compiled.__name__) if name else None
+    if content is None:
+        return None
+    try:
+        compiled.targetctx.refresh()
+        library, described, environment, result, reload, environments = _Unpickler(content, walk).load()
+        described.argtypes = kinds
+        return CompileResult._rebuild(
+            *(_context(), library, described, environment, signature(result, *kinds)),
+            *(False, (), "", reload, environments),
+        )
+    except Exception as error:  # whatever it is: it can be compiled again
+        return kernel_store.tell_damaged(compiled.__name__, str(error))
+
+
+def _keep(name: str, found: CompileResult, walk: Walk) -> None:
+    """Write an entry, if the code means the same in every process."""
+    variables = [variable.name for variable in found.library._final_module.global_variables]
+    names = [function.name for function in found.library.get_defined_functions()]
+    if found.library.has_dynamic_globals or any(".numba.unresolved" in variable for variable in variables):
+        why = "addresses in this process"
+    elif foreign := next((name for name in names if name.startswith("_Z") and _MARK not in name), None):
+        why = f"{foreign}, compiled for other than kernels"
+    else:
+        library, described, environment, sig, _, _, _, reload, environments = found._reduce()
+        kinds, described.argtypes = described.argtypes, ()
+        file = io.BytesIO()
+        try:
+            content = library, described, environment, sig.return_type, reload, environments
+            _Pickler(file, walk).dump(content)
+            return kernel_store.write(name, file.getvalue())
+        except Exception as error:  # of a type that only this process knows
+            why = str(error)
+        finally:
+            described.argtypes = kinds
+    _tell_unknown(found.fndesc.qualname, why)
+
+
+# The types of arguments
+
+_types_of_likes: dict[Any, types.Type] = {}
+
+
+def typeof(value: Any) -> types.Type:
+    """Return the result of `numba.typeof`, for tuples of arrays in a tenth of the time.
+
+    Raises
+    ------
+    ValueError or NumbaValueError
+        If a value has no type.
+    """
+    like = _like(value)
+    if (found := _types_of_likes.get(like)) is None:
+        found = _types_of_likes[like] = numba.typeof(value)
+    return found
+
+
+def _like(value: Any) -> Any:
+    """Properties that all values of one type have in common, and no values of another type."""
+    kind = type(value)
+    if kind is np.ndarray:
+        return value.dtype, value.ndim, value.flags.num
+    if kind is float or kind is bool:
+        return kind
+    if isinstance(value, tuple):
+        return kind, *map(_like, value)
+    return numba.typeof(value)

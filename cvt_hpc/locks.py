@@ -88,6 +88,33 @@ def is_locked(path: Path) -> bool:
     return False
 
 
+def refuse_locked(path: Path) -> None:
+    """Raise BusyError if a process holds a file that it may write to, as HDF5 does, with the name of it."""
+    if is_locked(path):
+        raise BusyError(
+            f"{path}: expected a file that nobody writes to, found it locked by {_owners(path)}; close it "
+            "there, or read a copy of it"
+        )
+
+
+def _owners(path: Path) -> str:
+    """Return the processes of this machine that hold locks on a file, as Linux lists them, for people."""
+    with suppress(OSError):
+        inode = f":{path.stat().st_ino}"
+        # such as "1: FLOCK ADVISORY WRITE 18113 fe:00:5564795 0 EOF"
+        lines = [line.split() for line in Path("/proc/locks").read_text().splitlines()]
+        owners = {int(line[4]) for line in lines if len(line) == 8 and line[5].endswith(inode)} - {-1, 0}
+        if owners:
+            return ", ".join(f"process {owner}{_program(owner)}" for owner in sorted(owners))
+    return "a process, perhaps on another machine"
+
+
+def _program(process: int) -> str:
+    with suppress(OSError):
+        return f" ({Path(f'/proc/{process}/comm').read_text().strip()})"
+    return ""
+
+
 def _take(
     descriptor: int,
     path: Path,

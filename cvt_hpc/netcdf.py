@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import json
+import os
 import platform
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from cvt_hpc.errors import mismatch
-from cvt_hpc.files import written_aside
+from cvt_hpc.dataset_form import check_form
+from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.files import kind_of, naming_refusals, open_regular, written_aside
+from cvt_hpc.locks import refuse_locked
 from cvt_hpc.provenance import command, git_revision, history_line, merge_versions, versions
 
 if TYPE_CHECKING:
@@ -24,6 +29,38 @@ CONTENT = "cvt_hpc_content"  # global attribute by which this program knows its 
 HISTORY = "history of one run"
 DIAGRAM = "bifurcation diagram"
 VOLATILE = "depends on the machine and the hour; not reproduced bitwise"
+
+
+_is_sweeping = False
+
+
+@contextmanager
+def library_for_sweep() -> Iterator[None]:
+    """Let no second thread use the HDF5 library, which would break, while this one sweeps.
+
+    Raises
+    ------
+    InputError
+        If this is not the main thread: signals reach no other one.
+    """
+    global _is_sweeping
+    _expect_main_thread("run", "start a process for each sweep")
+    _is_sweeping = True
+    try:
+        yield
+    finally:
+        _is_sweeping = False
+
+
+def refuse_beside_sweep(what: str) -> None:
+    """Raise InputError if this is a thread beside a sweep."""
+    if _is_sweeping:
+        _expect_main_thread(what, "read datasets before the sweep, or in another process")
+
+
+def _expect_main_thread(what: str, then: str) -> None:
+    if (thread := threading.current_thread()) is not threading.main_thread():
+        raise mismatch(what, "the main thread of the process", f"the thread {thread.name}", then)
 
 
 class Named(Protocol):
@@ -183,18 +220,79 @@ def store_history(dataset: xr.Dataset, path: Path) -> None:
 
 
 def is_history(path: Path) -> bool:
-    """Whether a file is a history that this program wrote."""
-    return holds(path, HISTORY)
+    """Whether a file that the user names is a history that this program wrote."""
+    return holds(path, HISTORY, follow=True)
 
 
-def holds(path: Path, content: str) -> bool:
-    """Whether a file is a dataset of this program with such content: HISTORY or DIAGRAM."""
-    if not Path(path).is_file():  # a pipe would be waited for
+def holds(path: Path, content: str, *, follow: bool = False) -> bool:
+    """Whether a file, or a link that may be followed, is a dataset of this program with such content.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    content : str
+        HISTORY or DIAGRAM.
+    follow : bool
+        As of `open_netcdf`.
+    """
+    if kind_of(path, follow=follow) != "a file":  # a pipe would be waited for
         return False
+    from cvt_hpc.hdf5 import global_text
+
+    return global_text(path, CONTENT) == content
+
+
+def open_netcdf(path: Path, *, follow: bool = False, **options: Any) -> xr.Dataset:
+    """Open a dataset on the disk, which may be somebody else's: all that opens one does so by this function.
+
+    Parameters
+    ----------
+    path : Path
+        A netCDF-4 file.
+    follow : bool
+        Whether a link may lead to the file, since the user named it herself.
+    **options
+        Of `xarray.open_dataset`.
+
+    Returns
+    -------
+    Dataset
+        Read from the file as it is used. Quantities in seconds are numbers, not dates.
+
+    Raises
+    ------
+    StorageError
+        Something other than a file is there, or the system refuses.
+    BusyError
+        A process that may write to the file has it open.
+    InputError
+        The file is not netCDF-4, is damaged, or is not as `check_hdf5` and `check_form` have it.
+    """
     import xarray as xr
 
+    from cvt_hpc.hdf5 import DAMAGE, check_hdf5
+
+    place = str(path)
+    with naming_refusals(path, "a netCDF dataset"):
+        with os.fdopen(open_regular(path, follow=follow), "rb") as file:
+            size, first = os.fstat(file.fileno()).st_size, file.read(4)
+        if first[:3] == b"CDF":
+            then = f"`nccopy -k nc4 {path.name} NEW.nc` of the netCDF library turns one into the other"
+            raise mismatch(place, "netCDF-4", "netCDF-3", then)
+        check_hdf5(path, size, place)
+        try:
+            dataset = xr.open_dataset(path, engine="netcdf4", decode_times=False, **options)
+        except OSError as error:
+            refuse_locked(path)
+            if error.errno and error.errno > 0:  # of the system, not of the library
+                raise
+            raise mismatch(place, "a netCDF dataset", "one that is damaged") from None
+        except DAMAGE as error:
+            raise mismatch(place, "a netCDF dataset", f"one that xarray cannot read: {error}") from None
     try:
-        with xr.open_dataset(path, engine="netcdf4", decode_cf=False) as dataset:
-            return dataset.attrs.get(CONTENT) == content
-    except (OSError, ValueError):
-        return False
+        check_form(dataset, place)
+    except InputError:
+        dataset.close()
+        raise
+    return dataset

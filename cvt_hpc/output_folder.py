@@ -293,15 +293,23 @@ class OutputFolder(ABC, Generic[Content]):
         if agrees and self.is_signed:
             return
         if found is not None and not agrees:
-            _logger.warning("%s: does not fit its job; written anew", self.job_file)
+            self.replace(found, asked)
         elif found is None and self.results_tell() is not None:
             _logger.warning(
                 "%s: damaged or gone; written anew, since the results are of this job", self.job_file
             )
-        entry = {"format": self.kind.format, **self.document(asked)}
+        self.write_job(self.job_file, asked)
+
+    def write_job(self, path: Path, content: Content) -> None:
+        """Write the job file of a content, with its checksum; StorageError if the system refuses."""
+        entry = {"format": self.kind.format, **self.document(content)}
         text = json.dumps({**entry, CHECKSUM: checksum(entry)}, indent=1, allow_nan=False)
-        with written_aside(self.job_file) as aside:
+        with written_aside(path) as aside:
             aside.write_text(text)
+
+    def replace(self, found: Any, asked: Content) -> None:
+        """Prepare for a job file in the place of one that is not refused, but does not agree."""
+        _logger.warning("%s: does not fit its job; written anew", self.job_file)
 
     def clear(self, found: Any) -> None:
         """Remove the files that work in the folder has left, and last the job file.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 
@@ -65,12 +65,15 @@ class FromFile:
         The parameters.
     arrange : callable
         Column by name -> raw value by parameter. It raises RowError for a row, ValueError else.
+    other_names : mapping
+        Further names of columns in CSV files, in lower case with _ between words, and the columns.
     """
 
     columns: Mapping[str, tuple[str, ...]]
     required: tuple[str, ...]
     gives: tuple[str, ...]
     arrange: Callable[[Mapping[str, Column]], dict[str, Any]]
+    other_names: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 import shlex
@@ -56,6 +57,17 @@ def versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that numbers may depend on."""
     found = {"cvt_hpc": cvt_hpc.__version__, "python": platform.python_version()}
     return found | _installed()
+
+
+@cache
+def program_identity() -> dict[str, Any]:
+    """Return what decides whether two processes run the same program: versions, and a digest of sources."""
+    package = Path(__file__).parent
+    digest = hashlib.sha256()
+    for source in sorted(package.rglob("*.py")):
+        digest.update(f"{source.relative_to(package)}\n".encode())
+        digest.update(source.read_bytes())
+    return {**versions(), "sources": digest.hexdigest()}
 
 
 @cache

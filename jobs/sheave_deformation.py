@@ -14,14 +14,22 @@ from cvt_hpc import simulate
 from cvt_hpc.job import load_job
 
 JOBS = Path(__file__).parent
+NO_MODES = {"driving_modes_file": "", "driven_modes_file": ""}
 RITZ = {"sheave_deformation": "ritz"}
+BENDING = {"sheave_deformation": "bending"} | NO_MODES
+W_IJ = {
+    "sheave_deformation": "flexibilities",
+    "driving_flexibility_file": "sheave/driving.nc",
+    "driven_flexibility_file": "sheave/driven.nc",
+} | NO_MODES
 PARTS = {
-    "bending": {"sheave_deformation": "bending"},
-    "bending x 1.5": {"sheave_deformation": "bending", "sheave_stiffness": 1.5},
-    "rigid": {"sheave_deformation": "bending", "sheave_stiffness": np.inf},
-    "cone": {"sheave_deformation": "cone"},
-    "w_ij": {"sheave_deformation": "flexibilities"},
-    "w_ij x 1.5": {"sheave_deformation": "flexibilities", "sheave_stiffness": 1.5},
+    "bending": BENDING,
+    "bending x 1.5": BENDING | {"sheave_stiffness": 1.5},
+    "rigid": BENDING | {"sheave_stiffness": np.inf},
+    # r^2 over what the driven discs' harmonic 1 gives
+    "cone": {"sheave_deformation": "cone", "cone_stiffness": "1.2e6 N m/rad"} | NO_MODES,
+    "w_ij": W_IJ,
+    "w_ij x 1.5": W_IJ | {"sheave_stiffness": 1.5},
     "modes at rest": RITZ | {"ritz_limit": 0.0},
     "ritz": RITZ,
     "ritz 2.3 us": RITZ | {"step": 2.3e-6},

@@ -84,13 +84,13 @@ def along_axis(shown: xr.Dataset, x: str) -> xr.DataArray | None:
         return None
     tables = (table for table in job.values() if isinstance(table, dict))
     fixed = {key: value for table in tables for key, value in table.items()}
-    fixed |= {str(key): value.item() for key, value in shown.coords.items() if value.ndim == 0}
+    fixed |= {str(key): value.values.item() for key, value in shown.coords.items() if value.ndim == 0}
     force = (shown["mean_ring_tension"] - shown["mean_push_force"]).transpose(x, "strand")
     if force.sizes["strand"] != len(STRANDS):
         return None
-    along = [str(key) for key, values in shown.coords.items() if values.dims == (x,)]
+    along = {str(key): values.values for key, values in shown.coords.items() if values.dims == (x,)}
     found = [
-        strand_frequencies(fixed | {key: shown[key].values[k] for key in along}, tuple(pair))
+        strand_frequencies(fixed | {key: values[k] for key, values in along.items()}, tuple(pair))
         for k, pair in enumerate(force.values)
     ]
     if not np.isfinite(found).any():

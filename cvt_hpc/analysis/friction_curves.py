@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from cvt_hpc.analysis.error_axes import COLOURS, LINES
 from cvt_hpc.analysis.figures import WIDTH, balanced, styled
 from cvt_hpc.errors import one_line
-from cvt_hpc.job import build_job
+from cvt_hpc.job import rebuild_job
 from cvt_hpc.physics.friction import friction_coefficients, given_law
 from cvt_hpc.variables import Vibrates
 
@@ -35,7 +35,7 @@ def curves_of(dataset: xr.Dataset, speeds: np.ndarray) -> dict[float, np.ndarray
     speeds : (n,) array
         [m/s]
     """
-    job: Any = build_job(json.loads(dataset.attrs["job"]))
+    job: Any = rebuild_job(json.loads(dataset.attrs["job"]), "dataset", {})
     found = {}
     for gradient in dataset["friction_gradient"].values:
         point = job.point_at({"friction_gradient": float(gradient)})

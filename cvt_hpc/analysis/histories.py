@@ -14,6 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from scipy.interpolate import CubicSpline
 
 from cvt_hpc.analysis import history_panels as panels
+from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.figures import LONG, WIDTH, balanced, draw, styled
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.job.schema import load_schema
@@ -57,6 +58,7 @@ def history_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
     InputError
         There is nothing to draw.
     """
+    dataset = standard(dataset, source)
     settings = _vibration_settings(dataset)
     band = (settings["band_low"], settings["band_high"])
     judged = settings["judged_fraction"] if _is_judged(dataset) else 0.0

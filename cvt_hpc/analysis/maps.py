@@ -30,6 +30,7 @@ from cvt_hpc.analysis.classes import (
     map_classes,
     occurrence_classes,
 )
+from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.figures import (
     LONG,
@@ -96,6 +97,7 @@ def map_figure(
         Amplitude at which the colours end [m]; by default that of 98 % of the vibrating cells, where few lie
         far above it.
     """
+    dataset = standard(dataset, source)
     check_results(dataset, source)
     if is_sampled(dataset):
         if sides != CHOSEN:

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from cvt_hpc.analysis.alignment import COMPARED, axes_of
 from cvt_hpc.analysis.arrangement import CHOSEN, Sides
 from cvt_hpc.analysis.classes import check_results
+from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.variables import Status
@@ -104,6 +105,7 @@ def maps_figure(
     from cvt_hpc.analysis.value_maps import value_map_figure
 
     named = list(sources) or [f"results {k + 1}" if k else "results" for k in range(len(datasets))]
+    datasets = list(map(standard, datasets, named))
     dataset, source = datasets[0], ", ".join(named)
     if len(datasets) > 1:
         dataset, sides = side_by_side(datasets, named, quantities, sides)

@@ -12,6 +12,7 @@ from cvt_hpc.analysis.arrangement import infinity_in_words
 from cvt_hpc.analysis.figures import check_known
 from cvt_hpc.analysis.histories import place_of, values_of
 from cvt_hpc.errors import InputError, mismatch, one_line
+from cvt_hpc.files import kind_of
 
 
 def told_apart(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[str, list[str]]:
@@ -79,7 +80,7 @@ def history_files(paths: Sequence[Path]) -> list[Path]:
         inside = path / "histories" if (path / "histories").is_dir() else path
         files = sorted(inside.glob("*.nc")) if path.is_dir() else [path]
         if path.is_dir():
-            files = [file for file in files if is_history(file)]
+            files = [file for file in files if kind_of(file) == "a file" and is_history(file)]
         if not files or not all(map(is_history, files)):
             raise _no_history(path)
         found += files

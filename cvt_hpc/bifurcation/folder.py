@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from cvt_hpc.archives import Archives
 from cvt_hpc.bifurcation.dataset import Stability
@@ -20,7 +19,7 @@ from cvt_hpc.bifurcation.followed import Followed
 from cvt_hpc.bifurcation.job import Diagram
 from cvt_hpc.bifurcation.kept import packed, unpacked
 from cvt_hpc.files import kind_of
-from cvt_hpc.netcdf import DIAGRAM, holds
+from cvt_hpc.netcdf import DIAGRAM, holds, open_netcdf
 from cvt_hpc.output_folder import Kind, OutputFolder
 from cvt_hpc.study.job_difference import another_job
 
@@ -75,7 +74,7 @@ class DiagramFolder(OutputFolder[Diagram]):
         if kind_of(self.dataset) is None:
             return 0
         try:
-            with xr.open_dataset(self._stored(), engine="netcdf4", decode_cf=False) as dataset:
+            with open_netcdf(self._stored(), decode_cf=False) as dataset:
                 computed = (dataset["stability"] != Stability.NOT_COMPUTED).all("load")
                 return int(np.count_nonzero(computed))
         except _DAMAGE as error:
@@ -149,7 +148,7 @@ class DiagramFolder(OutputFolder[Diagram]):
 
     def _job_of_dataset(self) -> dict[str, Any] | None:
         try:
-            with xr.open_dataset(self._stored(), engine="netcdf4", decode_cf=False) as dataset:
+            with open_netcdf(self._stored(), decode_cf=False) as dataset:
                 return self.accept({"fingerprint": "", "job": json.loads(dataset.attrs["job"])})
         except _DAMAGE:
             return None

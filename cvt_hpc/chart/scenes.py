@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from dataclasses import dataclass, replace
 from typing import Any
 
 from cvt_hpc.chart.declarations import LEAD, SCENE, SETTINGS
 from cvt_hpc.chart.plan import Lead, Quantity, Scene
 from cvt_hpc.chart.quantities import read_quantity
-from cvt_hpc.errors import mismatch, show, unknown
+from cvt_hpc.errors import NoEffectWarning, mismatch, show, unknown
 from cvt_hpc.job import Job, build_job
 from cvt_hpc.job.assignments import read_assignments
 from cvt_hpc.job.schema import load_schema
@@ -58,7 +59,9 @@ class Stage:
         # None: the model's own choice of a stepper
         values = {key: value for key, value in values.items() if value is not None}
         document = {**self.document, "model": model} if model else self.document
-        job = build_job(document, where, {**self.values, **values}, "set")
+        with warnings.catch_warnings():  # of a comparison each part has values without effect on others
+            warnings.simplefilter("ignore", NoEffectWarning)
+            job = build_job(document, where, {**self.values, **values}, "set")
         if job.axes:
             raise mismatch(f"{where}: set {job.axes[0].name}", "one value in a chart", "an axis")
         if job.stepper is None:

@@ -18,10 +18,13 @@ from typing import Any, NoReturn
 
 from cvt_hpc import __version__
 from cvt_hpc.cli import checking, experiments, plots, results, single_run, starting, sweep
-from cvt_hpc.cli.parts import BAD_INPUT, DONE, INTERRUPTED, complain, speaks
-from cvt_hpc.errors import CRASHED, InputError, JobWarning, did_you_mean, mismatch, one_line, show
+from cvt_hpc.cli.parts import DONE, INTERRUPTED, complain, end_all, speaks
+from cvt_hpc.errors import BAD_INPUT, CRASHED, InputError, JobWarning, did_you_mean, mismatch, one_line, show
+from cvt_hpc.files import open_missing_streams
 
 __all__ = ["main"]
+
+_JOINT = ("run", "ladder", "fit")  # commands whose ranks work together
 
 # How argparse tells of a word that is none of its choices
 _UNKNOWN_WORD = re.compile(
@@ -43,27 +46,43 @@ def main(arguments: list[str] | None = None) -> int:
         Exit status: 0 done, 1 some runs failed, 2 bad input, 70 a defect of this program, 99 stopped early
         and to be gone on with, 98 the same without any gain.
     """
+    open_missing_streams()
     told = logging.StreamHandler()
     told.setFormatter(_OneLine("cvt-hpc: %(message)s"))
     logging.basicConfig(handlers=[told])
+    words = sys.argv[1:] if arguments is None else arguments
     try:
-        _check_readable(sys.argv[1:] if arguments is None else arguments)
-        parsed = _parser().parse_args(arguments)
+        _check_readable(words)
+        parsed = _parser().parse_args(words)
         with _compiling_told(), _job_warnings_told():
             status = parsed.command(parsed)
         sys.stdout.flush()
         return status
     except InputError as error:
+        if words and words[0] in _JOINT and "--dry-run" not in words:
+            from cvt_hpc.study.ranks.launch import agree_on
+
+            error = agree_on(error)
+        if not error.everywhere:
+            end_all(BAD_INPUT, str(error))
         complain(str(error))
         return BAD_INPUT
     except KeyboardInterrupt:
+        end_all(INTERRUPTED, "interrupted")
         complain("interrupted")
         return INTERRUPTED
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
+    except (MemoryError, RuntimeError) as error:
+        if not isinstance(error, MemoryError) and not str(error).startswith("NetCDF: "):
+            traceback.print_exc()
+            return CRASHED
+        complain(f"a dataset: expected values that can be read, found damaged or too many ones: {error}")
+        return BAD_INPUT
     except Exception:  # Python's own status for a defect, 1, means here that some runs failed
         traceback.print_exc()
+        end_all(CRASHED)
         return CRASHED
 
 

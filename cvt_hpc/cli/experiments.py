@@ -12,6 +12,7 @@ from cvt_hpc.cli.parts import (
     add_assignments,
     add_command,
     add_folder,
+    alike,
     check_output,
     complain,
     output_folder,
@@ -62,7 +63,7 @@ def _ladder(arguments: argparse.Namespace) -> int:
     from cvt_hpc.study.ranks.launch import end_process
     from cvt_hpc.study.report import STALLED
 
-    job, rungs, refusals = load_ladder(arguments.path, arguments.set)
+    job, rungs, refusals = alike(arguments, lambda: load_ladder(arguments.path, arguments.set))
     out = output_folder(arguments.out, job)
     complain(*(f"{name} left out: {why}" for name, why in refusals.items()))
     status = run_ladder(
@@ -103,7 +104,7 @@ def _fit(arguments: argparse.Namespace) -> int:
     from cvt_hpc.fit.making import make_fit
     from cvt_hpc.study.ranks.launch import end_process
 
-    fit = load_fit(arguments.path, arguments.set)
+    fit = alike(arguments, lambda: load_fit(arguments.path, arguments.set))
     folder = output_folder(arguments.out, fit.job)
     try:
         report = make_fit(fit, folder, fresh=arguments.fresh, tell=complain)

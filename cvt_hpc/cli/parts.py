@@ -8,7 +8,7 @@ import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from cvt_hpc.errors import mismatch, one_line
 
@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from cvt_hpc.analysis.arrangement import Sides
     from cvt_hpc.job import Job
 
-DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+Result = TypeVar("Result")
+
+DONE, SOME_FAILED, INTERRUPTED = 0, 1, 130
 PICTURES = (".png", ".svg", ".pdf")
 LONGEST_NAME, LONGEST_NAMES = 100, 60  # letters of a picture's name, and of the files' names within it
 # what --set does
@@ -89,6 +91,25 @@ def output_folder(out: Path | None, job: Job) -> Path:
 def folder_of(results: Path) -> Path:
     """Return the folder of results that are given as a folder or as a dataset in it."""
     return results if results.is_dir() else results.parent
+
+
+def alike(arguments: argparse.Namespace, load: Callable[[], Result]) -> Result:
+    """Return what `load` returns, once it has succeeded on all ranks, and all have the same options."""
+    from cvt_hpc.study.ranks.launch import assembled_team
+
+    def options(_: Result) -> dict[str, dict[str, str]]:
+        given = vars(arguments).items()
+        words = {name: str(value) for name, value in given if name not in ("path", "command", "parser")}
+        return {"options": {"command": arguments.command.__name__.strip("_"), **words}}
+
+    with assembled_team() as team:
+        return team.agreed(load, options)
+
+
+def end_all(status: int, line: str = "") -> None:
+    """End all ranks with a line of this one, if there are several."""
+    if launch := sys.modules.get("cvt_hpc.study.ranks.launch"):  # else they are not connected
+        launch.end_all(status, line)
 
 
 def files_of(results: Path) -> list[Path]:

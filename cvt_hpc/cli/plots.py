@@ -91,12 +91,14 @@ def _draw(arguments: argparse.Namespace) -> int:
 
 
 def _draw_results(arguments: argparse.Namespace, words: Sequence[str], options: dict[str, Any]) -> None:
+    from cvt_hpc.analysis.conversion import standard
     from cvt_hpc.job.assignments import read_coordinates
     from cvt_hpc.study import open_results
 
     source = str(arguments.path)
     out = arguments.out or picture_beside(arguments.path, files_of(arguments.path), *words, *arguments.at)
-    with open_results(arguments.path) as dataset:
+    with open_results(arguments.path) as opened:
+        dataset = standard(opened, source)
         units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
         at = read_coordinates(arguments.at, units, source, "--at")
         say(f"picture: {_write(arguments.kind, [dataset], out, at, [source], options)}")
@@ -177,9 +179,9 @@ def _each(
 @contextmanager
 def _opened(files: Sequence[Path]) -> Iterator[list[Any]]:
     """Histories of runs, open within."""
-    import xarray as xr
+    from cvt_hpc.analysis.conversion import standard
+    from cvt_hpc.netcdf import open_netcdf
 
     with ExitStack() as stack:
-        yield [
-            stack.enter_context(xr.open_dataset(file, engine="netcdf4", decode_times=False)) for file in files
-        ]
+        opened = [stack.enter_context(open_netcdf(file, follow=True)) for file in files]
+        yield [standard(history, str(file)) for history, file in zip(opened, files, strict=True)]

@@ -82,13 +82,14 @@ def _gather(arguments: argparse.Namespace) -> int:
 
 
 def _table(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.conversion import plain
     from cvt_hpc.analysis.run_table import FORMATS, run_table, write_table
     from cvt_hpc.study import open_results
 
     out = arguments.out or folder_of(arguments.path) / "table.csv"
     check_output(out, FORMATS)
     with open_results(arguments.path) as dataset:
-        frame = run_table(dataset, str(arguments.path))
+        frame = run_table(plain(dataset, str(arguments.path)), str(arguments.path))
     say(f"table: {write_table(frame, out)}")
     return DONE
 
@@ -96,13 +97,14 @@ def _table(arguments: argparse.Namespace) -> int:
 def _map(arguments: argparse.Namespace) -> int:
     from contextlib import ExitStack
 
+    from cvt_hpc.analysis.conversion import standard
     from cvt_hpc.job.assignments import read_coordinates, split_assignments
     from cvt_hpc.study import open_results
 
     paths = [arguments.path, *arguments.others]
     source, kind = ", ".join(map(str, paths)), "maps" if arguments.others else "map"
     with ExitStack() as opened:
-        datasets = [opened.enter_context(open_results(path)) for path in paths]
+        datasets = [standard(opened.enter_context(open_results(path)), str(path)) for path in paths]
         dataset, sides = datasets[0], sides_of(arguments)
         if arguments.others:
             from cvt_hpc.analysis.studies import side_by_side
@@ -142,24 +144,28 @@ def _figure(arguments: argparse.Namespace) -> int:
 
 
 def _report(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.conversion import standard
     from cvt_hpc.report import write_report
     from cvt_hpc.study import open_results
 
     out = arguments.out or folder_of(arguments.path) / "report.html"
     check_output(out, (".html",))
-    with open_results(arguments.path) as dataset:
-        say(f"report: {write_report(dataset, out, str(arguments.path), folder_of(arguments.path))}")
+    source = str(arguments.path)
+    with open_results(arguments.path) as opened:
+        dataset = standard(opened, source)
+        say(f"report: {write_report(dataset, out, source, folder_of(arguments.path))}")
     return DONE
 
 
 def _compare(arguments: argparse.Namespace) -> int:
     from cvt_hpc.analysis.comparison import compare
+    from cvt_hpc.analysis.conversion import standard
     from cvt_hpc.printing import comparison_lines
     from cvt_hpc.study import open_results
 
     sources = str(arguments.path), str(arguments.other)
     with open_results(arguments.path) as a, open_results(arguments.other) as b:
-        found = compare(a, b, sources)
+        found = compare(standard(a, sources[0]), standard(b, sources[1]), sources)
     written = leave_comparison(found, arguments.out or folder_of(arguments.other), sources)
     say(*comparison_lines(found, sources), *written)
     return CONTRADICTING if found.contradicts.any() and not found.are_designs else DONE

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.cli.checking import show_job
@@ -14,6 +15,7 @@ from cvt_hpc.cli.parts import (
     add_assignments,
     add_command,
     add_folder,
+    alike,
     complain,
     output_folder,
     say,
@@ -24,6 +26,7 @@ from cvt_hpc.errors import mismatch
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
+    from cvt_hpc.study import RunReport
     from cvt_hpc.study.repeats import Repeat
 
 RETRIED = ("timed_out", "failed_error", "failed_numerics")
@@ -69,28 +72,14 @@ def add(commands: Any) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.job import load_job
-    from cvt_hpc.job.durations import read_duration
-    from cvt_hpc.printing import next_lines, repeat_line, report_lines, trouble_lines
-    from cvt_hpc.study import check_start, run
-    from cvt_hpc.study.ranks.launch import end_process
-    from cvt_hpc.study.time_steps import check_refinement
-    from cvt_hpc.variables import Status
+    load = partial(_load, arguments)
+    job, options, repeats = load() if arguments.dry_run else alike(arguments, load)
 
-    limits = {
-        name: read_duration(getattr(arguments, name), f"--{name.replace('_', '-')}")
-        for name in ("time_limit", "run_limit")
-        if getattr(arguments, name) is not None
-    }
-    retry = [Status[name.upper()] for name in arguments.retry]
-    job = load_job(arguments.path, arguments.set)
-    options = {"fresh": arguments.fresh, "retry": retry, **limits}
-    if arguments.refine is not None:
-        check_refinement(job, arguments.refine, retry)
-        options["refine"] = arguments.refine
-    repeats = _repeats(job, arguments)
+    from cvt_hpc.printing import next_lines, repeat_line, report_lines, trouble_lines
+    from cvt_hpc.study import run
+    from cvt_hpc.study.ranks.launch import end_process
+
     if arguments.dry_run:
-        check_start(job, arguments.out, part=arguments.part, fresh=arguments.fresh)
         show_job(job, arguments.out)
         if speaks():
             for repeat, _ in repeats:
@@ -101,13 +90,43 @@ def _run(arguments: argparse.Namespace) -> int:
     complain(*trouble_lines(report))
     if speaks():
         say(*report_lines(report))
-    statuses = [report.exit_status]
+    latest, statuses = report, [report.exit_status]
     for repeat, show in repeats:
-        if not report.remaining:
-            statuses.append(_repeat(repeat, show, options, started))
+        if stopped := latest.status_of_more:
+            statuses.append(stopped)
+            break
+        latest = _repeat(repeat, show, options, started)
+        statuses.append(latest.exit_status)
     if speaks():
         say(*next_lines(report))
     return end_process(max(statuses))
+
+
+def _load(
+    arguments: argparse.Namespace,
+) -> tuple[Job, dict[str, Any], list[tuple[Repeat, Callable[[Repeat], None]]]]:
+    """Return the job, the options of its sweep, and the samples that are to be done again."""
+    from cvt_hpc.job import load_job
+    from cvt_hpc.job.durations import read_duration
+    from cvt_hpc.study import check_start
+    from cvt_hpc.study.time_steps import check_refinement
+    from cvt_hpc.variables import Status
+
+    limits = {
+        name: read_duration(getattr(arguments, name), f"--{name.replace('_', '-')}")
+        for name in ("time_limit", "run_limit")
+        if getattr(arguments, name) is not None
+    }
+    retry = [Status[name.upper()] for name in arguments.retry]
+    job = load_job(arguments.path, arguments.set)
+    options = {"fresh": arguments.fresh, "retry": retry, "raises": False, **limits}
+    if arguments.refine is not None:
+        check_refinement(job, arguments.refine, retry)
+        options["refine"] = arguments.refine
+    repeats = _repeats(job, arguments)
+    if arguments.dry_run:
+        check_start(job, arguments.out, part=arguments.part, fresh=arguments.fresh)
+    return job, options, repeats
 
 
 def _repeats(job: Job, arguments: argparse.Namespace) -> list[tuple[Repeat, Callable[[Repeat], None]]]:
@@ -134,7 +153,9 @@ def _repeats(job: Job, arguments: argparse.Namespace) -> list[tuple[Repeat, Call
     return repeats
 
 
-def _repeat(repeat: Repeat, show: Callable[[Repeat], None], options: dict[str, Any], started: float) -> int:
+def _repeat(
+    repeat: Repeat, show: Callable[[Repeat], None], options: dict[str, Any], started: float
+) -> RunReport:
     """Do the runs of a sample again in the time that is left, and print what was found."""
     from cvt_hpc.printing import trouble_lines
 
@@ -145,7 +166,7 @@ def _repeat(repeat: Repeat, show: Callable[[Repeat], None], options: dict[str, A
     complain(*(f"{repeat.label}: {line}" for line in trouble_lines(report)))
     if speaks() and not report.remaining:
         show(repeat)
-    return report.exit_status
+    return report
 
 
 def _show_audit(audit: Repeat) -> None:

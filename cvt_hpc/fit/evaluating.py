@@ -115,9 +115,9 @@ class Evaluation:
         job, legal = study_of(self._fit, name, scenes, settings, values, asked)
         folder = self._out / name
         refuse_link(folder)
-        report = run(job, folder, fresh=self._fresh)
-        if report.remaining:
-            raise Stopped(report.exit_status)
+        report = run(job, folder, fresh=self._fresh, raises=False)
+        if status := report.status_of_more:
+            raise Stopped(status)
         with open_results(folder) as dataset:
             courses = self._courses(dataset, legal, list(asked), values)
             self.runs += job.size

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cvt_hpc.errors import check_keys, mismatch, show, unknown
+from cvt_hpc.job.arrays import plain
 from cvt_hpc.job.axes import is_axis
 from cvt_hpc.job.plausibility import warn_of_bare_numbers
 from cvt_hpc.job.schema import Schema
@@ -33,7 +34,7 @@ def split_assignments(assignments: Assignments, source: str, label: str) -> dict
         If a text is not KEY=VALUE.
     """
     if isinstance(assignments, Mapping):
-        return dict(assignments)
+        return plain(assignments)
     pairs = {}
     for text in [assignments] if isinstance(assignments, str) else assignments:
         key, equals, value = text.partition("=")

@@ -18,6 +18,7 @@ LARGEST_AXIS = 100_000
 _RANGE_KEYS = ("from", "to", "count", "step", "spacing")
 _SPACINGS = ("linear", "log")
 _STEP_TOLERANCE = Decimal("1e-9")
+_ROUNDING = 4  # units in the last place, after some additions
 _COUNT = Parameter(2, "", "values of a range", minimum=2, maximum=LARGEST_AXIS)
 _FORMS = "a list [v1, v2, ...] or a range {from=, to=, count=} or {from=, to=, step=}"
 
@@ -100,16 +101,24 @@ def read_axis(name: str, parameter: Parameter, raw: Any, where: str) -> Axis:
     Returns
     -------
     Axis
-        With distinct values, each one legal for the parameter.
+        With distinct values, each one legal for the parameter; 0.3 where 0.1 + 0.2 was given.
 
     Raises
     ------
     InputError
         If the list or the range is not legal.
     """
-    read = read_values(parameter, raw, where)
+    read = tuple(map(without_rounding, read_values(parameter, raw, where)))
     _check_distinct(read, raw, where)
     return Axis(name, read, parameter.unit, parameter.description)
+
+
+def without_rounding(value: Any) -> Any:
+    """Return a number, or that of nine digits which it is but for rounding: 0.3 for 0.1 + 0.2."""
+    if not isinstance(value, float) or not math.isfinite(value):
+        return value
+    short = float(f"{value:.9g}")
+    return short if abs(short - value) <= _ROUNDING * math.ulp(value) else value
 
 
 def is_axis(raw: Any) -> bool:

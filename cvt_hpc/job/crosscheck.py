@@ -23,7 +23,8 @@ def check_grid(
     *,
     rules: Sequence[Rule] = (),
     sampled: bool = False,
-) -> None:
+    given: Iterable[str] = (),
+) -> dict[str, str]:
     """Check the base scene and every run, and that axes are of effect; of a huge study, some runs.
 
     Of a grid these are the extremes of its axes; of samples those with an extreme value, and others from all
@@ -43,6 +44,13 @@ def check_grid(
         How parameters follow from others.
     sampled : bool
         Whether the values of the axes at one place make a run, instead of all their combinations.
+    given : iterable of str
+        Further keys to be checked for an effect.
+
+    Returns
+    -------
+    dict
+        Those of the given keys that change no run, each with the setting that makes it so.
 
     Raises
     ------
@@ -51,16 +59,17 @@ def check_grid(
     """
     check_point(schema, parameters, source)
     sizes = {axis.name: len(axis.values) for axis in axes}
-    idle = {name: "" for name, size in sizes.items() if size > 1}
+    idle = dict.fromkeys([*given, *(name for name, size in sizes.items() if size > 1)], "")
     for values in _samples_to_check(axes) if sampled else _points_to_check(axes):
         varied = dict(zip(sizes, values, strict=True))
         point = follow(rules, {**parameters, **varied})
         check_point(schema, point, source, varied)
         inert = _inert(schema, rules, point) if idle else {}
         idle = {name: inert[name] for name in idle if name in inert}
-    for name, setting in idle.items():
-        expected = f"one value, since it has no effect with {setting}"
+    for name in filter(idle.__contains__, sizes):
+        expected = f"one value, since it has no effect with {idle[name]}"
         raise mismatch(f"{source}: [axes] {name}", expected, f"{sizes[name]} values")
+    return idle
 
 
 def check_point(

@@ -1,27 +1,52 @@
-"""CSV files that give parameters of a job: columns with units in the header, one error for all faults."""
+"""CSV files that give parameters of a job, as spreadsheets, programs and measuring machines write them.
+
+A file is read where its meaning is certain; where it is no plain CSV file, a warning states how. All else is
+one error, which names the line and states what to write: `1,234` is never guessed to be 1234 or 1.234.
+"""
 
 from __future__ import annotations
 
+import codecs
+import csv
 import math
 import re
-import stat
-from collections.abc import Mapping
+import warnings
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
+from cvt_hpc.errors import InputError, JobWarning, did_you_mean, few_of, mismatch, show
+from cvt_hpc.files import read_regular
 from cvt_hpc.job.units import UnitError, to_si
 from cvt_hpc.parameters import Column, FromFile, RowError
 
 MOST_BYTES = 2**20
-_HEAD = re.compile(r"\s*(?P<name>\w+)\s*(?:\[\s*(?P<unit>[^\]]*?)\s*\]\s*)?")
+_SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
+_BINARY = re.compile(r"[\x00-\x08\x0b\x0e-\x1f\x7f]")
+_HEAD = re.compile(r"(?P<name>[^[(]*)(?:\[(?P<square>[^]]*)\]|\((?P<round>.*)\))?")
+_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_AMBIGUOUS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)  # a fraction, or a thousand and more
+_LINES = "a line of column names and lines of numbers"
+_MOST_NAMED = 8
+
+Row = tuple[int, list[str]]  # number of the line, and its cells up to the last one that is not empty
+
+
+class _Column(NamedTuple):
+    """Place of a column in its rows, its name, its unit, and the SI unit of this one."""
+
+    place: int
+    name: str
+    unit: str
+    si: str
 
 
 def read_csv(file: FromFile, name: str, source: str, where: str) -> dict[str, Any]:
     """Return the raw values of the parameters that a file gives, by key.
 
-    The first line has the names of the columns, each with its unit in brackets, such as "speed [mm/s]"; a
-    column without a unit is dimensionless. Empty lines and lines that begin with # do not count.
+    One line has the names of the columns, each with its unit in brackets, such as "speed [mm/s]", or with the
+    units in the line below; a column without a unit is dimensionless. Empty lines, lines that begin with #,
+    and lines above the names do not count.
 
     Parameters
     ----------
@@ -37,92 +62,220 @@ def read_csv(file: FromFile, name: str, source: str, where: str) -> dict[str, An
     Raises
     ------
     InputError
-        If the file is missing, no regular file, too large or no text, or if a line, which is then named, is
-        not legal.
+        If the file is missing, a link, no regular file, too large or no text, or if a line, which is then
+        named, is not legal or may mean two things.
     """
     path = Path(source).parent / name
-    numbered = enumerate(_text(path, where).splitlines(), 1)
-    told = ((number, line.split(",")) for number, line in numbered if not line.lstrip().startswith("#"))
-    rows = [(number, row) for number, row in told if "".join(row).strip()]
-    if len(rows) < 2:
-        raise mismatch(f"{where}: {path}", "a line of column names and lines of numbers", "fewer lines")
-    (first, names), *lines = rows
-    head = _read_head(file, names, f"{where}: {path}: line {first}")
-    columns: dict[str, list[float]] = {column: [] for column, _, _ in head}
-    for number, cells in lines:
-        place = f"{where}: {path}: line {number}"
-        if len(cells) != len(head):
-            raise mismatch(place, f"{len(head)} columns, as in line {first}", str(len(cells)))
-        for (column, unit, si), cell in zip(head, cells, strict=True):
-            columns[column].append(_number(cell, unit, si, f"{place}, {column}"))
-    try:
-        return file.arrange({column: Column(si, tuple(columns[column])) for column, _, si in head})
-    except RowError as error:
-        raise mismatch(f"{where}: {path}: line {lines[error.row][0]}", error.expected, error.found) from None
-    except ValueError as error:
-        raise InputError(f"{where}: {path}: {error}") from None
-
-
-def _text(path: Path, where: str) -> str:
     place = f"{where}: {path}"
+    text, encoding = _text(path, place)
+    numbered = enumerate(re.split(r"\r\n|\r|\n", text), 1)
+    lines = [(n, line) for n, line in numbered if line.strip() and not line.lstrip().startswith("#")]
+    if len(lines) < 2:
+        raise mismatch(place, _LINES, "fewer lines")
+    above, separator = _find_names(file, [line for _, line in lines])
+    of_names, *rows = [(n, _cells(line, separator, f"{place}: line {n}")) for n, line in lines[above:]]
+    rows = [(n, cells) for n, cells in rows if cells]
+    of_units = rows.pop(0) if rows and _are_units(rows[0][1]) else (of_names[0], [])
+    columns = _columns(file, of_names, of_units, place)
+    if not rows:
+        raise mismatch(place, _LINES, "fewer lines")
+    how = [
+        encoding,
+        f"names in line {of_names[0]}" if above else "",
+        f"units in line {of_units[0]}" if of_units[1] else "",
+        "" if separator == "," else f"{_SEPARATORS[separator]} between columns",
+        "empty columns" if any(line.rstrip(" ").endswith(separator) for _, line in lines) else "",
+        _left_out(of_names, rows, separator, place),
+        "decimal commas" if _decimal_mark(rows, separator, place) == "," else "",
+        *(f"{show(told)} as {c.name}" for c in columns if _plain(told := of_names[1][c.place]) != c.name),
+    ]
+    found = {
+        c.name: Column(c.si, tuple(_number(cells[c.place], c, f"{place}: line {n}") for n, cells in rows))
+        for c in columns
+    }
     try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):  # to open a pipe would wait for a writer
-            raise mismatch(place, "a CSV file", "a folder" if path.is_dir() else "no regular file")
-        if status.st_size > MOST_BYTES:
-            raise mismatch(place, f"at most {MOST_BYTES} bytes", str(status.st_size))
-        with path.open("rb") as opened:
-            return opened.read(MOST_BYTES).decode("utf-8-sig")
-    except InputError:
-        raise
+        raw = file.arrange(found)
+    except RowError as error:
+        raise mismatch(f"{place}: line {rows[error.row][0]}", error.expected, error.found) from None
+    except ValueError as error:
+        raise InputError(f"{place}: {error}") from None
+    if any(how):
+        values = ", ".join(
+            f"{key} {column.values[0]:g} {column.unit}".rstrip() for key, column in found.items()
+        )
+        told = f"{place}: read with {', '.join(filter(None, how))}; line {rows[0][0]} is {values}"
+        warnings.warn(told, JobWarning, stacklevel=2)
+    return raw
+
+
+def _text(path: Path, place: str) -> tuple[str, str]:
+    """Return the content of a file, and its encoding where that is not UTF-8."""
+    try:
+        content = read_regular(path, MOST_BYTES)
     except FileNotFoundError:
         near = did_you_mean(str(path), sorted(map(str, path.parent.glob("*.csv"))))
         raise mismatch(place, "a CSV file", f"nothing{near}") from None
-    except OSError as error:
-        raise mismatch(place, "a CSV file", str(error.strerror)) from None
-    except ValueError:  # bytes that are no UTF-8, or a NUL in the path
-        raise mismatch(place, "a text file (CSV in UTF-8)", "binary data") from None
-
-
-def _read_head(file: FromFile, cells: list[str], place: str) -> list[tuple[str, str, str]]:
-    """Return name, unit and SI unit of each column."""
-    head = [_column(file.columns, cell, place) for cell in cells]
-    names = [name for name, _, _ in head]
-    for name in names:
-        if names.count(name) > 1:
-            raise mismatch(place, "distinct columns", f"{name} twice")
-    for name in file.required:
-        if name not in names:
-            raise mismatch(place, f"a column {_told(name, file.columns)}", f"none among {', '.join(names)}")
-    return head
-
-
-def _column(columns: Mapping[str, tuple[str, ...]], cell: str, place: str) -> tuple[str, str, str]:
-    told = ", ".join(_told(name, columns) for name in columns)
-    match = _HEAD.fullmatch(cell)
-    if match is None or match["name"] not in columns:
-        near = did_you_mean(match["name"], columns) if match else ""
-        raise mismatch(place, f"columns among {told}", f"{show(cell)}{near}")
-    name, unit = match["name"], (match["unit"] or "").removeprefix("-")
-    for si in columns[name]:
+    except (OSError, ValueError) as error:  # a NUL in the path
+        raise mismatch(place, "a CSV file", getattr(error, "strerror", None) or str(error)) from None
+    wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    # the letters of units that are not ASCII stand in Latin-1 where Windows has them
+    encodings = {"utf-16": "UTF-16 letters"} if wide else {"utf-8-sig": "", "cp1252": "Latin-1 letters"}
+    for encoding, told in encodings.items():
         try:
-            to_si(f"1 {unit}", si)
-        except UnitError:
+            text = content.decode(encoding)
+        except ValueError:
             continue
-        if unit or not si:  # a bare number is legal to `to_si`, but a column states its unit
-            return name, unit, si
-    raise mismatch(place, _told(name, columns), show(cell))
+        if not _BINARY.search(text):
+            return text, told
+    raise mismatch(place, "a text file (CSV in UTF-8)", "binary data")
 
 
-def _told(name: str, columns: Mapping[str, tuple[str, ...]]) -> str:
-    return " or ".join(f"{name} [{unit}]" if unit else name for unit in columns[name])
-
-
-def _number(cell: str, unit: str, si: str, place: str) -> float:
+def _cells(line: str, separator: str, place: str) -> list[str]:
     try:
-        value = to_si(f"{float(cell)!r} {unit}", si)
-    except (ValueError, UnitError):
-        raise mismatch(place, "a number", show(cell.strip())) from None
+        (cells,) = csv.reader([line], delimiter=separator, skipinitialspace=True, strict=True)
+    except csv.Error as error:
+        raise mismatch(place, "each quoted text closed in its line", f"{show(line)} ({error})") from None
+    while cells and not cells[-1].strip():
+        cells.pop()
+    return [cell.strip() for cell in cells]
+
+
+def _find_names(file: FromFile, lines: Sequence[str]) -> tuple[int, str]:
+    """Return the place of the line that names all columns that have to be there, and its separator.
+
+    Where there is none, those of the line that names most of them.
+    """
+    most, best = -1, (0, ",")
+    for place, line in enumerate(lines):
+        for separator in _SEPARATORS:
+            try:
+                known = {_key(file, cell) for cell in _cells(line, separator, "")}
+            except InputError:
+                continue
+            if known >= set(file.required):
+                return place, separator
+            if len(known - {None}) > most:
+                most, best = len(known - {None}), (place, separator)
+    return best
+
+
+def _split(cell: str) -> tuple[str, str]:
+    """Return name and unit in a cell such as "speed [mm/s]" or "speed (mm/s)"."""
+    match = _HEAD.fullmatch(cell)
+    if match is None:
+        return cell, ""
+    return match["name"].strip(), (match["square"] or match["round"] or "").strip()
+
+
+def _plain(cell: str) -> str:
+    return re.sub(r"[\s_]+", "_", _split(cell)[0].casefold())
+
+
+def _key(file: FromFile, cell: str) -> str | None:
+    """Return the column that a cell names, whatever its case."""
+    name = _plain(cell)
+    return name if name in file.columns else file.other_names.get(name)
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    return all(cell == "1" or not _NUMBER.fullmatch(cell) for cell in cells) and set(cells) != {"1"}
+
+
+def _columns(file: FromFile, of_names: Row, of_units: Row, place: str) -> list[_Column]:
+    """Return the columns that have a name."""
+    line, names = of_names
+    where, legal = f"{place}: line {line}", ", ".join(_told(name, file) for name in file.columns)
+    if unknown := [cell for cell in names if cell and _key(file, cell) is None]:
+        near = did_you_mean(_split(unknown[0])[0], file.columns)
+        found = few_of([show(cell) for cell in unknown], _MOST_NAMED) + near
+        raise mismatch(where, f"columns among {legal}", found, "name them so, or delete them")
+    columns: list[_Column] = []
+    for i, cell in enumerate(names):
+        unit, key = _split(cell)[1], _key(file, cell)
+        if key is None:
+            continue
+        if key in [column.name for column in columns]:
+            raise mismatch(where, "distinct columns", f"{key} twice")
+        below = (of_units[1][i : i + 1] or [""])[0].strip("[]()").strip()
+        if unit and below and unit != below:
+            raise mismatch(f"{place}: line {of_units[0]}, {key}", f"no other unit than {unit}", show(below))
+        unit = (unit or below).removeprefix("-")
+        columns.append(_Column(i, key, unit, _si_unit(file, key, unit, f"{place}: line {of_units[0]}")))
+    for name in file.required:
+        if name not in [column.name for column in columns]:
+            found = ", ".join(column.name for column in columns)
+            raise mismatch(where, f"a column {_told(name, file)}", f"none among {found}")
+    return columns
+
+
+def _si_unit(file: FromFile, name: str, unit: str, place: str) -> str:
+    for si in file.columns[name]:
+        # a bare number is legal to `to_si`, but a column states its unit
+        if (unit or not si) and _is_unit(unit, si):
+            return si
+    weighs = any(_is_unit(f"{unit}f", si) for si in file.columns[name])
+    then = f'write "{unit}f" for the weight of this mass' if unit and weighs else ""
+    raise mismatch(place, _told(name, file), show(f"{name} [{unit}]" if unit else name), then)
+
+
+def _is_unit(unit: str, si: str) -> bool:
+    try:
+        to_si(f"1 {unit}", si)
+    except UnitError:
+        return False
+    return True
+
+
+def _told(name: str, file: FromFile) -> str:
+    return " or ".join(f"{name} [{unit}]" if unit else name for unit in file.columns[name])
+
+
+def _left_out(of_names: Row, rows: Sequence[Row], separator: str, place: str) -> str:
+    """Return what is not read beside the columns; InputError if it may be anything of meaning."""
+    line, names = of_names
+    for n, cells in rows:
+        if len(cells) != len(names):
+            where, expected = f"{place}: line {n}", f"{len(names)} columns, as in line {line}"
+            may_be_decimal = separator == "," and len(cells) > len(names)
+            then = "separate columns by semicolons where commas are decimal" if may_be_decimal else ""
+            raise mismatch(where, expected, str(len(cells)), then)
+    found = ""
+    for i in (i for i, name in enumerate(names) if not name):
+        below = [cells[i] for _, cells in rows]
+        if i == 0 and any(below == [str(n) for n in range(start, start + len(rows))] for start in (0, 1)):
+            found = "no column for the numbers of the rows"
+        elif any(below):
+            n, cells = next((n, cells) for n, cells in rows if cells[i])
+            where = f"{place}: line {n}, column {i + 1}"
+            raise mismatch(where, f"nothing, as it has no name in line {line}", show(cells[i]))
+    return found
+
+
+def _decimal_mark(rows: Sequence[Row], separator: str, place: str) -> str:
+    """Return the decimal mark of all numbers; InputError if it is not certain."""
+    certain = "." if separator == "," else ""  # a program that writes decimal commas separates by others
+    seen: dict[str, str] = {}
+    for n, cells in rows:
+        for cell in filter(_NUMBER.fullmatch, cells):
+            for mark in ".,":
+                if mark in cell:
+                    seen.setdefault(mark, f"{show(cell)} in line {n}")
+                    certain += "" if _AMBIGUOUS.fullmatch(cell) else mark
+    then = "write numbers with decimal points, without separators of thousands"
+    if len(seen) > 1:
+        raise mismatch(place, "one decimal mark", " and ".join(seen.values()), then)
+    mark = next(iter(seen), ".")
+    if seen and mark not in certain:
+        expected = "a number that shows whether the mark is decimal or separates thousands"
+        raise mismatch(place, expected, f"only such as {seen[mark]}", then)
+    return mark
+
+
+def _number(cell: str, column: _Column, place: str) -> float:
+    place = f"{place}, {column.name}"
+    if not _NUMBER.fullmatch(cell):
+        raise mismatch(place, "a number such as 1500 or 0.13", show(cell))
+    value = to_si(f"{float(cell.replace(',', '.'))!r} {column.unit}", column.si)
     if not math.isfinite(value):
-        raise mismatch(place, "a finite number", show(cell.strip()))
+        raise mismatch(place, "a finite number", show(cell))
     return value

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from cvt_hpc.errors import InputError, check_keys, did_you_mean, mismatch
+from cvt_hpc.files import read_regular
 
+MOST_BYTES = 2**26
 _POSITION = re.compile(r"(?P<what>.*?) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)")
 
 
@@ -18,10 +20,10 @@ def read_document(path: Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If the file is missing, a folder, not a text, or not TOML (then with line and column).
+        If the file is missing, not regular, too large, not a text, or not TOML (then with line and column).
     """
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        text = read_regular(path, MOST_BYTES, follow=True).decode("utf-8-sig")
     except FileNotFoundError:
         beside = sorted(str(file) for file in path.parent.glob("*.toml"))
         hint = did_you_mean(str(path), beside) or "; `cvt-hpc init NAME` writes one to begin with"
@@ -30,7 +32,7 @@ def read_document(path: Path) -> dict[str, Any]:
         raise mismatch(str(path), "a job file", "a folder") from None
     except OSError as error:
         raise mismatch(str(path), "a job file", str(error.strerror)) from None
-    except UnicodeDecodeError:
+    except ValueError:  # bytes that are no UTF-8, or a NUL in the path
         raise mismatch(str(path), "a text file (TOML in UTF-8)", "binary data") from None
     document = _parse(text, str(path))
     check_keys(document, str(path))

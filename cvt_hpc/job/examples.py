@@ -7,6 +7,7 @@ import os
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from importlib import metadata
 from pathlib import Path, PurePosixPath
 
 import cvt_hpc
@@ -14,32 +15,37 @@ from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.files import written_aside
 from cvt_hpc.tables import columns
 
+_SHARE = "share/cvt_hpc/"  # where an installed package has them
 _QUOTED = re.compile(r"\"([\w./-]+)\\?\"")  # in notebooks the marks are escaped
 
 
 def example_files() -> dict[str, Path]:
     """Return the examples by their names, such as "jobs/quickstart.toml".
 
-    They are within an installed package; those of a checkout are beside it, as its pyproject.toml lists them.
+    Those of an installed package are among its files; those of a checkout are where its pyproject.toml lists
+    them.
 
     Raises
     ------
     InputError
         If there are none.
     """
-    package = Path(cvt_hpc.__file__).parent
-    root, settings = package / "examples", package.parent / "pyproject.toml"
-    patterns = ["**/*"]
-    if not root.is_dir() and settings.is_file():
-        root = package.parent
-        patterns = (
-            tomllib.loads(settings.read_text("utf-8")).get("tool", {}).get("cvt_hpc", {}).get("examples", [])
-        )
-    files = {path for pattern in patterns for path in root.glob(pattern) if path.is_file()}
-    files = {path for path in files if path.suffix != ".pyc"}  # which an installer makes of scripts
+    root = Path(cvt_hpc.__file__).parents[1]
+    if (settings := root / "pyproject.toml").is_file():
+        kept = tomllib.loads(settings.read_text("utf-8"))["tool"]["setuptools"]["data-files"]
+        patterns = [pattern for listed in kept.values() for pattern in listed]
+        paths = {path for pattern in patterns for path in root.glob(pattern) if path.is_file()}
+        files = {path.relative_to(root).as_posix(): path for path in paths}
+    else:
+        installed = {file.as_posix().partition(_SHARE)[2]: file for file in metadata.files("cvt_hpc") or ()}
+        files = {
+            name: Path(str(file.locate()))
+            for name, file in installed.items()
+            if name and file.suffix != ".pyc"
+        }
     if not files:
-        raise mismatch("examples", f"those of a wheel or a checkout, beside {package}", "none")
-    return {path.relative_to(root).as_posix(): path for path in sorted(files)}
+        raise mismatch("examples", f"those of a wheel, or of a checkout in {root}", "none")
+    return dict(sorted(files.items()))
 
 
 def example_lines() -> Iterator[str]:

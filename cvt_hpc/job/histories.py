@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cvt_hpc.errors import mismatch, show
-from cvt_hpc.job.axes import Axis
+from cvt_hpc.job.axes import Axis, without_rounding
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.values import read_value
 
@@ -71,7 +71,7 @@ def _index(
     values = {}
     for name, raw in entry.items():
         key = schema.find(name, f"{where}, {name}")
-        values[key] = read_value(schema.parameters[key], raw, f"{where}, {name}")
+        values[key] = without_rounding(read_value(schema.parameters[key], raw, f"{where}, {name}"))
     index = 0
     for axis in axes:
         if axis.name in replaced and values.get(axis.name) not in axis.values:
@@ -83,7 +83,7 @@ def _index(
         )
     for key in values.keys() - replaced.keys():
         raise mismatch(where, f"axes of this job ({', '.join(axis.name for axis in axes)})", key)
-    return index if all(replaced[key] == value for key, value in values.items()) else None
+    return index if all(without_rounding(replaced[key]) == value for key, value in values.items()) else None
 
 
 def _numbered(entry: Any, size: int, where: str) -> int:

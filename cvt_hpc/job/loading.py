@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
+from cvt_hpc.job.arrays import plain
 from cvt_hpc.job.assignments import (
     Assignments,
     AxisEntry,
@@ -27,7 +28,7 @@ from cvt_hpc.job.document import read_document
 from cvt_hpc.job.for_model import answering_model, handed_to
 from cvt_hpc.job.histories import KEY, read_histories
 from cvt_hpc.job.netcdf_files import SUFFIX, read_netcdf
-from cvt_hpc.job.notices import warn_of_notices
+from cvt_hpc.job.notices import tell_of_no_effect, warn_of_notices
 from cvt_hpc.job.plausibility import warn_of_bare_numbers
 from cvt_hpc.job.rules import Link, Rule, follow
 from cvt_hpc.job.sampling import sampled_axes
@@ -78,8 +79,8 @@ def build_job(
     Parameters
     ----------
     document : mapping
-        Tables and values as TOML gives them. An axis may also be a 1-D numpy array of numbers, and a table of
-        coefficients a 2-D one.
+        Tables and values as TOML gives them. An axis may also be a 1-D array of numpy, pandas, xarray or
+        pint, and a table of coefficients a 2-D one; units of pint, and attributes `units`, count.
     source : str
         Where it is from, for the errors: for a job of a file its path.
     overrides : mapping, or sequence of "KEY=VALUE"
@@ -133,13 +134,15 @@ def _build(
     label: str | None = None,
     units: Mapping[str, str] | None = None,
 ) -> Job:
+    document = plain(document)
     label = label or ("override" if isinstance(overrides, Mapping) else "--set")
     pairs = split_assignments(overrides, source, label)
     head = {**document, **{key: value for key, value in pairs.items() if key in HEADER}}
     name, description = read_name(head, source), _read_description(head, source)
     schema = load_schema(head.get("model"), head.get("stepper"), source)
     _check_top_level(document, schema, source)
-    written = _written(document, pairs, schema, source, label) if units is None else {}
+    is_users = units is None
+    written = _written(document, pairs, schema, source, label) if is_users else {}
     found = {key: unit_in(raw) for key, (raw, _) in written.items()}
     if units is None:
         units = {key: unit for key, unit in found.items() if unit}
@@ -155,6 +158,7 @@ def _build(
     put |= {given for key in replaced if (file := schema.parameters[key].file) for given in file.gives}
     gone = {*put, *overridden(put, schema)}
     given = {key: value for key, value in tables.items() if key not in gone} | replaced
+    files = {key: name for key, name in given.items() if name and schema.parameters[key].file}
     given = _with_files(given, schema, source)
     axes, rules = _read_axes_and_rules(document, design, gone, put_axes, given, schema, source)
     for key, entry in written.items():
@@ -166,8 +170,17 @@ def _build(
     check_rules(schema, scene, axes, rules, sampled=sampled)
     scene = follow(rules, scene)
     parameters = {key: scene[key] for key in schema.parameters if key in scene}
-    check_grid(schema, parameters, axes, source, rules=rules, sampled=sampled)
     settled = _settled(rules, axes)
+    without = check_grid(
+        schema,
+        parameters,
+        axes,
+        source,
+        rules=rules,
+        sampled=sampled,
+        given=[*given, *sorted(settled)] if is_users else (),
+    )
+    tell_of_no_effect(schema, parameters, files, without, source)
     histories = document.get(KEY[0], {}).get(KEY[1], [])
     replacing = {key: replaced.get(key) for key in gone}
     job = Job(
@@ -178,7 +191,7 @@ def _build(
         source,
         parameters,
         axes,
-        frozenset({*given, *settled}),
+        frozenset([*given, *sorted(settled)]),
         design,
         read_histories(histories, schema, axes, replacing, source, design.get("runs")),
         tuple(rule for rule in rules if rule.key not in settled),

@@ -1,7 +1,6 @@
 """netCDF files that give parameters of a job: variables with units, one error for all faults.
 
-A file may come from somebody else. HDF5 lets a variable lie in another file, by links, raw storage or virtual
-parts; a few compressed bytes may stand for any number of values. Neither is read.
+A file may come from somebody else: `cvt_hpc/hdf5.py` says what is not read.
 """
 
 from __future__ import annotations
@@ -69,7 +68,10 @@ def read_netcdf(file: FromFile, name: str, source: str, where: str) -> dict[str,
 def _columns(file: FromFile, content: bytes, place: str) -> dict[str, Column]:
     import netCDF4
 
-    _refuse_elsewhere(content, place)
+    if _HDF5 in content:  # netCDF looks for it behind a block of the user's, too
+        from cvt_hpc.hdf5 import check_hdf5
+
+        check_hdf5(io.BytesIO(content), len(content), place)
     try:
         with netCDF4.Dataset("file", memory=content) as dataset:
             known = dataset.variables
@@ -82,27 +84,6 @@ def _columns(file: FromFile, content: bytes, place: str) -> dict[str, Column]:
             return _in_rows(file, {name: known[name] for name in file.columns if name in known}, place)
     except (OSError, RuntimeError) as error:
         raise mismatch(place, "a netCDF file", getattr(error, "strerror", None) or str(error)) from None
-
-
-def _refuse_elsewhere(content: bytes, place: str) -> None:
-    """Raise InputError where something of an HDF5 file lies in another one."""
-    import h5py
-
-    if _HDF5 not in content:  # netCDF looks for it behind a block of the user's, too
-        return
-    try:
-        with h5py.File(io.BytesIO(content), "r") as file:
-            for name in file:
-                link = file.get(name, getlink=True)
-                if not isinstance(link, h5py.HardLink):
-                    raise mismatch(f"{place}, {name}", "values in this file", "a link")
-                stored = file[name]
-                if isinstance(stored, h5py.Group):  # with links of its own
-                    raise mismatch(f"{place}, {name}", "a file without groups", "a group")
-                if isinstance(stored, h5py.Dataset) and (stored.is_virtual or stored.external):
-                    raise mismatch(f"{place}, {name}", "values in this file", "values in another one")
-    except (OSError, RuntimeError, KeyError):
-        raise mismatch(place, "a netCDF file", "one that is damaged") from None
 
 
 def _in_rows(file: FromFile, variables: dict[str, netCDF4.Variable], place: str) -> dict[str, Column]:

@@ -1,4 +1,4 @@
-"""Messages about values whose meaning another key decides, if nothing names that key."""
+"""Messages about values whose meaning another key decides, if nothing names that key, or that it disables."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cvt_hpc.errors import JobWarning
+from cvt_hpc.errors import JobWarning, NoEffectWarning, mismatch, show
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.definition import Derived, Job
+from cvt_hpc.job.schema import Schema
 
 
 def warn_of_notices(job: Job, beside: Mapping[str, Sequence[Any]] | None = None) -> None:
@@ -36,3 +37,50 @@ def warn_of_notices(job: Job, beside: Mapping[str, Sequence[Any]] | None = None)
         if any(value != parameter.default for value in values):
             text = f"{job.source}: [{schema.section_of[key]}] {key} {notice.text}"
             warnings.warn(text, JobWarning, stacklevel=3)
+
+
+def tell_of_no_effect(
+    schema: Schema,
+    values: Mapping[str, Any],
+    files: Mapping[str, str],
+    without: Mapping[str, str],
+    source: str,
+) -> None:
+    """Refuse files and lists without effect on any run, and warn of other values, unless they are defaults.
+
+    Parameters
+    ----------
+    schema : Schema
+        Of the job.
+    values : mapping
+        Value [SI] by key.
+    files : mapping
+        By key the name of each file that the job gives.
+    without : mapping
+        Given keys without effect, each with the setting that makes it so.
+    source : str
+        The job file.
+
+    Raises
+    ------
+    InputError
+        With the first file or list without effect.
+    """
+    of_files = {one: key for key in files if (file := schema.parameters[key].file) for one in file.gives}
+    told = []
+    for key, setting in without.items():
+        value, shown = values[key], of_files.get(key, key)
+        if value == schema.parameters[key].default:
+            continue
+        if isinstance(value, tuple):
+            found, nothing = (files[shown], '""') if shown in files else (value, "[]")
+            where, expected = (
+                f"{source}: [{schema.section_of[key]}] {shown}",
+                f"nothing, as it has no effect with {setting}",
+            )
+            raise mismatch(where, expected, show(found), f"delete it, or set {shown} = {nothing}")
+        told.append(f"{key} (with {setting})")
+    if told:
+        warnings.warn(
+            f"{source}: without effect on all runs: {', '.join(told)}", NoEffectWarning, stacklevel=4
+        )

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.errors import mismatch, show, unknown
-from cvt_hpc.job.axes import Axis, read_axis, read_bounds, read_spacing, read_values
+from cvt_hpc.job.axes import Axis, read_bounds, read_spacing, read_values
 from cvt_hpc.job.design import LISTED, Design
 from cvt_hpc.job.values import kind_of
 from cvt_hpc.parameters import Parameter
@@ -47,10 +47,9 @@ def sampled_axes(
     for parameter, _, where in found.values():
         if kind_of(parameter) is not float:
             raise mismatch(where, "a parameter with continuous values, to draw samples from", "another one")
-    if design["kind"] == LISTED:
+    drawn = all(isinstance(raw, list) and len(raw) == design["runs"] for _, raw, _ in found.values())
+    if drawn or design["kind"] == LISTED:
         return tuple(_read_listed(name, design["runs"], *entry) for name, entry in found.items())
-    if all(isinstance(raw, list) and len(raw) == design["runs"] for _, raw, _ in found.values()):
-        return tuple(read_axis(name, *entry) for name, entry in found.items())
     ranges = [read_range(*entry) for entry in found.values()]
     shares = _draw(design, len(ranges)).T
     return tuple(

@@ -15,7 +15,10 @@ from typing import Any
 _QUANTITY = re.compile(
     r"\s*(?P<number>[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|(?:inf|nan)(?![A-Za-z])))\s*(?P<unit>.*?)\s*"
 )
-_TOKEN = re.compile(r"(?P<name>[A-Za-zµμ_]+)(?:(?:\^|\*\*)?(?P<power>[+-]?[1-9]))?(?!\d)|[*/()]|1(?!\d)|\s+")
+_TOKEN = re.compile(
+    r"(?P<name>[A-Za-zµμ_]+)(?:(?:\s*(?:\^|\*\*)\s*)?(?P<power>[+-]?[1-9]))?(?!\d)|"
+    r"[*/()]|1(?!\d)|\s+"
+)
 _TYPOGRAPHY = str.maketrans(
     {"·": "*", "²": "2", "³": "3", "⁻": "-", "¹": "1", "%": " percent ", "°": " degree "}
 )
@@ -68,6 +71,14 @@ def from_si(value: float, unit: str, wanted: str) -> float:
     return float(_convert(Decimal(repr(float(value))), unit, wanted))
 
 
+def is_unit(text: str) -> bool:
+    """Return whether a text is a unit, of whatever dimension."""
+    try:
+        return bool(_parse_unit(text))
+    except UnitError:
+        return False
+
+
 def unit_in(raw: Any) -> str:
     """Return the unit that a value of a job file is written with, of a list or a range the first one.
 
@@ -89,17 +100,27 @@ def _convert(number: Decimal, given: str, unit: str) -> Decimal:
         return number.scaleb(_PREFIXES[given[0]])
     if given in _PREFIXED and unit[1:] == given and unit[0] in _PREFIXES:
         return number.scaleb(-_PREFIXES[unit[0]])
-    registry = _registry()
+    factor, shift = _conversion(given, unit)
+    return number * factor + shift
+
+
+@lru_cache
+def _conversion(given: str, unit: str) -> tuple[Decimal, Decimal]:
+    """Factor between two units, and what a zero of the first one is in the second one."""
     source, target = _parse_unit(given), _parse_unit(unit)
     if source.dimensionality != target.dimensionality:
         raise UnitError
     # pint counts a radian as 1, so that 50 Hz would pass for 50 rad/s.
     if "[mass]" not in source.dimensionality and _angle_power(source) != _angle_power(target):
-        raise UnitError(f"{given} and {unit or 'a plain number'} differ by an angle")
+        per_minute, hint = _parse_unit("1/minute"), ""
+        if source.dimensionality == per_minute.dimensionality and not _angle_power(source):
+            hint = "; write rpm" if source == per_minute else "; write turn/s if turns are meant"
+        raise UnitError(f"{given} and {unit or 'a plain number'} differ by an angle{hint}")
     try:
-        return registry.Quantity(number, source).to(target).magnitude
+        zero, one = (_registry().Quantity(Decimal(n), source).to(target).magnitude for n in (0, 1))
     except TypeError:  # pint's and Python's: decibels, or degrees Celsius within a product
         raise UnitError(f"{given} is no plain multiple of {unit or 1}") from None
+    return one - zero, zero
 
 
 def _parse_unit(text: str) -> Any:

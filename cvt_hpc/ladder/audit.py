@@ -18,7 +18,6 @@ from cvt_hpc.models.auto.rules import Rung
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.index import Records
-from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.study.repeats import AUDIT, AUDITED, FULL_MODEL, Repeat, built, interval
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.status import expected_cost
@@ -127,7 +126,7 @@ def report_audit(audit: Repeat) -> AuditReport:
         As returned by `audit_of`, with all runs done.
     """
     low = audit.records
-    full = read_records(StudyFolder(audit.place).records, describe(audit.job, default_simulator()))
+    full = StudyFolder(audit.place).read_records(describe(audit.job, default_simulator()))
     audited = np.flatnonzero(audit.sample & full.recorded)
     rungs, ended = low.read(audited, "rung"), full.status[audited] == Status.DONE
     classes = [classify_runs(r.status[audited], r.read(audited, "vibrates")) for r in (low, full)]

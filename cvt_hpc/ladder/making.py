@@ -93,11 +93,11 @@ def run_ladder(
         with one_thread():
             if rung.job.stepper is None and begins[rung.name]:
                 simulate(rung.job)  # libraries loaded and kernels compiled would count as time of a first run
-            report = run(rung.job, out / rung.name, fresh=fresh)
+            report = run(rung.job, out / rung.name, fresh=fresh, raises=False)
         tell(rung, report)
         done, spent = done + cost, spent + (time.monotonic() - started if runs else 0.0)
-        status = max(status, report.exit_status)
-        if report.remaining:
+        status = max(status, report.status_of_more or report.exit_status)
+        if report.status_of_more:
             break
     return status
 

@@ -1,4 +1,7 @@
-"""The interface of a model to the rest of the program, and `load_model`, the only way to it.
+"""The interface of a model to the rest of the program, and `load_model`, the way to it by the model's name.
+
+Parts of certain models answer questions that no other model answers, such as the branch of steady states; the
+README lists the rooms that import such parts themselves.
 
 A model is a package of up to four modules. All but the first are imported only when they are needed:
 

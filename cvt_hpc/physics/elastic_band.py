@@ -62,7 +62,7 @@ def elastic_band(
     driving_speed : float
         [rad/s]
     driven_moment : float
-        Load on the driven pulley, > 0 [N m].
+        Load on the driven pulley, 0 or more [N m]; at 0 both forces are equal and nothing slips.
     driven_thrust : float
         Axial force on the driven sheave [N].
     driven_wrap : float
@@ -71,6 +71,11 @@ def elastic_band(
         EA [N] and mass per length [kg/m].
     friction, half_wedge_angle : float
         mu [1], delta_0 [rad].
+
+    Raises
+    ------
+    ValueError
+        If the band has no equilibrium: the moment is more than friction carries.
     """
     driving_radius, driven_radius = radii
     wedged = friction / np.sin(half_wedge_angle)
@@ -99,10 +104,11 @@ def elastic_band(
     def left(unknown: np.ndarray) -> list[float]:
         found = band(unknown)
         moment = (found.driving_force - found.driven_force) * driven_radius
-        return [moment / driven_moment - 1.0, found.driven_thrust / driven_thrust - 1.0]
+        return [(moment - driven_moment) / typical, found.driven_thrust / driven_thrust - 1.0]
 
     # both pulleys' forces from their mean, m v^2 left out, to begin with
     mean, rim = squeeze * driven_thrust / driven_wrap, driving_radius * driving_speed
+    typical = driven_moment + mean * driven_radius
     flow = rim / (1.0 + (mean + 0.5 * driven_moment / driven_radius) / stiffness)
     driven = flow * (1.0 + (mean - 0.5 * driven_moment / driven_radius) / stiffness) / driven_radius
     with np.errstate(invalid="ignore"):

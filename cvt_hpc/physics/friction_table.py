@@ -9,6 +9,16 @@ from typing import Any
 from cvt_hpc.parameters import Column, FromFile, Parameter, RowError
 
 KEYS = ("table_force", "table_speed", "table_mu")
+_OTHER_NAMES = {
+    "cof": "mu",
+    "coefficient_of_friction": "mu",
+    "friction_coefficient": "mu",
+    "\u03bc": "mu",
+    "normal_force": "force",
+    "velocity": "speed",
+    "sliding_speed": "speed",
+    "sliding_velocity": "speed",
+}
 _ANY_FORCE = (0.0, 1.0)  # knots of a table that does not depend on the force, which is held outside
 
 
@@ -28,7 +38,7 @@ def friction_file(force_unit: str) -> Parameter:
         columns["element_pitch"] = ("m",)
     told = f"{', '.join(KEYS)}; columns {', '.join(columns)}"
     text = f"CSV or netCDF file of a friction table, in the place of {told}"
-    file = FromFile(columns, ("speed", "mu"), KEYS, partial(_arranged, force_unit))
+    file = FromFile(columns, ("speed", "mu"), KEYS, partial(_arranged, force_unit), _OTHER_NAMES)
     return Parameter("", "", text, file=file)
 
 
@@ -46,11 +56,12 @@ def _arranged(force_unit: str, columns: Mapping[str, Column]) -> dict[str, Any]:
         row %= len(speeds)
         for what, value in zip(("force", "speed"), place, strict=True):
             if value < 0.0:
-                raise RowError(row, f"a {what} of 0 or more", f"{value:g}")
+                raise RowError(row, f"a {what} of 0 or more (a magnitude)", f"{value:g}")
         if mu <= 0.0:
             raise RowError(row, "a coefficient of friction > 0", f"{mu:g}")
         if place in found:
-            raise RowError(row, "one coefficient for each force and speed", "a second one for these")
+            expected = "one coefficient for each force and speed, such as the mean of repeated measurements"
+            raise RowError(row, expected, "a second one for these")
         found[place] = mu
     forces, knots = (sorted({place[i] for place in found}) for i in (0, 1))
     for force in forces:

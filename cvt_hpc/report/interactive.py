@@ -19,11 +19,13 @@ from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words
 from cvt_hpc.analysis.hysteresis_bands import ALONG, INK, lowest_onsets, of_each_start
 from cvt_hpc.analysis.scatter import is_sampled, sample_axes
 from cvt_hpc.analysis.starts import AXIS, has_starts, join_starts
+from cvt_hpc.errors import escaped
 from cvt_hpc.report.findings import is_judged
 from cvt_hpc.report.quantities import AMPLITUDE, Quantity, quantities
 from cvt_hpc.vibration.hysteresis import StartClass
 
 LARGEST = 3e38  # in 4 bytes
+KEPT = "\n\t\u00a0"  # characters on a page that do not print, and are no harm
 _SYMBOLS = {  # marks of the plotting library on cells of a class, and for legends
     StartClass.FAILED: ("x", "✖"),
     StartClass.NOT_RUN: ("line-ew-open", "–"),
@@ -88,9 +90,18 @@ def map_data(dataset: xr.Dataset, source: str = "results") -> dict[str, Any]:
 
 
 def as_script(data: dict[str, Any]) -> str:
-    """JSON that ends no script, whatever the texts of a dataset are."""
-    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    """JSON that ends no script and turns no direction, whatever the texts of a dataset are."""
+    text = json.dumps(_as_they_stand(data), separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _as_they_stand(data: Any) -> Any:
+    """JSON types with escapes in all texts, as a page shows them."""
+    if isinstance(data, str):
+        return escaped(data, KEPT)
+    if isinstance(data, dict):
+        return {key: _as_they_stand(value) for key, value in data.items()}
+    return list(map(_as_they_stand, data)) if isinstance(data, (list, tuple)) else data
 
 
 def _grid_axis(axis: xr.DataArray) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from cvt_hpc.analysis.repeated import sample_sentences
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.analysis.starts import AXIS, has_starts
 from cvt_hpc.analysis.value_maps import value_map_figure
-from cvt_hpc.errors import InputError, mismatch, one_line
+from cvt_hpc.errors import InputError, escaped, mismatch, one_line
 from cvt_hpc.files import written_aside
 from cvt_hpc.job import Job, rebuild_job
 from cvt_hpc.job.summary import core_time_in_words, rules_in_words, value_in_words
@@ -42,7 +42,7 @@ from cvt_hpc.report.findings import (
     summary,
     window_sentences,
 )
-from cvt_hpc.report.interactive import as_script, map_data
+from cvt_hpc.report.interactive import KEPT, as_script, map_data
 from cvt_hpc.report.quantities import quantities
 
 MOST_FAILURES = 30  # kinds of failure in the table
@@ -97,16 +97,26 @@ def write_report(dataset: xr.Dataset, out: Path, source: str = "results", folder
     check_results(dataset, source)
     if (content := str(dataset.attrs.get(CONTENT, ""))) == HISTORY:
         raise mismatch(source, "results of a study", f"the {content}; `cvt-hpc plot` draws it")
-    templates = jinja2.Environment(loader=jinja2.PackageLoader("cvt_hpc.report", "."), autoescape=True)
+    loader = jinja2.PackageLoader("cvt_hpc.report", ".")
+    templates = jinja2.Environment(loader=loader, autoescape=True, finalize=_as_it_stands)
     page = templates.get_template("page.html").render(_content(dataset, source, folder))
     with written_aside(Path(out), parents=True) as aside:
         aside.write_text(page, encoding="utf-8")
     return Path(out)
 
 
+def _as_it_stands(value: Any) -> Any:
+    """What a page shows of a text: escapes for characters that would turn or hide what is beside them."""
+    return escaped(value, KEPT) if isinstance(value, str) and not isinstance(value, Markup) else value
+
+
 def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str, Any]:
     attributes = {str(key): str(value) for key, value in dataset.attrs.items()}
     job = _job(attributes, source)
+    own = ["run", *(axis.name for axis in job.axes)] if job else dataset["status"].dims
+    joined = [str(name) for name in dataset["status"].dims if name not in own]
+    if joined:  # the attributes are those of one of several studies
+        job = None
     arrangement = _arrangement(dataset, source)
     found = failures(dataset)
     parameters = _parameters(job) if job else {}
@@ -128,6 +138,7 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
         "description": attributes.get("title", ""),
         "model": f"{job.model}: {load_model(job.model).title}" if job else "",
         "axes": _axes(dataset, job),
+        "joined": " and ".join(joined),
         "summary": summary(dataset),
         "sentences": list(map(_with_code, sentences)),
         "windows": any("vibration from" in line or "vibration up to" in line for line in sentences),
@@ -188,7 +199,8 @@ def _pictures(
 def _axes(dataset: xr.Dataset, job: Job | None) -> list[tuple[str, str, str]]:
     """Name, meaning and values of each axis, in the units of the job; of an axis that is fixed its value."""
     dims = set(dataset["status"].dims)
-    names = [str(name) for name in dataset.coords if dims & set(dataset[name].dims)]
+    names = list(dict.fromkeys([*dataset.coords, *dataset["status"].dims]))
+    names = [str(name) for name in names if dims & set(dataset[name].dims)]
     if job is not None:
         names = [axis.name for axis in job.axes if axis.name in dataset.coords]
     rows = []
@@ -201,7 +213,8 @@ def _axes(dataset: xr.Dataset, job: Job | None) -> list[tuple[str, str, str]]:
             ends = int(np.argmin(axis.values)), int(np.argmax(axis.values))
             values = " to ".join(value_text(axis, place) for place in ends)
         else:
-            values = known_values(axis)
+            once = axis.values if axis.ndim == 1 else np.unique(axis.values)
+            values = known_values(xr.DataArray(once, name=name, attrs=axis.attrs))
         rows.append((name, meaning, values))
     return rows
 
@@ -231,7 +244,7 @@ def _encoded(compose: Callable[[], Figure]) -> str:
 
 def _with_code(text: str) -> Markup:
     """A text as HTML: what stands between backticks as code, numbers never parted from their units."""
-    text = with_units(text).replace("N m", "N\u00a0m")
+    text = with_units(_as_it_stands(text)).replace("N m", "N\u00a0m")
     parts = [
         Markup("<code>{}</code>" if k % 2 else "{}").format(part) for k, part in enumerate(text.split("`"))
     ]

@@ -46,6 +46,7 @@ _MARCH = (
     Variable("steps", (), "i8", "1", "time steps taken, all tries"),
     Variable("contact_solves", (), "i8", "1", "linear solves of the contact problem, all tries"),
 )
+COMMON = (*_VERDICT, *_COST, *_MARCH)  # of all models; those without a march have none of its
 
 
 def recorded_model(job: Job) -> Model:

@@ -21,7 +21,6 @@ from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.record.log import RecordLog
-from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.study.time_steps import asked_step
 from cvt_hpc.variables import Status
 
@@ -160,7 +159,7 @@ def enter_attempts(
             log.append([(index, study.pack_failure(reason)) for index, reason in lost.items()])
         if len(again):
             log.begin_again(again)
-    return read_records(folder.records, study)
+    return folder.read_records(study)
 
 
 def later_attempts(records: Records) -> dict[int, int]:

@@ -55,14 +55,18 @@ def examine(folder: Path) -> Iterator[Finding]:
 
 
 def _cores() -> Finding:
-    usable, present = len(os.sched_getaffinity(0)), os.cpu_count() or 1
+    usable, present = _usable_cores(), os.cpu_count() or 1
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     found = f"{usable} of {present} cores may be used, {size_in_words(memory)} of memory"
-    return Finding(True, "machine", found, f"mpirun -n {usable} fills it" if usable > 1 else "")
+    return Finding(True, "machine", found)
+
+
+def _usable_cores() -> int:
+    return len(os.sched_getaffinity(0))
 
 
 def _cache() -> Finding:
-    from cvt_hpc.kernels import cache_folder
+    from cvt_hpc.kernel_store import folder as cache_folder
 
     if (place := cache_folder()) is None:
         advice = "set NUMBA_CACHE_DIR to a folder of your own, or each start compiles again"
@@ -95,7 +99,8 @@ def _mpi(installed: bool) -> Finding:
     command = [launcher, "-n", str(_RANKS), sys.executable, "-c", _COUNT_RANKS]
     _, lines = _said(command)
     if len(lines) == 1 and lines[0].startswith(f"{_RANKS} "):
-        return Finding(True, "MPI", f"{_RANKS} ranks by {launcher} ({lines[0].split()[1]})")
+        fills = f"mpirun -n {usable} fills this machine" if (usable := _usable_cores()) > 1 else ""
+        return Finding(True, "MPI", f"{_RANKS} ranks by {launcher} ({lines[0].split()[1]})", fills)
     advice = f"`{launcher}` does not fit the MPI library of mpi4py; {serial}"
     return Finding(
         False, "MPI", f"{_RANKS} ranks did not find each other: {lines[-1:] or 'no answer'}", advice

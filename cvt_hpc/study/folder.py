@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 import json
+import logging
+import re
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from cvt_hpc.errors import InputError, few_of, mismatch, nearest
-from cvt_hpc.files import kind_of, make_own_folder, naming_refusals
+from cvt_hpc.files import kind_of, make_own_folder, naming_refusals, sync_folder
 from cvt_hpc.job.definition import fingerprint_of
-from cvt_hpc.locks import is_locked, locked
+from cvt_hpc.locks import BusyError, is_locked, locked
 from cvt_hpc.output_folder import DamagedJobError, Kind, OutputFolder
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.job_difference import refuse_other
+from cvt_hpc.study.growth import have_one_layout, places_in, refuse_other
 from cvt_hpc.study.part import Part
 from cvt_hpc.study.record.frames import MAGIC
-from cvt_hpc.study.record.index import open_log
-from cvt_hpc.study.record.recovery import read_records
+from cvt_hpc.study.record.index import Records, open_log
+from cvt_hpc.study.record.recovery import Places, read_records
 from cvt_hpc.study.stored import check_stored
 
 MOST_NAMED = 5
 _PART_LOCKS = ".part-*.lock"
+_EARLIER = f"job-{'[0-9a-f]' * 16}"  # files of jobs from which the study has grown
+
+_logger = logging.getLogger(__name__)
 
 
 def study_instead(path: Path) -> str:
@@ -60,6 +65,13 @@ class StudyFolder(OutputFolder[Study]):
     def history(self, index: int) -> Path:
         """Return the file of the history of run `index`."""
         return self.histories / f"run-{index:06d}.nc"
+
+    def read_records(self, study: Study) -> Records:
+        """Return which records of a study the logs hold, also from before it has grown."""
+        earlier, flaws = self._earlier_places(study)
+        records = read_records(self.records, study, earlier)
+        records.warnings[:0] = flaws
+        return records
 
     def make_histories(self) -> None:
         """Make the folder of histories; StorageError if something else is there, or the system refuses."""
@@ -104,7 +116,11 @@ class StudyFolder(OutputFolder[Study]):
 
     def leftovers(self) -> list[Path]:
         """Return the half-written files of processes that died while they wrote."""
-        return [*self.path.glob(".results.nc.*.part"), *super().leftovers()]
+        return [
+            *self.path.glob(".results.nc.*.part"),
+            *self.path.glob(f".{_EARLIER}.json.*.part"),
+            *super().leftovers(),
+        ]
 
     def half_histories(self) -> list[Path]:
         """Return the same of histories; only a process that works alone can separate unfinished ones."""
@@ -145,16 +161,93 @@ class StudyFolder(OutputFolder[Study]):
         """Return a function that decides whether the logs are of a study; None if there are none."""
         if not self._has_logs():
             return None
-        return lambda study: bool(read_records(self.records, study).recorded.any())
+        return lambda study: bool(self.read_records(study).recorded.any())
 
     def written(self, found: Study | None) -> Iterator[Path]:
         """Yield the files that runs have left: results, histories, records."""
         yield from (self.results, self.crash_log, *self.path.glob(_PART_LOCKS))
+        yield from self.path.glob(f"{_EARLIER}.json")
         yield from self._inside(self.histories, "run-*.nc")
+        for folder in self._inside(self.histories, _EARLIER):
+            yield from (*self._inside(folder, "run-*.nc"), folder)
         yield from self.half_histories()
         if kind_of(self.histories) == "a link":
             yield self.histories
         yield from self._inside(self.records, "rank-*.log")
+
+    @contextmanager
+    def claimed(
+        self, asked: Study, *, fresh: bool = False, inner: AbstractContextManager | None = None
+    ) -> Iterator[None]:
+        """Be at work in the folder, as of `OutputFolder.claimed`; a study grows while nobody else is."""
+        if inner is not None and self._grows(asked):
+            try:
+                with super().claimed(asked):
+                    pass
+            except BusyError:
+                if self._grows(asked):  # else another part of the same study was faster
+                    raise
+        with super().claimed(asked, fresh=fresh, inner=inner):
+            self._number_histories(asked)
+            yield
+
+    def replace(self, found: Study, asked: Study) -> None:
+        """Keep the job from which a study grows, and set its histories aside until they have new numbers.
+
+        At any moment the records belong to the one job that job.json holds, and to the other one.
+        """
+        if found.fingerprint == asked.fingerprint:
+            super().replace(found, asked)
+            return
+        self.write_job(self.path / f"{_stem(found.fingerprint)}.json", found)
+        if histories := list(self._inside(self.histories, "run-*.nc")):
+            aside = self.histories / _stem(found.fingerprint)
+            with naming_refusals(aside, "a folder that histories can be moved to"):
+                make_own_folder(aside)
+                for path in histories:
+                    path.replace(aside / path.name)
+                for folder in (aside, self.histories):
+                    sync_folder(folder)
+        told = "%s: the study grows from %d to %d runs, which have new numbers"
+        _logger.warning(told, self.path, found.size, asked.size)
+
+    def _grows(self, asked: Study) -> bool:
+        found = self.check_free_for(asked, fresh=False)
+        return found is not None and found.fingerprint != asked.fingerprint
+
+    def _earlier_places(self, study: Study) -> tuple[dict[str, Places], list[str]]:
+        """Return the places of the runs of studies that have grown to this one, by fingerprint; and flaws."""
+        found: dict[str, Places] = {}
+        flaws = []
+        for path in sorted(self.path.glob(f"{_EARLIER}.json")):
+            folder = StudyFolder(self.path)
+            folder.job_file = path
+            try:
+                earlier = folder.read_job()
+            except InputError as error:
+                flaws.append(f"{error}; the records of this job are left out")
+                continue
+            places = places_in(earlier.job, study.job) if have_one_layout(earlier, study) else None
+            if places is not None and places.size == earlier.size:
+                found[earlier.fingerprint] = places
+        return found, flaws
+
+    def _number_histories(self, study: Study) -> None:
+        """Give histories that were set aside the numbers that their runs have in a study."""
+        if not (asides := [*self._inside(self.histories, _EARLIER)]):
+            return
+        earlier, _ = self._earlier_places(study)
+        places = {_stem(one): numbers for one, numbers in earlier.items()}
+        places[_stem(study.fingerprint)] = range(study.size)
+        for aside in asides:
+            numbers = places.get(aside.name, range(0))
+            for path in list(self._inside(aside, "run-*.nc")):
+                named = re.fullmatch(r"run-(\d{6,9})\.nc", path.name)
+                if named and int(named[1]) < len(numbers):
+                    with naming_refusals(path, "a history that can be moved"), suppress(FileNotFoundError):
+                        path.replace(self.history(int(numbers[int(named[1])])))
+            with suppress(OSError):
+                aside.rmdir()
 
     def _has_logs(self) -> bool:
         """Return whether runs have left logs here, of whatever job."""
@@ -164,6 +257,11 @@ class StudyFolder(OutputFolder[Study]):
         """Yield files in a folder of this one; none where a link stands in its place."""
         if kind_of(folder) == "a folder":
             yield from folder.glob(pattern)
+
+
+def _stem(fingerprint: str) -> str:
+    """Return the name, without suffix, of what a job leaves from which a study has grown."""
+    return f"job-{fingerprint[:16]}"
 
 
 def _is_log(path: Path) -> bool:

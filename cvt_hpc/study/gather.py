@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 from collections.abc import Callable
 from pathlib import Path
@@ -12,17 +13,19 @@ import numpy as np
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.files import discard, kind_of, naming_refusals, written_aside
 from cvt_hpc.locks import locked
-from cvt_hpc.netcdf import global_attributes, variable_attributes
+from cvt_hpc.netcdf import global_attributes, open_netcdf, refuse_beside_sweep, variable_attributes
 from cvt_hpc.provenance import history_line
 from cvt_hpc.study.chunks import chunk_shape, fill
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.dimensions import Dimension
 from cvt_hpc.study.folder import StudyFolder, study_instead
+from cvt_hpc.study.growth import places_in
+from cvt_hpc.study.job_difference import difference_in_words, flatten
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.record.log import KEPT
-from cvt_hpc.study.record.recovery import read_records
+from cvt_hpc.study.stored import MOST_RUNS
 from cvt_hpc.study.tracing import inferred_classes
-from cvt_hpc.variables import Variable
+from cvt_hpc.variables import Status, Variable
 from cvt_hpc.vibration.classes import OccurrenceClass
 
 if TYPE_CHECKING:
@@ -41,6 +44,10 @@ PATIENCE = 600.0  # [s]; 10^6 runs are gathered within a minute
 _logger = logging.getLogger(__name__)
 
 
+class LossError(InputError):
+    """A dataset holds runs of which the logs have no records."""
+
+
 def gather(out: str | Path) -> Path:
     """Write the dataset of all runs recorded so far; works while a run is at work.
 
@@ -57,7 +64,8 @@ def gather(out: str | Path) -> Path:
     Raises
     ------
     InputError
-        If the folder is not that of a run, or cannot be written to.
+        If the folder is not that of a run, or cannot be written to, or runs of the dataset that is there are
+        not on record.
     """
     folder = StudyFolder(out)
     for warning in gather_records(folder, folder.load()).warnings:
@@ -83,15 +91,57 @@ def gather_records(
     ------
     BusyError
         If another process has gathered for longer than PATIENCE.
+    LossError
+        If runs of the dataset that is there are not on record.
     StorageError
         If the system refuses.
     """
     with locked(folder.gather_lock, patience=PATIENCE, interrupt=interrupt):
         for leftover in folder.leftovers():
             discard(leftover)
-        records = read_records(folder.records, study)
+        records = folder.read_records(study)
+        _refuse_loss(folder.results, study, records)
         write_results(folder, study, records)
     return records
+
+
+def _refuse_loss(path: Path, study: Study, records: Records) -> None:
+    """Raise LossError if a dataset holds runs that are not on record, except those that begin again."""
+    job, status = _read_held(path)
+    held = np.flatnonzero(status != Status.NOT_RUN)
+    places, why = places_in(job, study.job), ""
+    if places is None or places.size != status.size:
+        lost, why = held.size, f", since it is of another job ({difference_in_words(job, study.job)})"
+    else:
+        gone = ~records.recorded & (records.attempts == 1)
+        lost = int(gone[places[held]].sum())
+    if lost:
+        raise LossError(
+            f"{path}: expected all of its {held.size} runs on record, found {lost} of them missing{why}; it "
+            "stays as it is. Bring back job.json and records, or rename it and gather again"
+        )
+
+
+def _read_held(path: Path) -> tuple[dict[str, Any], np.ndarray]:
+    """Return the resolved job of a dataset, and how each of its runs has ended; or nothing."""
+    import h5py
+
+    nothing: tuple[dict[str, Any], np.ndarray] = {}, np.zeros(0, np.int8)
+    if kind_of(path) != "a file":
+        return nothing
+    try:
+        # Whoever else has locked it; anybody may have made it: no link is followed, no other file read.
+        with h5py.File(path, "r", locking=False) as file:
+            if not isinstance(file.get("status", getlink=True), h5py.HardLink):
+                return nothing
+            stored = file["status"]
+            if stored.dtype != np.int8 or stored.size > MOST_RUNS or stored.is_virtual or stored.external:
+                return nothing
+            job = json.loads(file.attrs["job"])
+            flatten(job)  # not nested too deep
+            return job, np.ravel(stored[()])
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError):
+        return nothing
 
 
 def open_results(path: str | Path) -> xr.Dataset:
@@ -111,13 +161,12 @@ def open_results(path: str | Path) -> xr.Dataset:
     Raises
     ------
     InputError
-        If there is no dataset, or none that can be read.
+        If there is no dataset, or none that can be read, or in a thread beside a sweep.
     """
-    import xarray as xr
-
+    refuse_beside_sweep(str(path))
     found = Path(path)
     with naming_refusals(found, "a netCDF dataset"):
-        if found.is_dir():
+        if is_folder := found.is_dir():
             folder = StudyFolder(found)
             found = folder.results
             if not found.exists() or kind_of(folder.job_file) is not None:
@@ -128,16 +177,10 @@ def open_results(path: str | Path) -> xr.Dataset:
                 )
         if not found.exists():
             raise mismatch(str(found), "a netCDF dataset", "nothing", study_instead(found))
-        if not found.is_file():
-            raise InputError(f"{found}: expected a netCDF dataset, found {kind_of(found)}")
         if found.suffix == ".toml":
             expected = "the output folder of a run, or a dataset"
             raise mismatch(str(found), expected, "a job file", study_instead(found))
-        try:
-            # Quantities in seconds are numbers, not dates.
-            return xr.open_dataset(found, engine="netcdf4", decode_times=False, chunks={})
-        except ValueError as error:
-            raise InputError(f"{found}: expected a netCDF dataset, found: {error}") from error
+    return open_netcdf(found, follow=not is_folder, chunks={})
 
 
 def write_results(folder: StudyFolder, study: Study, records: Records) -> Path:

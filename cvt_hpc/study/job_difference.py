@@ -3,60 +3,66 @@
 from __future__ import annotations
 
 import json
+import os.path
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.errors import InputError
-from cvt_hpc.study.description import Study
+from cvt_hpc.errors import InputError, few_of
 
-
-def refuse_other(path: Path, found: Study, asked: Study) -> None:
-    """Raise InputError unless the study in a folder is the requested one."""
-    if found.fingerprint != asked.fingerprint:
-        raise another_job(path, found.job, asked.job, f"job {found.name}: ")
-    if _layout(found) != _layout(asked):
-        raise InputError(
-            f"{path}: expected records with the quantities of this version, found others; choose "
-            "another --out, or --fresh to throw them away"
-        )
+_LONGEST = 40  # letters of a value
 
 
 def another_job(path: Path, found: dict[str, Any], asked: dict[str, Any], name: str = "") -> InputError:
     """Return the error that a folder holds the results of another resolved job."""
-    difference = f"{name}{_difference(found, asked)}"
+    difference = f"{name}{difference_in_words(found, asked)}"
     return InputError(
-        f"{path}: expected the folder of this job, found that of another ({difference}); choose another "
-        "--out, or --fresh to throw its results away"
+        f"{path}: expected the folder of this job, found that of another ({difference}); choose another name "
+        "or --out, or --fresh to throw its results away"
     )
 
 
-def _difference(found: dict[str, Any], asked: dict[str, Any]) -> str:
-    """The first few entries in which two resolved jobs differ, as "key is 1 there, 2 here"."""
-    entries = [
-        f"{key} is {short(there)} there, {short(here)} here"
-        for key, (there, here) in differences(found, asked).items()
-    ]
+def difference_in_words(found: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
+    """Return the first few entries in which two resolved jobs differ, as "key is 1 there, 2 here"."""
+    pairs = differences(found, asked).items()
+    entries = [f"{key} {_pair_in_words(there, here)}" for key, (there, here) in pairs]
     return "; ".join(entries[:3]) + ("; ..." if len(entries) > 3 else "")
 
 
-def differences(one: dict[str, Any], other: dict[str, Any]) -> dict[str, tuple[Any, Any]]:
+def _pair_in_words(there: Any, here: Any) -> str:
+    """Return in words how two values differ: of lists the values that only one of them has."""
+    if not isinstance(there, list) or not isinstance(here, list) or len(f"{there}{here}") <= _LONGEST:
+        first, second = short(there), short(here)
+        if first == second:  # what differs is behind the cut
+            texts = json.dumps(there), json.dumps(here)
+            same = len(os.path.commonprefix(texts))
+            first, second = (f"...{text[max(same - 10, 0) :][:_LONGEST]}" for text in texts)
+        return f"is {first} there, {second} here"
+    gone, more = (
+        [value for value in one if value not in other] for one, other in ((there, here), (here, there))
+    )
+    parts = [
+        f"has {len(values)} value{'s' * (len(values) > 1)} {where} ({_few(values)})"
+        for values, where in ((gone, "there that it lacks here"), (more, "here that it lacks there"))
+        if values
+    ]
+    return " and ".join(parts) or "has its values in another order"
+
+
+def _few(values: list) -> str:
+    return few_of([short(value) for value in values], 4)
+
+
+def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
     """Return the values, None where there is none, of each key "section.key" in which documents differ."""
     here, there = flatten(one), flatten(other)
     pairs = {key: (here.get(key), there.get(key)) for key in {**here, **there}}
     return {key: pair for key, pair in pairs.items() if pair[0] != pair[1]}
 
 
-def _layout(study: Study) -> dict[str, Any]:
-    """Return the entries in which records must agree to be of one dataset."""
-    return {
-        "quantities": [(v.name, v.dims, v.dtype) for v in study.variables],
-        "coordinates": [(dimension.name, dimension.values) for dimension in study.coordinates],
-    }
-
-
 def flatten(entry: Any, prefix: str = "") -> dict[str, Any]:
     """Return the values of nested tables by "section.key"."""
-    if not isinstance(entry, dict):
+    if not isinstance(entry, Mapping):
         return {prefix: entry}
     parts = (flatten(value, f"{prefix}.{key}" if prefix else key) for key, value in entry.items())
     return {key: value for part in parts for key, value in part.items()}
@@ -65,4 +71,4 @@ def flatten(entry: Any, prefix: str = "") -> dict[str, Any]:
 def short(value: Any) -> str:
     """Return a value of a resolved job in 40 letters at most."""
     text = "not set" if value is None else json.dumps(value)
-    return text if len(text) <= 40 else text[:37] + "..."
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."

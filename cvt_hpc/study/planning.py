@@ -27,7 +27,6 @@ from cvt_hpc.study.ranks.counter import Counter
 from cvt_hpc.study.ranks.progress import Progress
 from cvt_hpc.study.ranks.time_limit import TimeLimit
 from cvt_hpc.study.record.index import Records
-from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.study.task import Task
 from cvt_hpc.study.time_steps import refined_steps, untried_factor
 from cvt_hpc.study.tracing import needed_runs
@@ -68,7 +67,7 @@ def prepare(
     if part is None:
         for leftover in folder.half_histories():
             discard(leftover)
-    records = read_records(folder.records, study)
+    records = folder.read_records(study)
     session = new_session(ranks)
     for warning in records.warnings + _other_versions(records, session):
         _logger.warning(warning)
@@ -116,7 +115,7 @@ def next_round(
     RuntimeError
         If a run of that round is not on record: requesting it once more would never end.
     """
-    records = read_records(folder.records, task.study)
+    records = folder.read_records(task.study)
     lost = [
         index for assignment in plan.assignments for index in assignment.runs if not records.recorded[index]
     ]

@@ -22,7 +22,6 @@ from cvt_hpc.job import rebuild_job
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.index import Records
-from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.study.report import RunReport
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.sweep import check_start, run
@@ -92,7 +91,7 @@ class Repeat:
     @cached_property
     def records(self) -> Records:
         """Records of the first study, as they are at the first access."""
-        return read_records(StudyFolder(self.out).records, self.study)
+        return StudyFolder(self.out).read_records(self.study)
 
     @cached_property
     def may_be_drawn(self) -> NDArray[np.bool_]:

@@ -58,7 +58,8 @@ class RunReport:
     failed : tuple of FailedRun
         The runs that ended without results.
     stopped : str or None
-        Why the sweep ended early: the name of a signal, or "time limit".
+        Why the sweep ended early: the name of a signal, or "time limit". A signal may come when all runs are
+        done: then what was to follow must not begin.
     gained : int
         Number of runs recorded since this start.
     unneeded : int
@@ -90,6 +91,13 @@ class RunReport:
         if self.remaining:
             return STOPPED if self.gained else STALLED
         return SOME_FAILED if self.failed else DONE
+
+    @property
+    def status_of_more(self) -> int | None:
+        """Return the exit status if what was to follow must not begin, None if it may."""
+        if self.remaining:
+            return self.exit_status
+        return STOPPED if self.stopped else None
 
 
 def build_report(

@@ -15,7 +15,6 @@ from cvt_hpc.job import rebuild_job
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.index import Records
-from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.study.report import count_special
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.tracing import needed_runs
@@ -89,7 +88,7 @@ def read_status(out: str | Path) -> StudyStatus:
     folder = StudyFolder(out)
     study = folder.load()
     running = folder.is_in_use()
-    records = read_records(folder.records, study)
+    records = folder.read_records(study)
     recorded = int(records.recorded.sum())
     done = int((records.status == Status.DONE).sum())
     needed = needed_runs(study, records)
@@ -158,7 +157,7 @@ def find_records(out: Path, job: Job) -> Records | None:
         study = folder.load()
     except InputError:
         return None
-    return read_records(folder.records, study) if study.fingerprint == job.fingerprint() else None
+    return folder.read_records(study) if study.fingerprint == job.fingerprint() else None
 
 
 def _latest_session(records: Records, running: bool) -> tuple[np.ndarray, float]:

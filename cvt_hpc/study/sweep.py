@@ -10,33 +10,34 @@ from contextlib import ExitStack, closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cvt_hpc.errors import mismatch
-from cvt_hpc.files import StorageError
+from cvt_hpc.files import StorageError, open_missing_streams
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.locks import BusyError
+from cvt_hpc.netcdf import library_for_sweep
+from cvt_hpc.provenance import program_identity
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.forecast.cost_model import CostModel
 from cvt_hpc.study.forecast.needs import refuse_too_large
-from cvt_hpc.study.gather import gather_records
+from cvt_hpc.study.gather import LossError, gather_records
 from cvt_hpc.study.histories import keep_histories, leave_out_missing
 from cvt_hpc.study.part import Part, read_part
 from cvt_hpc.study.planning import Plan, asked_runs, next_round, prepare
 from cvt_hpc.study.ranks.counter import Counter
-from cvt_hpc.study.ranks.launch import Team, assembled_team
+from cvt_hpc.study.ranks.launch import Ranks, Team, assembled_team
 from cvt_hpc.study.ranks.progress import Progress
 from cvt_hpc.study.ranks.schedule import claimed_batches, open_counter
-from cvt_hpc.study.ranks.stopping import ELSEWHERE, SignalWatch, Stop
+from cvt_hpc.study.ranks.stopping import ELSEWHERE, SignalWatch, Stop, raise_again
 from cvt_hpc.study.ranks.survival import outlive
 from cvt_hpc.study.ranks.time_limit import find_time_limit, planning_within
 from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.log import RecordLog
-from cvt_hpc.study.record.recovery import read_records
-from cvt_hpc.study.report import RunReport, build_report
+from cvt_hpc.study.report import STOPPED, RunReport, build_report
 from cvt_hpc.study.simulator import Simulator, default_simulator
 from cvt_hpc.study.task import Task
 from cvt_hpc.study.time_steps import check_refinement
@@ -62,12 +63,18 @@ def run(
     refine: float | None = None,
     chosen: Callable[[], np.ndarray] | None = None,
     asked_steps: Callable[[], Mapping[int, float]] | None = None,
+    comm: Ranks = "all",
+    raises: bool = True,
 ) -> RunReport:
     """Do all runs of a job that are not yet recorded, and gather the dataset.
 
     Serial, or on all ranks when started under mpirun or srun. A run that raises is recorded as failed, and
-    the sweep continues; so do the other ranks when one dies, where MPI lets them. SIGINT, SIGTERM and SIGUSR1
-    end the sweep early and orderly: the runs at work are broken off, and the same call does them later.
+    the sweep continues; so do the other ranks when one dies, where MPI lets them. SIGINT, SIGHUP, SIGTERM,
+    SIGUSR1, SIGUSR2 and SIGXCPU end the sweep early and orderly: the runs at work are broken off, the dataset
+    is gathered, the signal's exception is raised on all ranks, and the same call does these runs later.
+
+    Only the main thread can call it, since signals reach no other one, and since the HDF5 library breaks if
+    two threads use it. Meanwhile other threads must not read datasets.
 
     Parameters
     ----------
@@ -103,6 +110,12 @@ def run(
     asked_steps : callable, optional
         Returns on rank 0 the time step [s] of runs that do not take the job's step, by run index, always
         the same one of a run.
+    comm : MPI.Intracomm, "all" or None
+        The ranks that compute together, and that all have to call this with the same arguments: those of a
+        communicator, all that were started together, or this process alone, whatever others do. Ranks of a
+        pool, or rank 0 alone, take None, or COMM_SELF.
+    raises : bool
+        Whether signals are raised again once the sweep has been stopped; if not, the report tells.
 
     Returns
     -------
@@ -114,17 +127,41 @@ def run(
     InputError
         If the folder holds another job, is in use or cannot be written to, if ranks are not connected, or if
         there is no such part, or it is to start over: the other parts would lose their runs; or if steps
-        cannot be shortened so; or if memory, disk or time do not suffice for so many runs.
+        cannot be shortened so; or if memory, disk or time do not suffice for so many runs. On all ranks if
+        one of them has an error, or another job, other options or another version than rank 0; in a thread;
+        or if not all ranks call this within CVT_HPC_RANK_WAIT, an environment variable (5 min by default).
+    KeyboardInterrupt
+        After SIGINT.
+    SystemExit
+        With the exit status 99, or 98 if no run has ended, after other signals.
     """
+    open_missing_streams()
     started = time.monotonic()
     simulator = simulator or default_simulator()
-    study, share, folder = _accept(job, out, part, fresh, simulator)
-    if refine is not None:
-        check_refinement(job, refine, retry)
-    task = Task(job, study, simulator, run_limit, chosen, asked_steps)
+    folder = _folder(job, out)
+    options = {
+        "out": str(folder.path),
+        "part": part,
+        "fresh": fresh,
+        "time_limit": time_limit,
+        "run_limit": run_limit,
+        "retry": [status.name for status in retry],
+        "refine": refine,
+    }
+
     first = True
 
-    def sweep(team: Team) -> RunReport:
+    def accept() -> tuple[Study, Part | None]:
+        if refine is not None:
+            check_refinement(job, refine, retry)
+        return _accept(job, part, fresh, simulator)
+
+    def plan_of(accepted: tuple[Study, Part | None]) -> dict[str, Any]:
+        study, _ = accepted
+        layout = str(study.record_dtype)
+        return {"job": study.job, "records": layout, "options": options, "program": program_identity()}
+
+    def sweep(team: Team) -> tuple[RunReport, str | None]:
         nonlocal first
         begins, first = first, False  # the survivors of a death continue from the records
 
@@ -158,32 +195,43 @@ def run(
                             break
                         more = partial(next_round, folder, task, plan, team.size, counter, display)
                         plan = team.on_root(more)
-            return team.on_root(lambda: _conclude(folder, task, share, plan, stopped, held, signals))
+            report = team.on_root(lambda: _conclude(folder, task, share, plan, stopped, held, signals))
+        noted = next(filter(None, team.collect(signals.noted)), None)
+        return replace(report, stopped=report.stopped or noted), noted
 
-    with SignalWatch() as signals, assembled_team(folder.crash_log) as team:
-        return outlive(team, sweep)
+    with library_for_sweep(), assembled_team(folder.crash_log, comm) as team:
+        study, share = team.agreed(accept, plan_of)
+        task = Task(job, study, simulator, run_limit, chosen, asked_steps)
+        with SignalWatch() as signals:
+            report, noted = outlive(team, sweep)
+    if raises and (name := noted or signals.noted):
+        raise_again(name, report.status_of_more or STOPPED, everywhere=noted is not None)
+    return report
 
 
 def check_start(
     job: Job, out: str | Path | None = None, *, part: str | None = None, fresh: bool = False
 ) -> None:
     """Raise the InputError that `run` would raise before it computes anything; touches nothing."""
-    study, _, folder = _accept(job, out, part, fresh, default_simulator())
+    folder = _folder(job, out)
+    study, _ = _accept(job, part, fresh, default_simulator())
     refuse_too_large(job, default_simulator(), folder.path)
     folder.check_free_for(study, fresh)
 
 
-def _accept(
-    job: Job, out: str | Path | None, part: str | None, fresh: bool, simulator: Simulator
-) -> tuple[Study, Part | None, StudyFolder]:
-    """Return the runs to be done and their folder, if all settings agree."""
+def _folder(job: Job, out: str | Path | None) -> StudyFolder:
+    return StudyFolder(out if out is not None else Path("out") / job.name)
+
+
+def _accept(job: Job, part: str | None, fresh: bool, simulator: Simulator) -> tuple[Study, Part | None]:
+    """Return the runs to be done, if all settings agree."""
     share = None if part is None else read_part(part)
     if share is not None and fresh:
         raise mismatch("fresh", "a run of the whole study", f"part {share}, and the others would lose theirs")
     study = describe(job, simulator)
     if share is not None and study.is_traced:
         raise mismatch("part", "a whole study, since a trace goes by the runs of all parts", f"part {share}")
-    return study, share, StudyFolder(out if out is not None else Path("out") / job.name)
+    return study, share
 
 
 def _compute(
@@ -254,9 +302,14 @@ def _conclude(
                 raise
             stopped = stopped or signals.noted
             _logger.warning("%s; not gathered", error)
+        except LossError as error:
+            records = folder.read_records(task.study)
+            if records.recorded.all():
+                raise
+            _logger.warning("%s", error)  # runs that were damaged are yet to be done again
     gathers = records is not None
     if records is None:
-        records = read_records(folder.records, task.study)
+        records = folder.read_records(task.study)
     leave_out_missing(task.job, folder, records)
     asked = asked_runs(task, records, part)
     gained = int(records.recorded[asked].sum()) - plan.recorded

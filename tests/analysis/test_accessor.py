@@ -264,7 +264,9 @@ def test_a_notebook_is_given_a_picture():
     assert study().cvt.map(sheave_stiffness=1.0)._repr_png_().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("kind", [name for name, kind in KINDS.items() if kind.subject != RESULTS])
+@pytest.mark.parametrize(
+    "kind", [*(name for name, kind in KINDS.items() if kind.subject != RESULTS), "animation"]
+)
 def test_pictures_of_single_runs_refuse_a_study(kind):
     results = xr.Dataset({"status": ("load", np.zeros(2, "i1"))}, {"load": [20.0, 40.0]})
     with pytest.raises(InputError, match=f"expected the history of a run, which {kind} draws, found a study"):

@@ -60,6 +60,9 @@ def draw_all(dataset, kinds, applying):
 
 def test_this_version_has_its_datasets():
     assert cvt_hpc.__version__ in [path.name for path in VERSIONS]
+    expected = {f"{name}.nc.xz" for name in (*FOUND, *(f"history_{name}" for name in DRAWN))}
+    for version in VERSIONS:
+        assert {path.name for path in version.glob("*.nc.xz")} == expected
 
 
 @pytest.mark.parametrize("name", FOUND)

@@ -115,6 +115,22 @@ def page_of(results, tmp_path):
     return words_of(write_report(results, tmp_path / "report.html"))
 
 
+def test_what_turns_the_direction_of_a_text_is_seen(tmp_path):
+    turning = "".join(map(chr, [0x061C, 0x200E, 0x200F, *range(0x202A, 0x202F), *range(0x2066, 0x206A)]))
+    results = study(**SMALL)
+    results.attrs |= {"title": f"a {turning}", "history": f"b\nc {turning}", "job_name": turning}
+    results["reason"] = results["status"].dims, np.full(results["status"].shape, f"d {turning}")
+    results["load"].attrs["long_name"] = f"e {turning}"
+    results["loss"] = results["load"] * (results["status"] == Status.DONE)
+    results["loss"].attrs = {"units": "W", "long_name": "f \u202e"}
+    text = write_report(results, tmp_path / "report.html").read_text()
+    data = re.search(r'id="map-data">(.*?)</script>', text, flags=re.S)[1]
+    for shown in (text, json.dumps(json.loads(data), ensure_ascii=False)):
+        assert not set(turning) & set(shown)
+    seen = turning.encode("unicode_escape").decode()
+    assert all(f"{letter} {seen}" in text for letter in "acde") and '"name":"f \\\\u202e"' in data
+
+
 @pytest.mark.parametrize("status", [Status.FAILED_NUMERICS, Status.NOT_RUN])
 def test_where_nothing_was_computed_nothing_is_called_quiet(status, tmp_path):
     results = study(**SMALL)

@@ -170,10 +170,11 @@ def test_limits_and_retries_reach_the_sweep(write_job, call, monkeypatch, tmp_pa
         "time_limit": 9000.0,
         "run_limit": 600.0,
         "retry": [Status.TIMED_OUT, Status.FAILED_ERROR],
+        "raises": False,
     }
     given.clear()
     call("run", "x.toml")
-    assert given == {"part": None, "fresh": False, "retry": []}
+    assert given == {"part": None, "fresh": False, "retry": [], "raises": False}
 
 
 def test_status_of_a_sweep_at_work(call, monkeypatch):

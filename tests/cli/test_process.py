@@ -73,6 +73,19 @@ def test_a_reader_that_has_seen_enough_is_no_error(tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.parametrize("closed", ["2>&-", "<&- >&- 2>&-"])
+def test_a_closed_stream_is_no_error(tmp_path, closed):
+    """Nothing of what is printed there gets into other streams, or into files that are opened in its place."""
+    (tmp_path / "x.toml").write_text('name = "x"\nmodel = "oscillator"\n[run]\nduration = 0.2\n')
+    lines = []
+    for command in ("run x.toml", "run missing.toml"):
+        done = call("bash", "-c", f"{sys.executable} -m cvt_hpc {command} {closed}", cwd=tmp_path)
+        lines.append((done.returncode, bool(done.stdout), done.stderr))
+    out = closed == "2>&-"
+    assert lines == [(0, out, ""), (2, False, "")]
+    assert (tmp_path / "out" / "x" / "results.nc").exists()
+
+
 def test_exports_are_there_whatever_was_imported_before(tmp_path):
     program = """
         import cvt_hpc.simulation

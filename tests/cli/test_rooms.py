@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import cvt_hpc
+from cvt_hpc.models import MODELS
 
 PACKAGE = Path(cvt_hpc.__file__).parent
 BUILT = (PACKAGE.parent / "docs" / "guide" / "structure.md").read_text()
@@ -86,6 +87,22 @@ def test_imports_run_downwards():
 )
 def test_what_only_some_rooms_do(modules, rooms):
     assert {room(path) for path in SOURCES if modules & imported(path)} == rooms
+
+
+def test_models_are_loaded_by_their_contract_but_where_their_readme_says():
+    text = (PACKAGE / "models" / "README.md").read_text()
+    told = re.search(r"imported outside this folder only in(.*?):", text, re.DOTALL)[1]
+    named = {
+        (at, model)
+        for at, models in re.findall(r"`(\w+)` \((.*?)\)", told)
+        for model in re.findall(r"\w+", models)
+    }
+    assert named == {
+        (room(path), module.split(".")[2])
+        for path in SOURCES
+        for module in imported(path)
+        if module.startswith("cvt_hpc.models.") and room(path) != "models" and module.split(".")[2] in MODELS
+    }
 
 
 def test_what_test_modules_share_lies_in_support():

@@ -1,7 +1,7 @@
 """What somebody needs who begins: a job to fill in, the keys of a model, a look at the machine, completion."""
 
-import compileall
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -132,22 +132,45 @@ def test_examples_are_listed_and_copied_with_what_they_read_and_replace_nothing(
 
 
 @pytest.mark.slow
-def test_the_package_that_is_built_brings_the_same_examples(tmp_path, monkeypatch):
-    root = Path(cvt_hpc.__file__).parent.parent
-    for name in ("pyproject.toml", "setup.py", "README.md", "jobs", "slurm"):
-        (tmp_path / name).symlink_to(root / name)
-    (tmp_path / "cvt_hpc").mkdir()
-    shutil.copy(root / "cvt_hpc" / "__init__.py", tmp_path / "cvt_hpc")
-    build = [sys.executable, "setup.py", "-q", "build_py", "--build-lib", tmp_path / "built"]
-    subprocess.run(build, cwd=tmp_path, check=True, capture_output=True)
-    compileall.compile_dir(tmp_path / "built" / "cvt_hpc" / "examples", quiet=1)  # as pip does
+def test_the_wheel_brings_the_same_examples(tmp_path):
+    root = Path(cvt_hpc.__file__).parents[1]
+    source = tmp_path / "source"  # a build writes beside its sources
+    shutil.copytree(root / "cvt_hpc", source / "cvt_hpc", ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "README.md", "jobs", "slurm"):
+        (source / name).symlink_to(root / name)
+    pip = [sys.executable, "-m", "pip", "-q", "--disable-pip-version-check"]
+    offline = ["--no-deps", "--no-index"]
+    subprocess.run(
+        [*pip, "wheel", *offline, "--no-build-isolation", "--wheel-dir", tmp_path, source], check=True
+    )
+    (wheel,) = tmp_path.glob("*.whl")
+    subprocess.run(
+        [*pip, "install", *offline, "--no-compile", "--prefix", tmp_path / "own", wheel], check=True
+    )
+    (package,) = (tmp_path / "own").glob("lib*/python*/site-packages")
+    program = (
+        "import json, cvt_hpc; from cvt_hpc.job.examples import example_files;"
+        "print(json.dumps([cvt_hpc.__file__, {name: str(path) for name, path in example_files().items()}]))"
+    )
+    environment = os.environ | {"PYTHONPATH": str(package)}
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, env=environment, check=True, capture_output=True
+    )
+    used, examples = json.loads(done.stdout)
+    assert Path(used).is_relative_to(package)
     known = example_files()
-    monkeypatch.setattr(cvt_hpc, "__file__", str(tmp_path / "built" / "cvt_hpc" / "__init__.py"))
-    built = example_files()
-    assert built.keys() == known.keys() and len(built) > 90
-    assert all(path.read_bytes() == known[name].read_bytes() for name, path in built.items())
-    shutil.rmtree(tmp_path / "built" / "cvt_hpc" / "examples")
-    with pytest.raises(InputError, match="examples: expected those of a wheel or a checkout"):
+    assert examples.keys() == known.keys() and len(examples) > 90
+    for name, path in examples.items():
+        assert (
+            Path(path).is_relative_to(tmp_path / "own")
+            and Path(path).read_bytes() == known[name].read_bytes()
+        )
+
+
+def test_a_package_without_examples_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(cvt_hpc, "__file__", str(tmp_path / "cvt_hpc" / "__init__.py"))
+    monkeypatch.setattr("cvt_hpc.job.examples.metadata.files", lambda _: None)
+    with pytest.raises(InputError, match="examples: expected those of a wheel, or of a checkout"):
         example_files()
 
 
@@ -164,6 +187,7 @@ def test_doctor_names_what_is_wrong_and_what_to_do(call, tmp_path, monkeypatch):
     assert {"ok       versions", "ok       machine", "trouble  disk", "trouble  MPI"} <= told
     advice = out[out.index(next(line for line in out if "trouble  MPI" in line)) + 1]
     assert "does not fit the MPI library" in advice
+    assert "fills" not in " ".join(out)  # ranks that cannot be started
 
 
 @pytest.mark.parametrize(
@@ -196,6 +220,7 @@ def test_doctor_asks_srun_whether_slurm_answers(call, tmp_path, monkeypatch, scr
 def test_doctor_starts_two_ranks():
     found = next(finding for finding in doctor.examine(doctor.Path()) if finding.what == "MPI")
     assert found.fine and found.found.startswith("2 ranks by ")
+    assert len(os.sched_getaffinity(0)) == 1 or "fills this machine" in found.advice
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import pytest
 
 from cvt_hpc.models.oscillator.exact import exact
 from cvt_hpc.variables import Status
-from support.small_systems import begin, bisect, finished, scene
+from support.small_systems import FIXED, begin, bisect, finished, scene
 
 FREQUENCY, GROWTH = 2 * np.pi * 600.0, 50.0
 MASS, LOAD = 0.02, 500.0
@@ -81,14 +81,8 @@ def test_a_vibration_that_friction_does_not_drive_may_be_damped():
 @pytest.mark.parametrize(
     ("stepper", "options"),
     [
-        ("theta", {}),
-        ("generalised_alpha", {}),
+        *((name, {}) for name in FIXED),
         ("generalised_alpha", {"spectral_radius": 0.0}),
-        ("sdirk", {}),
-        ("rosenbrock_w", {}),
-        ("runge_kutta_4", {}),
-        ("symplectic_euler", {}),
-        ("moreau", {}),
     ],
 )
 def test_other_methods_keep_it_at_three_times_that_step(stepper, options):

@@ -38,6 +38,20 @@ def test_published_equilibrium():
     assert found.driving_thrust == pytest.approx(17831.69997826813, rel=1e-10)
 
 
+def test_the_limit_of_no_moment():
+    wrap = 2.0 * np.deg2rad(107.2758155568609)
+    loads = [wrap, STIFFNESS, ELEMENT_MASS + RING_MASS, FRICTION, ANGLE]
+    found = elastic_band(RADII, SPEED, 0.0, THRUST, *loads)
+    # one force in both strands: each arc's thrust is that of F - m v^2 over its wrap
+    assert found.driving_force == pytest.approx(found.driven_force, rel=1e-12)
+    assert found.slip_arc == pytest.approx(0.0, abs=1e-12)
+    assert found.driven_speed == pytest.approx(SPEED * RADII[0] / RADII[1], rel=1e-12)
+    assert found.driving_thrust == pytest.approx(THRUST * (2.0 * np.pi - wrap) / wrap, rel=1e-9)
+    # of 170 N m that the forces would carry at most, 1 mN m is nearly nothing
+    beside = elastic_band(RADII, SPEED, 1e-3, THRUST, *loads)
+    assert np.array(beside) == pytest.approx(np.array(found), rel=1e-5, abs=2e-5)
+
+
 def test_more_than_friction_carries_has_no_equilibrium():
     with pytest.raises(ValueError, match="no equilibrium"):
         elastic_band(RADII, SPEED, 10 * MOMENT, THRUST, 3.7, STIFFNESS, 1.46, FRICTION, ANGLE)

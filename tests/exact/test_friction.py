@@ -38,7 +38,11 @@ FORMULAS = {
         else mu - 2.0 / 3.0 * g * vs + 0.0 * v
     ),
 }
-FALLING = [kind for kind in FORMULAS if kind != "coulomb"]
+GIVEN = {"kinetic_friction": 0.08, "friction_gradient": -0.8, "stribeck_velocity": 0.05}
+LAWS = [law.name.lower() for law in Law if law is not Law.TABLE]
+FALLING = [kind for kind in LAWS if not friction_problems(GIVEN | {"friction_law": kind})]
+# where the level is that of the job, in units of v_s: from the floor on, far out, at rest, at the minimum
+KEPT_AT = {"linear": (1.0, 7.0), "stribeck": (60.0,), "hyperbolic": (0.0,), "cubic": (1.0,)}
 # A formula of five operations and one exponential on numbers of order 1 loses a few units in the last place.
 ROUND_OFF = 1e-14
 
@@ -54,11 +58,15 @@ def thomsen_fidlin(mu_k, mu_s, x):
     return mu_s - 1.5 * (mu_s - mu_k) * (x - x * x * x / 3.0)
 
 
+def test_each_law_has_its_formula_and_its_kept_level_here():
+    assert set(FORMULAS) == set(LAWS) and set(KEPT_AT) == set(FALLING)
+
+
 def coefficient(kind, mu_k, gradient, v_s, speed):
     return friction_coefficient(friction_law(kind, mu_k, gradient, v_s), speed, 1e5)
 
 
-@pytest.mark.parametrize("kind", FORMULAS)
+@pytest.mark.parametrize("kind", LAWS)
 @given(levels, gradients, scales, shares)
 def test_the_largest_coefficient_is_that_at_rest(kind, mu_k, gradient, v_s, share):
     gradient = 0.0 if kind == "coulomb" else gradient
@@ -72,7 +80,7 @@ def test_the_largest_coefficient_of_a_table_is_its_largest():
     assert largest_friction({"friction_law": "table", "table_mu": ((0.1, 0.08), (0.12, 0.09))}) == 0.12
 
 
-@pytest.mark.parametrize("kind", FORMULAS)
+@pytest.mark.parametrize("kind", LAWS)
 @given(levels, gradients, scales, shares)
 def test_law_and_its_slope(kind, mu_k, gradient, v_s, share):
     gradient = 0.0 if kind == "coulomb" else gradient
@@ -88,6 +96,18 @@ def test_law_and_its_slope(kind, mu_k, gradient, v_s, share):
     assert slope == pytest.approx(expected.imag / tiny, abs=ROUND_OFF * lost)
 
 
+@pytest.mark.parametrize("kind", LAWS)
+@given(levels, gradients, scales, st.floats(0.0, 5.0))
+def test_slope_is_between_the_differences_to_both_sides(kind, mu_k, gradient, v_s, share):
+    gradient = 0.0 if kind == "coulomb" else gradient
+    speed, h = (share + 1e-5) * v_s, 1e-5 * v_s
+    below, (here, slope), above = (coefficient(kind, mu_k, gradient, v_s, speed + d) for d in (-h, 0.0, h))
+    sides = (here - below[0]) / h, (above[0] - here) / h
+    # round-off of the coefficients over h, and the curvature's own change within it
+    left = 1e-15 * (mu_k - 10.0 * gradient * v_s) / h - 1e-6 * gradient
+    assert min(sides) - left <= slope <= max(sides) + left
+
+
 @pytest.mark.parametrize("kind", FALLING)
 @given(levels, gradients, scales, shares)
 def test_gradient_is_the_slope_at_rest_and_the_steepest(kind, mu_k, gradient, v_s, share):
@@ -96,9 +116,7 @@ def test_gradient_is_the_slope_at_rest_and_the_steepest(kind, mu_k, gradient, v_
 
 
 @pytest.mark.parametrize(
-    ("kind", "where"),
-    # in units of v_s: at and beyond the linear law's floor, far out, at rest, at the cubic's minimum
-    [("linear", 1.0), ("linear", 7.0), ("stribeck", 60.0), ("hyperbolic", 0.0), ("cubic", 1.0)],
+    ("kind", "where"), [(kind, where) for kind in FALLING for where in KEPT_AT.get(kind, ())]
 )
 @given(levels, gradients, scales)
 def test_kept_level_does_not_move_with_the_gradient(kind, where, mu_k, gradient, v_s):
@@ -275,8 +293,11 @@ def test_saturation_in_lanes_is_the_plain_one(dtype):
 
 def test_every_law_that_a_job_may_name_has_all_its_parts():
     """A law is declared in `friction_laws`, and has its formula in `friction`: nothing else knows of it."""
-    values = {"kinetic_friction": 0.08, "friction_gradient": -0.8, "stribeck_velocity": 0.05}
-    values |= {"table_force": (0.0, 1.0), "table_speed": (0.0, 1.0), "table_mu": ((0.1, 0.1), (0.1, 0.1))}
+    values = GIVEN | {
+        "table_force": (0.0, 1.0),
+        "table_speed": (0.0, 1.0),
+        "table_mu": ((0.1, 0.1), (0.1, 0.1)),
+    }
     for name in FRICTION_LAWS:
         p = values | {"friction_law": name}
         assert [key for key, *_ in friction_problems(p)] == ["friction_gradient"] * (name == "coulomb")

@@ -1,11 +1,14 @@
 """The oscillator as a job has it: published and closed cases by its records, through the one rule of what vibrates."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.oscillator.constants import oscillator
+from cvt_hpc.models.oscillator.cycles import cycle_starts, work_per_cycle
 from cvt_hpc.models.oscillator.motion import system
 from cvt_hpc.models.oscillator.record import Sticks, judge
 from cvt_hpc.models.oscillator.steady import steady_sliding
@@ -42,6 +45,37 @@ WEAK = {
     "start": "sliding",
     "initial_displacement": 1e-4,
 }
+
+
+@pytest.mark.parametrize(("rate", "share"), [(0.3, 1.0), (-0.2, 1.0), (0.3, 1.2), (0.3, 0.9)])
+def test_work_of_growing_cycles_is_that_of_closed_integrals(rate, share):
+    """Friction that moves x = exp(a t) sin(w t) against spring and damper, and a share of it that does not."""
+    mass, damping, pulse, interval = 0.5, 0.3, 2.0 * np.pi, 1e-4
+    t = interval * np.arange(40_001)  # four periods
+    size = np.exp(rate * t)
+    x, v = size * np.sin(pulse * t), size * (rate * np.sin(pulse * t) + pulse * np.cos(pulse * t))
+    starts = cycle_starts(x - 0.5 * (x.max() + x.min()), 0.0)
+    passing = x[starts[0]]
+    acceleration = np.gradient(v, interval)
+    friction = share * (mass * acceleration + damping * v + 40.0 * (x - passing))
+    run = SimpleNamespace(
+        constants=SimpleNamespace(mass=mass, damping=damping),
+        interval=interval,
+        channel={"speed": v}.__getitem__,
+        friction=lambda: friction,
+    )
+    found = work_per_cycle(run, starts)
+    cycles = slice(starts[0], starts[-1] + 1)
+    loss = damping * np.trapezoid(v[cycles] ** 2, dx=interval)
+    gained = 0.5 * mass * (v[starts[-1]] ** 2 - v[starts[0]] ** 2)
+    turned_over = np.trapezoid(np.abs(friction[cycles] * v[cycles]), dx=interval)
+    assert abs(gained) > 0.05 * turned_over and loss > 0.05 * turned_over
+    count = len(starts) - 1
+    assert count == 3
+    assert found["damping_loss"] == pytest.approx(loss / count, rel=1e-9)
+    # a passage between two samples leaves a part of 1e-4 of the spring's work
+    assert found["friction_work"] == pytest.approx(share * (loss + gained) / count, rel=2e-3)
+    assert found["energy_residual"] == pytest.approx((share - 1.0) * (loss + gained) / turned_over, abs=1e-3)
 
 
 def test_stick_slip_of_unit_mass_and_stiffness():

@@ -78,6 +78,7 @@ def test_the_strand_is_that_of_its_equation():
     # m (w_tt + 2 v w_xt + v^2 w_xx) = F w_xx - EI w_xxxx on pinned ends, by the exact characteristic equation
     strand = Strand(0.15, 1.3, 25.0, 3000.0, 0.8)
     found = eigenfrequencies(strand, 96)[:3]
+    assert found.size == 3
 
     def boundary(frequency):
         w = 2.0 * np.pi * frequency
@@ -130,7 +131,9 @@ def test_eigenfrequencies_are_those_of_the_motion():
     )
     spectrum = np.abs(np.fft.rfft(motion * np.hanning(2000), 80_000))
     lines = np.fft.rfftfreq(80_000, 0.05)
-    for frequency in eigenfrequencies(strand, 6)[:4]:
+    found = eigenfrequencies(strand, 6)[:4]
+    assert found.size == 4
+    for frequency in found:
         near = np.abs(lines - frequency) < 0.05
         assert lines[near][spectrum[near].argmax()] == pytest.approx(frequency, abs=1e-3)
 

@@ -1,5 +1,7 @@
 """Every kind of bad job file: one error, with the file, the key, what was expected, what was found, the nearest key."""
 
+import os
+
 import pytest
 
 from cvt_hpc.errors import InputError
@@ -124,6 +126,10 @@ def test_head(write_job, text, message):
             "x.toml: line 3, column 6: expected TOML, found: cannot overwrite a value",
         ),
         (b"a = " + b"[" * 5000, "x.toml: expected TOML, found lists or tables nested too deep"),
+        (
+            b"a" + b".a" * 5000 + b" = 1",
+            "x.toml: expected lists and tables nested at most 20 deep, found deeper ones",
+        ),
         (b"\x7fELF\x00\xff\xfe", "x.toml: expected a text file (TOML in UTF-8), found binary data"),
     ],
 )
@@ -147,6 +153,13 @@ def test_missing_file(write_job, tmp_path):
 
 def test_folder_instead_of_a_file(tmp_path):
     assert complaint(tmp_path) == f"{tmp_path}: expected a job file, found a folder"
+
+
+def test_what_is_no_regular_file_is_not_waited_for(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("x.toml")
+    assert complaint() == "x.toml: expected a job file, found a pipe in the place of a file"
+    assert complaint("/dev/zero") == "/dev/zero: expected a job file, found a device in the place of a file"
 
 
 def test_path_that_the_system_refuses(write_job):

@@ -8,7 +8,7 @@ import pytest
 
 from cvt_hpc import models, simulate
 from cvt_hpc.cli import main
-from cvt_hpc.errors import JobWarning, UnitWarning
+from cvt_hpc.errors import JobWarning, NoEffectWarning, UnitWarning
 from cvt_hpc.fit.loading import load_fit
 from cvt_hpc.job import build_job, load_job, rebuild_job
 from cvt_hpc.job.plausibility import warn_of_bare_numbers
@@ -27,7 +27,7 @@ def warned(call, *arguments, **more):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         call(*arguments, **more)
-    assert {one.category for one in caught} <= {JobWarning, UnitWarning}
+    assert {one.category for one in caught} <= {JobWarning, NoEffectWarning, UnitWarning}
     return [str(one.message) for one in caught]
 
 
@@ -162,3 +162,24 @@ def test_jobs_that_are_shipped_draw_none(path):
     else:
         load = load_job
     assert warned(load, path) == []
+
+
+def test_values_without_effect_draw_one_line_and_defaults_none():
+    """Files and lists without effect are an error: see `test_friction_files`."""
+    friction = {"friction_gradient": "0 s/m", "stribeck_velocity": "0.2 m/s", "kinetic_friction": 0.1}
+    document = {
+        "name": "x",
+        "model": "elastic_belt",
+        "friction": friction,
+        "scene": {"seed": 7, "disturbance": 0},
+    }
+    (told,) = warned(build_job, document, "x.toml")
+    assert told == (
+        "x.toml: without effect on all runs: seed (with disturbance 0), stribeck_velocity (with friction_gradient 0)"
+    )
+    assert not warned(
+        build_job, document | {"axes": {"friction_gradient": [-1.0, 0.0], "disturbance": ["0 m", "1 nm"]}}
+    )
+    friction["stribeck_velocity"], document["scene"]["seed"] = "0.05 m/s", 1
+    assert not warned(build_job, document)
+    assert not warned(rebuild_job, build_job(document).resolved(), "x", {}, {"seed": 7})

@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,15 @@ PAIRS = [(model, stepper) for model in MODELS for stepper in TAKEN[model]]
 DIRECT = [model for model in MODELS if not TAKEN[model]]
 OWN = {name: place for taken in TAKEN.values() for name, place in taken.items() if name not in STEPPERS}
 both = pytest.mark.parametrize(("model", "stepper"), PAIRS + [(model, None) for model in DIRECT])
+
+
+def test_the_type_checker_reads_each_model_beside_its_contract():
+    text = (Path(__file__).parents[1] / "typing" / "models_by_contract.py").read_text()
+    for kind, module in (("declared", ""), ("recorded", "_record"), ("marched", "_transient")):
+        offering = [name for name in MODELS if find_spec(f"{MODELS[name]}{module.replace('_', '.', 1)}")]
+        assert re.findall(rf"^{kind} = (\w+)$", text, re.MULTILINE) == [
+            f"{name}{module}" for name in sorted(offering)
+        ]
 
 
 @both

@@ -3,7 +3,7 @@
 import pytest
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.job import load_job
+from cvt_hpc.job import build_job, load_job
 from cvt_hpc.job.summary import summarize
 
 AXES = (
@@ -87,6 +87,14 @@ def test_what_is_no_run_of_the_grid_is_refused(write, history, complaint):
         load(write, history)
     assert "[record] history" in str(caught.value)
     assert complaint in str(caught.value)
+
+
+def test_a_value_is_found_in_spite_of_rounding():
+    axes = {"load": [0.1, 0.1 + 0.2], "ratio": [1.0, 2.0]}
+    document = {"name": "x", "model": "elastic_belt", "axes": axes}
+    for load in (0.3, 0.1 + 0.2):
+        job = build_job({**document, "record": {"history": [{"load": f"{load!r} N m", "ratio": 2}]}})
+        assert job.histories == (3,)
 
 
 def test_samples_are_named_by_their_index(write):

@@ -24,6 +24,7 @@ from cvt_hpc.models.elastic_belt.belt import (
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP as STEP
+from cvt_hpc.physics.friction_laws import FRICTION_LAWS
 from support.fast_runs import FastRuns
 from support.fast_runs import march as march_steps
 
@@ -82,16 +83,15 @@ def order(steps, errors):
     return np.polyfit(np.log(steps), np.log(errors), 1)[0]
 
 
-LAWS = {
-    **{law: {"friction_law": law} for law in ("linear", "stribeck", "hyperbolic", "cubic")},
-    "coulomb": {"friction_law": "coulomb", "friction_gradient": 0.0},
+OF_LAWS = {
+    "coulomb": {"friction_gradient": 0.0},
     "table": {
-        "friction_law": "table",
         "table_force": (0.0, 2e5),
         "table_speed": (0.0, 0.05, 0.3),
         "table_mu": ((0.12, 0.09, 0.08), (0.11, 0.08, 0.07)),
     },
 }
+LAWS = {law: {"friction_law": law, **OF_LAWS.get(law, {})} for law in FRICTION_LAWS}
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -42,8 +42,9 @@ TABLE = {
 def records(model, **values):
     """Of all CELLS, together."""
     job = rung_job(model, duration=0.3, stations=96, step=7.6e-6, **values)
-    points = [job.point(0) | cell for cell in CELLS]
-    return run_points(job, points, lambda: None)
+    found = run_points(job, [job.point(0) | cell for cell in CELLS], lambda: None)
+    assert len(found) == len(CELLS)
+    return found
 
 
 def same(record, other, names):

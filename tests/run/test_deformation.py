@@ -1,5 +1,6 @@
 """Deformation of the discs as a choice: what describes the same disc gives the same run."""
 
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -123,14 +124,14 @@ def test_modes_of_a_disc_need_the_step_that_knows_them():
 
 
 def test_the_job_of_finite_elements_takes_its_discs_by_each_description():
-    path = Path(__file__).parents[2] / "jobs" / "sheave_deformation.toml"
-    found = {
-        kind: load_job(path, {"sheave_deformation": kind}).parameters for kind in ("ritz", "flexibilities")
-    }
+    jobs = Path(__file__).parents[2] / "jobs"
+    parts = runpy.run_path(str(jobs / "sheave_deformation.py"))["PARTS"]
+    path = jobs / "sheave_deformation.toml"
+    found = {name: load_job(path, part).parameters for name, part in parts.items()}
     # w_ij and the modes are of one disc: the table is that of the modes at its knots
     for pulley, radius in (("driving", 0.075 / 2.52), ("driven", 0.075)):
         p = found["ritz"]
-        angles = p[f"{pulley}_flexibility_angle"]
+        angles = found["w_ij"][f"{pulley}_flexibility_angle"]
         matrix = modal_flexibilities(
             np.array(p[f"{pulley}_mode_harmonic"]),
             np.array(p[f"{pulley}_mode_flexibility"]),
@@ -138,7 +139,7 @@ def test_the_job_of_finite_elements_takes_its_discs_by_each_description():
             radius * angles[1],
             radius,
         )
-        (row,) = found["flexibilities"][f"{pulley}_flexibility"]
+        (row,) = found["w_ij"][f"{pulley}_flexibility"]
         assert matrix[0] == pytest.approx(row, rel=1e-9, abs=1e-9 * row[0])
         assert min(row) < 0.0  # pressed here, a disc comes nearer over there
 

@@ -174,7 +174,9 @@ def test_friction_takes_what_its_surfaces_lose(share, bare):
     speeds = np.vstack([state.fields[FIRST_LAYER : FIRST_LAYER + n], state.fields[V_ELEMENT]])
     power = (inertia * (rate - smooth)[[0, 1, 2, 2 * n]] * speeds).sum(axis=0)
     kinetic, normal, sliding = np.array([0.08, 0.05, 0.05, 0.08]), np.empty(n + 1), np.empty(n + 1)
-    for j in np.flatnonzero(belt.arc_share):
+    on_arcs = np.flatnonzero(belt.arc_share)
+    assert on_arcs.size > cells / 2
+    for j in on_arcs:
         surface_friction(belt, rings, state, eps, share, j, normal, sliding)
         assert normal[bare] == 0.0 and np.delete(normal, bare).min() > 0.0
         size = np.abs(sliding)

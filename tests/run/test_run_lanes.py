@@ -91,7 +91,9 @@ def test_a_run_that_is_not_a_number_fails_alone(monkeypatch, value, method):
         return advance(batch, samples)
 
     monkeypatch.setattr(Batch, "advance", spoiling)
-    for k, record in enumerate(run_points(of(method), points(method), never)):
+    records = run_points(of(method), points(method), never)
+    assert len(records) == len(points(method)) > spoiled
+    for k, record in enumerate(records):
         if k == spoiled:
             assert record["status"] == Status.FAILED_NUMERICS
             assert "off its path" in record["reason"] or "not a number" in record["reason"]

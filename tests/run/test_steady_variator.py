@@ -35,7 +35,9 @@ LOADS = (60.0, 80.0, 100.0, 120.0)
 
 @cache
 def steady(**values):
-    return tuple(SteadyBelt(DEFAULTS | values).along(LOADS))
+    found = tuple(SteadyBelt(DEFAULTS | values).along(LOADS))
+    assert len(found) == len(LOADS)
+    return found
 
 
 def rates_of(found, belt):

@@ -142,6 +142,17 @@ def test_a_part_of_an_array_alone_and_then_all(cluster, job_file, serial, tmp_pa
     assert_same_as_serial(out, serial)
 
 
+def test_an_array_from_zero_in_steps_does_all_runs(cluster, job_file, serial, tmp_path):
+    out = tmp_path / "out"
+    array = cluster.submit(
+        "array.sbatch", job_file, "--out", out, options=("--array=0-3:2",), TMPDIR=str(tmp_path / "gone")
+    )
+    for task in (0, 2):
+        assert_completed(cluster, f"{array}_{task}")
+    assert cluster.output(array).count("6 runs: 6 done, 0 failed, 0 left") == 2
+    assert_same_as_serial(out, serial)
+
+
 def test_the_loss_of_a_node_costs_no_record(cluster, job_file, serial, tmp_path):
     out = tmp_path / "out"
     job = cluster.submit("sweep.sbatch", job_file, "--out", out, options=TWO_NODES)

@@ -47,6 +47,13 @@ def test_machine_code_has_a_folder_of_each_job_alone_that_is_gone_at_its_end(lau
     assert list((tmp_path / "tmp").iterdir()) == []
 
 
+@pytest.mark.parametrize("missing", ["gone", "file"])
+def test_a_tmpdir_that_this_node_lacks_is_replaced(launch, tmp_path, missing):
+    (tmp_path / "file").touch()
+    assert launch(0, TMPDIR=str(tmp_path / missing)) == 0
+    assert (tmp_path / "folders").read_text().startswith("/tmp/cvt_hpc-numba-")
+
+
 def test_the_folders_of_other_nodes_are_removed_by_slurm(launch, tmp_path):
     assert launch(0, SLURM_NNODES="2") == 0
     folder = (tmp_path / "folders").read_text().split()[0]
@@ -89,3 +96,41 @@ def test_the_ranks_run_in_the_container_that_is_named(launch, tmp_path, containe
         f"exec {container} {c}" for c in ("mpichversion", "bash -c exit 3") if container
     ]
     assert (tmp_path / "netmods").read_text() == "ofi\n"
+
+
+def parts_of(tmp_path, numbers, step, **environment):
+    """Return the parts that the tasks of an array do, as they are asked for, and what they print on stderr."""
+    srun = tmp_path / "srun"
+    srun.write_text('#!/bin/bash\nif [ "$2" = --wait=60 ]; then echo "${@: -1}"; fi\n')
+    srun.chmod(0o755)
+    known = {key: value for key, value in os.environ.items() if not key.startswith("SLURM")}
+    known |= {"PATH": f"{tmp_path}:{known['PATH']}", "SLURM_SUBMIT_DIR": str(ROOT), "SLURM_NTASKS": "1"}
+    known |= {"SLURM_ARRAY_TASK_COUNT": str(len(numbers)), "SLURM_ARRAY_TASK_STEP": str(step)}
+    known |= {"SLURM_ARRAY_TASK_MIN": str(min(numbers)), "SLURM_ARRAY_TASK_MAX": str(max(numbers))}
+    tasks = [
+        subprocess.run(
+            ["bash", ROOT / "slurm" / "array.sbatch", "x.toml"],
+            env={**known, "SLURM_ARRAY_TASK_ID": str(number), **environment},
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+        for number in numbers
+    ]
+    return [task.stdout.strip() for task in tasks], [task.stderr for task in tasks]
+
+
+@pytest.mark.parametrize(
+    ("numbers", "step"), [((1, 2, 3), 1), ((0, 1, 2), 1), ((2, 3, 4, 5), 1), ((1, 3), 2), ((7,), 1)]
+)
+def test_an_array_of_any_numbers_does_all_parts(tmp_path, numbers, step):
+    parts, _ = parts_of(tmp_path, numbers, step)
+    assert parts == [f"{place}/{len(numbers)}" for place in range(1, len(numbers) + 1)]
+
+
+def test_a_list_needs_the_number_of_parts(tmp_path):
+    assert parts_of(tmp_path, (7, 12), 1, CVT_HPC_PARTS="64")[0] == ["7/64", "12/64"]
+    parts, errors = parts_of(tmp_path, (7, 8, 12), 1)
+    assert parts == [""] * 3
+    assert all(error.startswith("--array: expected numbers in equal steps") for error in errors)
+    assert [error.count("\n") for error in errors] == [1] * 3

@@ -3,6 +3,7 @@
 import json
 import math
 import resource
+import shutil
 import subprocess
 import sys
 
@@ -13,6 +14,7 @@ import pytest
 import cvt_hpc
 from cvt_hpc.errors import InputError
 from cvt_hpc.netcdf import variable_attributes
+from cvt_hpc.output_folder import CHECKSUM, checksum
 from cvt_hpc.study import gather, open_results, run
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.variables import Status, Vibrates
@@ -225,3 +227,101 @@ def test_a_folder_of_an_earlier_version_has_its_sentences_as_comments():
     status = variable_attributes(study.variables[0])
     assert (status["long_name"], status["comment"]) == ("status", "how the run ended")
     assert study.axes[0].attributes == {"long_name": "slope of the friction law", "units": "s/m"}
+
+
+def test_a_dataset_that_a_notebook_writes_to_names_who_has_it(out, tmp_path):
+    path = shutil.copy(out / "results.nc", tmp_path)
+    program = f"import h5py; file = h5py.File({str(path)!r}, 'r+'); print('open', flush=True); input()"
+    with subprocess.Popen([sys.executable, "-c", program], stdin=-1, stdout=-1) as other:
+        assert other.stdout.readline() == b"open\n"
+        try:
+            with pytest.raises(InputError) as caught:
+                open_results(path)
+        finally:
+            other.communicate(b"\n")
+    told = f"{path}: expected a file that nobody writes to, found it locked by process {other.pid} (python"
+    assert str(caught.value).startswith(told)
+    assert str(caught.value).endswith("); close it there, or read a copy of it")
+    with open_results(path) as dataset:
+        assert "status" in dataset
+
+
+class TestADatasetThatHoldsMore:
+    """A dataset with runs that are not on record stays as it is."""
+
+    @pytest.fixture(autouse=True)
+    def folder(self, out, tmp_path):
+        shutil.copytree(out, tmp_path / "out")
+        self.out = tmp_path / "out"
+        self.before = (self.out / "results.nc").read_bytes()
+
+    def refusal(self):
+        """Return the one line with which it is refused to gather; the dataset stays."""
+        with pytest.raises(InputError) as caught:
+            gather(self.out)
+        assert (self.out / "results.nc").read_bytes() == self.before
+        assert [path.name for path in self.out.glob(".*.part")] == []
+        return str(caught.value)
+
+    def write_job(self, **changed):
+        entry = json.loads((self.out / "job.json").read_text())
+        del entry[CHECKSUM]
+        entry |= changed
+        (self.out / "job.json").write_text(json.dumps({**entry, CHECKSUM: checksum(entry)}))
+
+    def test_the_job_has_another_constant(self):
+        self.write_job(job={**JOB.resolved(), "scene": {"raise_at": 5}}, fingerprint="0" * 64)
+        told = self.refusal()
+        assert (
+            "found 12 of them missing, since it is of another job (scene.raise_at is -0.25 there, 5 here)"
+            in told
+        )
+        assert "; it stays as it is. Bring back job.json and records, or rename it and gather again" in told
+
+    def test_the_job_has_another_fingerprint(self):
+        self.write_job(fingerprint="0" * 64)
+        assert "expected all of its 12 runs on record, found 12 of them missing; it stays" in self.refusal()
+
+    def test_the_job_is_of_another_folder(self, tmp_path):
+        run(Job(), tmp_path / "other", simulator=Simulator(), progress=False)
+        shutil.copy(tmp_path / "other" / "job.json", self.out)
+        shutil.copytree(tmp_path / "other" / "records", self.out / "records", dirs_exist_ok=True)
+        assert "found 12 of them missing, since it is of another job (" in self.refusal()
+
+    def test_records_are_gone(self, caplog):
+        (log,) = (self.out / "records").iterdir()
+        log.write_bytes(log.read_bytes()[:-5])
+        assert "expected all of its 12 runs on record, found 1 of them missing; it stays" in self.refusal()
+        broken_off = run(JOB, self.out, simulator=Simulator(), progress=False, time_limit=0.0)
+        assert (broken_off.remaining, broken_off.results) == (1, self.out / "results.nc")
+        assert "found 1 of them missing" in caplog.text
+        assert (self.out / "results.nc").read_bytes() == self.before
+        assert run(JOB, self.out, simulator=Simulator(), progress=False).gained == 1
+        with open_results(self.out) as dataset:
+            assert (dataset["status"] != Status.NOT_RUN).all()
+
+    def test_runs_that_begin_again_may_go(self):
+        report = run(
+            JOB, self.out, simulator=Simulator(), progress=False, retry=[Status.FAILED_ERROR], time_limit=0.0
+        )
+        assert report.remaining == 4
+        with open_results(self.out) as dataset:
+            assert int((dataset["status"] == Status.NOT_RUN).sum()) == 4
+
+    @pytest.mark.parametrize("kind", ["text", "link", "other"])
+    def test_what_is_no_dataset_of_this_program_does_not_count(self, kind, tmp_path):
+        results = self.out / "results.nc"
+        results.unlink()
+        if kind == "text":
+            results.write_text("notes")
+        elif kind == "link":
+            (tmp_path / "target").write_bytes(self.before)
+            results.symlink_to(tmp_path / "target")
+        else:
+            with netCDF4.Dataset(results, "w") as file:
+                file.job = "[" * 1000
+                file.createDimension("run", 3)
+                file.createVariable("status", "i1", "run")[:] = 1
+        gather(self.out)
+        with open_results(self.out) as dataset:
+            assert (dataset["status"] != Status.NOT_RUN).all()

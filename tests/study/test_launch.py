@@ -1,12 +1,20 @@
 """Who started the process: serial runs leave MPI alone, ranks that cannot see each other are refused."""
 
 import json
+import re
+import signal
 import sys
+import threading
+import time
 
+import psutil
 import pytest
 
 from cvt_hpc.errors import InputError
+from cvt_hpc.study import open_results, run
 from cvt_hpc.study.ranks.launch import Launch, assembled_team, detect_launch
+from support.study_double import Job, Simulator
+from support.study_processes import find_mpirun, wait_until
 
 
 @pytest.mark.parametrize(
@@ -58,6 +66,122 @@ def test_an_mpi_without_threads_is_refused(start, tmp_path):
     finished = start({"out": tmp_path / "out", "thread_level": "funneled"}, ranks=2).finish()
     assert finished.returncode == 2
     assert "expected the thread level MULTIPLE, found FUNNELED" in finished.stderr
+
+
+JOB = 'name = "x"\nmodel = "elastic_belt"\n[friction]\nfriction_law = "table"\ntable_file = "mu.csv"\n'
+TABLE = "force [N/m], speed [m/s], mu\n1, 0, 0.2\n1, 1, 0.1\n2, 0, 0.2\n2, 1, "
+OLDER = "import cvt_hpc, cvt_hpc.cli, sys; cvt_hpc.__version__ = '0.0'; sys.exit(cvt_hpc.cli.main())"
+OURS = ("-m", "cvt_hpc")
+
+
+@pytest.fixture
+def side_by_side(spawn, tmp_path):
+    """Start a rank for each command line of Python, in folders of their own with jobs of one text."""
+
+    def start_ranks(*commands, mu=("0.1", "0.1"), **environment):
+        command = [find_mpirun()]
+        for rank, words in enumerate(commands):
+            folder = tmp_path / f"node-{rank}"
+            folder.mkdir()
+            (folder / "x.toml").write_text(JOB)
+            (folder / "mu.csv").write_text(f"{TABLE}{mu[rank]}\n")
+            command += [*[":"][:rank], "-n", "1", "-wdir", str(folder), sys.executable, *words]
+        return spawn(command, environment)
+
+    return start_ranks
+
+
+@pytest.mark.parametrize(
+    ("words", "mu", "told"),
+    [
+        ((*OURS, "run", "gone.toml"), "0.1", "gone.toml: expected a job file, found nothing"),
+        ((*OURS, "run", "x.toml", "--bogus"), "0.1", "unrecognized arguments: --bogus"),
+        ((*OURS, "run", "x.toml", "--fresh"), "0.1", "options.fresh: expected .*, as rank 0 has it"),
+        (
+            (*OURS, "run", "x.toml"),
+            "0.15",
+            r"job.friction.table_mu: expected .*, as rank 0 has it",
+        ),
+        (("-c", OLDER, "run", "x.toml"), "0.1", "program.cvt_hpc: expected .*, as rank 0 has it"),
+    ],
+)
+def test_a_rank_that_differs_ends_all_with_one_line(side_by_side, words, mu, told):
+    finished = side_by_side((*OURS, "run", "x.toml"), words, mu=("0.1", mu)).finish()
+    assert finished.returncode == 2
+    assert re.match(f"cvt-hpc: rank 1 on .*: {told}", finished.stderr), finished.stderr
+    assert finished.stderr.count("\n") == 1
+
+
+def test_ranks_of_one_error_print_it_once(side_by_side):
+    finished = side_by_side(*2 * [(*OURS, "run", "gone.toml")]).finish()
+    assert finished.returncode == 2
+    assert finished.stderr.startswith("cvt-hpc: gone.toml: expected")
+    assert finished.stderr.count("\n") == 1
+
+
+def test_a_rank_that_is_gone_before_mpi_starts_is_not_waited_for_without_end(side_by_side):
+    gone = ("-c", "raise SystemExit(3)")
+    finished = side_by_side((*OURS, "run", "x.toml"), gone, CVT_HPC_RANK_WAIT="1").finish()
+    assert finished.returncode not in (0, 1, 2, 98, 99)
+    (line,) = [line for line in finished.stderr.splitlines() if line.startswith("cvt-hpc")]
+    assert "expected all 2 ranks to start it within 1 s, found that rank 0 waits for others" in line
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_signals_end_ranks_that_wait_for_mpi_to_start(side_by_side, number):
+    sweep = side_by_side((*OURS, "run", "x.toml"), ("-c", "raise SystemExit(3)"))
+    wait_until(lambda: "watcher.py" in str(children(sweep)), "the rank that waits")
+    time.sleep(0.3)  # in MPI_Init
+    sweep.ranks()[0].send_signal(number)
+    assert sweep.finish().returncode in (number, 128 + number)
+
+
+def children(sweep):
+    """Return the command lines of all processes that a launcher has started."""
+    return [process.cmdline() for process in psutil.Process(sweep.process.pid).children(recursive=True)]
+
+
+def test_a_sweep_on_one_of_several_ranks_is_refused(start, tmp_path):
+    options = {"out": tmp_path / "out", "only_rank": 0}
+    finished = start(options, ranks=2, environment={"CVT_HPC_RANK_WAIT": "1"}).finish()
+    assert finished.returncode == 2
+    assert "run: expected a call on all 2 ranks within 1 s, found that rank 0 waits" in finished.stderr
+    assert "comm=None" in finished.stderr
+    assert "Traceback" not in finished.stderr
+
+
+def test_a_rank_can_sweep_by_itself(start, tmp_path):
+    options = {"out": tmp_path / "out", "only_rank": 0, "sweep": {"comm": None}}
+    finished = start(options, ranks=2).finish()
+    assert finished.returncode == 0, finished.stderr
+    assert json.loads(finished.stdout)["done"] == 12
+
+
+def test_threads_are_refused(tmp_path):
+    out = run(Job(), tmp_path / "first", simulator=Simulator(), progress=False).out
+    ends = {}
+
+    class Reading(Simulator):
+        def run_point(self, *arguments):
+            in_a_thread(lambda: open_results(out), "reads")
+            return super().run_point(*arguments)
+
+    def in_a_thread(work, name):
+        def do():
+            with pytest.raises(
+                InputError, match=f"expected the main thread .*, found the thread {name}"
+            ) as error:
+                work()
+            ends[name] = str(error.value)
+
+        thread = threading.Thread(target=do, name=name)
+        thread.start()
+        thread.join()
+
+    in_a_thread(lambda: run(Job(), tmp_path / "thread", simulator=Simulator()), "sweeps")
+    run(Job(), tmp_path / "second", simulator=Reading(), progress=False)
+    assert sorted(ends) == ["reads", "sweeps"]
+    assert not (tmp_path / "thread").exists()
 
 
 @pytest.mark.parametrize(

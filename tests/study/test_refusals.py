@@ -1,6 +1,7 @@
 """What the system refuses has one text, whichever library was told."""
 
 import errno
+import pwd
 
 import pytest
 
@@ -31,6 +32,19 @@ def test_other_refusals_are_named_by_what_was_expected(tmp_path):
     with pytest.raises(StorageError, match="x: expected a folder, found: Permission denied"):
         with naming_refusals("x", "a folder"):
             refuse(OSError(errno.EACCES, "Permission denied"))
+
+
+def test_who_can_grant_a_right_is_told(tmp_path):
+    owner = pwd.getpwuid(tmp_path.stat().st_uid).pw_name
+    told = f" ({tmp_path} belongs to {owner}, who can grant the right; or choose another --out, or copy it)"
+    path = tmp_path / "new" / "x.nc"
+    for errno_, reason, then in ((errno.EACCES, "Permission denied", told), (errno.EROFS, "Read-only", "")):
+        with pytest.raises(StorageError) as caught, naming_refusals(path, "a folder"):
+            refuse(OSError(errno_, reason))
+        assert str(caught.value) == f"{path}: expected a folder, found: {reason}{then}"
+    with pytest.raises(StorageError) as caught, written_aside(tmp_path / "x.nc", advice="Kept"):
+        refuse(OSError(errno.EPERM, "Operation not permitted"))
+    assert str(caught.value).endswith(f"found: Operation not permitted{told}. Kept")
 
 
 def test_the_system_is_asked_where_a_library_does_not_say(tmp_path, monkeypatch):

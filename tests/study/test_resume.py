@@ -1,6 +1,8 @@
 """Sweeps that are killed, interrupted or damaged go on where they stopped, to the very same numbers."""
 
 import json
+import os
+import pty
 import random
 import signal
 import time
@@ -10,11 +12,12 @@ import pytest
 
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.ranks.starting import SIGNALS
 from cvt_hpc.study.record.frames import PLACE, RECORD
 from cvt_hpc.study.record.recovery import read_records
 from support.recorded import assert_same_numbers
 from support.study_double import Axis, Job, Simulator
-from support.study_processes import wait_until
+from support.study_processes import PATIENCE, wait_until
 
 RUNS = 60
 
@@ -71,7 +74,7 @@ def test_a_rank_that_dies_takes_the_sweep_down_and_the_rest_is_done_later(start,
     assert 0 < recorded(tmp_path / "out").recorded.sum() < RUNS
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGUSR1"])
+@pytest.mark.parametrize("name", ["SIGINT", "SIGHUP", "SIGTERM", "SIGUSR1"])
 def test_a_signal_breaks_off_the_run_and_is_resumed(start, tmp_path, reference, name):
     # The run at work would take minutes: it has to be broken off, not waited for.
     options = {"out": tmp_path / "out", "runs": RUNS, "parameters": {"pause": 0.01}}
@@ -120,6 +123,79 @@ def test_a_signal_to_one_rank_stops_all(start, tmp_path, target):
     facts = json.loads(finished.stdout)
     assert facts["stopped"] == "SIGUSR1"
     assert (facts["done"], facts["remaining"]) == (25, RUNS - 25)
+
+
+class Signalling(Simulator):
+    """A simulator whose third run gets a signal."""
+
+    def __init__(self, number):
+        super().__init__()
+        self.number = number
+
+    def run_point(self, job, point, interrupt):
+        if point["load"] == 2:
+            signal.raise_signal(self.number)
+        return super().run_point(job, {**point, "pause": 0.01}, interrupt)
+
+
+@pytest.mark.parametrize(
+    ("number", "raised"),
+    [(number, SystemExit) for number in SIGNALS[1:]] + [(signal.SIGINT, KeyboardInterrupt)],
+)
+def test_a_signal_reaches_the_script_once_the_study_is_gathered(tmp_path, number, raised):
+    with pytest.raises(raised) as caught:
+        for study in ("first", "second"):
+            run(Job(), tmp_path / study, simulator=Signalling(number), progress=False)
+    assert raised is KeyboardInterrupt or caught.value.code == 99
+    with open_results(tmp_path / "first") as dataset:
+        assert int((dataset["status"] == 1).sum()) == 2
+    assert not (tmp_path / "second").exists()
+    assert signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler)
+
+
+def test_a_signal_that_comes_as_the_last_run_ends_reaches_the_script(tmp_path):
+    job = Job((Axis("load", (0, 1, 2)),))
+    simulator = Signalling(signal.SIGTERM)
+    simulator.run_point = lambda job, point, interrupt: Signalling.run_point(
+        simulator, job, point, lambda: None
+    )
+    with pytest.raises(SystemExit) as caught:
+        run(job, tmp_path, simulator=simulator, progress=False)
+    assert caught.value.code == 99
+    with open_results(tmp_path) as dataset:
+        assert (dataset["status"] == 1).all()
+
+
+def test_a_hangup_that_is_ignored_stays_ignored(tmp_path):
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+    try:
+        report = run(Job(), tmp_path, simulator=Signalling(signal.SIGHUP), progress=False)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    assert report.done == 12
+
+
+def test_a_terminal_that_closes_ends_the_sweep_with_its_dataset(start, tmp_path):
+    leader, terminal = pty.openpty()
+    options = {"out": tmp_path / "out", "runs": RUNS, "slow": {"from": 25, "pause": 300.0}}
+    sweep = start(options, stderr=terminal)
+    os.close(terminal)
+    wait_until(lambda: has_records(tmp_path / "out", 25), "25 records")
+    os.close(leader)  # what is written to the terminal fails from here on
+    sweep.process.send_signal(signal.SIGHUP)
+    assert sweep.process.wait(PATIENCE) == 99
+    assert (tmp_path / "out" / "results.nc").exists()
+
+
+def test_a_signal_to_one_rank_ends_the_script_on_all(start, tmp_path):
+    options = {"out": tmp_path / "out", "runs": RUNS, "sweep": {"raises": True}}
+    sweep = start({**options, "slow": {"from": 25, "pause": 300.0}}, ranks=2)
+    wait_until(lambda: has_records(tmp_path / "out", 25), "25 records")
+    sweep.ranks()[1].send_signal(signal.SIGTERM)
+    finished = sweep.finish()
+    assert finished.returncode == 99
+    assert "Traceback" not in finished.stderr
+    assert (tmp_path / "out" / "results.nc").exists()
 
 
 def test_damage_costs_only_the_runs_it_struck(start, tmp_path, reference, caplog):

@@ -47,7 +47,8 @@ def main(options: dict[str, Any]) -> int:
         return study_double.main(options)
     try:
         if not options.get("gathers"):
-            return end_process(run(load_job(options["job"]), options["out"], **options["sweep"]).exit_status)
+            sweep = {"raises": False, **options["sweep"]}
+            return end_process(run(load_job(options["job"]), options["out"], **sweep).exit_status)
         gather(options["out"])
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)

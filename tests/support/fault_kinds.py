@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import signal
 import subprocess
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -40,6 +41,14 @@ def _kill_rank(case: Case) -> Outcome:
     case.wait_for_a_moment(start, case.random.randint(1, RUNS))
     case.strike(start, target=f"rank {case.random.randrange(ranks)}")
     return case.finish(case.random.choice((0, 0, 2)))
+
+
+def _kill_starting(case: Case) -> Outcome:
+    """Kill a rank or mpirun while ranks import, connect and compare what they are to do."""
+    start = case.start(2)
+    time.sleep(case.random.uniform(0.0, 2.0))
+    case.strike(start, target=case.random.choice(("rank 0", "rank 1", "mpirun")))
+    return case.finish(case.random.choice((0, 2)))
 
 
 def _kill_mpirun(case: Case) -> Outcome:
@@ -210,6 +219,7 @@ def can_mount(folder: Path) -> bool:
 KINDS: dict[str, Callable[[Case], Outcome]] = {
     "kill -9 of a serial sweep": _kill_serial,
     "kill -9 of a rank": _kill_rank,
+    "kill -9 of ranks that start": _kill_starting,
     "kill -9 of mpirun": _kill_mpirun,
     "kill -9 of a part beside others": _kill_part,
     "kill -9 of gather": _kill_gather,
@@ -225,4 +235,4 @@ KINDS: dict[str, Callable[[Case], Outcome]] = {
     "signal to a rank": _signal_rank,
 }
 NEED_MOUNT = ("full disk", "read-only folder")
-NEED_MPI = ("kill -9 of a rank", "kill -9 of mpirun", "signal to a rank")
+NEED_MPI = ("kill -9 of a rank", "kill -9 of ranks that start", "kill -9 of mpirun", "signal to a rank")

@@ -209,7 +209,7 @@ def main(options: dict[str, Any]) -> int:
     Options: `out`; `runs`, the length of the only axis; `parameters`, `design` and `histories` of the job; `sweep`, further arguments of
     `run`; `slow`, `largest_file` and `lanes`, see `Simulator`; `thread_level` of MPI; `break_rank`, the rank whose log
     has a defect, and whether the program `swallows_defects`; `break_rank_after`, the rank that raises when the
-    sweep is over.
+    sweep is over; `only_rank`, the only one that sweeps.
     """
     if "thread_level" in options:
         import mpi4py
@@ -219,6 +219,11 @@ def main(options: dict[str, Any]) -> int:
     from cvt_hpc.study.ranks.launch import end_process
     from cvt_hpc.study.record.log import RecordLog
 
+    if "only_rank" in options:
+        from mpi4py import MPI
+
+        if MPI.COMM_WORLD.rank != options["only_rank"]:
+            return 0
     if process_rank() == options.get("break_rank"):
         RecordLog.append = raise_defect
     axes = (Axis("load", tuple(range(options.get("runs", 12)))),)
@@ -226,7 +231,9 @@ def main(options: dict[str, Any]) -> int:
     job = Job(axes, options.get("parameters", {}), design=options.get("design", {}), histories=kept)
     simulator = Simulator(options.get("slow"), options.get("largest_file"), options.get("lanes", 1))
     try:
-        report = run(job, Path(options["out"]), simulator=simulator, **options.get("sweep", {}))
+        report = run(
+            job, Path(options["out"]), simulator=simulator, **{"raises": False, **options.get("sweep", {})}
+        )
     except InputError as error:
         if process_rank() == 0:
             print(f"error: {error}", file=sys.stderr)

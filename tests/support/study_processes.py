@@ -22,9 +22,11 @@ PATIENCE = 40.0  # [s] until a process that should end counts as hanging
 class Sweep:
     """A process that sweeps the double."""
 
-    def __init__(self, command: list[str], environment: dict[str, str]) -> None:
+    def __init__(
+        self, command: list[str], environment: dict[str, str], stderr: int = subprocess.PIPE
+    ) -> None:
         self.process = subprocess.Popen(
-            command, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+            command, env=environment, text=True, stdout=subprocess.PIPE, stderr=stderr
         )
 
     def finish(self) -> subprocess.CompletedProcess:

@@ -11,6 +11,7 @@ from cvt_hpc.models import (
     oscillator,
     pushbelt,
     quasi_static_belt,
+    slip_limit,
     spatial_pushbelt,
     steady_variator,
     strand,
@@ -33,6 +34,7 @@ from cvt_hpc.models.pushbelt import record as pushbelt_record
 from cvt_hpc.models.pushbelt import transient as pushbelt_transient
 from cvt_hpc.models.quasi_static_belt import record as quasi_static_belt_record
 from cvt_hpc.models.quasi_static_belt import transient as quasi_static_belt_transient
+from cvt_hpc.models.slip_limit import record as slip_limit_record
 from cvt_hpc.models.spatial_pushbelt import record as spatial_pushbelt_record
 from cvt_hpc.models.spatial_pushbelt import transient as spatial_pushbelt_transient
 from cvt_hpc.models.steady_variator import record as steady_variator_record
@@ -49,6 +51,7 @@ declared = moving_string
 declared = oscillator
 declared = pushbelt
 declared = quasi_static_belt
+declared = slip_limit
 declared = spatial_pushbelt
 declared = steady_variator
 declared = strand
@@ -63,6 +66,7 @@ recorded = linear_stability_record
 recorded = oscillator_record
 recorded = pushbelt_record
 recorded = quasi_static_belt_record
+recorded = slip_limit_record
 recorded = spatial_pushbelt_record
 recorded = steady_variator_record
 recorded = strand_record

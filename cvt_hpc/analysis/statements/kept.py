@@ -13,6 +13,7 @@ import xarray as xr
 
 from cvt_hpc.analysis.profiles import inside
 from cvt_hpc.errors import InputError
+from cvt_hpc.netcdf import open_netcdf
 from cvt_hpc.variables import Status
 
 
@@ -72,8 +73,7 @@ def opened(folder: Path) -> Iterator[Kept]:
     with ExitStack() as stack:
         results = stack.enter_context(open_results(folder)).load()
         histories = [
-            stack.enter_context(xr.open_dataset(path, engine="netcdf4", decode_times=False))
-            for path in sorted((folder / "histories").glob("run-*.nc"))
+            stack.enter_context(open_netcdf(path)) for path in sorted((folder / "histories").glob("run-*.nc"))
         ]
         yield Kept(results, histories)
 

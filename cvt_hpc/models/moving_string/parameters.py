@@ -62,4 +62,5 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
 def inert(parameters: dict[str, Any]) -> dict[str, str]:
     """Parameters without effect on a run, each with the setting that makes it so."""
     shape = parameters["shape"]
-    return {"pulse_width" if shape == "mode" else "mode": f"shape {shape}"}
+    found = {"arc_probes": "model moving_string, which has one strand"}
+    return found | {"pulse_width" if shape == "mode" else "mode": f"shape {shape}"}

@@ -110,4 +110,5 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         (p["start"] != "given", "initial_speed", f"start {p['start']}"),
         (law != "coulomb", "static_friction", f"friction_law {law}"),
     )
-    return friction_inert(p) | {key: setting for holds, key, setting in cases if holds}
+    found = dict.fromkeys(("strand_probes", "arc_probes"), "model oscillator, which has no belt")
+    return friction_inert(p) | found | {key: setting for holds, key, setting in cases if holds}

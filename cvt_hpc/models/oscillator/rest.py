@@ -5,6 +5,10 @@ p = k x + c x' - P of the spring, m s' = p - N mu(s): a mass that slides slower 
 only while the pull exceeds friction there, and has to once it does. With N = N_0 - n x that is p + n
 mu_peak x against N_0 mu_peak. It holds for the model's own motion whatever the stepper; a run that breaks
 it shows a stick-slip that friction does not make.
+
+Friction as it is has no peak and no width: the mass sticks, s = 0, as long as |p| <= N mu at rest, and not
+longer. Moreau's steps compare the two in their middle, so a mass that sticks over an interval is held rightly
+if it is in the middle of the first step and of the last.
 """
 
 from __future__ import annotations
@@ -13,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cvt_hpc.models.oscillator.constants import Oscillator
+from cvt_hpc.models.oscillator.constants import Oscillator, normal_load
 from cvt_hpc.models.oscillator.motion import (
     HUMP,
     V,
@@ -22,8 +26,12 @@ from cvt_hpc.models.oscillator.motion import (
     largest_rate,
     regularised_frictions,
 )
+from cvt_hpc.physics.friction import friction_coefficient, friction_coefficients
 from cvt_hpc.steppers.facts import Facts
 
+LET_GO = "the mass was let go while friction at rest still holds it"
+HELD = "the mass was held against a pull beyond friction at rest"
+REST = 1e-9  # of the mass' largest speed: sliding that rounding may leave while friction holds
 REACH, POINTS = 2.0 * HUMP, 2401  # of the search for the peak, in units of v_reg; it is found within 1e-6
 
 
@@ -75,7 +83,7 @@ def rest_missed(o: Oscillator, facts: Facts, step: float, allowed: float, rows: 
 
 def peak(o: Oscillator) -> Peak | None:
     """Find the peak of smoothed friction; None where there is none or it moves with the load."""
-    if o.normal_stiffness != 0.0 and o.law.table_force.size > 1:
+    if _moves_with_load(o):
         return None
     sliding = np.linspace(0.0, REACH * o.width, POINTS)
     mu = regularised_frictions(o, sliding, np.full(POINTS, o.normal_load)) / o.normal_load
@@ -84,7 +92,7 @@ def peak(o: Oscillator) -> Peak | None:
 
 
 def wrongly_held(o: Oscillator, peak: Peak | None, rows: np.ndarray, interval: float) -> str | None:
-    """Decide whether the mass was released by a pull that friction holds, or held against a larger one.
+    """Decide whether smoothed friction released the mass where it holds, or held it against a larger pull.
 
     Parameters
     ----------
@@ -112,11 +120,65 @@ def wrongly_held(o: Oscillator, peak: Peak | None, rows: np.ndarray, interval: f
     rise = max(o.stiffness + o.normal_stiffness * peak.mu, 0.0) * o.belt_speed
     largest = pull[:-1] + o.damping * sliding[:-1] + rise * interval
     if np.any(slow[:-1] & (sliding[1:] > peak.sliding) & (largest < holds)):
-        return "the mass was let go while friction at rest still holds it"
+        return LET_GO
     # Pulled by more than the peak for so long, it has gained the difference in speed: over the peak
     excess = np.maximum(pull[1:] - holds, 0.0)
     since = np.minimum(excess / rise, interval) if rise > 0.0 else np.full(excess.size, interval)
     gained = (excess - 0.5 * rise * since) * since / o.mass
     if np.any(slow[:-1] & slow[1:] & (gained > peak.sliding)):
-        return "the mass was held against a pull beyond friction at rest"
+        return HELD
     return None
+
+
+def wrongly_stuck(
+    o: Oscillator, rows: np.ndarray, interval: float, step: float, rounding: float
+) -> str | None:
+    """Decide whether friction as it is released the mass where it holds, or held it against a larger pull.
+
+    Parameters
+    ----------
+    o : Oscillator
+        Constants.
+    rows : (n, 2) array
+        Displacement [m] and speed [m/s] at samples that follow each other.
+    interval, step : float
+        Sampling interval, and the step of Moreau's method, a part of it [s].
+    rounding : float
+        Sliding up to which the mass counts as sticking [m/s].
+
+    Returns
+    -------
+    str or None
+        The reason, where it was.
+    """
+    x, stuck = rows[:, X], np.abs(o.belt_speed - rows[:, V]) <= rounding
+    if not np.any(stuck[:-1]):
+        return None
+    way, half, farthest = o.belt_speed * interval, 0.5 * o.belt_speed * step, np.abs(x).max()
+    # sliding counts as sticking, by which friction differs, and a mass let go, until it is faster
+    slope = friction_coefficient(o.law, 0.0, o.normal_load)[1]
+    unseen = np.sqrt(2.0 * o.mass * o.stiffness * o.belt_speed * rounding)
+    unseen += REST * (o.stiffness * farthest + friction_at_rest(o))
+    unseen += 2.0 * (o.damping + o.normal_load * abs(slope)) * rounding
+    whole = stuck[:-1] & stuck[1:] & (np.abs(np.diff(x) - way) <= REST * (farthest + way))
+    if np.any(whole & (_beyond_rest(o, x[:-1] + half, x[1:] - half) > unseen)):
+        return HELD
+    # Carried by the belt through the whole interval it would be held at its end, too. Where a table's
+    # friction moves with the load, it could be let go between.
+    let_go = stuck[:-1] & ~stuck[1:] & (not _moves_with_load(o))
+    return LET_GO if np.any(let_go & (_beyond_rest(o, x[:-1], x[:-1] + way) < -unseen)) else None
+
+
+def _beyond_rest(o: Oscillator, *places: np.ndarray) -> np.ndarray:
+    """Pull of the spring less the friction that holds the mass where it sticks: the largest of places [m]."""
+    beyond = []
+    for x in places:
+        load = normal_load(o, x)
+        mu = friction_coefficients(o.law, np.zeros_like(x), load) + o.excess
+        beyond.append(np.abs(o.stiffness * x + o.damping * o.belt_speed - o.preload) - load * mu)
+    return np.max(beyond, axis=0)
+
+
+def _moves_with_load(o: Oscillator) -> bool:
+    """Whether the coefficient of friction changes with the displacement."""
+    return o.normal_stiffness != 0.0 and o.law.table_force.size > 1

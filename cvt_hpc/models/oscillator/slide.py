@@ -15,6 +15,7 @@ import numpy as np
 from cvt_hpc.models.oscillator.constants import Oscillator, normal_load
 from cvt_hpc.models.oscillator.motion import regularised_friction
 from cvt_hpc.models.oscillator.steady import steady_sliding
+from cvt_hpc.physics.friction import friction_coefficient
 from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.marching import Marching
 from cvt_hpc.steppers.system import SetValuedSystem, System
@@ -52,9 +53,11 @@ def silenced(
     if o.belt_speed == 0.0:
         return None
     load = normal_load(o, steady_sliding(o).displacement)
-    slower, mu, faster = (
-        regularised_friction(o, o.belt_speed * part, load) / load for part in (1.0 - SMALL, 1.0, 1.0 + SMALL)
-    )
+    speeds = [o.belt_speed * part for part in (1.0 - SMALL, 1.0, 1.0 + SMALL)]
+    if isinstance(system, SetValuedSystem):
+        slower, mu, faster = (friction_coefficient(o.law, speed, load)[0] for speed in speeds)
+    else:
+        slower, mu, faster = (regularised_friction(o, speed, load) / load for speed in speeds)
     true = -0.5 * (o.damping + load * (faster - slower) / (2.0 * SMALL * o.belt_speed)) / o.mass
     stiffness = o.stiffness + o.normal_stiffness * mu
     frequency = np.sqrt(max(stiffness, 0.0) / o.mass)

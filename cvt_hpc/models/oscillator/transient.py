@@ -18,12 +18,11 @@ from cvt_hpc.models.oscillator.motion import (
     set_valued_system,
     system,
 )
-from cvt_hpc.models.oscillator.rest import peak, rest_missed, wrongly_held
+from cvt_hpc.models.oscillator.rest import REST, peak, rest_missed, wrongly_held, wrongly_stuck
 from cvt_hpc.models.oscillator.slide import silenced
 from cvt_hpc.physics.friction import friction_coefficients
 
 CHANNELS = ("speed",)
-REST = 1e-9  # of the mass' largest speed: sliding that rounding may leave while friction holds
 
 
 class Transient(MarchedRun):
@@ -61,12 +60,16 @@ class Transient(MarchedRun):
         self._silenced = None
         if not self.marching.facts.adaptive:
             self._silenced = silenced(o, equations, stepper, parameters, self.interval)
-        self._allowed = parameters.get("tolerance", 0.0) * float(equations.scale[V])
+        self._typical_speed = float(equations.scale[V])
+        self._allowed = parameters.get("tolerance", 0.0) * self._typical_speed
 
     def _doubt(self, first: int) -> str | None:
         seen = self.rows[max(first - 1, 0) : self.done]
-        missed = rest_missed(self.constants, self.marching.facts, self.step, self._allowed, seen)
-        return missed or self._silenced or wrongly_held(self.constants, self._peak, seen, self.interval)
+        o = self.constants
+        missed = rest_missed(o, self.marching.facts, self.step, self._allowed, seen) or self._silenced
+        if missed or not self.is_set_valued:
+            return missed or wrongly_held(o, self._peak, seen, self.interval)
+        return wrongly_stuck(o, seen, self.interval, self.step, self._slowest)
 
     @property
     def contact_solves(self) -> int:
@@ -81,11 +84,14 @@ class Transient(MarchedRun):
     @property
     def is_stuck(self) -> np.ndarray:
         """Whether the mass sticks, or with smoothed friction creeps, at each sample so far, (done,) bool."""
-        speed = self.channel("speed")
-        width = REST * np.abs(speed).max(initial=0.0)
-        if not self.is_set_valued:
-            width = HUMP * self.constants.width
-        return np.abs(self.constants.belt_speed - speed) <= width
+        return np.abs(self.constants.belt_speed - self.channel("speed")) <= self._slowest
+
+    @property
+    def _slowest(self) -> float:
+        """Sliding [m/s] up to which the mass sticks or creeps."""
+        if self.is_set_valued:
+            return REST * float(np.abs(self.channel("speed")).max(initial=self._typical_speed))
+        return HUMP * self.constants.width
 
     def friction(self) -> np.ndarray:
         """Friction force on the mass at each sample so far, (done,) [N]."""

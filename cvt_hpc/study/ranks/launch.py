@@ -8,22 +8,26 @@ sizes are compared and such a start is refused.
 from __future__ import annotations
 
 import os
+import platform
 import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeAlias, TypeVar
 
-from cvt_hpc.errors import CRASHED, InputError
+from cvt_hpc.errors import BAD_INPUT, CRASHED, InputError, mismatch
 from cvt_hpc.files import append_text
+from cvt_hpc.study.job_difference import differences, short
+from cvt_hpc.study.ranks.starting import await_all, bounded_start
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
 Result = TypeVar("Result")
+Ranks: TypeAlias = "MPI.Intracomm | Literal['all'] | None"
 
 # Size and rank as launchers give them, the nearest to the process first: an mpirun within a Slurm allocation
 # inherits the numbers of the allocation, which are not the numbers of its own ranks.
@@ -38,6 +42,7 @@ _REMEDY = (
     "(MPICH) or `srun --mpi=pmix` (Open MPI); `srun --mpi=list` shows what there is. For a single process on "
     "purpose: `srun -n 1`, or unset {variable}"
 )
+_PASSING_ON = 0.5  # [s]; mpirun, after an abort, drops output that it has not yet passed on
 
 
 @dataclass(frozen=True)
@@ -68,6 +73,7 @@ def detect_launch(environment: Mapping[str, str] = os.environ) -> Launch:
     return Launch()
 
 
+_world: MPI.Intracomm | None = None  # of all ranks, once they are connected
 _rank_of_survivor: int | None = None
 
 
@@ -86,6 +92,16 @@ def end_process(status: int) -> int:
         sys.stderr.flush()
         os._exit(status)
     return status
+
+
+def end_all(status: int, line: str = "") -> None:
+    """End all ranks, since others may wait for this one, with a line that says why; not a process alone."""
+    if _world is None:
+        return
+    if line:
+        time.sleep(min(_world.rank, 1.0))  # [s]; should rank 0 have the same to say, it ends this one
+        print(f"cvt-hpc: rank {_world.rank} on {platform.node()}: {line}", file=sys.stderr)
+    _abort(_world, status)
 
 
 class RankDied(Exception):
@@ -142,6 +158,48 @@ class Team:
             raise error or InputError(text)
         return result
 
+    def agreed(self, work: Callable[[], Result], plan: Callable[[Result], dict[str, Any]]) -> Result:
+        """Return the result of `work`, once all ranks have done theirs, with the plan of rank 0.
+
+        Parameters
+        ----------
+        work : callable
+            Done by each rank for itself.
+        plan : callable
+            Given the result, returns what has to be alike on all ranks: nested tables of JSON types.
+
+        Raises
+        ------
+        InputError
+            On all ranks, with the text of the first one that has an error or another plan.
+        """
+        if self.communicator is None:
+            return work()
+        error = None
+        try:
+            result = work()
+        except InputError as caught:
+            error = caught
+        self._share(error)
+        mine = plan(result)
+        for key, (ours, here) in differences(self.communicator.bcast(mine), mine).items():
+            then = "start all ranks with the same job, options and version"
+            error = mismatch(key, f"{short(ours)}, as rank 0 has it", short(here), then)
+            break
+        self._share(error)
+        return result
+
+    def _share(self, error: InputError | None) -> None:
+        """Raise on all ranks the error of the first one that has one."""
+        owner = self.communicator.allreduce(self.size if error is None else self.rank, min)
+        if owner == self.size:
+            return
+        text, host = self.communicator.bcast((str(error), platform.node()), owner)
+        alike = self.communicator.allreduce(error is not None and str(error) == text, min)
+        shared = InputError(text if alike else f"rank {owner} on {host}: {text}")
+        shared.everywhere = True
+        raise shared from None
+
     def collect(self, value: Any) -> list[Any]:
         """Return the values of all ranks, on all ranks."""
         if self.communicator is None:
@@ -186,45 +244,81 @@ class Team:
 
 
 @contextmanager
-def assembled_team(crash_log: Path) -> Iterator[Team]:
-    """Give the team of all processes that were started together; an unexpected error of one ends them all.
+def assembled_team(crash_log: Path | None = None, ranks: Ranks = "all") -> Iterator[Team]:
+    """Give the team of ranks that work together; an unexpected error of one ends them all.
 
     Parameters
     ----------
-    crash_log : Path
+    crash_log : Path, optional
         A file to which such an error is appended, since launchers may lose the output of a dying rank.
+    ranks : MPI.Intracomm, "all" or None
+        Those of a communicator, all processes that were started together, or this process alone.
 
     Raises
     ------
     InputError
-        If the launcher started several processes that MPI does not connect.
+        If the launcher started several processes that MPI does not connect, or if not all ranks come here.
     """
-    launch = detect_launch()
-    # PMIX_RANK alone, without a size: some launcher that is not in the list. An application that has imported
-    # mpi4py itself was started for MPI as well.
-    may_have_company = launch.size > 1 or "PMIX_RANK" in os.environ or "mpi4py.MPI" in sys.modules
-    world = _connect(launch) if may_have_company else None
-    if world is None or world.size == 1:
+    communicator = _connected(crash_log) if ranks == "all" else ranks
+    if communicator is None or communicator.size == 1:
         yield Team()
         return
-    _abort_on_uncaught(world, crash_log)
-    team = Team(world.Dup())  # our messages never mix with messages of an application
+    with noticing_deaths():
+        await_all(communicator)
+        team = Team(communicator.Dup())  # our messages never mix with messages of an application
     try:
         yield team
-    except InputError:  # raised by all ranks alike, so all get here
+    except InputError as error:  # raised by all ranks alike, so all get here
+        error.everywhere = True
         team.release()
         raise
     except BaseException:
-        _abort(world, traceback.format_exc(), crash_log)
-        raise
+        _crash(communicator, traceback.format_exc(), crash_log)
     else:
         team.release()
+
+
+def agree_on(error: InputError) -> InputError:
+    """Return the error with which all ranks end; for one from before they have met.
+
+    Parameters
+    ----------
+    error : InputError
+        Of this rank. Others may be ahead, and wait for it.
+    """
+    if _world is not None:
+        return error
+
+    def refuse() -> None:
+        raise error
+
+    try:
+        with assembled_team() as team:
+            team.agreed(refuse, lambda _: {})
+    except InputError as shared:
+        return shared if shared.everywhere else error
+    return error
+
+
+def _connected(crash_log: Path | None) -> MPI.Intracomm | None:
+    """Return the communicator of all ranks, connected by MPI; None of a process alone."""
+    global _world
+    launch = detect_launch()
+    # PMIX_RANK alone, without a size: some launcher that is not in the list. An application that has imported
+    # mpi4py itself was started for MPI as well.
+    if launch.size > 1 or "PMIX_RANK" in os.environ or "mpi4py.MPI" in sys.modules:
+        world = _connect(launch)
+        _world = world if world.size > 1 else None
+    if _world is not None:
+        _abort_on_uncaught(_world, crash_log)
+    return _world
 
 
 def _connect(launch: Launch) -> MPI.Intracomm:
     """Initialise MPI and return the communicator of all ranks."""
     try:
-        from mpi4py import MPI
+        with nullcontext() if "mpi4py.MPI" in sys.modules else bounded_start(launch.rank, launch.size):
+            from mpi4py import MPI
     except (ImportError, RuntimeError) as error:  # RuntimeError: mpi4py is there, the MPI library is not
         raise InputError(
             f"{launch.variable or 'PMIX_RANK'}: expected mpi4py, to connect the tasks that were started "
@@ -241,22 +335,37 @@ def _connect(launch: Launch) -> MPI.Intracomm:
     return world
 
 
-def _abort_on_uncaught(world: MPI.Intracomm, crash_log: Path) -> None:
+def _abort_on_uncaught(world: MPI.Intracomm, crash_log: Path | None) -> None:
     """See to it that an error after or between sweeps ends all ranks, not one for which the others wait."""
 
     def hook(kind: type[BaseException], value: BaseException, trace: Any) -> None:
-        _abort(world, "".join(traceback.format_exception(kind, value, trace)), crash_log)
+        if not getattr(value, "everywhere", False):
+            if isinstance(value, InputError):
+                end_all(BAD_INPUT, str(value))
+            _crash(world, "".join(traceback.format_exception(kind, value, trace)), crash_log)
+        if world.rank == 0:
+            sys.__excepthook__(kind, value, trace)
 
     sys.excepthook = hook
 
 
-def _abort(world: MPI.Intracomm, text: str, crash_log: Path) -> None:
-    message = f"rank {world.rank}: {text}\nrank {world.rank}: ends all {world.size} ranks\n"
+def _crash(communicator: MPI.Intracomm, text: str, crash_log: Path | None) -> NoReturn:
+    rank, size = communicator.rank, communicator.size
+    message = f"rank {rank}: {text}\nrank {rank}: ends all {size} ranks\n"
     try:
-        with suppress(OSError):  # no folder, no space, a link: stderr has to do
-            append_text(crash_log, f"{time.strftime('%Y-%m-%dT%H:%M:%S%z')} {message}")
-        sys.stdout.flush()
-        print(message, end="", file=sys.stderr, flush=True)
-        time.sleep(0.5)  # mpirun, after an abort, drops output that it has not yet passed on
+        if crash_log is not None:
+            with suppress(OSError):  # no folder, no space, a link: stderr has to do
+                append_text(crash_log, f"{time.strftime('%Y-%m-%dT%H:%M:%S%z')} {message}")
+        print(message, end="", file=sys.stderr)
     finally:  # whatever became of the message: without this the other ranks wait for ever
-        world.Abort(CRASHED)
+        _abort(communicator, CRASHED)
+
+
+def _abort(communicator: MPI.Intracomm, status: int) -> NoReturn:
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        time.sleep(_PASSING_ON)
+    finally:
+        communicator.Abort(status)
+        os._exit(status)  # Abort may return, some time before the launcher ends this process

@@ -6,7 +6,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 
 import numpy as np
 
@@ -80,7 +80,8 @@ class Progress:
         interval = _BAR_INTERVAL if self._bar is not None else min(max(_FIRST_LINE, elapsed / 20), _LAST_LINE)
         if now - self._shown >= interval:
             self._shown = now
-            self._show(elapsed)
+            with suppress(OSError):  # the terminal is gone
+                self._show(elapsed)
 
     def tell(self, line: str, tell: Callable[[str], None]) -> None:
         """Print a line, above the bar where there is one."""
@@ -103,10 +104,10 @@ class Progress:
         """Show the state at the end."""
         if not self._visible:
             return
-        self._show(time.monotonic() - self._started)
-        if self._bar is not None:
-            self._bar.close()
-            self._lines_above.close()
+        with self._lines_above, suppress(OSError):
+            self._show(time.monotonic() - self._started)
+            if self._bar is not None:
+                self._bar.close()
 
     def _show(self, elapsed: float) -> None:
         tally = self._counter.tally()

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import signal
-import threading
 import time
 from collections.abc import Callable
 from types import FrameType
-from typing import Any, Self
+from typing import Any, NoReturn, Self
 
 from cvt_hpc.study.ranks.counter import Counter
 from cvt_hpc.study.ranks.launch import RankDied
 from cvt_hpc.study.ranks.progress import show_duration
+from cvt_hpc.study.ranks.starting import SIGNALS
 from cvt_hpc.study.ranks.time_limit import TimeLimit
 
-# Signals sent by a person at the terminal, by Slurm at the end of a job, and by Slurm as a warning before.
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
 _LOOK_INTERVAL = 0.5  # [s] between checks of the other ranks
 _IMPATIENCE = 1.0  # [s]; a Ctrl-C later than this after the first one ends the process at once
 
@@ -37,13 +35,14 @@ class SignalWatch:
         self._previous: dict[int, Any] = {}
 
     def __enter__(self) -> Self:
-        if threading.current_thread() is threading.main_thread():  # Python has signals there alone
-            self._previous = {number: signal.signal(number, self._note) for number in _SIGNALS}
+        for number in SIGNALS:
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:  # as nohup leaves it
+                self._previous[number] = signal.signal(number, self._note)
         return self
 
     def __exit__(self, *_: object) -> None:
         for number, handler in self._previous.items():
-            signal.signal(number, handler)
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)  # None: not of Python
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         now = time.monotonic()
@@ -52,6 +51,30 @@ class SignalWatch:
         elif number == signal.SIGINT and now - self._noted_at > _IMPATIENCE:
             # Not sooner: the terminal and mpirun may both pass on one Ctrl-C.
             raise KeyboardInterrupt
+
+
+def raise_again(name: str, status: int, everywhere: bool) -> NoReturn:
+    """Raise what a signal means to a script, once its sweep has been stopped.
+
+    Parameters
+    ----------
+    name : str
+        Of the signal.
+    status : int
+        Exit status of a script that leaves it uncaught.
+    everywhere : bool
+        Whether all ranks do so.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        After SIGINT.
+    SystemExit
+        After other signals.
+    """
+    error = KeyboardInterrupt(name) if name == signal.SIGINT.name else SystemExit(status)
+    vars(error)["everywhere"] = everywhere
+    raise error
 
 
 class Stop:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from io import FileIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cvt_hpc.files import naming_refusals
 from cvt_hpc.study.description import Study
@@ -31,6 +32,8 @@ from cvt_hpc.study.record.frames import (
 from cvt_hpc.study.record.index import ENTRY, Records, Timing, choose, open_log
 from cvt_hpc.variables import Status
 
+Places = range | NDArray[np.int64]  # the index in a study of each run of another, or of itself
+
 _ENDED = [int(status) for status in Status if status != Status.NOT_RUN]
 
 
@@ -43,7 +46,7 @@ class _Death(NamedTuple):
     begun: float
 
 
-def read_records(folder: Path, study: Study) -> Records:
+def read_records(folder: Path, study: Study, earlier: Mapping[str, Places] | None = None) -> Records:
     """Return which records all logs of a folder hold.
 
     Of several records of one run that of the latest attempt counts, and of these the earliest written.
@@ -54,9 +57,12 @@ def read_records(folder: Path, study: Study) -> Records:
         The study's folder of records; may be missing.
     study : Study
         The study that the records have to belong to.
+    earlier : mapping, optional
+        Studies from which this one has grown, whose records count as well: by fingerprint, which of its runs
+        each of theirs is.
     """
     logs = _files(folder)
-    reader = _Reader(study)
+    reader = _Reader(study, earlier or {})
     for number, path in enumerate(logs):
         try:
             with open_log(path) as file:
@@ -77,10 +83,10 @@ def _files(folder: Path) -> list[Path]:
 class _Reader:
     """Takes in one log after another."""
 
-    def __init__(self, study: Study) -> None:
+    def __init__(self, study: Study, earlier: Mapping[str, Places]) -> None:
         self.warnings: list[str] = []
         self._study = study
-        self._layout = RecordFormat(study.fingerprint, study.record_dtype)
+        self._sources: dict[str, Places] = {study.fingerprint: range(study.size), **earlier}
         self._found = [np.zeros(0, ENTRY)]
         self._attempts = np.ones(study.size, np.int64)
         self._status = study.record_dtype.fields["status"][1]  # type: ignore[index]  # where it is in a record [byte]
@@ -100,10 +106,21 @@ class _Reader:
         head = os.pread(file.fileno(), PREAMBLE_LIMIT, 0)
         if not head:  # a process that died before its first record
             return
-        session, start = read_preamble(head, self._layout)
+        refusals = []
+        for fingerprint, places in self._sources.items():
+            try:
+                layout = RecordFormat(fingerprint, self._study.record_dtype)
+                return self._read_as(layout, places, number, file, head)
+            except ForeignLog as error:
+                refusals.append(error)
+        raise refusals[0]
+
+    def _read_as(self, layout: RecordFormat, places: Places, number: int, file: FileIO, head: bytes) -> None:
+        """Read a log of a study whose runs have these places in this one; errors as of `read`."""
+        session, start = read_preamble(head, layout)
         flaws: list[str] = []
         trace = _Trace((session or {}).get("refine", 1.0))
-        frames = self._sound_frames(file, start, flaws)
+        frames = self._sound_frames(layout, places, file, start, flaws)
         found = np.fromiter(self._entries(frames, number, trace), ENTRY)
         if session is None and not trace.followed:
             known = head.startswith(MAGIC)
@@ -133,22 +150,23 @@ class _Reader:
         records.warnings[:0] = self.warnings
         return records
 
-    def _sound_frames(self, file: FileIO, start: int, flaws: list[str]) -> Iterator[tuple[int, Frame]]:
+    def _sound_frames(
+        self, layout: RecordFormat, places: Places, file: FileIO, start: int, flaws: list[str]
+    ) -> Iterator[tuple[int, Frame]]:
         """Yield place and content of the frames that name runs of the study; the rest goes to `flaws`."""
         size = os.fstat(file.fileno()).st_size
-        for begin, end, frame in self._layout.frames(file, start, size):
-            if frame is not None and self._is_sound(frame):
-                yield begin, frame
-            elif end == size and end - begin < self._layout.record_size:
+        for begin, end, frame in layout.frames(file, start, size):
+            if frame is not None and self._is_sound(frame, len(places)):
+                named = [(int(places[run]), attempt) for run, attempt in frame.places]
+                yield begin, frame._replace(places=named)
+            elif end == size and end - begin < layout.record_size:
                 flaws.append(f"the last {end - begin} bytes are an unfinished record")
             else:
                 flaws.append(f"bytes {begin} to {end} are damaged")
 
-    def _is_sound(self, frame: Frame) -> bool:
-        """Whether a frame with a right checksum holds content that a sweep may have written."""
-        places = all(
-            0 <= run < self._study.size and 0 < attempt <= MOST_ATTEMPTS for run, attempt in frame.places
-        )
+    def _is_sound(self, frame: Frame, runs: int) -> bool:
+        """Whether a frame with a right checksum holds what a sweep of so many runs may have written."""
+        places = all(0 <= run < runs and 0 < attempt <= MOST_ATTEMPTS for run, attempt in frame.places)
         ended = frame.kind != RECORD or frame.row[self._status] in _ENDED
         return places and ended and 0.0 <= frame.written < LATEST
 

@@ -1,0 +1,18 @@
+"""Ends the process that has started it unless its input ends in time; a program, see `starting`."""
+
+import os
+import select
+import signal
+import sys
+
+
+def watch(seconds: float, line: str) -> None:
+    """Wait for the end of the input; after so long [s] print a line and kill the parent process."""
+    parent = os.getppid()
+    if not select.select([0], [], [], seconds)[0]:
+        os.write(2, f"{line}\n".encode())
+        os.kill(parent, signal.SIGKILL)
+
+
+if __name__ == "__main__":
+    watch(float(sys.argv[1]), sys.argv[2])
