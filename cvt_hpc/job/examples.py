@@ -32,7 +32,7 @@ def example_files() -> dict[str, Path]:
     """
     root = Path(cvt_hpc.__file__).parents[1]
     if (settings := root / "pyproject.toml").is_file():
-        kept = tomllib.loads(settings.read_text())["tool"]["setuptools"]["data-files"]
+        kept = tomllib.loads(settings.read_text("utf-8"))["tool"]["setuptools"]["data-files"]
         patterns = [pattern for listed in kept.values() for pattern in listed]
         paths = {path for pattern in patterns for path in root.glob(pattern) if path.is_file()}
         files = {path.relative_to(root).as_posix(): path for path in paths}
