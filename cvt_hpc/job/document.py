@@ -33,7 +33,8 @@ def read_document(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise mismatch(str(path), "a job file", str(error.strerror)) from None
     except ValueError:  # bytes that are no UTF-8, or a NUL in the path
-        raise mismatch(str(path), "a text file (TOML in UTF-8)", "binary data") from None
+        found = "another encoding or binary data"
+        raise mismatch(str(path), "a text in UTF-8", found, "save it in UTF-8") from None
     document = _parse(text, str(path))
     check_keys(document, str(path))
     return document

@@ -12,6 +12,9 @@ HEAD = 'name = "x"\nmodel = "toy"\n'
 THRUST = '[scene]\nthrust = "20 kN"\n'
 IN_N = 'expected a value in N (such as "1 N" or a bare number in N), found'
 IN_KG_PER_M = 'expected a value in kg/m (such as "1 kg/m" or a bare number in kg/m), found'
+OTHER_ENCODING = (
+    "x.toml: expected a text in UTF-8, found another encoding or binary data; save it in UTF-8"
+)
 A_WORD = "expected a word of letters, digits, '.', '_' and '-' (it names the output folder), found"
 
 
@@ -130,7 +133,9 @@ def test_head(write_job, text, message):
             b"a" + b".a" * 5000 + b" = 1",
             "x.toml: expected lists and tables nested at most 20 deep, found deeper ones",
         ),
-        (b"\x7fELF\x00\xff\xfe", "x.toml: expected a text file (TOML in UTF-8), found binary data"),
+        (b"\x7fELF\x00\xff\xfe", OTHER_ENCODING),
+        ('name = "B\u00e4nder"'.encode("latin-1"), OTHER_ENCODING),
+        ('name = "x"'.encode("utf-16"), OTHER_ENCODING),
     ],
 )
 def test_files_that_are_not_toml(tmp_path, monkeypatch, content, message):

@@ -127,6 +127,13 @@ def test_a_rank_that_is_gone_before_mpi_starts_is_not_waited_for_without_end(sid
     assert "expected all 2 ranks to start it within 1 s, found that rank 0 waits for others" in line
 
 
+def test_a_rank_that_waits_ends_also_where_nobody_can_read_why(spawn):
+    waits = "from cvt_hpc.study.ranks.starting import bounded_start\nimport time\n"
+    waits += "with bounded_start(0, 2): time.sleep(20)"
+    command = ["sh", "-c", 'exec "$0" -c "$1" 2>&-', sys.executable, waits]
+    assert spawn(command, {"CVT_HPC_RANK_WAIT": "0.5"}).finish().returncode == -signal.SIGKILL
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_signals_end_ranks_that_wait_for_mpi_to_start(side_by_side, number):
     sweep = side_by_side((*OURS, "run", "x.toml"), ("-c", "raise SystemExit(3)"))
@@ -155,6 +162,11 @@ def test_a_rank_can_sweep_by_itself(start, tmp_path):
     finished = start(options, ranks=2).finish()
     assert finished.returncode == 0, finished.stderr
     assert json.loads(finished.stdout)["done"] == 12
+
+
+def test_the_time_that_is_left_may_differ_between_ranks(start, tmp_path):
+    finished = start({"out": tmp_path / "out", "time_left": True}, ranks=2).finish()
+    assert finished.returncode == 0, finished.stderr
 
 
 def test_threads_are_refused(tmp_path):

@@ -10,8 +10,10 @@ def watch(seconds: float, line: str) -> None:
     """Wait for the end of the input; after so long [s] print a line and kill the parent process."""
     parent = os.getppid()
     if not select.select([0], [], [], seconds)[0]:
-        os.write(2, f"{line}\n".encode())
-        os.kill(parent, signal.SIGKILL)
+        try:
+            os.write(2, f"{line}\n".encode())
+        finally:  # whatever became of the line, as where nobody reads it
+            os.kill(parent, signal.SIGKILL)
 
 
 if __name__ == "__main__":
