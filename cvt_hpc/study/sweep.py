@@ -94,6 +94,7 @@ def run(
     time_limit : float, optional
         Time [s] in which the sweep is to end; some of it is reserved for gathering the dataset. Within a
         Slurm job, that until its end by default. Runs that are not expected to end in time are not started.
+        That of rank 0 counts: ranks that read their clocks have different ones.
     run_limit : float, optional
         Time [s] that a run may take; runs that take longer are recorded as timed out.
     retry : collection of Status, optional
@@ -143,7 +144,6 @@ def run(
         "out": str(folder.path),
         "part": part,
         "fresh": fresh,
-        "time_limit": time_limit,
         "run_limit": run_limit,
         "retry": [status.name for status in retry],
         "refine": refine,

@@ -209,7 +209,7 @@ def main(options: dict[str, Any]) -> int:
     Options: `out`; `runs`, the length of the only axis; `parameters`, `design` and `histories` of the job; `sweep`, further arguments of
     `run`; `slow`, `largest_file` and `lanes`, see `Simulator`; `thread_level` of MPI; `break_rank`, the rank whose log
     has a defect, and whether the program `swallows_defects`; `break_rank_after`, the rank that raises when the
-    sweep is over; `only_rank`, the only one that sweeps.
+    sweep is over; `only_rank`, the only one that sweeps; `time_limits` of the ranks.
     """
     if "thread_level" in options:
         import mpi4py
@@ -230,10 +230,11 @@ def main(options: dict[str, Any]) -> int:
     kept = tuple(options.get("histories", ()))
     job = Job(axes, options.get("parameters", {}), design=options.get("design", {}), histories=kept)
     simulator = Simulator(options.get("slow"), options.get("largest_file"), options.get("lanes", 1))
+    further = {"raises": False, **options.get("sweep", {})}
+    if "time_limits" in options:
+        further["time_limit"] = options["time_limits"][process_rank()]
     try:
-        report = run(
-            job, Path(options["out"]), simulator=simulator, **{"raises": False, **options.get("sweep", {})}
-        )
+        report = run(job, Path(options["out"]), simulator=simulator, **further)
     except InputError as error:
         if process_rank() == 0:
             print(f"error: {error}", file=sys.stderr)
