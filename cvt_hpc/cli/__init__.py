@@ -74,16 +74,15 @@ def main(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
-    except (MemoryError, RuntimeError) as error:
-        if not isinstance(error, MemoryError) and not str(error).startswith("NetCDF: "):
-            traceback.print_exc()
-            return CRASHED
-        complain(f"a dataset: expected values that can be read, found damaged or too many ones: {error}")
-        return BAD_INPUT
-    except Exception:  # Python's own status for a defect, 1, means here that some runs failed
+    except Exception as error:
+        if isinstance(error, MemoryError) or str(error).startswith("NetCDF: "):
+            line = f"a dataset: expected values that can be read, found damaged or too many ones: {error}"
+            end_all(BAD_INPUT, line)
+            complain(line)
+            return BAD_INPUT
         traceback.print_exc()
         end_all(CRASHED)
-        return CRASHED
+        return CRASHED  # Python's own status for a defect, 1, means here that some runs failed
 
 
 @contextmanager

@@ -424,11 +424,25 @@ def test_other_ranks_are_silent(write_job, call, monkeypatch, variable):
     assert call("run", "x.toml", "--dry-run") == (0, [], [])
 
 
-def test_a_defect_is_no_failed_run(call, monkeypatch):
-    monkeypatch.setattr("cvt_hpc.study.read_status", lambda path: 1 / 0)
+@pytest.mark.parametrize(
+    ("error", "expected"),
+    [
+        (ZeroDivisionError("x"), (70, "ZeroDivisionError: x")),
+        (RuntimeError("x"), (70, "RuntimeError: x")),
+        (MemoryError("x"), (2, "too many ones: x")),
+        (RuntimeError("NetCDF: x"), (2, "too many ones: NetCDF: x")),
+    ],
+)
+def test_a_defect_is_no_failed_run_and_ends_all_ranks(call, monkeypatch, error, expected):
+    def fail(path):
+        raise error
+
+    ended = []
+    monkeypatch.setattr("cvt_hpc.study.read_status", fail)
+    monkeypatch.setattr("cvt_hpc.cli.end_all", lambda status, line="": ended.append(status))
     status, out, err = call("status", "out/x")
-    assert (status, out) == (70, [])
-    assert err[-1] == "ZeroDivisionError: division by zero"
+    assert (status, out, ended) == (expected[0], [], [expected[0]])
+    assert err[-1].endswith(expected[1])
 
 
 def test_an_interrupt_ends_with_130(write_job, call, monkeypatch):
