@@ -23,7 +23,6 @@ from cvt_hpc.study.growth import places_in
 from cvt_hpc.study.job_difference import difference_in_words, flatten
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.record.log import KEPT
-from cvt_hpc.study.stored import MOST_RUNS
 from cvt_hpc.study.tracing import inferred_classes
 from cvt_hpc.variables import Status, Variable
 from cvt_hpc.vibration.classes import OccurrenceClass
@@ -126,21 +125,18 @@ def _read_held(path: Path) -> tuple[dict[str, Any], np.ndarray]:
     """Return the resolved job of a dataset, and how each of its runs has ended; or nothing."""
     import h5py
 
+    from cvt_hpc.foreign_files import DAMAGE, check_hdf5
+
     nothing: tuple[dict[str, Any], np.ndarray] = {}, np.zeros(0, np.int8)
     if kind_of(path) != "a file":
         return nothing
     try:
-        # Whoever else has locked it; anybody may have made it: no link is followed, no other file read.
-        with h5py.File(path, "r", locking=False) as file:
-            if not isinstance(file.get("status", getlink=True), h5py.HardLink):
-                return nothing
-            stored = file["status"]
-            if stored.dtype != np.int8 or stored.size > MOST_RUNS or stored.is_virtual or stored.external:
-                return nothing
+        check_hdf5(path, path.stat().st_size, str(path))
+        with h5py.File(path, "r", locking=False) as file:  # whoever else has locked it
             job = json.loads(file.attrs["job"])
             flatten(job)  # not nested too deep
-            return job, np.ravel(stored[()])
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError):
+            return job, np.ravel(file["status"][()])
+    except (InputError, *DAMAGE):
         return nothing
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 _DTYPE = re.compile(r"f[48]|[iu][1248]|S[1-9]\d{0,3}")
 _FINGERPRINT = re.compile(r"[0-9a-f]{64}")
-MOST_RUNS = 10**8
+_MOST_RUNS = 10**8
 _LARGEST_RECORD = 1 << 26  # [bytes]
 _NEEDED = {"status": "i1", "vibrates": "i1"}  # `reason`, where there is one, is a text
 
@@ -45,7 +45,7 @@ def check_stored(entry: Mapping[str, Any]) -> None:
     _need(len(set(names)) == len(names), "names", "different ones")
     shape = _check_job(entry["job"], axes)
     size = math.prod(shape.values())
-    _need(size <= MOST_RUNS, "axes", f"{MOST_RUNS} runs at most")
+    _need(size <= _MOST_RUNS, "axes", f"{_MOST_RUNS} runs at most")
     for one in derived:
         along = one["dims"]
         _need(isinstance(along, list) and all(name in [*shape] for name in along), one["name"], "axes")
