@@ -210,7 +210,7 @@ def test_results_are_opened_in_the_chunks_of_the_file(dataset, tmp_path):
 def test_opening_what_is_no_dataset(tmp_path):
     run(JOB, tmp_path, simulator=Simulator(), progress=False)
     (tmp_path / "results.nc").write_text("mine")
-    with pytest.raises(InputError, match="expected a netCDF dataset"):
+    with pytest.raises(InputError, match="expected a netCDF file, found one that is damaged"):
         open_results(tmp_path)
     (tmp_path / "results.nc").unlink()
     with pytest.raises(InputError, match="cvt-hpc gather"):
