@@ -21,7 +21,7 @@ from cvt_hpc.files import written_aside
 from cvt_hpc.job.shown import heading, shown, shown_number
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
-from cvt_hpc.study.job_difference import differences, short
+from cvt_hpc.study.job_difference import differences, short_pair
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.agreement import (
     CONTRADICTIONS,
@@ -316,7 +316,7 @@ def _in_words(found: Mapping[str, tuple[Any, Any]]) -> Iterator[str]:
     """Yield the differences of two studies in words."""
     for key, (in_a, in_b) in found.items():
         if in_a is not None and in_b is not None:
-            yield f"{key}: {short(in_a)} in A, {short(in_b)} in B"
+            yield "{}: {} in A, {} in B".format(key, *short_pair(in_a, in_b))
     for label, missing in (("A", 1), ("B", 0)):
         alone = [key for key, pair in found.items() if pair[missing] is None]
         if alone:

@@ -32,12 +32,7 @@ def difference_in_words(found: Mapping[str, Any], asked: Mapping[str, Any]) -> s
 def _pair_in_words(there: Any, here: Any) -> str:
     """Return in words how two values differ: of lists the values that only one of them has."""
     if not isinstance(there, list) or not isinstance(here, list) or len(f"{there}{here}") <= _LONGEST:
-        first, second = short(there), short(here)
-        if first == second:  # what differs is behind the cut
-            texts = json.dumps(there), json.dumps(here)
-            same = len(os.path.commonprefix(texts))
-            first, second = (f"...{text[max(same - 10, 0) :][:_LONGEST]}" for text in texts)
-        return f"is {first} there, {second} here"
+        return "is {} there, {} here".format(*short_pair(there, here))
     gone, more = (
         [value for value in one if value not in other] for one, other in ((there, here), (here, there))
     )
@@ -72,3 +67,12 @@ def short(value: Any) -> str:
     """Return a value of a resolved job in 40 letters at most."""
     text = "not set" if value is None else json.dumps(value)
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+
+
+def short_pair(one: Any, other: Any) -> list[str]:
+    """Return two values of a resolved job that differ, each as short, from where they differ if need be."""
+    if (first := short(one)) != (second := short(other)):
+        return [first, second]
+    texts = [json.dumps(one), json.dumps(other)]
+    begin = max(len(os.path.commonprefix(texts)) - 10, 0)
+    return [f"...{text[begin:][:_LONGEST]}" for text in texts]

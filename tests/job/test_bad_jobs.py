@@ -12,9 +12,7 @@ HEAD = 'name = "x"\nmodel = "toy"\n'
 THRUST = '[scene]\nthrust = "20 kN"\n'
 IN_N = 'expected a value in N (such as "1 N" or a bare number in N), found'
 IN_KG_PER_M = 'expected a value in kg/m (such as "1 kg/m" or a bare number in kg/m), found'
-OTHER_ENCODING = (
-    "x.toml: expected a text in UTF-8, found another encoding or binary data; save it in UTF-8"
-)
+OTHER_ENCODING = "x.toml: expected a text in UTF-8, found another encoding or binary data; save it in UTF-8"
 A_WORD = "expected a word of letters, digits, '.', '_' and '-' (it names the output folder), found"
 
 

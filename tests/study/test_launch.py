@@ -69,7 +69,8 @@ def test_an_mpi_without_threads_is_refused(start, tmp_path):
 
 
 JOB = 'name = "x"\nmodel = "elastic_belt"\n[friction]\nfriction_law = "table"\ntable_file = "mu.csv"\n'
-TABLE = "force [N/m], speed [m/s], mu\n1, 0, 0.2\n1, 1, 0.1\n2, 0, 0.2\n2, 1, "
+TABLE = "force [N/m], speed [m/s], mu\n" + "".join(f"{f}, 0, 0.2\n{f}, 1, 0.1\n" for f in range(1, 9))
+TABLE += "9, 0, 0.2\n9, 1, "
 OLDER = "import cvt_hpc, cvt_hpc.cli, sys; cvt_hpc.__version__ = '0.0'; sys.exit(cvt_hpc.cli.main())"
 OURS = ("-m", "cvt_hpc")
 
@@ -100,7 +101,7 @@ def side_by_side(spawn, tmp_path):
         (
             (*OURS, "run", "x.toml"),
             "0.15",
-            r"job.friction.table_mu: expected .*, as rank 0 has it",
+            r"job.friction.table_mu: expected \.\.\..* 0\.1\]*, as rank 0 has it, found \.\.\..* 0\.15\]*; ",
         ),
         (("-c", OLDER, "run", "x.toml"), "0.1", "program.cvt_hpc: expected .*, as rank 0 has it"),
     ],

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeAlias, TypeVar
 
 from cvt_hpc.errors import BAD_INPUT, CRASHED, InputError, mismatch
 from cvt_hpc.files import append_text
-from cvt_hpc.study.job_difference import differences, short
+from cvt_hpc.study.job_difference import differences, short_pair
 from cvt_hpc.study.ranks.starting import await_all, bounded_start
 
 if TYPE_CHECKING:
@@ -182,9 +182,10 @@ class Team:
             error = caught
         self._share(error)
         mine = plan(result)
-        for key, (ours, here) in differences(self.communicator.bcast(mine), mine).items():
+        for key, pair in differences(self.communicator.bcast(mine), mine).items():
+            first, here = short_pair(*pair)
             then = "start all ranks with the same job, options and version"
-            error = mismatch(key, f"{short(ours)}, as rank 0 has it", short(here), then)
+            error = mismatch(key, f"{first}, as rank 0 has it", here, then)
             break
         self._share(error)
         return result
