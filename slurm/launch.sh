@@ -30,13 +30,13 @@ if [ -n "${CVT_HPC_CONTAINER:-}" ]; then
 fi
 # One rank a core: threads of numerical libraries would only get in each other's way.
 export OMP_NUM_THREADS=1
-# Machine code is kept on a disk of each node, in a folder of this job alone, which is removed at its end: caches on
-# network file systems are slow, and not always sound. A NUMBA_CACHE_DIR that is set at submission is used instead and
-# stays, so that further jobs need not compile again.
 if [ -n "${TMPDIR:-}" ] && { [ ! -d "$TMPDIR" ] || [ ! -w "$TMPDIR" ]; }; then # such as that of the login node
     echo "TMPDIR: $TMPDIR is no folder to write to on ${HOSTNAME:-this node}; /tmp is used instead" >&2
     unset TMPDIR
 fi
+# Machine code is kept on a disk of each node, in a folder of this job alone, which is removed at its end: caches on
+# network file systems are slow, and not always sound. A NUMBA_CACHE_DIR that is set at submission is used instead and
+# stays, so that further jobs need not compile again.
 own_cache=
 if [ -z "${NUMBA_CACHE_DIR:-}" ]; then
     own_cache=$(mktemp -d "${TMPDIR:-/tmp}/cvt_hpc-numba-XXXXXXXXXX") || exit 2
