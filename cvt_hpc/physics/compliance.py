@@ -48,7 +48,8 @@ INVERSE_11, INVERSE_12, INVERSE_22, ROUND_OFF, SOLVES, UNSOLVED = range(5, 11)
 CLEARANCE, LEAST_LOAD, DIRECTION_ERROR, AXIS_COSINE, AXIS_SINE, LARGER, LESSER = range(11, 18)
 LOOSE_1, LOOSE_2 = range(18, 20)
 
-# Forces are 1e5 N/m and come from openings that are 1 % of their parts: the error that each precision leaves.
+# Forces of the default scene are 1e5 N/m and come from openings that are 1 % of their parts: the error [N/m]
+# that each precision leaves.
 _ROUND_OFF = {np.dtype(np.float64): 1e-6, np.dtype(np.float32): 2.0}
 _DIRECTION_ERROR = {np.dtype(np.float64): 1e-13, np.dtype(np.float32): 1e-6}  # some ten roundings
 
@@ -112,13 +113,13 @@ def lane_contact(wraps: list[Sheaves], dtype: DTypeLike, sweeps: int = 0) -> Con
     stations = LaneArray(weight.size, 10, len(wraps), dtype)
     scalars = LaneArray(1, 20, len(wraps), dtype)
     stations.data[:, CLOSED] = 1.0
-    scalars.data[:, ROUND_OFF] = _ROUND_OFF[np.dtype(dtype)]
-    scalars.data[:, LEAST_LOAD] = _ROUND_OFF[np.dtype(dtype)] * weight.sum()
     scalars.data[:, DIRECTION_ERROR] = _DIRECTION_ERROR[np.dtype(dtype)]
     # the inverse of a tilt that is part of a matrix
     scalars.data[:, [INVERSE_11, INVERSE_22]] = 1.0
     for lane, wrap in enumerate(wraps):
         stations.data[:, DIAGONAL, lane] = wrap.diagonal
+        round_off = _ROUND_OFF[np.dtype(dtype)] * wrap.line_forces
+        scalars.data[0, [ROUND_OFF, LEAST_LOAD], lane] = round_off, round_off * weight.sum()
         scalars.data[0, :INVERSE_11, lane] = (
             wrap.element_stiffness,
             wrap.compliance,

@@ -6,7 +6,8 @@ from cvt_hpc.kernels import merged_kernel
 from cvt_hpc.lanes import fma, maximum, sqrt
 from cvt_hpc.physics.friction import saturation
 
-LEAST_SPEED = 1e-9  # [m/s]: below it the direction of sliding is of no effect, friction is linear there
+# Of the regularisation speed: below it the direction of sliding is of no effect, friction is linear there
+LEAST_SHARE = 3e-8
 
 
 @merged_kernel
@@ -77,7 +78,7 @@ def flank_forces(
         Forces of both flanks, outward and along the belt [N/m].
     """
     speed, meridian = flank_sliding(v_radial, v_tangential, 1.0 / cosine)
-    speed = maximum(speed, LEAST_SPEED)
+    speed = maximum(speed, LEAST_SHARE * width)
     factor, _ = saturation(speed, 1.0 / width)
     mu = coefficient * factor
     axial_share, radial_share = flank_shares(mu, meridian / speed, sine, cosine)

@@ -40,6 +40,8 @@ class Sheaves(NamedTuple):
         Discs whose inertia counts; W has them at rest.
     clearance : float
         Opening of the groove [m] by which collar and shaft tilt before they bear.
+    line_forces : float
+        Size of the axial line forces over that of the default scene [1].
     """
 
     weight: np.ndarray
@@ -53,6 +55,7 @@ class Sheaves(NamedTuple):
     flexibilities: np.ndarray
     modes: Modes
     clearance: float = 0.0
+    line_forces: float = 1.0
 
 
 def sheaves(

@@ -6,4 +6,5 @@ GROSS_SLIP = 0.05  # of the belt's speed: beyond, a pulley slips grossly
 # of the driven pulley's speed without slip: below, under a load, and above, under one that drives, the belt
 # slips through, and the run ends
 LEAST_SPEED, MOST_SPEED = 0.5, 1.5
-LARGEST_DISPLACEMENT = 10e-3  # [m]: a belt that is further off its path has left its grooves
+# of the distance of the shafts: a belt that is further off its path has left its grooves
+LARGEST_DISPLACEMENT = 2 / 31

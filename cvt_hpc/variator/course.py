@@ -7,10 +7,6 @@ import numpy as np
 from cvt_hpc.kernels import merged_kernel
 from cvt_hpc.lanes import like
 
-START_DAMPING = (
-    1e4  # [N s/m^2], fades out over rise_time: lets the belt settle in the grooves without ringing
-)
-
 
 @merged_kernel
 def load_course(time: float, rise_time: float, ramp_end: float, start, load):
@@ -34,7 +30,7 @@ def speed_course(time: float, rise_time: float, ramp_end: float, start):
 
 
 @merged_kernel
-def start_damping(time: float, rise_time: float) -> float:
-    """Transverse damping added by the start-up [N s/m^2]."""
+def faded_damping(time: float, rise_time: float, start_damping: float) -> float:
+    """Transverse damping that is left of the start-up's [N s/m^2]: it fades out over `rise_time`."""
     left = max(1.0 - time / rise_time, 0.0)
-    return START_DAMPING * left * left
+    return start_damping * left * left

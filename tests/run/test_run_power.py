@@ -79,7 +79,7 @@ def flow(found):
 def test_the_balance_closes(name):
     run, tolerance = settled(name)
     assert abs(balance(run)["power_residual"]) < tolerance
-    assert tolerance < power_limit(run.mesh.cell.min())
+    assert tolerance < power_limit(run.mesh)
 
 
 @pytest.mark.parametrize("name", DEFAULT_MESH)

@@ -17,7 +17,7 @@ from cvt_hpc.models.elastic_belt.parameters import check
 from cvt_hpc.models.elastic_belt.recorded_run import recording
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP, SAFE_SHARE, chosen_step, transverse_limit
 from cvt_hpc.models.elastic_belt.transient import Transient
-from cvt_hpc.models.elastic_belt.validity import LARGEST_STEP_RIPPLE, doubt, step_doubt
+from cvt_hpc.models.elastic_belt.validity import doubt, step_doubt
 from cvt_hpc.variables import Status, Vibrates
 from support.fast_runs import FastRuns
 from support.marched import fresh_record, job, record
@@ -57,7 +57,7 @@ def test_saddles_stick_however_stiff_their_friction_is(ratio):
     assert (found["status"], found["vibrates"]) == (Status.DONE, Vibrates.NO)
     # of rings that chatter 7e-2, 60 mm/s and up to 3 um; a mesh of 48 stations leaves 1.7e-3 at ratio 0.5 at any step
     assert abs(found["power_residual"]) < 2e-3
-    assert found["step_ripple"] < 0.1 * LARGEST_STEP_RIPPLE
+    assert found["step_ripple"] < 0.1 * job().point(0)["most_step_ripple"]
     assert found["amplitude"].max() < 0.3e-6
 
 
@@ -105,10 +105,11 @@ def test_a_step_beyond_the_limit_is_named():
 
 
 def test_speeds_that_alternate_from_step_to_step_are_no_result():
-    mesh = recording(job().point(0), np.float64).mesh
-    sound = {"power_residual": 1e-4, "least_strand_force": 1e3, "step_ripple": 0.5 * LARGEST_STEP_RIPPLE}
-    assert doubt(sound, 0.5, mesh) is None
-    status, why = doubt(sound | {"step_ripple": 20e-3}, 0.5, mesh)
+    point = job().point(0)
+    mesh, ripple = recording(point, np.float64).mesh, 0.5 * point["most_step_ripple"]
+    sound = {"power_residual": 1e-4, "least_strand_force": 1e3, "step_ripple": ripple}
+    assert doubt(sound, point, mesh) is None
+    status, why = doubt(sound | {"step_ripple": 20e-3}, point, mesh)
     assert status is Status.FAILED_NUMERICS and "from step to step, by 20 mm/s" in why
 
 
@@ -136,6 +137,7 @@ def chosen(**values):
 
 def test_the_step_is_chosen_for_the_scene():
     assert chosen() == REFERENCE_STEP
+    assert chosen(band_high=3000.0) == pytest.approx(0.5 * REFERENCE_STEP)
     assert chosen(step_error=0.01) == pytest.approx(0.5 * REFERENCE_STEP)
     fine = job(stations=288).point(0)
     assert chosen(stations=288) == pytest.approx(

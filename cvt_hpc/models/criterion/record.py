@@ -129,7 +129,7 @@ def _limit_amplitude(f: Flank, is_fed: np.ndarray) -> float:
     if not ends.size:
         return np.nan
     low, high = RELATIVE_AMPLITUDES[ends[-1] : ends[-1] + 2] * f.speed / f.angular_frequency
-    return brentq(lambda x: energy_per_cycle(f, np.array([x]))[0], low, high, rtol=1e-9)
+    return brentq(lambda x: energy_per_cycle(f, np.array([x]))[0], low, high, xtol=1e-12 * high, rtol=1e-9)
 
 
 def _critical_gradient(f: Flank) -> float:

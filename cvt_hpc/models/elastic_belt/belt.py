@@ -16,6 +16,7 @@ import numpy as np
 from cvt_hpc.models.elastic_belt.bending import bending_bands, bending_load, squared_curvature
 from cvt_hpc.models.elastic_belt.bending_settings import BENDING_DEFAULTS, CURVATURE_TERMS, has_column
 from cvt_hpc.models.elastic_belt.deflection_settings import disc_settings
+from cvt_hpc.models.elastic_belt.grouping import faded_coupling
 from cvt_hpc.models.elastic_belt.pulleys import (
     DRIVEN_COS,
     DRIVING_COS,
@@ -33,6 +34,8 @@ from cvt_hpc.physics.sheaves import (
     sheaves,
     stiffness_factors,
 )
+from cvt_hpc.variator import LARGEST_DISPLACEMENT
+from cvt_hpc.variator.measures import Measures, measures, rounded
 from cvt_hpc.vibration.ramped import ramped
 
 FIELDS = ("w", "u", "v_element", "v_ring", "v_filtered", "n_element", "n_ring")
@@ -52,6 +55,8 @@ class Belt(NamedTuple):
     `bending` is (N, 5): force per length on station j from the displacements of stations j-2 .. j+2,
     `bending_load` that without displacement; `squared_curvature` is kappa^2 at the stations where curvature
     terms count, else 0, and `curvature_terms` the place among those in CURVATURE_TERMS;
+    `measures` are those of the scene, `faded` is the coupling that counts for nothing, and a belt that is
+    further than `largest_displacement` off its path has left its grooves;
     `ring_relief` is the tension at which the rings' own weight bears them. `belt_speed` is that of the pitch
     line at `driving_speed`; along a ramp of speed both follow `rhs.speed_share_at`. `element_mass` and
     `ring_mass` are the inertia along the path, `mass` that across it. Across a gap the elements' damper may
@@ -110,6 +115,10 @@ class Belt(NamedTuple):
     load_start: float
     speed_start: float
     rise_time: float
+    start_damping: float
+    largest_displacement: float
+    faded: float
+    measures: Measures
     ramp_end: float
 
 
@@ -190,6 +199,7 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     ring_mass = p["ring_mass"] * 0.5 * _pair(cell * (1.0 + kappa * p["ring_offset"])) / dual
     belt_speed = p["driving_speed"] * path.driving_radius
     whole, disc = stiffness_factors(p)
+    size = measures(p)
     wraps = [
         sheaves(
             cell[grid.starts[region]],
@@ -204,8 +214,11 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
         )
         for region, radius in ((0, path.driving_radius), (2, path.driven_radius))
     ]
+    line_forces = rounded(size.force / size.length)
     wraps = [
-        wrap._replace(**disc_settings(p, pulley, (wrap.weight.size, wrap.weight[1], radius)))
+        wrap._replace(
+            line_forces=line_forces, **disc_settings(p, pulley, (wrap.weight.size, wrap.weight[1], radius))
+        )
         for pulley, wrap, radius in zip(
             ("driving", "driven"), wraps, (path.driving_radius, path.driven_radius), strict=True
         )
@@ -232,6 +245,9 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
         element_mass=p["longitudinal_mass"] * p["element_mass"],
         mass=p["element_mass"] + p["ring_mass"],
         belt_speed=belt_speed,
+        largest_displacement=LARGEST_DISPLACEMENT * p["centre_distance"],
+        faded=faded_coupling(p),
+        measures=size,
         bridging_stiffness=np.inf,
         law=law,
         driving=wraps[0],

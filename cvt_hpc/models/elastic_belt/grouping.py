@@ -10,6 +10,7 @@ import numpy as np
 from cvt_hpc.models.elastic_belt import OWN_STEPPERS
 from cvt_hpc.models.elastic_belt.deflection_settings import MODE_KEYS, RITZ
 from cvt_hpc.models.elastic_belt.pulley_settings import are_free
+from cvt_hpc.variator.measures import measures, rounded
 
 # Core-seconds per station and time step of a batch, measured on one core of an EPYC (Zen 5) at 160 stations.
 STEP_COST = {"imex": 1.3e-7, "explicit": 6.2e-8}
@@ -18,6 +19,7 @@ ALONE_SHARE = {"imex": 0.3, "explicit": 0.6}
 
 COST_PER_LAYER = 0.3  # of a ring layer, beside the rings as one
 
+FADED = 0.1  # [N s/m], of the default scene
 LANES = {"double": 8, "single": 16}  # capacity of registers of 64 bytes
 # Values that the runs of a batch have in common: the mesh, the law's kind, and the course of time.
 SHARED = (
@@ -30,6 +32,7 @@ SHARED = (
     "table_speed",
     "table_mu",
     "rise_time",
+    "start_damping",
     "load_history",
     "speed_history",
     "duration",
@@ -85,6 +88,15 @@ def lanes(parameters: Mapping[str, Any], stepper: str) -> int:
     return LANES[parameters["precision"]]
 
 
+def faded_coupling(parameters: Mapping[str, Any]) -> float:
+    """Coupling of stations by an implicit step [N s/m] below which it counts for nothing.
+
+    Others are 1e4 times as large, and more.
+    """
+    size = measures(parameters)
+    return FADED * rounded(size.force * size.time / size.length)
+
+
 def lane_key(parameters: Mapping[str, Any]) -> tuple:
     """Values that two runs must have in common to be in one batch.
 
@@ -94,4 +106,5 @@ def lane_key(parameters: Mapping[str, Any]) -> tuple:
         Resolved parameters of a run.
     """
     alike = (parameters[key] for key in SHARED if key in parameters)
-    return (*alike, parameters["friction_memory"] > 0.0, are_free(parameters))
+    common = parameters["friction_memory"] > 0.0, are_free(parameters), faded_coupling(parameters)
+    return (*alike, *common)

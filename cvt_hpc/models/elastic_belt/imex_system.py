@@ -79,7 +79,6 @@ CENTRED = 0.35
 # the default belt, a tenth of its rings' tension.
 LARGEST_OVERLAP = 1.25e-5
 TURNS_BACK, MEETS = 1, 2  # why a step has to be done again
-FADED = 0.1  # [N s/m]: couplings of stations are 1e3 and more
 
 
 @merged_kernel
@@ -115,7 +114,7 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
     `again` takes those elements as closed that a pass before has found to meet.
     """
     fields, stations, c = state.fields, work.stations, belt.constants
-    last = fields.rows - 1
+    last, faded = fields.rows - 1, belt.faded
     belt_speed = lane_belt_speed(belt, state.time[0])
     element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
     element_damping, ring_damping = c[0, ELEMENT_DAMPING], c[0, RING_DAMPING]
@@ -186,8 +185,8 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
         t00, t01, t11 = fma(-e0 * e0, i00, e0), -e0 * e1 * i01, fma(-e1 * e1, i11, e1)
         s0, s1 = fma(e0, z0, -stress_0), fma(e1, z1, -stress_1)
         # it fades along the belt, beyond all need: kept from numbers so small that the processor slows down
-        c00, c01 = (e0 * g00 + FADED) - FADED, (e0 * g01 + FADED) - FADED
-        c10, c11 = (e1 * g10 + FADED) - FADED, (e1 * g11 + FADED) - FADED
+        c00, c01 = (e0 * g00 + faded) - faded, (e0 * g01 + faded) - faded
+        c10, c11 = (e1 * g10 + faded) - faded, (e1 * g11 + faded) - faded
     x0, x1 = ring_solution(
         (p + t00) + from_ahead(p_b),
         (q + t01) + from_ahead(q_b),
@@ -198,7 +197,7 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
         c01,
         c10,
         c11,
-        FADED,
+        faded,
     )
     stations[last, DV_0], stations[last, DV_1] = x0, x1
 

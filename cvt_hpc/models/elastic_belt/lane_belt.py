@@ -192,6 +192,8 @@ class LaneBelt(NamedTuple):
         Its kind, and the table where it is one; coefficients are in `constants`.
     rise_time, ramp_end : float
         Course of the load and of the speed [s].
+    start_damping, largest_displacement, faded : float
+        As in `Belt`.
     speed_ramps : bool
         Whether some run's driving speed changes.
     is_free : bool
@@ -219,6 +221,9 @@ class LaneBelt(NamedTuple):
     memory: bool
     law: FrictionLaw
     rise_time: float
+    start_damping: float
+    largest_displacement: float
+    faded: float
     ramp_end: float
     speed_ramps: bool
     is_free: bool
@@ -292,6 +297,9 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
         memory=first.friction_memory > 0.0,
         law=FrictionLaw(law.kind, 0.0, 0.0, 0.0, *tables),
         rise_time=first.rise_time,
+        start_damping=first.start_damping,
+        largest_displacement=first.largest_displacement,
+        faded=first.faded,
         ramp_end=first.ramp_end,
         speed_ramps=any(belt.speed_start != belt.driving_speed for belt in belts),
         is_free=first.pulleys.are_free,

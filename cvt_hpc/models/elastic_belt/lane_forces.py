@@ -70,7 +70,7 @@ from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturatio
 from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.lane_gauss_seidel import sweep_lane_contact
 from cvt_hpc.physics.moving_discs import open_gaps, turn_discs
-from cvt_hpc.variator.course import load_course, speed_course, start_damping
+from cvt_hpc.variator.course import faded_damping, load_course, speed_course
 
 MOST_CONTACT_ROUNDS = 200
 LEAST_SHARE_OF_WIDTH = 1e-3  # of friction_speed: below it friction is linear to 1e-6, and has no direction
@@ -227,7 +227,7 @@ def lane_carry(belt: LaneBelt, cell: int, nominal: int, belt_speed):
 @merged_kernel
 def lane_damping(belt: LaneBelt, time: float):
     """Transverse damping [N s/m^2], as `rhs.damping_at`."""
-    damping = belt.constants[0, TRANSVERSE_DAMPING] + start_damping(time, belt.rise_time)
+    damping = belt.constants[0, TRANSVERSE_DAMPING] + faded_damping(time, belt.rise_time, belt.start_damping)
     return damping
 
 

@@ -51,7 +51,8 @@ from cvt_hpc.steppers.system import System
 ROWS = (W, U, V_ELEMENT, V_RING, N_ELEMENT, N_RING)  # of the state, as they follow in y
 VELOCITIES = (U, V_ELEMENT, V_RING)
 
-# Sizes that count alike in each unknown: 0.1 mm off the path, 0.1 m/s of sliding, the strain of the rings.
+# Sizes that count alike in each unknown of the default scene: 0.1 mm off the path, 0.1 m/s of sliding, the
+# strain of the rings.
 SIZES = {W: 1e-4, U: 0.1, V_ELEMENT: 0.1, V_RING: 0.1, V_FILTERED: 0.1, N_ELEMENT: 1e-3, N_RING: 1e-3}
 SIZE_OF_SPEED, SIZE_OF_POSITION = 1.0, 1e-4  # of a pulley [rad/s], [m]
 SIZE_OF_THRUST = 1e3  # [N]
@@ -270,8 +271,28 @@ def system(flat: FlatBelt) -> System:
     n = flat.belt.cell.size
     position_of = np.full(moving.size, -1)
     position_of[n : 2 * n] = np.arange(n)
-    scale = _by_row(flat, SIZES, np.array(SIZES_OF_STATES), SIZE_OF_SPEED, SIZE_OF_POSITION)
+    pulley = sizes_of_pulley(flat.belt)
+    scale = _by_row(flat, sizes(flat.belt), sizes_of_states(flat.belt), *pulley)
     return System(rates, flat, moving, position_of, scale)
+
+
+def sizes(belt: Belt) -> dict[int, float]:
+    """SIZES in the measures of a scene, by row."""
+    size = belt.measures
+    factors = {W: size.length, **dict.fromkeys((U, V_ELEMENT, V_RING, V_FILTERED), size.length / size.time)}
+    return {row: default * factors.get(row, 1.0) for row, default in SIZES.items()}
+
+
+def sizes_of_pulley(belt: Belt) -> tuple[float, float]:
+    """SIZE_OF_SPEED and SIZE_OF_POSITION in the measures of a scene."""
+    return SIZE_OF_SPEED / belt.measures.time, SIZE_OF_POSITION * belt.measures.length
+
+
+def sizes_of_states(belt: Belt) -> np.ndarray:
+    """SIZES_OF_STATES in the measures of a scene."""
+    size, positions = belt.measures, RATIO_SUM - 1
+    factors = [1.0 / size.time, *[size.length] * positions, size.force, size.force]
+    return np.array(SIZES_OF_STATES) * factors
 
 
 def _by_row(flat: FlatBelt, values: dict[int, float], states: np.ndarray, *scalars: float) -> np.ndarray:

@@ -47,7 +47,16 @@ def _stiffness(
 
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
-    "scene": SCENE,
+    "scene": SCENE
+    | {
+        "start_damping": not_negative(
+            1e4,
+            "N s/m^2",
+            "transverse damping that the start-up adds, so that the belt settles in the grooves without "
+            "ringing; fades out over rise_time",
+            sensible=(1.0, 1e7),
+        )
+    },
     "belt": {
         "element_mass": positive(1.0, "kg/m", "mass per length of the elements", sensible=(0.05, 20.0)),
         "ring_mass": positive(0.3, "kg/m", "mass per length of the rings", sensible=(0.01, 10.0)),
@@ -148,6 +157,16 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     "friction": FRICTION,
     "mesh": {
         "stations": Parameter(160, "", "cells around the belt", minimum=24, maximum=4096),
+    },
+    # Sound runs have 0.001-0.8 mm/s (random scenes up to 1.9), chatter of friction 10 mm/s and more: its
+    # speeds are those over which friction is regularised.
+    "numerics": {
+        "most_step_ripple": positive(
+            2e-3,
+            "m/s",
+            "speed that alternates from step to step, root mean square, beyond which a run fails",
+            sensible=(1e-6, 1.0),
+        ),
     },
     "record": {
         "profile_duration": not_negative(

@@ -125,7 +125,7 @@ def _most_axial_force(p: Mapping[str, Any]) -> dict[str, float]:
     if p["driving_axial"] != "position":
         is_held = p["driving_axial"] == "ratio"
         thrusts["driving"] = p["most_thrust"] if is_held else p["driving_thrust"]
-    moved = 2.0 * np.tan(p["half_wedge_angle"]) * LARGEST_DISPLACEMENT
+    moved = 2.0 * np.tan(p["half_wedge_angle"]) * LARGEST_DISPLACEMENT * p["centre_distance"]
     speeds = {"driving": p["driving_speed"], "driven": p["driving_speed"] / p["ratio"]}
     return {
         pulley: thrust

@@ -205,4 +205,4 @@ class RecordedRun:
         (Status, str) or None
             The reason.
         """
-        return doubt(record, self.parameters["bending_stiffness"], self.mesh)
+        return doubt(record, self.parameters, self.mesh)

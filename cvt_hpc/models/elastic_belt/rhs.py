@@ -45,7 +45,7 @@ from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVING_COS, EXCESS,
 from cvt_hpc.physics.compliance import Contact, plain_contact, solve_wrap
 from cvt_hpc.physics.flank import flank_forces, flank_sliding
 from cvt_hpc.physics.friction import friction_coefficient, saturation
-from cvt_hpc.variator.course import load_course, speed_course, start_damping
+from cvt_hpc.variator.course import faded_damping, load_course, speed_course
 
 
 @merged_kernel
@@ -81,7 +81,7 @@ def belt_acceleration_at(belt: Belt, time: float) -> float:
 @merged_kernel
 def damping_at(belt: Belt, time: float) -> float:
     """Transverse damping [N s/m^2]: the belt's own, and the start-up's until rise_time."""
-    damping = belt.transverse_damping + start_damping(time, belt.rise_time)
+    damping = belt.transverse_damping + faded_damping(time, belt.rise_time, belt.start_damping)
     return damping
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt import one_system
 from cvt_hpc.models.elastic_belt.belt import N_RING, TIME, V_ELEMENT, V_RING, Belt, Mesh, State
-from cvt_hpc.models.elastic_belt.one_system import ROWS, SIZES, FlatBelt
+from cvt_hpc.models.elastic_belt.one_system import ROWS, FlatBelt, sizes
 from cvt_hpc.models.elastic_belt.rhs import speed_share_at
 from cvt_hpc.models.elastic_belt.rings import (
     FIRST_LAYER,
@@ -128,7 +128,8 @@ def system(flat: FlatRings) -> System:
     velocities[first : first + cells] = False
     moving = np.concatenate([velocities, np.repeat([True, False], n * cells)])
     position_of = np.concatenate([one.position_of, np.full(2 * n * cells, -1)])
-    scale = np.concatenate([one.scale, np.repeat([SIZES[V_RING], SIZES[N_RING]], n * cells)])
+    size = sizes(flat.flat.belt)
+    scale = np.concatenate([one.scale, np.repeat([size[V_RING], size[N_RING]], n * cells)])
     return System(rates, flat, moving, position_of, scale)
 
 

@@ -42,7 +42,7 @@ from cvt_hpc.models.elastic_belt.pulley_step import opening_by_tilt
 from cvt_hpc.models.elastic_belt.pulleys import EXCESS, SHIFT
 from cvt_hpc.physics.compliance import SOLVES, UNSOLVED
 from cvt_hpc.physics.flank import tangential_sliding
-from cvt_hpc.variator import LARGEST_DISPLACEMENT, LEAST_SPEED, MOST_SPEED
+from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED
 
 SCALARS = (
     "load",
@@ -77,6 +77,7 @@ STEP_RIPPLE = CHANNELS.index("step_ripple")
 PROFILES = (*MOMENTS, "contact_force", "mean_displacement")
 CONTACT_FORCE, MEAN_DISPLACEMENT = range(len(MOMENTS), len(PROFILES))
 
+LEAST_FORCE = 1e-30  # [N]: less than any wrap bears, for a quotient without force
 LARGEST_STRAIN = 0.05  # of the rings, which break at 1 %
 LARGEST_ELEMENT_STRAIN = 0.2  # gaps of a fifth: all the play in a few cells
 
@@ -262,7 +263,7 @@ def sample(
             open_length += select(force > 0.0, zero, weight[i])
             length += weight[i]
         rows[k, sensed + Scalar.AXIAL_FORCE_DRIVING + wrap] = axial
-        rows[k, sensed + Scalar.SLIP_DRIVING + wrap] = sliding / (maximum(axial, 1e-9) * belt_speed)
+        rows[k, sensed + Scalar.SLIP_DRIVING + wrap] = sliding / (maximum(axial, LEAST_FORCE) * belt_speed)
         rows[k, sensed + Scalar.OPEN_SHARE_DRIVING + wrap] = open_length / length
         rows[k, sensed + Scalar.TILT_DRIVING + wrap] = opening_by_tilt(state, wrap)
     audit(belt, state, stations, axial, sensing.interval, rows, k, sensed + len(SCALARS), profiles)
@@ -297,7 +298,7 @@ def _watch(belt: LaneBelt, state: LaneState, stations: LaneArray, ended: LaneArr
     code = select(like(unsolved, speed) > 0.0, Outcome.NO_CONTACT_SOLUTION.value, code)
     code = select(speed < LEAST_SPEED * nominal, Outcome.SLIPPED_THROUGH.value, code)
     code = select(speed > MOST_SPEED * nominal, Outcome.RAN_AWAY.value, code)
-    code = select(like(largest, speed) > LARGEST_DISPLACEMENT, Outcome.LEFT_THE_GROOVES.value, code)
+    code = select(like(largest, speed) > belt.largest_displacement, Outcome.LEFT_THE_GROOVES.value, code)
     code = select(total <= 0.0, code, Outcome.NOT_FINITE.value)
     running = ended[0, OUTCOME] < 0.5
     ended[0, ENDED_AT] = select(running, like(state.time[0], speed), ended[0, ENDED_AT])

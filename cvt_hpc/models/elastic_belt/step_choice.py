@@ -1,9 +1,9 @@
 """The step of `imex` for a scene: as long as accuracy and stability allow.
 
 **Accuracy.** The step is of first order: its effect on a vibration's amplitude is in proportion to its
-length. REFERENCE_STEP changes it by REFERENCE_ERROR at the working point of the chart. Elsewhere that is no
-bound: of 81 random scenes that vibrate it changes half by more than 1.2 %, a tenth by more than 9 %
-(`README.md`).
+length over the period. REFERENCE_STEP changes it by REFERENCE_ERROR at the working point of the chart, whose
+vibrations are below REFERENCE_BAND. Elsewhere that is no bound: of 81 random scenes that vibrate it changes
+half by more than 1.2 %, a tenth by more than 9 % (`README.md`).
 
 **Stability.** Transverse motion is explicit: beyond 2 / w the shortest waves grow, w being their angular
 frequency under bending, tension and contact (`transverse_limit`). Measured limits are 1.00 to 1.2 of that
@@ -23,10 +23,12 @@ from cvt_hpc.physics.geometry import cell_counts, variator, variator_problems
 from cvt_hpc.physics.sheaves import axial_element_stiffness
 
 REFERENCE_STEP, REFERENCE_ERROR = 4.6e-6, 0.02  # [s], share of the amplitude
+REFERENCE_BAND = 1500.0  # [Hz], of a vibration, as a job has it by band_high
 SAFE_SHARE = 0.75
 SHORTEST = 1e-9  # [s], of a step: of scenes that are beyond all sense
 NEEDS = (
     "step_error",
+    "band_high",
     "ratio",
     "driven_radius",
     "centre_distance",
@@ -72,6 +74,7 @@ def chosen_step(parameters: Mapping[str, Any]) -> float:
     variator, which the model refuses, it is the one by accuracy alone.
     """
     step = REFERENCE_STEP * parameters["step_error"] / REFERENCE_ERROR
+    step *= REFERENCE_BAND / parameters["band_high"]
     if not variator_problems(parameters):
         step = min(step, SAFE_SHARE * transverse_limit(parameters))
     return max(float(f"{step:.2e}"), SHORTEST)

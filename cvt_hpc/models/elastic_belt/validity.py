@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from cvt_hpc.models.elastic_belt.belt import Mesh
@@ -14,14 +15,11 @@ from cvt_hpc.variables import Status
 from cvt_hpc.variator import LARGEST_DISPLACEMENT
 from cvt_hpc.variator.slip import GAINED, LOST
 
-# Limit of the open power balance, over the power that flows, with cells of REFERENCE_CELL. Sound runs of
-# 160 stations leave 0.005-0.2 % (2,000 random scenes: 99 in 100 below 0.05 %, the largest 0.39 %), chatter of
-# friction 0.6 % and more. On coarser meshes the transport leaves more, in proportion to the cells, at
+# Limit of the open power balance, over the power that flows, with REFERENCE_CELLS around the belt. Sound runs
+# of 160 stations leave 0.005-0.2 % (2,000 random scenes: 99 in 100 below 0.05 %, the largest 0.39 %), chatter
+# of friction 0.6 % and more. On coarser meshes the transport leaves more, in proportion to the cells, at
 # any step.
-LARGEST_POWER_RESIDUAL, REFERENCE_CELL = 0.004, 4.1e-3  # [1], [m]
-# Speed that alternates from step to step [m/s]. Sound runs have 0.001-0.8 mm/s (random scenes up to 1.9),
-# chatter of friction 10 mm/s and more: its speeds are those over which friction is regularised.
-LARGEST_STEP_RIPPLE = 2e-3
+LARGEST_POWER_RESIDUAL, REFERENCE_CELLS = 0.004, 159
 BEYOND_LIMIT = 1.25  # of the longest stable step by formula: methods were found to hold up to 1.22 of it
 
 # Of an end with a result the status is done.
@@ -33,7 +31,7 @@ FAILURES = {
     Outcome.NOT_FINITE: (Status.FAILED_NUMERICS, "the state is not a number"),
     Outcome.LEFT_THE_GROOVES: (
         Status.FAILED_NUMERICS,
-        f"the belt is more than {LARGEST_DISPLACEMENT * 1e3:g} mm off its path",
+        f"the belt is off its path by more than {LARGEST_DISPLACEMENT:.1%} of the distance of the shafts",
     ),
     Outcome.OVERSTRAINED: (
         Status.FAILED_NUMERICS,
@@ -74,9 +72,15 @@ def slack_doubt(bending_stiffness: float, cell: float, least_force: float) -> tu
     return Status.FAILED_NUMERICS, f"{found}, where waves as short as its cells grow from {bearable:.3g} N on"
 
 
-def power_limit(cell: float) -> float:
-    """Largest share of the power that flows which the balance may leave open, by a strand's cells [m]."""
-    return LARGEST_POWER_RESIDUAL * max(1.0, cell / REFERENCE_CELL)
+def power_limit(grid: Mesh) -> float:
+    """Largest share of the power that flows which the balance may leave open, by a strand's cells."""
+    around = grid.path.path_length / _strand_cell(grid)
+    return LARGEST_POWER_RESIDUAL * max(1.0, REFERENCE_CELLS / around)
+
+
+def _strand_cell(grid: Mesh) -> float:
+    """Length of the cells of the first strand [m]."""
+    return float(grid.cell[grid.starts[1]])
 
 
 def step_doubt(step: float, limit: float) -> tuple[Status, str] | None:
@@ -87,15 +91,15 @@ def step_doubt(step: float, limit: float) -> tuple[Status, str] | None:
     return Status.FAILED_NUMERICS, f"{why}: shorter waves across the belt grow from step to step"
 
 
-def doubt(record: dict[str, Any], bending_stiffness: float, grid: Mesh) -> tuple[Status, str] | None:
+def doubt(record: dict[str, Any], parameters: Mapping[str, Any], grid: Mesh) -> tuple[Status, str] | None:
     """Whether a run that reached its end is not to be trusted.
 
     Parameters
     ----------
     record : dict
         With `power_residual`, `step_ripple` and `least_strand_force`.
-    bending_stiffness : float
-        EI [N m^2].
+    parameters : mapping
+        Flat values [SI] of the run.
     grid : Mesh
         The belt's mesh.
 
@@ -104,11 +108,11 @@ def doubt(record: dict[str, Any], bending_stiffness: float, grid: Mesh) -> tuple
     (Status, str) or None
         The reason.
     """
-    residual, cell = abs(record["power_residual"]), float(grid.cell[grid.starts[1]])
-    if not residual <= power_limit(cell):
+    residual = abs(record["power_residual"])
+    if not residual <= power_limit(grid):
         why = f"the power balance is open by {residual:.3g} of the power that flows"
         return Status.FAILED_NUMERICS, why
-    if record["step_ripple"] > LARGEST_STEP_RIPPLE:
+    if record["step_ripple"] > parameters["most_step_ripple"]:
         why = f"speeds go to and fro from step to step, by {record['step_ripple'] * 1e3:.3g} mm/s on average"
         return Status.FAILED_NUMERICS, f"{why}: no motion of the belt is as fast"
-    return slack_doubt(bending_stiffness, cell, record["least_strand_force"])
+    return slack_doubt(parameters["bending_stiffness"], _strand_cell(grid), record["least_strand_force"])

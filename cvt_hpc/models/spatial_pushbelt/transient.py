@@ -78,7 +78,8 @@ class Transient(ElementRun):
         """As in the plane; or whether an element is so far out of it that no groove and no ring holds it."""
         elements = of_lanes(self._state.elements)
         lateral = np.abs(elements[:, belt.POSITION + 2])
-        most = LARGEST_DISPLACEMENT + 0.5 * abs(self.parameters["misalignment"])
+        most = LARGEST_DISPLACEMENT * self.parameters["centre_distance"]
+        most += 0.5 * abs(self.parameters["misalignment"])
         if (largest := lateral.max()) > most:
             element = int(lateral.argmax())
             return f"element {element} has left the grooves: it is {largest * 1e3:.3g} mm out of the plane"

@@ -12,7 +12,8 @@ from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.newton import Solvable, newton
 from cvt_hpc.physics.friction import softened
 
-BRIDGING = 10.0  # [N]: dampers push by 100 N or so, which a gap's strain times this does not reach
+# [N], in the default scene: dampers push by 100 N or so, which a gap's strain times this does not reach
+BRIDGING = 10.0
 ON_THE_WAY, AT_HOME = 1e-4, 1e-7  # of the unknowns' sizes: 10 nm and 10 pm of w
 SHORTEST = 1e-3  # of a path: shorter steps are not tried
 DAMPERS = ("element_damping", "ring_damping", "transverse_damping")
@@ -96,7 +97,8 @@ class Continuation:
     def bridge(self, share: float) -> None:
         """Dampers that reach across all gaps (0), or as far as the elements' own stiffness lets them (1)."""
         whole = self.whole.element_stiffness
-        self.equations.under(bridging_stiffness=BRIDGING * (whole / BRIDGING) ** share)
+        least = BRIDGING * self.whole.measures.force
+        self.equations.under(bridging_stiffness=least * (whole / least) ** share)
 
     def friction(self, share: float, wide: Widths = OWN) -> None:
         """Friction between widened and constant (0) and its own (1); it falls with the square."""

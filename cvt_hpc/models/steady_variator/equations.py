@@ -39,14 +39,14 @@ from cvt_hpc.models.elastic_belt.belt import (
     W,
     initial_state,
 )
-from cvt_hpc.models.elastic_belt.one_system import ROWS, SIZES_OF_STATES, flat_belt, rates, unpack
+from cvt_hpc.models.elastic_belt.one_system import ROWS, flat_belt, rates, sizes_of_states, unpack
 from cvt_hpc.models.elastic_belt.pulleys import moving_states
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.steady_variator.linearised import Linearisation
 
 LATE = 1e9  # [s]: load and damping are those after any start-up
-TYPICAL_SPEED = 100.0  # [rad/s]: of the driving pulley, from which on the sizes of speeds are those below
-# sizes that count alike in each unknown: w, eps_0, eps_1, v_f; Q_0, Q_1, driven speed, position
+# sizes that count alike in each unknown of the default scene: w, eps_0, eps_1, v_f; Q_0, Q_1, driven speed,
+# position
 SIZES = (1e-4, 1e-3, 1e-4, 0.1)
 SIZES_OF_SCALARS = (0.1, 0.1, 1.0, 1e-4)
 SPEED = -2  # place of the driven speed among the unknowns
@@ -83,11 +83,12 @@ class Equations:
         self._filtered = slice(3 * n, 3 * n + self._memories)
         self._states = slice(self._filtered.stop, self._filtered.stop + self._moving.size)
         counts = (n, n, n, self._memories)
-        of_states = np.array(SIZES_OF_STATES)[self._moving]
+        of_states = sizes_of_states(belt)[self._moving]
         self.sizes = np.concatenate([np.repeat(SIZES, counts), of_states, SIZES_OF_SCALARS])
-        slow = min(belt.driving_speed / TYPICAL_SPEED, 1.0)
-        self.sizes[self._filtered] *= slow
-        self.sizes[-4:-1] *= slow
+        length, speed = belt.measures.length, belt.measures.length / belt.measures.time
+        self.sizes[:n] *= length
+        self.sizes[self._filtered] *= speed
+        self.sizes[-4:] *= speed, speed, 1.0 / belt.measures.time, length
         # of the rates: those of u, v_element and v_ring, of the filtered speeds and of the pulleys
         self._loose = len(ROWS) * n + self._memories + self._moving
         last = self._flat.origin.size

@@ -16,6 +16,7 @@ OF_THE_COURSE = {
     "speed_history": "constant",
     "speed_start": 1.0,
     "rise_time": 1.0,
+    "start_damping": 1e4,
     "disturbance": 0.0,
     "seed": 1,
 }
@@ -26,7 +27,7 @@ OF_LAGS = ("tilt_lag", "ratio_gain")
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     section: {key: parameter for key, parameter in table.items() if key not in OF_THE_COURSE}
     for section, table in elastic_belt.PARAMETERS.items()
-    if section not in ("rings", "record")  # of a transient
+    if section not in ("rings", "numerics", "record")  # of a transient
 }
 
 

@@ -26,6 +26,7 @@ from cvt_hpc.models.elastic_belt.pulleys import (
 )
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
 from cvt_hpc.models.steady_variator.equations import Equations
+from cvt_hpc.variator.measures import measures
 
 # Keys that free a pulley, each with a value that does not
 HELD = {
@@ -43,7 +44,8 @@ HELD = {
         "bearing_clearance",
     )
 }
-ANY_LAG = 1e-3  # [s]: of a tilt that has clearance and no lag; a steady state does not know it
+# [s], in the default scene: of a tilt that has clearance and no lag; a steady state does not know it
+ANY_LAG = 1e-3
 
 
 def held(parameters: Mapping[str, Any]) -> dict[str, Any]:
@@ -58,7 +60,7 @@ def freed(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
     """Parameters under which a steady state knows of clearances; None where no pulley is free."""
     p = PULLEY_DEFAULTS | dict(parameters)
     if p["tilt_lag"] == 0.0 and (p["collar_clearance"] or p["bearing_clearance"]):
-        p["tilt_lag"] = ANY_LAG
+        p["tilt_lag"] = ANY_LAG * measures(p).time
     return p if are_free(p) else None
 
 

@@ -24,7 +24,8 @@ from cvt_hpc.variator import GROSS_SLIP
 
 __all__ = ["NoSteadyState", "SlipsThrough", "Steady", "SteadyBelt"]
 
-NEAR_LOAD, HALVINGS = 1e-6, 40  # [N m]: how closely a load is met along the driven speed; tries
+# how closely a load is met along the driven speed [N m], in the default scene; tries
+NEAR_LOAD, HALVINGS = 1e-6, 40
 FALLEN = 0.9  # of the largest load: a load that has fallen so far rises no more
 SLIDING = 0.5  # slip of a pulley beyond which no state under a load is looked for
 
@@ -222,13 +223,14 @@ class SteadyBelt:
         braked, ends = Braked(self._equations), [low.unknowns, high.unknowns]
         left = [low.load - load, high.load - load]
         self._course.load(0.0)
+        near_load = NEAR_LOAD * low.belt.measures.force * low.belt.measures.length
         for _ in range(HALVINGS):
             x = ends[0] + left[0] / (left[0] - left[1]) * (ends[1] - ends[0])
             found = braked.at(x[SPEED], x, AT_HOME)
             if found is None:
                 break
             x, off = found[0], found[1] - load
-            if abs(off) < NEAR_LOAD:
+            if abs(off) < near_load:
                 self._course.load(load)
                 return found[0] if (own := newton(self._equations, x, AT_HOME)) is None else own
             side = 0 if off * left[0] > 0.0 else 1
