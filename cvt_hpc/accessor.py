@@ -246,6 +246,8 @@ def _verb(name: str, kind: Kind) -> Any:
 
     def verb(self: Results, *words: Any, **given: Any) -> Figure:
         chosen = signature.bind(self, *words, **given).arguments
+        if word and not word.flag and not words:  # what the command line asks for, too
+            raise mismatch(name, word.text, "nothing")
         at, beside = chosen.pop("at", None), chosen.pop("beside", None)
         del chosen["self"]
         dataset = self._dataset if kind.subject == RESULTS else self._history(name)

@@ -31,10 +31,10 @@ TEXTS = (  # that are texts
     "cvt_hpc_content",
     "starts",
 )
-UNITS = ("units", "job_units", "si_units")  # of a variable
+UNITS = ("units", "job_units")  # of a variable
 WORDS = (*UNITS, "long_name", "comment", "flag_meanings", "spacing", "derived")
 PACKING = ("scale_factor", "add_offset")  # of a variable's attributes or, once applied, its encoding
-LARGEST = 1e100  # value of a coordinate [SI]: squares and cubes are numbers, too
+LARGEST = 1e100  # finite value of a parameter or coordinate [SI]: squares and cubes are numbers, too
 
 
 def check_form(dataset: xr.Dataset, source: str) -> None:

@@ -1,5 +1,6 @@
-# To be sourced by the batch files, in the root of the checkout: `launch COMMAND` runs a command on all tasks of the
-# Slurm job, tells it when the job is about to end, and puts the job back into the queue if it gets on but is not done.
+# The way to start ranks that the batch files share. `launch COMMAND` runs a command on all tasks of the Slurm job,
+# tells it when the job is about to end, and puts the job back into the queue if it gets on but is not done. To be
+# sourced in the root of the checkout.
 #
 # Environment, at submission:
 #     CVT_HPC_LAUNCHER=srun|mpirun    what starts the ranks: Slurm itself, or the mpirun of the MPI library

@@ -150,11 +150,12 @@ def _restored(dataset: xr.Dataset, source: str) -> Iterator[tuple[str, xr.Variab
 def _in_si(variable: xr.Variable, name: str, is_axis: bool, source: str) -> xr.Variable:
     """Numbers in the unit of this program; those in a unit of none of its quantities stay as they are."""
     given = str(variable.attrs.get("units", "")).strip()
-    if given in UNITS or not given and variable.dtype.kind != "f":
-        return variable
     documented = documented_units(is_axis).get(name, "")
     if not given:
-        return _changed_to(variable, variable._data, units=documented) if documented else variable
+        known = documented and variable.dtype.kind == "f"
+        return _changed_to(variable, variable._data, units=documented) if known else variable
+    if given == documented or (given in UNITS and not documented):
+        return variable
     for unit in [documented] if documented else UNITS:
         if factor := _factor(given, unit):
             return _changed_to(variable, variable.data * factor, units=unit)

@@ -23,6 +23,8 @@ from cvt_hpc.variables import Status
 HEIGHT = 3.8  # [inch]
 MOST_PANELS = 3  # side by side
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_PREFIXES = {-6: "µ", -3: "m", 3: "k", 6: "M"}  # of powers of ten
+_PREFIXED = ("m", "m s-1", "s", "N", "N m", "N m-1", "W", "Hz")
 BESIDE = ("-", "--", ":", "-.")
 MARKS = tuple(mark for mark in MARKERS if mark not in {STYLES[kind].mark for kind in WITHOUT_RESULT})
 
@@ -160,6 +162,8 @@ def scale(dataset: xr.Dataset, quantities: Sequence[str]) -> tuple[float, str]:
     if not (np.isfinite(largest) and largest > 0.0) or 0.1 <= largest < 1e4:
         return 1.0, unit
     power = 3 * int(np.floor(np.log10(largest) / 3.0))
+    if power in _PREFIXES and unit in _PREFIXED:
+        return 10.0**-power, _PREFIXES[power] + unit
     return 10.0**-power, f"10{str(power).translate(_RAISED)} {unit}".strip()
 
 

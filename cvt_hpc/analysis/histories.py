@@ -218,7 +218,9 @@ def values_of(attributes: Mapping[str, Any]) -> dict[str, str]:
     try:
         schema = load_schema(job["model"], job["stepper"], "history")
         tables = {key: value for section in schema.sections for key, value in job.get(section, {}).items()}
-        others = [key for key in point if key not in job["axes"] and point[key] != tables.get(key)]
+        # numerics that depart from the job, such as the step, are those that the program has chosen
+        chosen = {*job["axes"], *schema.sections.get("numerics", {})}
+        others = [key for key in point if key not in chosen and point[key] != tables.get(key)]
         # a parameter that follows from others is in no table; where a load was given there is no `load_share`
         keys = [key for key in (*job["axes"], *others) if key in point]
         units = _job_units(attributes)

@@ -36,7 +36,7 @@ NEAREST, NEAR = 0.75, 0.05  # of the way to the line of centres; of the path, ba
 PAPER = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0}  # under names on bars
 LEAST, HEIGHT, FRAME = 1.6, 3.1, 0.7  # [inch]: a variator, and what stands above all
 BALANCE, WHOLE_BELT = 1.3, "#8a8a8a"  # [inch]: what goes in and out; colour of what has no region
-WATTS = 0.01  # of the largest bar: what is smaller has no number
+WATTS = 0.02  # of the largest bar: what is smaller has no number
 
 
 class Drive(NamedTuple):

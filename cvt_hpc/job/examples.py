@@ -98,7 +98,7 @@ def _named(word: str, known: Mapping[str, Path]) -> list[str]:
         or any(word in (str(folder), folder.name) for folder in list(place.parents)[:-1])
     ]
     if not found:
-        stems = [PurePosixPath(name).stem for name in known]
+        stems = dict.fromkeys(PurePosixPath(name).stem for name in known)
         raise unknown(f"examples: {word}", "example", word, stems, "`cvt-hpc examples` lists them")
     return found
 
@@ -114,11 +114,11 @@ def _read_by(name: str, known: Mapping[str, Path]) -> Iterator[str]:
 
 
 def _subject(path: Path) -> str:
-    """What an example is about, by its own first words."""
+    """What an example is about, by the first sentence of its first line."""
     text = path.read_text()
     if path.suffix == ".toml":
         return str(tomllib.loads(text).get("description", ""))
     if path.suffix == ".ipynb":
         text = "".join(json.loads(text)["cells"][0]["source"])
     lines = (line.strip('#" \n') for line in text.splitlines() if not line.startswith("#!"))
-    return next(filter(None, lines), "")
+    return next(filter(None, lines), "").partition(". ")[0]

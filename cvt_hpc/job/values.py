@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.dataset_form import LARGEST
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
 from cvt_hpc.job.plausibility import meant
 from cvt_hpc.job.units import UnitError, from_si, to_si, unit_in
@@ -127,6 +128,8 @@ def _read_number(parameter: Parameter, raw: Any, where: str) -> float:
         value = math.inf
     if math.isnan(value) or (math.isinf(value) and not parameter.allow_infinite):
         raise mismatch(where, _with_unit("a finite value", parameter, " in "), show(raw))
+    if LARGEST < abs(value) < math.inf:
+        raise mismatch(where, _with_unit(f"a value of at most {LARGEST:g}", parameter, " in "), show(raw))
     _check_bounds(parameter, value, raw, where)
     return value + 0.0  # -0.0 and 0.0 are one value, and shall be one job
 

@@ -273,6 +273,11 @@ def test_pictures_of_single_runs_refuse_a_study(kind):
         getattr(results.cvt, kind)()
 
 
+def test_a_curve_of_nothing_is_refused():
+    with pytest.raises(InputError, match="curve: expected variable of the results; .*, found nothing"):
+        study().cvt.curve()
+
+
 def in_rpm(whole):
     """A study with an axis of speeds whose job gives them in rpm, and with what a table leaves out or names."""
     speeds = np.array([1000.0, 3000.0]) * np.pi / 30.0

@@ -186,6 +186,8 @@ def test_a_written_dataset_in_other_units_is_drawn_by_the_command_line_as_one_in
     ("name", "unit", "told"),
     [
         ("amplitude", "kN", 'results: amplitude: units: expected a unit of the dimension of m, found "kN"'),
+        ("frequency", "rad/s", 'frequency: units: expected a unit of the dimension of Hz, found "rad/s"'),
+        ("amplitude", "N", "amplitude: units: expected a unit of the dimension of m"),
         ("frequency", "rad/min", "frequency: units: expected a unit of the dimension of Hz"),
         ("amplitude", "micron-ish", "amplitude: units: expected a unit of the dimension of m, found "),
         ("mine", "a.u.", "mine: units: expected a unit such as mm, kN or rpm, found "),

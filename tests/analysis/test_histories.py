@@ -18,6 +18,7 @@ from cvt_hpc.netcdf import is_history, write_history
 from cvt_hpc.printing import point_lines
 from cvt_hpc.variables import Status, shortened
 from support.runs import PROBES, RATE, run
+from support.stored import stored
 
 BAND = (100.0, 1500.0)
 
@@ -213,6 +214,14 @@ sheave_stiffness = [1, inf]
     assert panel(figure, "load [kN m]").lines[0].get_ydata()[[0, -1]] == pytest.approx([0.02, 0.14], rel=1e-3)
     (printed,) = point_lines(job, {**at, "driving_speed": point["driving_speed"]})
     assert printed.endswith(lines[1].replace("\u00a0", " "))
+
+
+def test_the_title_has_no_numerics_that_the_program_has_chosen():
+    assert (
+        history_figure(stored("history_elastic_belt_ramp"))
+        .get_suptitle()
+        .startswith("One run: elastic_belt_ramp\nvibrates: yes")
+    )
 
 
 def test_the_title_names_the_rung_by_what_the_dataset_says_of_it():

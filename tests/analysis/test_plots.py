@@ -114,6 +114,14 @@ def test_small_numbers_have_their_power_of_ten_on_the_axis(results):
     np.testing.assert_allclose(axes.lines[0].get_ydata(), 1e6 * results["speed_loss"].sel(driving_speed=20.0))
 
 
+@pytest.mark.parametrize(
+    ("unit", "factor", "shown"), [("m", 1e-4, "µm"), ("N m", 1e6, "kN m"), ("s-1", 1e-4, "10⁻⁶ s-1")]
+)
+def test_a_power_of_ten_is_a_prefix_where_the_unit_takes_one(results, unit, factor, shown):
+    results["speed_loss"] = (factor * results["speed_loss"]).assign_attrs(units=unit)
+    assert curve_figure(results, ["speed_loss"]).axes[0].get_ylabel() == f"speed loss [{shown}]"
+
+
 def test_a_quantity_of_each_strand_gives_a_curve_of_each(results):
     figure = curve_figure(results, ["strand_tension"], {"driving_speed": 20.0})
     labels = [text.get_text() for text in figure.legends[0].get_texts()]

@@ -116,6 +116,7 @@ def test_examples_are_listed_and_copied_with_what_they_read_and_replace_nothing(
     listed = {line.split()[0]: line for line in out[: out.index("")]}
     assert listed["jobs/quickstart.toml"].endswith("A first map: fall of friction x sheave stiffness x load")
     assert {"jobs/notebooks/read_a_map.ipynb", "slurm/sweep.sbatch"} <= listed.keys()
+    assert listed["slurm/launch.sh"].endswith("The way to start ranks that the batch files share")
     status, out, err = call("examples", "sheave_deformation.toml", "read_a_map", "slurm", "--out", "mine")
     copied = {path.relative_to(tmp_path / "mine").as_posix() for path in (tmp_path / "mine").rglob("*.*")}
     assert (status, err) == (0, []) and len(out) == len(copied)
@@ -129,6 +130,8 @@ def test_examples_are_listed_and_copied_with_what_they_read_and_replace_nothing(
     assert call("examples", "quickstar")[2] == [
         "cvt-hpc: examples: quickstar: unknown example; did you mean quickstart?"
     ]
+    known = call("examples", "zzz")[2][0].partition("known: ")[2].partition(";")[0].split(", ")
+    assert len(known) == len({*known})
 
 
 @pytest.mark.slow

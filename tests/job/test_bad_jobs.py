@@ -40,6 +40,7 @@ def complaint(path="x.toml"):
         ("[scene]\nthrust = [1, 2]", f"[scene] thrust: {IN_N} a list; what a study varies stands in [axes]"),
         ("[scene]\nthrust = nan", "[scene] thrust: expected a finite value in N, found nan"),
         ("[scene]\nthrust = inf", "[scene] thrust: expected a finite value in N, found inf"),
+        ("[scene]\nthrust = '-1e98 kN'", '[scene] thrust: expected a value of at most 1e+100 in N, found "-1e98 kN"'),
         (f"[scene]\nthrust = 1{'0' * 400}", "[scene] thrust: expected a finite value in N, found a number of too many digits"),
         ("[scene]\nratio = 2", f"[scene] thrust: {IN_N} nothing"),
         ("[belt]\nelement_mass = -1", "[belt] element_mass: expected > 0 kg/m, found -1"),
