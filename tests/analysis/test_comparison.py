@@ -213,6 +213,7 @@ def test_the_report_says_both_counts_and_names_the_cells():
         ({"scene": {"ratio": 2.0, "seed": 2}}, True),
         ({"scene": {"ratio": 2.5, "seed": 2, "disturbance": 1e-5}}, False),
         ({"numerics": {"step": 2e-6}, "mesh": {"stations": 96}, "model": "pushbelt"}, False),
+        ({"limit": {"limit_frequency": 2e3}, "friction": {"friction_treatment": "set_valued"}}, False),
         ({"vibration": {"amplitude_threshold": 1e-6}, "rings": {"layers": 3}}, False),
     ],
 )
@@ -221,6 +222,8 @@ def test_of_two_designs_one_is_better_and_of_two_methods_one_contradicts(changes
         "scene": {"ratio": 2.5, "seed": 1, "disturbance": 1e-6},
         "sheaves": {"tilt_stiffness": 2e5},
         "mesh": {"stations": 160},
+        "limit": {"limit_frequency": 1e3},
+        "friction": {"friction_treatment": "regularised"},
     }
     a = row([VIBRATING, VIBRATING, QUIET, VIBRATING], [5.5, 9.0, 1.0, 20.0], **scene)
     b = row([QUIET, QUIET, VIBRATING, VIBRATING], [4.5, 1.0, 9.0, 10.0], **(scene | changes))
