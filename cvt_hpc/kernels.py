@@ -409,13 +409,23 @@ def _found(name: str, compiled: _Kernel, kinds: tuple, walk: Walk) -> CompileRes
         return kernel_store.tell_damaged(compiled.__name__, str(error))
 
 
+def _is_foreign(name: str) -> bool:
+    """Whether a compiled function may be another one in another process, though its name is the same.
+
+    The compiler takes some functions of its own library for all, and not for kernels: those are what their
+    names, with types and options, say, unless a function of somebody else is among the types.
+    """
+    of_library = name.startswith("_ZN5numba") and "Dispatcher" not in name
+    return name.startswith("_Z") and _MARK not in name and not of_library
+
+
 def _keep(name: str, found: CompileResult, walk: Walk) -> None:
     """Write an entry, if the code means the same in every process."""
     variables = [variable.name for variable in found.library._final_module.global_variables]
     names = [function.name for function in found.library.get_defined_functions()]
     if found.library.has_dynamic_globals or any(".numba.unresolved" in variable for variable in variables):
         why = "addresses in this process"
-    elif foreign := next((name for name in names if name.startswith("_Z") and _MARK not in name), None):
+    elif foreign := next(filter(_is_foreign, names), None):
         why = f"{foreign}, compiled for other than kernels"
     else:
         library, described, environment, sig, _, _, _, reload, environments = found._reduce()

@@ -43,8 +43,10 @@ _HEAD = (
     "frequency_b [Hz]",
 )
 # Tables and keys that say how a scene is computed or disturbed, not what it is
-_METHOD = ("model", "stepper", "mesh", "numerics", "limit", "record", "run", "vibration", "judgement", "auto")
-_METHOD += ("design", "versions")
+_METHOD = (
+    *("model", "stepper", "mesh", "numerics", "limit", "record", "run", "vibration", "judgement", "auto"),
+    *("design", "versions"),
+)
 _METHOD_KEYS = ("seed", "disturbance", "friction_treatment", "contact_points", "coarse", "git_revision")
 
 

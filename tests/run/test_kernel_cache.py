@@ -197,6 +197,28 @@ def test_what_has_taught_the_compiler_counts_and_what_it_has_loaded_itself_does_
     assert kernel_identity.extensions() != before
 
 
+@kernel
+def makes_and_raises(n):
+    rows = np.empty((n, 2))  # the size may be negative or overflow, of which the compiler's own code tells
+    if n > 3:
+        raise ValueError("at most 3, not " + str(n))
+    rows[:] = 1.0
+    return rows
+
+
+def test_kernels_with_functions_of_the_compilers_library_are_kept(chosen, caplog):
+    assert makes_and_raises(2).sum() == 4.0
+    with pytest.raises(ValueError, match="at most 3, not 4"):
+        makes_and_raises(4)
+    again = kernel(makes_and_raises.py_func)
+    assert again(2).sum() == 4.0 and hits(again) == 1
+    assert len(entries(chosen)) == 1 and caplog.messages == []
+    of_user = "_ZN5numba2np3sumB4v100typeC29CPUDispatcher"
+    assert [kernels._is_foreign(name) for name in ("_ZN5numba2np3sumE", of_user, "_ZN8__main__1fE", "sin")] == [
+        False, True, True, False,
+    ]  # fmt: skip
+
+
 def test_the_compiler_and_its_switches_count(chosen, monkeypatch):
     compiled = kernel(plus_one)
 
