@@ -11,7 +11,8 @@ users of an array: it makes none, and the arrays that it is given outlast it.
 
 Code that several processes have compiled is linked. The compiler tells functions of one name apart by numbers
 that it counts from 1 in each process; functions of two processes with one name and number would be taken for
-one. So the names of compiled functions hold a number drawn by the process, and code without one is not kept.
+one. So the names of compiled functions hold a number drawn by the process, and code without one is not kept,
+but for functions of the compiler's own library.
 
 Slow steps are logged by the logger of this module: compiling as INFO, missing storage as WARNING.
 """
