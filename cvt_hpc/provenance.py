@@ -156,8 +156,17 @@ def merge_versions(found: Sequence[dict[str, str]]) -> dict[str, str]:
 
 @cache
 def git_revision() -> str:
-    """Return the revision of the source that this process runs, as `revision_of` does."""
-    return revision_of(Path(__file__))
+    """Return the revision of the source that this process runs: of its checkout, or of what was installed.
+
+    A build writes revision.txt, and so does `git archive`; in a checkout it has a place for it alone.
+    """
+    here = Path(__file__)
+    if found := revision_of(here):
+        return found
+    with suppress(OSError):
+        written = here.with_name("revision.txt").read_text(encoding="utf-8").strip()
+        return "" if written.startswith("$") else written
+    return ""
 
 
 def revision_of(source: Path) -> str:

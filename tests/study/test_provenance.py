@@ -50,6 +50,14 @@ def test_no_revision_without_git(monkeypatch):
     assert revision_of(Path(provenance.__file__)) == ""
 
 
+@pytest.mark.parametrize(("written", "told"), [("abc\n", "abc"), ("$Format:%H$\n", ""), (None, "")])
+def test_the_revision_of_what_is_installed_is_the_one_that_was_written(written, told, tmp_path, monkeypatch):
+    monkeypatch.setattr(provenance, "__file__", str(tmp_path / "provenance.py"))
+    if written:
+        (tmp_path / "revision.txt").write_text(written)
+    assert provenance.git_revision.__wrapped__() == told
+
+
 def test_versions_of_several_sessions_stand_side_by_side():
     found = [{"numpy": "2.0", "python": "3.11"}, {"numpy": "2.1", "python": "3.11"}, {"mpi4py": "4"}]
     assert merge_versions(found) == {"numpy": "2.0, 2.1", "python": "3.11", "mpi4py": "4"}
