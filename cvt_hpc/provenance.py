@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import platform
 import shlex
@@ -10,7 +11,7 @@ import subprocess
 import sys
 import time
 import uuid
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from importlib import metadata
@@ -19,6 +20,8 @@ from typing import Any
 
 import cvt_hpc
 
+NOT_RECORDED = "not recorded"
+_TURNS = 2_000_000  # of a loop that marks the speed of a machine
 _PACKAGES = ("numpy", "numba", "scipy", "xarray", "netCDF4", "mpi4py")
 
 
@@ -92,6 +95,56 @@ def machine() -> dict[str, Any]:
     return {"processor": processor, "architecture": platform.machine(), "cores": os.cpu_count()}
 
 
+@cache
+def _loop_seconds() -> float:
+    """Processor time [s] of a loop of Python, by which costs on different machines can be compared."""
+    start, s = time.process_time(), 0
+    for i in range(_TURNS):
+        s += i * i
+    return time.process_time() - start
+
+
+def origin_lines(made: Mapping[str, Any] | None = None) -> Iterator[str]:
+    """Yield the lines with "#" that stand on top of a table and tell where its numbers come from.
+
+    `cvt_hpc.tables.below_origin` reads what stands below them.
+
+    Parameters
+    ----------
+    made : mapping, optional
+        Attributes of the dataset behind the table, as `netcdf.global_attributes` gives them, and possibly
+        `job_fingerprint` and `machine`; by default those of this process, without a job.
+    """
+    if made is None:
+        own = {"git_revision": git_revision(), "versions": json.dumps(versions()), "job_name": "none"}
+        made = own | {"command": command(), "history": history_line(command()), "host": platform.node()}
+    fingerprint = made.get("job_fingerprint", "")[:16]
+    packages = json.loads(made.get("versions", "{}"))
+    told = {
+        "revision": made.get("git_revision"),
+        "job": made.get("job_name", NOT_RECORDED) + (f", fingerprint {fingerprint}" if fingerprint else ""),
+        "command": made.get("command"),
+        "versions": ", ".join(f"{package} {version}" for package, version in packages.items()),
+        "date": made.get("history", "").rpartition("\n")[2][: len("2026-01-31")],
+        "machine": _machine_in_words(made),
+    }
+    for name, text in told.items():
+        yield f"# {name}: {' '.join((text or NOT_RECORDED).split())}\n"  # a command may have several lines
+
+
+def _machine_in_words(made: Mapping[str, Any]) -> str:
+    """The machine of a dataset, and its speed if it is this one; "" where it is not known."""
+    here = machine()
+    found = json.loads(made["machine"]) if "machine" in made else here
+    found = found if isinstance(found, list) else [found]
+    if made.get("host") == platform.node() and found == [here]:
+        speed = f"{_TURNS:.0e} turns of s += i * i take {_loop_seconds():.2g} s".replace("e+0", "e")
+        return f"{here['processor']}, {here['cores']} cores, {speed}"
+    if "machine" not in made:
+        return ""
+    return "; ".join(f"{one['processor']}, {one['cores']} cores" for one in found)
+
+
 def merge_versions(found: Sequence[dict[str, str]]) -> dict[str, str]:
     """Return the version of each package, several of them as "1.0, 1.1" where sessions differ."""
     merged: dict[str, dict[str, None]] = {}
@@ -103,8 +156,17 @@ def merge_versions(found: Sequence[dict[str, str]]) -> dict[str, str]:
 
 @cache
 def git_revision() -> str:
-    """Return the revision of the source that this process runs, as `revision_of` does."""
-    return revision_of(Path(__file__))
+    """Return the revision of the source that this process runs: of its checkout, or of what was installed.
+
+    A build writes revision.txt, and so does `git archive`; in a checkout it has a place for it alone.
+    """
+    here = Path(__file__)
+    if found := revision_of(here):
+        return found
+    with suppress(OSError):
+        written = here.with_name("revision.txt").read_text(encoding="utf-8").strip()
+        return "" if written.startswith("$") else written
+    return ""
 
 
 def revision_of(source: Path) -> str:

@@ -1,9 +1,15 @@
-"""Tables for people, as aligned lines of text."""
+"""Tables for people, as aligned lines of text, and the lines of stored tables."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import dropwhile
+
+
+def below_origin(lines: Iterable[str]) -> Iterator[str]:
+    """Return head and rows of a stored table, which stand below the lines of `provenance.origin_lines`."""
+    return dropwhile(lambda line: line.startswith("#"), lines)
 
 
 def columns(rows: Sequence[Sequence[str]], indent: str = "  ") -> Iterator[str]:

@@ -8,6 +8,7 @@ import xarray as xr
 
 from cvt_hpc.analysis.flanks import AROUND, alone, ends_of_arcs, from_end
 from cvt_hpc.analysis.telling_apart import history_files, on_axes
+from cvt_hpc.provenance import origin_lines
 
 HEAD = "run,end,flank alone,alone [mm],its largest sliding along the belt [m/s],and along the meridian [m/s]"
 
@@ -30,4 +31,5 @@ if __name__ == "__main__":
     folder, table = map(Path, sys.argv[1:])
     files = history_files([folder])
     opened = [xr.open_dataset(file, engine="netcdf4", decode_times=False) for file in files]
-    table.write_text("\n".join([*rows(opened, [file.stem for file in files]), ""]), encoding="utf-8")
+    body = [f"{row}\n" for row in rows(opened, [file.stem for file in files])]
+    table.write_text("".join([*origin_lines(opened[0].attrs), *body]), encoding="utf-8")

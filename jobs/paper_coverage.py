@@ -5,6 +5,8 @@ import sys
 import tomllib
 from pathlib import Path
 
+from cvt_hpc.tables import below_origin
+
 HERE = Path(__file__).parent
 TABLES = HERE / "results" / "figures"
 PAPERS = {
@@ -32,7 +34,7 @@ def tables():
     found = {}
     for table in sorted(TABLES.glob("*.csv")):
         with table.open(encoding="utf-8") as source:
-            found[table.stem] = list(csv.DictReader(source))
+            found[table.stem] = list(csv.DictReader(below_origin(source)))
     return found
 
 

@@ -5,7 +5,7 @@
 # Needs the environment of jobs/quickstart.sh.
 PATH=$PWD/.venv/bin:$PATH
 table=jobs/results/$job.csv
-rm -f "$table.part"
+rm -f "$table.part" "$table.origin"
 
 part() { # VALUES-OF-LABELS SETTINGS...
   local values=$1
@@ -13,10 +13,14 @@ part() { # VALUES-OF-LABELS SETTINGS...
   shift
   cvt-hpc run "jobs/$job.toml" --set name="$name" "$@" > /dev/null
   python jobs/tabulate.py "out/$name" "out/$name/table.csv" "${columns[@]}" > /dev/null
-  [ -s "$table.part" ] || sed -n "1s/^/$labels,/p" "out/$name/table.csv" > "$table.part"
-  sed -n "2,\$s/^/$values,/p" "out/$name/table.csv" >> "$table.part"
+  grep '^#' "out/$name/table.csv" >> "$table.origin"
+  [ -s "$table.part" ] || sed "/^#/d; s/^/$labels,/; q" "out/$name/table.csv" > "$table.part"
+  sed "/^#/d" "out/$name/table.csv" | sed "1d; s/^/$values,/" >> "$table.part"
 }
 
-joined() { # all parts are done
-  mv "$table.part" "$table"
+joined() { # all parts are done; of their origins each line once, but the machine's speed, which differs a little
+  awk '!seen[$0]++ && !(/^# machine: .* take / && machine++)' "$table.origin" > "$table.whole"
+  cat "$table.part" >> "$table.whole"
+  mv "$table.whole" "$table"
+  rm "$table.part" "$table.origin"
 }

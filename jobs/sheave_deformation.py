@@ -12,6 +12,7 @@ import numpy as np
 
 from cvt_hpc import simulate
 from cvt_hpc.job import load_job
+from cvt_hpc.provenance import origin_lines
 
 JOBS = Path(__file__).parent
 NO_MODES = {"driving_modes_file": "", "driven_modes_file": ""}
@@ -101,4 +102,5 @@ if __name__ == "__main__":
         rows.append(row(*found))
         print(",".join(rows[-1]), flush=True)
     with table.open("w", encoding="utf-8", newline="") as out:
+        out.writelines(origin_lines())
         csv.writer(out, lineterminator="\n").writerows([HEAD, *rows])

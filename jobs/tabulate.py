@@ -7,6 +7,7 @@ import numpy as np
 
 from cvt_hpc import open_results
 from cvt_hpc.errors import InputError, unknown
+from cvt_hpc.provenance import origin_lines
 
 OF_A_BELT = ("amplitude", "frequency", "mode", "power_residual")
 # unit, factor and digits of quantities that are not written in SI units, to six digits
@@ -65,7 +66,8 @@ if __name__ == "__main__":
     folder, table, *asked = sys.argv[1:]
     try:
         with open_results(folder) as results:
-            lines = [f"{row}\n" for row in rows(results.load(), asked or OF_A_BELT)]
+            body = [f"{row}\n" for row in rows(results.load(), asked or OF_A_BELT)]
+            lines = [*origin_lines(results.attrs), *body]
     except InputError as error:
         sys.exit(f"tabulate.py: {error}")
     with open(table, "w", encoding="utf-8") as out:

@@ -15,6 +15,7 @@ from cvt_hpc.files import naming_refusals, read_regular
 from cvt_hpc.job.units import to_si
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
+from cvt_hpc.tables import below_origin
 from cvt_hpc.variables import Status, Vibrates
 
 _LARGEST_TABLE = 16 << 20  # [byte]
@@ -27,8 +28,9 @@ def read_table(path: str | Path) -> xr.Dataset:
     Parameters
     ----------
     path : str or Path
-        A CSV file as `jobs/tabulate.py` writes it: axes [SI], `status`, `vibrates`, quantities with the unit
-        in their head and a column for each strand or pulley. The axes make a full grid.
+        A CSV file as `jobs/tabulate.py` writes it: lines with "#" of its origin, then a head of axes [SI],
+        `status`, `vibrates`, and quantities with the unit and a column for each strand or pulley. The axes
+        make a full grid.
 
     Returns
     -------
@@ -41,7 +43,8 @@ def read_table(path: str | Path) -> xr.Dataset:
         If the file cannot be read or is no such table.
     """
     with naming_refusals(Path(path), "a table of a study"):
-        rows = list(csv.reader(read_regular(Path(path), _LARGEST_TABLE).decode().splitlines()))
+        lines = read_regular(Path(path), _LARGEST_TABLE).decode().splitlines()
+        rows = list(csv.reader(below_origin(lines)))
     head, body = (rows[0] if rows else []), rows[1:]
     if "status" not in head or any(len(row) != len(head) for row in body):
         raise mismatch(str(path), "a table of a study, with a column status and full rows", ", ".join(head))

@@ -86,10 +86,11 @@ def make_chart(
     with folder.claimed(chart, fresh=fresh):
         measurements = _fill(chart, folder, processes or len(os.sched_getaffinity(0)), tell)
         comparisons = compare(chart, measurements)
+        dataset = chart_dataset(chart, comparisons, folder.points.makers)
         with written_aside(folder.table) as aside:
-            write_table(comparisons, aside)
+            write_table(comparisons, dataset.attrs, aside)
         with written_aside(folder.dataset) as aside:
-            write_netcdf(chart_dataset(chart, comparisons, folder.points.makers), aside)
+            write_netcdf(dataset, aside)
         pictures = [draw_scene(c, folder.picture(c.scene.name)) for c in comparisons]
         pictures += [draw_budget(c, folder.picture("budget")) for c in comparisons if c.choices]
     return ChartReport(comparisons, folder.table, folder.dataset, tuple(pictures))

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from textwrap import shorten
+from typing import Any
 
 from cvt_hpc.chart.comparing import Comparison, Result
 from cvt_hpc.chart.plan import Role
 from cvt_hpc.chart.quantities import KINDS
+from cvt_hpc.provenance import origin_lines
 from cvt_hpc.tables import columns, number, short
 
 _HEAD = (
@@ -29,12 +31,13 @@ _HEAD = (
 _LONGEST_NOTE = 90  # letters; the whole reason is in the file
 
 
-def write_table(comparisons: Sequence[Comparison], path: Path) -> None:
-    """Write all results as comma-separated values, a row for each point."""
+def write_table(comparisons: Sequence[Comparison], made: Mapping[str, Any], path: Path) -> None:
+    """Write all results as comma-separated values, a row for each point, below their origin."""
     rows = [result for comparison in comparisons for result in _results(comparison)]
     names = [name for name in KINDS if any(name in row.errors for row in rows)]
     counters = list(dict.fromkeys(name for row in rows for name in row.measurement.counters))
     with path.open("w", encoding="utf-8", newline="") as file:
+        file.writelines(origin_lines(made))
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*_HEAD, *_quantity_heads(names), "below_reference", *counters])
         for row in rows:

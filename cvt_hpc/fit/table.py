@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc import __version__
 from cvt_hpc.files import written_aside
 from cvt_hpc.fit.around import Around, reach
 from cvt_hpc.fit.confirming import Confirmed
@@ -21,7 +20,8 @@ from cvt_hpc.fit.job import Fit
 from cvt_hpc.fit.scoring import REPRODUCED, Course, areas, verdict
 from cvt_hpc.fit.search import Found
 from cvt_hpc.job.units import from_si
-from cvt_hpc.provenance import command, git_revision
+from cvt_hpc.netcdf import global_attributes
+from cvt_hpc.provenance import origin_lines
 from cvt_hpc.tables import columns
 from cvt_hpc.vibration.classes import OccurrenceClass
 
@@ -47,13 +47,13 @@ class Table(NamedTuple):
 
 
 def write_table(fit: Fit, table: Table, folder: Path) -> Path:
-    """Write a table with its provenance: program, revision, command, and the job's fingerprint."""
+    """Write a table with its title and its origin."""
     numbers = json.dumps(fit.resolved(), sort_keys=True)
-    fingerprint = hashlib.sha256(numbers.encode()).hexdigest()[:16]
-    by = f"cvt_hpc {__version__}, revision {git_revision() or 'unknown'}"
+    fingerprint = hashlib.sha256(numbers.encode()).hexdigest()
+    made = global_attributes(fit.job, fit.resolved(), "fit") | {"job_fingerprint": fingerprint}
     path = folder / f"{table.name}.csv"
     with written_aside(path) as aside, aside.open("w", encoding="utf-8", newline="") as file:
-        file.write(f"# {table.what}\n# {by}, job {fit.job.name} {fingerprint}: {command()}\n")
+        file.writelines([f"# {table.what}\n", *origin_lines(made)])
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(table.head)
         writer.writerows([_cell(cell) for cell in row] for row in table.rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -123,9 +124,14 @@ def report_ladder(job: Job, rungs: Sequence[Rung], out: Path) -> LadderReport:
             results[rung.name] = dataset.load()
     findings = tuple(compare(rungs, results))
     report = LadderReport(findings, *(out / f"ladder.{suffix}" for suffix in ("csv", "nc", "png")))
+    makers = [
+        {"versions": json.loads(found.attrs["versions"]), "git_revision": found.attrs["git_revision"]}
+        for found in results.values()
+    ]
+    dataset = ladder_dataset(job, rungs, findings, makers)
     with written_aside(report.table) as aside:
-        write_ladder(job, findings, aside)
+        write_ladder(job, findings, dataset.attrs | {"job_fingerprint": job.fingerprint()}, aside)
     with written_aside(report.dataset) as aside:
-        write_netcdf(ladder_dataset(job, rungs, findings), aside)
+        write_netcdf(dataset, aside)
     draw_ladder(job, findings, report.picture)
     return report

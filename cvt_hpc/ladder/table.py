@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -16,7 +17,7 @@ from cvt_hpc.job.shown import JOB_UNITS
 from cvt_hpc.ladder.comparing import Finding
 from cvt_hpc.ladder.rungs import QUESTIONS, Rung
 from cvt_hpc.netcdf import attributes, global_attributes
-from cvt_hpc.provenance import machine
+from cvt_hpc.provenance import machine, origin_lines
 from cvt_hpc.tables import columns, number, short
 
 UNITS = dict.fromkeys(QUESTIONS, "1") | {"onset": "N m"}
@@ -54,11 +55,12 @@ def in_job_unit(job: Job, findings: Sequence[Finding]) -> tuple[list[Finding], s
     return shown, unit
 
 
-def write_ladder(job: Job, findings: Sequence[Finding], path: Path) -> None:
-    """Write the findings as comma-separated values, a row for each model and question."""
+def write_ladder(job: Job, findings: Sequence[Finding], made: Mapping[str, Any], path: Path) -> None:
+    """Write the findings as comma-separated values, a row for each model and question, below their origin."""
     findings, unit = in_job_unit(job, findings)
     units = UNITS | {"onset": unit}
     with path.open("w", encoding="utf-8", newline="") as file:
+        file.writelines(origin_lines(made))
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["question", "rung", "error_unit", *NUMBERS])
         for finding in findings:
@@ -77,7 +79,9 @@ def ladder_lines(job: Job, findings: Sequence[Finding]) -> Iterator[str]:
         yield from columns([heads, *([f.rung, *_cells(f), ""] for f in found)])
 
 
-def ladder_dataset(job: Job, rungs: Sequence[Rung], findings: Sequence[Finding]) -> xr.Dataset:
+def ladder_dataset(
+    job: Job, rungs: Sequence[Rung], findings: Sequence[Finding], makers: Sequence[Mapping[str, Any]] = ()
+) -> xr.Dataset:
     """Return the findings as a dataset over `question` and `rung`, with all that is needed to repeat it.
 
     Parameters
@@ -88,6 +92,8 @@ def ladder_dataset(job: Job, rungs: Sequence[Rung], findings: Sequence[Finding])
         Its models.
     findings : sequence of Finding
         The results.
+    makers : sequence of mapping
+        By whom the runs were made, as of `netcdf.global_attributes`.
     """
     names = list(dict.fromkeys(finding.rung for finding in findings))
     values = np.full((len(NUMBERS), len(QUESTIONS), len(names)), np.nan)
@@ -100,8 +106,9 @@ def ladder_dataset(job: Job, rungs: Sequence[Rung], findings: Sequence[Finding])
     texts = {"question": np.array(QUESTIONS, object), "rung": np.array(names, object)}
     coordinates = {name: (name, labels, attributes(name)) for name, labels in texts.items()}
     units = ("question", np.array(list(UNITS.values()), object), attributes("unit of errors"))
+    subject = "accuracy against cost of the ladder of models"
     told = {
-        **global_attributes(job, job.resolved(), "accuracy against cost of the ladder of models"),
+        **global_attributes(job, job.resolved(), subject, makers=makers),
         "rungs": json.dumps({rung.name: rung.job.resolved() for rung in rungs}),
         "machine": json.dumps(machine()),
     }

@@ -18,6 +18,7 @@ import xarray as xr
 from cvt_hpc.job import Job, build_job, load_job
 from cvt_hpc.job.for_model import handed_to
 from cvt_hpc.models.auto.rules import Rung
+from cvt_hpc.provenance import origin_lines
 from cvt_hpc.study import open_results, run
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 
@@ -95,6 +96,7 @@ def main() -> None:
         )
     if arguments.table:
         with arguments.table.open("w", newline="") as file:
+            file.writelines(origin_lines())
             writer = csv.writer(file, lineterminator="\n")
             names = [axis.name for axis in asked["full"].axes]
             writer.writerow([*names, *found, "rung of auto", "margin of auto"])

@@ -18,6 +18,7 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, fma
+from cvt_hpc.provenance import origin_lines
 from cvt_hpc.solvers import cyclic_blocks, linked_blocks
 from cvt_hpc.solvers.cyclic_blocks import DIAGONAL, LOWER, UPPER, block_size
 
@@ -163,6 +164,7 @@ def main() -> None:
         print("  ".join(f"{key} {value}" for key, value in line.items()))
     if len(sys.argv) > 1:
         with open(sys.argv[1], "w", newline="") as file:
+            file.writelines(origin_lines())
             table = csv.DictWriter(file, lines[0], lineterminator="\n")
             table.writeheader()
             table.writerows(lines)

@@ -42,6 +42,7 @@ from cvt_hpc.models.belt_drive.theory import expected_loss, strand_frequencies
 from cvt_hpc.models.belt_drive.transient import Transient
 from cvt_hpc.multibody.ancf_beam import SHAPES, WEIGHTS, at_places
 from cvt_hpc.physics.nearest_on_path import along
+from cvt_hpc.provenance import origin_lines
 
 HERE = Path(__file__).parent
 LOAD, DURATION, INTERVAL, IMPULSE = 8.0, 0.65, 1e-3, 0.01
@@ -283,6 +284,7 @@ def main() -> None:
     rows = with_errors(rows)
     if options.table:
         with options.table.open("w", newline="", encoding="utf-8") as file:
+            file.writelines(origin_lines())
             writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
             writer.writeheader()
             writer.writerows(

@@ -26,6 +26,7 @@ TESTS = Path(__file__).parents[1]
 sys.path.insert(0, str(TESTS))
 
 from cvt_hpc import load_job, open_results, run  # noqa: E402
+from cvt_hpc.provenance import origin_lines  # noqa: E402
 from cvt_hpc.study.folder import StudyFolder  # noqa: E402
 from cvt_hpc.study.record.recovery import read_records  # noqa: E402
 from support.cluster import JOB, TWO_NODES, Cluster, missing, wait_until  # noqa: E402
@@ -115,6 +116,7 @@ def write_table(path: Path, outcomes: list[Outcome]) -> None:
     kinds = dict.fromkeys(outcome.kind for outcome in outcomes)
     groups = {kind: [o for o in outcomes if o.kind == kind] for kind in kinds} | {"all": outcomes}
     with path.open("w", newline="") as file:
+        file.writelines(origin_lines())
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("kind", "cases", *COUNTS, "longest_start_s"))
         for kind, group in groups.items():

@@ -24,7 +24,7 @@ import numpy as np
 
 from cvt_hpc import simulation
 from cvt_hpc.job import build_job
-from cvt_hpc.provenance import new_session
+from cvt_hpc.provenance import new_session, origin_lines
 from cvt_hpc.study import gather, open_results, read_status
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.dimensions import Dimension
@@ -132,6 +132,7 @@ def report(path: Path, runs: int, table: Path | None) -> None:
         with table.open("a", newline="") as file:
             writer = csv.DictWriter(file, row)
             if is_new:
+                file.writelines(origin_lines())
                 writer.writeheader()
             writer.writerow({name: f"{value:.4g}" for name, value in row.items()})
 

@@ -28,6 +28,7 @@ from peer_tasks import read_witness
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent))
+from cvt_hpc.provenance import origin_lines  # noqa: E402
 from support.study_processes import clean_environment, find_mpirun  # noqa: E402
 
 PEERS = ("cvt_hpc", "mpi4py.futures", "libEnsemble", "dask.distributed")
@@ -181,6 +182,7 @@ def main() -> None:
     print(markdown([row for row in rows if row["kind"] == "kill"], ("peer", *COLUMNS[12:])))
     if options.table:
         with options.table.open("w", newline="", encoding="utf-8") as file:
+            file.writelines(origin_lines())
             writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
             writer.writeheader()
             writer.writerows(rows)

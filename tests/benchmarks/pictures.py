@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from cvt_hpc.provenance import origin_lines  # noqa: E402
 from support.studies import study  # noqa: E402
 
 REPEATS = 3
@@ -69,6 +70,7 @@ def main() -> None:
         print("  ".join(f"{cell:>16}" for cell in row))
     if table:
         with table.open("w", newline="") as file:
+            file.writelines(origin_lines())
             csv.writer(file, lineterminator="\n").writerows(rows)
 
 

@@ -12,6 +12,7 @@ With --explicit the reference is the explicit step, for the first groups alone: 
 import argparse
 import csv
 from concurrent.futures import ProcessPoolExecutor
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,9 @@ from scipy.stats import qmc
 
 from cvt_hpc.job import Job, build_job
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP
+from cvt_hpc.provenance import origin_lines
 from cvt_hpc.simulation import run_points
+from cvt_hpc.tables import below_origin
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 
 LAWS = ("stribeck", "linear", "hyperbolic", "cubic")
@@ -141,6 +144,7 @@ def main() -> None:
     with ProcessPoolExecutor(2) as pool, arguments.table.open("a", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         if not done:
+            file.writelines(origin_lines())
             writer.writerow(header)
         tasks = [
             tuple(pool.submit(run_group, group, *how) for how in (("imex", None), reference))
@@ -168,13 +172,16 @@ def _read(table: Path, header: list[str], groups: list[list[dict]]) -> list[tupl
     if not table.exists():
         return []
     with table.open(newline="") as file:
-        lines = list(csv.reader(file))
+        text = file.readlines()
+    lines = list(csv.reader(below_origin(text)))
     rows = lines[1 : 1 + max(len(lines) - 1, 0) // TOGETHER * TOGETHER]
     asked = [_given(scene) for group in groups for scene in group]
     if rows and (lines[0] != header or [row[: len(GIVEN)] for row in rows] != asked[: len(rows)]):
         raise SystemExit(f"{table}: a table of other scenes, or of another reference")
     with table.open("w", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows([header, *rows] if rows else [])
+        if rows:
+            file.writelines(takewhile(lambda line: line.startswith("#"), text))
+            csv.writer(file, lineterminator="\n").writerows([header, *rows])
     first, second = len(GIVEN), len(GIVEN) + len(FOUND)
     return [
         (dict(zip(FOUND, row[first:second], strict=True)), dict(zip(FOUND, row[second:], strict=True)))

@@ -12,6 +12,7 @@ import sys
 import numpy as np
 from scipy.stats import qmc
 
+from cvt_hpc.provenance import origin_lines
 from cvt_hpc.variables import Status, Vibrates
 from support.rungs import rung_record
 
@@ -43,6 +44,7 @@ def outcome(record: dict) -> str:
 
 
 if __name__ == "__main__":
+    sys.stdout.writelines(origin_lines())
     rows = csv.writer(sys.stdout, lineterminator="\n")
     rows.writerow(["scene", *scenes()[0], "outcome", "slip_margin", "core_seconds", "reason"])
     for k, scene in enumerate(scenes()[: int(sys.argv[1]) if len(sys.argv) > 1 else None]):

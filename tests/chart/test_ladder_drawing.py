@@ -73,5 +73,5 @@ def test_errors_of_onsets_are_in_the_unit_of_the_job(panels, tmp_path):
     lines = list(ladder_lines(job, FINDINGS))
     at = lines.index("onset: error [kN m]; that of the reference is estimated")
     assert lines[at + 2].split()[:4] == ["dear", "4", "0.005", "0.01"]
-    write_ladder(job, FINDINGS, tmp_path / "ladder.csv")
+    write_ladder(job, FINDINGS, {}, tmp_path / "ladder.csv")
     assert "\nonset,dear,kN m,4,0.005,0.01," in (tmp_path / "ladder.csv").read_text()

@@ -21,6 +21,7 @@ from cvt_hpc.chart.table import table_lines
 from cvt_hpc.errors import InputError
 from cvt_hpc.output_folder import checksum
 from cvt_hpc.provenance import git_revision, machine
+from cvt_hpc.tables import below_origin
 from support.bells import Transient
 from support.cf import cf_findings
 
@@ -66,8 +67,10 @@ def report(write_chart, undrawn, bell, first_made, tmp_path):
 
 def test_the_table_holds_every_point_with_its_outcome(report):
     with report.table.open() as file:
-        rows = list(csv.DictReader(file))
+        rows = list(csv.DictReader(below_origin(file)))
     assert str(report.table) == "out/bells/chart.csv"
+    told = report.table.read_text().splitlines()
+    assert told[0] == f"# revision: {git_revision()}" and told[1].startswith("# job: bells, fingerprint ")
     assert [row["method"] for row in rows] == [
         "exact", *["soft hammer"] * 4, *["clever"] * 3, "hard", "louder", "step 1 us", "cracked",
     ]  # fmt: skip
@@ -90,7 +93,9 @@ def test_what_takes_longer_than_its_scene_allows_is_in_the_table_with_its_cost_s
     report = made(write_chart(('title = "Ringing"', 'time_limit = "0.5 s"')))
     with report.table.open() as file:
         (row,) = [
-            row for row in csv.DictReader(file) if row["method"] == "soft hammer" and row["value"] == "1e-06"
+            row
+            for row in csv.DictReader(below_origin(file))
+            if row["method"] == "soft hammer" and row["value"] == "1e-06"
         ]
     assert row["outcome"].startswith("timed_out at ")
     assert float(row["core_s_per_s"]) == pytest.approx(20e3 * 1.1e-9 / 1e-6, rel=1e-3)

@@ -43,7 +43,7 @@ def imported(path):
 def test_the_tree_names_all_that_is_there():
     tree = BUILT.split("\ncvt_hpc/\n")[1].split("\nslurm/")[0]
     names = " ".join(re.split(r"\s{2,}", line.strip())[0] for line in tree.splitlines())
-    named = set(re.findall(r"[a-z_]+(?:/|[.]py\b|[.]typed)", names))
+    named = set(re.findall(r"[a-z_]+(?:/|[.]py\b|[.]typed|[.]txt)", names))
     found = {
         f"{path.name}/" if path.is_dir() else path.name for path in PACKAGE.iterdir() if path.name[0] != "_"
     }

@@ -135,12 +135,19 @@ def test_examples_are_listed_and_copied_with_what_they_read_and_replace_nothing(
 
 
 @pytest.mark.slow
-def test_the_wheel_brings_the_same_examples(tmp_path):
+def test_the_wheel_brings_its_revision_and_the_same_examples(tmp_path):
+    if shutil.which("git") is None:
+        pytest.skip("git is not installed")
     root = Path(cvt_hpc.__file__).parents[1]
     source = tmp_path / "source"  # a build writes beside its sources
     shutil.copytree(root / "cvt_hpc", source / "cvt_hpc", ignore=shutil.ignore_patterns("__pycache__"))
     for name in ("pyproject.toml", "README.md", "jobs", "slurm"):
         (source / name).symlink_to(root / name)
+    (source / ".gitignore").write_text("build\n*.egg-info\n")
+    git = ["git", "-c", "user.name=a", "-c", "user.email=a@b", "-C", source]
+    for asked in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "a"]):
+        subprocess.run([*git, *asked], check=True)
+    revision = subprocess.run([*git, "rev-parse", "HEAD"], check=True, capture_output=True, text=True).stdout
     pip = [sys.executable, "-m", "pip", "-q", "--disable-pip-version-check"]
     offline = ["--no-deps", "--no-index"]
     subprocess.run(
@@ -153,14 +160,16 @@ def test_the_wheel_brings_the_same_examples(tmp_path):
     (package,) = (tmp_path / "own").glob("lib*/python*/site-packages")
     program = (
         "import json, cvt_hpc; from cvt_hpc.job.examples import example_files;"
-        "print(json.dumps([cvt_hpc.__file__, {name: str(path) for name, path in example_files().items()}]))"
+        "from cvt_hpc.provenance import git_revision;"
+        "files = {name: str(path) for name, path in example_files().items()};"
+        "print(json.dumps([cvt_hpc.__file__, git_revision(), files]))"
     )
     environment = os.environ | {"PYTHONPATH": str(package)}
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=tmp_path, env=environment, check=True, capture_output=True
     )
-    used, examples = json.loads(done.stdout)
-    assert Path(used).is_relative_to(package)
+    used, told, examples = json.loads(done.stdout)
+    assert Path(used).is_relative_to(package) and told == revision.strip()
     known = example_files()
     assert examples.keys() == known.keys() and len(examples) > 90
     for name, path in examples.items():

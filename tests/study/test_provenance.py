@@ -1,13 +1,23 @@
 """Where numbers come from: the revision of this source, and of no other."""
 
+import csv
+import json
+import platform
+import runpy
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 
-from cvt_hpc import provenance
-from cvt_hpc.provenance import merge_versions, revision_of
+from cvt_hpc import provenance, read_table
+from cvt_hpc.provenance import machine, merge_versions, origin_lines, revision_of
+from cvt_hpc.tables import below_origin
+from support.studies import study
+
+ROOT = Path(__file__).parents[2]
+TABLES = sorted((ROOT / "jobs" / "results").rglob("*.csv"))
+TOLD = ("revision", "job", "command", "versions", "date", "machine")
 
 
 def git(folder, *arguments):
@@ -40,6 +50,14 @@ def test_no_revision_without_git(monkeypatch):
     assert revision_of(Path(provenance.__file__)) == ""
 
 
+@pytest.mark.parametrize(("written", "told"), [("abc\n", "abc"), ("$Format:%H$\n", ""), (None, "")])
+def test_the_revision_of_what_is_installed_is_the_one_that_was_written(written, told, tmp_path, monkeypatch):
+    monkeypatch.setattr(provenance, "__file__", str(tmp_path / "provenance.py"))
+    if written:
+        (tmp_path / "revision.txt").write_text(written)
+    assert provenance.git_revision.__wrapped__() == told
+
+
 def test_versions_of_several_sessions_stand_side_by_side():
     found = [{"numpy": "2.0", "python": "3.11"}, {"numpy": "2.1", "python": "3.11"}, {"mpi4py": "4"}]
     assert merge_versions(found) == {"numpy": "2.0, 2.1", "python": "3.11", "mpi4py": "4"}
@@ -48,3 +66,58 @@ def test_versions_of_several_sessions_stand_side_by_side():
 def test_command_has_no_folder_of_the_program(monkeypatch):
     monkeypatch.setattr("sys.argv", ["/home/me/.venv/bin/cvt-hpc", "run", "a job.toml"])
     assert provenance.command() == "cvt-hpc run 'a job.toml'"
+
+
+@pytest.mark.parametrize("path", TABLES, ids=[path.stem for path in TABLES])
+def test_a_stored_table_says_where_it_comes_from(path):
+    lines = path.read_text().splitlines()
+    for name, line in zip(TOLD, lines, strict=False):
+        assert line.startswith(f"# {name}: ") and line.partition(": ")[2].strip()
+    head, *rows = csv.reader(below_origin(lines))
+    assert rows and all(len(row) == len(head) for row in rows)
+
+
+def test_a_stored_table_is_read_as_a_dataset():
+    assert len(TABLES) >= 94
+    assert read_table(ROOT / "jobs/results/lebrecht_2004.csv")["status"].shape == (5, 4, 19)
+
+
+def test_a_table_tells_the_origin_of_its_dataset_in_one_line_each():
+    made = {
+        "git_revision": "abc-dirty",
+        "job_name": "x",
+        "job_fingerprint": 64 * "f",
+        "command": "cvt-hpc run x.toml --set 'a=[1,\n2]'",
+        "versions": json.dumps({"numpy": "2.0, 2.1"}),
+        "history": "2026-01-30T01:00:00Z: began\n2026-01-31T01:00:00Z: ended",
+        "host": platform.node(),
+    }
+    *lines, of_machine = origin_lines(made)
+    assert lines == [
+        "# revision: abc-dirty\n",
+        "# job: x, fingerprint ffffffffffffffff\n",
+        "# command: cvt-hpc run x.toml --set 'a=[1, 2]'\n",
+        "# versions: numpy 2.0, 2.1\n",
+        "# date: 2026-01-31\n",
+    ]
+    assert f"{machine()['cores']} cores, 2e6 turns of s += i * i take " in of_machine
+
+
+def test_the_speed_of_this_machine_is_not_told_of_another():
+    other = {"processor": "Abacus", "cores": 3}
+    assert list(origin_lines({"host": "other"}))[-1] == "# machine: not recorded\n"
+    for machines in (other, [other]):
+        made = {"host": platform.node(), "machine": json.dumps(machines)}
+        assert list(origin_lines(made))[-1] == "# machine: Abacus, 3 cores\n"
+    assert [line.split(":")[0] for line in origin_lines()] == [f"# {name}" for name in TOLD]
+
+
+def test_the_table_of_a_study_is_read_with_its_origin(tmp_path, monkeypatch):
+    made = study().assign_attrs(git_revision="abc", job_name="x")
+    made["core_seconds"] = made["status"].astype(float)
+    made.to_netcdf(tmp_path / "results.nc")
+    table = tmp_path / "table.csv"
+    monkeypatch.setattr("sys.argv", ["tabulate.py", str(tmp_path / "results.nc"), str(table), "amplitude"])
+    runpy.run_path(str(ROOT / "jobs" / "tabulate.py"), run_name="__main__")
+    assert table.read_text().startswith("# revision: abc\n# job: x\n")
+    assert read_table(table)["status"].equals(made["status"])

@@ -31,6 +31,7 @@ from cvt_hpc.analysis.strand_bars import strand_bars_figure
 from cvt_hpc.analysis.waterfall import waterfall_figure
 from cvt_hpc.errors import unknown
 from cvt_hpc.files import written_aside
+from cvt_hpc.provenance import origin_lines
 
 SLIDING = ("radial_sliding", "sliding_speed")
 COLUMNS = ("figure", "statement", "verdict", "measured", "why")
@@ -125,8 +126,10 @@ def figure_of(folder: Path) -> tuple[Path, Path, list[Finding]]:
         figure = FIGURES[name]
         picture = draw(lambda: figure.compose(kept), folder / "figure.png")
         findings = [judged(statement, kept) for statement in figure.statements]
+        origin = list(origin_lines(kept.results.attrs))
     table = folder / "statements.csv"
     with written_aside(table, parents=True) as aside, aside.open("w", encoding="utf-8", newline="") as out:
+        out.writelines(origin)
         writer = csv.writer(out, lineterminator="\n")
         writer.writerow(COLUMNS)
         for finding in findings:
