@@ -190,7 +190,7 @@ def test_another_job_in_the_folder_is_refused_unless_fresh(report, write_chart, 
         "out/bells: expected the folder of this job, found that of another (points."
     )
     assert "loudness is 2e-05 there, 2.1e-05 here" in str(caught.value)
-    assert str(caught.value).endswith("choose another --out, or --fresh to throw its results away")
+    assert str(caught.value).endswith("choose another name or --out, or --fresh to throw its results away")
     assert report.table.read_bytes() == before
     (tmp_path / "out/bells/notes.txt").write_text("mine")
     (tmp_path / "out/bells/mine.png").write_text("mine")
