@@ -1,0 +1,316 @@
+"""Whether two revisions compute the same, bit for bit: small jobs of every model and experiment, digests compared.
+
+    python tests/bits.py HEAD~1           # against the working tree; about five minutes a revision on one core
+    python tests/bits.py v1 v2 pushbelt   # two revisions, only jobs whose names begin so
+
+Each revision is checked out beside this one and does the jobs below in a process of its own, with machine code
+of its own. A digest is that of a variable's bytes, or of a column of a table; what depends on the machine and
+the hour does not count. Exit status 1: something differs, or is on one side only.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+SHORT = {"duration": "40 ms", "longest_duration": "40 ms"}
+ROLLING = {  # of both pushbelts and of the ring of beams
+    "scene": {"rise_time": "10 ms", "load": "60 N m"},
+    "belt": {"elements": 100},
+    "record": {"sampling_rate": "5 kHz", "spectrum_step": "50 Hz"},
+    "run": {"duration": "34 ms", "longest_duration": "34 ms"},
+    "numerics": {"most_refinements": 0},
+    "vibration": {"band_high": "700 Hz"},
+}
+BELT = {
+    "scene": {"rise_time": "20 ms", "load": "100 N m"},
+    "friction": {"friction_gradient": "-1.2 s/m"},
+    "mesh": {"stations": 96},
+    "record": {"sampling_rate": "6 kHz", "spectrum_step": "50 Hz", "profile_duration": "1 ms"},
+    "run": SHORT,
+}
+SLOW_BELT = BELT | {"mesh": {"stations": 48}, "run": {"duration": "22 ms", "longest_duration": "22 ms"}}
+SHAFT = {
+    "shaft_lengths": ["60 mm", "100 mm", "60 mm"],
+    "shaft_diameters": ["35 mm", "45 mm", "35 mm"],
+    "seat_positions": ["85 mm", "135 mm"],
+    "bearing_positions": ["10 mm", "210 mm"],
+}
+MODES = {
+    f"{pulley}_mode_{name}": values
+    for pulley in ("driving", "driven")
+    for name, values in (
+        ("harmonic", [0, 1, 2]),
+        ("flexibility", ["2e-9 m/N", "4e-9 m/N", "1e-9 m/N"]),
+        ("mass", ["1 kg", "1 kg", "0.5 kg"]),
+    )
+}
+GRID = {"axes": {"load": ["60 N m", "120 N m"]}}
+
+
+def variant(base: dict, **tables: object) -> dict:
+    """A job with further entries in its tables."""
+    merged = {key: dict(value) if isinstance(value, dict) else value for key, value in base.items()}
+    for name, table in tables.items():
+        merged[name] = merged.get(name, {}) | table if isinstance(table, dict) else table
+    return merged
+
+
+# By name, which begins with that of its model: a job file's content; axes of one value where none are given.
+STUDIES: dict[str, dict] = {
+    "auto": {key: value for key, value in BELT.items() if key != "record"} | GRID,
+    "beam_pushbelt": variant(
+        ROLLING, sheaves={"sheave_stiffness": "inf"}, run={"duration": "17 ms", "longest_duration": "17 ms"}
+    ),
+    "belt_drive": {
+        "scene": {"load": "8 N m"},
+        "belt": {"elements": 48},
+        "record": {"sampling_rate": "1 kHz"},
+        "run": {"duration": "0.17 s", "longest_duration": "0.17 s"},
+        "vibration": {"band_low": "60 Hz", "band_high": "250 Hz"},
+    },
+    "criterion": {
+        "axes": {"friction_gradient": ["-2.0 s/m", "-0.2 s/m"], "radial_speed": ["10 mm/s", "0.1 m/s"]}
+    },
+    "elastic_belt": BELT | GRID,
+    "elastic_belt stations": variant(BELT, numerics={"lanes": "stations"}),
+    "elastic_belt single": variant(BELT, numerics={"precision": "single"}),
+    "elastic_belt ramp": variant(BELT, scene={"load_history": "ramp", "load_start": "40 N m"}),
+    "elastic_belt speed ramp": variant(BELT, scene={"speed_history": "ramp", "speed_start": "2500 rpm"}),
+    "elastic_belt rigid": variant(BELT, sheaves={"sheave_stiffness": "inf"}),
+    "elastic_belt rings": variant(BELT, rings={"ring_layers": 3, "layer_tolerance": [1.0, 1.0001, 0.9999]}),
+    "elastic_belt curved": variant(BELT, bending={"curvature_terms": "path"}),
+    "elastic_belt column": variant(BELT, bending={"column_bending": "rocking"}),
+    "elastic_belt clearance": variant(BELT, pulleys={"collar_clearance": "0.1 mrad"}),
+    "elastic_belt lag": variant(BELT, pulleys={"tilt_lag": "0.5 ms", "driving_inertia": "0.1 kg m^2"}),
+    "elastic_belt shaft": variant(BELT, shaft=SHAFT),
+    "elastic_belt thrust": variant(BELT, pulleys={"driving_axial": "ratio", "clamping": "torque_ratio"}),
+    "elastic_belt cone": variant(BELT, deflection={"sheave_deformation": "cone"}),
+    "elastic_belt ritz": variant(BELT, deflection={"sheave_deformation": "ritz"} | MODES),
+    "elastic_belt explicit": SLOW_BELT | {"stepper": "explicit"},
+    "elastic_belt rosenbrock_w": SLOW_BELT | {"stepper": "rosenbrock_w", "mesh": {"stations": 24}},
+    "linear_stability": {"mesh": {"stations": 96}} | GRID,
+    "moving_string": {"run": {"duration": "50 ms", "longest_duration": "50 ms"}},
+    **{
+        f"oscillator {stepper}": {
+            "stepper": stepper,
+            "run": {"duration": "0.1 s", "longest_duration": "0.1 s"},
+        }
+        for stepper in (
+            "symplectic_euler",
+            "dormand_prince",
+            "generalised_alpha",
+            "sdirk",
+            "moreau",
+            "scipy_radau",
+        )
+    },
+    "pushbelt": ROLLING,
+    "pushbelt rigid": variant(ROLLING, sheaves={"sheave_stiffness": "inf"}),
+    "quasi_static_belt": variant(
+        BELT, mesh={"stations": 48}, run={"duration": "30 ms", "longest_duration": "30 ms"}
+    ),
+    "slip_limit": GRID,
+    "spatial_pushbelt": ROLLING,
+    "spatial_pushbelt flows": variant(ROLLING, sheaves={"sheave_stiffness": "inf"}, rings={"ring_flows": 2}),
+    "steady_variator": {"mesh": {"stations": 96}} | GRID,
+    "strand": GRID,
+}
+TINY = """
+name = "tiny"
+model = "elastic_belt"
+axes = { friction_gradient = [-1.0], load = [110] }
+mesh = { stations = 24 }
+numerics = { step = "12 us" }
+run = { duration = "0.06 s", longest_duration = "0.06 s" }
+"""
+EXPERIMENTS = {  # by the command: a job file's text
+    "branch": """
+name = "tiny"
+model = "linear_stability"
+axes = { load = ["90 N m", "105 N m"] }
+mesh = { stations = 48 }
+branch = { resolution = "10 N m", set = { duration = "60 ms" } }
+""",
+    "chart": """
+name = "tiny"
+model = "oscillator"
+run = { duration = "20 ms" }
+[chart]
+repeats = 1
+scenes.one = { reference = "exact", set = { friction_law = "coulomb", kinetic_friction = 0.6, static_friction = 1.0, \
+normal_load = "3162 N", belt_speed = "0.2 m/s", initial_speed = "0.2 m/s" }, quantities.amplitude.tolerance = "1 %" }
+methods.rk4 = { stepper = "runge_kutta_4", step = ["50 us", "10 us"] }
+""".replace("\\\n", ""),
+    "fit": TINY.replace(
+        "friction_gradient = [-1.0], load = [110]", "friction_gradient = { from = -1.4, to = -0.8 }"
+    )
+    + """
+[fit]
+screened = 4
+population = 4
+generations = 1
+confirmed = 1
+samples = 0
+along = { load = [60, 110] }
+targets = [{ name = "one", measure = "vibrating", from = "100 N m", to = "120 N m", statement = "noise at 110 N m" }]
+""",
+    "ladder": TINY,
+}
+VOLATILE = re.compile("core|seconds|wall|memory|steps_per", re.IGNORECASE)  # in the head of a table's column
+
+
+def digests(wanted: list[str]) -> dict[str, str]:
+    """Digests of all jobs whose names begin in one of these ways, by "job, file: variable"."""
+    found: dict[str, str] = {}
+    with tempfile.TemporaryDirectory() as temporary:
+        for name, document in STUDIES.items():
+            if name.startswith(tuple(wanted or ("",))):
+                folder = Path(temporary) / name.replace(" ", "_")
+                found |= guarded(name, folder, lambda: do_study(name, document, folder))  # noqa: B023  # called here
+        for command, text in EXPERIMENTS.items():
+            if command.startswith(tuple(wanted or ("",))):
+                folder = Path(temporary) / command
+                found |= guarded(command, folder, lambda: do_experiment(command, text, folder))  # noqa: B023
+    return found
+
+
+def guarded(name: str, folder: Path, work: Callable[[], None]) -> dict[str, str]:
+    """Digests of all that a job leaves; a refusal counts as a result."""
+    print(f"  {name} ...", file=sys.stderr, flush=True)
+    try:
+        work()
+    except Exception as error:
+        return {f"{name}: refused": str(error).replace(str(folder.parent), "")}
+    return {f"{name}, {key}": digest for key, digest in of_folder(folder).items()}
+
+
+def do_study(name: str, document: dict, folder: Path) -> None:
+    """Run a study in a folder, and keep the history of its first run where the model has any."""
+    from cvt_hpc import build_job, run, simulate
+    from cvt_hpc.models.contract import load_model
+    from cvt_hpc.netcdf import write_history
+
+    model = name.split()[0]
+    job = build_job({"name": "bits", "model": model, **document})
+    run(job, folder, progress=False)
+    if hasattr(load_model(model), "transient"):
+        write_history(simulate(job, job.point(0)), folder / "history.nc")
+
+
+def do_experiment(command: str, text: str, folder: Path) -> None:
+    """Run an experiment by its command."""
+    from cvt_hpc.cli import main
+
+    folder.mkdir()
+    (folder / "job.toml").write_text(text)
+    with contextlib.redirect_stdout(sys.stderr):
+        status = main([command, str(folder / "job.toml"), "--out", str(folder / "out")])
+    if status > 1:
+        raise RuntimeError(f"exit status {status}")
+
+
+def of_folder(folder: Path) -> dict[str, str]:
+    """Digests of all datasets and tables below a folder, by file and variable or column."""
+    found: dict[str, str] = {}
+    for path in sorted(folder.rglob("*")):
+        name = str(path.relative_to(folder))
+        if path.suffix == ".nc":
+            found |= {f"{name}: {key}": digest for key, digest in of_dataset(path).items()}
+        elif path.suffix == ".csv":
+            found |= {f"{name}: {key}": digest for key, digest in of_table(path).items()}
+    return found
+
+
+def of_dataset(path: Path) -> dict[str, str]:
+    """Digests of a dataset's variables, without those that depend on the machine and the hour."""
+    import xarray as xr
+
+    with xr.open_dataset(path, decode_cf=False) as dataset:
+        return {
+            str(name): sha(
+                np.ascontiguousarray(variable.values).tobytes(), str(variable.dtype), variable.dims
+            )
+            for name, variable in dataset.variables.items()
+            if variable.attrs.get("volatile") != "yes"
+        }
+
+
+def of_table(path: Path) -> dict[str, str]:
+    """Digests of a table's columns, without those that depend on the machine and the hour."""
+    with path.open(newline="", encoding="utf-8") as file:
+        head, *rows = csv.reader(line for line in file if not line.startswith("#"))
+    columns = zip(head, zip(*rows, strict=True), strict=True) if rows else ()
+    return {name: sha(repr(cells).encode()) for name, cells in columns if not VOLATILE.search(name)}
+
+
+def sha(content: bytes, *also: object) -> str:
+    """Digest of bytes and of what else tells values apart."""
+    return hashlib.sha256(content + repr(also).encode()).hexdigest()[:16]
+
+
+def at_revision(revision: str, wanted: list[str]) -> dict[str, str]:
+    """Digests at a revision; "" is the working tree."""
+    with tempfile.TemporaryDirectory() as temporary, contextlib.ExitStack() as stack:
+        tree = ROOT
+        if revision:
+            tree = Path(temporary) / "tree"
+            subprocess.run(
+                ["git", "worktree", "add", "--detach", tree, revision],
+                cwd=ROOT,
+                check=True,
+                stdout=sys.stderr,
+            )
+            stack.callback(
+                subprocess.run, ["git", "worktree", "remove", "--force", tree], cwd=ROOT, check=False
+            )
+        environment = os.environ | {"PYTHONPATH": str(tree), "NUMBA_CACHE_DIR": f"{temporary}/code"}
+        print(f"{revision or 'working tree'}:", file=sys.stderr)
+        child = [sys.executable, __file__, "--here", *wanted]
+        done = subprocess.run(
+            child, cwd=temporary, env=environment, check=True, stdout=subprocess.PIPE, text=True
+        )
+    answer = json.loads(done.stdout)
+    assert Path(answer["package"]).is_relative_to(tree), f"{answer['package']} was run, not that of {tree}"
+    return answer["digests"]
+
+
+def main(arguments: list[str]) -> int:
+    """Compare two revisions, or print the digests of the package that this process imports."""
+    if arguments[:1] == ["--here"]:
+        import cvt_hpc
+
+        print(json.dumps({"package": cvt_hpc.__file__, "digests": digests(arguments[1:])}))
+        return 0
+    revisions = [word for word in arguments if is_revision(word)][:2]
+    wanted = [word for word in arguments if word not in revisions]
+    if not revisions:
+        raise SystemExit(__doc__)
+    before, after = (at_revision(revision, wanted) for revision in [*revisions, ""][:2])
+    differing = [key for key in before | after if before.get(key) != after.get(key)]
+    for key in differing:
+        print(f"differs: {key}: {before.get(key, 'nothing')} -> {after.get(key, 'nothing')}")
+    print(f"{len(before | after) - len(differing)} the same, {len(differing)} differ")
+    return int(bool(differing) or not before)
+
+
+def is_revision(word: str) -> bool:
+    """Whether git knows a revision of this name."""
+    asked = ["git", "rev-parse", "--verify", "--quiet", f"{word}^{{commit}}"]
+    return subprocess.run(asked, cwd=ROOT, capture_output=True, check=False).returncode == 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
